@@ -1,0 +1,164 @@
+"""The namespaces ``xp`` that every kernel computes in.
+
+A kernel uses operators and exactly the names of `NAMES`; each engine here offers just these, so that a
+name that one engine lacks cannot slip into a kernel.
+
+========  ==============================================================================
+`MATH`    one point, floats, standard library only: inside an FMU
+`numpy_`  arrays of any broadcastable shape
+`casadi_` symbols, from which C code, exact derivatives and sparsity come
+`jax_`    arrays under ``jit``/``grad`` (needs the extra ``jax``)
+`dual`    first-order dual numbers on top of any of the others: exact slopes
+========  ==============================================================================
+"""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+NAMES = ("sin", "cos", "sqrt", "atan2", "asin", "acos", "abs", "minimum", "maximum")
+
+MATH = SimpleNamespace(
+    sin=math.sin,
+    cos=math.cos,
+    sqrt=math.sqrt,
+    atan2=math.atan2,
+    asin=math.asin,
+    acos=math.acos,
+    abs=abs,
+    minimum=min,
+    maximum=max,
+)
+
+
+def numpy_() -> SimpleNamespace:
+    """The engine on numpy arrays (numpy >= 2, whose names are those of the array API)."""
+    import numpy
+
+    return SimpleNamespace(**{name: getattr(numpy, name) for name in NAMES})
+
+
+def jax_() -> SimpleNamespace:
+    """The engine on jax arrays; switch on ``jax_enable_x64`` before use."""
+    import jax.numpy
+
+    return SimpleNamespace(**{name: getattr(jax.numpy, name) for name in NAMES})
+
+
+def casadi_() -> SimpleNamespace:
+    """The engine on CasADi symbols (SX)."""
+    import casadi
+
+    renamed = {"abs": "fabs", "minimum": "fmin", "maximum": "fmax"}
+    return SimpleNamespace(**{name: getattr(casadi, renamed.get(name, name)) for name in NAMES})
+
+
+class Dual:
+    """``v + d*epsilon``: a value with its derivative in one direction.
+
+    `v` and `d` are whatever the engine below computes with (floats, arrays, symbols).
+    """
+
+    __slots__ = ("d", "v")
+    # numpy must hand `array * Dual` to Dual instead of looping over its elements
+    __array_ufunc__ = None
+
+    def __init__(self, v: Any, d: Any) -> None:
+        self.v = v
+        self.d = d
+
+    def __add__(self, other: Any) -> Dual:
+        if isinstance(other, Dual):
+            return Dual(self.v + other.v, self.d + other.d)
+        return Dual(self.v + other, self.d)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> Dual:
+        if isinstance(other, Dual):
+            return Dual(self.v - other.v, self.d - other.d)
+        return Dual(self.v - other, self.d)
+
+    def __rsub__(self, other: Any) -> Dual:
+        return Dual(other - self.v, -self.d)
+
+    def __mul__(self, other: Any) -> Dual:
+        if isinstance(other, Dual):
+            return Dual(self.v * other.v, self.v * other.d + self.d * other.v)
+        return Dual(self.v * other, self.d * other)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> Dual:
+        if isinstance(other, Dual):
+            v = self.v / other.v
+            return Dual(v, (self.d - v * other.d) / other.v)
+        return Dual(self.v / other, self.d / other)
+
+    def __rtruediv__(self, other: Any) -> Dual:
+        v = other / self.v
+        return Dual(v, -v * self.d / self.v)
+
+    def __neg__(self) -> Dual:
+        return Dual(-self.v, -self.d)
+
+
+def value(x: Any) -> Any:
+    """The value of `x`, dual or not."""
+    return x.v if isinstance(x, Dual) else x
+
+
+def slope(x: Any) -> Any:
+    """The derivative that `x` carries; 0 for a number that does not depend on the seed."""
+    return x.d if isinstance(x, Dual) else 0.0
+
+
+def dual(xp: Any) -> SimpleNamespace:
+    """The engine on dual numbers over `xp`; plain numbers pass through it unharmed.
+
+    At a kink (`abs`, `minimum`, `maximum`) the derivative is that of either side, as
+    in every automatic differentiation.
+    """
+
+    def lift(f: Any, df: Any) -> Any:
+        def g(x: Any) -> Any:
+            if isinstance(x, Dual):
+                y = f(x.v)
+                return Dual(y, df(x.v, y) * x.d)
+            return f(x)
+
+        return g
+
+    def atan2(y: Any, x: Any) -> Any:
+        if not (isinstance(y, Dual) or isinstance(x, Dual)):
+            return xp.atan2(y, x)
+        yv, xv = value(y), value(x)
+        return Dual(xp.atan2(yv, xv), (xv * slope(y) - yv * slope(x)) / (xv * xv + yv * yv))
+
+    def absolute(x: Any) -> Any:
+        return maximum(x, -x)
+
+    def minimum(a: Any, b: Any) -> Any:
+        if not (isinstance(a, Dual) or isinstance(b, Dual)):
+            return xp.minimum(a, b)
+        return a + b - maximum(a, b)
+
+    def maximum(a: Any, b: Any) -> Any:
+        if not (isinstance(a, Dual) or isinstance(b, Dual)):
+            return xp.maximum(a, b)
+        takes_a = value(a) >= value(b)
+        return Dual(xp.maximum(value(a), value(b)), slope(b) + takes_a * (slope(a) - slope(b)))
+
+    return SimpleNamespace(
+        sin=lift(xp.sin, lambda v, y: xp.cos(v)),
+        cos=lift(xp.cos, lambda v, y: -xp.sin(v)),
+        sqrt=lift(xp.sqrt, lambda v, y: 0.5 / y),
+        asin=lift(xp.asin, lambda v, y: 1.0 / xp.sqrt(1.0 - v * v)),
+        acos=lift(xp.acos, lambda v, y: -1.0 / xp.sqrt(1.0 - v * v)),
+        atan2=atan2,
+        abs=absolute,
+        minimum=minimum,
+        maximum=maximum,
+    )

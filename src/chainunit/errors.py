@@ -1,0 +1,15 @@
+"""Errors that speak to an engineer: the quantity, its value, the allowed range, what to do."""
+
+from __future__ import annotations
+
+
+class InputError(ValueError):
+    """A value given by the user is outside what is allowed; the message is one line."""
+
+
+class GeometryError(InputError):
+    """The lengths do not make a machine that turns a full crank revolution."""
+
+
+class RunError(RuntimeError):
+    """A run stopped half-way; what was computed before is kept by the caller."""

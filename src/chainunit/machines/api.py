@@ -1,0 +1,207 @@
+"""`ChainUnit`: the machine for Python - arrays in, arrays out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..engines import numpy_
+from ..errors import GeometryError
+from . import chain_unit
+from .chain_unit import Chamber, ChamberForces, Inputs, Outputs, Parameters, SideLoads, Slopes, State
+
+_XP = numpy_()
+EMPTY = SideLoads(material_mass=0.0, processing_force=0.0)
+
+
+class ChainUnit:
+    """A chain unit with its parameters checked.
+
+    Angles and speeds are the motor's, as at the FMU; with ``ratio`` 1 they are the crank's.
+    Every argument may be a float or an array; shapes broadcast, and outputs have the common shape.
+
+    Parameters
+    ----------
+    parameters : Parameters, or names of `ChamberForces` parameters with their values (SI), e.g.
+        ``{"r": 0.2, "crank.m": 35.0}``; what is not named is the packaged machine's.
+    **values : the same for names without a dot.
+
+    Raises
+    ------
+    KeyError
+        for a name that is not declared.
+    InputError, GeometryError
+        for values out of bounds and lengths that cannot turn, in one line.
+
+    Examples
+    --------
+    >>> machine = ChainUnit.from_ratios(rho=0.1, lam=2 / 3, mu=0.6, zeta=0.5)
+    >>> round(float(machine.forces(phi=0.5, w=3.0).tau), 2)
+    -10.53
+    """
+
+    def __init__(
+        self, parameters: Parameters | Mapping[str, float] | None = None, /, **values: float
+    ) -> None:
+        if isinstance(parameters, Parameters):
+            given, base = values, parameters
+        else:
+            given, base = {**(parameters or {}), **values}, Parameters()
+        self.p: Parameters = ChamberForces.parameter_layout.from_names(given, base)
+        ChamberForces.check(self.p)
+
+    @classmethod
+    def from_ratios(
+        cls,
+        rho: float,
+        lam: float,
+        mu: float,
+        zeta: float,
+        parameters: Mapping[str, float] | None = None,
+        /,
+        *,
+        l: float = 1.5,
+        l1: float = 1.35,
+        **values: float,
+    ) -> ChainUnit:
+        """The machine in the papers' ratios and frame.
+
+        rho = r/l, lam = h/l, mu = e/l1, zeta = z/z_max with z_max = 2 l1 sqrt(1 - mu), l2 = l1 - e;
+        c = sqrt(l^2 - r^2) and hy = h, so that crank and rocker are parallel at phi = 0 (papers 000, 001).
+        """
+        lengths = ratios(rho, lam, mu, zeta, l, l1)
+        return cls({**lengths, **(parameters or {}), **values})
+
+    def _inputs(self, phi: Any, w: Any, a: Any, left: SideLoads, right: SideLoads) -> Inputs:
+        return Inputs(phi=_array(phi), w=_array(w), a=_array(a), left=left, right=right)
+
+    def _state(self, u: Inputs) -> State:
+        return ChamberForces.shared(_XP, self.p, u, None)
+
+    def forces(
+        self, phi: Any, w: Any = 0.0, a: Any = 0.0, left: SideLoads = EMPTY, right: SideLoads = EMPTY
+    ) -> Outputs:
+        """Torque, load port (without slopes), energies and every reaction at motor angle `phi` [rad],
+        speed `w` [rad/s] and acceleration `a` [rad/s2] (see `Outputs` for names and units)."""
+        u = self._inputs(phi, w, a, left, right)
+        return ChamberForces.parts[0].equations(_XP, self.p, u, None, self._state(u))
+
+    def slopes(self, phi: Any, w: Any = 0.0, left: SideLoads = EMPTY, right: SideLoads = EMPTY) -> Slopes:
+        """Exact derivatives of `tau_bias` by motor angle and speed."""
+        u = self._inputs(phi, w, 0.0, left, right)
+        return ChamberForces.parts[1].equations(_XP, self.p, u, None, self._state(u))
+
+    def evaluate(self, inputs: Mapping[str, Any]) -> dict[str, Any]:
+        """All outputs of the FMU by name, from inputs by name; an input not named is 0.
+
+        Raises
+        ------
+        KeyError
+            for a name that is not an input.
+        """
+        names = ChamberForces.input_layout.names
+        u = ChamberForces.input_layout.from_names({**dict.fromkeys(names, 0.0), **inputs})
+        u = ChamberForces.input_layout.instance([_array(v) for v in ChamberForces.input_layout.values(u)])
+        outputs = ChamberForces.evaluate(_XP, self.p, u)
+        return {
+            name: value
+            for part, instance in zip(ChamberForces.parts, outputs, strict=True)
+            for name, value in zip(part.layout.names, part.layout.values(instance), strict=True)
+        }
+
+    def torque_by_reactions(
+        self, phi: Any, w: Any = 0.0, a: Any = 0.0, left: SideLoads = EMPTY, right: SideLoads = EMPTY
+    ) -> Any:
+        """The motor torque without friction [N m], from the reactions, group by group: the second route."""
+        u = self._inputs(phi, w, a, left, right)
+        s = self._state(u)
+        forces = chain_unit.Reactions(s.m, self.p, s.w * s.w, u.a / self.p.ratio, *s.bias.processing_forces)
+        return forces.torque / self.p.ratio
+
+    def friction_torque(self, phi: Any, w: Any, left: SideLoads = EMPTY, right: SideLoads = EMPTY) -> Any:
+        """The part of `tau` that pin friction and joint damping take [N m]."""
+        return self._state(self._inputs(phi, w, 0.0, left, right)).bias.friction / self.p.ratio
+
+    def chamber(
+        self, psi: Any, w: Any = 0.0, a: Any = 0.0, left: SideLoads = EMPTY, right: SideLoads = EMPTY
+    ) -> Chamber:
+        """Loads of the organs at a rocker angle `psi` [rad] (speed `w`, acceleration `a` of the
+        rocker), whatever drives it: the papers' statics at +-12 degrees, beyond this drive's swing."""
+        return chain_unit.chamber(
+            _XP, self.p, Inputs(left=left, right=right), _array(psi), _array(w), _array(a)
+        )
+
+    def rocker_extremes(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """(psi, phi_crank) [rad] at the right and at the left extreme of the rocker."""
+        p = self.p
+        extremes = []
+        for psi, sense in zip(chain_unit.rocker_extremes(p), (1.0, -1.0), strict=True):
+            x, y = p.h * math.sin(psi) + p.c, -p.h * math.cos(psi) + p.hy
+            extremes.append((psi, math.atan2(sense * x, sense * y) % (2.0 * math.pi)))
+        return extremes[0], extremes[1]
+
+    def least_web_pull(
+        self, w: float, left: SideLoads = EMPTY, right: SideLoads = EMPTY, points: int = 720
+    ) -> float:
+        """The least pull in both webs [N] over a crank turn at constant motor speed `w`."""
+        from scipy.optimize import minimize_scalar
+
+        turn = 2.0 * math.pi * self.p.ratio
+
+        def pull(phi: Any) -> Any:
+            out = self.forces(phi, w, 0.0, left, right)
+            return np.minimum(out.left.web_pull, out.right.web_pull)
+
+        grid = np.linspace(0.0, turn, points, endpoint=False)
+        lowest = grid[int(np.argmin(pull(grid)))]
+        step = turn / points
+        refined = minimize_scalar(
+            lambda phi: float(pull(phi)), bounds=(lowest - step, lowest + step), method="bounded"
+        )
+        return min(float(refined.fun), float(pull(lowest)))
+
+    def slack_speed(
+        self, left: SideLoads = EMPTY, right: SideLoads = EMPTY, highest: float = 1000.0
+    ) -> float:
+        """Crank speed [rad/s] at which a web loses its pull somewhere in the turn; 0 if it has none at
+        rest, infinity if it keeps it up to `highest`. Above it two rigid bars are no model of a chain."""
+        from scipy.optimize import brentq
+
+        def pull(w_crank: float) -> float:
+            return self.least_web_pull(w_crank * self.p.ratio, left, right)
+
+        if pull(0.0) <= 0.0:
+            return 0.0
+        high = 1.0
+        while pull(high) > 0.0:
+            high *= 2.0
+            if high > highest:
+                return math.inf
+        return float(brentq(pull, 0.5 * high if high > 1.0 else 0.0, high, xtol=1e-6))
+
+
+def ratios(rho: float, lam: float, mu: float, zeta: float, l: float, l1: float) -> dict[str, float]:
+    """Lengths [m] from the papers' ratios, by parameter name; see `ChainUnit.from_ratios`."""
+    r, h, e = rho * l, lam * l, mu * l1
+    if not abs(rho) < 1.0 or not mu < 1.0:
+        raise GeometryError(
+            f"rho = {rho:g}, mu = {mu:g}: the papers' frame needs rho = r/l < 1 and mu = e/l1 < 1"
+        )
+    return {
+        "r": r,
+        "l": l,
+        "h": h,
+        "c": math.sqrt(l * l - r * r),
+        "hy": h,
+        "e": e,
+        "l1": l1,
+        "l2": l1 - e,
+        "z": zeta * 2.0 * l1 * math.sqrt(1.0 - mu),
+    }
+
+
+def _array(x: Any) -> Any:
+    return x if isinstance(x, float) else np.asarray(x, float)

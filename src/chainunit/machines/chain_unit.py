@@ -1,0 +1,594 @@
+"""The chain unit: crank + dyad (coupler, rocker) + dyad (left organ) + dyad (right organ).
+
+Symbols are those of papers 000 and 001: ``r, l, h`` crank, coupler and rocker arm; ``c, hy`` crank
+bearing O1 = (-c, -hy) from the rocker pivot C, which is the origin; ``e`` rocker arm to the web hinge
+A2; ``l1`` wall A1-B, ``l2`` web B-A2; ``z`` half width, A1 = (-z, 0) and A1' = (+z, 0). ``phi`` is the
+crank angle from the upward vertical, clockwise; ``psi`` the rocker angle from the downward vertical,
+positive towards +x. x right, y up. A force is the one on the machine part from its support
+or neighbour. Paper 000's eqs. (24)-(34), (41)-(45), with the corrections of docs/physics.md, follow from
+the dyad of `chainunit.groups.dyad`.
+
+Below, q is the crank angle, `w` and `a` its derivatives; only at the port are `phi w a tau J` the
+motor's, with the gear `ratio` between.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from ..engines import Dual, dual, slope
+from ..errors import GeometryError, InputError
+from ..groups.body import Body, point_load, total
+from ..groups.driver import crank, driving_torque
+from ..groups.dyad import Dyad
+from ..model import Model, Part
+from ..planar import ZERO, Link, Motion, Vec2
+from ..quantities import Value, declaration, group, quantity, violations
+
+# A pin that carries nothing has no direction: without a floor the slope of |R| is 0/0 there.
+_NO_FORCE = 1e-60  # N2
+
+
+@declaration
+class Rod:
+    """A link of the drive as a body."""
+
+    m: Value = quantity("kg", "mass", default=0.0, min=0.0, tunable=True)
+    s: Value = quantity(
+        "m", "distance of the centroid from the first pin, along the link", default=0.0, tunable=True
+    )
+    I: Value = quantity("kg.m2", "moment of inertia about the centroid", default=0.0, min=0.0, tunable=True)
+
+
+@declaration
+class SideMasses:
+    """Masses of one working organ, over all webs that share the rocker."""
+
+    wall_mass: Value = quantity("kg", "mass of the wall (rod l1)", default=54.0, min=0.0, tunable=True)
+    web_mass: Value = quantity("kg", "mass of the web (rod l2)", default=21.6, min=0.0, tunable=True)
+
+
+@declaration
+class Pin:
+    """The pins, all alike."""
+
+    friction: Value = quantity("1", "coefficient of friction", default=0.12, min=0.0, tunable=True)
+    diameter: Value = quantity("m", "diameter", default=0.06, min=0.0, tunable=True)
+    w_smooth: Value = quantity(
+        "rad/s", "relative speed below which friction is smoothed", default=0.02, above=0.0, tunable=True
+    )
+
+
+@declaration
+class Processing:
+    """The law of the processing force."""
+
+    v_smooth: Value = quantity(
+        "m/s", "speed of B below which the force is smoothed", default=0.02, above=0.0, tunable=True
+    )
+
+
+@declaration
+class Parameters:
+    """Parameters of the chain unit. The start values are the packaged machine: plausible, but ours; the
+    papers print no masses and no absolute lengths."""
+
+    r: Value = quantity("m", "crank O1-A", default=0.15, above=0.0)
+    l: Value = quantity("m", "coupler A-Bd", default=1.5, above=0.0)
+    h: Value = quantity("m", "rocker arm C-Bd", default=1.0, above=0.0)
+    c: Value = quantity(
+        "m", "crank bearing O1 lies this far left of the pivot C", default=math.sqrt(1.5**2 - 0.15**2)
+    )
+    hy: Value = quantity("m", "crank bearing O1 lies this far below the pivot C", default=1.0)
+    e: Value = quantity("m", "rocker arm C-A2 to the web hinge", default=0.81, above=0.0)
+    l1: Value = quantity("m", "wall A1-B", default=1.35, above=0.0)
+    l2: Value = quantity("m", "web B-A2", default=0.54, above=0.0)
+    z: Value = quantity(
+        "m", "half width: the wall hinges A1 lie this far left and right of C", default=0.853815, above=0.0
+    )
+    g: Value = quantity("m/s2", "gravity", default=9.81, min=0.0, tunable=True)
+    ratio: Value = quantity("1", "gear ratio, motor turns per crank turn", default=1.0, above=0.0)
+    crank: Rod = group(Rod, "crank", default=Rod(m=40.0, s=0.05, I=0.6))
+    coupler: Rod = group(Rod, "coupler", default=Rod(m=25.0, s=0.7, I=5.0))
+    rocker: Rod = group(Rod, "rocker", default=Rod(m=60.0, s=0.5, I=8.0))
+    left: SideMasses = group(SideMasses, "left organ", default=SideMasses())
+    right: SideMasses = group(SideMasses, "right organ", default=SideMasses())
+    web_share: Value = quantity(
+        "1",
+        "part of the material that lies on the web, the rest on the wall",
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        tunable=True,
+    )
+    rod_inertia: Value = quantity(
+        "1",
+        "factor on m l^2/12 of rods and material: 1 uniform rods, 0 point masses at the middle",
+        default=1.0,
+        min=0.0,
+    )
+    pin: Pin = group(Pin, "pins", default=Pin())
+    joint_damping: Value = quantity(
+        "N.m.s/rad", "viscous damping of each of the ten pins", default=0.0, min=0.0, tunable=True
+    )
+    processing: Processing = group(Processing, "processing force", default=Processing())
+
+
+@declaration
+class SideLoads:
+    """What the material does to one organ."""
+
+    material_mass: Value = quantity("kg", "material that lies on the organ", default=30.0, min=0.0)
+    processing_force: Value = quantity(
+        "N", "force on the web at B, against the motion of B", default=0.0, min=0.0, nominal=100.0
+    )
+
+
+@declaration
+class Inputs:
+    """Motion of the motor shaft and loads of the organs."""
+
+    phi: Value = quantity(
+        "rad", "motor angle; crank angle is phi/ratio, from the upward vertical, clockwise", default=0.0
+    )
+    w: Value = quantity("rad/s", "motor speed", default=3.0)
+    a: Value = quantity("rad/s2", "motor acceleration", default=0.0)
+    left: SideLoads = group(SideLoads, "left organ", default=SideLoads())
+    right: SideLoads = group(SideLoads, "right organ", default=SideLoads())
+
+
+@declaration
+class Force:
+    """A force in the frame x right, y up."""
+
+    fx: Value = quantity("N", "force along x", nominal=1000.0)
+    fy: Value = quantity("N", "force along y", nominal=1000.0)
+
+
+@declaration
+class Side:
+    """Loads of one organ."""
+
+    tangential_load: Value = quantity(
+        "N", "R_t, load across the rocker arm at A2; both sides mirrored alike", nominal=100.0
+    )
+    normal_load: Value = quantity("N", "R_n, load along the rocker arm at A2", nominal=100.0)
+    support: Force = group(Force, "on the wall at A1, from the support")
+    hinge: Force = group(Force, "on the wall at B, from the web")
+    rocker_joint: Force = group(Force, "on the web at A2, from the rocker")
+    web_pull: Value = quantity(
+        "N", "least axial pull in the web; below zero the chain would have to push", nominal=100.0
+    )
+    wall_pull: Value = quantity(
+        "N", "least axial pull in the wall; below zero the wall would have to push", nominal=100.0
+    )
+
+
+@declaration
+class RockerLoad:
+    """What both organs ask of the rocker."""
+
+    tau: Value = quantity(
+        "N.m", "torque along psi that the drive must apply to the rocker to carry both organs", nominal=100.0
+    )
+    tangential_load: Value = quantity("N", "R_t left minus R_t right", nominal=100.0)
+    normal_load: Value = quantity("N", "R_n left plus R_n right", nominal=100.0)
+
+
+@declaration
+class Rocker(RockerLoad):
+    """Motion and load of the rocker."""
+
+    psi: Value = quantity("rad", "angle from the downward vertical, positive towards +x")
+    w: Value = quantity("rad/s", "angular speed")
+    a: Value = quantity("rad/s2", "angular acceleration")
+
+
+@declaration
+class Chamber:
+    """Loads of both organs and of the rocker that carries them."""
+
+    rocker: RockerLoad = group(RockerLoad, "rocker")
+    left: Side = group(Side, "left organ")
+    right: Side = group(Side, "right organ")
+
+
+@declaration
+class Frame(Force):
+    """A force in the frame and its moment about C."""
+
+    moment: Value = quantity(
+        "N.m",
+        "moment about C, counter-clockwise, with the reaction of the crank torque without friction",
+        nominal=1000.0,
+    )
+
+
+@declaration
+class Outputs:
+    """Torque, load port, motion and every reaction."""
+
+    tau: Value = quantity("N.m", "torque needed at the motor shaft, J a + tau_bias", nominal=100.0)
+    tau_bias: Value = quantity("N.m", "torque needed at constant motor speed", nominal=100.0)
+    J: Value = quantity("kg.m2", "inertia reflected to the motor shaft")
+    dJ_dphi: Value = quantity("kg.m2/rad", "derivative of J by the motor angle")
+    phi0: Value = quantity("rad", "motor angle at which the load port was evaluated")
+    w0: Value = quantity("rad/s", "motor speed at which the load port was evaluated")
+    rocker: Rocker = group(Rocker, "rocker")
+    left: Side = group(Side, "left organ")
+    right: Side = group(Side, "right organ")
+    pivot: Force = group(Force, "on the rocker at C, from the frame")
+    crank_bearing: Force = group(Force, "on the crank at O1, from the frame")
+    crank_pin: Force = group(Force, "on the coupler at A, from the crank")
+    coupler_pin: Force = group(Force, "on the coupler at Bd, from the rocker")
+    pressure_angle: Value = quantity("rad", "pressure angle at Bd, signed")
+    frame: Frame = group(Frame, "from the machine on its frame")
+    power: Value = quantity("W", "power that the motor shaft takes, tau w", nominal=100.0)
+    kinetic_energy: Value = quantity("J", "kinetic energy")
+    potential_energy: Value = quantity("J", "potential energy, zero at the level of C", nominal=1000.0)
+    dissipated_power: Value = quantity("W", "power that friction, damping and processing take", nominal=100.0)
+    margin: Value = quantity("1", "least |sin| of the three transmission angles; 0 is a dead position")
+
+
+@declaration
+class Slopes:
+    """Exact derivatives of the load port."""
+
+    tau_bias_dphi: Value = quantity("N.m/rad", "derivative of tau_bias by the motor angle", nominal=100.0)
+    tau_bias_dw: Value = quantity("N.m.s/rad", "derivative of tau_bias by the motor speed")
+
+
+class Organ:
+    """A working organ: the dyad wall (A1-B) and web (A2-B) with the material on it."""
+
+    __slots__ = ("dyad", "wall", "web")
+
+    def __init__(self, xp: Any, p: Any, a1: Vec2, a2: Motion, masses: Any, loads: Any, side: float) -> None:
+        self.dyad = Dyad(xp, Motion(a1), a2, p.l1, p.l2, side)
+        on_web = p.web_share * loads.material_mass
+        self.wall = self._rod(self.dyad.first, masses.wall_mass + (loads.material_mass - on_web), p.l1, p)
+        self.web = self._rod(self.dyad.second, masses.web_mass + on_web, p.l2, p)
+
+    @staticmethod
+    def _rod(link: Link, mass: Any, length: Any, p: Any) -> Body:
+        return Body(link, mass, 0.5 * length, p.rod_inertia * mass * (length * length) * (1.0 / 12.0))
+
+    def resistance(self, xp: Any, p: Any, loads: Any, w: Any) -> tuple[Vec2, Any]:
+        """The processing force on the web at B, and the torque that overcomes it (its power over w)."""
+        v1 = self.dyad.b.p1
+        v = (
+            loads.processing_force
+            * w
+            / xp.sqrt(v1.squared() * (w * w) + p.processing.v_smooth * p.processing.v_smooth)
+        )
+        return v1 * (-v), v1.squared() * v
+
+    def reactions(self, w2: Any, a: Any, g: Any, processing: Vec2) -> tuple[Vec2, Vec2, Vec2]:
+        """Forces at A1 and B on the wall and at A2 on the web."""
+        wall = self.wall.applied(w2, a, g)
+        web = total(self.web.applied(w2, a, g), point_load(self.dyad.b, self.dyad.second.pin, processing))
+        return self.dyad.reactions(wall, web)
+
+    def loads(
+        self, xp: Any, psi_hand: float, rocker: Link, forces: tuple[Vec2, Vec2, Vec2], processing: Vec2
+    ) -> dict[str, Any]:
+        """The fields of `Side`; `psi_hand` is +1 on the left and -1 on the right."""
+        at_a1, at_b, at_a2 = forces
+        wall_axis, web_axis = self.dyad.first.u, self.dyad.second.u
+        return {
+            # X cos s + Y sin s with s = +-psi: the force across the arm, along the arm
+            "tangential_load": rocker.u.turned().dot(at_a2) * psi_hand,
+            "normal_load": -rocker.u.dot(at_a2),
+            "support": _force(at_a1),
+            "hinge": _force(at_b),
+            "rocker_joint": _force(at_a2),
+            "web_pull": xp.minimum(-web_axis.dot(at_a2), -web_axis.dot(at_b - processing)),
+            "wall_pull": xp.minimum(-wall_axis.dot(at_a1), wall_axis.dot(at_b)),
+        }
+
+
+class Mechanism:
+    """The moving machine at crank angle q: links, bodies and dyads."""
+
+    __slots__ = (
+        "a",
+        "bodies",
+        "coupler_body",
+        "crank",
+        "crank_body",
+        "drive",
+        "left",
+        "right",
+        "rocker",
+        "rocker_body",
+    )
+
+    def __init__(self, xp: Any, p: Any, u: Any, q: Any) -> None:
+        self.crank = crank(xp, Vec2(-p.c, -p.hy), q)
+        self.a = self.crank.at(p.r)
+        self.drive = Dyad(xp, self.a, Motion(ZERO), p.l, p.h, -1.0)
+        self.rocker = self.drive.second
+        self.left, self.right = organs(xp, p, u, self.rocker)
+        self.crank_body = Body(self.crank, p.crank.m, p.crank.s, p.crank.I)
+        self.coupler_body = Body(self.drive.first, p.coupler.m, p.coupler.s, p.coupler.I)
+        self.rocker_body = Body(self.rocker, p.rocker.m, p.rocker.s, p.rocker.I)
+        self.bodies = (
+            self.crank_body,
+            self.coupler_body,
+            self.rocker_body,
+            self.left.wall,
+            self.left.web,
+            self.right.wall,
+            self.right.web,
+        )
+
+    def inertia(self) -> tuple[Any, Any]:
+        """Reflected inertia at the crank J [kg m2] and dJ/dq."""
+        parts = [body.inertia() for body in self.bodies]
+        return sum(j for j, _ in parts), sum(j1 for _, j1 in parts)
+
+    def potential(self, g: Any) -> Any:
+        """Potential energy [J], zero at the level of C."""
+        return sum(body.potential(g) for body in self.bodies)
+
+
+def organs(xp: Any, p: Any, u: Any, rocker: Link) -> tuple[Organ, Organ]:
+    """Both working organs on a rocker that moves in a known way."""
+    a2 = rocker.at(p.e)
+    return (
+        Organ(xp, p, Vec2(-p.z, 0.0), a2, p.left, u.left, -1.0),
+        Organ(xp, p, Vec2(p.z, 0.0), a2, p.right, u.right, 1.0),
+    )
+
+
+class Reactions:
+    """The force pass, last group first, at crank speed w (squared: `w2`) and acceleration `a`.
+
+    Friction is left out of it: it is small, and with it the torque would no longer be linear in `a`.
+    """
+
+    __slots__ = ("at_a", "at_bd", "at_c", "at_o1", "left", "right", "torque")
+
+    def __init__(self, m: Mechanism, p: Any, w2: Any, a: Any, left: Vec2, right: Vec2) -> None:
+        g = p.g
+        self.left = m.left.reactions(w2, a, g, left)
+        self.right = m.right.reactions(w2, a, g, right)
+        a2, pivot = m.left.dyad.second.pin, m.rocker.pin
+        rocker = total(
+            m.rocker_body.applied(w2, a, g), point_load(a2, pivot, -(self.left[2] + self.right[2]))
+        )
+        self.at_a, self.at_bd, self.at_c = m.drive.reactions(m.coupler_body.applied(w2, a, g), rocker)
+        self.torque, self.at_o1 = driving_torque(m.crank, m.a, m.crank_body.applied(w2, a, g), -self.at_a)
+
+    def pins(self, m: Mechanism) -> tuple[tuple[Vec2, Any], ...]:
+        """Reaction and relative rotation per crank rotation of the ten pins O1, A, Bd, C, A1, B, A2 (both sides)."""
+        k0, k1, k2 = m.crank.t1, m.drive.first.t1, m.rocker.t1
+        pins = [(self.at_o1, k0), (self.at_a, k1 - k0), (self.at_bd, k1 - k2), (self.at_c, k2)]
+        for organ, (at_a1, at_b, at_a2) in ((m.left, self.left), (m.right, self.right)):
+            wall, web = organ.dyad.first.t1, organ.dyad.second.t1
+            pins += [(at_a1, wall), (at_b, web - wall), (at_a2, web - k2)]
+        return tuple(pins)
+
+
+class Bias:
+    """The torque at constant crank speed, by virtual work, and its parts [N m at the crank].
+
+    Each loss is its power over w, written so that w = 0 is regular.
+    """
+
+    __slots__ = ("conservative", "friction", "processing", "processing_forces", "reactions", "total")
+
+    def __init__(self, xp: Any, p: Any, u: Any, m: Mechanism, dJ: Any, w: Any) -> None:
+        w2 = w * w
+        force_l, torque_l = m.left.resistance(xp, p, u.left, w)
+        force_r, torque_r = m.right.resistance(xp, p, u.right, w)
+        self.processing_forces = (force_l, force_r)
+        self.processing = torque_l + torque_r
+        self.reactions = Reactions(m, p, w2, 0.0, force_l, force_r)
+
+        per_newton = 0.5 * p.pin.friction * p.pin.diameter
+        smooth2 = p.pin.w_smooth * p.pin.w_smooth
+        friction = 0.0
+        for force, k in self.reactions.pins(m):
+            k2 = k * k
+            size = xp.sqrt(force.squared() + _NO_FORCE)
+            friction = friction + k2 * (per_newton * size / xp.sqrt(k2 * w2 + smooth2) + p.joint_damping)
+        self.friction = friction * w
+        self.conservative = 0.5 * dJ * w2 + sum(body.weight_slope(p.g) for body in m.bodies)
+        self.total = self.conservative + self.processing + self.friction
+
+
+class State:
+    """The machine at one point: mechanism, inertia, and torque at constant speed."""
+
+    __slots__ = ("J", "bias", "dJ", "m", "w")
+
+    def __init__(self, xp: Any, p: Any, u: Any, q: Any, w: Any) -> None:
+        self.w = w
+        self.m = Mechanism(xp, p, u, q)
+        self.J, self.dJ = self.m.inertia()
+        self.bias = Bias(xp, p, u, self.m, self.dJ, w)
+
+
+def _force(f: Vec2) -> Force:
+    return Force(fx=f.x, fy=f.y)
+
+
+def _chamber(
+    xp: Any, p: Any, left: Organ, right: Organ, rocker: Link, forces: Any, processing: Any
+) -> tuple[dict[str, Any], Side, Side]:
+    """The fields of `RockerLoad`, and both sides."""
+    sides = [
+        Side(**organ.loads(xp, hand, rocker, f, pf))
+        for organ, hand, f, pf in zip((left, right), (1.0, -1.0), forces, processing, strict=True)
+    ]
+    tangential = sides[0].tangential_load - sides[1].tangential_load
+    load = {
+        "tau": p.e * tangential,
+        "tangential_load": tangential,
+        "normal_load": sides[0].normal_load + sides[1].normal_load,
+    }
+    return load, sides[0], sides[1]
+
+
+def chamber(xp: Any, p: Any, u: Any, psi: Any, psi_w: Any, psi_a: Any) -> Chamber:
+    """Both organs on a rocker at angle `psi` with speed `psi_w` and acceleration `psi_a`, whatever drives it."""
+    rocker = Link(Motion(ZERO), Vec2(xp.sin(psi), -xp.cos(psi)), 1.0, 0.0)
+    left, right = organs(xp, p, u, rocker)
+    w2 = psi_w * psi_w
+    processing = (left.resistance(xp, p, u.left, psi_w)[0], right.resistance(xp, p, u.right, psi_w)[0])
+    forces = (
+        left.reactions(w2, psi_a, p.g, processing[0]),
+        right.reactions(w2, psi_a, p.g, processing[1]),
+    )
+    load, on_left, on_right = _chamber(xp, p, left, right, rocker, forces, processing)
+    return Chamber(rocker=RockerLoad(**load), left=on_left, right=on_right)
+
+
+def _outputs(xp: Any, p: Any, u: Any, x: Any, s: State) -> Outputs:
+    m, w = s.m, s.w
+    a = u.a / p.ratio
+    w2 = w * w
+    f = Reactions(m, p, w2, a, *s.bias.processing_forces)
+    torque = s.J * a + s.bias.total
+    rocker, drive = m.rocker, m.drive
+    load, on_left, on_right = _chamber(
+        xp, p, m.left, m.right, rocker, (f.left, f.right), s.bias.processing_forces
+    )
+    arm = drive.r1 - drive.r2
+    at_frame = f.at_o1 + f.at_c + f.left[0] + f.right[0]
+    moment = (
+        m.crank.pin.p.cross(f.at_o1)
+        + m.left.dyad.first.pin.p.cross(f.left[0])
+        + m.right.dyad.first.pin.p.cross(f.right[0])
+    )
+    return Outputs(
+        tau=torque / p.ratio,
+        tau_bias=s.bias.total / p.ratio,
+        J=s.J / (p.ratio * p.ratio),
+        dJ_dphi=s.dJ / (p.ratio * p.ratio * p.ratio),
+        phi0=u.phi,
+        w0=u.w,
+        rocker=Rocker(
+            psi=xp.atan2(rocker.u.x, -rocker.u.y),
+            w=rocker.t1 * w,
+            a=rocker.t1 * a + rocker.t2 * w2,
+            **load,
+        ),
+        left=on_left,
+        right=on_right,
+        pivot=_force(f.at_c),
+        crank_bearing=_force(f.at_o1),
+        crank_pin=_force(f.at_a),
+        coupler_pin=_force(f.at_bd),
+        pressure_angle=xp.asin((p.h * p.h + p.l * p.l - arm.squared()) / (2.0 * p.h * p.l)),
+        frame=Frame(fx=-at_frame.x, fy=-at_frame.y, moment=torque - s.bias.friction - moment),
+        power=torque * w,
+        kinetic_energy=0.5 * s.J * w2,
+        potential_energy=m.potential(p.g),
+        dissipated_power=(s.bias.friction + s.bias.processing) * w,
+        margin=xp.minimum(
+            xp.abs(drive.transmission),
+            xp.minimum(xp.abs(m.left.dyad.transmission), xp.abs(m.right.dyad.transmission)),
+        ),
+    )
+
+
+def _slopes(xp: Any, p: Any, u: Any, x: Any, s: State) -> Slopes:
+    # by the speed, only the force pass varies: the mechanism of the point is used again
+    by_w = Bias(dual(xp), p, u, s.m, s.dJ, Dual(s.w, 1.0)).total
+    by_q = State(dual(xp), p, u, Dual(u.phi / p.ratio, 1.0), s.w).bias.total
+    per_motor_turn = 1.0 / (p.ratio * p.ratio)
+    return Slopes(tau_bias_dphi=slope(by_q) * per_motor_turn, tau_bias_dw=slope(by_w) * per_motor_turn)
+
+
+def rocker_extremes(p: Any) -> tuple[float, float]:
+    """Largest and smallest rocker angle psi [rad], where crank and coupler lie on one line.
+
+    Eqs. (14), (15) of paper 001, for any frame. Floats only.
+    """
+    b2 = p.c * p.c + p.hy * p.hy
+    to_bearing = math.atan2(p.c, p.hy)
+
+    def psi(reach: float) -> float:
+        return math.acos((p.h * p.h + b2 - reach * reach) / (2.0 * p.h * math.sqrt(b2))) - to_bearing
+
+    return psi(p.l + p.r), psi(p.l - p.r)
+
+
+def check(p: Parameters) -> None:
+    """Refuse values outside their bounds and machines that cannot turn a full revolution.
+
+    Existence of the crank: (3), (4) of paper 001 and the third condition that it misses for
+    lam > 1. Organs: both dyads must close at both extremes of the rocker.
+
+    Raises
+    ------
+    InputError
+        for a value outside its bounds.
+    GeometryError
+        for lengths that cannot be assembled all round, with the allowed range.
+    """
+    for line in violations(ChamberForces.parameter_layout, p):
+        raise InputError(line)
+    b = math.hypot(p.c, p.hy)
+    if not p.c > p.r:
+        raise GeometryError(
+            f"c = {p.c:g} m: the crank circle must stay left of the pivot C, so c must be > r = {p.r:g} m"
+        )
+    longest = min(p.l + p.h - b, b - abs(p.l - p.h))
+    if not p.r < longest:
+        reason = f"r = {p.r:g} m: the crank cannot turn with l = {p.l:g}, h = {p.h:g}, |O1 C| = {b:g} m; "
+        if longest > 0:
+            raise GeometryError(reason + f"r must be < {longest:g} m")
+        raise GeometryError(
+            reason + f"no crank can: l + h must be > |O1 C| and |O1 C| > |l - h| = {abs(p.l - p.h):g} m"
+        )
+    psi = rocker_extremes(p)
+    if not max(map(abs, psi)) < math.pi / 2:
+        raise GeometryError(
+            f"h = {p.h:g} m: the rocker swings from {math.degrees(psi[1]):.1f} to {math.degrees(psi[0]):.1f} deg; "
+            "it must stay within -90 and 90 deg (shorten r, lengthen h or change c, hy)"
+        )
+    reach = p.e * math.sin(max(map(abs, psi)))
+    drop2 = p.e * p.e - reach * reach
+    high = math.sqrt(max((p.l1 + p.l2) ** 2 - drop2, 0.0)) - reach
+    low = math.sqrt(max((p.l1 - p.l2) ** 2 - drop2, 0.0)) + reach
+    if not low < p.z < high:
+        reason = (
+            f"z = {p.z:g} m: the organs cannot follow the rocker's swing of {math.degrees(psi[1]):.1f} to "
+            f"{math.degrees(psi[0]):.1f} deg; "
+        )
+        if low < high:
+            raise GeometryError(
+                reason
+                + f"with l1 = {p.l1:g}, l2 = {p.l2:g}, e = {p.e:g} m it must be > {low:g} and < {high:g} m"
+            )
+        raise GeometryError(
+            reason
+            + f"no z fits l1 = {p.l1:g}, l2 = {p.l2:g}, e = {p.e:g} m: l1 + l2 must be > {math.sqrt(drop2):g} m "
+            "by enough, or the swing smaller"
+        )
+
+
+class ChamberForces(Model):
+    """The inverse model: motion of the motor shaft in, torque and every reaction out."""
+
+    name = "ChamberForces"
+    description = (
+        "Forces in a chain unit: crank, coupler, rocker and two working organs; "
+        "from motor angle and speed to torque, load port and every support reaction"
+    )
+    Parameters = Parameters
+    Inputs = Inputs
+    files = ("machines/__init__.py", "machines/chain_unit.py", "groups")
+
+    check = staticmethod(check)
+
+    @staticmethod
+    def shared(xp: Any, p: Any, u: Any, x: Any) -> State:
+        """The machine at the crank angle and speed that belong to the motor's."""
+        return State(xp, p, u, u.phi / p.ratio, u.w / p.ratio)
+
+    parts = (Part(Outputs, _outputs), Part(Slopes, _slopes))

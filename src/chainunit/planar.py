@@ -1,0 +1,91 @@
+"""Planar vectors and the motion of points and links.
+
+Frame of the whole package: x to the right, y up, angles counter-clockwise.
+
+A mechanism with one degree of freedom moves along one coordinate q (a crank angle, a rocker
+angle). A `Motion` holds a point and its first and second derivative *by q*, so that
+
+    velocity = p1 * w,     acceleration = p1 * a + p2 * w**2,     w = dq/dt, a = dw/dt.
+
+Kinetics are then linear in `a` and quadratic in `w` by construction.
+Components are whatever the engine computes with: floats, arrays, symbols, dual numbers.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+class Vec2:
+    """A vector in the plane; a scalar factor stands on the right: ``v * 2.0``."""
+
+    __slots__ = ("x", "y")
+
+    def __init__(self, x: Any, y: Any) -> None:
+        self.x = x
+        self.y = y
+
+    def __add__(self, other: Vec2) -> Vec2:
+        return Vec2(self.x + other.x, self.y + other.y)
+
+    def __sub__(self, other: Vec2) -> Vec2:
+        return Vec2(self.x - other.x, self.y - other.y)
+
+    def __neg__(self) -> Vec2:
+        return Vec2(-self.x, -self.y)
+
+    def __mul__(self, factor: Any) -> Vec2:
+        return Vec2(self.x * factor, self.y * factor)
+
+    def dot(self, other: Vec2) -> Any:
+        """Scalar product."""
+        return self.x * other.x + self.y * other.y
+
+    def cross(self, other: Vec2) -> Any:
+        """z component of the vector product: the moment of force `other` on arm `self`."""
+        return self.x * other.y - self.y * other.x
+
+    def turned(self) -> Vec2:
+        """The vector turned by +90 degrees."""
+        return Vec2(-self.y, self.x)
+
+    def squared(self) -> Any:
+        """Squared length."""
+        return self.x * self.x + self.y * self.y
+
+
+ZERO = Vec2(0.0, 0.0)
+
+
+class Motion:
+    """A point `p` with its derivatives `p1`, `p2` by the coordinate q [m, m/rad, m/rad^2]."""
+
+    __slots__ = ("p", "p1", "p2")
+
+    def __init__(self, p: Vec2, p1: Vec2 = ZERO, p2: Vec2 = ZERO) -> None:
+        self.p = p
+        self.p1 = p1
+        self.p2 = p2
+
+
+class Link:
+    """A rigid link: the pin it starts from, the unit vector `u` along it, and the first and
+    second derivative of its angle by q (`t1`, `t2`, counter-clockwise)."""
+
+    __slots__ = ("pin", "t1", "t2", "u")
+
+    def __init__(self, pin: Motion, u: Vec2, t1: Any, t2: Any) -> None:
+        self.pin = pin
+        self.u = u
+        self.t1 = t1
+        self.t2 = t2
+
+    def at(self, s: Any) -> Motion:
+        """Motion of the point at distance `s` from the pin along the link."""
+        r = self.u * s
+        n = r.turned()
+        return Motion(
+            self.pin.p + r,
+            self.pin.p1 + n * self.t1,
+            self.pin.p2 + n * self.t2 - r * (self.t1 * self.t1),
+        )

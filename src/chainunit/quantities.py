@@ -1,0 +1,238 @@
+"""Declares a parameter, input, state or output once: unit, description, bounds, start.
+
+A model states its quantities as frozen dataclasses whose fields come from `quantity` (one
+scalar) or `group` (a nested dataclass, whose fields appear under a prefix: ``crank.m``).
+Everything else - modelDescription.xml, config validation, tables, netCDF attributes - is
+generated from these declarations. Standard library only: FMUs carry this file.
+
+Units are written as in FMI: ``.`` multiplies, ``/`` divides (everything behind it), an integer
+behind a name is its power: ``kg.m2``, ``N.m.s/rad``, ``1`` for a pure number.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from operator import attrgetter
+from typing import Any, TypeAlias, TypeVar, dataclass_transform
+
+T = TypeVar("T")
+
+SI = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+
+# exponents of the SI base units (FMI counts rad among them) of every unit name in use
+_NAMED: dict[str, dict[str, int]] = {
+    **{name: {name: 1} for name in SI},
+    "1": {},
+    "N": {"kg": 1, "m": 1, "s": -2},
+    "J": {"kg": 1, "m": 2, "s": -2},
+    "W": {"kg": 1, "m": 2, "s": -3},
+    "V": {"kg": 1, "m": 2, "s": -3, "A": -1},
+    "Ohm": {"kg": 1, "m": 2, "s": -3, "A": -2},
+    "H": {"kg": 1, "m": 2, "s": -2, "A": -2},
+}
+
+DISPLAY_UNITS: dict[str, tuple[str, float, float]] = {
+    "rad": ("deg", 180.0 / math.pi, 0.0),
+    "rad/s": ("rev/min", 30.0 / math.pi, 0.0),
+    "K": ("degC", 1.0, -273.15),
+}
+"""unit -> (display unit, factor, offset), shown = factor * value + offset."""
+
+
+def base_units(unit: str) -> dict[str, int]:
+    """Exponents of the SI base units in `unit`, e.g. ``N.m`` -> ``{kg: 1, m: 2, s: -2}``.
+
+    Raises
+    ------
+    ValueError
+        for a unit name that is not known here.
+    """
+    exponents: dict[str, int] = {}
+    for sign, part in zip((1, -1), unit.split("/"), strict=False):
+        for factor in part.split("."):
+            match = re.fullmatch(r"([A-Za-z]+|1)(-?\d+)?", factor)
+            if match is None or match[1] not in _NAMED:
+                raise ValueError(f"unknown unit {factor!r} in {unit!r}")
+            power = sign * int(match[2] or 1)
+            for base, exponent in _NAMED[match[1]].items():
+                exponents[base] = exponents.get(base, 0) + exponent * power
+    return {base: exponents[base] for base in SI if exponents.get(base)}
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """One scalar: unit, description, bounds (`low` may itself be forbidden: `open_low`),
+    start value (None for outputs), size that is typical of it, and whether it may change in a run."""
+
+    unit: str
+    description: str
+    start: float | None = None
+    low: float = -math.inf
+    high: float = math.inf
+    open_low: bool = False
+    nominal: float | None = None
+    tunable: bool = False
+
+    @property
+    def allowed(self) -> str:
+        """The allowed range in words, e.g. ``> 0 m``."""
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        low = f"{'>' if self.open_low else '>='} {self.low:g}{unit}" if math.isfinite(self.low) else ""
+        high = f"<= {self.high:g}{unit}" if math.isfinite(self.high) else ""
+        return " and ".join(x for x in (low, high) if x) or "any finite number"
+
+    def admits(self, x: float) -> bool:
+        """Whether the number `x` is finite and inside the bounds."""
+        above = x > self.low if self.open_low else x >= self.low
+        return math.isfinite(x) and above and x <= self.high
+
+
+Value: TypeAlias = Any
+"""What a declared scalar holds: a float, an array, a symbol or a dual number."""
+
+
+def quantity(
+    unit: str,
+    description: str,
+    *,
+    default: float | None = None,
+    min: float = -math.inf,
+    max: float = math.inf,
+    above: float | None = None,
+    nominal: float | None = None,
+    tunable: bool = False,
+) -> Any:
+    """A field that declares one scalar; `default` is its start value (outputs have none), `above` a
+    lower bound that is itself forbidden."""
+    base_units(unit)
+    low = min if above is None else above
+    declared = Quantity(unit, description, default, low, max, above is not None, nominal, tunable)
+    metadata = {"quantity": declared}
+    if default is None:
+        return dataclasses.field(metadata=metadata)
+    return dataclasses.field(default=default, metadata=metadata)
+
+
+def group(of: type, description: str, *, default: Any = None) -> Any:
+    """A field that holds the quantities of the declaration `of`, under this field's name.
+
+    `default` is an instance of `of` with the start values (outputs have none).
+    """
+    metadata = {"group": description, "of": of, "default": default}
+    if default is None:
+        return dataclasses.field(metadata=metadata)
+    return dataclasses.field(default=default, metadata=metadata)
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(quantity, group))
+def declaration(cls: type[T]) -> type[T]:
+    """Make `cls` a declaration: a frozen dataclass with keyword-only fields."""
+    return dataclass(frozen=True, slots=True, kw_only=True)(cls)
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """A declared scalar with the full name and description it has in its model."""
+
+    name: str
+    description: str
+    quantity: Quantity
+
+    @property
+    def unit(self) -> str:
+        """The unit, as in the declaration."""
+        return self.quantity.unit
+
+
+def variables(cls: type, prefix: str = "", context: str = "", default: Any = None) -> Iterator[Variable]:
+    """Every scalar of the declaration `cls`, in declared order.
+
+    `prefix` and `context` go before names and descriptions; `default` is an instance of `cls` whose
+    values replace the declared start values.
+    """
+    for field in dataclasses.fields(cls):
+        name = prefix + field.name
+        if "quantity" in field.metadata:
+            q = field.metadata["quantity"]
+            if default is not None:
+                q = dataclasses.replace(q, start=getattr(default, field.name))
+            yield Variable(name, context + q.description, q)
+        else:
+            inner = field.metadata["default"] if default is None else getattr(default, field.name)
+            described = f"{context}{field.metadata['group']}: "
+            yield from variables(field.metadata["of"], name + ".", described, inner)
+
+
+class Layout:
+    """Converts between an instance of a declaration and the flat list of its values."""
+
+    def __init__(self, cls: type) -> None:
+        self.cls = cls
+        self.variables = tuple(variables(cls))
+        self.names = tuple(v.name for v in self.variables)
+        self._getter = attrgetter(*self.names)
+        self._plan = _plan(cls, 0)[0]
+
+    def values(self, instance: Any) -> list[Any]:
+        """The values of `instance`, in declared order."""
+        if len(self.names) == 1:
+            return [self._getter(instance)]
+        return list(self._getter(instance))
+
+    def instance(self, values: Any) -> Any:
+        """The instance that holds `values`, given in declared order."""
+        return _build(self._plan, values)
+
+    def from_names(self, given: dict[str, Any], default: Any = None) -> Any:
+        """The instance with the values named in `given`; others from `default`, else at start.
+
+        Raises
+        ------
+        KeyError
+            for a name that is not declared.
+        """
+        unknown = set(given) - set(self.names)
+        if unknown:
+            raise KeyError(f"no variable {sorted(unknown)[0]!r} in {self.cls.__qualname__}")
+        if default is not None:
+            base = self.values(default)
+        else:
+            base = [v.quantity.start for v in self.variables]
+        return self.instance([given.get(n, b) for n, b in zip(self.names, base, strict=True)])
+
+
+def _plan(cls: type, i: int) -> tuple[tuple[type, list[tuple[str, Any]]], int]:
+    steps: list[tuple[str, Any]] = []
+    for field in dataclasses.fields(cls):
+        if "quantity" in field.metadata:
+            steps.append((field.name, i))
+            i += 1
+        else:
+            inner, i = _plan(field.metadata["of"], i)
+            steps.append((field.name, inner))
+    return (cls, steps), i
+
+
+def _build(plan: tuple[type, list[tuple[str, Any]]], values: Any) -> Any:
+    cls, steps = plan
+    return cls(
+        **{name: values[step] if isinstance(step, int) else _build(step, values) for name, step in steps}
+    )
+
+
+def violations(layout: Layout, instance: Any) -> Iterator[str]:
+    """One line for each value of `instance` outside its bounds: name, value, what is allowed."""
+    for variable, x in zip(layout.variables, layout.values(instance), strict=True):
+        if not variable.quantity.admits(x):
+            yield complaint(variable, x)
+
+
+def complaint(variable: Variable, x: Any) -> str:
+    """The line that says what is wrong with the value `x` of `variable`."""
+    q = variable.quantity
+    unit = "" if q.unit == "1" else f" {q.unit}"
+    return f"{variable.name} = {x:g}{unit}: must be {q.allowed} ({variable.description})"

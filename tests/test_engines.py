@@ -1,0 +1,110 @@
+"""The same kernel under every engine."""
+
+from __future__ import annotations
+
+import casadi
+import numpy as np
+import pytest
+from machines import random_loads, random_machine, random_state
+
+from chainunit import engines
+from chainunit.machines.chain_unit import ChamberForces
+
+MODEL = ChamberForces
+
+
+def all_outputs(xp, p, u):
+    parts = MODEL.evaluate(xp, p, u)
+    return [v for part, out in zip(MODEL.parts, parts, strict=True) for v in part.layout.values(out)]
+
+
+def case(seed):
+    rng = np.random.default_rng(seed)
+    machine = random_machine(rng)
+    phi, w, a = random_state(rng, machine)
+    u = MODEL.Inputs(phi=float(phi), w=float(w), a=float(a), left=random_loads(rng), right=random_loads(rng))
+    return machine.p, u
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_math_numpy_and_casadi_agree(seed):
+    p, u = case(seed)
+    by_math = np.array(all_outputs(engines.MATH, p, u))
+
+    arrays = MODEL.input_layout.instance([np.full((2, 1), v) for v in MODEL.input_layout.values(u)])
+    by_numpy = np.array([np.broadcast_to(v, (2, 1)) for v in all_outputs(engines.numpy_(), p, arrays)])
+    np.testing.assert_allclose(by_numpy[:, 0, 0], by_math, rtol=1e-12, atol=1e-9)
+    np.testing.assert_allclose(by_numpy[:, 1, 0], by_math, rtol=1e-12, atol=1e-9)
+
+    ps = casadi.SX.sym("p", len(MODEL.parameter_layout.names))
+    us = casadi.SX.sym("u", len(MODEL.input_layout.names))
+    symbols = all_outputs(
+        engines.casadi_(),
+        MODEL.parameter_layout.instance(casadi.vertsplit(ps)),
+        MODEL.input_layout.instance(casadi.vertsplit(us)),
+    )
+    f = casadi.Function("f", [ps, us], [casadi.vertcat(*symbols)])
+    by_casadi = f(MODEL.parameter_layout.values(p), MODEL.input_layout.values(u)).full().ravel()
+    np.testing.assert_allclose(by_casadi, by_math, rtol=1e-12, atol=1e-9)
+
+
+def test_dual_slopes_are_casadis_derivatives():
+    p, u = case(3)
+    names = MODEL.input_layout.names
+    us = casadi.SX.sym("u", len(names))
+    ui = MODEL.input_layout.instance(casadi.vertsplit(us))
+    xp = engines.casadi_()
+    state = MODEL.shared(xp, p, ui, None)
+    bias = MODEL.parts[0].equations(xp, p, ui, None, state).tau_bias
+    gradient = casadi.Function("g", [us], [casadi.jacobian(bias, us)])
+    exact = gradient(MODEL.input_layout.values(u)).full().ravel()
+    slopes = MODEL.parts[1].equations(engines.MATH, p, u, None, MODEL.shared(engines.MATH, p, u, None))
+    assert slopes.tau_bias_dphi == pytest.approx(exact[names.index("phi")], rel=1e-10)
+    assert slopes.tau_bias_dw == pytest.approx(exact[names.index("w")], rel=1e-10)
+
+
+def test_broadcasting_over_states_and_parameters():
+    p, u = case(5)
+    phi, w = np.linspace(0.0, 6.0, 7)[:, None], np.linspace(1.0, 5.0, 3)
+    masses = np.linspace(0.0, 20.0, 4)[:, None, None]
+    xp = engines.numpy_()
+    loads = MODEL.input_layout.from_names({"phi": phi, "w": w, "left.material_mass": masses}, u)
+    tau = MODEL.evaluate(xp, p, loads)[0].tau
+    assert tau.shape == (4, 7, 3)
+    one = MODEL.input_layout.from_names(
+        {"phi": float(phi[2, 0]), "w": float(w[1]), "left.material_mass": float(masses[3, 0, 0])}, u
+    )
+    assert tau[3, 2, 1] == pytest.approx(MODEL.evaluate(engines.MATH, p, one)[0].tau, rel=1e-12)
+
+
+def test_jax():
+    jax = pytest.importorskip("jax", reason="needs the extra `jax`")
+    jax.config.update("jax_enable_x64", True)
+    p, u = case(9)
+    xp = engines.jax_()
+    f = jax.jit(lambda v: jax.numpy.stack(all_outputs(xp, p, MODEL.input_layout.instance(v))))
+    got = f([jax.numpy.asarray(v) for v in MODEL.input_layout.values(u)])
+    np.testing.assert_allclose(np.asarray(got), all_outputs(engines.MATH, p, u), rtol=1e-11, atol=1e-8)
+
+
+def test_every_engine_has_exactly_the_names():
+    made = [engines.MATH, engines.numpy_(), engines.casadi_(), engines.dual(engines.MATH)]
+    assert all(set(vars(xp)) == set(engines.NAMES) for xp in made)
+
+
+def test_dual_functions_against_differences():
+    xp = engines.dual(engines.MATH)
+    x, h = 0.37, 1e-6
+    for name in ("sin", "cos", "sqrt", "asin", "acos", "abs"):
+        f = getattr(xp, name)
+        assert engines.slope(f(engines.Dual(x, 1.0))) == pytest.approx(
+            (f(x + h) - f(x - h)) / (2 * h), rel=1e-8
+        )
+    d = engines.Dual(x, 1.0)
+    assert engines.slope(xp.atan2(d, 2.0 - d)) == pytest.approx(
+        (xp.atan2(x + h, 2 - x - h) - xp.atan2(x - h, 2 - x + h)) / (2 * h), rel=1e-8
+    )
+    assert engines.slope(xp.minimum(d, 0.2)) == 0.0 and engines.slope(xp.maximum(d, 0.2)) == 1.0
+    assert engines.slope(xp.abs(-d)) == 1.0
+    assert engines.slope(2.0 / d) == pytest.approx(-2.0 / x**2)
+    assert engines.slope(3.0 - d * d) == pytest.approx(-2.0 * x)
