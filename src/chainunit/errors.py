@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 
 class InputError(ValueError):
     """A value given by the user is outside what is allowed; the message is one line."""
@@ -12,4 +14,6 @@ class GeometryError(InputError):
 
 
 class RunError(RuntimeError):
-    """A run stopped half-way; what was computed before is kept by the caller."""
+    """A run stopped half-way; `partial` holds what was computed before, if anything was."""
+
+    partial: Any = None

@@ -131,7 +131,8 @@ def group(of: type, description: str, *, default: Any = None) -> Any:
 @dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(quantity, group))
 def declaration(cls: type[T]) -> type[T]:
     """Make `cls` a declaration: a frozen dataclass with keyword-only fields."""
-    return dataclass(frozen=True, slots=True, kw_only=True)(cls)
+    # no slots: declarations may inherit from several others
+    return dataclass(frozen=True, kw_only=True)(cls)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,8 +10,9 @@ import numpy as np
 
 from ..engines import numpy_
 from ..errors import GeometryError
+from ..ports import PortSlopes
 from . import chain_unit
-from .chain_unit import Chamber, ChamberForces, Inputs, Outputs, Parameters, SideLoads, Slopes, State
+from .chain_unit import Chamber, ChamberForces, Inputs, Outputs, Parameters, SideLoads, State
 
 _XP = numpy_()
 EMPTY = SideLoads(material_mass=0.0, processing_force=0.0)
@@ -89,7 +90,7 @@ class ChainUnit:
         u = self._inputs(phi, w, a, left, right)
         return ChamberForces.parts[0].equations(_XP, self.p, u, None, self._state(u))
 
-    def slopes(self, phi: Any, w: Any = 0.0, left: SideLoads = EMPTY, right: SideLoads = EMPTY) -> Slopes:
+    def slopes(self, phi: Any, w: Any = 0.0, left: SideLoads = EMPTY, right: SideLoads = EMPTY) -> PortSlopes:
         """Exact derivatives of `tau_bias` by motor angle and speed."""
         u = self._inputs(phi, w, 0.0, left, right)
         return ChamberForces.parts[1].equations(_XP, self.p, u, None, self._state(u))
@@ -124,6 +125,17 @@ class ChainUnit:
     def friction_torque(self, phi: Any, w: Any, left: SideLoads = EMPTY, right: SideLoads = EMPTY) -> Any:
         """The part of `tau` that pin friction and joint damping take [N m]."""
         return self._state(self._inputs(phi, w, 0.0, left, right)).bias.friction / self.p.ratio
+
+    def energy_per_kg(self, side: str, phi: Any, w: Any) -> Any:
+        """Kinetic and potential energy of a kilogram of material on the `side` ("left" or "right") [J/kg]:
+        dE/dm, with which the feed enters an energy balance (the energy is linear in the mass)."""
+        kilogram = SideLoads(material_mass=1.0, processing_force=0.0)
+
+        def energy(**loads: SideLoads) -> Any:
+            out = self.forces(phi, w, 0.0, **loads)
+            return out.kinetic_energy + out.potential_energy
+
+        return energy(**{side: kilogram}) - energy()
 
     def chamber(
         self, psi: Any, w: Any = 0.0, a: Any = 0.0, left: SideLoads = EMPTY, right: SideLoads = EMPTY

@@ -24,6 +24,7 @@ from ..groups.driver import crank, driving_torque
 from ..groups.dyad import Dyad
 from ..model import Model, Part
 from ..planar import ZERO, Link, Motion, Vec2
+from ..ports import PortSlopes, PortValues
 from ..quantities import Value, declaration, group, quantity, violations
 
 # A pin that carries nothing has no direction: without a floor the slope of |R| is 0/0 there.
@@ -206,15 +207,10 @@ class Frame(Force):
 
 
 @declaration
-class Outputs:
+class Outputs(PortValues):
     """Torque, load port, motion and every reaction."""
 
     tau: Value = quantity("N.m", "torque needed at the motor shaft, J a + tau_bias", nominal=100.0)
-    tau_bias: Value = quantity("N.m", "torque needed at constant motor speed", nominal=100.0)
-    J: Value = quantity("kg.m2", "inertia reflected to the motor shaft")
-    dJ_dphi: Value = quantity("kg.m2/rad", "derivative of J by the motor angle")
-    phi0: Value = quantity("rad", "motor angle at which the load port was evaluated")
-    w0: Value = quantity("rad/s", "motor speed at which the load port was evaluated")
     rocker: Rocker = group(Rocker, "rocker")
     left: Side = group(Side, "left organ")
     right: Side = group(Side, "right organ")
@@ -229,14 +225,6 @@ class Outputs:
     potential_energy: Value = quantity("J", "potential energy, zero at the level of C", nominal=1000.0)
     dissipated_power: Value = quantity("W", "power that friction, damping and processing take", nominal=100.0)
     margin: Value = quantity("1", "least |sin| of the three transmission angles; 0 is a dead position")
-
-
-@declaration
-class Slopes:
-    """Exact derivatives of the load port."""
-
-    tau_bias_dphi: Value = quantity("N.m/rad", "derivative of tau_bias by the motor angle", nominal=100.0)
-    tau_bias_dw: Value = quantity("N.m.s/rad", "derivative of tau_bias by the motor speed")
 
 
 class Organ:
@@ -495,12 +483,12 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, s: State) -> Outputs:
     )
 
 
-def _slopes(xp: Any, p: Any, u: Any, x: Any, s: State) -> Slopes:
+def _slopes(xp: Any, p: Any, u: Any, x: Any, s: State) -> PortSlopes:
     # by the speed, only the force pass varies: the mechanism of the point is used again
     by_w = Bias(dual(xp), p, u, s.m, s.dJ, Dual(s.w, 1.0)).total
     by_q = State(dual(xp), p, u, Dual(u.phi / p.ratio, 1.0), s.w).bias.total
     per_motor_turn = 1.0 / (p.ratio * p.ratio)
-    return Slopes(tau_bias_dphi=slope(by_q) * per_motor_turn, tau_bias_dw=slope(by_w) * per_motor_turn)
+    return PortSlopes(tau_bias_dphi=slope(by_q) * per_motor_turn, tau_bias_dw=slope(by_w) * per_motor_turn)
 
 
 def rocker_extremes(p: Any) -> tuple[float, float]:
@@ -591,4 +579,4 @@ class ChamberForces(Model):
         """The machine at the crank angle and speed that belong to the motor's."""
         return State(xp, p, u, u.phi / p.ratio, u.w / p.ratio)
 
-    parts = (Part(Outputs, _outputs), Part(Slopes, _slopes))
+    parts = (Part(Outputs, _outputs), Part(PortSlopes, _slopes))

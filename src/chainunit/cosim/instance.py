@@ -1,0 +1,144 @@
+"""One FMU 2.0 co-simulation instance on fmpy, by variable name."""
+
+from __future__ import annotations
+
+import ctypes
+import logging
+import shutil
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..errors import RunError
+
+log = logging.getLogger("chainunit.fmu")
+
+
+class Fmu:
+    """An FMU file, unpacked once; instances come from `instantiate`."""
+
+    def __init__(self, file: Path) -> None:
+        from fmpy import extract, read_model_description
+
+        self.folder = tempfile.mkdtemp(prefix="chainunit_fmu_")
+        extract(str(file), unzipdir=self.folder)
+        self.description = read_model_description(self.folder, validate=False)
+        self.variables = {v.name: v for v in self.description.modelVariables}
+
+    def outputs(self) -> list[str]:
+        """Names of the outputs, in declared order."""
+        return [name for name, v in self.variables.items() if v.causality == "output"]
+
+    def feedthrough(self) -> dict[str, set[str]]:
+        """Of each output: the inputs that it depends on directly."""
+        inputs = {name for name, v in self.variables.items() if v.causality == "input"}
+        depends: dict[str, set[str]] = {}
+        for unknown in self.description.outputs:
+            known = unknown.dependencies
+            depends[unknown.variable.name] = (
+                inputs if known is None else {v.name for v in known} & inputs
+            )
+        return depends
+
+    def close(self) -> None:
+        """Remove the unpacked files."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+class Instance:
+    """A running instance; every failing call becomes a `RunError` that cites what the FMU logged."""
+
+    def __init__(self, fmu: Fmu, name: str) -> None:
+        from fmpy import calloc, free
+        from fmpy import fmi2 as api
+
+        self.fmu = fmu
+        self.name = name
+        self.messages: list[str] = []
+
+        def logger(_env: Any, _name: Any, status: int, _category: Any, message: bytes | None) -> None:
+            if message and status > 0:
+                text = message.decode(errors="replace")
+                self.messages.append(text)
+                log.warning("%s: %s", name, text)
+
+        self._callbacks = api.fmi2CallbackFunctions()
+        self._callbacks.logger = api.fmi2CallbackLoggerTYPE(logger)
+        self._callbacks.allocateMemory = api.fmi2CallbackAllocateMemoryTYPE(calloc)
+        self._callbacks.freeMemory = api.fmi2CallbackFreeMemoryTYPE(free)
+        description = fmu.description
+        self._fmi = api.FMU2Slave(
+            guid=description.guid,
+            unzipDirectory=fmu.folder,
+            modelIdentifier=description.coSimulation.modelIdentifier,
+            instanceName=name,
+        )
+        self._fmi.instantiate(callbacks=self._callbacks, loggingOn=True)
+
+    def _call(self, what: str, function: Any, *args: Any) -> Any:
+        from fmpy.fmi1 import FMICallException
+
+        try:
+            return function(*args)
+        except FMICallException as error:
+            said = f": {self.messages[-1]}" if self.messages else ""
+            raise RunError(f"{self.name}: {what} ended with status {error.status}{said}") from error
+
+    def initialize(self, start: Mapping[str, float], time: float) -> None:
+        """Set start values and enter the initialization mode; `finish_initialization` leaves it."""
+        self._call("setup", self._fmi.setupExperiment, None, time)
+        self.set(list(start), list(start.values()))
+        self._call("initialization", self._fmi.enterInitializationMode)
+
+    def finish_initialization(self) -> None:
+        """Leave the initialization mode."""
+        self._call("initialization", self._fmi.exitInitializationMode)
+
+    def handle(self, names: Sequence[str]) -> tuple[Any, Any, int]:
+        """Value references and room for their values, for `read` and `write`."""
+        n = len(names)
+        references = (ctypes.c_uint * n)(*(self.fmu.variables[name].valueReference for name in names))
+        return references, (ctypes.c_double * n)(), n
+
+    def read(self, handle: tuple[Any, Any, int]) -> Sequence[float]:
+        """Values behind a handle."""
+        references, values, n = handle
+        self._call("reading values", self._fmi.fmi2GetReal, self._fmi.component, references, n, values)
+        return values
+
+    def write(self, handle: tuple[Any, Any, int], new: Sequence[float]) -> None:
+        """Set the values behind a handle."""
+        references, values, n = handle
+        values[:] = new
+        self._call("setting values", self._fmi.fmi2SetReal, self._fmi.component, references, n, values)
+
+    def get(self, names: Sequence[str]) -> list[float]:
+        """Values by name."""
+        return list(self.read(self.handle(names)))
+
+    def set(self, names: Sequence[str], values: Sequence[float]) -> None:
+        """Set values by name."""
+        if names:
+            self.write(self.handle(names), values)
+
+    def step(self, time: float, step: float) -> None:
+        """One communication step."""
+        self._call(f"step at t = {time:g} s", self._fmi.doStep, time, step)
+
+    def state(self) -> Any:
+        """The FMU's state, for `restore`."""
+        return self._call("saving the state", self._fmi.getFMUState)
+
+    def restore(self, state: Any) -> None:
+        """Return to a saved state."""
+        self._call("restoring the state", self._fmi.setFMUState, state)
+
+    def forget(self, state: Any) -> None:
+        """Free a saved state."""
+        self._call("freeing a state", self._fmi.freeFMUState, state)
+
+    def close(self) -> None:
+        """End and free the instance."""
+        self._fmi.terminate()
+        self._fmi.freeInstance()

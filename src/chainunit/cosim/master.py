@@ -1,0 +1,272 @@
+"""The master: fixed communication step, all signals consistent at every communication point.
+
+At each point the connected variables are transferred in the order that the FMUs' true dependencies allow (states first,
+then what follows from them), so that every recorded row belongs to one instant; then every FMU makes its step. With a
+load port the driver sees the linearised load inside its step, and the coupling is of second order.
+An external signal that varies within a step acts with its value at the step's middle, second order as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..errors import InputError, RunError
+from .instance import Fmu, Instance
+from .system import System
+
+Progress = Callable[[float], None]
+"""Called with the simulated time [s] now and then."""
+
+
+class CoSimulation:
+    """A running co-simulation; use it as a context manager.
+
+    Parameters
+    ----------
+    system : FMUs, connections, start values
+    signals : by full name of an input, a number or a function of time
+    start_time : [s]
+
+    Raises
+    ------
+    InputError
+        for a connection or signal that names no variable, and for an algebraic loop, which is named.
+    RunError
+        where an FMU refuses to start.
+    """
+
+    def __init__(
+        self, system: System, signals: Mapping[str, Any] | None = None, start_time: float = 0.0
+    ) -> None:
+        self.time = start_time
+        self._fmus: dict[str, Fmu] = {}
+        self._instances: dict[str, Instance] = {}
+        self._state: dict[str, Any] = {}
+        try:
+            files: dict[Any, Fmu] = {}
+            for name, file in system.fmus.items():
+                if file not in files:
+                    files[file] = Fmu(file)
+                self._fmus[name] = files[file]
+                self._instances[name] = Instance(files[file], name)
+            self._transfers = self._schedule(system)
+            self._starts = self._split_names(system.start)
+            self.signals = dict(signals or {})
+            self._initialize()
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self) -> CoSimulation:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Free every instance and the unpacked files."""
+        for name, instance in self._instances.items():
+            if name in self._state:
+                instance.forget(self._state[name])
+            instance.close()
+        for fmu in self._fmus.values():
+            fmu.close()
+        self._instances, self._fmus, self._state = {}, {}, {}
+
+    # -- set-up
+
+    def _split(self, full: str, causality: str | None = None) -> tuple[str, str]:
+        instance, _, variable = full.partition(".")
+        known = self._fmus[instance].variables if instance in self._fmus else {}
+        if variable not in known or causality not in (None, known[variable].causality):
+            raise InputError(f"{full}: no such {causality or 'variable'} in the system")
+        return instance, variable
+
+    def _split_names(self, values: Mapping[str, float]) -> dict[str, dict[str, float]]:
+        split: dict[str, dict[str, float]] = {name: {} for name in self._fmus}
+        for full, value in values.items():
+            instance, variable = self._split(full)
+            split[instance][variable] = value
+        return split
+
+    def _schedule(self, system: System) -> list[tuple[Instance, Any, list[tuple[Instance, Any, list[int]]]]]:
+        """Groups of connected outputs in an order in which each is final when it is read."""
+        sources = {
+            self._split(target, "input"): self._split(source, "output")
+            for source, target in system.connections
+        }
+        feedthrough = {name: fmu.feedthrough() for name, fmu in self._fmus.items()}
+        level: dict[tuple[str, str], int] = {}
+
+        def rank(output: tuple[str, str], above: tuple[tuple[str, str], ...]) -> int:
+            if output in above:
+                loop = " -> ".join(".".join(v) for v in (*above[above.index(output) :], output))
+                raise InputError(f"algebraic loop: {loop}; break it with a load port or a state")
+            if output not in level:
+                instance, variable = output
+                feeding = [
+                    sources[(instance, known)]
+                    for known in feedthrough[instance].get(variable, ())
+                    if (instance, known) in sources
+                ]
+                level[output] = 1 + max((rank(s, (*above, output)) for s in feeding), default=-1)
+            return level[output]
+
+        for source in sources.values():
+            rank(source, ())
+        transfers = []
+        for height in range(max(level.values(), default=-1) + 1):
+            for name, instance in self._instances.items():
+                names = [v for (i, v), at in level.items() if i == name and at == height]
+                if not names:
+                    continue
+                targets: dict[str, list[tuple[str, int]]] = {}
+                for (target, variable), (source, output) in sources.items():
+                    if source == name and output in names:
+                        targets.setdefault(target, []).append((variable, names.index(output)))
+                transfers.append(
+                    (
+                        instance,
+                        instance.handle(names),
+                        [
+                            (
+                                self._instances[target],
+                                self._instances[target].handle([v for v, _ in pairs]),
+                                [at for _, at in pairs],
+                            )
+                            for target, pairs in targets.items()
+                        ],
+                    )
+                )
+        return transfers
+
+    def _initialize(self) -> None:
+        for name, instance in self._instances.items():
+            instance.initialize(self._starts[name], self.time)
+        self._apply_signals(self.time)
+        self._transfer()
+        for instance in self._instances.values():
+            instance.finish_initialization()
+
+    # -- running
+
+    def _apply_signals(self, time: float) -> bool:
+        """Set the external signals; whether any is a function of time."""
+        varying = False
+        split: dict[str, tuple[list[str], list[float]]] = {}
+        for full, signal in self.signals.items():
+            instance, variable = self._split(full, "input")
+            varying = varying or callable(signal)
+            names, values = split.setdefault(instance, ([], []))
+            names.append(variable)
+            values.append(signal(time) if callable(signal) else signal)
+        for instance, (names, values) in split.items():
+            self._instances[instance].set(names, values)
+        return varying
+
+    def _changes(self, t0: float, t1: float) -> bool:
+        return any(callable(s) and s(t0) != s(t1) for s in self.signals.values())
+
+    def _transfer(self) -> None:
+        for source, outputs, targets in self._transfers:
+            values = source.read(outputs)
+            for target, inputs, order in targets:
+                target.write(inputs, [values[i] for i in order])
+
+    def run(self, stop: float, step: float, progress: Progress | None = None) -> xr.Dataset:
+        """Simulate to the time `stop` [s] with the communication step `step` [s].
+
+        Returns
+        -------
+        every output and connected or driven input, over the dimension ``time``, with units and descriptions.
+        A further call goes on from where this one ended.
+
+        Raises
+        ------
+        RunError
+            where an FMU fails; its attribute ``partial`` holds the Dataset up to there.
+        """
+        n = max(1, round((stop - self.time) / step))
+        start = self.time
+        times = start + step * np.arange(n + 1)
+        recorders = [
+            (instance, instance.handle(names), [f"{name}.{v}" for v in names])
+            for name, instance in self._instances.items()
+            if (names := self._recorded(name))
+        ]
+        table = np.full((n + 1, sum(len(r[2]) for r in recorders)), np.nan)
+
+        def record(row: int) -> None:
+            at = 0
+            for instance, handle, names in recorders:
+                table[row, at : at + len(names)] = instance.read(handle)
+                at += len(names)
+
+        varying = self._apply_signals(start)
+        self._transfer()
+        record(0)
+        every = max(1, n // 200)
+        done = 0
+        try:
+            for k in range(n):
+                t, after = float(times[k]), float(times[k + 1])
+                middle = 0.5 * (t + after)
+                if varying and (self._changes(t, middle) or self._changes(middle, after)):
+                    self._apply_signals(middle)
+                    self._transfer()
+                for instance in self._instances.values():
+                    instance.step(t, step)
+                self.time = after
+                if varying:
+                    self._apply_signals(after)
+                self._transfer()
+                record(k + 1)
+                done = k + 1
+                if progress and done % every == 0:
+                    progress(self.time)
+        except RunError as error:
+            error.partial = self._dataset(times[: done + 1], table[: done + 1], recorders)
+            raise
+        if progress:
+            progress(self.time)
+        return self._dataset(times, table, recorders)
+
+    def _recorded(self, name: str) -> list[str]:
+        fmu = self._fmus[name]
+        driven = {full.partition(".")[2] for full in self.signals if full.startswith(name + ".")}
+        return [*fmu.outputs(), *sorted(driven)]
+
+    def _dataset(self, times: Any, table: Any, recorders: Any) -> xr.Dataset:
+        variables = {}
+        at = 0
+        for instance, _, names in recorders:
+            for full in names:
+                declared = instance.fmu.variables[full.partition(".")[2]]
+                attributes = {"units": declared.unit or "1", "long_name": declared.description or full}
+                variables[full] = ("time", table[:, at].copy(), attributes)
+                at += 1
+        return xr.Dataset(variables, {"time": ("time", times, {"units": "s", "long_name": "time"})})
+
+    # -- branching
+
+    def save(self) -> float:
+        """Keep the present state of every FMU, in place of the one kept before; returns the time."""
+        for name, instance in self._instances.items():
+            if name in self._state:
+                instance.forget(self._state[name])
+            self._state[name] = instance.state()
+        self._saved_at = self.time
+        return self.time
+
+    def restore(self) -> None:
+        """Return to the state that `save` kept, from which another branch can run."""
+        for name, instance in self._instances.items():
+            instance.restore(self._state[name])
+        self.time = self._saved_at

@@ -1,0 +1,48 @@
+"""Loads and references over time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Profile:
+    """A value that changes smoothly from time to time.
+
+    `changes` lists (time at which the change begins [s], its duration [s], value after it), in order and
+    without overlap; each change is a quintic step, continuous to the second derivative, so that a
+    communication step or a solver meets no jump.
+
+    Raises
+    ------
+    ValueError
+        where changes overlap or last no time.
+    """
+
+    start: float
+    changes: tuple[tuple[float, float, float], ...] = ()
+
+    def __post_init__(self) -> None:
+        free = -float("inf")
+        for at, duration, _ in self.changes:
+            if duration <= 0.0 or at < free:
+                raise ValueError(f"change at t = {at:g} s: must last > 0 s and begin after the one before ends")
+            free = at + duration
+
+    def __call__(self, t: Any) -> Any:
+        """The value at time `t` (float or array)."""
+        value: Any = self.start
+        before = self.start
+        for at, duration, after in self.changes:
+            s = np.clip((np.asarray(t) - at) / duration, 0.0, 1.0)
+            value = value + (after - before) * (s * s * s * (10.0 + s * (6.0 * s - 15.0)))
+            before = after
+        return value if np.ndim(t) else float(value)
+
+    @property
+    def corners(self) -> list[float]:
+        """Times at which a change begins or ends."""
+        return [x for at, duration, _ in self.changes for x in (at, at + duration)]

@@ -1,0 +1,1 @@
+"""FMUs from declared models. Nothing here names a machine."""

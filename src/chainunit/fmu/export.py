@@ -1,0 +1,147 @@
+"""Export of a model as an FMU through pythonfmu.
+
+The mechanics travel inside the FMU as a package folder whose name holds a hash of all that the FMU is made
+of: two FMUs in one process never share code by accident, and the same model gives the same file, byte for byte.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import sys
+import tempfile
+import uuid
+import zipfile
+from collections.abc import Iterator
+from importlib import metadata
+from pathlib import Path
+from xml.etree.ElementTree import tostring
+
+from ..errors import InputError
+from ..model import Model
+from ..quantities import complaint
+from .description import Interface, model_description
+
+_PACKAGE = Path(__file__).parents[1]
+_COMMON = (
+    "engines.py",
+    "errors.py",
+    "integrate.py",
+    "model.py",
+    "planar.py",
+    "ports.py",
+    "quantities.py",
+    "fmu/__init__.py",
+    "fmu/slave.py",
+)
+_OPTIONS = {
+    "needsExecutionTool": "true",
+    "canHandleVariableCommunicationStepSize": "true",
+    "canNotUseMemoryManagementFunctions": "true",
+    "canGetAndSetFMUstate": "true",
+    "canSerializeFMUstate": "true",
+}
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the oldest time that a zip entry can bear
+
+
+def export(model: type[Model], file: Path, start: dict[str, float] | None = None) -> Path:
+    """Write `model` as a co-simulation FMU 2.0.
+
+    Parameters
+    ----------
+    model : the model's class
+    file : path of the FMU; a file there is replaced, in one step
+    start : start values of parameters and inputs, by name, that replace the declared ones
+
+    Raises
+    ------
+    KeyError
+        for a name in `start` that the model does not have.
+    InputError
+        where the start values are out of bounds or make no machine.
+    """
+    start = {name: float(value) for name, value in (start or {}).items()}
+    interface = Interface(model, start)
+    for signal in interface.of("input"):
+        if not signal.variable.quantity.admits(signal.start or 0.0):
+            raise InputError(complaint(signal.variable, signal.start))
+    model.check(model.parameter_layout.instance([s.start for s in interface.of("parameter")]))
+
+    version = metadata.version("chainunit")
+    shipped = dict(_shipped(model))
+    digest = hashlib.sha256()
+    for name, content in sorted(shipped.items()):
+        digest.update(name.encode() + b"\0" + content + b"\0")
+    digest.update(metadata.version("pythonfmu").encode())
+    digest.update(tostring(model_description(interface, "", _OPTIONS, version)))
+    hashed = digest.hexdigest()[:32]
+    description = model_description(interface, f"{{{uuid.UUID(hashed)}}}", _OPTIONS, version)
+
+    with tempfile.TemporaryDirectory(prefix="chainunit_") as folder:
+        work = Path(folder)
+        package = work / f"chainunit_{hashed[:12]}"
+        for name, content in shipped.items():
+            target = package / name
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes(content)
+        (package / "__init__.py").write_text(f'"""chainunit {version}, the part that {model.name} needs."""\n')
+        recipe = work / f"{model.name}_{hashed[:12]}.py"
+        recipe.write_text(_recipe(model, package.name, start))
+        (work / "modelDescription.xml").write_bytes(tostring(description, "utf-8"))
+        raw = _build(recipe, package, work / "modelDescription.xml", work / "raw.fmu")
+        file = Path(file)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        part = file.with_name(file.name + ".part")
+        _normalise(raw, part)
+        part.replace(file)
+    return file
+
+
+def _shipped(model: type[Model]) -> Iterator[tuple[str, bytes]]:
+    """Files of this package that the FMU carries, by their path inside it."""
+    for name in (*_COMMON, *model.files):
+        path = _PACKAGE / name
+        for source in sorted(path.glob("*.py")) if path.is_dir() else [path]:
+            yield source.relative_to(_PACKAGE).as_posix(), source.read_bytes()
+
+
+def _recipe(model: type[Model], package: str, start: dict[str, float]) -> str:
+    module = model.__module__.removeprefix("chainunit")
+    return (
+        f'"""{model.description}."""\n'
+        f"from {package}.fmu.slave import ModelSlave, hold\n"
+        f"from {package}{module} import {model.__qualname__} as _Model\n\n"
+        "hold(globals())\n\n\n"
+        f"class {model.name}(ModelSlave):\n"
+        f"    model = _Model\n"
+        f"    start = {dict(sorted(start.items()))!r}\n"
+    )
+
+
+def _build(recipe: Path, package: Path, description: Path, file: Path) -> Path:
+    """pythonfmu's build, which leaves its traces in `sys.path` and `sys.modules` behind."""
+    from pythonfmu import FmuBuilder
+
+    path = list(sys.path)
+    modules = set(sys.modules)
+    try:
+        FmuBuilder.build_FMU(recipe, file, project_files=[package, description])
+    finally:
+        sys.path[:] = path
+        for name in set(sys.modules) - modules:
+            if name.split(".")[0] in (package.name, recipe.stem):
+                del sys.modules[name]
+    return file
+
+
+def _normalise(raw: Path, file: Path) -> None:
+    """The same archive in one order and with one time stamp, the scaffold left out."""
+    with zipfile.ZipFile(raw) as old, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as new:
+        for name in sorted(old.namelist()):
+            if name == "resources/modelDescription.xml" or "__pycache__" in name:
+                continue
+            entry = zipfile.ZipInfo(name, _EPOCH)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = 0o644 << 16
+            with old.open(name) as source, new.open(entry, "w") as target:
+                shutil.copyfileobj(source, target)

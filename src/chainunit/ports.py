@@ -1,0 +1,49 @@
+"""The load port: how a machine shows its load to the shaft that drives it.
+
+The machine gives torque at constant speed and reflected inertia at one point, with their slopes; the driver
+solves for its own acceleration with the linearised load inside its step, so that there is no algebraic
+loop, and the coupling is second order in the communication step. Seven plain signals, which chain.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .quantities import Value, declaration, quantity
+
+
+@declaration
+class PortValues:
+    """The load at the point (phi0, w0)."""
+
+    tau_bias: Value = quantity("N.m", "torque needed at constant speed of the shaft", nominal=100.0)
+    J: Value = quantity("kg.m2", "inertia reflected to the shaft")
+    dJ_dphi: Value = quantity("kg.m2/rad", "derivative of J by the angle of the shaft")
+    phi0: Value = quantity("rad", "angle of the shaft at which the load was evaluated")
+    w0: Value = quantity("rad/s", "speed of the shaft at which the load was evaluated")
+
+
+@declaration
+class PortSlopes:
+    """Exact derivatives of the load."""
+
+    tau_bias_dphi: Value = quantity("N.m/rad", "derivative of tau_bias by the angle of the shaft", nominal=100.0)
+    tau_bias_dw: Value = quantity("N.m.s/rad", "derivative of tau_bias by the speed of the shaft")
+
+
+@declaration
+class LoadPort(PortSlopes, PortValues):
+    """The seven signals, as a driver takes them."""
+
+
+NO_LOAD = LoadPort(tau_bias=0.0, J=0.0, dJ_dphi=0.0, phi0=0.0, w0=0.0, tau_bias_dphi=0.0, tau_bias_dw=0.0)
+
+
+def load_torque(load: LoadPort, phi: Any, w: Any) -> Any:
+    """Torque that the load needs at constant speed [N m], linearised about the port's point."""
+    return load.tau_bias + load.tau_bias_dphi * (phi - load.phi0) + load.tau_bias_dw * (w - load.w0)
+
+
+def load_inertia(load: LoadPort, phi: Any) -> Any:
+    """Inertia of the load [kg m2], linearised about the port's point."""
+    return load.J + load.dJ_dphi * (phi - load.phi0)
