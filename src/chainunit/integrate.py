@@ -20,10 +20,10 @@ def rk4(
     now = list(x)
     for _ in range(n):
         k1 = rates(now)
-        k2 = rates([v + 0.5 * h * k for v, k in zip(now, k1)])
-        k3 = rates([v + 0.5 * h * k for v, k in zip(now, k2)])
-        k4 = rates([v + h * k for v, k in zip(now, k3)])
+        k2 = rates([v + 0.5 * h * k for v, k in zip(now, k1, strict=True)])
+        k3 = rates([v + 0.5 * h * k for v, k in zip(now, k2, strict=True)])
+        k4 = rates([v + h * k for v, k in zip(now, k3, strict=True)])
         now = [
-            v + h / 6.0 * (a + 2.0 * (b + c) + d) for v, a, b, c, d in zip(now, k1, k2, k3, k4)
+            v + h / 6.0 * (a + 2.0 * (b + c) + d) for v, a, b, c, d in zip(now, k1, k2, k3, k4, strict=True)
         ]
     return now

@@ -27,7 +27,9 @@ class PortValues:
 class PortSlopes:
     """Exact derivatives of the load."""
 
-    tau_bias_dphi: Value = quantity("N.m/rad", "derivative of tau_bias by the angle of the shaft", nominal=100.0)
+    tau_bias_dphi: Value = quantity(
+        "N.m/rad", "derivative of tau_bias by the angle of the shaft", nominal=100.0
+    )
     tau_bias_dw: Value = quantity("N.m.s/rad", "derivative of tau_bias by the speed of the shaft")
 
 

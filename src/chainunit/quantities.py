@@ -83,7 +83,7 @@ class Quantity:
         unit = "" if self.unit == "1" else f" {self.unit}"
         low = f"{'>' if self.open_low else '>='} {self.low:g}{unit}" if math.isfinite(self.low) else ""
         high = f"<= {self.high:g}{unit}" if math.isfinite(self.high) else ""
-        return " and ".join(x for x in (low, high) if x) or "any finite number"
+        return " and ".join(x for x in (low, high) if x) or "any number"
 
     def admits(self, x: float) -> bool:
         """Whether the number `x` is finite and inside the bounds."""
@@ -236,4 +236,5 @@ def complaint(variable: Variable, x: Any) -> str:
     """The line that says what is wrong with the value `x` of `variable`."""
     q = variable.quantity
     unit = "" if q.unit == "1" else f" {q.unit}"
-    return f"{variable.name} = {x:g}{unit}: must be {q.allowed} ({variable.description})"
+    allowed = q.allowed if math.isfinite(x) else f"finite, {q.allowed}"
+    return f"{variable.name} = {x:g}{unit}: must be {allowed} ({variable.description})"

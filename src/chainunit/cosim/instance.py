@@ -36,9 +36,7 @@ class Fmu:
         depends: dict[str, set[str]] = {}
         for unknown in self.description.outputs:
             known = unknown.dependencies
-            depends[unknown.variable.name] = (
-                inputs if known is None else {v.name for v in known} & inputs
-            )
+            depends[unknown.variable.name] = inputs if known is None else {v.name for v in known} & inputs
         return depends
 
     def close(self) -> None:

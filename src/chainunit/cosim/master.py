@@ -1,9 +1,10 @@
 """The master: fixed communication step, all signals consistent at every communication point.
 
-At each point the connected variables are transferred in the order that the FMUs' true dependencies allow (states first,
-then what follows from them), so that every recorded row belongs to one instant; then every FMU makes its step. With a
-load port the driver sees the linearised load inside its step, and the coupling is of second order.
-An external signal that varies within a step acts with its value at the step's middle, second order as well.
+At each point the connected variables are transferred in the order that the FMUs' true dependencies allow
+(states first, then what follows from them), so that every recorded row belongs to one instant; then every
+FMU makes its step. With a load port the driver sees the linearised load inside its step, and the coupling
+is of second order. An external signal that varies within a step acts with its value at the step's middle,
+second order as well.
 """
 
 from __future__ import annotations
@@ -128,8 +129,8 @@ class CoSimulation:
                 if not names:
                     continue
                 targets: dict[str, list[tuple[str, int]]] = {}
-                for (target, variable), (source, output) in sources.items():
-                    if source == name and output in names:
+                for (target, variable), (giver, output) in sources.items():
+                    if giver == name and output in names:
                         targets.setdefault(target, []).append((variable, names.index(output)))
                 transfers.append(
                     (

@@ -7,6 +7,7 @@ present angle and speed. It is what a co-simulation converges to.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -113,7 +114,7 @@ def monolithic(
     stops = [times[0], *inner, times[-1]]
     x = np.asarray(start)
     found = np.empty((n, len(times)))
-    for low, high in zip(stops, stops[1:], strict=False):
+    for low, high in pairwise(stops):
         chosen = (times >= low) & (times <= high)
         solution = solve_ivp(
             rates,

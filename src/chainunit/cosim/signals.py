@@ -29,7 +29,9 @@ class Profile:
         free = -float("inf")
         for at, duration, _ in self.changes:
             if duration <= 0.0 or at < free:
-                raise ValueError(f"change at t = {at:g} s: must last > 0 s and begin after the one before ends")
+                raise ValueError(
+                    f"change at t = {at:g} s: must last > 0 s and begin after the one before ends"
+                )
             free = at + duration
 
     def __call__(self, t: Any) -> Any:

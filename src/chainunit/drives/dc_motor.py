@@ -29,10 +29,16 @@ class Armature:
 
     R: Value = quantity("Ohm", "resistance at 20 degC", default=4.5, above=0.0, tunable=True)
     L: Value = quantity("H", "inductance", default=0.06, above=0.0)
-    k: Value = quantity("N.m/A", "torque constant, also the back-EMF constant in V.s/rad", default=1.27, above=0.0)
-    alpha: Value = quantity("1/K", "rise of the resistance with temperature", default=0.00393, min=0.0, tunable=True)
+    k: Value = quantity(
+        "N.m/A", "torque constant, also the back-EMF constant in V.s/rad", default=1.27, above=0.0
+    )
+    alpha: Value = quantity(
+        "1/K", "rise of the resistance with temperature", default=0.00393, min=0.0, tunable=True
+    )
     C: Value = quantity("J/K", "heat capacity", default=3000.0, above=0.0)
-    R_th: Value = quantity("K/W", "thermal resistance to the surroundings", default=0.6, above=0.0, tunable=True)
+    R_th: Value = quantity(
+        "K/W", "thermal resistance to the surroundings", default=0.6, above=0.0, tunable=True
+    )
 
 
 @declaration
@@ -176,7 +182,9 @@ class DcMotor(Model):
     """A DC motor under speed control that owns the shaft and takes the machine's load port."""
 
     name = "DcMotor"
-    description = "DC motor with cascaded PI control, current limit and winding temperature; takes a load port"
+    description = (
+        "DC motor with cascaded PI control, current limit and winding temperature; takes a load port"
+    )
     Parameters = Parameters
     Inputs = Inputs
     States = States
@@ -185,7 +193,7 @@ class DcMotor(Model):
     internal_step = 2.5e-4
 
     @staticmethod
-    def initial_states(p: Any) -> States:
+    def initial_states(p: Any) -> Any:
         """At rest electrically, at the start angle and speed, winding at ambient temperature."""
         return States(
             phi=p.phi_start,

@@ -84,7 +84,9 @@ def export(model: type[Model], file: Path, start: dict[str, float] | None = None
             target = package / name
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(content)
-        (package / "__init__.py").write_text(f'"""chainunit {version}, the part that {model.name} needs."""\n')
+        (package / "__init__.py").write_text(
+            f'"""chainunit {version}, the part that {model.name} needs."""\n'
+        )
         recipe = work / f"{model.name}_{hashed[:12]}.py"
         recipe.write_text(_recipe(model, package.name, start))
         (work / "modelDescription.xml").write_bytes(tostring(description, "utf-8"))

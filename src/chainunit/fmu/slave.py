@@ -1,15 +1,20 @@
 """The slave inside a pythonfmu FMU: serves any model from its declarations.
 
-It computes with `math`, so that the importing Python needs nothing but the standard library. It never
-raises: pythonfmu turns an exception into a fatal status, after which the host must give up. Instead the outputs become NaN,
-the step is discarded, and the reason is logged once. Outputs are evaluated when they are asked for, part by part, once per state.
+It computes with `math`, so that the importing Python (3.11 or later) needs nothing but the standard
+library. It never raises: pythonfmu turns an exception into a fatal status, after which the host must give
+up. Instead the outputs become NaN, the step is discarded, and the reason is logged once. Outputs are
+evaluated when they are asked for, part by part, once per state.
 """
 
 from __future__ import annotations
 
+import atexit
+import contextlib
 import ctypes
 import json
 import math
+import os
+import sys
 from pathlib import Path
 from typing import Any, ClassVar
 from xml.etree.ElementTree import Element, parse
@@ -25,16 +30,39 @@ from ..quantities import complaint
 _NAN = float("nan")
 
 
+_LIBRARIES: set[Path] = set()
+
+
 def hold(namespace: dict[str, Any]) -> None:
     """Take one reference to the namespace of the exported module.
 
-    pythonfmu 0.7 runs that module at every instantiation, and each time gives up a reference to its namespace that it never
-    took; without this, the second or third instance in a process works on freed memory.
+    pythonfmu 0.7 runs that module at every instantiation, and each time gives up a reference to its
+    namespace that it never took; without this, the second or third instance in a process works on freed
+    memory.
     """
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(namespace))
 
 
-class ModelSlave(Fmi2Slave):
+def _release_at_exit(library: Path) -> None:
+    """Have the FMU's library let go of its interpreter handle while Python still runs.
+
+    On Linux, pythonfmu 0.7 releases that handle twice when the process ends, the second time in freed
+    memory, which now and then aborts the host at its exit. After this release, which sets it to null, both
+    find nothing to do.
+    """
+    if sys.platform != "linux" or library in _LIBRARIES or not library.is_file():
+        return
+    _LIBRARIES.add(library)
+
+    def release() -> None:
+        # where the host has unloaded it, this has been done in the right order
+        with contextlib.suppress(OSError, AttributeError):
+            ctypes.CDLL(str(library), mode=os.RTLD_NOW | os.RTLD_NOLOAD).finalizePythonInterpreter()
+
+    atexit.register(release)
+
+
+class ModelSlave(Fmi2Slave):  # type: ignore[misc]
     """A model as pythonfmu's slave; the exported module derives one class with `model` and `start`."""
 
     model: ClassVar[type[Model]]
@@ -43,8 +71,11 @@ class ModelSlave(Fmi2Slave):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         model = self.model
+        _release_at_exit(Path(self.resources).parent / "binaries" / "linux64" / f"{model.name}.so")
         parameters, inputs = model.parameter_layout.variables, model.input_layout.variables
-        self._set = [self.start.get(v.name, v.quantity.start) for v in (*parameters, *inputs)]
+        self._set: list[float] = [
+            float(self.start.get(v.name, v.quantity.start or 0.0)) for v in (*parameters, *inputs)
+        ]
         self._n_p = len(parameters)
         self._first = len(self._set)
         self._n_x = len(model.state_layout.names) if model.state_layout else 0
@@ -118,7 +149,7 @@ class ModelSlave(Fmi2Slave):
     def set_real(self, vrs: list[int], values: list[float]) -> None:
         """Take parameters and inputs; a fixed parameter only before initialisation."""
         n_p = self._n_p
-        for vr, value in zip(vrs, values):
+        for vr, value in zip(vrs, values, strict=True):
             if vr >= self._first:
                 self._tell(f"value reference {vr} is not a parameter or input: not set")
             elif self._set[vr] == value:

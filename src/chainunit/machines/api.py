@@ -47,12 +47,14 @@ class ChainUnit:
     def __init__(
         self, parameters: Parameters | Mapping[str, float] | None = None, /, **values: float
     ) -> None:
-        if isinstance(parameters, Parameters):
-            given, base = values, parameters
-        else:
-            given, base = {**(parameters or {}), **values}, Parameters()
-        self.p: Parameters = ChamberForces.parameter_layout.from_names(given, base)
+        base = parameters if isinstance(parameters, Parameters) else Parameters()
+        given = {} if isinstance(parameters, Parameters) else dict(parameters or {})
+        self.p: Parameters = ChamberForces.parameter_layout.from_names({**given, **values}, base)
         ChamberForces.check(self.p)
+
+    def replace(self, parameters: Mapping[str, float] | None = None, /, **values: float) -> ChainUnit:
+        """The same machine with some parameters changed, given as to the constructor."""
+        return ChainUnit(ChamberForces.parameter_layout.from_names({**(parameters or {}), **values}, self.p))
 
     @classmethod
     def from_ratios(

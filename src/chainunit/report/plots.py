@@ -1,0 +1,173 @@
+"""Plots of a study (matplotlib). Lines differ in dash and weight, too: they must survive a grey print."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+from ..studies.overload import PINS, SCENARIOS, Study
+
+_STYLE: dict[str, Any] = {
+    "font.size": 10,
+    "axes.grid": True,
+    "grid.alpha": 0.35,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+    "figure.constrained_layout.use": True,
+    "savefig.dpi": 130,
+}
+_LINES = [
+    {"color": "#1b1b1b", "linestyle": "-", "linewidth": 1.8},
+    {"color": "#c1440e", "linestyle": "--", "linewidth": 1.6},
+    {"color": "#0b6fa4", "linestyle": "-.", "linewidth": 1.6},
+    {"color": "#6a994e", "linestyle": ":", "linewidth": 2.0},
+]
+
+
+def write(study: Study, folder: Path) -> list[Path]:
+    """Write every plot that the study has data for; returns the files."""
+    folder.mkdir(parents=True, exist_ok=True)
+    plots = {"torque_angle.png": _torque_angle}
+    if any(name in study.runs for name in SCENARIOS):
+        plots |= {
+            "overload_time.png": _overload_time,
+            "torque_speed.png": _torque_speed,
+            "reactions.png": _reactions,
+        }
+    if "start_up" in study.runs:
+        plots["start_up.png"] = _start_up
+    written = []
+    with plt.rc_context(_STYLE):
+        for name, draw in plots.items():
+            figure = draw(study)
+            figure.savefig(folder / name)
+            plt.close(figure)
+            written.append(folder / name)
+    return written
+
+
+def _torque_angle(study: Study) -> Any:
+    figure, (top, bottom) = plt.subplots(2, 1, figsize=(8, 6.5), sharex=True)
+    for line, (name, c) in zip(_LINES, study.cycles.items(), strict=False):
+        degrees = np.degrees(c.angle)
+        top.plot(degrees, c.crank_torque, label=name, **line)
+        bottom.plot(degrees, c.outputs.rocker.tau, label=name, **line)
+    top.set_ylabel("crank torque [N m]")
+    bottom.set_ylabel("rocker torque from organs [N m]")
+    bottom.set_xlabel("crank angle from the upward vertical [deg]")
+    bottom.set_xticks(range(0, 361, 45))
+    bottom.set_xlim(0, 360)
+    top.set_title(f"One turn at constant {study.config.run.crank_speed:g} rad/s")
+    top.legend(loc="upper center", ncols=3, bbox_to_anchor=(0.5, -0.02), fontsize=9)
+    return figure
+
+
+def _series(study: Study, name: str) -> tuple[Any, Any, Any, Any]:
+    run, ratio = study.runs[name], study.config.machine.p.ratio
+    time = run["time"].values - study.event.get(name, 0.0)
+    return (
+        time,
+        run["machine.tau"].values * ratio,
+        run["motor.w"].values / ratio,
+        run["motor.armature.i"].values,
+    )
+
+
+def _start_up(study: Study) -> Any:
+    figure, axes = plt.subplots(3, 1, figsize=(8, 7), sharex=True)
+    time, torque, speed, current = _series(study, "start_up")
+    for axis, y, label in zip(
+        axes,
+        (speed, torque, current),
+        ("crank speed [rad/s]", "crank torque [N m]", "motor current [A]"),
+        strict=True,
+    ):
+        axis.plot(time, y, **_LINES[0])
+        axis.set_ylabel(label)
+    reference = study.runs["start_up"]["motor.w_ref"].values / study.config.machine.p.ratio
+    axes[0].plot(time, reference, label="reference", **_LINES[1])
+    axes[0].legend(loc="lower right")
+    axes[0].set_title("Start-up under load and steady running")
+    axes[-1].set_xlabel("time [s]")
+    axes[-1].set_xlim(time[0], time[-1])
+    return figure
+
+
+def _overload_time(study: Study) -> Any:
+    names = [n for n in SCENARIOS if n in study.runs]
+    figure, axes = plt.subplots(
+        3, len(names), figsize=(4.2 * len(names), 7.5), sharex=True, sharey="row", squeeze=False
+    )
+    labels = ("crank torque [N m]", "crank speed [rad/s]", "motor current [A]")
+    for column, name in zip(axes.T, names, strict=True):
+        time, torque, speed, current = _series(study, name)
+        for axis, y in zip(column, (torque, speed, current), strict=True):
+            axis.plot(time, y, **_LINES[0])
+        limit = study.motor.limit.i
+        column[2].axhline(limit, label="current limit", **_LINES[1])
+        column[0].set_title(SCENARIOS[name])
+        column[-1].set_xlabel("time after the event [s]")
+        column[-1].set_xlim(time[0], time[-1])
+    axes[2, 0].legend(loc="center right", fontsize=9)
+    for axis, label in zip(axes[:, 0], labels, strict=True):
+        axis.set_ylabel(label)
+    return figure
+
+
+def _torque_speed(study: Study) -> Any:
+    figure, axis = plt.subplots(figsize=(7.5, 5.5))
+    motor = study.motor
+    names = ["start_up", *(n for n in SCENARIOS if n in study.runs)]
+    fastest = 0.0
+    for line, name in zip(_LINES, names, strict=False):
+        run = study.runs[name]
+        axis.plot(
+            run["motor.w"], run["motor.air_gap_tau"], label=SCENARIOS.get(name, "start-up and steady"), **line
+        )
+        fastest = max(fastest, float(run["motor.w"].max()))
+    w = np.linspace(0.0, 1.15 * fastest, 200)
+    current = np.minimum(motor.limit.i, (motor.limit.v - motor.armature.k * w) / motor.armature.R)
+    axis.plot(
+        w, motor.armature.k * current, color="#777777", linewidth=3.0, alpha=0.6, label="limit of the drive"
+    )
+    axis.set_xlabel("motor speed [rad/s]")
+    axis.set_ylabel("air-gap torque [N m]")
+    axis.set_title("Torque-speed trajectory")
+    axis.set_xlim(left=0.0)
+    axis.legend(loc="center left")
+    return figure
+
+
+def _reactions(study: Study) -> Any:
+    figure, axis = plt.subplots(figsize=(8, 5.5))
+    names = list(study.pins)
+    height = 0.8 / len(names)
+    hatches = ("", "//", "xx", "..")
+    shades = ("#1b1b1b", "#8a8a8a", "#c8c8c8", "#efefef")
+    rows = np.arange(len(PINS))
+    for i, name in enumerate(names):
+        peaks = [study.pins[name][pin]["peak"] for pin in PINS]
+        axis.barh(
+            rows + i * height,
+            peaks,
+            height,
+            label=SCENARIOS.get(name, "steady"),
+            color=shades[i],
+            hatch=hatches[i],
+            edgecolor="#1b1b1b",
+            linewidth=0.6,
+        )
+    axis.set_yticks(rows + 0.4 - height / 2, list(PINS))
+    axis.invert_yaxis()
+    axis.set_xlabel("largest reaction [N]")
+    axis.set_title("What the bearings carry")
+    axis.grid(axis="y", visible=False)
+    axis.legend(loc="lower right")
+    return figure

@@ -1,0 +1,101 @@
+"""The answer on the terminal."""
+
+from __future__ import annotations
+
+import math
+
+from rich.console import Console
+from rich.table import Table
+
+from ..studies.overload import SCENARIOS, Study, unit_of
+
+_SHORT = {
+    "steady": "steady",
+    "right_empties": "right empties",
+    "feed_left": "feed to left",
+    "jam_left": "jam left",
+}
+
+_ROWS = {
+    "crank_torque_peak": "crank torque, peak",
+    "crank_torque_rms": "crank torque, RMS",
+    "crank_torque_mean": "crank torque, mean",
+    "motor_torque_peak": "motor torque, peak",
+    "motor_torque_rms": "motor torque, RMS",
+    "power_peak": "shaft power, peak",
+    "power_mean": "shaft power, mean",
+    "current_peak": "motor current, peak",
+    "current_rms": "motor current, RMS",
+    "rocker_torque_peak": "rocker torque, peak",
+    "speed_dip": "speed dip",
+    "recovery_time": "recovery",
+    "web_pull_least": "least pull in a web",
+    "wall_pull_least": "least pull in a wall",
+}
+
+
+def _number(value: float | None, unit: str) -> str:
+    if value is None:
+        return "not reached"
+    if unit == "1":
+        return f"{100.0 * value:.2f} %"
+    shown = unit.replace(".", " ")
+    return f"{value:.3g} {shown}" if abs(value) < 100.0 else f"{value:.0f} {shown}"
+
+
+def show(study: Study, console: Console) -> None:
+    """Print tables and notes."""
+    config = study.config
+    runs = [name for name in ("steady", *SCENARIOS) if name in study.answers]
+    if runs:
+        table = Table(title=config.title or None, title_justify="left")
+        table.add_column(f"crank at {config.run.crank_speed:g} rad/s")
+        for name in runs:
+            table.add_column(_SHORT[name], justify="right")
+        for key, label in _ROWS.items():
+            cells = [
+                _number(study.answers[n][key], unit_of(key)) if key in study.answers[n] else "" for n in runs
+            ]
+            table.add_row(label, *cells)
+        console.print(table)
+    if study.factors:
+        f = study.factors
+        table = Table(title="Overload factor, left organ alone against both", title_justify="left")
+        table.add_column("way")
+        table.add_column("factor", justify="right")
+        table.add_row("R_left/(R_left - R_right) at the right extreme, at rest", f"{f.static_at_extreme:.3f}")
+        table.add_row("rocker torque, ratio of cycle maxima", f"{f.rocker_torque:.3f}")
+        table.add_row("crank torque, ratio of cycle maxima", f"{f.crank_torque:.3f}")
+        console.print(table)
+    if study.pins:
+        heaviest = {pin: max(t[pin]["peak"] for t in study.pins.values()) for pin in study.pins["steady"]}
+        table = Table(title="What the bearings carry", title_justify="left")
+        for column in ("pin", "steady RMS", "steady peak", "largest peak", "in"):
+            table.add_column(column, justify="left" if column in ("pin", "in") else "right")
+        for pin, steady in study.pins["steady"].items():
+            worst = max(study.pins, key=lambda run: study.pins[run][pin]["peak"])
+            table.add_row(
+                pin,
+                f"{steady['rms']:.0f} N",
+                f"{steady['peak']:.0f} N",
+                f"{heaviest[pin]:.0f} N",
+                _SHORT[worst],
+            )
+        console.print(table)
+    limits = study.limits
+    swing = (math.degrees(limits["rocker_extreme_left"]), math.degrees(limits["rocker_extreme_right"]))
+    console.print(f"Rocker swings from {swing[0]:.3f} to {swing[1]:.3f} deg; margin {limits['margin']:.2f}.")
+    console.print(
+        f"A web first goes slack at {limits['slack_speed']:.2f} rad/s of the crank with this feed "
+        f"({limits['slack_speed_empty']:.2f} rad/s empty); lowest chain mode near "
+        f"{limits['chain_resonance']:.1f} rad/s."
+    )
+    if study.certificate:
+        worst_share = max(c["energy_residual_share"] for c in study.certificate.values())
+        console.print(f"Energy residual of the shaft: at most {worst_share:.1e} of the energy moved.")
+    for name, value in study.certificate.get("start_up", {}).items():
+        if name.endswith("_difference_to_monolithic"):
+            quantity = name.removesuffix("_difference_to_monolithic")
+            console.print(f"Difference of {quantity} to the monolithic solution: {value:.1e} of its peak.")
+    for note in study.notes:
+        console.print(f"[bold]Note:[/bold] {note}")

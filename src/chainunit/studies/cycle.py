@@ -1,0 +1,72 @@
+"""One crank turn at constant speed: what the mechanism asks of the drive, by inverse dynamics."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..machines.api import EMPTY, ChainUnit
+from ..machines.chain_unit import Outputs, SideLoads
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """Outputs of the machine over `angle`, the crank angle [rad], shape (points,)."""
+
+    angle: Any
+    crank_torque: Any
+    """[N m]"""
+    outputs: Outputs
+
+
+def cycle(
+    machine: ChainUnit, crank_speed: float, left: SideLoads, right: SideLoads, points: int = 720
+) -> Cycle:
+    """The machine over a crank turn at constant `crank_speed` [rad/s]."""
+    angle = np.linspace(0.0, 2.0 * math.pi, points, endpoint=False)
+    ratio = machine.p.ratio
+    out = machine.forces(angle * ratio, crank_speed * ratio, 0.0, left, right)
+    return Cycle(angle, out.tau * ratio, out)
+
+
+def without_right(machine: ChainUnit) -> ChainUnit:
+    """The machine with its left organ alone: the papers' one-sided loading."""
+    return machine.replace({"right.wall_mass": 0.0, "right.web_mass": 0.0})
+
+
+@dataclass(frozen=True)
+class OverloadFactors:
+    """How much more one side alone asks than both, three ways; see `overload_factors`."""
+
+    static_at_extreme: float
+    rocker_torque: float
+    crank_torque: float
+
+
+def overload_factors(
+    machine: ChainUnit, crank_speed: float, left: SideLoads, right: SideLoads
+) -> OverloadFactors:
+    """The overload factor of a one-sided machine.
+
+    `static_at_extreme` is the papers' R_left/(R_left - R_right) at the right extreme of the rocker, at rest:
+    it diverges as the swing shrinks, and its value at the extreme is its minimum, so that it is no design
+    factor (docs/physics.md). The other two are ratios of cycle maxima at `crank_speed`, left organ alone to
+    both, of the rocker torque and of the crank torque: gravity and inertia cancel or add up there, and above
+    a certain speed both sides together are the heavier case.
+    """
+    (psi, _), _ = machine.rocker_extremes()
+    static = machine.chamber(psi, 0.0, 0.0, left, right)
+    both = cycle(machine, crank_speed, left, right)
+    alone = cycle(without_right(machine), crank_speed, left, EMPTY)
+
+    def ratio(x: Any, y: Any) -> float:
+        return float(np.max(np.abs(x)) / np.max(np.abs(y)))
+
+    return OverloadFactors(
+        float(static.left.tangential_load / static.rocker.tangential_load),
+        ratio(alone.outputs.rocker.tau, both.outputs.rocker.tau),
+        ratio(alone.crank_torque, both.crank_torque),
+    )

@@ -1,0 +1,402 @@
+"""The main job: start-up, steady running and one-sided overloads of a machine with its motor.
+
+The FMUs are exported, co-simulated, and the answers are read from what they did. Every transient branches
+from the same steady state, saved once.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from .. import __version__
+from ..config import Config
+from ..cosim import Bond, CoSimulation, Profile, System, energy_residual, monolithic, port_connections
+from ..drives.dc_motor import DcMotor
+from ..drives.speed_control import Tuning, tune
+from ..errors import RunError
+from ..fmu.export import export
+from ..machines.api import ChainUnit
+from ..machines.chain_unit import ChamberForces
+from .cycle import OverloadFactors, cycle, overload_factors
+
+PINS = {
+    "O1 crank bearing": "crank_bearing",
+    "A crank pin": "crank_pin",
+    "Bd coupler pin": "coupler_pin",
+    "C rocker pivot": "pivot",
+    "A2 left web at rocker": "left.rocker_joint",
+    "B left hinge": "left.hinge",
+    "A1 left support": "left.support",
+    "A2 right web at rocker": "right.rocker_joint",
+    "B right hinge": "right.hinge",
+    "A1 right support": "right.support",
+}
+
+SCENARIOS = {
+    "right_empties": "the right side empties",
+    "feed_left": "all feed moves to the left",
+    "jam_left": "a lump jams the left side",
+}
+
+Report = Callable[[str, float, float], None]
+"""Called with what is running, the time done and the time to do [s]."""
+
+
+@dataclass
+class Study:
+    """What a study found. `runs` holds a Dataset per co-simulation, `failure` why it stopped early, if it did."""
+
+    config: Config
+    motor: Any
+    tuning: Tuning | None
+    cycles: Any = None
+    factors: OverloadFactors | None = None
+    limits: dict[str, float] = field(default_factory=dict)
+    runs: dict[str, xr.Dataset] = field(default_factory=dict)
+    event: dict[str, float] = field(default_factory=dict)
+    answers: dict[str, dict[str, float | None]] = field(default_factory=dict)
+    pins: dict[str, dict[str, dict[str, float]]] = field(default_factory=dict)
+    certificate: dict[str, dict[str, float]] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    failure: str = ""
+
+
+def run_study(config: Config, folder: Path, report: Report | None = None, *, check: bool = False) -> Study:
+    """Run the study; FMUs are written to ``folder/fmu``.
+
+    With `check`, the start-up and steady running are also compared with the monolithic solution.
+    A run that fails ends the study early: what was computed is in it, and `failure` says why.
+    """
+    motor, tuning = _tuned(config)
+    study = Study(config, motor, tuning)
+    _statics(study)
+    files = {
+        "machine": export(
+            ChamberForces, folder / "fmu" / "ChamberForces.fmu", _named(ChamberForces, config.machine.p)
+        ),
+        "motor": export(DcMotor, folder / "fmu" / "DcMotor.fmu", _named(DcMotor, motor)),
+    }
+    try:
+        _simulate(study, files, report or (lambda what, done, todo: None), check)
+    except RunError as error:
+        if error.partial is not None:
+            study.runs["unfinished"] = error.partial
+        study.failure = str(error)
+    _note(study)
+    return study
+
+
+def _tuned(config: Config) -> tuple[Any, Tuning | None]:
+    """The motor with controller gains tuned to this machine, where the config does not give them."""
+    both = cycle(config.machine, config.run.crank_speed, config.feed.left, config.feed.right)
+    inertia = config.motor.rotor.J + float(np.mean(both.outputs.J))
+    gains = [
+        n for n in DcMotor.parameter_layout.names if n.startswith(("speed_control.", "current_control."))
+    ]
+    if config.motor_given.intersection(gains):
+        return config.motor, None
+    tuning = tune(config.motor.armature, inertia)
+    return DcMotor.parameter_layout.from_names(tuning.parameters, config.motor), tuning
+
+
+def _named(model: Any, p: Any) -> dict[str, float]:
+    return dict(zip(model.parameter_layout.names, model.parameter_layout.values(p), strict=True))
+
+
+def _statics(study: Study) -> None:
+    """What needs no co-simulation: the cycle at constant speed, overload factors, limits of the model."""
+    config = study.config
+    machine, feed, w = config.machine, config.feed, config.run.crank_speed
+    empty_right = type(feed.right)(material_mass=0.0, processing_force=0.0)
+    study.cycles = {
+        "both sides": cycle(machine, w, feed.left, feed.right),
+        "right side empty": cycle(machine, w, feed.left, empty_right),
+        "all feed on the left": cycle(machine, w, _sum(feed.left, feed.right), empty_right),
+    }
+    study.factors = overload_factors(machine, w, feed.left, feed.right)
+    (right, _), (left, _) = machine.rocker_extremes()
+    study.limits = {
+        "slack_speed": machine.slack_speed(feed.left, feed.right),
+        "slack_speed_empty": machine.slack_speed(),
+        # lowest mode of a hanging chain organ of this kind, from the chain model's prototype
+        "chain_resonance": 1.8 * math.sqrt(machine.p.g / machine.p.l1),
+        "rocker_extreme_right": right,
+        "rocker_extreme_left": left,
+        "margin": float(np.min(study.cycles["both sides"].outputs.margin)),
+    }
+
+
+def _sum(one: Any, other: Any) -> Any:
+    return type(one)(
+        material_mass=one.material_mass + other.material_mass,
+        processing_force=one.processing_force + other.processing_force,
+    )
+
+
+def _loads(config: Config) -> dict[str, float]:
+    return {
+        f"machine.{side}.{name}": getattr(getattr(config.feed, side), name)
+        for side in ("left", "right")
+        for name in ("material_mass", "processing_force")
+    }
+
+
+def scenario_signals(config: Config, name: str, at: float) -> dict[str, Any]:
+    """Loads over time in the overload `name` of `SCENARIOS` that begins at time `at` [s]."""
+    normal, o = _loads(config), config.overload
+    signals: dict[str, Any] = dict(normal)
+    if name == "jam_left":
+        force = normal["machine.left.processing_force"]
+        signals["machine.left.processing_force"] = Profile(
+            force,
+            (
+                (at, o.jam_rise, force + o.jam_force),
+                (at + o.jam_rise + o.jam_duration, o.jam_rise, force),
+            ),
+        )
+        return signals
+    for load in ("material_mass", "processing_force"):
+        left, right = normal[f"machine.left.{load}"], normal[f"machine.right.{load}"]
+        signals[f"machine.right.{load}"] = Profile(right, ((at, o.shift, 0.0),))
+        if name == "feed_left":
+            signals[f"machine.left.{load}"] = Profile(left, ((at, o.shift, left + right),))
+    return signals
+
+
+def _simulate(study: Study, files: Mapping[str, Path], report: Report, check: bool) -> None:
+    config, machine = study.config, study.config.machine
+    run = config.run
+    w = run.crank_speed * machine.p.ratio
+    turn = 2.0 * math.pi / run.crank_speed
+    settled = run.ramp + run.settle_turns * turn
+    stop = settled + run.turns * turn
+    follow = config.overload.turns * turn
+    total = stop + len(SCENARIOS) * follow
+    done = 0.0
+
+    reference = Profile(0.0, ((0.0, run.ramp, w),))
+    signals = {**_loads(config), "motor.w_ref": reference}
+    system = System(files, port_connections("machine", "motor"))
+    bond = Bond(
+        "motor",
+        "machine",
+        {f"{side}.material_mass": partial(_energy_per_kg, machine, side) for side in ("left", "right")},
+    )
+    with CoSimulation(system, signals) as simulation:
+        start_up = simulation.run(
+            stop, run.step, partial(_progress, report, "start-up and steady running", 0.0, total)
+        )
+        _certify(study, "start_up", start_up, bond)
+        steady = start_up.sel(time=slice(settled, None))
+        study.answers["steady"] = _answers(study, steady, None, steady)
+        study.pins["steady"] = _pins(steady)
+        start = simulation.save()
+        done = start
+        for name, title in SCENARIOS.items():
+            simulation.restore()
+            simulation.signals = {**scenario_signals(config, name, start), "motor.w_ref": w}
+            transient = simulation.run(
+                start + follow, run.step, partial(_progress, report, title, done - start, total)
+            )
+            done += follow
+            _certify(study, name, transient, bond)
+            study.event[name] = start
+            study.answers[name] = _answers(study, transient, start, steady)
+            study.pins[name] = _pins(transient)
+        if check:
+            report("monolithic reference", total, total)
+            _compare(study, start_up, signals)
+
+
+def _energy_per_kg(machine: ChainUnit, side: str, run: xr.Dataset) -> Any:
+    return machine.energy_per_kg(side, run["machine.phi0"].values, run["machine.w0"].values)
+
+
+def _progress(report: Report, what: str, before: float, todo: float, time: float) -> None:
+    report(what, before + time, todo)
+
+
+def _certify(study: Study, name: str, run: xr.Dataset, bond: Bond) -> None:
+    run["residual"], share = energy_residual(run, bond)
+    study.runs[name] = run
+    study.certificate[name] = {"energy_residual_share": share}
+
+
+def _compare(study: Study, run: xr.Dataset, signals: Mapping[str, Any]) -> None:
+    models = {"machine": (ChamberForces, study.config.machine.p), "motor": (DcMotor, study.motor)}
+    times = run["time"].values[::10]
+    reference = monolithic(
+        models,
+        port_connections("machine", "motor", slopes=False),
+        signals,
+        times,
+        corners=signals["motor.w_ref"].corners,
+    )
+    for name in ("machine.tau", "motor.w"):
+        difference = np.abs(run[name].values[::10] - reference[name].values)
+        study.certificate["start_up"][f"{name}_difference_to_monolithic"] = float(
+            np.max(difference) / np.max(np.abs(reference[name].values))
+        )
+
+
+def _answers(
+    study: Study, run: xr.Dataset, event: float | None, steady: xr.Dataset
+) -> dict[str, float | None]:
+    """The numbers of one run, in SI units; speeds and torques of the crank unless the name says motor."""
+    ratio = study.config.machine.p.ratio
+    w_ref = study.config.run.crank_speed
+    crank_torque = run["machine.tau"].values * ratio
+    motor_torque = run["motor.air_gap_tau"].values
+    speed = run["motor.w"].values / ratio
+    power = run["machine.power"].values
+    time = run["time"].values
+
+    def rms(x: Any) -> float:
+        return float(np.sqrt(np.mean(x * x)))
+
+    pulls = np.minimum(run["machine.left.web_pull"].values, run["machine.right.web_pull"].values)
+    walls = np.minimum(run["machine.left.wall_pull"].values, run["machine.right.wall_pull"].values)
+    answers: dict[str, float | None] = {
+        "crank_torque_peak": float(np.max(np.abs(crank_torque))),
+        "crank_torque_rms": rms(crank_torque),
+        "crank_torque_mean": float(np.mean(crank_torque)),
+        "motor_torque_peak": float(np.max(np.abs(motor_torque))),
+        "motor_torque_rms": rms(motor_torque),
+        "power_peak": float(np.max(power)),
+        "power_mean": float(np.mean(power)),
+        "supply_power_mean": float(np.mean(run["motor.supply_power"].values)),
+        "current_peak": float(np.max(np.abs(run["motor.armature.i"].values))),
+        "current_rms": rms(run["motor.armature.i"].values),
+        "winding_temperature": float(run["motor.armature.T"].values[-1]),
+        "rocker_torque_peak": float(np.max(np.abs(run["machine.rocker.tau"].values))),
+        "web_pull_least": float(np.min(pulls)),
+        "wall_pull_least": float(np.min(walls)),
+        "speed_least": float(np.min(speed)),
+        "speed_dip": float((w_ref - np.min(speed)) / w_ref),
+    }
+    if event is not None:
+        answers["recovery_time"] = _recovery(time - event, speed, steady["motor.w"].values / ratio, w_ref)
+    return answers
+
+
+def _recovery(since: Any, speed: Any, steady: Any, w_ref: float) -> float | None:
+    """Time after the event from which the speed stays in the band of steady running, widened by 0.5 %; None if
+    it does not return in the time followed, or only at its very end."""
+    widening = 0.005 * w_ref
+    outside = (speed < np.min(steady) - widening) | (speed > np.max(steady) + widening)
+    if not outside.any():
+        return 0.0
+    last = int(np.flatnonzero(outside)[-1])
+    return float(since[last]) if last < len(since) - len(since) // 10 else None
+
+
+def _pins(run: xr.Dataset) -> dict[str, dict[str, float]]:
+    """Peak and RMS of the reaction of every pin [N]."""
+    table = {}
+    for title, name in PINS.items():
+        size = np.hypot(run[f"machine.{name}.fx"].values, run[f"machine.{name}.fy"].values)
+        table[title] = {"peak": float(np.max(size)), "rms": float(np.sqrt(np.mean(size**2)))}
+    return table
+
+
+def _note(study: Study) -> None:
+    """What the reader has to know beside the numbers."""
+    config, limits, note = study.config, study.limits, study.notes.append
+    relative = config.run.crank_speed / limits["chain_resonance"]
+    if config.source == "packaged example":
+        note("Masses, pins, feed and drive are assumed; the papers print none.")
+    note(
+        "Friction is smoothed: at rest nothing sticks, so that the torque to break away from a loaded "
+        "stop is not in the start-up."
+    )
+    # two bars against a chain of many rods, on this organ: docs/physics.md
+    if relative > 0.31:
+        note(
+            "A chain has a mode that two bars lack: the rocker torque of two bars is good to 10 % only up "
+            f"to about {0.31 * limits['chain_resonance']:.1f} rad/s of the crank"
+            + (", the crank torque up to about twice that." if relative > 0.65 else ".")
+        )
+    for name, answers in study.answers.items():
+        title = SCENARIOS.get(name, "steady running")
+        pull, current = answers["web_pull_least"], answers["current_peak"]
+        if pull is not None and pull < 0.0:
+            note(
+                f"{title}: web pull down to {pull:.0f} N; a chain cannot push, it would go slack and snatch."
+            )
+        if current is not None and current > 0.999 * study.motor.limit.i:
+            note(f"{title}: the motor runs into its current limit of {study.motor.limit.i:g} A.")
+        if "recovery_time" in answers and answers["recovery_time"] is None:
+            note(f"{title}: the speed does not return to its steady band within the time followed.")
+
+
+UNITS = {
+    "torque": "N.m",
+    "power": "W",
+    "current": "A",
+    "temperature": "K",
+    "pull": "N",
+    "speed": "rad/s",
+    "resonance": "rad/s",
+    "extreme": "rad",
+    "dip": "1",
+    "margin": "1",
+    "time": "s",
+}
+
+
+def unit_of(name: str) -> str:
+    """The unit of an answer or limit, from its name."""
+    return next(unit for part in reversed(name.split("_")) if (unit := UNITS.get(part)))
+
+
+def as_dict(study: Study) -> dict[str, Any]:
+    """Everything but the time series, ready for JSON: each number with its unit."""
+    config = study.config
+
+    def with_units(values: Mapping[str, float | None]) -> dict[str, Any]:
+        return {
+            name: {
+                "value": None if value is None or not math.isfinite(value) else value,
+                "unit": unit_of(name),
+            }
+            for name, value in values.items()
+        }
+
+    def declared(model: Any, instance: Any) -> dict[str, Any]:
+        layout = model.parameter_layout
+        return {
+            v.name: {"value": value, "unit": v.unit}
+            for v, value in zip(layout.variables, layout.values(instance), strict=True)
+        }
+
+    return {
+        "chainunit": __version__,
+        "title": config.title,
+        "source": config.source,
+        "status": f"failed: {study.failure}" if study.failure else "complete",
+        "answers": {name: with_units(values) for name, values in study.answers.items()},
+        "overload_factors": asdict(study.factors) if study.factors else None,
+        "limits": with_units(study.limits),
+        "pins": {
+            run: {
+                pin: {k: {"value": v, "unit": "N"} for k, v in sizes.items()} for pin, sizes in table.items()
+            }
+            for run, table in study.pins.items()
+        },
+        "certificate": study.certificate,
+        "control": asdict(study.tuning) if study.tuning else "gains given",
+        "notes": study.notes,
+        "machine": declared(ChamberForces, config.machine.p),
+        "motor": declared(DcMotor, study.motor),
+        "feed": asdict(config.feed),
+        "run": asdict(config.run),
+        "overload": asdict(config.overload),
+    }
