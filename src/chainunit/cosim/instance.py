@@ -47,7 +47,8 @@ class Fmu:
 class Instance:
     """A running instance; every failing call becomes a `RunError` that cites what the FMU logged."""
 
-    def __init__(self, fmu: Fmu, name: str) -> None:
+    def __init__(self, fmu: Fmu, name: str, journal: list[str] | None = None) -> None:
+        """`journal` takes what the FMU says, for several instances in the order in which they said it."""
         from fmpy import calloc, free
         from fmpy import fmi2 as api
 
@@ -59,6 +60,8 @@ class Instance:
             if message and status > 0:
                 text = message.decode(errors="replace")
                 self.messages.append(text)
+                if journal is not None:
+                    journal.append(f"{name}: {text}")
                 log.warning("%s: %s", name, text)
 
         self._callbacks = api.fmi2CallbackFunctions()

@@ -48,13 +48,14 @@ class CoSimulation:
         self._fmus: dict[str, Fmu] = {}
         self._instances: dict[str, Instance] = {}
         self._state: dict[str, Any] = {}
+        self._journal: list[str] = []
         try:
             files: dict[Any, Fmu] = {}
             for name, file in system.fmus.items():
                 if file not in files:
                     files[file] = Fmu(file)
                 self._fmus[name] = files[file]
-                self._instances[name] = Instance(files[file], name)
+                self._instances[name] = Instance(files[file], name, self._journal)
             self._transfers = self._schedule(system)
             self._starts = self._split_names(system.start)
             self.signals = dict(signals or {})
@@ -214,9 +215,11 @@ class CoSimulation:
         self._transfer()
         record(0)
         every = max(1, n // 200)
-        done = 0
+        done = said = before = 0
         try:
             for k in range(n):
+                # what leads to a failure may have been said while the values for this step were set
+                said, before = before, len(self._journal)
                 t, after = float(times[k]), float(times[k + 1])
                 middle = 0.5 * (t + after)
                 if varying and (self._changes(t, middle) or self._changes(middle, after)):
@@ -233,8 +236,11 @@ class CoSimulation:
                 if progress and done % every == 0:
                     progress(self.time)
         except RunError as error:
-            error.partial = self._dataset(times[: done + 1], table[: done + 1], recorders)
-            raise
+            # the call that fails may only pass on what another FMU complained of before
+            first = f" (before: {self._journal[said]})" if len(self._journal) > said + 1 else ""
+            failed = RunError(f"{error}{first}")
+            failed.partial = self._dataset(times[: done + 1], table[: done + 1], recorders)
+            raise failed from error
         if progress:
             progress(self.time)
         return self._dataset(times, table, recorders)

@@ -27,17 +27,17 @@ _T_RATED = 293.15  # K, where R is given
 class Armature:
     """The winding."""
 
-    R: Value = quantity("Ohm", "resistance at 20 degC", default=4.5, above=0.0, tunable=True)
-    L: Value = quantity("H", "inductance", default=0.06, above=0.0)
+    R: Value = quantity("Ohm", "resistance at 20 degC", default=9.5, above=0.0, tunable=True)
+    L: Value = quantity("H", "inductance", default=0.11, above=0.0)
     k: Value = quantity(
         "N.m/A", "torque constant, also the back-EMF constant in V.s/rad", default=1.27, above=0.0
     )
     alpha: Value = quantity(
         "1/K", "rise of the resistance with temperature", default=0.00393, min=0.0, tunable=True
     )
-    C: Value = quantity("J/K", "heat capacity", default=3000.0, above=0.0)
+    C: Value = quantity("J/K", "heat capacity", default=2000.0, above=0.0)
     R_th: Value = quantity(
-        "K/W", "thermal resistance to the surroundings", default=0.6, above=0.0, tunable=True
+        "K/W", "thermal resistance to the surroundings", default=0.9, above=0.0, tunable=True
     )
 
 
@@ -45,7 +45,7 @@ class Armature:
 class Rotor:
     """The rotor."""
 
-    J: Value = quantity("kg.m2", "inertia", default=0.006, above=0.0)
+    J: Value = quantity("kg.m2", "inertia", default=0.0035, above=0.0)
     d: Value = quantity("N.m.s/rad", "viscous friction and windage", default=0.001, min=0.0, tunable=True)
 
 
@@ -53,7 +53,7 @@ class Rotor:
 class Limit:
     """What the converter can give."""
 
-    i: Value = quantity("A", "largest armature current", default=8.4, above=0.0, tunable=True)
+    i: Value = quantity("A", "largest armature current", default=4.4, above=0.0, tunable=True)
     v: Value = quantity("V", "largest armature voltage", default=240.0, above=0.0, tunable=True)
 
 
@@ -61,16 +61,16 @@ class Limit:
 class SpeedControl:
     """Speed to current reference."""
 
-    kp: Value = quantity("A.s/rad", "proportional gain", default=0.1654, above=0.0, tunable=True)
-    ki: Value = quantity("A/rad", "integral gain", default=0.9922, min=0.0, tunable=True)
+    kp: Value = quantity("A.s/rad", "proportional gain", default=0.1017, above=0.0, tunable=True)
+    ki: Value = quantity("A/rad", "integral gain", default=0.6102, min=0.0, tunable=True)
 
 
 @declaration
 class CurrentControl:
     """Current to voltage, beside the feed-forward of the back-EMF."""
 
-    kp: Value = quantity("Ohm", "proportional gain", default=18.0, above=0.0, tunable=True)
-    ki: Value = quantity("Ohm/s", "integral gain", default=1350.0, min=0.0, tunable=True)
+    kp: Value = quantity("Ohm", "proportional gain", default=33.0, above=0.0, tunable=True)
+    ki: Value = quantity("Ohm/s", "integral gain", default=2850.0, min=0.0, tunable=True)
 
 
 @declaration
@@ -82,7 +82,7 @@ class Ambient:
 
 @declaration
 class Parameters:
-    """Parameters of the motor. The start values are a typical 0.75 kW, 1500 rev/min, 220 V machine."""
+    """Parameters of the motor. The start values are a typical 0.37 kW, 1500 rev/min, 220 V machine."""
 
     armature: Armature = group(Armature, "armature", default=Armature())
     rotor: Rotor = group(Rotor, "rotor", default=Rotor())

@@ -1,7 +1,7 @@
 """Tuning of a cascaded speed control, checked with python-control.
 
 Current loop: PI whose zero cancels the armature pole R/L, so that its open loop is w_c/s. Speed loop: PI on
-the integrator k/(J s) behind the closed current loop; crossover a tenth of w_c, zero a fifth below that.
+the integrator k/(J s) behind the closed current loop; crossover a tenth of w_c, zero at a fifth of that.
 """
 
 from __future__ import annotations
@@ -25,10 +25,11 @@ class Tuning:
     """[rad/s]"""
 
 
-def tune(armature: Any, inertia: float, bandwidth: float = 300.0) -> Tuning:
+def tune(armature: Any, inertia: float, bandwidth: float = 300.0, crossover_share: float = 0.1) -> Tuning:
     """Gains for a motor with this `armature` (R, L, k) on a total `inertia` at its shaft [kg m2].
 
-    `bandwidth` is the crossover of the current loop [rad/s]. The phase margin is that of the whole speed
+    `bandwidth` is the crossover of the current loop [rad/s], `crossover_share` that of the speed loop in
+    relation to it. The phase margin is that of the whole speed
     loop, the current loop included.
 
     Raises
@@ -44,13 +45,13 @@ def tune(armature: Any, inertia: float, bandwidth: float = 300.0) -> Tuning:
     # the feed-forward of the back-EMF leaves the armature circuit alone as plant
     current_open = control.minreal((current_kp + current_ki / s) / (L * s + R), verbose=False)
     current = control.feedback(current_open, 1)
-    crossover = bandwidth / 10.0
+    crossover = bandwidth * crossover_share
     kp = inertia * crossover / k
     ki = kp * crossover / 5.0
     opened = (kp + ki / s) * current * k / (inertia * s)
     _, phase, _, at = control.margin(opened)
     if not phase > 45.0:
-        raise InputError(f"speed loop: phase margin {phase:.0f} deg, must be > 45 deg; lower the bandwidth")
+        raise InputError(f"speed loop: phase margin {phase:.0f} deg, must be > 45 deg; lower crossover_share")
     gains = {
         "speed_control.kp": kp,
         "speed_control.ki": ki,

@@ -64,7 +64,6 @@ class ChainUnit:
         mu: float,
         zeta: float,
         parameters: Mapping[str, float] | None = None,
-        /,
         *,
         l: float = 1.5,
         l1: float = 1.35,
@@ -158,43 +157,36 @@ class ChainUnit:
         return extremes[0], extremes[1]
 
     def least_web_pull(
-        self, w: float, left: SideLoads = EMPTY, right: SideLoads = EMPTY, points: int = 720
-    ) -> float:
-        """The least pull in both webs [N] over a crank turn at constant motor speed `w`."""
-        from scipy.optimize import minimize_scalar
-
-        turn = 2.0 * math.pi * self.p.ratio
-
-        def pull(phi: Any) -> Any:
-            out = self.forces(phi, w, 0.0, left, right)
-            return np.minimum(out.left.web_pull, out.right.web_pull)
-
-        grid = np.linspace(0.0, turn, points, endpoint=False)
-        lowest = grid[int(np.argmin(pull(grid)))]
-        step = turn / points
-        refined = minimize_scalar(
-            lambda phi: float(pull(phi)), bounds=(lowest - step, lowest + step), method="bounded"
-        )
-        return min(float(refined.fun), float(pull(lowest)))
+        self, w: Any, left: SideLoads = EMPTY, right: SideLoads = EMPTY, points: int = 720
+    ) -> Any:
+        """The least pull in both webs [N] over `points` angles of a crank turn at constant motor speed `w`,
+        for each speed given."""
+        phi = np.linspace(0.0, 2.0 * math.pi * self.p.ratio, points, endpoint=False)
+        out = self.forces(phi, np.asarray(w, float)[..., None], 0.0, left, right)
+        return np.min(np.minimum(out.left.web_pull, out.right.web_pull), axis=-1)
 
     def slack_speed(
         self, left: SideLoads = EMPTY, right: SideLoads = EMPTY, highest: float = 1000.0
     ) -> float:
-        """Crank speed [rad/s] at which a web loses its pull somewhere in the turn; 0 if it has none at
-        rest, infinity if it keeps it up to `highest`. Above it two rigid bars are no model of a chain."""
+        """Lowest crank speed [rad/s] at which a web loses its pull somewhere in the turn; 0 if it has none at
+        rest, infinity if it keeps it up to `highest`. Beyond, two rigid bars are no model of a chain."""
         from scipy.optimize import brentq
 
-        def pull(w_crank: float) -> float:
-            return self.least_web_pull(w_crank * self.p.ratio, left, right)
+        def pull(crank_speed: Any) -> Any:
+            return self.least_web_pull(crank_speed * self.p.ratio, left, right)
 
-        if pull(0.0) <= 0.0:
+        low, high = 0.0, 1.0
+        if pull(low) <= 0.0:
             return 0.0
-        high = 1.0
-        while pull(high) > 0.0:
-            high *= 2.0
-            if high > highest:
-                return math.inf
-        return float(brentq(pull, 0.5 * high if high > 1.0 else 0.0, high, xtol=1e-6))
+        while low < highest:
+            # the pull may fall and rise again with the speed: look for the first loss, not for any
+            speeds = np.linspace(low, high, 33)
+            lost = np.flatnonzero(pull(speeds) <= 0.0)
+            if lost.size:
+                i = int(lost[0])
+                return float(brentq(pull, speeds[i - 1], speeds[i], xtol=1e-9))
+            low, high = high, 2.0 * high
+        return math.inf
 
 
 def ratios(rho: float, lam: float, mu: float, zeta: float, l: float, l1: float) -> dict[str, float]:

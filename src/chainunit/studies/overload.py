@@ -40,6 +40,9 @@ PINS = {
     "A1 right support": "right.support",
 }
 
+LEAD = 0.25
+"""Crank turns of steady running that a transient shows before its event."""
+
 SCENARIOS = {
     "right_empties": "the right side empties",
     "feed_left": "all feed moves to the left",
@@ -178,8 +181,8 @@ def _simulate(study: Study, files: Mapping[str, Path], report: Report, check: bo
     turn = 2.0 * math.pi / run.crank_speed
     settled = run.ramp + run.settle_turns * turn
     stop = settled + run.turns * turn
-    follow = config.overload.turns * turn
-    total = stop + len(SCENARIOS) * follow
+    lead, follow = LEAD * turn, config.overload.turns * turn
+    total = stop + len(SCENARIOS) * (lead + follow)
     done = 0.0
 
     reference = Profile(0.0, ((0.0, run.ramp, w),))
@@ -199,18 +202,20 @@ def _simulate(study: Study, files: Mapping[str, Path], report: Report, check: bo
         study.answers["steady"] = _answers(study, steady, None, steady)
         study.pins["steady"] = _pins(steady)
         start = simulation.save()
+        event = start + lead
         done = start
         for name, title in SCENARIOS.items():
             simulation.restore()
-            simulation.signals = {**scenario_signals(config, name, start), "motor.w_ref": w}
+            simulation.signals = {**scenario_signals(config, name, event), "motor.w_ref": w}
             transient = simulation.run(
-                start + follow, run.step, partial(_progress, report, title, done - start, total)
+                event + follow, run.step, partial(_progress, report, title, done - start, total)
             )
-            done += follow
+            done += lead + follow
             _certify(study, name, transient, bond)
-            study.event[name] = start
-            study.answers[name] = _answers(study, transient, start, steady)
-            study.pins[name] = _pins(transient)
+            study.event[name] = event
+            transient_only = transient.sel(time=slice(event, None))
+            study.answers[name] = _answers(study, transient_only, event, steady)
+            study.pins[name] = _pins(transient_only)
         if check:
             report("monolithic reference", total, total)
             _compare(study, start_up, signals)

@@ -1,0 +1,118 @@
+# %% [markdown]
+# Cost of a step
+#
+# Microseconds of one kernel call under `math` (a point) and `numpy` (per point of an array), and of one FMU
+# step through fmpy, measured side by side in one run. For scale: an empty `fmi2DoStep` of the same FMU, which
+# is the importer's and pythonfmu's own overhead, and the floor of what any Python FMU can do.
+
+# %%
+from __future__ import annotations
+
+import tempfile
+import timeit
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from chainunit import ChainUnit, engines
+from chainunit.cosim.instance import Fmu, Instance
+from chainunit.drives.dc_motor import DcMotor
+from chainunit.fmu.export import export
+from chainunit.integrate import rk4
+from chainunit.machines.chain_unit import ChamberForces
+
+
+def cost(call, number: int = 1000, repeat: int = 5) -> float:
+    """The least time of a call [us] over `repeat` rounds."""
+    return 1e6 * min(timeit.repeat(call, number=number, repeat=repeat)) / number
+
+
+def main() -> None:
+    p = ChainUnit().p
+    u = ChamberForces.Inputs(phi=0.5, w=6.0, a=1.0)
+    outputs, slopes = (part.equations for part in ChamberForces.parts)
+    rows: list[tuple[str, float]] = []
+
+    def kernel(xp, inputs, *parts):
+        shared = ChamberForces.shared(xp, p, inputs, None)
+        for part in parts:
+            part(xp, p, inputs, None, shared)
+
+    by_math = cost(lambda: kernel(engines.MATH, u, outputs))
+    rows.append(("kernel, all outputs but slopes, math, one point", by_math))
+    rows.append(
+        ("kernel, all outputs, math, one point", cost(lambda: kernel(engines.MATH, u, outputs, slopes)))
+    )
+    xp = engines.numpy_()
+    scalar = ChamberForces.Inputs(phi=np.float64(0.5), w=np.float64(6.0), a=np.float64(1.0))
+    rows.append(
+        ("kernel, all outputs but slopes, numpy, one point", cost(lambda: kernel(xp, scalar, outputs), 200))
+    )
+    n = 10_000
+    many = ChamberForces.Inputs(phi=np.linspace(0.0, 6.0, n), w=6.0, a=1.0)
+    rows.append(
+        (
+            "kernel, all outputs but slopes, numpy, per point of 10,000",
+            cost(lambda: kernel(xp, many, outputs), 5) / n,
+        )
+    )
+    rows.append(
+        (
+            "kernel, all outputs, numpy, per point of 10,000",
+            cost(lambda: kernel(xp, many, outputs, slopes), 5) / n,
+        )
+    )
+    motor, layout = DcMotor.Parameters(), DcMotor.state_layout
+    x, at = layout.values(DcMotor.initial_states(motor)), DcMotor.Inputs(w_ref=100.0)
+    rows.append(
+        (
+            "motor, step of 1 ms (4 internal), math",
+            cost(
+                lambda: rk4(
+                    lambda y: DcMotor.derivatives(engines.MATH, motor, at, layout.instance(y)),
+                    x, 1e-3, DcMotor.internal_step,
+                )
+            ),
+        )
+    )  # fmt: skip
+
+    with tempfile.TemporaryDirectory() as folder:
+        fmu = Fmu(export(ChamberForces, Path(folder) / "ChamberForces.fmu"))
+        unit = Instance(fmu, "unit")
+        unit.initialize({}, 0.0)
+        unit.finish_initialization()
+        inputs = unit.handle(["phi", "w", "a"])
+        port = unit.handle(["tau_bias", "J", "dJ_dphi", "tau_bias_dphi", "tau_bias_dw"])
+        everything = unit.handle(fmu.outputs())
+        without = unit.handle([n for n in fmu.outputs() if n not in ("tau_bias_dphi", "tau_bias_dw")])
+        state = [0.0]
+
+        def step(handle):
+            state[0] += 1e-3
+            unit.write(inputs, (state[0], 6.0, 1.0))
+            unit.step(state[0], 1e-3)
+            if handle:
+                unit.read(handle)
+
+        empty = cost(lambda: unit.step(0.0, 1e-3))
+        rows.append(("FMU through fmpy, an empty step", empty))
+        rows.append(("FMU, set three inputs + step", cost(lambda: step(None))))
+        rows.append(("FMU, set + step + get all but slopes", cost(lambda: step(without))))
+        rows.append(("FMU, set + step + get the load port", cost(lambda: step(port))))
+        rows.append(("FMU, set + step + get all outputs", cost(lambda: step(everything))))
+        unit.close()
+        fmu.close()
+
+    table = Table(title="Cost of a step", title_justify="left")
+    table.add_column("what")
+    table.add_column("us", justify="right")
+    table.add_column("to the math kernel", justify="right")
+    for what, time in rows:
+        table.add_row(what, f"{time:.3g}", f"{time / by_math:.3g}")
+    Console(width=110).print(table)
+
+
+if __name__ == "__main__":
+    main()

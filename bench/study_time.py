@@ -1,0 +1,34 @@
+# %% [markdown]
+# The whole study from a cold start
+#
+# Wall-clock time of ``chainunit study`` in a new process with an empty bytecode cache; the limit set for it is
+# 60 s on two cores. Beside it, the time of a process that only imports the package.
+
+# %%
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+
+
+def run(*command: str, folder: str) -> float:
+    env = os.environ | {"PYTHONPYCACHEPREFIX": folder}
+    began = time.perf_counter()
+    subprocess.run([sys.executable, *command], check=True, capture_output=True, cwd=folder, env=env)
+    return time.perf_counter() - began
+
+
+def main() -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        importing = run("-c", "import chainunit", folder=folder)
+    with tempfile.TemporaryDirectory() as folder:
+        study = run("-m", "chainunit.cli", "study", folder=folder)
+    print(f"import chainunit, cold: {importing:.1f} s")
+    print(f"chainunit study, cold:  {study:.1f} s of 60 s allowed ({study / importing:.0f} times the import)")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,201 @@
+"""Co-simulation against the monolithic solution, energy, and the master's own duties."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from chainunit import ChainUnit, InputError, RunError, SideLoads
+from chainunit.cosim import Bond, CoSimulation, Profile, System, energy_residual, monolithic, port_connections
+from chainunit.drives.dc_motor import DcMotor
+from chainunit.machines.chain_unit import ChamberForces
+
+RATIO, SPEED = 50.0, 6.0
+FEED = SideLoads()
+BOND = Bond("motor", "machine")
+
+
+def system(fmus, *, slopes=True, **start):
+    files = {"machine": fmus["ChamberForces"], "motor": fmus["DcMotor"]}
+    begin = {"machine.ratio": RATIO, "motor.w_start": RATIO * SPEED / 2.0} | start
+    return System(files, port_connections("machine", "motor", slopes=slopes), begin)
+
+
+@pytest.fixture(scope="module")
+def reference():
+    models = {
+        "machine": (ChamberForces, ChainUnit(ratio=RATIO).p),
+        "motor": (DcMotor, DcMotor.parameter_layout.from_names({"w_start": RATIO * SPEED / 2.0})),
+    }
+    connections = port_connections("machine", "motor", slopes=False)
+    return monolithic(
+        models, connections, {"motor.w_ref": RATIO * SPEED / 2.0}, np.arange(0.0, 0.6001, 0.004)
+    )
+
+
+def error(run, reference, name):
+    every = round(0.004 / float(run["time"][1] - run["time"][0]))
+    return float(np.max(np.abs(run[name].values[::every] - reference[name].values)))
+
+
+def test_second_order_with_slopes_first_without(fmus, reference):
+    orders = {}
+    for slopes in (True, False):
+        errors = []
+        for step in (0.004, 0.002):
+            with CoSimulation(
+                system(fmus, slopes=slopes), {"motor.w_ref": RATIO * SPEED / 2.0}
+            ) as simulation:
+                errors.append(error(simulation.run(0.6, step), reference, "machine.tau"))
+        orders[slopes] = np.log2(errors[0] / errors[1])
+    assert orders[True] == pytest.approx(2.0, abs=0.1)
+    assert orders[False] == pytest.approx(1.0, abs=0.1)
+
+
+def test_every_row_belongs_to_one_instant(fmus):
+    """tau = J a + tau_bias of the recorded row, the motor's shaft torque the machine's, angles the same."""
+    with CoSimulation(system(fmus), {"motor.w_ref": 150.0}) as simulation:
+        run = simulation.run(0.05, 0.001)
+    m, d = (lambda n: run[f"machine.{n}"].values), (lambda n: run[f"motor.{n}"].values)
+    np.testing.assert_array_equal(m("phi0"), d("phi"))
+    np.testing.assert_array_equal(m("w0"), d("w"))
+    np.testing.assert_allclose(m("J") * d("a") + m("tau_bias"), m("tau"), rtol=1e-12)
+    np.testing.assert_allclose(d("tau"), m("tau"), rtol=1e-12)
+
+
+def test_python_api_gives_the_recorded_outputs(fmus):
+    with CoSimulation(system(fmus), {"motor.w_ref": 150.0}) as simulation:
+        run = simulation.run(0.02, 0.001)
+    out = ChainUnit(ratio=RATIO).forces(
+        run["motor.phi"].values, run["motor.w"].values, run["motor.a"].values, FEED, FEED
+    )
+    np.testing.assert_allclose(run["machine.tau"].values, out.tau, rtol=1e-9)
+    np.testing.assert_allclose(run["machine.left.support.fx"].values, out.left.support.fx, rtol=1e-9)
+    assert run["machine.tau"].attrs["units"] == "N.m" and run["machine.tau"].attrs["long_name"]
+
+
+def test_energy_residual_with_friction_processing_and_feed(fmus):
+    """Mass flows from right to left while the machine runs: the feed's energy closes the balance."""
+    machine = ChainUnit(ratio=RATIO)
+
+    def per_kg(side):
+        return lambda run: machine.energy_per_kg(side, run["machine.phi0"].values, run["machine.w0"].values)
+
+    fed = Bond("motor", "machine", {f"{s}.material_mass": per_kg(s) for s in ("left", "right")})
+    signals = {
+        "motor.w_ref": 150.0,
+        "machine.left.material_mass": Profile(30.0, ((0.1, 0.3, 55.0),)),
+        "machine.right.material_mass": Profile(30.0, ((0.1, 0.3, 0.0),)),
+        "machine.left.processing_force": Profile(100.0, ((0.2, 0.05, 800.0), (0.35, 0.05, 100.0))),
+    }
+    shares, without = [], []
+    for step in (0.002, 0.001):
+        with CoSimulation(system(fmus), signals) as simulation:
+            run = simulation.run(0.8, step)
+        shares.append(energy_residual(run, fed)[1])
+        without.append(energy_residual(run, BOND)[1])
+    assert shares[1] < 2e-5 and shares[1] < shares[0] / 3.0
+    assert without[1] > 100.0 * shares[1]
+
+
+def test_varying_loads_act_to_second_order(fmus):
+    """A load that changes within the step acts with its value at the middle of the step."""
+    profile = Profile(0.0, ((0.05, 0.2, 900.0),))
+    models = {
+        "machine": (ChamberForces, ChainUnit(ratio=RATIO).p),
+        "motor": (DcMotor, DcMotor.parameter_layout.from_names({"w_start": RATIO * SPEED / 2.0})),
+    }
+    signals = {"motor.w_ref": 150.0, "machine.left.processing_force": profile}
+    times = np.arange(0.0, 0.3001, 0.004)
+    exact = monolithic(
+        models, port_connections("machine", "motor", slopes=False), signals, times, corners=profile.corners
+    )
+    errors = []
+    for step in (0.004, 0.002):
+        with CoSimulation(system(fmus), signals) as simulation:
+            errors.append(error(simulation.run(0.3, step), exact, "motor.w"))
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.25)
+
+
+def test_stable_with_a_light_rotor(fmus):
+    """Rotor inertia 1/50 of the machine's largest J, driven directly."""
+    J = float(np.max(ChainUnit().forces(np.linspace(0.0, 6.3, 400), 0.0, 0.0, FEED, FEED).J))
+    light = {
+        "machine.ratio": 1.0,
+        "motor.rotor.J": J / 50.0,
+        "motor.armature.k": 60.0,
+        "motor.armature.R": 20.0,
+        "motor.armature.L": 0.3,
+        "motor.limit.i": 10.0,
+        "motor.limit.v": 800.0,
+        "motor.speed_control.kp": 1.0,
+        "motor.speed_control.ki": 5.0,
+        "motor.current_control.kp": 90.0,
+        "motor.current_control.ki": 6000.0,
+        "motor.w_start": SPEED,
+    }
+    with CoSimulation(system(fmus, **light), {"motor.w_ref": SPEED}) as simulation:
+        run = simulation.run(2.0, 0.004)
+    own = {n.removeprefix("motor."): v for n, v in light.items() if n.startswith("motor.")}
+    models = {
+        "machine": (ChamberForces, ChainUnit().p),
+        "motor": (DcMotor, DcMotor.parameter_layout.from_names(own)),
+    }
+    exact = monolithic(
+        models, port_connections("machine", "motor", slopes=False), {"motor.w_ref": SPEED}, run["time"].values
+    )
+    assert error(run, exact, "motor.w") < 5e-4 * SPEED
+    assert energy_residual(run, BOND)[1] < 1e-3
+
+
+def test_going_on_and_branching(fmus):
+    signals = {"motor.w_ref": 150.0}
+    with CoSimulation(system(fmus), signals) as simulation:
+        whole = simulation.run(0.04, 0.001)
+    with CoSimulation(system(fmus), signals) as simulation:
+        simulation.run(0.02, 0.001)
+        simulation.save()
+        first = simulation.run(0.04, 0.001)
+        simulation.restore()
+        simulation.signals = {"motor.w_ref": 100.0}
+        other = simulation.run(0.04, 0.001)
+        simulation.restore()
+        simulation.signals = signals
+        again = simulation.run(0.04, 0.001)
+    np.testing.assert_allclose(first["motor.w"].values, whole["motor.w"].values[20:], rtol=1e-12)
+    xr.testing.assert_identical(first, again)
+    assert abs(float(other["motor.w"][-1] - first["motor.w"][-1])) > 1e-3
+
+
+def test_a_failing_run_keeps_what_it_computed(fmus):
+    signals = {"motor.w_ref": lambda t: 150.0 if t < 0.0105 else float("nan")}
+    with CoSimulation(system(fmus), signals) as simulation:
+        with pytest.raises(RunError, match=r"step at t = 0\.011 s .*motor: input w_ref = nan") as caught:
+            simulation.run(0.05, 0.001)
+    partial = caught.value.partial
+    assert 10 <= len(partial["time"]) <= 12
+    assert np.all(np.isfinite(partial["motor.w"].values))
+
+
+def test_wrong_names_and_loops_are_named(fmus):
+    files = {"machine": fmus["ChamberForces"], "motor": fmus["DcMotor"]}
+    with pytest.raises(InputError, match=r"machine.speed: no such input"):
+        CoSimulation(System(files, [("motor.w", "machine.speed")]))
+    with pytest.raises(InputError, match=r"motor.phi: no such input"):
+        CoSimulation(System(files, [("motor.w", "motor.phi")]))
+    with pytest.raises(InputError, match=r"gearbox.w: no such output"):
+        CoSimulation(System(files, [("gearbox.w", "machine.w")]))
+    # torque and acceleration exchanged directly: what the load port is there to avoid
+    with pytest.raises(InputError, match=r"algebraic loop: .*machine.tau.*load port"):
+        CoSimulation(System(files, [("motor.a", "machine.a"), ("machine.tau", "motor.load.tau_bias")]))
+
+
+def test_profile():
+    profile = Profile(1.0, ((1.0, 0.5, 3.0), (2.0, 1.0, 0.0)))
+    np.testing.assert_allclose(
+        profile(np.array([0.0, 1.0, 1.25, 1.5, 2.0, 2.5, 9.0])), [1, 1, 2, 3, 3, 1.5, 0]
+    )
+    assert profile(1.25) == 2.0 and profile.corners == [1.0, 1.5, 2.0, 3.0]
+    with pytest.raises(ValueError, match=r"change at t = 1.2 s"):
+        Profile(0.0, ((1.0, 0.5, 3.0), (1.2, 1.0, 0.0)))

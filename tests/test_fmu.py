@@ -1,0 +1,340 @@
+"""The FMUs through fmpy, and the traps of pythonfmu."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+import textwrap
+import zipfile
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.validation import validate_fmu
+from test_reference import POINTS, deviation
+
+from chainunit import ChainUnit, GeometryError, InputError, RunError
+from chainunit.cosim.instance import Fmu, Instance
+from chainunit.fmu.description import Interface
+from chainunit.fmu.export import export
+from chainunit.machines.chain_unit import ChamberForces
+from chainunit.models import MODELS
+
+
+class Running:
+    """An initialised instance, closed at the end of a with-block."""
+
+    def __init__(self, fmu: Fmu, start=None):
+        self.instance = Instance(fmu, "unit")
+        self.instance.initialize(start or {}, 0.0)
+        self.instance.finish_initialization()
+
+    def __enter__(self):
+        return self.instance
+
+    def __exit__(self, *_):
+        self.instance.close()
+
+
+@pytest.fixture(scope="module")
+def chamber(fmus):
+    fmu = Fmu(fmus["ChamberForces"])
+    yield fmu
+    fmu.close()
+
+
+@pytest.fixture(scope="module")
+def motor(fmus):
+    fmu = Fmu(fmus["DcMotor"])
+    yield fmu
+    fmu.close()
+
+
+@pytest.mark.parametrize("point", POINTS, ids=lambda p: p["name"])
+def test_reference_points(chamber, point):
+    inputs = {name: 0.0 for name, v in chamber.variables.items() if v.causality == "input"}
+    with Running(chamber, point["parameters"]) as unit:
+        unit.set([*(inputs | point["inputs"])], [*(inputs | point["inputs"]).values()])
+        unit.step(0.0, 1e-3)
+        got = dict(zip(point["outputs"], unit.get(list(point["outputs"])), strict=True))
+    assert {n for n, v in chamber.variables.items() if v.causality == "output"} == set(point["outputs"])
+    worst = {name: deviation(got[name], wanted) for name, wanted in point["outputs"].items()}
+    assert max(worst.values()) < 1e-9, max(worst.items(), key=lambda kv: kv[1])
+
+
+def test_fmpy_validate_is_silent(fmus):
+    for file in fmus.values():
+        assert validate_fmu(str(file)) == []
+        command = [sys.executable, "-m", "fmpy", "validate", str(file)]
+        done = subprocess.run(command, capture_output=True, text=True)
+        assert (done.returncode, done.stderr) == (0, "") and done.stdout.strip() == "No problems found."
+
+
+def test_variables_are_those_of_the_design(fmus):
+    description = fmpy.read_model_description(str(fmus["ChamberForces"]))
+    names = {v.name for v in description.modelVariables if v.causality == "parameter"}
+    assert names == {
+        *("r", "l", "h", "c", "hy", "e", "l1", "l2", "z", "g", "ratio", "web_share", "rod_inertia"),
+        *(f"{rod}.{x}" for rod in ("crank", "coupler", "rocker") for x in ("m", "s", "I")),
+        *(f"{side}.{x}" for side in ("left", "right") for x in ("wall_mass", "web_mass")),
+        *("pin.friction", "pin.diameter", "pin.w_smooth", "joint_damping", "processing.v_smooth"),
+    }
+    fixed = {v.name for v in description.modelVariables if v.variability == "fixed"}
+    assert fixed == {"r", "l", "h", "c", "hy", "e", "l1", "l2", "z", "ratio", "rod_inertia"}
+    for v in description.modelVariables:
+        assert v.unit and v.description, v.name
+
+
+def test_dependencies_are_true(fmus):
+    """A dependency that is missing would be a wrong loop analysis; one too many, a loop that is none."""
+    rng = np.random.default_rng(1)
+    interface = Interface(ChamberForces, {})
+    names = [s.name for s in interface.of("input")]
+    offset = len(interface.parameters)
+    machine = ChainUnit({"joint_damping": 1.0, "ratio": 3.0, "web_share": 0.4})
+    declared = {
+        s.name: {names[i - offset] for i in known}
+        for s, (known, _) in zip(interface.of("output"), interface.dependencies, strict=True)
+    }
+    seen = {name: set() for name in declared}
+    for _ in range(5):
+        base = dict(zip(names, rng.uniform(0.5, 20.0, len(names)), strict=True))
+        before = machine.evaluate(base)
+        for name in names:
+            after = machine.evaluate(base | {name: base[name] * 1.01})
+            for output, value in after.items():
+                # a change, not the rounding of a sum taken in another way
+                if abs(value - before[output]) > 1e-11 * (1.0 + abs(before[output])):
+                    seen[output].add(name)
+    assert seen == declared
+
+
+def test_same_model_same_file(fmus, tmp_path):
+    for name, model in MODELS.items():
+        again = export(model, tmp_path / "again.fmu")
+        assert again.read_bytes() == fmus[name].read_bytes()
+    other = export(ChamberForces, tmp_path / "other.fmu", {"r": 0.14})
+    guids = {fmpy.read_model_description(str(f)).guid for f in (other, fmus["ChamberForces"])}
+    assert len(guids) == 2
+
+
+def test_two_versions_in_one_process_do_not_share_code(fmus, tmp_path):
+    """Trap: helper modules of the same name silently share the first FMU's code."""
+    other = Fmu(export(ChamberForces, tmp_path / "other.fmu", {"r": 0.10, "crank.m": 0.0}))
+    one = Fmu(fmus["ChamberForces"])
+    with Running(one) as a, Running(other) as b:
+        for unit in (a, b):
+            unit.set(["phi", "w", "a"], [1.0, 2.0, 3.0])
+            unit.step(0.0, 0.1)
+        got = [unit.get(["tau"])[0] for unit in (a, b)]
+    loads = {f"{side}.material_mass": 30.0 for side in ("left", "right")}
+    want = [
+        ChainUnit(p).evaluate({"phi": 1.0, "w": 2.0, "a": 3.0, **loads})["tau"]
+        for p in ({}, {"r": 0.10, "crank.m": 0.0})
+    ]
+    assert got == pytest.approx([float(w) for w in want], rel=1e-12)
+    one.close()
+    other.close()
+
+
+def test_runs_twice_and_side_by_side(fmus):
+    for _ in range(3):
+        for file in fmus.values():
+            result = fmpy.simulate_fmu(str(file), stop_time=0.01, output_interval=0.001)
+            assert all(math.isfinite(x) for x in result[-1])
+
+
+def test_two_instances_do_not_disturb_each_other(chamber):
+    with Running(chamber) as a, Running(chamber) as b:
+        a.set(["phi"], [0.5])
+        b.set(["phi"], [2.5])
+        a.step(0.0, 0.1)
+        b.step(0.0, 0.1)
+        first = a.get(["tau", "rocker.psi"])
+        assert first != b.get(["tau", "rocker.psi"])
+        b.set(["phi"], [0.5])
+        assert b.get(["tau", "rocker.psi"]) == first
+
+
+def test_many_instances_in_one_process(chamber):
+    """pythonfmu 0.7 gives up a reference of the module at each instantiation: the third one used to crash."""
+    for k in range(60):
+        with Running(chamber) as unit:
+            unit.set(["phi"], [0.1 * k])
+            assert math.isfinite(unit.get(["tau"])[0])
+
+
+def test_process_ends_cleanly(fmus):
+    """pythonfmu 0.7 releases its interpreter handle twice at exit; now and then that aborted the host."""
+    script = textwrap.dedent(
+        """
+        import sys, fmpy
+        for _ in range(3):
+            for file in sys.argv[1:]:
+                fmpy.simulate_fmu(file, stop_time=0.01, output_interval=0.001)
+        junk = [[bytearray(120) for _ in range(50)] for _ in range(50)]
+        print("done")
+        """
+    )
+    for _ in range(3):
+        files = [str(f) for f in fmus.values()]
+        done = subprocess.run([sys.executable, "-c", script, *files], capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        assert done.stdout.strip() == "done"
+
+
+def test_needs_only_the_standard_library(fmus, tmp_path):
+    """The slave in a Python without site-packages, as pythonfmu calls it."""
+    for name, file in fmus.items():
+        with zipfile.ZipFile(file) as archive:
+            archive.extractall(tmp_path / name)
+        resources = tmp_path / name / "resources"
+        module = (resources / "slavemodule.txt").read_text()
+        script = f"""
+import sys, json
+sys.path.insert(0, {str(resources)!r})
+module = __import__({module!r})
+unit = getattr(module, {name!r})(instance_name="unit", resources={str(resources)!r})
+unit.enter_initialization_mode(); unit.exit_initialization_mode()
+ok = unit.do_step(0.0, 0.01)
+count = {len(fmpy.read_model_description(str(file)).modelVariables)}
+values = unit.get_real(list(range(count)))
+foreign = [m for m in sys.modules if m.split(".")[0] in ("numpy", "casadi", "fmpy", "pydantic")]
+print(json.dumps([ok, all(v == v for v in values), foreign]))
+"""
+        done = subprocess.run([sys.executable, "-I", "-S", "-c", script], capture_output=True, text=True)
+        assert json.loads(done.stdout) == [True, True, []], done.stderr
+
+
+def test_geometry_that_cannot_turn_gives_nan_and_a_reason(chamber):
+    with Running(chamber, {"r": 0.9}) as unit:
+        assert all(math.isnan(v) for v in unit.get(["tau", "J", "tau_bias_dphi"]))
+        with pytest.raises(RunError, match=r"r = 0\.9 m: the crank cannot turn .* r must be < 0\.703"):
+            unit.step(0.0, 0.1)
+
+
+def test_bad_input_gives_nan_not_stale_numbers(chamber):
+    with Running(chamber) as unit:
+        unit.set(["phi"], [0.5])
+        good = unit.get(["tau"])
+        unit.set(["w"], [math.nan])
+        assert math.isnan(unit.get(["tau"])[0])
+        with pytest.raises(RunError, match="input w = nan: must be a finite number"):
+            unit.step(0.0, 0.1)
+        unit.set(["w"], [3.0])
+        assert unit.get(["tau"]) == good
+        unit.step(0.0, 0.1)
+        assert len(unit.messages) == 1
+
+
+def test_fixed_and_tunable_parameters(chamber):
+    with Running(chamber) as unit:
+        unit.set(["phi", "a"], [0.5, 1.0])
+        before = unit.get(["tau", "r", "crank.m"])
+        unit.set(["r"], [0.12])
+        assert unit.get(["tau", "r", "crank.m"]) == before
+        assert "r is fixed" in unit.messages[-1]
+        unit.set(["crank.m"], [0.0])
+        after = unit.get(["tau", "r", "crank.m"])
+        assert after[0] != before[0] and after[2] == 0.0
+        unit.set(["crank.m"], [-1.0])
+        assert unit.get(["crank.m"]) == [0.0] and "crank.m = -1 kg" in unit.messages[-1]
+
+
+def test_reset(chamber):
+    with Running(chamber) as unit:
+        unit.set(["phi"], [0.5])
+        unit._fmi.reset()
+        unit.initialize({"r": 0.14}, 0.0)
+        unit.finish_initialization()
+        loads = {f"{side}.material_mass": 30.0 for side in ("left", "right")}
+        want = ChainUnit(r=0.14).evaluate({"w": 3.0, **loads})["tau"]
+        assert unit.get(["r", "tau"]) == pytest.approx([0.14, float(want)], rel=1e-12)
+
+
+def test_slopes_are_evaluated_only_when_asked_for(fmus, tmp_path, monkeypatch):
+    with zipfile.ZipFile(fmus["ChamberForces"]) as archive:
+        archive.extractall(tmp_path)
+    resources = tmp_path / "resources"
+    monkeypatch.syspath_prepend(str(resources))
+    module = __import__((resources / "slavemodule.txt").read_text())
+    unit = module.ChamberForces(instance_name="unit", resources=str(resources))
+    unit.enter_initialization_mode()
+    unit.exit_initialization_mode()
+    calls = []
+    for i, part in enumerate(unit.model.parts):
+        equations = part.equations
+        monkeypatch.setattr(part, "equations", lambda *a, f=equations, i=i: (calls.append(i), f(*a))[1])
+    references = {s.name: s.reference for s in Interface(ChamberForces, {}).signals}
+    unit.get_real([references["tau"], references["J"]])
+    unit.get_real([references["pivot.fx"]])
+    assert calls == [0]
+    unit.get_real([references["tau_bias_dw"]])
+    unit.get_real([references["tau_bias_dphi"]])
+    assert calls == [0, 1]
+    unit.set_real([references["phi"]], [1.0])
+    unit.get_real([references["tau"]])
+    assert calls == [0, 1, 0]
+
+
+def test_state_is_saved_and_serialised(motor):
+    names = [n for n, v in motor.variables.items() if v.causality == "output"]
+    with Running(motor, {"w_ref": 50.0}) as unit:
+        unit.step(0.0, 0.01)
+        state = unit.state()
+        kept = unit.get(names)
+        unit.step(0.01, 0.05)
+        later = unit.get(names)
+        assert later != kept
+        unit.restore(state)
+        assert unit.get(names) == kept
+        raw = unit._fmi.serializeFMUstate(state)
+        unit.step(0.01, 0.05)
+        assert unit.get(names) == later
+        unit.restore(unit._fmi.deSerializeFMUstate(raw))
+        assert unit.get(names) == kept
+        unit.forget(state)
+
+
+def test_variable_communication_step(motor):
+    """Equal end, whatever the steps: the internal integrator's error is far below."""
+    ends = []
+    for steps in ([0.1], [0.01] * 10, [0.03, 0.0001, 0.0499, 0.02]):
+        with Running(motor, {"w_ref": 40.0}) as unit:
+            t = 0.0
+            for h in steps:
+                unit.step(t, h)
+                t += h
+            ends.append(unit.get(["phi", "w", "armature.i"]))
+    assert ends[1] == pytest.approx(ends[0], rel=1e-7)
+    assert ends[2] == pytest.approx(ends[0], rel=1e-7)
+
+
+def test_export_refuses_bad_start_values(tmp_path):
+    file = tmp_path / "x.fmu"
+    with pytest.raises(GeometryError, match="the crank cannot turn"):
+        export(ChamberForces, file, {"r": 0.9})
+    with pytest.raises(InputError, match=r"crank\.m = -1 kg: must be >= 0 kg"):
+        export(ChamberForces, file, {"crank.m": -1.0})
+    with pytest.raises(InputError, match=r"left.material_mass = nan kg"):
+        export(ChamberForces, file, {"left.material_mass": math.nan})
+    with pytest.raises(KeyError, match="no parameter or input 'q'"):
+        export(ChamberForces, file, {"q": 1.0})
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_export_leaves_the_process_as_it_was(tmp_path):
+    path, modules = list(sys.path), set(sys.modules)
+    export(ChamberForces, tmp_path / "x.fmu")
+    assert sys.path == path
+    assert not [m for m in set(sys.modules) - modules if m.startswith(("chainunit_", "ChamberForces_"))]
+
+
+def test_no_scaffold_in_the_file(fmus):
+    names = zipfile.ZipFile(fmus["ChamberForces"]).namelist()
+    assert "modelDescription.xml" in names and "resources/modelDescription.xml" not in names
+    assert not [n for n in names if "__pycache__" in n or "\\" in n]
+    assert all(Path(n).suffix in (".py", ".txt", ".xml", ".so", ".dll") for n in names)

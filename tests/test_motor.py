@@ -1,0 +1,121 @@
+"""The DC motor: energy, limits, limit cases."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from chainunit import engines
+from chainunit.config import load
+from chainunit.drives.dc_motor import DcMotor
+from chainunit.drives.speed_control import tune
+from chainunit.errors import InputError
+from chainunit.integrate import rk4
+from chainunit.studies.overload import _tuned
+
+LAYOUT = DcMotor.state_layout
+
+
+def outputs(p, u, x):
+    return DcMotor.evaluate(engines.MATH, p, u, x)[0]
+
+
+def run(p, u, stop, longest=DcMotor.internal_step):
+    x = LAYOUT.values(DcMotor.initial_states(p))
+    return LAYOUT.instance(
+        rk4(lambda y: DcMotor.derivatives(engines.MATH, p, u, LAYOUT.instance(y)), x, stop, longest)
+    )
+
+
+def parameters(**values):
+    return DcMotor.parameter_layout.from_names({k.replace("__", "."): v for k, v in values.items()})
+
+
+def inputs(**values):
+    return DcMotor.input_layout.from_names({k.replace("__", "."): v for k, v in values.items()})
+
+
+def test_electric_power_is_accounted_for():
+    """v i = heat + magnetic energy + air-gap power, and that is kinetic energy, losses and load."""
+    p, u = parameters(), inputs(w_ref=100.0, load__tau_bias=0.5, load__J=0.002)
+    x = LAYOUT.instance([0.3, 40.0, 2.0, 320.0, 0.4, 1.0, 0.0])
+    out = outputs(p, u, x)
+    d = dict(zip(LAYOUT.names, DcMotor.derivatives(engines.MATH, p, u, x), strict=True))
+    magnetic = p.armature.L * x.armature.i * d["armature.i"]
+    assert out.supply_power == pytest.approx(out.heat + magnetic + out.air_gap_tau * x.w, rel=1e-12)
+    rotor = p.rotor.J * out.a * x.w + p.rotor.d * x.w**2
+    assert out.air_gap_tau * x.w == pytest.approx(rotor + d["load_energy"], rel=1e-12)
+    assert d["load_energy"] == pytest.approx((0.5 + 0.002 * out.a) * x.w, rel=1e-12)
+
+
+def test_steady_state_is_the_hand_calculation():
+    p = parameters(armature__alpha=0.0)
+    x = run(p, inputs(w_ref=100.0, load__tau_bias=1.0), 8.0)
+    i = (1.0 + p.rotor.d * 100.0) / p.armature.k
+    assert x.w == pytest.approx(100.0, rel=1e-6)
+    assert x.armature.i == pytest.approx(i, rel=1e-6)
+    out = outputs(p, inputs(w_ref=100.0, load__tau_bias=1.0), x)
+    assert out.v == pytest.approx(p.armature.k * 100.0 + p.armature.R * i, rel=1e-6)
+
+
+def test_current_and_voltage_limits_hold_and_do_not_wind_up():
+    gains = tune(DcMotor.Parameters().armature, 0.05 + DcMotor.Parameters().rotor.J).parameters
+    p, u = DcMotor.parameter_layout.from_names(gains), inputs(w_ref=100.0, load__tau_bias=1.0, load__J=0.05)
+    x, currents, voltages, speeds = LAYOUT.values(DcMotor.initial_states(p)), [], [], []
+    for _ in range(3000):
+        x = rk4(lambda y: DcMotor.derivatives(engines.MATH, p, u, LAYOUT.instance(y)), x, 1e-3, 2.5e-4)
+        s = LAYOUT.instance(x)
+        currents.append(s.armature.i)
+        speeds.append(s.w)
+        voltages.append(outputs(p, u, s).v)
+    assert max(currents) < p.limit.i * 1.02 and max(currents) > p.limit.i * 0.95
+    assert max(np.abs(voltages)) <= p.limit.v
+    assert max(speeds) < 110.0
+    assert speeds[-1] == pytest.approx(100.0, rel=1e-2)
+
+
+def test_blocked_motor_heats_as_the_closed_form():
+    p = parameters(armature__alpha=0.0, armature__C=50.0)
+    u = inputs(w_ref=100.0, load__tau_bias=0.0, load__J=1e9)
+    x = run(p, u, 20.0, 1e-3)
+    heat = p.armature.R * p.limit.i**2
+    tau = p.armature.R_th * p.armature.C
+    rise = heat * p.armature.R_th * (1.0 - math.exp(-20.0 / tau))
+    assert pytest.approx(rise, rel=5e-3) == x.armature.T - p.ambient.T
+
+
+def test_internal_integrator_against_an_error_controlled_solver():
+    p, u = parameters(), inputs(w_ref=100.0, load__tau_bias=0.5, load__J=0.002)
+    x0 = LAYOUT.values(DcMotor.initial_states(p))
+    exact = solve_ivp(
+        lambda t, y: DcMotor.derivatives(engines.MATH, p, u, LAYOUT.instance(y)),
+        (0.0, 0.3), x0, method="Radau", rtol=1e-11, atol=1e-12,
+    ).y[:, -1]  # fmt: skip
+    got = LAYOUT.values(run(p, u, 0.3))
+    np.testing.assert_allclose(got, exact, rtol=1e-5, atol=1e-6)
+
+
+def test_declared_gains_are_the_tuned_ones_of_the_packaged_drive():
+    config = load()
+    tuned, tuning = _tuned(config)
+    declared = DcMotor.Parameters()
+    for name in ("kp", "ki"):
+        assert getattr(declared.speed_control, name) == pytest.approx(
+            getattr(tuned.speed_control, name), rel=1e-3
+        )
+        assert getattr(declared.current_control, name) == pytest.approx(
+            getattr(tuned.current_control, name), rel=1e-3
+        )
+    assert tuning.phase_margin > 60.0
+
+
+def test_tuning_scales_with_inertia_and_refuses_a_loop_without_margin():
+    arm = DcMotor.Parameters().armature
+    one, two = tune(arm, 0.004), tune(arm, 0.008)
+    assert two.parameters["speed_control.kp"] == pytest.approx(2.0 * one.parameters["speed_control.kp"])
+    assert one.crossover == pytest.approx(30.0, rel=0.05)
+    with pytest.raises(InputError, match="phase margin"):
+        tune(arm, 0.004, crossover_share=1.0)

@@ -1,0 +1,181 @@
+"""The main job end to end, by the command line."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import xarray as xr
+from fmpy.validation import validate_fmu
+
+from chainunit import EMPTY, ChainUnit, SideLoads
+from chainunit.studies.cycle import cycle, overload_factors, without_right
+
+SHORT = """
+[run]
+ramp = 0.3
+settle_turns = 0.2
+turns = 1
+step = 0.004
+crank_speed = 6
+[overload]
+turns = 0.5
+[machine]
+ratio = 50
+"""
+
+
+def chainunit(*arguments, cwd):
+    return subprocess.run(
+        [sys.executable, "-m", "chainunit.cli", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        env=os.environ | {"COLUMNS": "120"},
+    )
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study")
+    (folder / "short.toml").write_text(SHORT)
+    result = chainunit("study", "short.toml", "-o", "out dir", "--check", cwd=folder)
+    assert result.returncode == 0, result.stderr
+    return result, folder / "out dir"
+
+
+def test_study_writes_numbers_series_plots_and_fmus(done):
+    result, folder = done
+    names = {p.name for p in folder.iterdir()}
+    assert names == {"result.json", "result.nc", "fmu"} | {
+        f"{n}.png" for n in ("torque_angle", "overload_time", "torque_speed", "reactions", "start_up")
+    }
+    for name in ("ChamberForces", "DcMotor"):
+        assert validate_fmu(str(folder / "fmu" / f"{name}.fmu")) == []
+    for word in (
+        "crank torque, peak",
+        "Overload factor",
+        "What the bearings carry",
+        "Energy residual",
+        "Note:",
+    ):
+        assert word in result.stdout
+
+
+def test_study_numbers_are_those_of_the_series(done):
+    _, folder = done
+    numbers = json.loads((folder / "result.json").read_text())
+    assert numbers["status"] == "complete"
+    with xr.open_datatree(folder / "result.nc") as tree:
+        assert set(tree.children) == {"start_up", "right_empties", "feed_left", "jam_left"}
+        for name in ("right_empties", "feed_left", "jam_left"):
+            run = tree[name].to_dataset()
+            event = run["time"].values[0] + 0.25 * 2 * math.pi / 6.0
+            after = run.sel(time=slice(event, None))
+            peak = float(np.max(np.abs(after["machine.tau"]))) * 50.0
+            assert numbers["answers"][name]["crank_torque_peak"] == {
+                "value": pytest.approx(peak),
+                "unit": "N.m",
+            }
+            pivot = float(np.max(np.hypot(after["machine.pivot.fx"], after["machine.pivot.fy"])))
+            assert numbers["pins"][name]["C rocker pivot"]["peak"]["value"] == pytest.approx(pivot)
+            assert run["machine.tau"].attrs["units"] == "N.m"
+        right = tree["right_empties"]["machine.right.material_mass"].values
+        assert right[0] == 30.0 and right[-1] == 0.0
+        assert tree["feed_left"]["machine.left.material_mass"].values[-1] == 60.0
+        assert float(tree["jam_left"]["machine.left.processing_force"].max()) == pytest.approx(2000.0)
+
+
+def test_study_certifies_itself(done):
+    numbers = json.loads((done[1] / "result.json").read_text())
+    shares = [c["energy_residual_share"] for c in numbers["certificate"].values()]
+    assert len(shares) == 4 and max(shares) < 2e-3
+    start_up = numbers["certificate"]["start_up"]
+    assert start_up["machine.tau_difference_to_monolithic"] < 1e-2
+    # a start in 0.3 s at 4 ms; 6.9e-5 at 2 ms and 1.8e-5 at 1 ms
+    assert start_up["motor.w_difference_to_monolithic"] < 5e-4
+
+
+def test_bad_input_ends_with_2_in_one_line_and_writes_nothing(tmp_path):
+    (tmp_path / "bad.toml").write_text("[machine]\ncrank = { m = -3 }")
+    for arguments in (
+        ("study", "bad.toml", "-o", "out"),
+        ("study", "missing.toml", "-o", "out"),
+        ("export", "ChainMill", "-o", "out/x.fmu"),
+        ("export", "ChamberForces", "--config", "bad.toml", "-o", "out/x.fmu"),
+        ("study", "-o", "bad.toml"),
+    ):
+        result = chainunit(*arguments, cwd=tmp_path)
+        assert result.returncode == 2, result.stderr
+        assert result.stdout == "" and len(result.stderr.strip().splitlines()) == 1
+        assert "Traceback" not in result.stderr
+    assert {p.name for p in tmp_path.iterdir()} == {"bad.toml"}
+    assert "machine.crank.m = -3 kg: must be >= 0 kg" in chainunit("study", "bad.toml", cwd=tmp_path).stderr
+
+
+def test_a_run_that_fails_keeps_what_it_computed(tmp_path, monkeypatch):
+    from chainunit import config
+    from chainunit.cosim.instance import Instance
+    from chainunit.report import files, plots
+    from chainunit.studies.overload import run_study
+
+    step = Instance.step
+
+    def fails_late(self, time, h):
+        if time > 1.7 and self.name == "motor":
+            from chainunit import RunError
+
+            raise RunError("motor: step at t = 1.7 s ended with status 3: it broke")
+        step(self, time, h)
+
+    monkeypatch.setattr(Instance, "step", fails_late)
+    study = run_study(config.parse(SHORT), tmp_path)
+    assert "it broke" in study.failure and "start_up" in study.runs and "unfinished" in study.runs
+    files.write(study, tmp_path)
+    plots.write(study, tmp_path)
+    assert json.loads((tmp_path / "result.json").read_text())["status"].startswith("failed: motor: step")
+    with xr.open_datatree(tmp_path / "result.nc") as tree:
+        assert {"start_up", "unfinished"} <= set(tree.children)
+
+
+def test_export_with_a_config_burns_the_start_values_in(tmp_path):
+    import fmpy
+
+    (tmp_path / "mine.toml").write_text('[machine]\nr = "140 mm"\n[feed]\nleft = { material_mass = 12 }')
+    result = chainunit("export", "ChamberForces", "--config", "mine.toml", "-o", "a b/x.fmu", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    starts = {
+        v.name: v.start for v in fmpy.read_model_description(str(tmp_path / "a b" / "x.fmu")).modelVariables
+    }
+    assert float(starts["r"]) == 0.14 and float(starts["left.material_mass"]) == 12.0
+
+
+def test_overload_factors_are_the_erratas():
+    """Errata, paper 000, item 14b: left alone to both, cycle maxima; uniform rods, no drive masses."""
+    bare = {f"{body}.{x}": 0.0 for body in ("crank", "coupler", "rocker") for x in ("m", "I")}
+    machine = ChainUnit.from_ratios(0.1, 2 / 3, 0.6, 0.5, bare | {"pin.friction": 0.0})
+    rocker, crank = {}, {}
+    for speed in (1e-6, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 20.0, 50.0):
+        factors = overload_factors(machine, speed, EMPTY, EMPTY)
+        rocker[speed], crank[speed] = factors.rocker_torque, factors.crank_torque
+    wanted = {1e-6: (1.36, 1.9), 5.0: (3.1, 5.3), 10.0: (0.50, 0.80), 20.0: (0.63, 0.53), 50.0: (0.66, 0.57)}
+    for speed, (on_rocker, on_crank) in wanted.items():
+        assert rocker[speed] == pytest.approx(on_rocker, abs=0.055 if on_rocker > 2 else 0.006)
+        assert crank[speed] == pytest.approx(on_crank, abs=0.055 if on_crank > 1.5 else 0.006)
+    assert rocker[6.0] > 1.0 > rocker[7.0]
+    assert crank[8.0] > 1.0 > crank[9.0]
+
+
+def test_cycle_and_the_side_that_is_gone():
+    machine = ChainUnit(ratio=7.0)
+    loads = SideLoads(material_mass=10.0, processing_force=0.0)
+    c = cycle(machine, 3.0, loads, EMPTY)
+    out = machine.forces(7.0 * c.angle[100], 21.0, 0.0, loads, EMPTY)
+    assert c.crank_torque[100] == pytest.approx(7.0 * float(out.tau))
+    alone = cycle(without_right(machine), 3.0, loads, EMPTY)
+    assert np.all(alone.outputs.right.tangential_load == 0.0)
