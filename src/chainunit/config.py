@@ -62,7 +62,10 @@ class Run:
 class Overload:
     """The one-sided overloads."""
 
-    turns: Value = quantity("1", "crank turns that are followed after the event", default=2.5, min=0.5)
+    turns: Value = quantity("1", "crank turns that are followed after the event", default=2.0, min=1.0)
+    crank_angle: Value = quantity(
+        "rad", "crank angle at which the event begins; at 0 the rocker is at its fastest", default=0.0
+    )
     shift: Value = quantity("s", "time in which material leaves or changes sides", default=0.3, above=0.0)
     jam_force: Value = quantity(
         "N", "processing force of a lump that jams the left organ", default=2000.0, min=0.0

@@ -40,9 +40,6 @@ PINS = {
     "A1 right support": "right.support",
 }
 
-LEAD = 0.25
-"""Crank turns of steady running that a transient shows before its event."""
-
 SCENARIOS = {
     "right_empties": "the right side empties",
     "feed_left": "all feed moves to the left",
@@ -180,9 +177,10 @@ def _simulate(study: Study, files: Mapping[str, Path], report: Report, check: bo
     w = run.crank_speed * machine.p.ratio
     turn = 2.0 * math.pi / run.crank_speed
     settled = run.ramp + run.settle_turns * turn
-    stop = settled + run.turns * turn
-    lead, follow = LEAD * turn, config.overload.turns * turn
-    total = stop + len(SCENARIOS) * (lead + follow)
+    # a little more than asked, so that a dip in speed does not cost a whole turn
+    stop = settled + (run.turns + 0.1) * turn
+    follow = (config.overload.turns + 0.1) * turn
+    total = stop + len(SCENARIOS) * (turn + follow)
     done = 0.0
 
     reference = Profile(0.0, ((0.0, run.ramp, w),))
@@ -202,7 +200,9 @@ def _simulate(study: Study, files: Mapping[str, Path], report: Report, check: bo
         study.answers["steady"] = _answers(study, steady, None, steady)
         study.pins["steady"] = _pins(steady)
         start = simulation.save()
+        lead = _lead(config, float(start_up["motor.phi"].values[-1]) / machine.p.ratio)
         event = start + lead
+        total = stop + len(SCENARIOS) * (lead + follow)
         done = start
         for name, title in SCENARIOS.items():
             simulation.restore()
@@ -219,6 +219,14 @@ def _simulate(study: Study, files: Mapping[str, Path], report: Report, check: bo
         if check:
             report("monolithic reference", total, total)
             _compare(study, start_up, signals)
+
+
+def _lead(config: Config, angle: float) -> float:
+    """Time of steady running until the crank next stands at the event's angle, at least an eighth of a turn [s]."""
+    ahead = (config.overload.crank_angle - angle) % (2.0 * math.pi)
+    if ahead < 0.25 * math.pi:
+        ahead += 2.0 * math.pi
+    return ahead / config.run.crank_speed
 
 
 def _energy_per_kg(machine: ChainUnit, side: str, run: xr.Dataset) -> Any:
@@ -255,7 +263,10 @@ def _compare(study: Study, run: xr.Dataset, signals: Mapping[str, Any]) -> None:
 def _answers(
     study: Study, run: xr.Dataset, event: float | None, steady: xr.Dataset
 ) -> dict[str, float | None]:
-    """The numbers of one run, in SI units; speeds and torques of the crank unless the name says motor."""
+    """The numbers of one run, in SI units; speeds and torques of the crank unless the name says motor.
+
+    Means and RMS are over whole turns of the crank.
+    """
     ratio = study.config.machine.p.ratio
     w_ref = study.config.run.crank_speed
     crank_torque = run["machine.tau"].values * ratio
@@ -264,20 +275,27 @@ def _answers(
     power = run["machine.power"].values
     time = run["time"].values
 
+    turned = (run["motor.phi"].values - run["motor.phi"].values[0]) / (2.0 * math.pi * ratio)
+    # over anything but whole turns, the mean of a cyclic torque means nothing
+    whole = turned <= max(1.0, math.floor(turned[-1]))
+
+    def mean(x: Any) -> float:
+        return float(np.mean(x[whole]))
+
     def rms(x: Any) -> float:
-        return float(np.sqrt(np.mean(x * x)))
+        return math.sqrt(mean(x * x))
 
     pulls = np.minimum(run["machine.left.web_pull"].values, run["machine.right.web_pull"].values)
     walls = np.minimum(run["machine.left.wall_pull"].values, run["machine.right.wall_pull"].values)
     answers: dict[str, float | None] = {
         "crank_torque_peak": float(np.max(np.abs(crank_torque))),
         "crank_torque_rms": rms(crank_torque),
-        "crank_torque_mean": float(np.mean(crank_torque)),
+        "crank_torque_mean": mean(crank_torque),
         "motor_torque_peak": float(np.max(np.abs(motor_torque))),
         "motor_torque_rms": rms(motor_torque),
         "power_peak": float(np.max(power)),
-        "power_mean": float(np.mean(power)),
-        "supply_power_mean": float(np.mean(run["motor.supply_power"].values)),
+        "power_mean": mean(power),
+        "supply_power_mean": mean(run["motor.supply_power"].values),
         "current_peak": float(np.max(np.abs(run["motor.armature.i"].values))),
         "current_rms": rms(run["motor.armature.i"].values),
         "winding_temperature": float(run["motor.armature.T"].values[-1]),
@@ -285,6 +303,7 @@ def _answers(
         "web_pull_least": float(np.min(pulls)),
         "wall_pull_least": float(np.min(walls)),
         "speed_least": float(np.min(speed)),
+        "speed_mean": mean(speed),
         "speed_dip": float((w_ref - np.min(speed)) / w_ref),
     }
     if event is not None:
@@ -328,6 +347,12 @@ def _note(study: Study) -> None:
             "A chain has a mode that two bars lack: the rocker torque of two bars is good to 10 % only up "
             f"to about {0.31 * limits['chain_resonance']:.1f} rad/s of the crank"
             + (", the crank torque up to about twice that." if relative > 0.65 else ".")
+        )
+    reached = study.answers.get("steady", {}).get("speed_mean")
+    if reached is not None and abs(reached - config.run.crank_speed) > 0.01 * config.run.crank_speed:
+        note(
+            f"steady running: the crank turns at {reached:.3g} rad/s in place of {config.run.crank_speed:g} rad/s; "
+            "the motor's voltage or current is at its limit, or the run is too short to settle."
         )
     for name, answers in study.answers.items():
         title = SCENARIOS.get(name, "steady running")
@@ -390,6 +415,7 @@ def as_dict(study: Study) -> dict[str, Any]:
         "answers": {name: with_units(values) for name, values in study.answers.items()},
         "overload_factors": asdict(study.factors) if study.factors else None,
         "limits": with_units(study.limits),
+        "events": {name: {"value": at, "unit": "s"} for name, at in study.event.items()},
         "pins": {
             run: {
                 pin: {k: {"value": v, "unit": "N"} for k, v in sizes.items()} for pin, sizes in table.items()
