@@ -1,4 +1,4 @@
-"""The command line: ``chainunit study``, ``chainunit export``."""
+"""The command line: ``chainunit study``, ``chainunit reproduce``, ``chainunit export``."""
 
 from __future__ import annotations
 
@@ -91,6 +91,30 @@ def study(
             soft_wrap=True,
         )
         raise typer.Exit(1)
+
+
+@app.command()
+def reproduce(
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path(
+        "reproduction"
+    ),
+) -> None:
+    """Compute every number that the papers print, right or wrong, with the reason; draw their figures.
+
+    Writes reproduction.json, reproduction.md and the figures into the output folder.
+    """
+    if output.exists() and not output.is_dir():
+        raise InputError(f"-o {output}: is a file; name a folder")
+
+    from .report import reproduction
+    from .studies.reproduction import reproduce as compute
+
+    console = Console()
+    with Console(stderr=True).status("computing"):
+        rows = compute()
+        written = reproduction.write(rows, output)
+    reproduction.show(rows, console)
+    console.print("Written: " + ", ".join(str(path) for path in written), soft_wrap=True)
 
 
 @app.command()

@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from ..engines import Dual, dual, slope
+from ..engines import MATH, Dual, dual, slope
 from ..errors import GeometryError, InputError
 from ..groups.body import Body, point_load, total
 from ..groups.driver import crank, driving_torque
@@ -26,6 +26,7 @@ from ..model import Model, Part
 from ..planar import ZERO, Link, Motion, Vec2
 from ..ports import PortSlopes, PortValues
 from ..quantities import Value, declaration, group, quantity, violations
+from .crank_rocker import angle_at_pivot, check_turns, pressure_angle
 
 # A pin that carries nothing has no direction: without a floor the slope of |R| is 0/0 there.
 _NO_FORCE = 1e-60  # N2
@@ -470,7 +471,7 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, s: State) -> Outputs:
         crank_bearing=_force(f.at_o1),
         crank_pin=_force(f.at_a),
         coupler_pin=_force(f.at_bd),
-        pressure_angle=xp.asin((p.h * p.h + p.l * p.l - arm.squared()) / (2.0 * p.h * p.l)),
+        pressure_angle=pressure_angle(xp, p.l, p.h, arm.squared()),
         frame=Frame(fx=-at_frame.x, fy=-at_frame.y, moment=torque - s.bias.friction - moment),
         power=torque * w,
         kinetic_energy=0.5 * s.J * w2,
@@ -496,20 +497,25 @@ def rocker_extremes(p: Any) -> tuple[float, float]:
 
     Eqs. (14), (15) of paper 001, for any frame. Floats only.
     """
-    b2 = p.c * p.c + p.hy * p.hy
-    to_bearing = math.atan2(p.c, p.hy)
+    b, to_bearing = math.hypot(p.c, p.hy), math.atan2(p.c, p.hy)
+    right, left = (angle_at_pivot(MATH, p.h, b, reach) - to_bearing for reach in (p.l + p.r, p.l - p.r))
+    return right, left
 
-    def psi(reach: float) -> float:
-        return math.acos((p.h * p.h + b2 - reach * reach) / (2.0 * p.h * math.sqrt(b2))) - to_bearing
 
-    return psi(p.l + p.r), psi(p.l - p.r)
+def half_width_range(e: float, l1: float, l2: float, swing: float) -> tuple[float, float]:
+    """Least and largest half width z [m] at which both organs close wherever the rocker stands within
+    +-`swing` [rad]; both ends are singular. With l2 = l1 - e the least is 2 e sin(swing). Empty where the
+    least is not below the largest."""
+    reach = e * math.sin(swing)
+    drop2 = e * e - reach * reach
+    low = math.sqrt(max((l1 - l2) ** 2 - drop2, 0.0)) + reach
+    return low, math.sqrt(max((l1 + l2) ** 2 - drop2, 0.0)) - reach
 
 
 def check(p: Parameters) -> None:
     """Refuse values outside their bounds and machines that cannot turn a full revolution.
 
-    Existence of the crank: (3), (4) of paper 001 and the third condition that it misses for
-    lam > 1. Organs: both dyads must close at both extremes of the rocker.
+    Crank: `chainunit.machines.crank_rocker`. Organs: both dyads must close at both extremes of the rocker.
 
     Raises
     ------
@@ -525,24 +531,14 @@ def check(p: Parameters) -> None:
         raise GeometryError(
             f"c = {p.c:g} m: the crank circle must stay left of the pivot C, so c must be > r = {p.r:g} m"
         )
-    longest = min(p.l + p.h - b, b - abs(p.l - p.h))
-    if not p.r < longest:
-        reason = f"r = {p.r:g} m: the crank cannot turn with l = {p.l:g}, h = {p.h:g}, |O1 C| = {b:g} m; "
-        if longest > 0:
-            raise GeometryError(reason + f"r must be < {longest:g} m")
-        raise GeometryError(
-            reason + f"no crank can: l + h must be > |O1 C| and |O1 C| > |l - h| = {abs(p.l - p.h):g} m"
-        )
+    check_turns(p.r, p.l, p.h, b)
     psi = rocker_extremes(p)
     if not max(map(abs, psi)) < math.pi / 2:
         raise GeometryError(
             f"h = {p.h:g} m: the rocker swings from {math.degrees(psi[1]):.1f} to {math.degrees(psi[0]):.1f} deg; "
             "it must stay within -90 and 90 deg (shorten r, lengthen h or change c, hy)"
         )
-    reach = p.e * math.sin(max(map(abs, psi)))
-    drop2 = p.e * p.e - reach * reach
-    high = math.sqrt(max((p.l1 + p.l2) ** 2 - drop2, 0.0)) - reach
-    low = math.sqrt(max((p.l1 - p.l2) ** 2 - drop2, 0.0)) + reach
+    low, high = half_width_range(p.e, p.l1, p.l2, max(map(abs, psi)))
     if not low < p.z < high:
         reason = (
             f"z = {p.z:g} m: the organs cannot follow the rocker's swing of {math.degrees(psi[1]):.1f} to "
@@ -555,8 +551,7 @@ def check(p: Parameters) -> None:
             )
         raise GeometryError(
             reason
-            + f"no z fits l1 = {p.l1:g}, l2 = {p.l2:g}, e = {p.e:g} m: l1 + l2 must be > {math.sqrt(drop2):g} m "
-            "by enough, or the swing smaller"
+            + f"no z fits l1 = {p.l1:g}, l2 = {p.l2:g}, e = {p.e:g} m; lengthen l1 + l2 or lessen the swing"
         )
 
 
@@ -570,7 +565,7 @@ class ChamberForces(Model):
     )
     Parameters = Parameters
     Inputs = Inputs
-    files = ("machines/__init__.py", "machines/chain_unit.py", "groups")
+    files = ("machines/__init__.py", "machines/chain_unit.py", "machines/crank_rocker.py", "groups")
 
     check = staticmethod(check)
 

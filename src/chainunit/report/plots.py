@@ -1,39 +1,20 @@
-"""Plots of a study (matplotlib). Lines differ in dash and weight, too: they must survive a grey print."""
+"""Plots of a study."""
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-import matplotlib
+import matplotlib.pyplot as plt
 import numpy as np
 
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
-
 from ..studies.overload import PINS, SCENARIOS, Study
-
-_STYLE: dict[str, Any] = {
-    "font.size": 10,
-    "axes.grid": True,
-    "grid.alpha": 0.35,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "legend.frameon": False,
-    "figure.constrained_layout.use": True,
-    "savefig.dpi": 130,
-}
-_LINES = [
-    {"color": "#1b1b1b", "linestyle": "-", "linewidth": 1.8},
-    {"color": "#c1440e", "linestyle": "--", "linewidth": 1.6},
-    {"color": "#0b6fa4", "linestyle": "-.", "linewidth": 1.6},
-    {"color": "#6a994e", "linestyle": ":", "linewidth": 2.0},
-]
+from .style import LINES, draw
 
 
 def write(study: Study, folder: Path) -> list[Path]:
     """Write every plot that the study has data for; returns the files."""
-    folder.mkdir(parents=True, exist_ok=True)
     plots = {"torque_angle.png": _torque_angle}
     if any(name in study.runs for name in SCENARIOS):
         plots |= {
@@ -43,19 +24,12 @@ def write(study: Study, folder: Path) -> list[Path]:
         }
     if "start_up" in study.runs:
         plots["start_up.png"] = _start_up
-    written = []
-    with plt.rc_context(_STYLE):
-        for name, draw in plots.items():
-            figure = draw(study)
-            figure.savefig(folder / name)
-            plt.close(figure)
-            written.append(folder / name)
-    return written
+    return draw({name: partial(make, study) for name, make in plots.items()}, folder)
 
 
 def _torque_angle(study: Study) -> Any:
     figure, (top, bottom) = plt.subplots(2, 1, figsize=(8, 6.5), sharex=True)
-    for line, (name, c) in zip(_LINES, study.cycles.items(), strict=False):
+    for line, (name, c) in zip(LINES, study.cycles.items(), strict=False):
         degrees = np.degrees(c.angle)
         top.plot(degrees, c.crank_torque, label=name, **line)
         bottom.plot(degrees, c.outputs.rocker.tau, label=name, **line)
@@ -89,10 +63,10 @@ def _start_up(study: Study) -> Any:
         ("crank speed [rad/s]", "crank torque [N m]", "motor current [A]"),
         strict=True,
     ):
-        axis.plot(time, y, **_LINES[0])
+        axis.plot(time, y, **LINES[0])
         axis.set_ylabel(label)
     reference = study.runs["start_up"]["motor.w_ref"].values / study.config.machine.p.ratio
-    axes[0].plot(time, reference, label="reference", **_LINES[1])
+    axes[0].plot(time, reference, label="reference", **LINES[1])
     axes[0].legend(loc="lower right")
     axes[0].set_title("Start-up under load and steady running")
     axes[-1].set_xlabel("time [s]")
@@ -109,9 +83,9 @@ def _overload_time(study: Study) -> Any:
     for column, name in zip(axes.T, names, strict=True):
         time, torque, speed, current = _series(study, name)
         for axis, y in zip(column, (torque, speed, current), strict=True):
-            axis.plot(time, y, **_LINES[0])
+            axis.plot(time, y, **LINES[0])
         limit = study.motor.limit.i
-        column[2].axhline(limit, label="current limit", **_LINES[1])
+        column[2].axhline(limit, label="current limit", **LINES[1])
         column[0].set_title(SCENARIOS[name])
         column[-1].set_xlabel("time after the event [s]")
         column[-1].set_xlim(time[0], time[-1])
@@ -126,7 +100,7 @@ def _torque_speed(study: Study) -> Any:
     motor = study.motor
     names = ["start_up", *(n for n in SCENARIOS if n in study.runs)]
     fastest = 0.0
-    for line, name in zip(_LINES, names, strict=False):
+    for line, name in zip(LINES, names, strict=False):
         run = study.runs[name]
         axis.plot(
             run["motor.w"], run["motor.air_gap_tau"], label=SCENARIOS.get(name, "start-up and steady"), **line

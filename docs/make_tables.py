@@ -1,0 +1,20 @@
+"""Writes the generated tables into docs/papers.md."""
+
+import re
+from pathlib import Path
+
+from chainunit.report.reproduction import markdown
+from chainunit.studies.reproduction import reproduce
+
+PAGE = Path(__file__).parent / "papers.md"
+
+text = PAGE.read_text("utf-8")
+for paper in ("000", "001"):
+    table = markdown([row for row in reproduce() if row.paper == paper])
+    text = re.sub(
+        rf"(<!-- rows of paper {paper} -->\n).*?(<!-- end -->)",
+        lambda m, table=table: m[1] + table + m[2],
+        text,
+        flags=re.DOTALL,
+    )
+PAGE.write_text(text, "utf-8")

@@ -1,0 +1,42 @@
+"""The look of every plot (matplotlib): lines differ in dash and weight, too, to survive a grey print."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+STYLE: dict[str, Any] = {
+    "font.size": 10,
+    "axes.grid": True,
+    "grid.alpha": 0.35,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+    "figure.constrained_layout.use": True,
+    "savefig.dpi": 130,
+}
+LINES = [
+    {"color": "#1b1b1b", "linestyle": "-", "linewidth": 1.8},
+    {"color": "#c1440e", "linestyle": "--", "linewidth": 1.6},
+    {"color": "#0b6fa4", "linestyle": "-.", "linewidth": 1.6},
+    {"color": "#6a994e", "linestyle": ":", "linewidth": 2.0},
+]
+
+
+def draw(plots: Mapping[str, Callable[[], Any]], folder: Path) -> list[Path]:
+    """Draw each figure into its file in `folder`; returns the files."""
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    with plt.rc_context(STYLE):
+        for name, make in plots.items():
+            figure = make()
+            figure.savefig(folder / name)
+            plt.close(figure)
+            written.append(folder / name)
+    return written
