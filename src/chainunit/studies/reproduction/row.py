@@ -10,8 +10,9 @@ from typing import Any
 class Row:
     """A number of a paper, and what it is.
 
-    `printed` is the paper's text, with its digits, or what its formula gives as printed (None: not stated there); `computed` the right value in
-    `unit`; `rebuilt` what the paper's own scheme gives once its slips are put back, where that explains the print.
+    `printed` is the paper's text, with its digits, or what its formula gives as printed (None: not stated
+    there); `computed` the right value in `unit`; `rebuilt` what the paper's own scheme gives once its slips
+    are put back, where that explains the print.
     """
 
     paper: str
