@@ -78,7 +78,7 @@ def test_temperatures():
         ("[machin]\nr = 1", "machin: unknown key; known here: title, machine, ratios"),
         ("[machine]\ncrank = 3", "machine.crank = 3: must be a table"),
         ("[machine]\nr = 0.9", "machine: r = 0.9 m: the crank cannot turn"),
-        ("[machine]\nz = 0.1", "machine: z = 0.1 m: the organs cannot follow the rocker's swing"),
+        ("[machine]\nz = 0.1", "machine: z = 0.1 m: the organs cannot follow the rocker over its swing"),
         ("[ratios]\nrho = 0.1\n[machine]\nr = 0.2", "machine.r: given beside [ratios]"),
         ("[ratios]\nrho = 0.6", "machine: "),
         ("[ratios]\nmu = 1.0", "rho = 0.1, mu = 1: the papers' frame needs"),

@@ -212,7 +212,7 @@ print(json.dumps([ok, all(v == v for v in values), foreign]))
 def test_geometry_that_cannot_turn_gives_nan_and_a_reason(chamber):
     with Running(chamber, {"r": 0.9}) as unit:
         assert all(math.isnan(v) for v in unit.get(["tau", "J", "tau_bias_dphi"]))
-        with pytest.raises(RunError, match=r"r = 0\.9 m: the crank cannot turn .* r must be < 0\.703"):
+        with pytest.raises(RunError, match=r"r = 0\.9 m: the crank cannot turn .* must be > 0 and < 0\.703"):
             unit.step(0.0, 0.1)
 
 

@@ -5,10 +5,40 @@ Standard library only: FMUs carry this file.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from .quantities import Layout
+from .engines import MATH
+from .errors import GeometryError, InputError
+from .quantities import Layout, violations
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """What the parameters must meet beyond their own bounds: `subject` in `unit` lies strictly between two
+    limits that depend on the others.
+
+    `why` says what fails otherwise, with the parameters `given` named beside it; `remedy` what to do where
+    no value fits. The words are declared once; the limits come from the model's `requirements`.
+    """
+
+    subject: str
+    unit: str
+    why: str
+    given: tuple[str, ...] = ()
+    remedy: str = ""
+
+    def refusal(self, value: float, low: float, high: float, given: Mapping[str, float]) -> str:
+        """The line that refuses `value`."""
+        those = ", ".join(f"{name} = {given[name]:g}" for name in self.given)
+        reason = self.why + (f" with {those}" if those else "")
+        limits = [f"{sign} {limit:g}" for sign, limit in ((">", low), ("<", high)) if math.isfinite(limit)]
+        allowed = (
+            f"must be {' and '.join(limits)} {self.unit}" if low < high else f"no value fits; {self.remedy}"
+        )
+        return f"{self.subject} = {value:g} {self.unit}: {reason}; {allowed}"
 
 
 class Part:
@@ -36,6 +66,7 @@ class Model:
     Inputs: ClassVar[type]
     States: ClassVar[type | None] = None
     parts: ClassVar[tuple[Part, ...]]
+    required: ClassVar[tuple[Requirement, ...]] = ()
     internal_step: ClassVar[float] = 0.0
     """Largest step of the internal integrator [s]; 0 for a model without states."""
 
@@ -51,14 +82,28 @@ class Model:
         cls.state_layout = Layout(cls.States) if cls.States else None
 
     @staticmethod
-    def check(p: Any) -> None:
-        """Refuse parameters that make no machine.
+    def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
+        """Value, lower and upper limit of each of `required`, in order; a later one may be undefined where an
+        earlier one is not met."""
+        return iter(())
+
+    @classmethod
+    def check(cls, p: Any) -> None:
+        """Refuse parameters out of bounds, or that make no machine.
 
         Raises
         ------
         InputError
-            in one line, with the quantity, its value and the allowed range.
+            for a value outside its own bounds, in one line with what is allowed.
+        GeometryError
+            where a requirement is not met, in one line with the allowed range.
         """
+        for line in violations(cls.parameter_layout, p):
+            raise InputError(line)
+        given = dict(zip(cls.parameter_layout.names, cls.parameter_layout.values(p), strict=True))
+        for required, (value, low, high) in zip(cls.required, cls.requirements(MATH, p), strict=True):
+            if not low < value < high:
+                raise GeometryError(required.refusal(value, low, high, given))
 
     @staticmethod
     def initial_states(p: Any) -> Any:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..engines import numpy_
+from ..engines import MATH, numpy_
 from ..errors import GeometryError
 from ..ports import PortSlopes
 from . import chain_unit
@@ -151,7 +151,7 @@ class ChainUnit:
         """(psi, phi_crank) [rad] at the right and at the left extreme of the rocker."""
         p = self.p
         extremes = []
-        for psi, sense in zip(chain_unit.rocker_extremes(p), (1.0, -1.0), strict=True):
+        for psi, sense in zip(chain_unit.rocker_extremes(MATH, p), (1.0, -1.0), strict=True):
             x, y = p.h * math.sin(psi) + p.c, -p.h * math.cos(psi) + p.hy
             extremes.append((psi, math.atan2(sense * x, sense * y) % (2.0 * math.pi)))
         return extremes[0], extremes[1]

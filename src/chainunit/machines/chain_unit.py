@@ -14,19 +14,20 @@ motor's, with the gear `ratio` between.
 
 from __future__ import annotations
 
+import dataclasses
 import math
+from collections.abc import Iterator
 from typing import Any
 
-from ..engines import MATH, Dual, dual, slope
-from ..errors import GeometryError, InputError
+from ..engines import Dual, dual, slope
 from ..groups.body import Body, point_load, total
 from ..groups.driver import crank, driving_torque
 from ..groups.dyad import Dyad
-from ..model import Model, Part
+from ..model import Model, Part, Requirement
 from ..planar import ZERO, Link, Motion, Vec2
 from ..ports import PortSlopes, PortValues
-from ..quantities import Value, declaration, group, quantity, violations
-from .crank_rocker import angle_at_pivot, check_turns, pressure_angle
+from ..quantities import Value, declaration, group, quantity
+from .crank_rocker import TURNS, angle_at_pivot, longest_crank, pressure_angle
 
 # A pin that carries nothing has no direction: without a floor the slope of |R| is 0/0 there.
 _NO_FORCE = 1e-60  # N2
@@ -492,67 +493,24 @@ def _slopes(xp: Any, p: Any, u: Any, x: Any, s: State) -> PortSlopes:
     return PortSlopes(tau_bias_dphi=slope(by_q) * per_motor_turn, tau_bias_dw=slope(by_w) * per_motor_turn)
 
 
-def rocker_extremes(p: Any) -> tuple[float, float]:
+def rocker_extremes(xp: Any, p: Any) -> tuple[Any, Any]:
     """Largest and smallest rocker angle psi [rad], where crank and coupler lie on one line.
 
-    Eqs. (14), (15) of paper 001, for any frame. Floats only.
+    Eqs. (14), (15) of paper 001, for any frame.
     """
-    b, to_bearing = math.hypot(p.c, p.hy), math.atan2(p.c, p.hy)
-    right, left = (angle_at_pivot(MATH, p.h, b, reach) - to_bearing for reach in (p.l + p.r, p.l - p.r))
+    b, to_bearing = xp.sqrt(p.c * p.c + p.hy * p.hy), xp.atan2(p.c, p.hy)
+    right, left = (angle_at_pivot(xp, p.h, b, reach) - to_bearing for reach in (p.l + p.r, p.l - p.r))
     return right, left
 
 
-def half_width_range(e: float, l1: float, l2: float, swing: float) -> tuple[float, float]:
+def half_width_range(xp: Any, e: Any, l1: Any, l2: Any, swing: Any) -> tuple[Any, Any]:
     """Least and largest half width z [m] at which both organs close wherever the rocker stands within
     +-`swing` [rad]; both ends are singular. With l2 = l1 - e the least is 2 e sin(swing). Empty where the
     least is not below the largest."""
-    reach = e * math.sin(swing)
+    reach = e * xp.sin(swing)
     drop2 = e * e - reach * reach
-    low = math.sqrt(max((l1 - l2) ** 2 - drop2, 0.0)) + reach
-    return low, math.sqrt(max((l1 + l2) ** 2 - drop2, 0.0)) - reach
-
-
-def check(p: Parameters) -> None:
-    """Refuse values outside their bounds and machines that cannot turn a full revolution.
-
-    Crank: `chainunit.machines.crank_rocker`. Organs: both dyads must close at both extremes of the rocker.
-
-    Raises
-    ------
-    InputError
-        for a value outside its bounds.
-    GeometryError
-        for lengths that cannot be assembled all round, with the allowed range.
-    """
-    for line in violations(ChamberForces.parameter_layout, p):
-        raise InputError(line)
-    b = math.hypot(p.c, p.hy)
-    if not p.c > p.r:
-        raise GeometryError(
-            f"c = {p.c:g} m: the crank circle must stay left of the pivot C, so c must be > r = {p.r:g} m"
-        )
-    check_turns(p.r, p.l, p.h, b)
-    psi = rocker_extremes(p)
-    if not max(map(abs, psi)) < math.pi / 2:
-        raise GeometryError(
-            f"h = {p.h:g} m: the rocker swings from {math.degrees(psi[1]):.1f} to {math.degrees(psi[0]):.1f} deg; "
-            "it must stay within -90 and 90 deg (shorten r, lengthen h or change c, hy)"
-        )
-    low, high = half_width_range(p.e, p.l1, p.l2, max(map(abs, psi)))
-    if not low < p.z < high:
-        reason = (
-            f"z = {p.z:g} m: the organs cannot follow the rocker's swing of {math.degrees(psi[1]):.1f} to "
-            f"{math.degrees(psi[0]):.1f} deg; "
-        )
-        if low < high:
-            raise GeometryError(
-                reason
-                + f"with l1 = {p.l1:g}, l2 = {p.l2:g}, e = {p.e:g} m it must be > {low:g} and < {high:g} m"
-            )
-        raise GeometryError(
-            reason
-            + f"no z fits l1 = {p.l1:g}, l2 = {p.l2:g}, e = {p.e:g} m; lengthen l1 + l2 or lessen the swing"
-        )
+    low = xp.sqrt(xp.maximum((l1 - l2) * (l1 - l2) - drop2, 0.0)) + reach
+    return low, xp.sqrt(xp.maximum((l1 + l2) * (l1 + l2) - drop2, 0.0)) - reach
 
 
 class ChamberForces(Model):
@@ -567,7 +525,34 @@ class ChamberForces(Model):
     Inputs = Inputs
     files = ("machines/__init__.py", "machines/chain_unit.py", "machines/crank_rocker.py", "groups")
 
-    check = staticmethod(check)
+    required = (
+        Requirement("c", "m", "the crank circle must stay left of the pivot C"),
+        dataclasses.replace(TURNS, given=("l", "h", "c", "hy")),
+        Requirement(
+            "largest rocker angle",
+            "rad",
+            "the rocker swings beyond the horizontal",
+            ("r", "l", "h", "c", "hy"),
+        ),
+        Requirement(
+            "z",
+            "m",
+            "the organs cannot follow the rocker over its swing",
+            ("l1", "l2", "e"),
+            "lengthen l1 + l2, or lessen the swing by a shorter r or a longer h",
+        ),
+    )
+
+    @staticmethod
+    def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
+        """The crank turns, and both organs close at both extremes of the rocker."""
+        yield p.c, p.r, math.inf
+        yield p.r, 0.0, longest_crank(xp, p.l, p.h, xp.sqrt(p.c * p.c + p.hy * p.hy))
+        right, left = rocker_extremes(xp, p)
+        swing = xp.maximum(xp.abs(right), xp.abs(left))
+        yield swing, -math.inf, 0.5 * math.pi
+        low, high = half_width_range(xp, p.e, p.l1, p.l2, swing)
+        yield p.z, low, high
 
     @staticmethod
     def shared(xp: Any, p: Any, u: Any, x: Any) -> State:

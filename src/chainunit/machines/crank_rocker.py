@@ -18,6 +18,7 @@ from typing import Any
 
 from ..engines import MATH
 from ..errors import GeometryError
+from ..model import Requirement
 
 
 def longest_crank(xp: Any, l: Any, h: Any, b: Any) -> Any:
@@ -69,23 +70,9 @@ def speed_change(xp: Any, r: Any, l: Any, h: Any, b: Any) -> Any:
     return (math.pi + theta) / (math.pi - theta)
 
 
-def check_turns(r: float, l: float, h: float, b: float) -> None:
-    """Refuse a crank that cannot turn.
-
-    Raises
-    ------
-    GeometryError
-        with the allowed range.
-    """
-    longest = longest_crank(MATH, l, h, b)
-    if r < longest:
-        return
-    reason = f"r = {r:g} m: the crank cannot turn with l = {l:g}, h = {h:g}, |O1 C| = {b:g} m; "
-    if longest > 0:
-        raise GeometryError(reason + f"r must be < {longest:g} m")
-    raise GeometryError(
-        reason + f"no crank can: |O1 C| must be > |l - h| = {abs(l - h):g} m and < l + h = {l + h:g} m"
-    )
+TURNS = Requirement(
+    "r", "m", "the crank cannot turn", ("l", "h", "b"), "|O1 C| must be > |l - h| and < l + h for any crank"
+)
 
 
 @dataclass(frozen=True)
@@ -108,7 +95,9 @@ class CrankRocker:
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
                 raise GeometryError(f"{name} = {value:g} m: must be finite, > 0 m")
-        check_turns(self.r, self.l, self.h, self.b)
+        longest = longest_crank(MATH, self.l, self.h, self.b)
+        if not self.r < longest:
+            raise GeometryError(TURNS.refusal(self.r, 0.0, longest, vars(self)))
 
     @property
     def swing(self) -> float:

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ...engines import MATH
 from ...machines.api import ChainUnit
 from ...machines.chain_unit import half_width_range
 from ..cycle import overload_factors
@@ -209,7 +210,7 @@ def mu_range() -> tuple[float, float]:
 
 def zeta_range(psi: float, mu: float = MU) -> tuple[float, float]:
     """The zeta at which both organs follow a swing of +-psi [rad], l2 = l1 - e."""
-    low, high = half_width_range(mu, 1.0, 1.0 - mu, psi)
+    low, high = half_width_range(MATH, mu, 1.0, 1.0 - mu, psi)
     return low / (2.0 * math.sqrt(1.0 - mu)), high / (2.0 * math.sqrt(1.0 - mu))
 
 
