@@ -6,9 +6,10 @@ import math
 
 import pytest
 
-from chainunit.config import example, load, parse
+from chainunit.config import example, load, parse, to_number
 from chainunit.errors import InputError
 from chainunit.machines.chain_unit import Parameters
+from chainunit.models import MODELS
 
 
 def test_the_packaged_example_is_the_packaged_machine():
@@ -34,8 +35,28 @@ def test_the_packaged_example_is_the_packaged_machine():
     assert config.machine.p.z == pytest.approx(0.853815, abs=5e-7)
 
 
-def test_an_empty_file_is_the_packaged_machine():
-    assert parse("").machine.p == Parameters()
+def test_a_file_is_laid_over_the_example():
+    assert parse("").machine.p == load().machine.p
+    assert parse("").motor == load().motor and parse("").run == load().run
+    mine = parse("[machine]\nz = 0.9\ncrank = { m = 10 }\n[feed]\nleft = { material_mass = 5 }")
+    assert (mine.machine.p.ratio, mine.machine.p.z, mine.machine.p.crank.m, mine.machine.p.crank.I) == (
+        50,
+        0.9,
+        10,
+        0.6,
+    )
+    assert (mine.feed.left.material_mass, mine.feed.left.processing_force) == (5, 10)
+    assert parse("[ratios]\nzeta = 0.4").machine.p.z == pytest.approx(0.8 * load().machine.p.z)
+
+
+@pytest.mark.parametrize("name", ["ChamberForces", "DcMotor"])
+def test_the_form_that_a_refusal_shows_is_taken(name):
+    model = MODELS[name]
+    for layout in (model.parameter_layout, model.input_layout):
+        for v in layout.variables:
+            start = v.quantity.start
+            unit = "" if v.unit == "1" else f" {v.unit}"
+            assert to_number(v, f"{start!r}{unit}") == pytest.approx(start, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -45,6 +66,9 @@ def test_an_empty_file_is_the_packaged_machine():
         ('[run]\ncrank_speed = "30 rev/min"', "run", "crank_speed", math.pi),
         ('[run]\ncrank_speed = "30 rpm"', "run", "crank_speed", math.pi),
         ('[machine]\njoint_damping = "1 N*m*s"', "machine", "joint_damping", 1.0),
+        ('[machine]\njoint_damping = "1 N.m.s/rad"', "machine", "joint_damping", 1.0),
+        ('[run]\ncrank_speed = "0.5 rev/s"', "run", "crank_speed", math.pi),
+        ('[overload]\ncrank_angle = "90 deg"', "overload", "crank_angle", math.pi / 2),
         ('[overload]\njam_force = "2 kN"', "overload", "jam_force", 2000.0),
         ("[run]\nturns = 3", "run", "turns", 3.0),
     ],
@@ -63,7 +87,7 @@ def test_temperatures():
     ("text", "line"),
     [
         ("[machine]\ncrank = { m = -3 }", "machine.crank.m = -3 kg: must be >= 0 kg (mass)"),
-        ("[machine]\nr = nan", "machine.r = nan m: must be finite, > 0 m (crank O1-A)"),
+        ("[machine]\nr = nan", "machine.r = nan m: must be finite, > 0 m and <= 10000 m (crank"),
         (
             "[feed]\nleft = { material_mass = inf }",
             "feed.left.material_mass = inf kg: must be finite, >= 0 kg",
@@ -81,9 +105,33 @@ def test_temperatures():
         ("[machine]\nz = 0.1", "machine: z = 0.1 m: the organs cannot follow the rocker over its swing"),
         ("[ratios]\nrho = 0.1\n[machine]\nr = 0.2", "machine.r: given beside [ratios]"),
         ("[ratios]\nrho = 0.6", "machine: "),
-        ("[ratios]\nmu = 1.0", "rho = 0.1, mu = 1: the papers' frame needs"),
+        ("[ratios]\nmu = 1.0", "ratios: rho = 0.1, mu = 1: the papers' frame needs"),
         ("[run]\nstep = 1", "run.step = 1 s: must be >= 1e-05 s and <= 0.02 s"),
         ("x =", "no valid TOML"),
+        ("[machine]\nr = 1" + 5000 * "0", "no valid TOML"),
+        ("[machine]\nr = 1" + 400 * "0", "machine.r: the number is too large"),
+        *(
+            (f'[run]\ncrank_speed = "{text}"', f'run.crank_speed = "{text}": must be a number in rad/s')
+            for text in (
+                "30 1/min",
+                "30 min^-1",
+                "0.5 Hz",
+                "30 m",
+                "rpm",
+                "1/0 rpm",
+                "9**9**9 rpm",
+                "(3 rpm",
+            )
+        ),
+        ('[run]\ncrank_speed = "1e400 rpm"', "run.crank_speed = inf rad/s: must be finite"),
+        ('[machine]\nr = "2 rad"', 'machine.r = "2 rad": must be a number in m'),
+        ("[motor]\nambient = { T = 20 }", "motor.ambient.T = 20 K: must be >= 200 K"),
+        ("[motor]\nrotor = { J = -1 }", "motor.rotor.J = -1 kg.m2: must be > 0 kg.m2"),
+        ("[motor]\narmature = { L = 1e-6 }", "motor: armature.L = 1e-06 H: the current changes faster"),
+        ("[run]\ncrank_speed = 0.01\nstep = 1e-5", "run.step = 1e-05 s: the study would take"),
+        ("[ratios]\nrho = 1.0", "ratios: rho = 1, mu = 0.6"),
+        ('[machine]\nr = "a\\nb"', 'machine.r = "a\\nb"'),
+        ('"x\\ny" = 1', "x\\ny: unknown key"),
         ("title = 3", "title = 3"),
     ],
 )

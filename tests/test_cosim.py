@@ -171,7 +171,9 @@ def test_going_on_and_branching(fmus):
 def test_a_failing_run_keeps_what_it_computed(fmus):
     signals = {"motor.w_ref": lambda t: 150.0 if t < 0.0105 else float("nan")}
     with CoSimulation(system(fmus), signals) as simulation:
-        with pytest.raises(RunError, match=r"step at t = 0\.011 s .*motor: input w_ref = nan") as caught:
+        with pytest.raises(
+            RunError, match=r"step at t = 0\.011 s .*motor: input w_ref = nan rad/s"
+        ) as caught:
             simulation.run(0.05, 0.001)
     partial = caught.value.partial
     assert 10 <= len(partial["time"]) <= 12
@@ -189,6 +191,27 @@ def test_wrong_names_and_loops_are_named(fmus):
     # torque and acceleration exchanged directly: what the load port is there to avoid
     with pytest.raises(InputError, match=r"algebraic loop: .*machine.tau.*load port"):
         CoSimulation(System(files, [("motor.a", "machine.a"), ("machine.tau", "motor.load.tau_bias")]))
+
+
+def test_systems_that_contradict_themselves(fmus, tmp_path):
+    files = {"machine": fmus["ChamberForces"], "motor": fmus["DcMotor"]}
+    with pytest.raises(InputError, match=r"machine\.w: is connected to motor\.w and to motor\.phi"):
+        CoSimulation(System(files, [("motor.w", "machine.w"), ("motor.phi", "machine.w")]))
+    with pytest.raises(InputError, match=r"machine\.w: is connected, it cannot have a signal"):
+        CoSimulation(System(files, [("motor.w", "machine.w")]), {"machine.w": 3.0})
+    with pytest.raises(InputError, match=r"motor\.w: is no parameter or input"):
+        CoSimulation(System(files, [], {"motor.w": 3.0}))
+    with pytest.raises(InputError, match="no such FMU"):
+        CoSimulation(System({"machine": tmp_path / "none.fmu"}, []))
+    (tmp_path / "bad.fmu").write_text("no archive")
+    with pytest.raises(InputError, match="is no FMU"):
+        CoSimulation(System({"machine": tmp_path / "bad.fmu"}, []))
+    with CoSimulation(system(fmus)) as simulation:
+        for stop, step in ((-1.0, 0.001), (0.0, 0.001), (0.1, 0.0), (0.1, -0.001), (0.1, float("nan"))):
+            with pytest.raises(InputError, match="must go forward"):
+                simulation.run(stop, step)
+        run = simulation.run(0.01, 0.003)
+    assert run["time"].values[-1] == 0.01 and len(run["time"]) == 5
 
 
 def test_profile():

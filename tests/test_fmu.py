@@ -121,21 +121,33 @@ def test_same_model_same_file(fmus, tmp_path):
     assert len(guids) == 2
 
 
-def test_two_versions_in_one_process_do_not_share_code(fmus, tmp_path):
-    """Trap: helper modules of the same name silently share the first FMU's code."""
-    other = Fmu(export(ChamberForces, tmp_path / "other.fmu", {"r": 0.10, "crank.m": 0.0}))
+def test_two_versions_in_one_process_do_not_share_code(fmus, tmp_path, monkeypatch):
+    """Trap: helper modules of the same name silently share the first FMU's code. Here the second FMU carries
+    other mechanics: every torque doubled."""
+    from chainunit.fmu import export as module
+
+    shipped = module._shipped
+
+    def changed(model):
+        for name, content in shipped(model):
+            if name == "machines/chain_unit.py":
+                assert b"torque = s.J * a + s.bias.total" in content
+                content = content.replace(
+                    b"torque = s.J * a + s.bias.total", b"torque = 2.0 * (s.J * a + s.bias.total)"
+                )
+            yield name, content
+
+    monkeypatch.setattr(module, "_shipped", changed)
+    other = Fmu(export(ChamberForces, tmp_path / "other.fmu"))
+    monkeypatch.undo()
     one = Fmu(fmus["ChamberForces"])
-    with Running(one) as a, Running(other) as b:
-        for unit in (a, b):
+    with Running(one) as a, Running(other) as b, Running(one) as again:
+        taus = []
+        for unit in (a, b, again):
             unit.set(["phi", "w", "a"], [1.0, 2.0, 3.0])
             unit.step(0.0, 0.1)
-        got = [unit.get(["tau"])[0] for unit in (a, b)]
-    loads = {f"{side}.material_mass": 30.0 for side in ("left", "right")}
-    want = [
-        ChainUnit(p).evaluate({"phi": 1.0, "w": 2.0, "a": 3.0, **loads})["tau"]
-        for p in ({}, {"r": 0.10, "crank.m": 0.0})
-    ]
-    assert got == pytest.approx([float(w) for w in want], rel=1e-12)
+            taus += unit.get(["tau"])
+    assert taus[1] == pytest.approx(2.0 * taus[0], rel=1e-12) and taus[2] == taus[0]
     one.close()
     other.close()
 
@@ -222,12 +234,82 @@ def test_bad_input_gives_nan_not_stale_numbers(chamber):
         good = unit.get(["tau"])
         unit.set(["w"], [math.nan])
         assert math.isnan(unit.get(["tau"])[0])
-        with pytest.raises(RunError, match="input w = nan: must be a finite number"):
+        with pytest.raises(RunError, match=r"input w = nan rad/s: must be finite"):
             unit.step(0.0, 0.1)
         unit.set(["w"], [3.0])
         assert unit.get(["tau"]) == good
         unit.step(0.0, 0.1)
         assert len(unit.messages) == 1
+
+
+@pytest.mark.parametrize("name", ["rotor.J", "armature.R", "limit.i"])
+def test_a_motor_out_of_bounds_is_refused(motor, name, tmp_path):
+    with Running(motor, {name: -1.0}) as unit:
+        assert all(math.isnan(v) for v in unit.get(["phi", "w", "a"]))
+        with pytest.raises(RunError, match=rf"{name} = -1 .*must be > 0"):
+            unit.step(0.0, 0.01)
+    with pytest.raises(InputError, match=rf"{name} = -1 "):
+        export(MODELS["DcMotor"], tmp_path / "x.fmu", {name: -1.0})
+
+
+def test_a_geometry_set_too_late_for_initialisation_is_seen(chamber):
+    instance = Instance(chamber, "unit")
+    instance.set(["r"], [0.9])
+    assert all(math.isnan(v) for v in instance.get(["tau"]))
+    instance.set(["r"], [0.15])
+    instance.initialize({}, 0.0)
+    instance.set(["r"], [0.9])
+    assert math.isnan(instance.get(["tau"])[0])
+    instance.set(["r"], [0.14])
+    assert math.isfinite(instance.get(["tau"])[0])
+    instance.finish_initialization()
+    instance.close()
+
+
+def test_start_values_show_before_initialisation(motor):
+    instance = Instance(motor, "unit")
+    instance.set(["w_start"], [5.0])
+    assert instance.get(["w"]) == [5.0]
+    instance.set(["w_start"], [6.0])
+    assert instance.get(["w", "a"])[0] == 6.0
+    instance.close()
+
+
+@pytest.mark.parametrize("step", [-0.01, math.nan, math.inf, 1e9])
+def test_a_step_that_is_none_is_discarded(motor, step):
+    with Running(motor, {"w_ref": 50.0}) as unit:
+        before = unit.get(["phi", "w"])
+        with pytest.raises(RunError, match="status 2"):
+            unit.step(0.0, step)
+        assert unit.get(["phi", "w"]) == before
+        unit.step(0.0, 0.0)
+        assert unit.get(["phi", "w"]) == before
+
+
+@pytest.mark.parametrize(("name", "value"), [("w", 1e308), ("a", 1e308), ("left.material_mass", -50.0)])
+def test_inputs_beyond_any_machine_give_nan_and_a_reason(chamber, name, value):
+    with Running(chamber) as unit:
+        unit.set([name], [value])
+        assert math.isnan(unit.get(["tau"])[0])
+        assert len(unit.messages) == 1
+
+
+def test_calls_of_other_types_and_unknown_references_are_not_fatal(motor):
+    with Running(motor) as unit:
+        api = unit._fmi
+        assert math.isnan(api.getReal([12345])[0])
+        api.setReal([12345], [1.0])
+        assert api.getInteger([0]) == [0]
+        assert not api.getBoolean([0])[0]
+        assert api.getString([0])[0] in ("", b"")
+        api.setInteger([0], [1])
+        state = unit.state()
+        before = unit.get(["w"])
+        unit.restore(api.deSerializeFMUstate(b"no state at all"))
+        unit.restore(api.deSerializeFMUstate(b'{"set": [1], "x": "y"}'))
+        assert "not one of this model" in unit.messages[-1]
+        unit.restore(state)
+        assert unit.get(["w"]) == before
 
 
 def test_fixed_and_tunable_parameters(chamber):

@@ -23,7 +23,7 @@ def outputs(p, u, x):
     return DcMotor.evaluate(engines.MATH, p, u, x)[0]
 
 
-def run(p, u, stop, longest=DcMotor.internal_step):
+def run(p, u, stop, longest=2.5e-4):
     x = LAYOUT.values(DcMotor.initial_states(p))
     return LAYOUT.instance(
         rk4(lambda y: DcMotor.derivatives(engines.MATH, p, u, LAYOUT.instance(y)), x, stop, longest)

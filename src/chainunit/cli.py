@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -13,6 +13,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 
 from . import __version__
 from .errors import InputError
+from .files import folder
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -38,6 +39,11 @@ def _root(
     pass
 
 
+def _console(**options: Any) -> Console:
+    # titles and paths are the user's: they may hold what rich takes for markup
+    return Console(markup=False, highlight=False, **options)
+
+
 @app.command()
 def study(
     config: Annotated[
@@ -61,13 +67,17 @@ def study(
         print(configuration.example(), end="")
         return
     loaded = configuration.load(config)
-    if output.exists() and not output.is_dir():
-        raise InputError(f"-o {output}: is a file; name a folder")
+    folder(output)
 
+    from .errors import InterruptedRunError
     from .report import files, plots, table
     from .studies.overload import run_study
 
-    console, errors = Console(), Console(stderr=True)
+    for stale in ("result.json", "result.nc", *plots.NAMES):
+        if (output / stale).exists() and not (output / stale).is_file():
+            raise InputError(f"{output / stale}: is not a regular file; name another folder")
+        (output / stale).unlink(missing_ok=True)
+    console, errors = _console(), _console(stderr=True)
     bar = Progress(
         TextColumn("{task.description}"),
         BarColumn(),
@@ -85,12 +95,12 @@ def study(
     written = [*files.write(result, output), *plots.write(result, output)]
     table.show(result, console)
     console.print("Written: " + ", ".join(str(path) for path in written), soft_wrap=True)
-    if result.failure:
+    if result.failure is not None:
         errors.print(
             f"The run stopped early: {result.failure}. What was computed before is in {output}.",
             soft_wrap=True,
         )
-        raise typer.Exit(1)
+        raise typer.Exit(130 if isinstance(result.failure, InterruptedRunError) else 1)
 
 
 @app.command()
@@ -103,14 +113,13 @@ def reproduce(
 
     Writes reproduction.json, reproduction.md and the figures into the output folder.
     """
-    if output.exists() and not output.is_dir():
-        raise InputError(f"-o {output}: is a file; name a folder")
+    folder(output)
 
     from .report import reproduction
     from .studies.reproduction import reproduce as compute
 
-    console = Console()
-    with Console(stderr=True).status("computing"):
+    console = _console()
+    with _console(stderr=True).status("computing"):
         rows = compute()
         written = reproduction.write(rows, output)
     reproduction.show(rows, console)
@@ -137,25 +146,35 @@ def export(
         raise InputError(f"{name}: no such model; there are {', '.join(MODELS)}")
     start = configuration.start_values(configuration.load(config), MODELS[name]) if config else {}
     file = output or Path(f"{name}.fmu")
-    if file.is_dir():
-        raise InputError(f"-o {file}: is a folder; name a file")
+    if file.suffix != ".fmu":
+        raise InputError(f"-o {file}: must be a file name that ends in .fmu")
     write(MODELS[name], file, start)
     print(f"{file}: {name}, FMI 2.0 co-simulation, by pythonfmu (needs Python in the importing process)")
 
 
 def main() -> None:
-    """Run the command line: exit status 2 for bad input, in one line; 1 for a run that failed."""
+    """Run the command line: exit status 2 for bad input, in one line; 1 for a run that failed, 130 for Ctrl-C."""
     try:
-        app()
+        sys.exit(app(standalone_mode=False))
     except InputError as error:
-        print(f"chainunit: {error}", file=sys.stderr)
-        sys.exit(2)
-    except OSError as error:
-        print(f"chainunit: {error.filename or ''}: {error.strerror or error}", file=sys.stderr)
-        sys.exit(2)
+        _end(str(error), 2)
+    except (typer.Abort, KeyboardInterrupt):
+        _end("interrupted", 130)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
+    except OSError as error:
+        _end(f"{error.filename or ''}: {error.strerror or error}", 2)
+    except Exception as error:
+        # wrong usage: an unknown command or option, a missing argument
+        if not hasattr(error, "format_message"):
+            raise
+        _end(f"{error.format_message()} (chainunit --help shows the commands)", 2)
+
+
+def _end(message: str, status: int) -> None:
+    print("chainunit: " + " ".join(message.split()), file=sys.stderr)
+    sys.exit(status)
 
 
 if __name__ == "__main__":

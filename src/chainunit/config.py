@@ -7,6 +7,8 @@ converted. Every refusal is one line that names the field, its value and what is
 from __future__ import annotations
 
 import dataclasses
+import json
+import math
 import re
 import tomllib
 from collections.abc import Mapping
@@ -22,7 +24,17 @@ from .errors import InputError
 from .machines.api import ChainUnit, ratios
 from .machines.chain_unit import ChamberForces, Inputs, SideLoads
 from .model import Model
-from .quantities import Layout, Value, Variable, complaint, declaration, group, quantity, variables
+from .quantities import (
+    Layout,
+    Value,
+    Variable,
+    base_units,
+    complaint,
+    declaration,
+    group,
+    quantity,
+    variables,
+)
 
 
 @declaration
@@ -49,12 +61,18 @@ class Ratios:
 class Run:
     """How the machine is run."""
 
-    crank_speed: Value = quantity("rad/s", "speed of the crank in normal running", default=3.0, above=0.0)
-    ramp: Value = quantity("s", "time in which the speed reference rises from rest", default=1.5, above=0.0)
-    settle_turns: Value = quantity(
-        "1", "crank turns after the ramp, before running counts as steady", default=1.0, min=0.0
+    crank_speed: Value = quantity(
+        "rad/s", "speed of the crank in normal running", default=3.0, min=0.01, max=1000.0
     )
-    turns: Value = quantity("1", "crank turns of steady running that are evaluated", default=2.0, min=1.0)
+    ramp: Value = quantity(
+        "s", "time in which the speed reference rises from rest", default=1.5, min=0.001, max=1e4
+    )
+    settle_turns: Value = quantity(
+        "1", "crank turns after the ramp, before running counts as steady", default=1.0, min=0.0, max=1e4
+    )
+    turns: Value = quantity(
+        "1", "crank turns of steady running that are evaluated", default=2.0, min=1.0, max=1e4
+    )
     step: Value = quantity("s", "communication step of the co-simulation", default=0.002, min=1e-5, max=0.02)
 
 
@@ -62,29 +80,48 @@ class Run:
 class Overload:
     """The one-sided overloads."""
 
-    turns: Value = quantity("1", "crank turns that are followed after the event", default=2.0, min=1.0)
+    turns: Value = quantity(
+        "1", "crank turns that are followed after the event", default=2.0, min=1.0, max=1e4
+    )
     crank_angle: Value = quantity(
         "rad", "crank angle at which the event begins; at 0 the rocker is at its fastest", default=0.0
     )
-    shift: Value = quantity("s", "time in which material leaves or changes sides", default=0.3, above=0.0)
+    shift: Value = quantity(
+        "s", "time in which material leaves or changes sides", default=0.3, min=1e-4, max=1e4
+    )
     jam_force: Value = quantity(
         "N", "processing force of a lump that jams the left organ", default=2000.0, min=0.0
     )
-    jam_duration: Value = quantity("s", "time for which the lump holds", default=0.3, above=0.0)
-    jam_rise: Value = quantity("s", "time in which the jam rises and falls", default=0.02, above=0.0)
+    jam_duration: Value = quantity("s", "time for which the lump holds", default=0.3, min=1e-4, max=1e4)
+    jam_rise: Value = quantity("s", "time in which the jam rises and falls", default=0.02, min=1e-4, max=1e4)
+
+
+_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*")
+_UNIT = re.compile(r"1|(?:1/)?[A-Za-zµΩ°]+(?:\^|\*\*)?-?\d?(?:\s*[.*/·]\s*[A-Za-zµΩ°]+(?:\^|\*\*)?-?\d?)*")
+_ANGLES = frozenset(
+    "rad mrad radian radians deg degree degrees ° rev revolution revolutions turn turns rpm".split()
+)
 
 
 @cache
 def _unit_registry() -> Any:
     import pint
 
-    registry: Any = pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
+    registry: Any = pint.UnitRegistry()
     registry.define("@alias revolution = rev")
+    registry.define("@alias ohm = Ohm")
     return registry
 
 
 def _pint_unit(unit: str) -> str:
-    return re.sub(r"([A-Za-z])(\d)", r"\1**\2", unit.replace(".", "*")) if unit != "1" else "dimensionless"
+    """A unit as FMI or an engineer writes it ("kg.m2", "rev/min"), as pint reads it."""
+    if unit in ("", "1"):
+        return "dimensionless"
+    spaced = re.sub(r"\s*[.·]\s*", "*", unit).replace("^", "**")
+    powers = re.sub(r"([A-Za-zµΩ°])(-?\d)", r"\1**\2", spaced)
+    # in FMI everything behind a stroke is below it
+    top, *below = powers.split("/")
+    return top + "".join(f"/({part})" for part in below)
 
 
 def to_number(variable: Variable, given: Any) -> float:
@@ -96,22 +133,41 @@ def to_number(variable: Variable, given: Any) -> float:
         for what is no number, a unit of another kind, or a value out of bounds.
     """
     if isinstance(given, bool) or not isinstance(given, int | float | str):
-        raise ValueError(
-            f"{variable.name} = {given!r}: must be a number in {variable.unit} or a text with a unit"
-        )
-    if isinstance(given, str):
-        import pint
-
-        try:
-            parsed = _unit_registry().Quantity(given)
-            value = float(parsed.to(_pint_unit(variable.unit)).magnitude)
-        except (pint.PintError, ValueError, TypeError, AttributeError, AssertionError) as error:
-            raise ValueError(f'{variable.name} = "{given}": must be {_kind(variable)}') from error
-    else:
-        value = float(given)
+        raise ValueError(f"{variable.name} = {given!r}: must be {_kind(variable)}")
+    try:
+        value = _converted(variable, given) if isinstance(given, str) else float(given)
+    except OverflowError:
+        raise ValueError(f"{variable.name}: the number is too large; must be {_kind(variable)}") from None
     if not variable.quantity.admits(value):
         raise ValueError(complaint(variable, value))
     return value
+
+
+def _converted(variable: Variable, text: str) -> float:
+    import pint
+
+    refusal = ValueError(
+        f"{variable.name} = {json.dumps(text, ensure_ascii=False)}: must be {_kind(variable)}"
+    )
+    match = _NUMBER.fullmatch(text)
+    if match is None:
+        raise refusal
+    number, unit = float(match[1]), match[2]
+    if not unit:
+        return number
+    if _UNIT.fullmatch(unit) is None:
+        raise refusal
+    # pint takes an angle for a pure number: "1/min" would pass for an angular speed, in radians
+    angular = base_units(variable.unit).get("rad", 0)
+    named = set(re.findall(r"[A-Za-zµΩ°]+", unit)) & _ANGLES
+    if (angular > 0 and not named) or (angular == 0 and named):
+        raise refusal
+    try:
+        return float(
+            _unit_registry().Quantity(number, _pint_unit(unit)).to(_pint_unit(variable.unit)).magnitude
+        )
+    except (pint.PintError, ValueError, TypeError, AttributeError, AssertionError) as error:
+        raise refusal from error
 
 
 def _kind(variable: Variable) -> str:
@@ -183,7 +239,7 @@ def _given(section: BaseModel) -> dict[str, float]:
 
 def _first_line(error: ValidationError) -> str:
     first = error.errors()[0]
-    where = ".".join(str(part) for part in first["loc"])
+    where = ".".join(str(part) for part in first["loc"]).encode("unicode_escape").decode()
     if first["type"] == "extra_forbidden":
         section: Any = _File
         for part in first["loc"][:-1]:
@@ -231,15 +287,19 @@ def parse(text: str, source: str = "config") -> Config:
     """
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:  # TOMLDecodeError, and numbers that are too long
         raise InputError(f"no valid TOML: {error}") from error
     try:
-        checked: Any = _File.model_validate(data)
+        _File.model_validate(data)
+        checked: Any = _File.model_validate(_over_example(data))
     except ValidationError as error:
         raise InputError(_first_line(error)) from error
     machine_given = _given(checked.machine)
-    if "ratios" in data:
-        lengths = ratios(**_filled(Ratios, _given(checked.ratios)))
+    if checked.ratios.model_fields_set:
+        try:
+            lengths = ratios(**_filled(Ratios, _given(checked.ratios)))
+        except InputError as error:
+            raise InputError(f"ratios: {error}") from error
         twice = sorted(set(lengths) & set(machine_given))
         if twice:
             raise InputError(
@@ -251,16 +311,53 @@ def parse(text: str, source: str = "config") -> Config:
     except InputError as error:
         raise InputError(f"machine: {error}") from error
     motor_given = _given(checked.motor)
-    return Config(
+    motor = DcMotor.parameter_layout.from_names(motor_given)
+    try:
+        DcMotor.check(motor)
+    except InputError as error:
+        raise InputError(f"motor: {error}") from error
+    config = Config(
         title=checked.title,
         machine=machine,
         feed=_instance(Feed, _given(checked.feed)),
-        motor=DcMotor.parameter_layout.from_names(motor_given),
+        motor=motor,
         motor_given=frozenset(motor_given),
         run=_instance(Run, _given(checked.run)),
         overload=_instance(Overload, _given(checked.overload)),
         source=source,
     )
+    run, turn = config.run, 2.0 * math.pi / config.run.crank_speed
+    steps = (
+        run.ramp + (run.settle_turns + run.turns + 3.0 * (config.overload.turns + 2.0)) * turn
+    ) / run.step
+    if not steps <= MOST_STEPS:
+        raise InputError(
+            f"run.step = {run.step:g} s: the study would take {steps:.2g} steps, more than {MOST_STEPS:.0e}; "
+            "lengthen the step, raise the speed, or lessen the turns"
+        )
+    return config
+
+
+MOST_STEPS = 1e6
+_LENGTHS = ("r", "l", "h", "c", "hy", "e", "l1", "l2", "z")
+
+
+def _over_example(data: Mapping[str, Any]) -> dict[str, Any]:
+    """A study file laid over the packaged example: what is not named is the example's. Its ratios give way to
+    lengths of the user's own."""
+    base = tomllib.loads(example())
+    if any(name in data.get("machine", {}) for name in _LENGTHS) and "ratios" not in data:
+        del base["ratios"]
+    base["title"] = ""
+    return _merged(base, data)
+
+
+def _merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    merged = dict(base)
+    for name, value in over.items():
+        below = merged.get(name)
+        merged[name] = _merged(below, value) if isinstance(below, dict) and isinstance(value, dict) else value
+    return merged
 
 
 def _filled(declared: type, given: Mapping[str, float]) -> dict[str, Any]:

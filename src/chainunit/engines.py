@@ -4,7 +4,8 @@ A kernel uses operators and exactly the names of `NAMES`; each engine here offer
 name that one engine lacks cannot slip into a kernel.
 
 ========  ==============================================================================
-`MATH`    one point, floats, standard library only: inside an FMU
+`MATH`    one point, floats, standard library only: inside an FMU; where numpy gives NaN it raises, and
+          `minimum`, `maximum` may pass a NaN by
 `numpy_`  arrays of any broadcastable shape
 `casadi_` symbols, from which C code, exact derivatives and sparsity come
 `jax_`    arrays under ``jit``/``grad`` (needs the extra ``jax``)

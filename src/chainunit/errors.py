@@ -17,3 +17,7 @@ class RunError(RuntimeError):
     """A run stopped half-way; `partial` holds what was computed before, if anything was."""
 
     partial: Any = None
+
+
+class InterruptedRunError(RunError):
+    """The user stopped the run (Ctrl-C)."""

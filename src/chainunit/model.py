@@ -67,8 +67,6 @@ class Model:
     States: ClassVar[type | None] = None
     parts: ClassVar[tuple[Part, ...]]
     required: ClassVar[tuple[Requirement, ...]] = ()
-    internal_step: ClassVar[float] = 0.0
-    """Largest step of the internal integrator [s]; 0 for a model without states."""
 
     parameter_layout: ClassVar[Layout]
     input_layout: ClassVar[Layout]
@@ -113,6 +111,11 @@ class Model:
     @staticmethod
     def derivatives(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """Time derivatives of the states, in declared order (models with states)."""
+        raise NotImplementedError
+
+    @staticmethod
+    def internal_step(p: Any) -> Any:
+        """Longest step of the internal integrator [s] (models with states)."""
         raise NotImplementedError
 
     @staticmethod

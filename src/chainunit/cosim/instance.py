@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import logging
 import shutil
@@ -10,9 +11,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..errors import RunError
+from ..errors import InputError, RunError
 
 log = logging.getLogger("chainunit.fmu")
+_FATAL = 4  # fmi2Fatal
 
 
 class Fmu:
@@ -21,9 +23,15 @@ class Fmu:
     def __init__(self, file: Path) -> None:
         from fmpy import extract, read_model_description
 
+        if not Path(file).is_file():
+            raise InputError(f"{file}: no such FMU")
         self.folder = tempfile.mkdtemp(prefix="chainunit_fmu_")
-        extract(str(file), unzipdir=self.folder)
-        self.description = read_model_description(self.folder, validate=False)
+        try:
+            extract(str(file), unzipdir=self.folder)
+            self.description = read_model_description(self.folder, validate=False)
+        except Exception as error:
+            self.close()
+            raise InputError(f"{file}: is no FMU ({error})") from error
         self.variables = {v.name: v for v in self.description.modelVariables}
 
     def outputs(self) -> list[str]:
@@ -75,7 +83,9 @@ class Instance:
             modelIdentifier=description.coSimulation.modelIdentifier,
             instanceName=name,
         )
+        self._alive = False
         self._fmi.instantiate(callbacks=self._callbacks, loggingOn=True)
+        self._alive = True
 
     def _call(self, what: str, function: Any, *args: Any) -> Any:
         from fmpy.fmi1 import FMICallException
@@ -83,6 +93,8 @@ class Instance:
         try:
             return function(*args)
         except FMICallException as error:
+            if error.status == _FATAL:
+                self._alive = False
             said = f": {self.messages[-1]}" if self.messages else ""
             raise RunError(f"{self.name}: {what} ended with status {error.status}{said}") from error
 
@@ -137,9 +149,15 @@ class Instance:
 
     def forget(self, state: Any) -> None:
         """Free a saved state."""
+        if not self._alive:
+            return
         self._call("freeing a state", self._fmi.freeFMUState, state)
 
     def close(self) -> None:
-        """End and free the instance."""
-        self._fmi.terminate()
+        """End and free the instance; one that reported a fatal error must not be called again."""
+        if not self._alive:
+            return
+        self._alive = False
+        with contextlib.suppress(Exception):
+            self._fmi.terminate()
         self._fmi.freeInstance()

@@ -9,19 +9,37 @@ second order as well.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+import signal
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from ..errors import InputError, RunError
+from ..errors import InputError, InterruptedRunError, RunError
 from .instance import Fmu, Instance
 from .system import System
 
 Progress = Callable[[float], None]
 """Called with the simulated time [s] now and then."""
+
+
+@contextmanager
+def _stoppable() -> Iterator[Callable[[], bool]]:
+    """Whether Ctrl-C was pressed, asked between steps: a KeyboardInterrupt inside an FMU would be a fatal error."""
+    pressed: list[int] = []
+    if threading.current_thread() is not threading.main_thread():
+        yield lambda: False
+        return
+    previous = signal.signal(signal.SIGINT, lambda number, frame: pressed.append(number))
+    try:
+        yield lambda: bool(pressed)
+    finally:
+        signal.signal(signal.SIGINT, previous)
 
 
 class CoSimulation:
@@ -95,15 +113,20 @@ class CoSimulation:
         split: dict[str, dict[str, float]] = {name: {} for name in self._fmus}
         for full, value in values.items():
             instance, variable = self._split(full)
+            if self._fmus[instance].variables[variable].causality not in ("parameter", "input"):
+                raise InputError(f"{full}: is no parameter or input, it cannot be set")
             split[instance][variable] = value
         return split
 
     def _schedule(self, system: System) -> list[tuple[Instance, Any, list[tuple[Instance, Any, list[int]]]]]:
         """Groups of connected outputs in an order in which each is final when it is read."""
-        sources = {
-            self._split(target, "input"): self._split(source, "output")
-            for source, target in system.connections
-        }
+        sources: dict[tuple[str, str], tuple[str, str]] = {}
+        for source, target in system.connections:
+            into = self._split(target, "input")
+            if into in sources:
+                raise InputError(f"{target}: is connected to {'.'.join(sources[into])} and to {source}")
+            sources[into] = self._split(source, "output")
+        self._driven = {".".join(target) for target in sources}
         feedthrough = {name: fmu.feedthrough() for name, fmu in self._fmus.items()}
         level: dict[tuple[str, str], int] = {}
 
@@ -121,8 +144,8 @@ class CoSimulation:
                 level[output] = 1 + max((rank(s, (*above, output)) for s in feeding), default=-1)
             return level[output]
 
-        for source in sources.values():
-            rank(source, ())
+        for connected in sources.values():
+            rank(connected, ())
         transfers = []
         for height in range(max(level.values(), default=-1) + 1):
             for name, instance in self._instances.items():
@@ -163,12 +186,14 @@ class CoSimulation:
         """Set the external signals; whether any is a function of time."""
         varying = False
         split: dict[str, tuple[list[str], list[float]]] = {}
-        for full, signal in self.signals.items():
+        for full, given in self.signals.items():
             instance, variable = self._split(full, "input")
-            varying = varying or callable(signal)
+            if full in self._driven:
+                raise InputError(f"{full}: is connected, it cannot have a signal")
+            varying = varying or callable(given)
             names, values = split.setdefault(instance, ([], []))
             names.append(variable)
-            values.append(signal(time) if callable(signal) else signal)
+            values.append(given(time) if callable(given) else given)
         for instance, (names, values) in split.items():
             self._instances[instance].set(names, values)
         return varying
@@ -195,9 +220,14 @@ class CoSimulation:
         RunError
             where an FMU fails; its attribute ``partial`` holds the Dataset up to there.
         """
-        n = max(1, round((stop - self.time) / step))
         start = self.time
-        times = start + step * np.arange(n + 1)
+        if not (0.0 < step < math.inf) or not start < stop < math.inf:
+            raise InputError(
+                f"a run from t = {start:g} to {stop:g} s in steps of {step:g} s: must go forward"
+            )
+        n = max(1, math.ceil((stop - start) / step - 1e-9))
+        # the last step is shorter where the end is no multiple of the step
+        times = np.minimum(start + step * np.arange(n + 1), stop)
         recorders = [
             (instance, instance.handle(names), [f"{name}.{v}" for v in names])
             for name, instance in self._instances.items()
@@ -211,36 +241,39 @@ class CoSimulation:
                 table[row, at : at + len(names)] = instance.read(handle)
                 at += len(names)
 
-        varying = self._apply_signals(start)
-        self._transfer()
-        record(0)
         every = max(1, n // 200)
         done = said = before = 0
-        try:
-            for k in range(n):
-                # what leads to a failure may have been said while the values for this step were set
-                said, before = before, len(self._journal)
-                t, after = float(times[k]), float(times[k + 1])
-                middle = 0.5 * (t + after)
-                if varying and (self._changes(t, middle) or self._changes(middle, after)):
-                    self._apply_signals(middle)
-                    self._transfer()
-                for instance in self._instances.values():
-                    instance.step(t, step)
-                self.time = after
-                if varying:
-                    self._apply_signals(after)
+        with _stoppable() as stopped:
+            try:
+                varying = self._apply_signals(start)
                 self._transfer()
-                record(k + 1)
-                done = k + 1
-                if progress and done % every == 0:
-                    progress(self.time)
-        except RunError as error:
-            # the call that fails may only pass on what another FMU complained of before
-            first = f" (before: {self._journal[said]})" if len(self._journal) > said + 1 else ""
-            failed = RunError(f"{error}{first}")
-            failed.partial = self._dataset(times[: done + 1], table[: done + 1], recorders)
-            raise failed from error
+                record(0)
+                for k in range(n):
+                    # what leads to a failure may have been said while the values for this step were set
+                    said, before = before, len(self._journal)
+                    t, after = float(times[k]), float(times[k + 1])
+                    middle = 0.5 * (t + after)
+                    if varying and (self._changes(t, middle) or self._changes(middle, after)):
+                        self._apply_signals(middle)
+                        self._transfer()
+                    for instance in self._instances.values():
+                        instance.step(t, after - t)
+                    self.time = after
+                    if varying:
+                        self._apply_signals(after)
+                    self._transfer()
+                    record(k + 1)
+                    done = k + 1
+                    if progress and done % every == 0:
+                        progress(self.time)
+                    if stopped():
+                        raise InterruptedRunError(f"interrupted at t = {self.time:g} s")
+            except RunError as error:
+                # the call that fails may only pass on what another FMU complained of before
+                first = f" (before: {self._journal[said]})" if len(self._journal) > said + 1 else ""
+                failed = type(error)(f"{error}{first}")
+                failed.partial = self._dataset(times[: done + 1], table[: done + 1], recorders)
+                raise failed from error
         if progress:
             progress(self.time)
         return self._dataset(times, table, recorders)

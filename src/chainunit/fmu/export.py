@@ -18,6 +18,7 @@ from pathlib import Path
 from xml.etree.ElementTree import tostring
 
 from ..errors import InputError
+from ..files import folder, whole
 from ..model import Model
 from ..quantities import complaint
 from .description import Interface, model_description
@@ -67,6 +68,8 @@ def export(model: type[Model], file: Path, start: dict[str, float] | None = None
             raise InputError(complaint(signal.variable, signal.start))
     model.check(model.parameter_layout.instance([s.start for s in interface.of("parameter")]))
 
+    file = Path(file)
+    folder(file.parent)
     version = metadata.version("chainunit")
     shipped = dict(_shipped(model))
     digest = hashlib.sha256()
@@ -77,8 +80,8 @@ def export(model: type[Model], file: Path, start: dict[str, float] | None = None
     hashed = digest.hexdigest()[:32]
     description = model_description(interface, f"{{{uuid.UUID(hashed)}}}", _OPTIONS, version)
 
-    with tempfile.TemporaryDirectory(prefix="chainunit_") as folder:
-        work = Path(folder)
+    with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
+        work = Path(scratch)
         package = work / f"chainunit_{hashed[:12]}"
         for name, content in shipped.items():
             target = package / name
@@ -91,11 +94,8 @@ def export(model: type[Model], file: Path, start: dict[str, float] | None = None
         recipe.write_text(_recipe(model, package.name, start))
         (work / "modelDescription.xml").write_bytes(tostring(description, "utf-8"))
         raw = _build(recipe, package, work / "modelDescription.xml", work / "raw.fmu")
-        file = Path(file)
-        file.parent.mkdir(parents=True, exist_ok=True)
-        part = file.with_name(file.name + ".part")
-        _normalise(raw, part)
-        part.replace(file)
+        with whole(file) as part:
+            _normalise(raw, part)
     return file
 
 

@@ -62,6 +62,10 @@ def _release_at_exit(library: Path) -> None:
     atexit.register(release)
 
 
+_LONGEST_STEP = 1_000_000
+"""Internal steps that one communication step may take."""
+
+
 class ModelSlave(Fmi2Slave):  # type: ignore[misc]
     """A model as pythonfmu's slave; the exported module derives one class with `model` and `start`."""
 
@@ -84,6 +88,7 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         for part in model.parts:
             self._ranges.append((at, at + len(part.layout.names)))
             at = self._ranges[-1][1]
+        self._end = at
         self._out = [_NAN] * (at - self._first)
         self._fresh = [False] * len(model.parts)
         self._shared: Any = None
@@ -98,68 +103,65 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
 
     def enter_initialization_mode(self) -> None:
         """Parameters are settled: check them and start the states."""
-        self._initialize()
+        self._prepare()
 
     def exit_initialization_mode(self) -> None:
         """From here on, fixed parameters stay as they are."""
-        self._initialize()
+        self._prepare()
         self._initialized = True
 
-    def _initialize(self) -> None:
-        self._touch(True, True)
-        self._refused = ""
-        try:
-            p = self._parameters()
-            self.model.check(p)
-            if self.model.state_layout:
-                self._x = self.model.state_layout.values(self.model.initial_states(p))
-        except Exception as reason:
-            self._refused = str(reason)
-            self._tell(self._refused)
-
     def do_step(self, current_time: float, step_size: float) -> bool:
-        """One communication step; False (discard) where the model or its inputs are not usable."""
+        """One communication step; False (discard) where the model, its inputs or the step are not usable."""
         try:
-            bad = self._refused or self._bad_input()
+            bad = self._prepare() or self._bad_input()
+            if not bad and not 0.0 <= step_size < math.inf:
+                bad = f"step of {step_size:g} s: must be finite and not negative"
             if bad:
-                self._touch(True, True)
+                self._touch()
                 self._tell(bad)
                 return False
-            if self._n_x:
-                p, u, model = self._parameters(), self._inputs(), self.model
-                layout = model.state_layout
-                assert layout is not None
-
-                def rates(x: Any) -> list[float]:
-                    return model.derivatives(MATH, p, u, layout.instance(x))
-
-                x = rk4(rates, self._x, step_size, model.internal_step)
-                if not all(map(math.isfinite, x)):
-                    self._tell(f"the states left all bounds in the step from t = {current_time:g} s")
-                    return False
-                self._x = x
-                self._touch(False, False)
-            return True
-        except Exception as reason:
-            self._tell(f"step from t = {current_time:g} s failed: {reason}")
+            return not self._n_x or self._integrate(current_time, step_size)
+        except BaseException as reason:
+            self._tell(f"step from t = {current_time:g} s failed: {reason!r}")
             return False
+
+    def _integrate(self, time: float, step: float) -> bool:
+        p, u, model = self._p, self._inputs(), self.model
+        layout = model.state_layout
+        assert layout is not None
+        longest = model.internal_step(p)
+        if step > _LONGEST_STEP * longest:
+            self._tell(f"step of {step:g} s: must be < {_LONGEST_STEP * longest:g} s")
+            return False
+
+        def rates(x: Any) -> list[float]:
+            return model.derivatives(MATH, p, u, layout.instance(x))
+
+        x = rk4(rates, self._x, step, longest)
+        if not all(map(math.isfinite, x)):
+            self._tell(f"the states left all bounds in the step from t = {time:g} s")
+            return False
+        self._x = x
+        self._touch()
+        return True
 
     # -- values
 
     def set_real(self, vrs: list[int], values: list[float]) -> None:
         """Take parameters and inputs; a fixed parameter only before initialisation."""
-        n_p = self._n_p
         for vr, value in zip(vrs, values, strict=True):
-            if vr >= self._first:
+            if not 0 <= vr < self._first:
                 self._tell(f"value reference {vr} is not a parameter or input: not set")
             elif self._set[vr] == value:
                 continue
-            elif vr >= n_p:
+            elif vr >= self._n_p:
                 self._set[vr] = value
-                self._touch(False, True)
+                self._u = None
+                self._touch()
             elif not self._initialized:
                 self._set[vr] = value
-                self._touch(True, False)
+                self._p = None
+                self._touch()
             else:
                 self._tune(vr, value)
 
@@ -171,58 +173,67 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
             self._tell(complaint(variable, value) + "; not changed")
         else:
             self._set[vr] = value
-            self._touch(True, False)
+            self._p = None
+            self._touch()
 
     def get_real(self, vrs: list[int]) -> list[float]:
         """Values by reference; outputs are evaluated at most once per state and part."""
         first, states = self._first, self._first + self._n_x
         out: list[float] = []
         for vr in vrs:
-            if vr < first:
+            if 0 <= vr < first:
                 out.append(self._set[vr])
-            elif vr < states:
-                out.append(self._x[vr - first] if self._x else _NAN)
-            else:
+            elif first <= vr < states:
+                out.append(_NAN if self._prepare() else self._x[vr - first])
+            elif states <= vr < self._end:
                 for i, (low, high) in enumerate(self._ranges):
                     if low <= vr < high and not self._fresh[i]:
                         self._evaluate(i, low, high)
                 out.append(self._out[vr - first])
+            else:
+                self._tell(f"value reference {vr} does not exist")
+                out.append(_NAN)
         return out
 
     def _evaluate(self, i: int, low: int, high: int) -> None:
         values: list[float] | None = None
-        bad = self._refused or self._bad_input()
+        bad = self._prepare() or self._bad_input()
         if not bad:
             try:
-                p, u = self._parameters(), self._inputs()
+                p, u = self._p, self._inputs()
                 layout, part = self.model.state_layout, self.model.parts[i]
-                if layout and not self._x:
-                    self._x = layout.values(self.model.initial_states(p))
                 x = layout.instance(self._x) if layout else None
                 if self._shared is None:
                     self._shared = self.model.shared(MATH, p, u, x)
                 values = part.layout.values(part.equations(MATH, p, u, x, self._shared))
-            except Exception as reason:
-                bad = f"outputs cannot be evaluated: {reason}"
+                if not all(map(math.isfinite, values)):
+                    values, bad = None, "outputs are not finite numbers: the inputs are beyond any machine"
+            except BaseException as reason:
+                bad = f"outputs cannot be evaluated: {reason!r}"
         if values is None:
             self._tell(bad)
             values = [_NAN] * (high - low)
         self._out[low - self._first : high - self._first] = values
         self._fresh[i] = True
 
-    def _touch(self, parameters: bool, inputs: bool) -> None:
-        """Outputs are to be evaluated anew; parameters or inputs may have changed, too."""
-        if parameters:
-            self._p = None
-        if inputs:
-            self._u = None
+    def _touch(self) -> None:
+        """Outputs are to be evaluated anew."""
         self._shared = None
         self._fresh = [False] * len(self._fresh)
 
-    def _parameters(self) -> Any:
+    def _prepare(self) -> str:
+        """Parameters checked and states started, after a change of parameters; why not, where they make no model."""
         if self._p is None:
-            self._p = self.model.parameter_layout.instance(self._set[: self._n_p])
-        return self._p
+            self._refused = ""
+            try:
+                p = self._p = self.model.parameter_layout.instance(self._set[: self._n_p])
+                self.model.check(p)
+                if self.model.state_layout and not self._initialized:
+                    self._x = self.model.state_layout.values(self.model.initial_states(p))
+            except BaseException as reason:
+                self._refused = str(reason) or repr(reason)
+                self._tell(self._refused)
+        return self._refused
 
     def _inputs(self) -> Any:
         if self._u is None:
@@ -230,10 +241,12 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         return self._u
 
     def _bad_input(self) -> str:
-        for i in range(self._n_p, self._first):
-            if not math.isfinite(self._set[i]):
-                name = self.model.input_layout.names[i - self._n_p]
-                return f"input {name} = {self._set[i]}: must be a finite number"
+        if self._u is None:
+            for variable, value in zip(
+                self.model.input_layout.variables, self._set[self._n_p :], strict=True
+            ):
+                if not variable.quantity.admits(value):
+                    return f"input {complaint(variable, value)}"
         return ""
 
     def _tell(self, reason: str) -> None:
@@ -241,22 +254,53 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
             self._told = reason
             self.log(reason, Fmi2Status.error)
 
+    # every variable is a Real; pythonfmu would raise for another type, which is fatal for the host
+
+    def _no_such_type(self, vrs: list[int]) -> None:
+        if vrs:
+            self._tell("every variable is a Real")
+
+    def get_integer(self, vrs: list[int]) -> list[int]:
+        """None are there: zeros, and a line in the log."""
+        self._no_such_type(vrs)
+        return [0] * len(vrs)
+
+    def get_boolean(self, vrs: list[int]) -> list[bool]:
+        """None are there: False, and a line in the log."""
+        self._no_such_type(vrs)
+        return [False] * len(vrs)
+
+    def get_string(self, vrs: list[int]) -> list[str]:
+        """None are there: empty texts, and a line in the log."""
+        self._no_such_type(vrs)
+        return [""] * len(vrs)
+
+    def set_integer(self, vrs: list[int], values: list[int]) -> None:
+        """None are there: a line in the log."""
+        self._no_such_type(vrs)
+
+    set_boolean = set_string = set_integer
+
     # -- states of the FMU, and its description
 
     def _get_fmu_state(self) -> dict[str, Any]:
-        return {
-            "set": list(self._set),
-            "x": list(self._x),
-            "initialized": self._initialized,
-            "refused": self._refused,
-        }
+        return {"set": list(self._set), "x": list(self._x), "initialized": self._initialized}
 
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
-        self._set = list(state["set"])
-        self._x = list(state["x"])
-        self._initialized = state["initialized"]
-        self._refused = state["refused"]
-        self._touch(True, True)
+        values, x = state.get("set"), state.get("x")
+        if not (
+            isinstance(values, list)
+            and isinstance(x, list)
+            and len(values) == self._first
+            and len(x) in (0, self._n_x)
+            and all(isinstance(v, int | float) for v in (*values, *x))
+        ):
+            self._tell("the saved state is not one of this model: not restored")
+            return
+        self._set, self._x = list(values), list(x)
+        self._initialized = bool(state.get("initialized"))
+        self._p = self._u = None
+        self._touch()
 
     @staticmethod
     def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
@@ -264,7 +308,11 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
 
     @staticmethod
     def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
-        return json.loads(state.decode())
+        try:
+            read = json.loads(state.decode())
+        except ValueError:
+            return {}
+        return read if isinstance(read, dict) else {}
 
     def to_xml(self, model_options: Any = None) -> Element:
         """The description that the exporter wrote beside this module: pythonfmu's own lacks

@@ -78,7 +78,7 @@ class ChainUnit:
         return cls({**lengths, **(parameters or {}), **values})
 
     def _inputs(self, phi: Any, w: Any, a: Any, left: SideLoads, right: SideLoads) -> Inputs:
-        return Inputs(phi=_array(phi), w=_array(w), a=_array(a), left=left, right=right)
+        return Inputs(phi=_array(phi), w=_array(w), a=_array(a), left=_arrays(left), right=_arrays(right))
 
     def _state(self, u: Inputs) -> State:
         return ChamberForces.shared(_XP, self.p, u, None)
@@ -89,7 +89,9 @@ class ChainUnit:
         """Torque, load port (without slopes), energies and every reaction at motor angle `phi` [rad],
         speed `w` [rad/s] and acceleration `a` [rad/s2] (see `Outputs` for names and units)."""
         u = self._inputs(phi, w, a, left, right)
-        return ChamberForces.parts[0].equations(_XP, self.p, u, None, self._state(u))
+        part = ChamberForces.parts[0]
+        out = part.equations(_XP, self.p, u, None, self._state(u))
+        return part.layout.instance(np.broadcast_arrays(*part.layout.values(out)))
 
     def slopes(self, phi: Any, w: Any = 0.0, left: SideLoads = EMPTY, right: SideLoads = EMPTY) -> PortSlopes:
         """Exact derivatives of `tau_bias` by motor angle and speed."""
@@ -108,11 +110,12 @@ class ChainUnit:
         u = ChamberForces.input_layout.from_names({**dict.fromkeys(names, 0.0), **inputs})
         u = ChamberForces.input_layout.instance([_array(v) for v in ChamberForces.input_layout.values(u)])
         outputs = ChamberForces.evaluate(_XP, self.p, u)
-        return {
+        named = {
             name: value
             for part, instance in zip(ChamberForces.parts, outputs, strict=True)
             for name, value in zip(part.layout.names, part.layout.values(instance), strict=True)
         }
+        return dict(zip(named, np.broadcast_arrays(*named.values()), strict=True))
 
     def torque_by_reactions(
         self, phi: Any, w: Any = 0.0, a: Any = 0.0, left: SideLoads = EMPTY, right: SideLoads = EMPTY
@@ -144,7 +147,7 @@ class ChainUnit:
         """Loads of the organs at a rocker angle `psi` [rad] (speed `w`, acceleration `a` of the
         rocker), whatever drives it: the papers' statics at +-12 degrees, beyond this drive's swing."""
         return chain_unit.chamber(
-            _XP, self.p, Inputs(left=left, right=right), _array(psi), _array(w), _array(a)
+            _XP, self.p, Inputs(left=_arrays(left), right=_arrays(right)), _array(psi), _array(w), _array(a)
         )
 
     def rocker_extremes(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -159,11 +162,23 @@ class ChainUnit:
     def least_web_pull(
         self, w: Any, left: SideLoads = EMPTY, right: SideLoads = EMPTY, points: int = 720
     ) -> Any:
-        """The least pull in both webs [N] over `points` angles of a crank turn at constant motor speed `w`,
-        for each speed given."""
+        """The least pull in the webs [N] over `points` angles of a crank turn at constant motor speed `w`, for
+        each speed given; infinite where no side is loaded."""
         phi = np.linspace(0.0, 2.0 * math.pi * self.p.ratio, points, endpoint=False)
         out = self.forces(phi, np.asarray(w, float)[..., None], 0.0, left, right)
-        return np.min(np.minimum(out.left.web_pull, out.right.web_pull), axis=-1)
+        pulls = [getattr(out, side).web_pull for side in self.loaded_sides(left, right)]
+        return np.min(pulls, axis=(0, -1)) if pulls else np.full(np.shape(w), np.inf)
+
+    def loaded_sides(self, left: SideLoads = EMPTY, right: SideLoads = EMPTY) -> list[str]:
+        """The sides whose organ has any mass or load: a web that is not there cannot go slack."""
+        present = []
+        for side, loads in (("left", left), ("right", right)):
+            masses = getattr(self.p, side)
+            if np.any(
+                masses.wall_mass + masses.web_mass + loads.material_mass + loads.processing_force > 0.0
+            ):
+                present.append(side)
+        return present
 
     def slack_speed(
         self, left: SideLoads = EMPTY, right: SideLoads = EMPTY, highest: float = 1000.0
@@ -207,6 +222,12 @@ def ratios(rho: float, lam: float, mu: float, zeta: float, l: float, l1: float) 
         "l2": l1 - e,
         "z": zeta * 2.0 * l1 * math.sqrt(1.0 - mu),
     }
+
+
+def _arrays(loads: SideLoads) -> SideLoads:
+    return SideLoads(
+        material_mass=_array(loads.material_mass), processing_force=_array(loads.processing_force)
+    )
 
 
 def _array(x: Any) -> Any:

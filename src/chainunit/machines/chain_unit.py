@@ -59,7 +59,7 @@ class Pin:
     friction: Value = quantity("1", "coefficient of friction", default=0.12, min=0.0, tunable=True)
     diameter: Value = quantity("m", "diameter", default=0.06, min=0.0, tunable=True)
     w_smooth: Value = quantity(
-        "rad/s", "relative speed below which friction is smoothed", default=0.02, above=0.0, tunable=True
+        "rad/s", "relative speed below which friction is smoothed", default=0.02, min=1e-9, tunable=True
     )
 
 
@@ -68,7 +68,7 @@ class Processing:
     """The law of the processing force."""
 
     v_smooth: Value = quantity(
-        "m/s", "speed of B below which the force is smoothed", default=0.02, above=0.0, tunable=True
+        "m/s", "speed of B below which the force is smoothed", default=0.02, min=1e-9, tunable=True
     )
 
 
@@ -77,21 +77,30 @@ class Parameters:
     """Parameters of the chain unit. The start values are the packaged machine: plausible, but ours; the
     papers print no masses and no absolute lengths."""
 
-    r: Value = quantity("m", "crank O1-A", default=0.15, above=0.0)
-    l: Value = quantity("m", "coupler A-Bd", default=1.5, above=0.0)
-    h: Value = quantity("m", "rocker arm C-Bd", default=1.0, above=0.0)
+    r: Value = quantity("m", "crank O1-A", default=0.15, above=0.0, max=1e4)
+    l: Value = quantity("m", "coupler A-Bd", default=1.5, above=0.0, max=1e4)
+    h: Value = quantity("m", "rocker arm C-Bd", default=1.0, above=0.0, max=1e4)
     c: Value = quantity(
-        "m", "crank bearing O1 lies this far left of the pivot C", default=math.sqrt(1.5**2 - 0.15**2)
+        "m",
+        "crank bearing O1 lies this far left of the pivot C",
+        default=math.sqrt(1.5**2 - 0.15**2),
+        max=1e4,
     )
-    hy: Value = quantity("m", "crank bearing O1 lies this far below the pivot C", default=1.0)
-    e: Value = quantity("m", "rocker arm C-A2 to the web hinge", default=0.81, above=0.0)
-    l1: Value = quantity("m", "wall A1-B", default=1.35, above=0.0)
-    l2: Value = quantity("m", "web B-A2", default=0.54, above=0.0)
+    hy: Value = quantity(
+        "m", "crank bearing O1 lies this far below the pivot C", default=1.0, min=-1e4, max=1e4
+    )
+    e: Value = quantity("m", "rocker arm C-A2 to the web hinge", default=0.81, above=0.0, max=1e4)
+    l1: Value = quantity("m", "wall A1-B", default=1.35, above=0.0, max=1e4)
+    l2: Value = quantity("m", "web B-A2", default=0.54, above=0.0, max=1e4)
     z: Value = quantity(
-        "m", "half width: the wall hinges A1 lie this far left and right of C", default=0.853815, above=0.0
+        "m",
+        "half width: the wall hinges A1 lie this far left and right of C",
+        default=0.853815,
+        above=0.0,
+        max=1e4,
     )
     g: Value = quantity("m/s2", "gravity", default=9.81, min=0.0, tunable=True)
-    ratio: Value = quantity("1", "gear ratio, motor turns per crank turn", default=1.0, above=0.0)
+    ratio: Value = quantity("1", "gear ratio, motor turns per crank turn", default=1.0, above=0.0, max=1e6)
     crank: Rod = group(Rod, "crank", default=Rod(m=40.0, s=0.05, I=0.6))
     coupler: Rod = group(Rod, "coupler", default=Rod(m=25.0, s=0.7, I=5.0))
     rocker: Rod = group(Rod, "rocker", default=Rod(m=60.0, s=0.5, I=8.0))
@@ -262,20 +271,20 @@ class Organ:
 
     def loads(
         self, xp: Any, psi_hand: float, rocker: Link, forces: tuple[Vec2, Vec2, Vec2], processing: Vec2
-    ) -> dict[str, Any]:
-        """The fields of `Side`; `psi_hand` is +1 on the left and -1 on the right."""
+    ) -> Side:
+        """What the organ carries; `psi_hand` is +1 on the left and -1 on the right."""
         at_a1, at_b, at_a2 = forces
         wall_axis, web_axis = self.dyad.first.u, self.dyad.second.u
-        return {
+        return Side(
             # X cos s + Y sin s with s = +-psi: the force across the arm, along the arm
-            "tangential_load": rocker.u.turned().dot(at_a2) * psi_hand,
-            "normal_load": -rocker.u.dot(at_a2),
-            "support": _force(at_a1),
-            "hinge": _force(at_b),
-            "rocker_joint": _force(at_a2),
-            "web_pull": xp.minimum(-web_axis.dot(at_a2), -web_axis.dot(at_b - processing)),
-            "wall_pull": xp.minimum(-wall_axis.dot(at_a1), wall_axis.dot(at_b)),
-        }
+            tangential_load=rocker.u.turned().dot(at_a2) * psi_hand,
+            normal_load=-rocker.u.dot(at_a2),
+            support=_force(at_a1),
+            hinge=_force(at_b),
+            rocker_joint=_force(at_a2),
+            web_pull=xp.minimum(-web_axis.dot(at_a2), -web_axis.dot(at_b - processing)),
+            wall_pull=xp.minimum(-wall_axis.dot(at_a1), wall_axis.dot(at_b)),
+        )
 
 
 class Mechanism:
@@ -405,21 +414,14 @@ def _force(f: Vec2) -> Force:
     return Force(fx=f.x, fy=f.y)
 
 
-def _chamber(
-    xp: Any, p: Any, left: Organ, right: Organ, rocker: Link, forces: Any, processing: Any
-) -> tuple[dict[str, Any], Side, Side]:
-    """The fields of `RockerLoad`, and both sides."""
-    sides = [
-        Side(**organ.loads(xp, hand, rocker, f, pf))
-        for organ, hand, f, pf in zip((left, right), (1.0, -1.0), forces, processing, strict=True)
-    ]
-    tangential = sides[0].tangential_load - sides[1].tangential_load
-    load = {
+def _rocker_load(p: Any, left: Side, right: Side) -> dict[str, Any]:
+    """The fields of `RockerLoad`, which `Rocker` has, too."""
+    tangential = left.tangential_load - right.tangential_load
+    return {
         "tau": p.e * tangential,
         "tangential_load": tangential,
-        "normal_load": sides[0].normal_load + sides[1].normal_load,
+        "normal_load": left.normal_load + right.normal_load,
     }
-    return load, sides[0], sides[1]
 
 
 def chamber(xp: Any, p: Any, u: Any, psi: Any, psi_w: Any, psi_a: Any) -> Chamber:
@@ -432,8 +434,10 @@ def chamber(xp: Any, p: Any, u: Any, psi: Any, psi_w: Any, psi_a: Any) -> Chambe
         left.reactions(w2, psi_a, p.g, processing[0]),
         right.reactions(w2, psi_a, p.g, processing[1]),
     )
-    load, on_left, on_right = _chamber(xp, p, left, right, rocker, forces, processing)
-    return Chamber(rocker=RockerLoad(**load), left=on_left, right=on_right)
+    on_left = left.loads(xp, 1.0, rocker, forces[0], processing[0])
+    on_right = right.loads(xp, -1.0, rocker, forces[1], processing[1])
+    load = RockerLoad(**_rocker_load(p, on_left, on_right))
+    return Chamber(rocker=load, left=on_left, right=on_right)
 
 
 def _outputs(xp: Any, p: Any, u: Any, x: Any, s: State) -> Outputs:
@@ -443,9 +447,9 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, s: State) -> Outputs:
     f = Reactions(m, p, w2, a, *s.bias.processing_forces)
     torque = s.J * a + s.bias.total
     rocker, drive = m.rocker, m.drive
-    load, on_left, on_right = _chamber(
-        xp, p, m.left, m.right, rocker, (f.left, f.right), s.bias.processing_forces
-    )
+    force_l, force_r = s.bias.processing_forces
+    on_left = m.left.loads(xp, 1.0, rocker, f.left, force_l)
+    on_right = m.right.loads(xp, -1.0, rocker, f.right, force_r)
     arm = drive.r1 - drive.r2
     at_frame = f.at_o1 + f.at_c + f.left[0] + f.right[0]
     moment = (
@@ -464,7 +468,7 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, s: State) -> Outputs:
             psi=xp.atan2(rocker.u.x, -rocker.u.y),
             w=rocker.t1 * w,
             a=rocker.t1 * a + rocker.t2 * w2,
-            **load,
+            **_rocker_load(p, on_left, on_right),
         ),
         left=on_left,
         right=on_right,

@@ -8,6 +8,7 @@ from pathlib import Path
 import xarray as xr
 
 from .. import __version__
+from ..files import whole
 from ..studies.overload import SCENARIOS, Study, as_dict
 
 
@@ -17,15 +18,12 @@ def write(study: Study, folder: Path) -> list[Path]:
     ``result.nc`` is netCDF-4 with a group per run (open it with `xarray.open_datatree`); each variable has its
     unit and description.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     numbers = folder / "result.json"
-    part = numbers.with_name("result.json.part")
-    part.write_text(json.dumps(as_dict(study), indent=2, allow_nan=False) + "\n", "utf-8")
-    part.replace(numbers)
+    with whole(numbers) as part:
+        part.write_text(json.dumps(as_dict(study), indent=2, allow_nan=False) + "\n", "utf-8")
     written = [numbers]
     if study.runs:
         series = folder / "result.nc"
-        part = series.with_name("result.nc.part")
         tree = xr.DataTree.from_dict(
             {
                 f"/{name}": run.assign_attrs(title=SCENARIOS.get(name, name.replace("_", " ")))
@@ -33,7 +31,7 @@ def write(study: Study, folder: Path) -> list[Path]:
             }
         )
         tree.attrs.update(title=study.config.title, source=f"chainunit {__version__}")
-        tree.to_netcdf(part, engine="netcdf4")
-        part.replace(series)
+        with whole(series) as part:
+            tree.to_netcdf(part, engine="netcdf4")
         written.append(series)
     return written

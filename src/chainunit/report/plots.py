@@ -12,6 +12,8 @@ import numpy as np
 from ..studies.overload import PINS, SCENARIOS, Study
 from .style import LINES, draw
 
+NAMES = ("torque_angle.png", "overload_time.png", "torque_speed.png", "reactions.png", "start_up.png")
+
 
 def write(study: Study, folder: Path) -> list[Path]:
     """Write every plot that the study has data for; returns the files."""

@@ -6,8 +6,10 @@ import math
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
-from ..studies.overload import SCENARIOS, Study, unit_of
+from ..quantities import Layout, Variable
+from ..studies.overload import SCENARIOS, Answers, Study
 
 _SHORT = {
     "steady": "steady",
@@ -16,26 +18,11 @@ _SHORT = {
     "jam_left": "jam left",
 }
 
-_ROWS = {
-    "crank_torque_peak": "crank torque, peak",
-    "crank_torque_rms": "crank torque, RMS",
-    "crank_torque_mean": "crank torque, mean",
-    "motor_torque_peak": "motor torque, peak",
-    "motor_torque_rms": "motor torque, RMS",
-    "power_peak": "shaft power, peak",
-    "power_mean": "shaft power, mean",
-    "current_peak": "motor current, peak",
-    "current_rms": "motor current, RMS",
-    "rocker_torque_peak": "rocker torque, peak",
-    "speed_dip": "speed dip",
-    "recovery_time": "recovery",
-    "web_pull_least": "least pull in a web",
-    "wall_pull_least": "least pull in a wall",
-}
+_HIDDEN = {"supply_power_mean", "winding_temperature", "speed_mean", "speed_least"}
 
 
 def _number(value: float | None, unit: str) -> str:
-    if value is None:
+    if value is None or math.isnan(value):
         return "not reached"
     if unit == "1":
         return f"{100.0 * value:.2f} %"
@@ -43,20 +30,24 @@ def _number(value: float | None, unit: str) -> str:
     return f"{value:.3g} {shown}" if abs(value) < 100.0 else f"{value:.0f} {shown}"
 
 
+def _cell(study: Study, run: str, v: Variable) -> str:
+    if v.name == "recovery_time" and run == "steady":
+        return ""
+    return _number(getattr(study.answers[run], v.name), v.unit)
+
+
 def show(study: Study, console: Console) -> None:
     """Print tables and notes."""
     config = study.config
     runs = [name for name in ("steady", *SCENARIOS) if name in study.answers]
     if runs:
-        table = Table(title=config.title or None, title_justify="left")
+        table = Table(title=Text(config.title) if config.title else None, title_justify="left")
         table.add_column(f"crank at {config.run.crank_speed:g} rad/s")
         for name in runs:
             table.add_column(_SHORT[name], justify="right")
-        for key, label in _ROWS.items():
-            cells = [
-                _number(study.answers[n][key], unit_of(key)) if key in study.answers[n] else "" for n in runs
-            ]
-            table.add_row(label, *cells)
+        for v in Layout(Answers).variables:
+            if v.name not in _HIDDEN:
+                table.add_row(v.description, *(_cell(study, run, v) for run in runs))
         console.print(table)
     if study.factors:
         f = study.factors
@@ -83,13 +74,14 @@ def show(study: Study, console: Console) -> None:
             )
         console.print(table)
     limits = study.limits
-    swing = (math.degrees(limits["rocker_extreme_left"]), math.degrees(limits["rocker_extreme_right"]))
-    console.print(f"Rocker swings from {swing[0]:.3f} to {swing[1]:.3f} deg; margin {limits['margin']:.2f}.")
-    console.print(
-        f"A web first goes slack at {limits['slack_speed']:.2f} rad/s of the crank with this feed "
-        f"({limits['slack_speed_empty']:.2f} rad/s empty); lowest chain mode near "
-        f"{limits['chain_resonance']:.1f} rad/s."
-    )
+    if limits is not None:
+        swing = (math.degrees(limits.rocker_extreme_left), math.degrees(limits.rocker_extreme_right))
+        console.print(f"Rocker swings from {swing[0]:.3f} to {swing[1]:.3f} deg; margin {limits.margin:.2f}.")
+        console.print(
+            f"A web first goes slack at {limits.slack_speed:.2f} rad/s of the crank with this feed "
+            f"({limits.slack_speed_empty:.2f} rad/s empty); lowest chain mode near "
+            f"{limits.chain_resonance:.1f} rad/s."
+        )
     if study.certificate:
         worst_share = max(c["energy_residual_share"] for c in study.certificate.values())
         console.print(f"Energy residual of the shaft: at most {worst_share:.1e} of the energy moved.")
@@ -98,4 +90,4 @@ def show(study: Study, console: Console) -> None:
             quantity = name.removesuffix("_difference_to_monolithic")
             console.print(f"Difference of {quantity} to the monolithic solution: {value:.1e} of its peak.")
     for note in study.notes:
-        console.print(f"[bold]Note:[/bold] {note}")
+        console.print(f"Note: {note}")

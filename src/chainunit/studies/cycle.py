@@ -63,10 +63,11 @@ def overload_factors(
     alone = cycle(without_right(machine), crank_speed, left, EMPTY)
 
     def ratio(x: Any, y: Any) -> float:
-        return float(np.max(np.abs(x)) / np.max(np.abs(y)))
+        whole = float(np.max(np.abs(y)))
+        return float(np.max(np.abs(x))) / whole if whole > 0.0 else math.nan
 
     return OverloadFactors(
-        float(static.left.tangential_load / static.rocker.tangential_load),
+        ratio(static.left.tangential_load, static.rocker.tangential_load),
         ratio(alone.outputs.rocker.tau, both.outputs.rocker.tau),
         ratio(alone.crank_torque, both.crank_torque),
     )

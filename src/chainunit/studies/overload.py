@@ -25,6 +25,7 @@ from ..errors import RunError
 from ..fmu.export import export
 from ..machines.api import ChainUnit
 from ..machines.chain_unit import ChamberForces
+from ..quantities import Layout, Value, declaration, quantity
 from .cycle import OverloadFactors, cycle, overload_factors
 
 PINS = {
@@ -46,6 +47,57 @@ SCENARIOS = {
     "jam_left": "a lump jams the left side",
 }
 
+
+@declaration
+class Answers:
+    """What a run asks of the drive; torques and speeds are the crank's unless they are called the motor's. Means
+    and RMS are over whole turns of the crank."""
+
+    crank_torque_peak: Value = quantity("N.m", "crank torque, peak")
+    crank_torque_rms: Value = quantity("N.m", "crank torque, RMS")
+    crank_torque_mean: Value = quantity("N.m", "crank torque, mean")
+    motor_torque_peak: Value = quantity("N.m", "motor torque, peak")
+    motor_torque_rms: Value = quantity("N.m", "motor torque, RMS")
+    power_peak: Value = quantity("W", "shaft power, peak")
+    power_mean: Value = quantity("W", "shaft power, mean")
+    supply_power_mean: Value = quantity("W", "electric power, mean")
+    current_peak: Value = quantity("A", "motor current, peak")
+    current_rms: Value = quantity("A", "motor current, RMS")
+    winding_temperature: Value = quantity("K", "winding temperature")
+    rocker_torque_peak: Value = quantity("N.m", "rocker torque, peak")
+    speed_mean: Value = quantity("rad/s", "crank speed, mean")
+    speed_least: Value = quantity("rad/s", "crank speed, least")
+    speed_dip: Value = quantity("1", "speed dip")
+    recovery_time: Value = quantity("s", "recovery")
+    web_pull_least: Value = quantity("N", "least pull in a web")
+    wall_pull_least: Value = quantity("N", "least pull in a wall")
+
+
+@declaration
+class Limits:
+    """Where the model ends."""
+
+    slack_speed: Value = quantity("rad/s", "crank speed at which a web first goes slack with this feed")
+    slack_speed_empty: Value = quantity("rad/s", "crank speed at which a web first goes slack, empty")
+    chain_resonance: Value = quantity("rad/s", "crank speed of the lowest mode of a hanging chain, estimated")
+    rocker_extreme_right: Value = quantity("rad", "right extreme of the rocker")
+    rocker_extreme_left: Value = quantity("rad", "left extreme of the rocker")
+    margin: Value = quantity("1", "least |sin| of the transmission angles over the turn")
+
+
+def entries(declared: Any) -> dict[str, Any]:
+    """The declared values of an instance as ``{name: {"value": .., "unit": ..}}``; what is not finite is null."""
+    layout = Layout(type(declared))
+    return {
+        v.name: {"value": _number(value), "unit": v.unit}
+        for v, value in zip(layout.variables, layout.values(declared), strict=True)
+    }
+
+
+def _number(value: Any) -> float | None:
+    return None if value is None or not math.isfinite(value) else float(value)
+
+
 Report = Callable[[str, float, float], None]
 """Called with what is running, the time done and the time to do [s]."""
 
@@ -59,14 +111,14 @@ class Study:
     tuning: Tuning | None
     cycles: Any = None
     factors: OverloadFactors | None = None
-    limits: dict[str, float] = field(default_factory=dict)
+    limits: Limits | None = None
     runs: dict[str, xr.Dataset] = field(default_factory=dict)
     event: dict[str, float] = field(default_factory=dict)
-    answers: dict[str, dict[str, float | None]] = field(default_factory=dict)
+    answers: dict[str, Answers] = field(default_factory=dict)
     pins: dict[str, dict[str, dict[str, float]]] = field(default_factory=dict)
     certificate: dict[str, dict[str, float]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
-    failure: str = ""
+    failure: RunError | None = None
 
 
 def run_study(config: Config, folder: Path, report: Report | None = None, *, check: bool = False) -> Study:
@@ -89,7 +141,7 @@ def run_study(config: Config, folder: Path, report: Report | None = None, *, che
     except RunError as error:
         if error.partial is not None:
             study.runs["unfinished"] = error.partial
-        study.failure = str(error)
+        study.failure = error
     _note(study)
     return study
 
@@ -98,13 +150,9 @@ def _tuned(config: Config) -> tuple[Any, Tuning | None]:
     """The motor with controller gains tuned to this machine, where the config does not give them."""
     both = cycle(config.machine, config.run.crank_speed, config.feed.left, config.feed.right)
     inertia = config.motor.rotor.J + float(np.mean(both.outputs.J))
-    gains = [
-        n for n in DcMotor.parameter_layout.names if n.startswith(("speed_control.", "current_control."))
-    ]
-    if config.motor_given.intersection(gains):
-        return config.motor, None
     tuning = tune(config.motor.armature, inertia)
-    return DcMotor.parameter_layout.from_names(tuning.parameters, config.motor), tuning
+    own = {name: gain for name, gain in tuning.parameters.items() if name not in config.motor_given}
+    return DcMotor.parameter_layout.from_names(own, config.motor), tuning if own else None
 
 
 def _named(model: Any, p: Any) -> dict[str, float]:
@@ -123,15 +171,16 @@ def _statics(study: Study) -> None:
     }
     study.factors = overload_factors(machine, w, feed.left, feed.right)
     (right, _), (left, _) = machine.rocker_extremes()
-    study.limits = {
-        "slack_speed": machine.slack_speed(feed.left, feed.right),
-        "slack_speed_empty": machine.slack_speed(),
+    g = machine.p.g
+    study.limits = Limits(
+        slack_speed=machine.slack_speed(feed.left, feed.right),
+        slack_speed_empty=machine.slack_speed(),
         # lowest mode of a hanging chain organ of this kind, from the chain model's prototype
-        "chain_resonance": 1.8 * math.sqrt(machine.p.g / machine.p.l1),
-        "rocker_extreme_right": right,
-        "rocker_extreme_left": left,
-        "margin": float(np.min(study.cycles["both sides"].outputs.margin)),
-    }
+        chain_resonance=1.8 * math.sqrt(g / machine.p.l1),
+        rocker_extreme_right=right,
+        rocker_extreme_left=left,
+        margin=float(np.min(study.cycles["both sides"].outputs.margin)),
+    )
 
 
 def _sum(one: Any, other: Any) -> Any:
@@ -198,9 +247,10 @@ def _simulate(study: Study, files: Mapping[str, Path], report: Report, check: bo
         _certify(study, "start_up", start_up, bond)
         steady = start_up.sel(time=slice(settled, None))
         study.answers["steady"] = _answers(study, steady, None, steady)
-        study.pins["steady"] = _pins(steady)
+        study.pins["steady"] = _pins(study, steady)
         start = simulation.save()
-        lead = _lead(config, float(start_up["motor.phi"].values[-1]) / machine.p.ratio)
+        angle = float(start_up["motor.phi"].values[-1]) / machine.p.ratio
+        lead = _lead(config, angle, study.answers["steady"].speed_mean)
         event = start + lead
         total = stop + len(SCENARIOS) * (lead + follow)
         done = start
@@ -215,18 +265,19 @@ def _simulate(study: Study, files: Mapping[str, Path], report: Report, check: bo
             study.event[name] = event
             transient_only = transient.sel(time=slice(event, None))
             study.answers[name] = _answers(study, transient_only, event, steady)
-            study.pins[name] = _pins(transient_only)
+            study.pins[name] = _pins(study, transient_only)
         if check:
             report("monolithic reference", total, total)
             _compare(study, start_up, signals)
 
 
-def _lead(config: Config, angle: float) -> float:
-    """Time of steady running until the crank next stands at the event's angle, at least an eighth of a turn [s]."""
+def _lead(config: Config, angle: float, speed: float) -> float:
+    """Time of steady running at `speed` until the crank next stands at the event's angle, at least an eighth of a
+    turn [s]; a crank that hardly turns is not waited for."""
     ahead = (config.overload.crank_angle - angle) % (2.0 * math.pi)
     if ahead < 0.25 * math.pi:
         ahead += 2.0 * math.pi
-    return ahead / config.run.crank_speed
+    return ahead / max(speed, 0.5 * config.run.crank_speed)
 
 
 def _energy_per_kg(machine: ChainUnit, side: str, run: xr.Dataset) -> Any:
@@ -260,24 +311,24 @@ def _compare(study: Study, run: xr.Dataset, signals: Mapping[str, Any]) -> None:
         )
 
 
-def _answers(
-    study: Study, run: xr.Dataset, event: float | None, steady: xr.Dataset
-) -> dict[str, float | None]:
-    """The numbers of one run, in SI units; speeds and torques of the crank unless the name says motor.
+def _whole_turns(study: Study, run: xr.Dataset) -> Any:
+    """Which rows belong to whole turns of the crank: over anything else the mean of a cyclic torque means nothing."""
+    phi = run["motor.phi"].values
+    turned = (phi - phi[0]) / (2.0 * math.pi * study.config.machine.p.ratio)
+    return turned <= max(1.0, math.floor(turned[-1]))
 
-    Means and RMS are over whole turns of the crank.
-    """
-    ratio = study.config.machine.p.ratio
-    w_ref = study.config.run.crank_speed
-    crank_torque = run["machine.tau"].values * ratio
-    motor_torque = run["motor.air_gap_tau"].values
-    speed = run["motor.w"].values / ratio
-    power = run["machine.power"].values
-    time = run["time"].values
 
-    turned = (run["motor.phi"].values - run["motor.phi"].values[0]) / (2.0 * math.pi * ratio)
-    # over anything but whole turns, the mean of a cyclic torque means nothing
-    whole = turned <= max(1.0, math.floor(turned[-1]))
+def _answers(study: Study, run: xr.Dataset, event: float | None, steady: xr.Dataset) -> Answers:
+    """The numbers of one run."""
+    config = study.config
+    ratio, w_ref = config.machine.p.ratio, config.run.crank_speed
+    whole = _whole_turns(study, run)
+
+    def value(name: str) -> Any:
+        return run[name].values
+
+    def peak(x: Any) -> float:
+        return float(np.max(np.abs(x)))
 
     def mean(x: Any) -> float:
         return float(np.mean(x[whole]))
@@ -285,30 +336,41 @@ def _answers(
     def rms(x: Any) -> float:
         return math.sqrt(mean(x * x))
 
-    pulls = np.minimum(run["machine.left.web_pull"].values, run["machine.right.web_pull"].values)
-    walls = np.minimum(run["machine.left.wall_pull"].values, run["machine.right.wall_pull"].values)
-    answers: dict[str, float | None] = {
-        "crank_torque_peak": float(np.max(np.abs(crank_torque))),
-        "crank_torque_rms": rms(crank_torque),
-        "crank_torque_mean": mean(crank_torque),
-        "motor_torque_peak": float(np.max(np.abs(motor_torque))),
-        "motor_torque_rms": rms(motor_torque),
-        "power_peak": float(np.max(power)),
-        "power_mean": mean(power),
-        "supply_power_mean": mean(run["motor.supply_power"].values),
-        "current_peak": float(np.max(np.abs(run["motor.armature.i"].values))),
-        "current_rms": rms(run["motor.armature.i"].values),
-        "winding_temperature": float(run["motor.armature.T"].values[-1]),
-        "rocker_torque_peak": float(np.max(np.abs(run["machine.rocker.tau"].values))),
-        "web_pull_least": float(np.min(pulls)),
-        "wall_pull_least": float(np.min(walls)),
-        "speed_least": float(np.min(speed)),
-        "speed_mean": mean(speed),
-        "speed_dip": float((w_ref - np.min(speed)) / w_ref),
-    }
-    if event is not None:
-        answers["recovery_time"] = _recovery(time - event, speed, steady["motor.w"].values / ratio, w_ref)
-    return answers
+    sides = config.machine.loaded_sides(config.feed.left, config.feed.right)
+
+    def least(rod: str) -> float:
+        return min((float(np.min(value(f"machine.{side}.{rod}_pull"))) for side in sides), default=math.inf)
+
+    crank_torque, motor_torque = value("machine.tau") * ratio, value("motor.air_gap_tau")
+    speed, power, current = value("motor.w") / ratio, value("machine.power"), value("motor.armature.i")
+    recovery = None
+    if event is not None and _settled(study.answers["steady"], w_ref):
+        recovery = _recovery(value("time") - event, speed, steady["motor.w"].values / ratio, w_ref)
+    return Answers(
+        crank_torque_peak=peak(crank_torque),
+        crank_torque_rms=rms(crank_torque),
+        crank_torque_mean=mean(crank_torque),
+        motor_torque_peak=peak(motor_torque),
+        motor_torque_rms=rms(motor_torque),
+        power_peak=float(np.max(power)),
+        power_mean=mean(power),
+        supply_power_mean=mean(value("motor.supply_power")),
+        current_peak=peak(current),
+        current_rms=rms(current),
+        winding_temperature=float(value("motor.armature.T")[-1]),
+        rocker_torque_peak=peak(value("machine.rocker.tau")),
+        speed_mean=mean(speed),
+        speed_least=float(np.min(speed)),
+        speed_dip=float((w_ref - np.min(speed)) / w_ref),
+        recovery_time=recovery,
+        web_pull_least=least("web"),
+        wall_pull_least=least("wall"),
+    )
+
+
+def _settled(steady: Answers, w_ref: float) -> bool:
+    """Whether the machine runs at the speed that is asked of it, within 1 %."""
+    return bool(abs(steady.speed_mean - w_ref) <= 0.01 * w_ref)
 
 
 def _recovery(since: Any, speed: Any, steady: Any, w_ref: float) -> float | None:
@@ -322,99 +384,76 @@ def _recovery(since: Any, speed: Any, steady: Any, w_ref: float) -> float | None
     return float(since[last]) if last < len(since) - len(since) // 10 else None
 
 
-def _pins(run: xr.Dataset) -> dict[str, dict[str, float]]:
+def _pins(study: Study, run: xr.Dataset) -> dict[str, dict[str, float]]:
     """Peak and RMS of the reaction of every pin [N]."""
-    table = {}
+    table, whole = {}, _whole_turns(study, run)
     for title, name in PINS.items():
         size = np.hypot(run[f"machine.{name}.fx"].values, run[f"machine.{name}.fy"].values)
-        table[title] = {"peak": float(np.max(size)), "rms": float(np.sqrt(np.mean(size**2)))}
+        table[title] = {"peak": float(np.max(size)), "rms": float(np.sqrt(np.mean(size[whole] ** 2)))}
     return table
 
 
 def _note(study: Study) -> None:
     """What the reader has to know beside the numbers."""
     config, limits, note = study.config, study.limits, study.notes.append
-    relative = config.run.crank_speed / limits["chain_resonance"]
+    assert limits is not None
     if config.source == "packaged example":
         note("Masses, pins, feed and drive are assumed; the papers print none.")
+    else:
+        note(
+            "What the study file does not name is the packaged example's, whose masses and drive are assumed."
+        )
     note(
         "Friction is smoothed: at rest nothing sticks, so that the torque to break away from a loaded "
         "stop is not in the start-up."
     )
     # two bars against a chain of many rods, on this organ: docs/physics.md
-    if relative > 0.31:
+    speed, mode = config.run.crank_speed, limits.chain_resonance
+    if speed > 0.31 * mode:
         note(
             "A chain has a mode that two bars lack: the rocker torque of two bars is good to 10 % only up "
-            f"to about {0.31 * limits['chain_resonance']:.1f} rad/s of the crank"
-            + (", the crank torque up to about twice that." if relative > 0.65 else ".")
+            f"to about {0.31 * mode:.1f} rad/s of the crank"
+            + (", the crank torque up to about twice that." if speed > 0.65 * mode else ".")
         )
-    reached = study.answers.get("steady", {}).get("speed_mean")
-    if reached is not None and abs(reached - config.run.crank_speed) > 0.01 * config.run.crank_speed:
+    steady = study.answers.get("steady")
+    if steady is not None and not _settled(steady, speed):
         note(
-            f"steady running: the crank turns at {reached:.3g} rad/s in place of {config.run.crank_speed:g} rad/s; "
-            "the motor's voltage or current is at its limit, or the run is too short to settle."
+            f"steady running: the crank turns at {steady.speed_mean:.3g} rad/s in place of {speed:g} rad/s; the "
+            "motor's voltage or current is at its limit, or the run is too short to settle. Overloads are those "
+            "of this state."
         )
     for name, answers in study.answers.items():
         title = SCENARIOS.get(name, "steady running")
-        pull, current = answers["web_pull_least"], answers["current_peak"]
-        if pull is not None and pull < 0.0:
+        if answers.web_pull_least < 0.0:
             note(
-                f"{title}: web pull down to {pull:.0f} N; a chain cannot push, it would go slack and snatch."
+                f"{title}: web pull down to {answers.web_pull_least:.0f} N; a chain cannot push, it would go slack "
+                "and snatch."
             )
-        if current is not None and current > 0.999 * study.motor.limit.i:
+        if answers.current_peak > 0.999 * study.motor.limit.i:
             note(f"{title}: the motor runs into its current limit of {study.motor.limit.i:g} A.")
-        if "recovery_time" in answers and answers["recovery_time"] is None:
+        if name in SCENARIOS and answers.recovery_time is None:
             note(f"{title}: the speed does not return to its steady band within the time followed.")
-
-
-UNITS = {
-    "torque": "N.m",
-    "power": "W",
-    "current": "A",
-    "temperature": "K",
-    "pull": "N",
-    "speed": "rad/s",
-    "resonance": "rad/s",
-    "extreme": "rad",
-    "dip": "1",
-    "margin": "1",
-    "time": "s",
-}
-
-
-def unit_of(name: str) -> str:
-    """The unit of an answer or limit, from its name."""
-    return next(unit for part in reversed(name.split("_")) if (unit := UNITS.get(part)))
+    for name, certificate in study.certificate.items():
+        share = certificate["energy_residual_share"]
+        if not share < 1e-3:
+            note(
+                f"{SCENARIOS.get(name, 'start-up and steady running')}: the energy residual is {share:.1e} of "
+                "the energy moved; the step is too long for this run, lessen run.step."
+            )
 
 
 def as_dict(study: Study) -> dict[str, Any]:
     """Everything but the time series, ready for JSON: each number with its unit."""
     config = study.config
 
-    def with_units(values: Mapping[str, float | None]) -> dict[str, Any]:
-        return {
-            name: {
-                "value": None if value is None or not math.isfinite(value) else value,
-                "unit": unit_of(name),
-            }
-            for name, value in values.items()
-        }
-
-    def declared(model: Any, instance: Any) -> dict[str, Any]:
-        layout = model.parameter_layout
-        return {
-            v.name: {"value": value, "unit": v.unit}
-            for v, value in zip(layout.variables, layout.values(instance), strict=True)
-        }
-
     return {
         "chainunit": __version__,
         "title": config.title,
         "source": config.source,
         "status": f"failed: {study.failure}" if study.failure else "complete",
-        "answers": {name: with_units(values) for name, values in study.answers.items()},
-        "overload_factors": asdict(study.factors) if study.factors else None,
-        "limits": with_units(study.limits),
+        "answers": {name: entries(answers) for name, answers in study.answers.items()},
+        "overload_factors": _pure(asdict(study.factors)) if study.factors else None,
+        "limits": entries(study.limits) if study.limits else None,
         "events": {name: {"value": at, "unit": "s"} for name, at in study.event.items()},
         "pins": {
             run: {
@@ -422,12 +461,22 @@ def as_dict(study: Study) -> dict[str, Any]:
             }
             for run, table in study.pins.items()
         },
-        "certificate": study.certificate,
-        "control": asdict(study.tuning) if study.tuning else "gains given",
+        "certificate": {name: _pure(shares) for name, shares in study.certificate.items()},
+        "control": {
+            "phase_margin": {"value": study.tuning.phase_margin, "unit": "deg"},
+            "crossover": {"value": study.tuning.crossover, "unit": "rad/s"},
+            "current_crossover": {"value": study.tuning.current_crossover, "unit": "rad/s"},
+        }
+        if study.tuning
+        else "all gains given",
         "notes": study.notes,
-        "machine": declared(ChamberForces, config.machine.p),
-        "motor": declared(DcMotor, study.motor),
-        "feed": asdict(config.feed),
-        "run": asdict(config.run),
-        "overload": asdict(config.overload),
+        "machine": entries(config.machine.p),
+        "motor": entries(study.motor),
+        "feed": entries(config.feed),
+        "run": entries(config.run),
+        "overload": entries(config.overload),
     }
+
+
+def _pure(values: Mapping[str, float]) -> dict[str, Any]:
+    return {name: {"value": _number(value), "unit": "1"} for name, value in values.items()}
