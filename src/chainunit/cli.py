@@ -155,7 +155,7 @@ def export(
 def main() -> None:
     """Run the command line: exit status 2 for bad input, in one line; 1 for a run that failed, 130 for Ctrl-C."""
     try:
-        sys.exit(app(standalone_mode=False))
+        sys.exit(app(sys.argv[1:] or ["--help"], standalone_mode=False))
     except InputError as error:
         _end(str(error), 2)
     except (typer.Abort, KeyboardInterrupt):
