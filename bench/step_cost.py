@@ -72,7 +72,7 @@ def main() -> None:
             cost(
                 lambda: rk4(
                     lambda y: DcMotor.derivatives(engines.MATH, motor, at, layout.instance(y)),
-                    x, 1e-3, DcMotor.internal_step(motor),
+                    x, 1e-3, DcMotor.internal_step(engines.MATH, motor),
                 )
             ),
         )

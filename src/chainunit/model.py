@@ -48,9 +48,21 @@ class Part:
     model's `shared` returned, and gives an instance of the declaration `declared`.
     """
 
-    def __init__(self, declared: type, equations: Callable[..., Any]) -> None:
+    def __init__(
+        self,
+        declared: type,
+        equations: Callable[..., Any],
+        *,
+        often: frozenset[str] = frozenset(),
+        derivatives: Mapping[str, tuple[str, str]] | None = None,
+    ) -> None:
+        """`often` names the outputs that a driver asks for at every step: a native FMU evaluates them apart from the
+        rest. `derivatives` says which output by which input each of this part's is the derivative of, for an
+        engine that differentiates by itself."""
         self.layout = Layout(declared)
         self.equations = equations
+        self.often = often
+        self.derivatives = dict(derivatives or {})
 
 
 class Model:
@@ -114,7 +126,7 @@ class Model:
         raise NotImplementedError
 
     @staticmethod
-    def internal_step(p: Any) -> Any:
+    def internal_step(xp: Any, p: Any) -> Any:
         """Longest step of the internal integrator [s] (models with states)."""
         raise NotImplementedError
 

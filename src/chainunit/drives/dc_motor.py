@@ -208,10 +208,10 @@ class DcMotor(Model):
         yield p.armature.L, 1e-6 * (p.armature.R + p.current_control.kp), math.inf
 
     @staticmethod
-    def internal_step(p: Any) -> Any:
+    def internal_step(xp: Any, p: Any) -> Any:
         """A quarter of the time constant of the closed current loop, its fastest part, and at most 0.25 ms: the
         Runge-Kutta method is stable up to 2.8 of it, which leaves room for a winding that heats up."""
-        return min(2.5e-4, 0.25 * p.armature.L / (p.armature.R + p.current_control.kp))
+        return xp.minimum(2.5e-4, 0.25 * p.armature.L / (p.armature.R + p.current_control.kp))
 
     @staticmethod
     def initial_states(p: Any) -> Any:

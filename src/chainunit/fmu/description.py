@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -63,9 +63,9 @@ class Interface:
         return [s for s in self.signals if s.causality == causality]
 
     @cached_property
-    def dependencies(self) -> list[tuple[list[int], list[int]]]:
-        """Of each output: value references of what it truly depends on, in a run (inputs) and at the start
-        (parameters and inputs), from the sparsity of the traced equations."""
+    def traced(self) -> tuple[list[Any], Any, Any, Any, list[Any], list[Any]]:
+        """The model in symbols: (p, u, x as casadi vectors), p, u and x as declarations, outputs part by part in
+        declared order, and derivatives of the states."""
         import casadi
 
         model = self.model
@@ -74,36 +74,62 @@ class Interface:
             for name, group in (("p", self.parameters), ("u", self.inputs), ("x", self.states))
         ]
         p = model.parameter_layout.instance(casadi.vertsplit(symbols[0]))
-        running = started = None
-        if model.state_layout:
-            running = model.state_layout.instance(casadi.vertsplit(symbols[2]))
-            started = model.initial_states(p)
-        in_run = self._influences(symbols, p, running)
-        at_start = self._influences(symbols, p, started)
-        return [
-            ([i for i in known if i >= len(self.parameters)], first)
-            for known, first in zip(in_run, at_start, strict=True)
-        ]
+        u = model.input_layout.instance(casadi.vertsplit(symbols[1]))
+        x = model.state_layout.instance(casadi.vertsplit(symbols[2])) if model.state_layout else None
+        outputs = self._outputs(p, u, x)
+        derivatives = model.derivatives(casadi_(), p, u, x) if model.state_layout else []
+        return symbols, p, u, x, outputs, derivatives
 
-    def _influences(self, symbols: list[Any], p: Any, x: Any) -> list[list[int]]:
-        """Value references of the parameters and inputs that each output depends on, at states `x`."""
+    def _outputs(self, p: Any, u: Any, x: Any) -> list[Any]:
+        parts = self.model.evaluate(casadi_(), p, u, x)
+        return [v for part, out in zip(self.model.parts, parts, strict=True) for v in part.layout.values(out)]
+
+    @cached_property
+    def dependencies(self) -> list[tuple[list[int], list[int]]]:
+        """Of each output, and of each state's derivative behind them: value references of what it truly depends on, in
+        a run (inputs and states) and at the start (parameters and inputs), from the sparsity of the
+        traced equations. A state, in a run, depends on itself alone."""
+        model = self.model
+        symbols, p, u, x, outputs, derivatives = self.traced
+        states, started = [], []
+        rows_at_start = [*outputs, *derivatives]
+        if model.state_layout:
+            states = model.state_layout.values(x)
+            first = model.initial_states(p)
+            started = model.state_layout.values(first)
+            rows_at_start = [*self._outputs(p, u, first), *model.derivatives(casadi_(), p, u, first)]
+        in_run = self._influences(symbols, [*states, *outputs, *derivatives])
+        at_start = self._influences(symbols, [*started, *rows_at_start])
+        n = len(self.parameters)
+        return [([i for i in known if i >= n], first) for known, first in zip(in_run, at_start, strict=True)]
+
+    @staticmethod
+    def _influences(symbols: list[Any], rows: list[Any]) -> list[list[int]]:
+        """Value references of parameters, inputs and states that each row depends on."""
         import casadi
 
-        model = self.model
-        u = model.input_layout.instance(casadi.vertsplit(symbols[1]))
-        outputs = model.state_layout.values(x) if model.state_layout else []
-        for part, values in zip(model.parts, model.evaluate(casadi_(), p, u, x), strict=True):
-            outputs += part.layout.values(values)
-        f = casadi.Function("outputs", symbols, [casadi.vertcat(*outputs)])
-        rows: list[list[int]] = [[] for _ in outputs]
-        for side, offset in ((0, 0), (1, len(self.parameters))):
+        f = casadi.Function("rows", symbols, [casadi.vertcat(*rows)])
+        known: list[list[int]] = [[] for _ in rows]
+        offset = 0
+        for side, symbol in enumerate(symbols):
             for row, column in zip(*f.jac_sparsity(0, side).get_triplet(), strict=True):
-                rows[row].append(offset + column)
-        return rows
+                known[row].append(offset + column)
+            offset += symbol.shape[0]
+        return known
 
 
-def model_description(interface: Interface, guid: str, options: dict[str, str], version: str) -> Element:
-    """The XML tree of a co-simulation FMU; `options` are attributes of its CoSimulation element."""
+def model_description(
+    interface: Interface,
+    guid: str,
+    kinds: Mapping[str, Mapping[str, str]],
+    version: str,
+    sources: Sequence[str] = (),
+) -> Element:
+    """The XML tree of an FMI 2.0 FMU.
+
+    `kinds` maps "ModelExchange" and "CoSimulation" to the attributes of their elements; with Model Exchange the
+    derivatives of the states are variables, too. `sources` are the files that the FMU can be compiled from.
+    """
     model = interface.model
     root = Element(
         "fmiModelDescription",
@@ -117,8 +143,17 @@ def model_description(interface: Interface, guid: str, options: dict[str, str], 
         variableNamingConvention="structured",
         numberOfEventIndicators="0",
     )
-    SubElement(root, "CoSimulation", {"modelIdentifier": model.name, **options})
-    _unit_definitions(root, {s.variable.unit for s in interface.signals})
+    for kind, options in kinds.items():
+        element = SubElement(root, kind, {"modelIdentifier": model.name, **options})
+        if sources:
+            files = SubElement(element, "SourceFiles")
+            for name in sources:
+                SubElement(files, "File", name=name)
+    exchange = "ModelExchange" in kinds
+    units = {s.variable.unit for s in interface.signals}
+    if exchange:
+        units |= {_per_second(v.unit) for v in interface.states}
+    _unit_definitions(root, units)
     categories = SubElement(root, "LogCategories")
     for name in ("logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal", "logAll"):
         SubElement(categories, "Category", name=name)
@@ -126,15 +161,53 @@ def model_description(interface: Interface, guid: str, options: dict[str, str], 
     variables = SubElement(root, "ModelVariables")
     for signal in interface.signals:
         _scalar(variables, signal)
+    first_state, first_derivative = len(interface.parameters) + len(interface.inputs), len(interface.signals)
+    if exchange:
+        for i, v in enumerate(interface.states):
+            _derivative(variables, v, first_state + i, first_derivative + i)
     structure = SubElement(root, "ModelStructure")
-    outputs = list(zip(interface.of("output"), interface.dependencies, strict=True))
+    outputs = interface.of("output")
+    known = interface.dependencies
     listed = SubElement(structure, "Outputs")
-    for signal, (_, inputs) in outputs:
-        _unknown(listed, signal, inputs)
+    for signal, (in_run, _) in zip(outputs, known, strict=False):
+        used = in_run if exchange else [i for i in in_run if i < first_state]
+        _unknown(listed, signal.reference, used)
+    if exchange and interface.states:
+        listed = SubElement(structure, "Derivatives")
+        for i, (in_run, _) in enumerate(known[len(outputs) :]):
+            _unknown(listed, first_derivative + i, in_run)
     listed = SubElement(structure, "InitialUnknowns")
-    for signal, (_, known) in outputs:
-        _unknown(listed, signal, known)
+    for signal, (_, at_start) in zip(outputs, known, strict=False):
+        _unknown(listed, signal.reference, at_start)
+    if exchange:
+        for i, (_, at_start) in enumerate(known[len(outputs) :]):
+            _unknown(listed, first_derivative + i, at_start)
     return root
+
+
+def _per_second(unit: str) -> str:
+    """The unit of a derivative by time, in base units where it has no name of its own."""
+    if unit == "1":
+        return "1/s"
+    powers = base_units(unit)
+    powers["s"] = powers.get("s", 0) - 1
+    top = ".".join(f"{b}{'' if n == 1 else n}" for b, n in powers.items() if n > 0)
+    below = ".".join(f"{b}{'' if n == -1 else -n}" for b, n in powers.items() if n < 0)
+    return (top or "1") + (f"/{below}" if below else "")
+
+
+def _derivative(variables: Element, state: Variable, of: int, reference: int) -> None:
+    node = SubElement(
+        variables,
+        "ScalarVariable",
+        name=f"der({state.name})",
+        valueReference=str(reference),
+        description=f"derivative by time: {state.description}",
+        causality="local",
+        variability="continuous",
+        initial="calculated",
+    )
+    SubElement(node, "Real", unit=_per_second(state.unit), derivative=str(of + 1))
 
 
 def _unit_definitions(root: Element, units: Iterable[str]) -> None:
@@ -177,12 +250,12 @@ def _scalar(variables: Element, signal: Signal) -> None:
     SubElement(node, "Real", real)
 
 
-def _unknown(listed: Element, signal: Signal, known: list[int]) -> None:
+def _unknown(listed: Element, reference: int, known: Sequence[int]) -> None:
     # FMI 2.0 counts variables from 1
     SubElement(
         listed,
         "Unknown",
-        index=str(signal.reference + 1),
+        index=str(reference + 1),
         dependencies=" ".join(str(i + 1) for i in sorted(known)),
         dependenciesKind=" ".join("dependent" for _ in known),
     )

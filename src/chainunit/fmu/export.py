@@ -7,7 +7,6 @@ of: two FMUs in one process never share code by accident, and the same model giv
 from __future__ import annotations
 
 import hashlib
-import shutil
 import sys
 import tempfile
 import uuid
@@ -17,11 +16,10 @@ from importlib import metadata
 from pathlib import Path
 from xml.etree.ElementTree import tostring
 
-from ..errors import InputError
 from ..files import folder, whole
 from ..model import Model
-from ..quantities import complaint
-from .description import Interface, model_description
+from .description import model_description
+from .pack import checked, pack
 
 _PACKAGE = Path(__file__).parents[1]
 _COMMON = (
@@ -35,14 +33,15 @@ _COMMON = (
     "fmu/__init__.py",
     "fmu/slave.py",
 )
-_OPTIONS = {
-    "needsExecutionTool": "true",
-    "canHandleVariableCommunicationStepSize": "true",
-    "canNotUseMemoryManagementFunctions": "true",
-    "canGetAndSetFMUstate": "true",
-    "canSerializeFMUstate": "true",
+_KINDS = {
+    "CoSimulation": {
+        "needsExecutionTool": "true",
+        "canHandleVariableCommunicationStepSize": "true",
+        "canNotUseMemoryManagementFunctions": "true",
+        "canGetAndSetFMUstate": "true",
+        "canSerializeFMUstate": "true",
+    }
 }
-_EPOCH = (1980, 1, 1, 0, 0, 0)  # the oldest time that a zip entry can bear
 
 
 def export(model: type[Model], file: Path, start: dict[str, float] | None = None) -> Path:
@@ -61,13 +60,7 @@ def export(model: type[Model], file: Path, start: dict[str, float] | None = None
     InputError
         where the start values are out of bounds or make no machine.
     """
-    start = {name: float(value) for name, value in (start or {}).items()}
-    interface = Interface(model, start)
-    for signal in interface.of("input"):
-        if not signal.variable.quantity.admits(signal.start or 0.0):
-            raise InputError(complaint(signal.variable, signal.start))
-    model.check(model.parameter_layout.instance([s.start for s in interface.of("parameter")]))
-
+    interface = checked(model, start)
     file = Path(file)
     folder(file.parent)
     version = metadata.version("chainunit")
@@ -76,9 +69,9 @@ def export(model: type[Model], file: Path, start: dict[str, float] | None = None
     for name, content in sorted(shipped.items()):
         digest.update(name.encode() + b"\0" + content + b"\0")
     digest.update(metadata.version("pythonfmu").encode())
-    digest.update(tostring(model_description(interface, "", _OPTIONS, version)))
+    digest.update(tostring(model_description(interface, "", _KINDS, version)))
     hashed = digest.hexdigest()[:32]
-    description = model_description(interface, f"{{{uuid.UUID(hashed)}}}", _OPTIONS, version)
+    description = model_description(interface, f"{{{uuid.UUID(hashed)}}}", _KINDS, version)
 
     with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
         work = Path(scratch)
@@ -91,11 +84,11 @@ def export(model: type[Model], file: Path, start: dict[str, float] | None = None
             f'"""chainunit {version}, the part that {model.name} needs."""\n'
         )
         recipe = work / f"{model.name}_{hashed[:12]}.py"
-        recipe.write_text(_recipe(model, package.name, start))
+        recipe.write_text(_recipe(model, package.name, start or {}))
         (work / "modelDescription.xml").write_bytes(tostring(description, "utf-8"))
         raw = _build(recipe, package, work / "modelDescription.xml", work / "raw.fmu")
         with whole(file) as part:
-            _normalise(raw, part)
+            pack(_contents(raw), part)
     return file
 
 
@@ -107,7 +100,8 @@ def _shipped(model: type[Model]) -> Iterator[tuple[str, bytes]]:
             yield source.relative_to(_PACKAGE).as_posix(), source.read_bytes()
 
 
-def _recipe(model: type[Model], package: str, start: dict[str, float]) -> str:
+def _recipe(model: type[Model], package: str, given: dict[str, float]) -> str:
+    start = {name: float(given[name]) for name in sorted(given)}
     module = model.__module__.removeprefix("chainunit")
     return (
         f'"""{model.description}."""\n'
@@ -116,7 +110,7 @@ def _recipe(model: type[Model], package: str, start: dict[str, float]) -> str:
         "hold(globals())\n\n\n"
         f"class {model.name}(ModelSlave):\n"
         f"    model = _Model\n"
-        f"    start = {dict(sorted(start.items()))!r}\n"
+        f"    start = {start!r}\n"
     )
 
 
@@ -136,14 +130,11 @@ def _build(recipe: Path, package: Path, description: Path, file: Path) -> Path:
     return file
 
 
-def _normalise(raw: Path, file: Path) -> None:
-    """The same archive in one order and with one time stamp, the scaffold left out."""
-    with zipfile.ZipFile(raw) as old, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as new:
-        for name in sorted(old.namelist()):
-            if name == "resources/modelDescription.xml" or "__pycache__" in name:
-                continue
-            entry = zipfile.ZipInfo(name, _EPOCH)
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            entry.external_attr = 0o644 << 16
-            with old.open(name) as source, new.open(entry, "w") as target:
-                shutil.copyfileobj(source, target)
+def _contents(raw: Path) -> dict[str, bytes]:
+    """What pythonfmu packed, the scaffold left out."""
+    with zipfile.ZipFile(raw) as archive:
+        return {
+            name: archive.read(name)
+            for name in archive.namelist()
+            if name != "resources/modelDescription.xml" and "__pycache__" not in name
+        }

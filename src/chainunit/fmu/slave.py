@@ -129,7 +129,7 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         p, u, model = self._p, self._inputs(), self.model
         layout = model.state_layout
         assert layout is not None
-        longest = model.internal_step(p)
+        longest = model.internal_step(MATH, p)
         if step > _LONGEST_STEP * longest:
             self._tell(f"step of {step:g} s: must be < {_LONGEST_STEP * longest:g} s")
             return False

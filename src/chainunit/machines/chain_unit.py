@@ -563,4 +563,29 @@ class ChamberForces(Model):
         """The machine at the crank angle and speed that belong to the motor's."""
         return State(xp, p, u, u.phi / p.ratio, u.w / p.ratio)
 
-    parts = (Part(Outputs, _outputs), Part(PortSlopes, _slopes))
+    parts = (
+        Part(
+            Outputs,
+            _outputs,
+            often=frozenset(
+                (
+                    "tau",
+                    "tau_bias",
+                    "J",
+                    "dJ_dphi",
+                    "phi0",
+                    "w0",
+                    "rocker.psi",
+                    "rocker.w",
+                    "rocker.a",
+                    "power",
+                )
+                + ("kinetic_energy", "potential_energy", "dissipated_power", "margin", "pressure_angle")
+            ),
+        ),
+        Part(
+            PortSlopes,
+            _slopes,
+            derivatives={"tau_bias_dphi": ("tau_bias", "phi"), "tau_bias_dw": ("tau_bias", "w")},
+        ),
+    )

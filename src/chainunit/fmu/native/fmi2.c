@@ -1,0 +1,342 @@
+/* FMI 2.0, Co-Simulation and Model Exchange, over runtime.h. Names no model. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "fmi2Functions.h"
+#include "runtime.h"
+
+#define INSTANCE ((Instance *)c)
+#define RUNNING (EVENT | CONTINUOUS | STEP)
+#define NEED(modes)                                                  \
+    do {                                                             \
+        if (!c) return fmi2Error;                                    \
+        if (expect(INSTANCE, (modes), __func__)) return fmi2Error;   \
+    } while (0)
+#define NOT_NULL(pointer)                                                                              \
+    do {                                                                                               \
+        if (!(pointer)) return (fmi2Status)complain(INSTANCE, ERROR, "%s: null argument", __func__); \
+    } while (0)
+
+static void report(const Instance *c, Status status, const char *message) {
+    const fmi2CallbackFunctions *functions = c->host[0];
+    if (functions && functions->logger)
+        functions->logger(functions->componentEnvironment, c->name, (fmi2Status)status,
+                          status == DISCARD ? "logStatusDiscard" : "logStatusError", "%s", message);
+}
+
+const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
+const char *fmi2GetVersion(void) { return fmi2Version; }
+
+fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
+                              const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean logging) {
+    (void)resources;
+    (void)visible;
+    (void)logging;
+    if (!functions) return NULL;
+    Instance *c = instance_new(name && *name ? name : model.name, report);
+    if (!c) return NULL;
+    c->host[0] = (void *)functions;
+    c->model_exchange = type == fmi2ModelExchange;
+    if (!name || !*name)
+        complain(c, ERROR, "the instance has no name");
+    else if (!guid || strcmp(guid, model.guid))
+        complain(c, ERROR, "the GUID %s is not that of this FMU, %s", guid ? guid : "(null)", model.guid);
+    else
+        return c;
+    instance_free(c);
+    return NULL;
+}
+
+void fmi2FreeInstance(fmi2Component c) { instance_free(INSTANCE); }
+
+fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String categories[]) {
+    (void)on;
+    (void)n;
+    (void)categories;
+    return c ? fmi2OK : fmi2Error;
+}
+
+fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2Real tolerance, fmi2Real time,
+                               fmi2Boolean has_stop, fmi2Real stop) {
+    (void)has_tolerance;
+    (void)tolerance;
+    (void)has_stop;
+    (void)stop;
+    NEED(INSTANTIATED);
+    INSTANCE->time = time;
+    return fmi2OK;
+}
+
+fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
+    NEED(INSTANTIATED);
+    const Status status = start(INSTANCE);
+    if (status) return (fmi2Status)status;
+    INSTANCE->mode = INITIALIZATION;
+    return fmi2OK;
+}
+
+fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
+    NEED(INITIALIZATION);
+    const Status status = start(INSTANCE);
+    if (status) return (fmi2Status)status;
+    INSTANCE->mode = INSTANCE->model_exchange ? EVENT : STEP;
+    return fmi2OK;
+}
+
+fmi2Status fmi2Terminate(fmi2Component c) {
+    NEED(RUNNING);
+    INSTANCE->mode = TERMINATED;
+    return fmi2OK;
+}
+
+fmi2Status fmi2Reset(fmi2Component c) {
+    if (!c) return fmi2Error;
+    instance_reset(INSTANCE);
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[]) {
+    if (!c) return fmi2Error;
+    if (n) NOT_NULL(vr && value);
+    return (fmi2Status)get(INSTANCE, vr, n, value);
+}
+
+fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[]) {
+    NEED(INSTANTIATED | INITIALIZATION | RUNNING);
+    if (n) NOT_NULL(vr && value);
+    for (size_t i = 0; i < n; ++i) {
+        const Status status = set(INSTANCE, vr[i], value[i]);
+        if (status) return (fmi2Status)status;
+    }
+    return fmi2OK;
+}
+
+#define NO_SUCH_TYPE(name, type, qualifier)                                                               \
+    fmi2Status name(fmi2Component c, const fmi2ValueReference vr[], size_t n, qualifier type value[]) {   \
+        (void)vr;                                                                                         \
+        (void)value;                                                                                      \
+        if (!c) return fmi2Error;                                                                         \
+        return n ? (fmi2Status)complain(INSTANCE, ERROR, "%s: every variable is a Real", __func__) : fmi2OK; \
+    }
+NO_SUCH_TYPE(fmi2GetInteger, fmi2Integer, )
+NO_SUCH_TYPE(fmi2GetBoolean, fmi2Boolean, )
+NO_SUCH_TYPE(fmi2GetString, fmi2String, )
+NO_SUCH_TYPE(fmi2SetInteger, fmi2Integer, const)
+NO_SUCH_TYPE(fmi2SetBoolean, fmi2Boolean, const)
+NO_SUCH_TYPE(fmi2SetString, fmi2String, const)
+
+/* -- saved states */
+
+fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
+    if (!c) return fmi2Error;
+    NOT_NULL(state);
+    if (!*state) *state = malloc(state_size(INSTANCE));
+    if (!*state) return (fmi2Status)complain(INSTANCE, ERROR, "out of memory");
+    state_write(INSTANCE, *state);
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
+    if (!c) return fmi2Error;
+    NOT_NULL(state);
+    return (fmi2Status)state_read(INSTANCE, state, state_size(INSTANCE));
+}
+
+fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state) {
+    if (!c) return fmi2Error;
+    if (state) {
+        free(*state);
+        *state = NULL;
+    }
+    return fmi2OK;
+}
+
+fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size) {
+    if (!c) return fmi2Error;
+    NOT_NULL(state && size);
+    *size = state_size(INSTANCE);
+    return fmi2OK;
+}
+
+fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size) {
+    if (!c) return fmi2Error;
+    NOT_NULL(state && bytes);
+    if (size < state_size(INSTANCE)) return (fmi2Status)complain(INSTANCE, ERROR, "%s: too little room", __func__);
+    memcpy(bytes, state, state_size(INSTANCE));
+    return fmi2OK;
+}
+
+fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state) {
+    if (!c) return fmi2Error;
+    NOT_NULL(bytes && state);
+    if (size != state_size(INSTANCE))
+        return (fmi2Status)complain(INSTANCE, ERROR, "%s: the size is not this model's", __func__);
+    if (!*state) *state = malloc(size);
+    if (!*state) return (fmi2Status)complain(INSTANCE, ERROR, "out of memory");
+    memcpy(*state, bytes, size);
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[], size_t n_unknown,
+                                        const fmi2ValueReference known[], size_t n_known, const fmi2Real seed[],
+                                        fmi2Real sensitivity[]) {
+    NEED(INITIALIZATION | RUNNING);
+    NOT_NULL(unknown && known && seed && sensitivity);
+    const Status status = INSTANCE->mode == INITIALIZATION ? start(INSTANCE) : OK;
+    if (status) return (fmi2Status)status;
+    return (fmi2Status)forward(INSTANCE, unknown, n_unknown, known, n_known, seed, sensitivity);
+}
+
+/* -- model exchange */
+
+fmi2Status fmi2EnterEventMode(fmi2Component c) {
+    NEED(EVENT | CONTINUOUS);
+    INSTANCE->mode = EVENT;
+    return fmi2OK;
+}
+
+fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info) {
+    NEED(EVENT);
+    NOT_NULL(info);
+    memset(info, 0, sizeof *info);
+    return fmi2OK;
+}
+
+fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) {
+    NEED(EVENT);
+    INSTANCE->mode = CONTINUOUS;
+    return fmi2OK;
+}
+
+fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_set, fmi2Boolean *enter_event,
+                                       fmi2Boolean *terminate) {
+    (void)no_set;
+    NEED(CONTINUOUS);
+    NOT_NULL(enter_event && terminate);
+    *enter_event = *terminate = fmi2False;
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {
+    NEED(EVENT | CONTINUOUS);
+    INSTANCE->time = time;
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n) {
+    NEED(CONTINUOUS | EVENT);
+    if (n != (size_t)model.n_x) return (fmi2Status)complain(INSTANCE, ERROR, "%s: there are %d states", __func__, model.n_x);
+    if (n) NOT_NULL(x);
+    for (size_t i = 0; i < n; ++i)
+        if (!(x[i] - x[i] == 0.0)) return (fmi2Status)complain(INSTANCE, ERROR, "state %d must be a finite number", (int)i);
+    if (n) memcpy(INSTANCE->x, x, n * sizeof *x);
+    states_changed(INSTANCE);
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real dx[], size_t n) {
+    NEED(INITIALIZATION | EVENT | CONTINUOUS);
+    if (n != (size_t)model.n_x) return (fmi2Status)complain(INSTANCE, ERROR, "%s: there are %d states", __func__, model.n_x);
+    if (n) NOT_NULL(dx);
+    const Status status = derivatives(INSTANCE);
+    if (status) return (fmi2Status)status;
+    if (n) memcpy(dx, INSTANCE->dx, n * sizeof *dx);
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real z[], size_t n) {
+    (void)z;
+    NEED(INITIALIZATION | EVENT | CONTINUOUS);
+    return n ? (fmi2Status)complain(INSTANCE, ERROR, "%s: there are none", __func__) : fmi2OK;
+}
+
+static fmi2Status copy_states(Instance *c, const double *from, double *to, size_t n, const char *call) {
+    if (n != (size_t)model.n_x) return (fmi2Status)complain(c, ERROR, "%s: there are %d states", call, model.n_x);
+    if (n && !to) return (fmi2Status)complain(c, ERROR, "%s: null argument", call);
+    if (n) memcpy(to, from, n * sizeof *to);
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t n) {
+    NEED(INITIALIZATION | EVENT | CONTINUOUS);
+    return copy_states(INSTANCE, INSTANCE->x, x, n, __func__);
+}
+
+fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x[], size_t n) {
+    if (!c) return fmi2Error;
+    return copy_states(INSTANCE, model.nominal, x, n, __func__);
+}
+
+/* -- co-simulation */
+
+fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
+                                       const fmi2Integer order[], const fmi2Real value[]) {
+    NEED(INITIALIZATION | STEP);
+    if (n) NOT_NULL(vr && order && value);
+    for (size_t i = 0; i < n; ++i) {
+        if (order[i] != 1) return (fmi2Status)complain(INSTANCE, ERROR, "%s: only the first derivative", __func__);
+        const Status status = set_input_derivative(INSTANCE, vr[i], value[i]);
+        if (status) return (fmi2Status)status;
+    }
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
+                                        const fmi2Integer order[], fmi2Real value[]) {
+    NEED(STEP);
+    if (n) NOT_NULL(vr && order && value);
+    for (size_t i = 0; i < n; ++i) {
+        if (order[i] != 1) return (fmi2Status)complain(INSTANCE, ERROR, "%s: only the first derivative", __func__);
+        const Status status = output_derivative(INSTANCE, vr[i], &value[i]);
+        if (status) return (fmi2Status)status;
+    }
+    return fmi2OK;
+}
+
+fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean no_set) {
+    (void)no_set;
+    NEED(STEP);
+    return (fmi2Status)step(INSTANCE, time, size);
+}
+
+fmi2Status fmi2CancelStep(fmi2Component c) {
+    if (!c) return fmi2Error;
+    return (fmi2Status)complain(INSTANCE, ERROR, "%s: steps are not asynchronous", __func__);
+}
+
+fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value) {
+    (void)kind;
+    (void)value;
+    if (!c) return fmi2Error;
+    return (fmi2Status)complain(INSTANCE, DISCARD, "%s: steps are not asynchronous", __func__);
+}
+
+fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value) {
+    if (!c) return fmi2Error;
+    NOT_NULL(value);
+    if (kind != fmi2LastSuccessfulTime) return (fmi2Status)complain(INSTANCE, DISCARD, "%s: not available", __func__);
+    *value = INSTANCE->time;
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value) {
+    (void)kind;
+    (void)value;
+    if (!c) return fmi2Error;
+    return (fmi2Status)complain(INSTANCE, DISCARD, "%s: not available", __func__);
+}
+
+fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value) {
+    if (!c) return fmi2Error;
+    NOT_NULL(value);
+    if (kind != fmi2Terminated) return (fmi2Status)complain(INSTANCE, DISCARD, "%s: not available", __func__);
+    *value = fmi2False;
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2String *value) {
+    (void)kind;
+    (void)value;
+    if (!c) return fmi2Error;
+    return (fmi2Status)complain(INSTANCE, DISCARD, "%s: not available", __func__);
+}

@@ -1,0 +1,187 @@
+"""C source of a model: kernels by CasADi, and the tables that model.h asks for.
+
+No equation is written here: the model's own kernels are traced with symbols, so that the C code, its exact
+derivatives and the Python results come from the same lines.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from ...engines import casadi_
+from ...quantities import Variable
+from ..description import Interface
+
+
+def groups(interface: Interface) -> list[list[int]]:
+    """Outputs that are evaluated together, as places among the declared outputs."""
+    found: list[list[int]] = []
+    at = 0
+    for part in interface.model.parts:
+        places = {name: at + i for i, name in enumerate(part.layout.names)}
+        at += len(places)
+        often = [i for name, i in places.items() if name in part.often]
+        rest = [i for name, i in places.items() if name not in part.often]
+        found += [group for group in (often, rest) if group]
+    return found
+
+
+def sources(interface: Interface, guid: str, token: str) -> dict[str, str]:
+    """``kernels.c`` and ``model.c`` by name, for the FMI 2.0 GUID and the FMI 3.0 instantiation token given."""
+    return {"kernels.c": _kernels(interface), "model.c": _tables(interface, guid, token)}
+
+
+def _kernels(interface: Interface) -> str:
+    import casadi
+
+    model = interface.model
+    symbols, p, _, _, outputs, derivatives = interface.traced
+    ps, us, xs = symbols
+    outputs = list(outputs)
+    names = [v.name for v in interface.others]
+    for part in model.parts:
+        for name, (of, by) in part.derivatives.items():
+            # CasADi differentiates the expression; dual numbers would give the same with twice the operations
+            column = us[model.input_layout.names.index(by)]
+            outputs[names.index(name)] = casadi.jacobian(outputs[names.index(of)], column)
+    du, dx = casadi.SX.sym("du", us.shape[0]), casadi.SX.sym("dx", xs.shape[0])
+
+    functions = []
+
+    def add(name: str, arguments: list[Any], result: Any) -> None:
+        functions.append(casadi.Function(f"kernel_{name}", arguments, [casadi.cse(casadi.densify(result))]))
+
+    def forward(result: Any) -> Any:
+        return casadi.jtimes(result, casadi.vertcat(us, xs), casadi.vertcat(du, dx))
+
+    add("all", symbols, casadi.vertcat(*(outputs[k] for group in groups(interface) for k in group)))
+    for i, group in enumerate(groups(interface)):
+        values = casadi.vertcat(*(outputs[k] for k in group))
+        add(f"group_{i}", symbols, values)
+        add(f"group_{i}_forward", [*symbols, du, dx], forward(values))
+    if interface.states:
+        rates = casadi.vertcat(*derivatives)
+        add("derivatives", symbols, rates)
+        add("derivatives_forward", [*symbols, du, dx], forward(rates))
+        assert model.state_layout is not None
+        add("initial", [ps], casadi.vertcat(*model.state_layout.values(model.initial_states(p))))
+        add("internal_step", [ps], casadi.SX(model.internal_step(casadi_(), p)))
+    limits = [casadi.SX(v) for row in model.requirements(casadi_(), p) for v in row]
+    if limits:
+        add("requirements", [ps], casadi.vertcat(*limits))
+
+    generator = casadi.CodeGenerator("kernels.c", {"with_header": False, "verbose": False})
+    for function in functions:
+        generator.add(function)
+    with tempfile.TemporaryDirectory() as folder:
+        generator.generate(folder + "/")
+        return Path(folder, "kernels.c").read_text()
+
+
+def _number(x: float) -> str:
+    if math.isinf(x):
+        return "INFINITY" if x > 0 else "-INFINITY"
+    return repr(float(x))
+
+
+def _text(s: str) -> str:
+    return json.dumps(s)
+
+
+def _unit(unit: str) -> str:
+    return _text("" if unit == "1" else unit)
+
+
+def _array(kind: str, name: str, items: list[str]) -> str:
+    # C has no empty arrays
+    body = ",\n    ".join(items or ["0"])
+    return f"static const {kind} {name}[] = {{\n    {body},\n}};\n"
+
+
+def _tables(interface: Interface, guid: str, token: str) -> str:
+    model = interface.model
+    groups_ = groups(interface)
+    kernels = ["all", *(f"group_{i}{end}" for i in range(len(groups_)) for end in ("", "_forward"))]
+    if interface.states:
+        kernels += ["derivatives", "derivatives_forward", "initial", "internal_step"]
+    if model.required:
+        kernels.append("requirements")
+
+    def quantity(v: Variable) -> str:
+        q = v.quantity
+        return (
+            f"{{{_text(v.name)}, {_unit(v.unit)}, {_text(q.allowed)}, {_number(q.low)}, {_number(q.high)}, "
+            f"{int(q.open_low)}, {int(q.tunable)}}}"
+        )
+
+    place, group_of = {}, {}
+    first = 0
+    group_rows = []
+    for g, group in enumerate(groups_):
+        group_rows.append(f"{{{first}, {len(group)}, kernel_group_{g}, kernel_group_{g}_forward}}")
+        for k, output in enumerate(group):
+            place[output], group_of[output] = first + k, g
+        first += len(group)
+    n_y = len(interface.others)
+    starts = [s.start for s in (*interface.of("parameter"), *interface.of("input"))]
+    parameter_names = model.parameter_layout.names
+    lines = [
+        f"/* {model.name}: tables for model.h, generated from the model's declarations. */",
+        "#include <math.h>",
+        "#include <stddef.h>",
+        "",
+        '#include "model.h"',
+        "",
+        *(
+            f"int kernel_{k}(const double **arg, double **res, long long int *iw, double *w, int mem);"
+            for k in kernels
+        ),
+        "",
+        _array("double", "starts", [_number(x or 0.0) for x in starts]),
+        _array("Quantity", "declared", [quantity(v) for v in (*interface.parameters, *interface.inputs)]),
+        _array("double", "nominal", [_number(v.quantity.nominal or 1.0) for v in interface.states]),
+        _array("int", "place", [str(place[i]) for i in range(n_y)]),
+        _array("int", "group_of", [str(group_of[i]) for i in range(n_y)]),
+        _array("Group", "group", group_rows),
+    ]
+    for i, r in enumerate(model.required):
+        lines.append(_array("int", f"given_{i}", [str(parameter_names.index(n)) for n in r.given]))
+    rows = [
+        f"{{{_text(r.subject)}, {_unit(r.unit)}, {_text(r.why)}, {_text(r.remedy)}, {len(r.given)}, given_{i}}}"
+        for i, r in enumerate(model.required)
+    ]
+    if rows:
+        lines.append(_array("Requirement", "required", rows))
+    states = bool(interface.states)
+    fields = {
+        "name": _text(model.name),
+        "guid": _text(guid),
+        "token": _text(token),
+        "n_p": len(interface.parameters),
+        "n_u": len(interface.inputs),
+        "n_x": len(interface.states),
+        "n_y": n_y,
+        "n_groups": len(groups_),
+        "n_required": len(model.required),
+        "start": "starts",
+        "declared": "declared",
+        "nominal": "nominal",
+        "place": "place",
+        "group_of": "group_of",
+        "groups": "group",
+        "all": "kernel_all",
+        "required": "required" if rows else "NULL",
+        "requirements": "kernel_requirements" if rows else "NULL",
+        "initial": "kernel_initial" if states else "NULL",
+        "derivatives": "kernel_derivatives" if states else "NULL",
+        "derivatives_forward": "kernel_derivatives_forward" if states else "NULL",
+        "internal_step": "kernel_internal_step" if states else "NULL",
+    }
+    lines.append("const Model model = {")
+    lines += [f"    .{name} = {value}," for name, value in fields.items()]
+    lines.append("};")
+    return "\n".join(lines) + "\n"

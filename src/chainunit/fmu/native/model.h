@@ -1,0 +1,58 @@
+/* The seam between the generated model and the FMI layers.
+ *
+ * A model fills one `Model`; it names no FMI function. The FMI files see nothing but this header and
+ * runtime.h; they name no model. Values are doubles throughout, in the order parameters, inputs, states,
+ * outputs, derivatives of the states; a value reference is the place in that order.
+ */
+#ifndef CHAINUNIT_MODEL_H
+#define CHAINUNIT_MODEL_H
+
+/* A casadi function on (p, u, x) or (p, u, x, du, dx). */
+typedef int (*Kernel)(const double **arg, double **res, long long int *iw, double *w, int mem);
+
+typedef struct {
+    const char *name;
+    const char *unit;
+    const char *allowed; /* the bounds in words */
+    double low, high;
+    int open_low; /* low itself is forbidden */
+    int tunable;  /* may change in a run */
+} Quantity;
+
+/* Outputs that are evaluated together, once per state, when one of them is asked for. */
+typedef struct {
+    int first, count; /* places among the outputs as they are stored */
+    Kernel values;
+    Kernel forward; /* directional derivative by inputs and states */
+} Group;
+
+/* What parameters must meet beyond their own bounds: value between two limits. */
+typedef struct {
+    const char *subject, *unit, *why, *remedy;
+    int n_given;
+    const int *given; /* parameters named beside the reason */
+} Requirement;
+
+typedef struct {
+    const char *name;
+    const char *guid; /* of the FMI 2.0 description */
+    const char *token; /* of the FMI 3.0 description */
+    int n_p, n_u, n_x, n_y, n_groups, n_required;
+    const double *start;          /* parameters, inputs */
+    const Quantity *declared;     /* parameters, inputs */
+    const double *nominal;        /* of the states */
+    const int *place;             /* of each output, by value reference, as they are stored */
+    const int *group_of;          /* of each output, by value reference */
+    const Group *groups;
+    Kernel all;                   /* (p, u, x) -> outputs of all groups; cheaper than one after the other */
+    const Requirement *required;
+    Kernel requirements;          /* (p) -> value, low, high of each */
+    Kernel initial;               /* (p) -> states at the start */
+    Kernel derivatives;           /* (p, u, x) */
+    Kernel derivatives_forward;   /* (p, u, x, du, dx) */
+    Kernel internal_step;         /* (p) -> longest step of the internal integrator [s] */
+} Model;
+
+extern const Model model;
+
+#endif

@@ -1,0 +1,392 @@
+#include "runtime.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* bits of `needs` and `fresh` beside those of the groups */
+enum { STARTED_BIT = 30, DERIVATIVES_BIT = 31 };
+
+typedef struct {
+    int mode, model_exchange;
+    double time;
+    unsigned guard; /* of the model: a state of another one is refused */
+} Saved;
+
+static unsigned guard(void) {
+    unsigned h = 2166136261u;
+    for (const char *s = model.guid; *s; ++s) h = (h ^ (unsigned char)*s) * 16777619u;
+    return h;
+}
+
+Instance *instance_new(const char *name, Report report) {
+    const int n_in = model.n_u + model.n_x;
+    const int work = 4 * model.n_x + 2 * n_in + model.n_y + model.n_x + 3 * model.n_required + 1;
+    const size_t n = (size_t)(model.n_p + 2 * model.n_u + 2 * model.n_x + model.n_y + work);
+    Instance *c = calloc(1, sizeof *c);
+    if (!c) return NULL;
+    c->block_size = (n - (size_t)work) * sizeof(double);
+    c->block = calloc(n, sizeof(double));
+    c->name = malloc(strlen(name) + 1);
+    c->n_references = (unsigned)(model.n_p + model.n_u + 2 * model.n_x + model.n_y);
+    c->slot = malloc(2 * c->n_references * sizeof *c->slot);
+    if (!c->block || !c->name || !c->slot) {
+        instance_free(c);
+        return NULL;
+    }
+    strcpy(c->name, name);
+    c->p = c->block;
+    c->u = c->p + model.n_p;
+    c->du = c->u + model.n_u;
+    c->x = c->du + model.n_u;
+    c->dx = c->x + model.n_x;
+    c->y = c->dx + model.n_x;
+    c->work = c->y + model.n_y;
+    c->needs = c->slot + c->n_references;
+    unsigned r = 0;
+    for (int k = 0; k < model.n_p + model.n_u; ++k, ++r) c->slot[r] = r, c->needs[r] = 0;
+    for (int k = 0; k < model.n_x; ++k, ++r)
+        c->slot[r] = (unsigned)(c->x - c->block + k), c->needs[r] = 1u << STARTED_BIT;
+    for (int k = 0; k < model.n_y; ++k, ++r)
+        c->slot[r] = (unsigned)(c->y - c->block + model.place[k]),
+        c->needs[r] = 1u << STARTED_BIT | 1u << model.group_of[k];
+    for (int k = 0; k < model.n_x; ++k, ++r)
+        c->slot[r] = (unsigned)(c->dx - c->block + k), c->needs[r] = 1u << STARTED_BIT | 1u << DERIVATIVES_BIT;
+    c->report = report;
+    instance_reset(c);
+    return c;
+}
+
+void instance_free(Instance *c) {
+    if (!c) return;
+    free(c->block);
+    free(c->slot);
+    free(c->name);
+    free(c);
+}
+
+void instance_reset(Instance *c) {
+    memset(c->block, 0, c->block_size);
+    memcpy(c->p, model.start, (size_t)(model.n_p + model.n_u) * sizeof(double));
+    c->mode = INSTANTIATED;
+    c->time = 0.0;
+    c->fresh = 0;
+    c->changed = 1;
+}
+
+Status complain(Instance *c, Status status, const char *format, ...) {
+    char message[640];
+    va_list list;
+    va_start(list, format);
+    vsnprintf(message, sizeof message, format, list);
+    va_end(list);
+    c->report(c, status, message);
+    return status;
+}
+
+Status expect(Instance *c, int modes, const char *call) {
+    if (c->mode & modes) return OK;
+    return complain(c, ERROR, "%s is not allowed now (%s)", call,
+                    c->mode == INSTANTIATED     ? "before initialization"
+                    : c->mode == INITIALIZATION ? "in initialization"
+                    : c->mode == TERMINATED     ? "after termination"
+                    : c->mode == FAILED         ? "after an error; reset or free the instance"
+                                                : "in this mode");
+}
+
+/* -- start */
+
+static Status check(Instance *c) {
+    for (int i = 0; i < model.n_p + model.n_u; ++i) {
+        const Quantity *q = &model.declared[i];
+        const double v = c->p[i];
+        const int above = q->open_low ? v > q->low : v >= q->low;
+        if (!isfinite(v) || (i < model.n_p && !(above && v <= q->high)))
+            return complain(c, ERROR, "%s = %g %s: must be %s%s", q->name, v, q->unit, isfinite(v) ? "" : "finite, ",
+                            q->allowed);
+    }
+    if (!model.n_required) return OK;
+    double *limits = c->work;
+    const double *arg[1] = {c->p};
+    double *res[1] = {limits};
+    model.requirements(arg, res, NULL, NULL, 0);
+    for (int i = 0; i < model.n_required; ++i) {
+        const Requirement *r = &model.required[i];
+        const double value = limits[3 * i], low = limits[3 * i + 1], high = limits[3 * i + 2];
+        if (value > low && value < high) continue;
+        char given[256] = "", range[160] = "";
+        size_t at = 0;
+        for (int k = 0; k < r->n_given && at < sizeof given; ++k)
+            at += (size_t)snprintf(given + at, sizeof given - at, "%s%s = %g", k ? ", " : " with ",
+                                   model.declared[r->given[k]].name, c->p[r->given[k]]);
+        if (!(low < high))
+            snprintf(range, sizeof range, "no value fits; %s", r->remedy);
+        else if (isfinite(low) && isfinite(high))
+            snprintf(range, sizeof range, "must be > %g and < %g %s", low, high, r->unit);
+        else
+            snprintf(range, sizeof range, "must be %s %g %s", isfinite(low) ? ">" : "<", isfinite(low) ? low : high,
+                     r->unit);
+        return complain(c, ERROR, "%s = %g %s: %s%s; %s", r->subject, value, r->unit, r->why, given, range);
+    }
+    return OK;
+}
+
+Status start(Instance *c) {
+    if (!c->changed) return OK;
+    Status status = check(c);
+    if (status) return status;
+    if (model.n_x) {
+        const double *arg[1] = {c->p};
+        double *res[1] = {c->x};
+        model.initial(arg, res, NULL, NULL, 0);
+    }
+    c->fresh = 0;
+    c->changed = 0;
+    return OK;
+}
+
+/* -- values */
+
+static Status unknown_reference(Instance *c, unsigned reference) {
+    return complain(c, ERROR, "value reference %u does not exist", reference);
+}
+
+static int finite(const double *v, int n) {
+    /* an infinite or undefined value makes its sum undefined; four sums, so that none waits for another */
+    double sum[4] = {0.0, 0.0, 0.0, 0.0};
+    int i = 0;
+    for (; i + 4 <= n; i += 4)
+        for (int k = 0; k < 4; ++k) sum[k] += v[i + k] * 0.0;
+    for (; i < n; ++i) sum[0] += v[i] * 0.0;
+    return sum[0] + sum[1] + sum[2] + sum[3] == 0.0;
+}
+
+/* Evaluate the groups in the set `wanted`, a bit each, where they are not fresh. */
+static Status evaluate(Instance *c, unsigned wanted) {
+    wanted &= ~c->fresh;
+    if (!wanted) return OK;
+    const double *arg[3] = {c->p, c->u, c->x};
+    double *res[1] = {c->y};
+    if (wanted & (wanted - 1)) { /* more than one */
+        model.all(arg, res, NULL, NULL, 0);
+        wanted = (1u << model.n_groups) - 1u;
+    } else {
+        for (int g = 0; g < model.n_groups; ++g)
+            if (wanted >> g & 1u) {
+                res[0] = c->y + model.groups[g].first;
+                model.groups[g].values(arg, res, NULL, NULL, 0);
+            }
+    }
+    for (int g = 0; g < model.n_groups; ++g)
+        if ((wanted >> g & 1u) && !finite(c->y + model.groups[g].first, model.groups[g].count))
+            return complain(c, ERROR, "an output of %s is not a finite number at t = %g s", model.name, c->time);
+    c->fresh |= wanted;
+    return OK;
+}
+
+Status derivatives(Instance *c) {
+    if (!model.n_x || (c->fresh >> DERIVATIVES_BIT)) return OK;
+    const double *arg[3] = {c->p, c->u, c->x};
+    double *res[1] = {c->dx};
+    model.derivatives(arg, res, NULL, NULL, 0);
+    if (!finite(c->dx, model.n_x)) return complain(c, ERROR, "a derivative is not a finite number at t = %g s", c->time);
+    c->fresh |= 1u << DERIVATIVES_BIT;
+    return OK;
+}
+
+Status get(Instance *c, const unsigned *reference, size_t n, double *value) {
+    unsigned needs = 0;
+    for (size_t k = 0; k < n; ++k) {
+        if (reference[k] >= c->n_references) return unknown_reference(c, reference[k]);
+        needs |= c->needs[reference[k]];
+    }
+    if (needs) {
+        /* before the states are started there is nothing to show but parameters and inputs */
+        if (c->mode == INSTANTIATED) return complain(c, ERROR, "outputs cannot be read before initialization");
+        Status status = c->mode == INITIALIZATION ? start(c) : OK;
+        if (!status) status = evaluate(c, needs & ((1u << STARTED_BIT) - 1u));
+        if (!status && (needs >> DERIVATIVES_BIT)) status = derivatives(c);
+        if (status) return status;
+    }
+    for (size_t k = 0; k < n; ++k) value[k] = c->block[c->slot[reference[k]]];
+    return OK;
+}
+
+Status set(Instance *c, unsigned reference, double value) {
+    const int i = (int)reference;
+    if (reference >= c->n_references) return unknown_reference(c, reference);
+    if (i >= model.n_p + model.n_u)
+        return complain(c, ERROR, "value reference %u is an output and cannot be set", reference);
+    const Quantity *q = &model.declared[i];
+    if (!isfinite(value)) return complain(c, ERROR, "%s = %g %s: must be a finite number", q->name, value, q->unit);
+    if (i < model.n_p && !(c->mode & (INSTANTIATED | INITIALIZATION))) {
+        if (!q->tunable)
+            return complain(c, ERROR, "%s is fixed: set it before initialization or after reset", q->name);
+        if (!((q->open_low ? value > q->low : value >= q->low) && value <= q->high))
+            return complain(c, ERROR, "%s = %g %s: must be %s", q->name, value, q->unit, q->allowed);
+    }
+    if (c->p[i] != value) {
+        c->p[i] = value;
+        c->fresh = 0;
+        if (c->mode & (INSTANTIATED | INITIALIZATION)) c->changed = 1;
+    }
+    if (i >= model.n_p) c->du[i - model.n_p] = 0.0;
+    return OK;
+}
+
+Status set_input_derivative(Instance *c, unsigned reference, double value) {
+    const int i = (int)reference - model.n_p;
+    if (i < 0 || i >= model.n_u) return complain(c, ERROR, "value reference %u is not an input", reference);
+    if (!isfinite(value))
+        return complain(c, ERROR, "derivative of %s: must be a finite number", model.declared[reference].name);
+    c->du[i] = value;
+    return OK;
+}
+
+void states_changed(Instance *c) { c->fresh = 0; }
+
+/* -- derivatives of outputs */
+
+Status forward(Instance *c, const unsigned *unknown, size_t n_unknown, const unsigned *known, size_t n_known,
+               const double *seed, double *sensitivity) {
+    double *du = c->work, *dx = du + model.n_u, *dy = dx + model.n_x, *ddx = dy + model.n_y;
+    memset(du, 0, (size_t)(model.n_u + model.n_x) * sizeof(double));
+    for (size_t k = 0; k < n_known; ++k) {
+        const int i = (int)known[k] - model.n_p;
+        if (i < 0 || i >= model.n_u + model.n_x || known[k] > 1000000u)
+            return complain(c, ERROR, "directional derivative: value reference %u is neither input nor state", known[k]);
+        du[i] += seed[k]; /* inputs and states follow each other in both */
+    }
+    const double *arg[5] = {c->p, c->u, c->x, du, dx};
+    unsigned done = 0;
+    for (size_t k = 0; k < n_unknown; ++k) {
+        int i = (int)unknown[k] - model.n_p - model.n_u;
+        if (i < 0 || i >= 2 * model.n_x + model.n_y || unknown[k] > 1000000u)
+            return complain(c, ERROR, "directional derivative: value reference %u is no output", unknown[k]);
+        if (i < model.n_x) {
+            sensitivity[k] = dx[i];
+            continue;
+        }
+        i -= model.n_x;
+        if (i < model.n_y) {
+            const int g = model.group_of[i];
+            if (!(done & (1u << g))) {
+                double *res[1] = {dy + model.groups[g].first};
+                model.groups[g].forward(arg, res, NULL, NULL, 0);
+                done |= 1u << g;
+            }
+            sensitivity[k] = dy[model.place[i]];
+        } else {
+            if (!(done >> DERIVATIVES_BIT)) {
+                double *res[1] = {ddx};
+                model.derivatives_forward(arg, res, NULL, NULL, 0);
+                done |= 1u << DERIVATIVES_BIT;
+            }
+            sensitivity[k] = ddx[i - model.n_y];
+        }
+        if (!isfinite(sensitivity[k]))
+            return complain(c, ERROR, "directional derivative is not a finite number at t = %g s", c->time);
+    }
+    return OK;
+}
+
+Status output_derivative(Instance *c, unsigned reference, double *value) {
+    Status status = derivatives(c);
+    if (status) return status;
+    const int n = model.n_u + model.n_x;
+    unsigned *known = malloc((size_t)(n ? n : 1) * sizeof *known);
+    double *seed = malloc((size_t)(n ? n : 1) * sizeof *seed);
+    if (!known || !seed) {
+        free(known);
+        free(seed);
+        return complain(c, ERROR, "out of memory");
+    }
+    for (int i = 0; i < n; ++i) {
+        known[i] = (unsigned)(model.n_p + i);
+        seed[i] = i < model.n_u ? c->du[i] : c->dx[i - model.n_u];
+    }
+    status = forward(c, &reference, 1, known, (size_t)n, seed, value);
+    free(known);
+    free(seed);
+    return status;
+}
+
+/* -- co-simulation: the classical Runge-Kutta method with equal steps, its cost known beforehand; inputs run
+ * along their derivatives */
+
+static int slope(Instance *c, double *u, const double *x, double *dx) {
+    const double *arg[3] = {c->p, u, x};
+    double *res[1] = {dx};
+    model.derivatives(arg, res, NULL, NULL, 0);
+    return finite(dx, model.n_x);
+}
+
+Status step(Instance *c, double time, double size) {
+    if (!isfinite(time) || !isfinite(size) || size < 0.0)
+        return complain(c, ERROR, "step of %g s from t = %g s: must be finite and not negative", size, time);
+    const int n_x = model.n_x, n_u = model.n_u;
+    if (n_x && size > 0.0) {
+        double *x = c->work, *k = x + n_x, *sum = k + n_x, *at = sum + n_x, *u = at + n_x;
+        double longest = 0.0;
+        const double *of[1] = {c->p};
+        double *into[1] = {&longest};
+        model.internal_step(of, into, NULL, NULL, 0);
+        const double wanted = ceil(size / longest - 1e-9);
+        if (!(wanted < 1e6)) return complain(c, DISCARD, "step of %g s: must be < %g s", size, 1e6 * longest);
+        const long n = wanted < 1.0 ? 1 : (long)wanted;
+        const double h = size / (double)n;
+        static const double node[4] = {0.0, 0.5, 0.5, 1.0}, weight[4] = {1.0, 2.0, 2.0, 1.0};
+        memcpy(x, c->x, (size_t)n_x * sizeof(double));
+        for (long s = 0; s < n; ++s) {
+            for (int i = 0; i < n_x; ++i) sum[i] = 0.0;
+            for (int stage = 0; stage < 4; ++stage) {
+                for (int i = 0; i < n_u; ++i) u[i] = c->u[i] + c->du[i] * h * ((double)s + node[stage]);
+                for (int i = 0; i < n_x; ++i) at[i] = stage ? x[i] + node[stage] * h * k[i] : x[i];
+                if (!slope(c, u, at, k))
+                    return complain(c, DISCARD, "the states left all bounds in the step from t = %g s", time);
+                for (int i = 0; i < n_x; ++i) sum[i] += weight[stage] * k[i];
+            }
+            for (int i = 0; i < n_x; ++i) x[i] += h / 6.0 * sum[i];
+        }
+        memcpy(c->x, x, (size_t)n_x * sizeof(double));
+        c->fresh = 0;
+    }
+    for (int i = 0; i < n_u; ++i)
+        if (c->du[i] != 0.0) {
+            c->u[i] += c->du[i] * size;
+            c->fresh = 0;
+        }
+    c->time = time + size;
+    return OK;
+}
+
+/* -- saved states */
+
+size_t state_size(const Instance *c) { return sizeof(Saved) + c->block_size; }
+
+void state_write(const Instance *c, void *memory) {
+    Saved saved;
+    memset(&saved, 0, sizeof saved);
+    saved.mode = (int)c->mode;
+    saved.model_exchange = c->model_exchange;
+    saved.time = c->time;
+    saved.guard = guard();
+    memcpy(memory, &saved, sizeof saved);
+    memcpy((char *)memory + sizeof saved, c->block, c->block_size);
+}
+
+Status state_read(Instance *c, const void *memory, size_t size) {
+    Saved saved;
+    if (size != state_size(c)) return complain(c, ERROR, "saved state: its size is not this model's");
+    memcpy(&saved, memory, sizeof saved);
+    if (saved.guard != guard() || saved.model_exchange != c->model_exchange)
+        return complain(c, ERROR, "saved state: it belongs to another model or kind of simulation");
+    memcpy(c->block, (const char *)memory + sizeof saved, c->block_size);
+    c->mode = (Mode)saved.mode;
+    c->time = saved.time;
+    c->fresh = 0;
+    c->changed = c->mode == INSTANTIATED || c->mode == INITIALIZATION;
+    return OK;
+}

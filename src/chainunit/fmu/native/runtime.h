@@ -1,0 +1,65 @@
+/* An instance of the model, for any FMI version. */
+#ifndef CHAINUNIT_RUNTIME_H
+#define CHAINUNIT_RUNTIME_H
+
+#include <stddef.h>
+
+#include "model.h"
+
+typedef enum { OK = 0, DISCARD = 2, ERROR = 3 } Status;
+
+typedef enum {
+    INSTANTIATED = 1,
+    INITIALIZATION = 2,
+    EVENT = 4,      /* Model Exchange */
+    CONTINUOUS = 8, /* Model Exchange */
+    STEP = 16,      /* Co-Simulation */
+    TERMINATED = 32,
+    FAILED = 64
+} Mode;
+
+typedef struct Instance Instance;
+typedef void (*Report)(const Instance *instance, Status status, const char *message);
+
+struct Instance {
+    Mode mode;
+    int model_exchange;
+    double time;
+    /* one block: parameters, inputs, their derivatives, states, derivatives, outputs, work */
+    double *block, *p, *u, *du, *x, *dx, *y, *work;
+    size_t block_size;
+    unsigned n_references;
+    unsigned *slot, *needs; /* of each value reference: place in the block, and what must be evaluated for it */
+    unsigned fresh;         /* a bit per group of outputs; the highest for the derivatives */
+    int changed;    /* parameters or inputs set since the states were started */
+    char *name;
+    Report report;
+    void *host[3]; /* the FMI layer's own */
+};
+
+Instance *instance_new(const char *name, Report report);
+void instance_free(Instance *c);
+void instance_reset(Instance *c);
+
+/* Say what is wrong, in one line, and hand the status on. */
+Status complain(Instance *c, Status status, const char *format, ...);
+/* Whether the instance is in one of the modes; else ERROR, with the name of the call. */
+Status expect(Instance *c, int modes, const char *call);
+
+Status start(Instance *c); /* checks the parameters, starts the states */
+Status get(Instance *c, const unsigned *reference, size_t n, double *value);
+Status set(Instance *c, unsigned reference, double value);
+Status set_input_derivative(Instance *c, unsigned reference, double value);
+Status derivatives(Instance *c);
+Status forward(Instance *c, const unsigned *unknown, size_t n_unknown, const unsigned *known, size_t n_known,
+               const double *seed, double *sensitivity);
+Status output_derivative(Instance *c, unsigned reference, double *value);
+Status step(Instance *c, double time, double size);
+void states_changed(Instance *c);
+
+/* What a saved state holds. */
+size_t state_size(const Instance *c);
+void state_write(const Instance *c, void *memory);
+Status state_read(Instance *c, const void *memory, size_t size);
+
+#endif

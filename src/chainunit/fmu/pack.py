@@ -1,0 +1,42 @@
+"""What both backends share: start values checked, archives that are the same byte for byte."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+
+from ..errors import InputError
+from ..model import Model
+from ..quantities import complaint
+from .description import Interface
+
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the oldest time that a zip entry can bear
+
+
+def checked(model: type[Model], start: Mapping[str, float] | None) -> Interface:
+    """The interface of `model` with its start values, which must make a model.
+
+    Raises
+    ------
+    KeyError
+        for a name in `start` that the model does not have.
+    InputError
+        where the start values are out of bounds or make no machine.
+    """
+    interface = Interface(model, {name: float(value) for name, value in (start or {}).items()})
+    for signal in interface.of("input"):
+        if not signal.variable.quantity.admits(signal.start or 0.0):
+            raise InputError(complaint(signal.variable, signal.start))
+    model.check(model.parameter_layout.instance([s.start for s in interface.of("parameter")]))
+    return interface
+
+
+def pack(contents: Mapping[str, bytes], file: Path) -> None:
+    """Write an archive in one order and with one time stamp."""
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in sorted(contents):
+            entry = zipfile.ZipInfo(name, _EPOCH)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = 0o644 << 16
+            archive.writestr(entry, contents[name])
