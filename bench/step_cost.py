@@ -19,7 +19,7 @@ from rich.table import Table
 from chainunit import ChainUnit, engines
 from chainunit.cosim.instance import Fmu, Instance
 from chainunit.drives.dc_motor import DcMotor
-from chainunit.fmu.export import export
+from chainunit.fmu.backends import export
 from chainunit.integrate import rk4
 from chainunit.machines.chain_unit import ChamberForces
 
@@ -79,31 +79,36 @@ def main() -> None:
     )  # fmt: skip
 
     with tempfile.TemporaryDirectory() as folder:
-        fmu = Fmu(export(ChamberForces, Path(folder) / "ChamberForces.fmu"))
-        unit = Instance(fmu, "unit")
-        unit.initialize({}, 0.0)
-        unit.finish_initialization()
-        inputs = unit.handle(["phi", "w", "a"])
-        port = unit.handle(["tau_bias", "J", "dJ_dphi", "tau_bias_dphi", "tau_bias_dw"])
-        everything = unit.handle(fmu.outputs())
-        without = unit.handle([n for n in fmu.outputs() if n not in ("tau_bias_dphi", "tau_bias_dw")])
-        state = [0.0]
+        for backend in ("python", "native"):
+            file = Path(folder) / f"{backend}.fmu"
+            export(ChamberForces, file, backend=backend)
+            fmu = Fmu(file)
+            unit = Instance(fmu, "unit")
+            unit.initialize({}, 0.0)
+            unit.finish_initialization()
+            inputs = unit.handle(["phi", "w", "a"])
+            port = unit.handle(["tau_bias", "J", "dJ_dphi", "tau_bias_dphi", "tau_bias_dw"])
+            everything = unit.handle(fmu.outputs())
+            without = unit.handle([n for n in fmu.outputs() if n not in ("tau_bias_dphi", "tau_bias_dw")])
+            state = [0.0]
 
-        def step(handle):
-            state[0] += 1e-3
-            unit.write(inputs, (state[0], 6.0, 1.0))
-            unit.step(state[0], 1e-3)
-            if handle:
-                unit.read(handle)
+            def step(handle, unit=unit, inputs=inputs, state=state):
+                state[0] += 1e-3
+                unit.write(inputs, (state[0], 6.0, 1.0))
+                unit.step(state[0], 1e-3)
+                if handle:
+                    unit.read(handle)
 
-        empty = cost(lambda: unit.step(0.0, 1e-3))
-        rows.append(("FMU through fmpy, an empty step", empty))
-        rows.append(("FMU, set three inputs + step", cost(lambda: step(None))))
-        rows.append(("FMU, set + step + get all but slopes", cost(lambda: step(without))))
-        rows.append(("FMU, set + step + get the load port", cost(lambda: step(port))))
-        rows.append(("FMU, set + step + get all outputs", cost(lambda: step(everything))))
-        unit.close()
-        fmu.close()
+            def measure(what, call, backend=backend):
+                rows.append((f"{backend} FMU through fmpy, {what}", cost(call)))
+
+            measure("an empty step", lambda unit=unit: unit.step(0.0, 1e-3))
+            measure("set three inputs + step", lambda step=step: step(None))
+            measure("set + step + get all but slopes", lambda step=step, h=without: step(h))
+            measure("set + step + get the load port", lambda step=step, h=port: step(h))
+            measure("set + step + get all outputs", lambda step=step, h=everything: step(h))
+            unit.close()
+            fmu.close()
 
     table = Table(title="Cost of a step", title_justify="left")
     table.add_column("what")

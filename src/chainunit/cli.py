@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,6 +15,14 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from . import __version__
 from .errors import InputError
 from .files import folder
+
+
+class Backend(StrEnum):
+    """How an FMU computes."""
+
+    native = "native"
+    python = "python"
+
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -53,6 +62,9 @@ def study(
     check: Annotated[
         bool, typer.Option("--check", help="Also compare with the monolithic solution.")
     ] = False,
+    backend: Annotated[
+        Backend | None, typer.Option("--backend", help="Of the FMUs; native where a C compiler is found.")
+    ] = None,
     example: Annotated[
         bool, typer.Option("--example", help="Print the packaged study file, to start one's own, and stop.")
     ] = False,
@@ -91,7 +103,7 @@ def study(
         def report(what: str, done: float, todo: float) -> None:
             bar.update(task, description=what, completed=done, total=todo)
 
-        result = run_study(loaded, output, report, check=check)
+        result = run_study(loaded, output, report, check=check, backend=backend.value if backend else None)
     written = [*files.write(result, output), *plots.write(result, output)]
     table.show(result, console)
     console.print("Written: " + ", ".join(str(path) for path in written), soft_wrap=True)
@@ -136,10 +148,14 @@ def export(
         Path | None,
         typer.Option("--config", help="Study file whose machine, feed or motor gives the start values."),
     ] = None,
+    backend: Annotated[
+        Backend | None, typer.Option("--backend", help="native where a C compiler is found, else python.")
+    ] = None,
+    fmi: Annotated[int, typer.Option("--fmi", help="Version of FMI: 2, or 3 (native only).")] = 2,
 ) -> None:
-    """Write a model as an FMU (FMI 2.0 co-simulation, by pythonfmu)."""
+    """Write a model as an FMU."""
     from . import config as configuration
-    from .fmu.export import export as write
+    from .fmu.backends import export as write
     from .models import MODELS
 
     if name not in MODELS:
@@ -148,8 +164,8 @@ def export(
     file = output or Path(f"{name}.fmu")
     if file.suffix != ".fmu":
         raise InputError(f"-o {file}: must be a file name that ends in .fmu")
-    write(MODELS[name], file, start)
-    print(f"{file}: {name}, FMI 2.0 co-simulation, by pythonfmu (needs Python in the importing process)")
+    made = write(MODELS[name], file, start, backend=backend.value if backend else None, fmi=fmi)
+    print(f"{file}: {name}, {made}")
 
 
 def main() -> None:

@@ -73,7 +73,7 @@ class Run:
     turns: Value = quantity(
         "1", "crank turns of steady running that are evaluated", default=2.0, min=1.0, max=1e4
     )
-    step: Value = quantity("s", "communication step of the co-simulation", default=0.002, min=1e-5, max=0.02)
+    step: Value = quantity("s", "communication step of the co-simulation", default=0.001, min=1e-5, max=0.02)
 
 
 @declaration

@@ -86,8 +86,8 @@ class Interface:
 
     @cached_property
     def dependencies(self) -> list[tuple[list[int], list[int]]]:
-        """Of each output, and of each state's derivative behind them: value references of what it truly depends on, in
-        a run (inputs and states) and at the start (parameters and inputs), from the sparsity of the
+        """Of each output, and of each state's derivative behind them: value references of what it truly depends
+        on, in a run (inputs and states) and at the start (parameters and inputs), from the sparsity of the
         traced equations. A state, in a run, depends on itself alone."""
         model = self.model
         symbols, p, u, x, outputs, derivatives = self.traced
@@ -154,9 +154,7 @@ def model_description(
     if exchange:
         units |= {_per_second(v.unit) for v in interface.states}
     _unit_definitions(root, units)
-    categories = SubElement(root, "LogCategories")
-    for name in ("logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal", "logAll"):
-        SubElement(categories, "Category", name=name)
+    _log_categories(root)
     SubElement(root, "DefaultExperiment", startTime="0", stopTime="10", stepSize="0.001")
     variables = SubElement(root, "ModelVariables")
     for signal in interface.signals:
@@ -185,6 +183,71 @@ def model_description(
     return root
 
 
+def model_description_3(
+    interface: Interface, token: str, kinds: Mapping[str, Mapping[str, str]], version: str
+) -> Element:
+    """The XML tree of an FMI 3.0 FMU, with the same value references as that of FMI 2.0 and, behind them, time."""
+    model = interface.model
+    root = Element(
+        "fmiModelDescription",
+        fmiVersion="3.0",
+        modelName=model.name,
+        instantiationToken=token,
+        description=model.description,
+        version=version,
+        license="MIT",
+        generationTool=f"chainunit {version}",
+        variableNamingConvention="structured",
+    )
+    for kind, options in kinds.items():
+        SubElement(root, kind, {"modelIdentifier": model.name, **options})
+    _unit_definitions(
+        root,
+        {
+            "s",
+            *(s.variable.unit for s in interface.signals),
+            *(_per_second(v.unit) for v in interface.states),
+        },
+    )
+    _log_categories(root)
+    SubElement(root, "DefaultExperiment", startTime="0", stopTime="10", stepSize="0.001")
+    variables = SubElement(root, "ModelVariables")
+    for signal in interface.signals:
+        SubElement(variables, "Float64", {**_attributes(signal), **_real(signal)})
+    first_state, first_derivative = len(interface.parameters) + len(interface.inputs), len(interface.signals)
+    for i, v in enumerate(interface.states):
+        attributes = _derivative_attributes(v, first_derivative + i)
+        SubElement(
+            variables, "Float64", attributes, unit=_per_second(v.unit), derivative=str(first_state + i)
+        )
+    SubElement(
+        variables,
+        "Float64",
+        name="time",
+        valueReference=str(first_derivative + len(interface.states)),
+        description="time",
+        causality="independent",
+        variability="continuous",
+        unit="s",
+    )
+    structure = SubElement(root, "ModelStructure")
+    known = interface.dependencies
+    references = [s.reference for s in interface.of("output")]
+    derivatives = [first_derivative + i for i in range(len(interface.states))]
+
+    def listed(kind: str, reference: int, used: Sequence[int]) -> None:
+        attributes = {"valueReference": str(reference), "dependencies": " ".join(map(str, sorted(used)))}
+        SubElement(structure, kind, attributes, dependenciesKind=" ".join("dependent" for _ in used))
+
+    for reference, (in_run, _) in zip(references, known, strict=False):
+        listed("Output", reference, in_run)
+    for reference, (in_run, _) in zip(derivatives, known[len(references) :], strict=True):
+        listed("ContinuousStateDerivative", reference, in_run)
+    for reference, (_, at_start) in zip([*references, *derivatives], known, strict=True):
+        listed("InitialUnknown", reference, at_start)
+    return root
+
+
 def _per_second(unit: str) -> str:
     """The unit of a derivative by time, in base units where it has no name of its own."""
     if unit == "1":
@@ -196,17 +259,25 @@ def _per_second(unit: str) -> str:
     return (top or "1") + (f"/{below}" if below else "")
 
 
+def _log_categories(root: Element) -> None:
+    categories = SubElement(root, "LogCategories")
+    for name in ("logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal", "logAll"):
+        SubElement(categories, "Category", name=name)
+
+
+def _derivative_attributes(state: Variable, reference: int) -> dict[str, str]:
+    return {
+        "name": f"der({state.name})",
+        "valueReference": str(reference),
+        "description": f"derivative by time: {state.description}",
+        "causality": "local",
+        "variability": "continuous",
+        "initial": "calculated",
+    }
+
+
 def _derivative(variables: Element, state: Variable, of: int, reference: int) -> None:
-    node = SubElement(
-        variables,
-        "ScalarVariable",
-        name=f"der({state.name})",
-        valueReference=str(reference),
-        description=f"derivative by time: {state.description}",
-        causality="local",
-        variability="continuous",
-        initial="calculated",
-    )
+    node = SubElement(variables, "ScalarVariable", _derivative_attributes(state, reference))
     SubElement(node, "Real", unit=_per_second(state.unit), derivative=str(of + 1))
 
 
@@ -223,7 +294,7 @@ def _unit_definitions(root: Element, units: Iterable[str]) -> None:
             SubElement(node, "DisplayUnit", attributes)
 
 
-def _scalar(variables: Element, signal: Signal) -> None:
+def _attributes(signal: Signal) -> dict[str, str]:
     v, q = signal.variable, signal.variable.quantity
     fixed = "tunable" if q.tunable else "fixed"
     attributes = {
@@ -235,10 +306,14 @@ def _scalar(variables: Element, signal: Signal) -> None:
     }
     if signal.causality != "input":
         attributes["initial"] = "calculated" if signal.causality == "output" else "exact"
-    node = SubElement(variables, "ScalarVariable", attributes)
-    real = {"unit": v.unit}
-    if v.unit in DISPLAY_UNITS:
-        real["displayUnit"] = DISPLAY_UNITS[v.unit][0]
+    return attributes
+
+
+def _real(signal: Signal) -> dict[str, str]:
+    unit, q = signal.variable.unit, signal.variable.quantity
+    real = {"unit": unit}
+    if unit in DISPLAY_UNITS:
+        real["displayUnit"] = DISPLAY_UNITS[unit][0]
     if q.low > float("-inf"):
         real["min"] = repr(q.low)
     if q.high < float("inf"):
@@ -247,7 +322,11 @@ def _scalar(variables: Element, signal: Signal) -> None:
         real["nominal"] = repr(q.nominal)
     if signal.start is not None:
         real["start"] = repr(float(signal.start))
-    SubElement(node, "Real", real)
+    return real
+
+
+def _scalar(variables: Element, signal: Signal) -> None:
+    SubElement(SubElement(variables, "ScalarVariable", _attributes(signal)), "Real", _real(signal))
 
 
 def _unknown(listed: Element, reference: int, known: Sequence[int]) -> None:

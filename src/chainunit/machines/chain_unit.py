@@ -568,19 +568,8 @@ class ChamberForces(Model):
             Outputs,
             _outputs,
             often=frozenset(
-                (
-                    "tau",
-                    "tau_bias",
-                    "J",
-                    "dJ_dphi",
-                    "phi0",
-                    "w0",
-                    "rocker.psi",
-                    "rocker.w",
-                    "rocker.a",
-                    "power",
-                )
-                + ("kinetic_energy", "potential_energy", "dissipated_power", "margin", "pressure_angle")
+                "tau tau_bias J dJ_dphi phi0 w0 rocker.psi rocker.w rocker.a power kinetic_energy potential_energy "
+                "dissipated_power margin pressure_angle".split()
             ),
         ),
         Part(

@@ -22,7 +22,7 @@ from ..cosim import Bond, CoSimulation, Profile, System, energy_residual, monoli
 from ..drives.dc_motor import DcMotor
 from ..drives.speed_control import Tuning, tune
 from ..errors import RunError
-from ..fmu.export import export
+from ..fmu.backends import Backend, export
 from ..machines.api import ChainUnit
 from ..machines.chain_unit import ChamberForces
 from ..quantities import Layout, Value, declaration, quantity
@@ -118,11 +118,19 @@ class Study:
     pins: dict[str, dict[str, dict[str, float]]] = field(default_factory=dict)
     certificate: dict[str, dict[str, float]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    made: dict[str, str] = field(default_factory=dict)
     failure: RunError | None = None
 
 
-def run_study(config: Config, folder: Path, report: Report | None = None, *, check: bool = False) -> Study:
-    """Run the study; FMUs are written to ``folder/fmu``.
+def run_study(
+    config: Config,
+    folder: Path,
+    report: Report | None = None,
+    *,
+    check: bool = False,
+    backend: Backend | None = None,
+) -> Study:
+    """Run the study; FMUs are written to ``folder/fmu``, by `backend` (see `chainunit.fmu.backends`).
 
     With `check`, the start-up and steady running are also compared with the monolithic solution.
     A run that fails ends the study early: what was computed is in it, and `failure` says why.
@@ -130,12 +138,10 @@ def run_study(config: Config, folder: Path, report: Report | None = None, *, che
     motor, tuning = _tuned(config)
     study = Study(config, motor, tuning)
     _statics(study)
-    files = {
-        "machine": export(
-            ChamberForces, folder / "fmu" / "ChamberForces.fmu", _named(ChamberForces, config.machine.p)
-        ),
-        "motor": export(DcMotor, folder / "fmu" / "DcMotor.fmu", _named(DcMotor, motor)),
-    }
+    files = {}
+    for name, model, p in (("machine", ChamberForces, config.machine.p), ("motor", DcMotor, motor)):
+        files[name] = folder / "fmu" / f"{model.name}.fmu"
+        study.made[name] = export(model, files[name], _named(model, p), backend=backend)
     try:
         _simulate(study, files, report or (lambda what, done, todo: None), check)
     except RunError as error:
@@ -469,6 +475,7 @@ def as_dict(study: Study) -> dict[str, Any]:
         }
         if study.tuning
         else "all gains given",
+        "fmus": study.made,
         "notes": study.notes,
         "machine": entries(config.machine.p),
         "motor": entries(study.motor),

@@ -10,20 +10,21 @@ import shutil
 import subprocess
 import tempfile
 import uuid
+from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
-from xml.etree.ElementTree import indent, tostring
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from ...errors import InputError, RunError
 from ...files import folder, whole
 from ...model import Model
-from ..description import model_description
+from ..description import model_description, model_description_3
 from ..pack import checked, pack
 from .generate import sources
 
 _HERE = Path(__file__).parent
-_LAYER = ("model.h", "runtime.h", "runtime.c", "fmi2.c")
-_HEADERS = ("fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h")
+_LAYER = ("model.h", "runtime.h", "runtime.c")
 _FLAGS = (
     "-std=c99",
     "-O2",
@@ -33,21 +34,45 @@ _FLAGS = (
     "-shared",
     "-Wl,--build-id=none",
 )
-_COMMON = {
+
+
+@dataclass(frozen=True)
+class _Version:
+    """What one FMI version needs."""
+
+    layer: str
+    headers: tuple[str, ...]
+    binaries: str
+    kinds: Mapping[str, Mapping[str, str]]
+
+
+_COMMON_2 = {
     "needsExecutionTool": "false",
     "canNotUseMemoryManagementFunctions": "true",
     "canGetAndSetFMUstate": "true",
     "canSerializeFMUstate": "true",
     "providesDirectionalDerivative": "true",
 }
-_KINDS = {
-    "ModelExchange": _COMMON,
-    "CoSimulation": _COMMON
-    | {
-        "canHandleVariableCommunicationStepSize": "true",
-        "canInterpolateInputs": "true",
-        "maxOutputDerivativeOrder": "1",
-    },
+_COMMON_3 = {
+    "needsExecutionTool": "false",
+    "canGetAndSetFMUState": "true",
+    "canSerializeFMUState": "true",
+    "providesDirectionalDerivatives": "true",
+}
+_STEP = {"canHandleVariableCommunicationStepSize": "true", "maxOutputDerivativeOrder": "1"}
+_VERSIONS = {
+    2: _Version(
+        "fmi2.c",
+        ("fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h"),
+        "linux64",
+        {"ModelExchange": _COMMON_2, "CoSimulation": _COMMON_2 | _STEP | {"canInterpolateInputs": "true"}},
+    ),
+    3: _Version(
+        "fmi3.c",
+        ("fmi3FunctionTypes.h", "fmi3Functions.h", "fmi3PlatformTypes.h"),
+        "x86_64-linux",
+        {"ModelExchange": _COMMON_3, "CoSimulation": _COMMON_3 | _STEP},
+    ),
 }
 
 
@@ -56,12 +81,13 @@ def compiler() -> str | None:
     return shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 
 
-def export(model: type[Model], file: Path, start: dict[str, float] | None = None) -> Path:
-    """Write `model` as a native FMU 2.0, Co-Simulation and Model Exchange, for this platform (linux64).
+def export(model: type[Model], file: Path, start: dict[str, float] | None = None, *, fmi: int = 2) -> Path:
+    """Write `model` as a native FMU, Co-Simulation and Model Exchange, for 64-bit Linux.
 
     Parameters
     ----------
     model, file, start : see `chainunit.fmu.export.export`
+    fmi : version of FMI, 2 or 3
 
     Raises
     ------
@@ -78,41 +104,63 @@ def export(model: type[Model], file: Path, start: dict[str, float] | None = None
     interface = checked(model, start)
     file = Path(file)
     folder(file.parent)
+    wanted = _VERSIONS[fmi]
     version = metadata.version("chainunit")
-    names = ("kernels.c", "model.c", "runtime.c", "fmi2.c")
-    generated = sources(interface, "", "")
-    digest = hashlib.sha256()
-    for text in (*generated.values(), *((_HERE / name).read_text("utf-8") for name in _LAYER)):
+    layer = (*_LAYER, wanted.layer)
+    compiled = ("kernels.c", "model.c", *(name for name in layer if name.endswith(".c")))
+
+    def description(token: str) -> bytes:
+        if fmi == 2:
+            root = model_description(interface, token, wanted.kinds, version, compiled)
+        else:
+            root = model_description_3(interface, token, wanted.kinds, version)
+        indent(root)
+        return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root)
+
+    digest = hashlib.sha256(description(""))
+    for text in (
+        *sources(interface, "", "").values(),
+        *((_HERE / name).read_text("utf-8") for name in layer),
+    ):
         digest.update(text.encode() + b"\0")
-    digest.update(tostring(model_description(interface, "", _KINDS, version, names)))
-    guid = f"{{{uuid.UUID(digest.hexdigest()[:32])}}}"
+    token = f"{{{uuid.UUID(digest.hexdigest()[:32])}}}"
+    contents = {"modelDescription.xml": description(token)}
+    for name, text in sources(interface, token, token).items():
+        contents[f"sources/{name}"] = text.encode()
+    for name in layer:
+        contents[f"sources/{name}"] = (_HERE / name).read_bytes()
+    for name in wanted.headers:
+        contents[f"sources/{name}"] = (_headers() / name).read_bytes()
+    if fmi == 3:
+        contents["sources/buildDescription.xml"] = _build_description(model.name, compiled)
+    contents[f"binaries/{wanted.binaries}/{model.name}.so"] = _compile(command, contents, compiled)
+    with whole(file) as part:
+        pack(contents, part)
+    return file
+
+
+def _compile(command: str, contents: Mapping[str, bytes], names: tuple[str, ...]) -> bytes:
     with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
         work = Path(scratch)
-        for name, text in sources(interface, guid, guid).items():
-            (work / name).write_text(text, "utf-8")
-        for name in _LAYER:
-            shutil.copy2(_HERE / name, work)
-        for name in _HEADERS:
-            shutil.copy2(_headers() / name, work)
+        for name, content in contents.items():
+            if name.startswith("sources/"):
+                (work / Path(name).name).write_bytes(content)
         built = subprocess.run(
-            [command, *_FLAGS, *names, "-o", f"{model.name}.so", "-lm"],
-            cwd=work,
-            capture_output=True,
-            text=True,
+            [command, *_FLAGS, *names, "-o", "model.so", "-lm"], cwd=work, capture_output=True, text=True
         )
         if built.returncode:
             raise RunError(f"the C compiler {command} failed: {built.stderr.strip()}")
-        description = model_description(interface, guid, _KINDS, version, names)
-        indent(description)
-        contents = {
-            "modelDescription.xml": b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(description),
-            f"binaries/linux64/{model.name}.so": (work / f"{model.name}.so").read_bytes(),
-        }
-        for name in (*names, *(n for n in _LAYER if n.endswith(".h")), *_HEADERS):
-            contents[f"sources/{name}"] = (work / name).read_bytes()
-        with whole(file) as part:
-            pack(contents, part)
-    return file
+        return (work / "model.so").read_bytes()
+
+
+def _build_description(identifier: str, names: tuple[str, ...]) -> bytes:
+    root = Element("fmiBuildDescription", fmiVersion="3.0")
+    configuration = SubElement(root, "BuildConfiguration", modelIdentifier=identifier)
+    files = SubElement(configuration, "SourceFileSet", language="C99")
+    for name in names:
+        SubElement(files, "SourceFile", name=name)
+    indent(root)
+    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root)
 
 
 def _headers() -> Path:

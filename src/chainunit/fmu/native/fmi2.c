@@ -19,9 +19,17 @@
 
 static void report(const Instance *c, Status status, const char *message) {
     const fmi2CallbackFunctions *functions = c->host[0];
-    if (functions && functions->logger)
-        functions->logger(functions->componentEnvironment, c->name, (fmi2Status)status,
-                          status == DISCARD ? "logStatusDiscard" : "logStatusError", "%s", message);
+    if (!functions || !functions->logger) return;
+    /* the message is a format to the host, but not every host takes it as one: no arguments, and no stray % */
+    char format[1400];
+    size_t n = 0;
+    for (; *message && n + 3 < sizeof format; ++message) {
+        format[n++] = *message;
+        if (*message == '%') format[n++] = '%';
+    }
+    format[n] = 0;
+    functions->logger(functions->componentEnvironment, c->name, (fmi2Status)status,
+                      status == DISCARD ? "logStatusDiscard" : "logStatusError", format);
 }
 
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
@@ -63,8 +71,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2R
     (void)has_stop;
     (void)stop;
     NEED(INSTANTIATED);
-    INSTANCE->time = time;
-    return fmi2OK;
+    return (fmi2Status)set_time(INSTANCE, time);
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
@@ -219,29 +226,18 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_set, fmi2
 
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {
     NEED(EVENT | CONTINUOUS);
-    INSTANCE->time = time;
-    return fmi2OK;
+    return (fmi2Status)set_time(INSTANCE, time);
 }
 
 fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n) {
     NEED(CONTINUOUS | EVENT);
-    if (n != (size_t)model.n_x) return (fmi2Status)complain(INSTANCE, ERROR, "%s: there are %d states", __func__, model.n_x);
-    if (n) NOT_NULL(x);
-    for (size_t i = 0; i < n; ++i)
-        if (!(x[i] - x[i] == 0.0)) return (fmi2Status)complain(INSTANCE, ERROR, "state %d must be a finite number", (int)i);
-    if (n) memcpy(INSTANCE->x, x, n * sizeof *x);
-    states_changed(INSTANCE);
-    return fmi2OK;
+    return (fmi2Status)states_set(INSTANCE, x, n, __func__);
 }
 
 fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real dx[], size_t n) {
     NEED(INITIALIZATION | EVENT | CONTINUOUS);
-    if (n != (size_t)model.n_x) return (fmi2Status)complain(INSTANCE, ERROR, "%s: there are %d states", __func__, model.n_x);
-    if (n) NOT_NULL(dx);
     const Status status = derivatives(INSTANCE);
-    if (status) return (fmi2Status)status;
-    if (n) memcpy(dx, INSTANCE->dx, n * sizeof *dx);
-    return fmi2OK;
+    return (fmi2Status)(status ? status : states_get(INSTANCE, INSTANCE->dx, dx, n, __func__));
 }
 
 fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real z[], size_t n) {
@@ -250,21 +246,14 @@ fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real z[], size_t n) {
     return n ? (fmi2Status)complain(INSTANCE, ERROR, "%s: there are none", __func__) : fmi2OK;
 }
 
-static fmi2Status copy_states(Instance *c, const double *from, double *to, size_t n, const char *call) {
-    if (n != (size_t)model.n_x) return (fmi2Status)complain(c, ERROR, "%s: there are %d states", call, model.n_x);
-    if (n && !to) return (fmi2Status)complain(c, ERROR, "%s: null argument", call);
-    if (n) memcpy(to, from, n * sizeof *to);
-    return fmi2OK;
-}
-
 fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t n) {
     NEED(INITIALIZATION | EVENT | CONTINUOUS);
-    return copy_states(INSTANCE, INSTANCE->x, x, n, __func__);
+    return (fmi2Status)states_get(INSTANCE, INSTANCE->x, x, n, __func__);
 }
 
 fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x[], size_t n) {
     if (!c) return fmi2Error;
-    return copy_states(INSTANCE, model.nominal, x, n, __func__);
+    return (fmi2Status)states_get(INSTANCE, model.nominal, x, n, __func__);
 }
 
 /* -- co-simulation */

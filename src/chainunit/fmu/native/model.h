@@ -2,7 +2,7 @@
  *
  * A model fills one `Model`; it names no FMI function. The FMI files see nothing but this header and
  * runtime.h; they name no model. Values are doubles throughout, in the order parameters, inputs, states,
- * outputs, derivatives of the states; a value reference is the place in that order.
+ * outputs, derivatives of the states, time; a value reference is the place in that order.
  */
 #ifndef CHAINUNIT_MODEL_H
 #define CHAINUNIT_MODEL_H

@@ -23,15 +23,16 @@ static unsigned guard(void) {
 
 Instance *instance_new(const char *name, Report report) {
     const int n_in = model.n_u + model.n_x;
-    const int work = 4 * model.n_x + 2 * n_in + model.n_y + model.n_x + 3 * model.n_required + 1;
-    const size_t n = (size_t)(model.n_p + 2 * model.n_u + 2 * model.n_x + model.n_y + work);
+    int work = 4 * model.n_x + 2 * n_in + model.n_y + model.n_x + 3 * model.n_required;
+    if (work < model.n_p + n_in + model.n_u) work = model.n_p + n_in + model.n_u; /* for a saved state */
+    const size_t n = (size_t)(model.n_p + 2 * model.n_u + 2 * model.n_x + model.n_y + work + 1);
     Instance *c = calloc(1, sizeof *c);
     if (!c) return NULL;
-    c->block_size = (n - (size_t)work) * sizeof(double);
+    c->block_size = (n - 1 - (size_t)work) * sizeof(double);
     c->block = calloc(n, sizeof(double));
     c->name = malloc(strlen(name) + 1);
     c->n_references = (unsigned)(model.n_p + model.n_u + 2 * model.n_x + model.n_y);
-    c->slot = malloc(2 * c->n_references * sizeof *c->slot);
+    c->slot = malloc(2 * (c->n_references + 1) * sizeof *c->slot);
     if (!c->block || !c->name || !c->slot) {
         instance_free(c);
         return NULL;
@@ -44,7 +45,7 @@ Instance *instance_new(const char *name, Report report) {
     c->dx = c->x + model.n_x;
     c->y = c->dx + model.n_x;
     c->work = c->y + model.n_y;
-    c->needs = c->slot + c->n_references;
+    c->needs = c->slot + c->n_references + 1;
     unsigned r = 0;
     for (int k = 0; k < model.n_p + model.n_u; ++k, ++r) c->slot[r] = r, c->needs[r] = 0;
     for (int k = 0; k < model.n_x; ++k, ++r)
@@ -54,6 +55,7 @@ Instance *instance_new(const char *name, Report report) {
         c->needs[r] = 1u << STARTED_BIT | 1u << model.group_of[k];
     for (int k = 0; k < model.n_x; ++k, ++r)
         c->slot[r] = (unsigned)(c->dx - c->block + k), c->needs[r] = 1u << STARTED_BIT | 1u << DERIVATIVES_BIT;
+    c->slot[r] = (unsigned)(n - 1), c->needs[r] = 0; /* the time */
     c->report = report;
     instance_reset(c);
     return c;
@@ -94,6 +96,12 @@ Status expect(Instance *c, int modes, const char *call) {
                     : c->mode == TERMINATED     ? "after termination"
                     : c->mode == FAILED         ? "after an error; reset or free the instance"
                                                 : "in this mode");
+}
+
+Status set_time(Instance *c, double time) {
+    if (!isfinite(time)) return complain(c, ERROR, "time = %g s: must be a finite number", time);
+    c->time = time;
+    return OK;
 }
 
 /* -- start */
@@ -153,7 +161,7 @@ static Status unknown_reference(Instance *c, unsigned reference) {
     return complain(c, ERROR, "value reference %u does not exist", reference);
 }
 
-static int finite(const double *v, int n) {
+static int all_finite(const double *v, int n) {
     /* an infinite or undefined value makes its sum undefined; four sums, so that none waits for another */
     double sum[4] = {0.0, 0.0, 0.0, 0.0};
     int i = 0;
@@ -180,7 +188,7 @@ static Status evaluate(Instance *c, unsigned wanted) {
             }
     }
     for (int g = 0; g < model.n_groups; ++g)
-        if ((wanted >> g & 1u) && !finite(c->y + model.groups[g].first, model.groups[g].count))
+        if ((wanted >> g & 1u) && !all_finite(c->y + model.groups[g].first, model.groups[g].count))
             return complain(c, ERROR, "an output of %s is not a finite number at t = %g s", model.name, c->time);
     c->fresh |= wanted;
     return OK;
@@ -191,7 +199,7 @@ Status derivatives(Instance *c) {
     const double *arg[3] = {c->p, c->u, c->x};
     double *res[1] = {c->dx};
     model.derivatives(arg, res, NULL, NULL, 0);
-    if (!finite(c->dx, model.n_x)) return complain(c, ERROR, "a derivative is not a finite number at t = %g s", c->time);
+    if (!all_finite(c->dx, model.n_x)) return complain(c, ERROR, "a derivative is not a finite number at t = %g s", c->time);
     c->fresh |= 1u << DERIVATIVES_BIT;
     return OK;
 }
@@ -199,7 +207,7 @@ Status derivatives(Instance *c) {
 Status get(Instance *c, const unsigned *reference, size_t n, double *value) {
     unsigned needs = 0;
     for (size_t k = 0; k < n; ++k) {
-        if (reference[k] >= c->n_references) return unknown_reference(c, reference[k]);
+        if (reference[k] > c->n_references) return unknown_reference(c, reference[k]);
         needs |= c->needs[reference[k]];
     }
     if (needs) {
@@ -210,6 +218,7 @@ Status get(Instance *c, const unsigned *reference, size_t n, double *value) {
         if (!status && (needs >> DERIVATIVES_BIT)) status = derivatives(c);
         if (status) return status;
     }
+    c->block[c->slot[c->n_references]] = c->time;
     for (size_t k = 0; k < n; ++k) value[k] = c->block[c->slot[reference[k]]];
     return OK;
 }
@@ -245,7 +254,26 @@ Status set_input_derivative(Instance *c, unsigned reference, double value) {
     return OK;
 }
 
-void states_changed(Instance *c) { c->fresh = 0; }
+static Status count_states(Instance *c, size_t n, const void *pointer, const char *call) {
+    if (n != (size_t)model.n_x) return complain(c, ERROR, "%s: there are %d states", call, model.n_x);
+    if (n && !pointer) return complain(c, ERROR, "%s: null argument", call);
+    return OK;
+}
+
+Status states_set(Instance *c, const double *x, size_t n, const char *call) {
+    Status status = count_states(c, n, x, call);
+    if (status) return status;
+    if (n && !all_finite(x, (int)n)) return complain(c, ERROR, "%s: a state is not a finite number", call);
+    if (n) memcpy(c->x, x, n * sizeof *x);
+    c->fresh = 0;
+    return OK;
+}
+
+Status states_get(Instance *c, const double *from, double *to, size_t n, const char *call) {
+    Status status = count_states(c, n, to, call);
+    if (!status && n) memcpy(to, from, n * sizeof *to);
+    return status;
+}
 
 /* -- derivatives of outputs */
 
@@ -320,13 +348,17 @@ static int slope(Instance *c, double *u, const double *x, double *dx) {
     const double *arg[3] = {c->p, u, x};
     double *res[1] = {dx};
     model.derivatives(arg, res, NULL, NULL, 0);
-    return finite(dx, model.n_x);
+    return all_finite(dx, model.n_x);
 }
 
 Status step(Instance *c, double time, double size) {
     if (!isfinite(time) || !isfinite(size) || size < 0.0)
         return complain(c, ERROR, "step of %g s from t = %g s: must be finite and not negative", size, time);
     const int n_x = model.n_x, n_u = model.n_u;
+    for (int i = 0; i < n_u; ++i)
+        if (!isfinite(c->u[i] + c->du[i] * size))
+            return complain(c, DISCARD, "%s leaves all bounds in the step from t = %g s",
+                            model.declared[model.n_p + i].name, time);
     if (n_x && size > 0.0) {
         double *x = c->work, *k = x + n_x, *sum = k + n_x, *at = sum + n_x, *u = at + n_x;
         double longest = 0.0;
@@ -383,7 +415,14 @@ Status state_read(Instance *c, const void *memory, size_t size) {
     memcpy(&saved, memory, sizeof saved);
     if (saved.guard != guard() || saved.model_exchange != c->model_exchange)
         return complain(c, ERROR, "saved state: it belongs to another model or kind of simulation");
-    memcpy(c->block, (const char *)memory + sizeof saved, c->block_size);
+    const int mode = saved.mode, known = INSTANTIATED | INITIALIZATION | EVENT | CONTINUOUS | STEP | TERMINATED;
+    /* parameters, inputs and states come first; what follows from them is evaluated anew */
+    const size_t first = (size_t)(c->dx - c->block) * sizeof(double);
+    double *values = c->work;
+    memcpy(values, (const char *)memory + sizeof saved, first);
+    if (!(mode & known) || (mode & (mode - 1)) || !isfinite(saved.time) || !all_finite(values, (int)(c->dx - c->block)))
+        return complain(c, ERROR, "saved state: it is damaged");
+    memcpy(c->block, values, first);
     c->mode = (Mode)saved.mode;
     c->time = saved.time;
     c->fresh = 0;

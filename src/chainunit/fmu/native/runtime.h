@@ -46,6 +46,7 @@ Status complain(Instance *c, Status status, const char *format, ...);
 /* Whether the instance is in one of the modes; else ERROR, with the name of the call. */
 Status expect(Instance *c, int modes, const char *call);
 
+Status set_time(Instance *c, double time);
 Status start(Instance *c); /* checks the parameters, starts the states */
 Status get(Instance *c, const unsigned *reference, size_t n, double *value);
 Status set(Instance *c, unsigned reference, double value);
@@ -55,7 +56,9 @@ Status forward(Instance *c, const unsigned *unknown, size_t n_unknown, const uns
                const double *seed, double *sensitivity);
 Status output_derivative(Instance *c, unsigned reference, double *value);
 Status step(Instance *c, double time, double size);
-void states_changed(Instance *c);
+Status states_set(Instance *c, const double *x, size_t n, const char *call);
+/* `from` is the states, their derivatives or their nominal sizes */
+Status states_get(Instance *c, const double *from, double *to, size_t n, const char *call);
 
 /* What a saved state holds. */
 size_t state_size(const Instance *c);

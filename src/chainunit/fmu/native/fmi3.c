@@ -1,0 +1,374 @@
+/* FMI 3.0, Co-Simulation and Model Exchange, over runtime.h. Names no model. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "fmi3Functions.h"
+#include "runtime.h"
+
+#define INSTANCE ((Instance *)c)
+#define RUNNING (EVENT | CONTINUOUS | STEP)
+#define NEED(modes)                                                \
+    do {                                                           \
+        if (!c) return fmi3Error;                                  \
+        if (expect(INSTANCE, (modes), __func__)) return fmi3Error; \
+    } while (0)
+#define CHECK(condition, what)                                                                        \
+    do {                                                                                              \
+        if (!(condition)) return (fmi3Status)complain(INSTANCE, ERROR, "%s: %s", __func__, what); \
+    } while (0)
+#define NOT_NULL(pointer) CHECK(pointer, "null argument")
+
+static void report(const Instance *c, Status status, const char *message) {
+    const fmi3LogMessageCallback log = (fmi3LogMessageCallback)c->host[0];
+    if (log) log(c->host[1], (fmi3Status)status, status == DISCARD ? "logStatusDiscard" : "logStatusError", message);
+}
+
+const char *fmi3GetVersion(void) { return fmi3Version; }
+
+static fmi3Instance instantiate(fmi3String name, fmi3String token, int model_exchange, fmi3InstanceEnvironment environment,
+                                fmi3LogMessageCallback log) {
+    Instance *c = instance_new(name && *name ? name : model.name, report);
+    if (!c) return NULL;
+    c->host[0] = (void *)log;
+    c->host[1] = environment;
+    c->model_exchange = model_exchange;
+    if (!name || !*name)
+        complain(c, ERROR, "the instance has no name");
+    else if (!token || strcmp(token, model.token))
+        complain(c, ERROR, "the token %s is not that of this FMU, %s", token ? token : "(null)", model.token);
+    else
+        return c;
+    instance_free(c);
+    return NULL;
+}
+
+fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
+                                          fmi3Boolean logging, fmi3InstanceEnvironment environment,
+                                          fmi3LogMessageCallback log) {
+    (void)resources, (void)visible, (void)logging;
+    return instantiate(name, token, 1, environment, log);
+}
+
+fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
+                                         fmi3Boolean logging, fmi3Boolean events, fmi3Boolean early,
+                                         const fmi3ValueReference required[], size_t n_required,
+                                         fmi3InstanceEnvironment environment, fmi3LogMessageCallback log,
+                                         fmi3IntermediateUpdateCallback update) {
+    (void)resources, (void)visible, (void)logging, (void)events, (void)early, (void)required, (void)n_required;
+    (void)update;
+    return instantiate(name, token, 0, environment, log);
+}
+
+fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token, fmi3String resources,
+                                               fmi3Boolean visible, fmi3Boolean logging,
+                                               fmi3InstanceEnvironment environment, fmi3LogMessageCallback log,
+                                               fmi3ClockUpdateCallback update, fmi3LockPreemptionCallback lock,
+                                               fmi3UnlockPreemptionCallback unlock) {
+    (void)name, (void)token, (void)resources, (void)visible, (void)logging, (void)update, (void)lock, (void)unlock;
+    if (log) log(environment, fmi3Error, "logStatusError", "scheduled execution is not supported");
+    return NULL;
+}
+
+void fmi3FreeInstance(fmi3Instance c) { instance_free(INSTANCE); }
+
+fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t n, const fmi3String categories[]) {
+    (void)on, (void)n, (void)categories;
+    return c ? fmi3OK : fmi3Error;
+}
+
+fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean has_tolerance, fmi3Float64 tolerance, fmi3Float64 time,
+                                       fmi3Boolean has_stop, fmi3Float64 stop) {
+    (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
+    NEED(INSTANTIATED);
+    Status status = set_time(INSTANCE, time);
+    if (!status) status = start(INSTANCE);
+    if (status) return (fmi3Status)status;
+    INSTANCE->mode = INITIALIZATION;
+    return fmi3OK;
+}
+
+fmi3Status fmi3ExitInitializationMode(fmi3Instance c) {
+    NEED(INITIALIZATION);
+    const Status status = start(INSTANCE);
+    if (status) return (fmi3Status)status;
+    INSTANCE->mode = INSTANCE->model_exchange ? EVENT : STEP;
+    return fmi3OK;
+}
+
+fmi3Status fmi3EnterEventMode(fmi3Instance c) {
+    NEED(EVENT | CONTINUOUS);
+    INSTANCE->mode = EVENT;
+    return fmi3OK;
+}
+
+fmi3Status fmi3Terminate(fmi3Instance c) {
+    NEED(RUNNING);
+    INSTANCE->mode = TERMINATED;
+    return fmi3OK;
+}
+
+fmi3Status fmi3Reset(fmi3Instance c) {
+    if (!c) return fmi3Error;
+    instance_reset(INSTANCE);
+    return fmi3OK;
+}
+
+/* -- values: every variable is a Float64 */
+
+fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3Float64 value[], size_t n_values) {
+    if (!c) return fmi3Error;
+    if (n) NOT_NULL(vr && value);
+    CHECK(n == n_values, "as many values as references are needed");
+    return (fmi3Status)get(INSTANCE, vr, n, value);
+}
+
+fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3Float64 value[],
+                          size_t n_values) {
+    NEED(INSTANTIATED | INITIALIZATION | RUNNING);
+    if (n) NOT_NULL(vr && value);
+    CHECK(n == n_values, "as many values as references are needed");
+    for (size_t i = 0; i < n; ++i) {
+        const Status status = set(INSTANCE, vr[i], value[i]);
+        if (status) return (fmi3Status)status;
+    }
+    return fmi3OK;
+}
+
+#define NO_SUCH_TYPE(type)                                                                                         \
+    fmi3Status fmi3Get##type(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3##type value[],          \
+                             size_t n_values) {                                                                    \
+        (void)vr, (void)value, (void)n_values;                                                                     \
+        if (!c) return fmi3Error;                                                                                  \
+        CHECK(!n, "every variable is a Float64");                                                                  \
+        return fmi3OK;                                                                                             \
+    }                                                                                                              \
+    fmi3Status fmi3Set##type(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3##type value[],    \
+                             size_t n_values) {                                                                    \
+        (void)vr, (void)value, (void)n_values;                                                                     \
+        if (!c) return fmi3Error;                                                                                  \
+        CHECK(!n, "every variable is a Float64");                                                                  \
+        return fmi3OK;                                                                                             \
+    }
+NO_SUCH_TYPE(Float32)
+NO_SUCH_TYPE(Int8)
+NO_SUCH_TYPE(UInt8)
+NO_SUCH_TYPE(Int16)
+NO_SUCH_TYPE(UInt16)
+NO_SUCH_TYPE(Int32)
+NO_SUCH_TYPE(UInt32)
+NO_SUCH_TYPE(Int64)
+NO_SUCH_TYPE(UInt64)
+NO_SUCH_TYPE(Boolean)
+NO_SUCH_TYPE(String)
+
+#define NOT_THERE(what)                                    \
+    {                                                      \
+        if (!c) return fmi3Error;                          \
+        CHECK(0, what);                                    \
+    }
+#define V const fmi3ValueReference vr[], size_t n
+fmi3Status fmi3GetBinary(fmi3Instance c, V, size_t sizes[], fmi3Binary value[], size_t n_values)
+    NOT_THERE("there are no binary variables")
+fmi3Status fmi3SetBinary(fmi3Instance c, V, const size_t sizes[], const fmi3Binary value[], size_t n_values)
+    NOT_THERE("there are no binary variables")
+fmi3Status fmi3GetClock(fmi3Instance c, V, fmi3Clock value[]) NOT_THERE("there are no clocks")
+fmi3Status fmi3SetClock(fmi3Instance c, V, const fmi3Clock value[]) NOT_THERE("there are no clocks")
+fmi3Status fmi3GetIntervalDecimal(fmi3Instance c, V, fmi3Float64 interval[], fmi3IntervalQualifier qualifier[])
+    NOT_THERE("there are no clocks")
+fmi3Status fmi3GetIntervalFraction(fmi3Instance c, V, fmi3UInt64 counter[], fmi3UInt64 resolution[],
+                                   fmi3IntervalQualifier qualifier[]) NOT_THERE("there are no clocks")
+fmi3Status fmi3GetShiftDecimal(fmi3Instance c, V, fmi3Float64 shift[]) NOT_THERE("there are no clocks")
+fmi3Status fmi3GetShiftFraction(fmi3Instance c, V, fmi3UInt64 counter[], fmi3UInt64 resolution[])
+    NOT_THERE("there are no clocks")
+fmi3Status fmi3SetIntervalDecimal(fmi3Instance c, V, const fmi3Float64 interval[]) NOT_THERE("there are no clocks")
+fmi3Status fmi3SetIntervalFraction(fmi3Instance c, V, const fmi3UInt64 counter[], const fmi3UInt64 resolution[])
+    NOT_THERE("there are no clocks")
+fmi3Status fmi3SetShiftDecimal(fmi3Instance c, V, const fmi3Float64 shift[]) NOT_THERE("there are no clocks")
+fmi3Status fmi3SetShiftFraction(fmi3Instance c, V, const fmi3UInt64 counter[], const fmi3UInt64 resolution[])
+    NOT_THERE("there are no clocks")
+fmi3Status fmi3ActivateModelPartition(fmi3Instance c, fmi3ValueReference clock, fmi3Float64 time)
+    NOT_THERE("scheduled execution is not supported")
+fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance c, fmi3ValueReference vr, size_t *n)
+    NOT_THERE("dependencies stand in the model description")
+fmi3Status fmi3GetVariableDependencies(fmi3Instance c, fmi3ValueReference vr, size_t of[], fmi3ValueReference by[],
+                                       size_t elements[], fmi3DependencyKind kinds[], size_t n)
+    NOT_THERE("dependencies stand in the model description")
+fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unknown[], size_t n_unknown,
+                                    const fmi3ValueReference known[], size_t n_known, const fmi3Float64 seed[],
+                                    size_t n_seed, fmi3Float64 sensitivity[], size_t n_sensitivity)
+    NOT_THERE("adjoint derivatives are not provided, directional ones are")
+fmi3Status fmi3EnterConfigurationMode(fmi3Instance c) NOT_THERE("there are no structural parameters")
+fmi3Status fmi3ExitConfigurationMode(fmi3Instance c) NOT_THERE("there are no structural parameters")
+
+/* -- saved states */
+
+fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state) {
+    if (!c) return fmi3Error;
+    NOT_NULL(state);
+    if (!*state) *state = malloc(state_size(INSTANCE));
+    CHECK(*state, "out of memory");
+    state_write(INSTANCE, *state);
+    return fmi3OK;
+}
+
+fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state) {
+    if (!c) return fmi3Error;
+    NOT_NULL(state);
+    return (fmi3Status)state_read(INSTANCE, state, state_size(INSTANCE));
+}
+
+fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState *state) {
+    if (!c) return fmi3Error;
+    if (state) {
+        free(*state);
+        *state = NULL;
+    }
+    return fmi3OK;
+}
+
+fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state, size_t *size) {
+    if (!c) return fmi3Error;
+    NOT_NULL(state && size);
+    *size = state_size(INSTANCE);
+    return fmi3OK;
+}
+
+fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[], size_t size) {
+    if (!c) return fmi3Error;
+    NOT_NULL(state && bytes);
+    CHECK(size >= state_size(INSTANCE), "too little room");
+    memcpy(bytes, state, state_size(INSTANCE));
+    return fmi3OK;
+}
+
+fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size, fmi3FMUState *state) {
+    if (!c) return fmi3Error;
+    NOT_NULL(bytes && state);
+    CHECK(size == state_size(INSTANCE), "the size is not this model's");
+    if (!*state) *state = malloc(size);
+    CHECK(*state, "out of memory");
+    memcpy(*state, bytes, size);
+    return fmi3OK;
+}
+
+fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknown[], size_t n_unknown,
+                                        const fmi3ValueReference known[], size_t n_known, const fmi3Float64 seed[],
+                                        size_t n_seed, fmi3Float64 sensitivity[], size_t n_sensitivity) {
+    NEED(INITIALIZATION | RUNNING);
+    NOT_NULL(unknown && known && seed && sensitivity);
+    CHECK(n_seed == n_known && n_sensitivity == n_unknown, "as many values as references are needed");
+    const Status status = INSTANCE->mode == INITIALIZATION ? start(INSTANCE) : OK;
+    if (status) return (fmi3Status)status;
+    return (fmi3Status)forward(INSTANCE, unknown, n_unknown, known, n_known, seed, sensitivity);
+}
+
+/* -- model exchange */
+
+fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance c) {
+    NEED(INITIALIZATION | EVENT);
+    return fmi3OK;
+}
+
+fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *again, fmi3Boolean *terminate, fmi3Boolean *nominals,
+                                    fmi3Boolean *values, fmi3Boolean *has_next, fmi3Float64 *next) {
+    NEED(EVENT | STEP);
+    NOT_NULL(again && terminate && nominals && values && has_next && next);
+    *again = *terminate = *nominals = *values = *has_next = fmi3False;
+    *next = 0.0;
+    return fmi3OK;
+}
+
+fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance c) {
+    NEED(EVENT);
+    INSTANCE->mode = CONTINUOUS;
+    return fmi3OK;
+}
+
+fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean no_set, fmi3Boolean *enter_event,
+                                       fmi3Boolean *terminate) {
+    (void)no_set;
+    NEED(CONTINUOUS);
+    NOT_NULL(enter_event && terminate);
+    *enter_event = *terminate = fmi3False;
+    return fmi3OK;
+}
+
+fmi3Status fmi3SetTime(fmi3Instance c, fmi3Float64 time) {
+    NEED(EVENT | CONTINUOUS);
+    return (fmi3Status)set_time(INSTANCE, time);
+}
+
+fmi3Status fmi3SetContinuousStates(fmi3Instance c, const fmi3Float64 x[], size_t n) {
+    NEED(CONTINUOUS | EVENT);
+    return (fmi3Status)states_set(INSTANCE, x, n, __func__);
+}
+
+fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance c, fmi3Float64 dx[], size_t n) {
+    NEED(INITIALIZATION | EVENT | CONTINUOUS);
+    const Status status = derivatives(INSTANCE);
+    return (fmi3Status)(status ? status : states_get(INSTANCE, INSTANCE->dx, dx, n, __func__));
+}
+
+fmi3Status fmi3GetEventIndicators(fmi3Instance c, fmi3Float64 z[], size_t n) {
+    (void)z;
+    NEED(INITIALIZATION | EVENT | CONTINUOUS);
+    CHECK(!n, "there are none");
+    return fmi3OK;
+}
+
+fmi3Status fmi3GetContinuousStates(fmi3Instance c, fmi3Float64 x[], size_t n) {
+    NEED(INITIALIZATION | EVENT | CONTINUOUS);
+    return (fmi3Status)states_get(INSTANCE, INSTANCE->x, x, n, __func__);
+}
+
+fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance c, fmi3Float64 x[], size_t n) {
+    if (!c) return fmi3Error;
+    return (fmi3Status)states_get(INSTANCE, model.nominal, x, n, __func__);
+}
+
+fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance c, size_t *n) {
+    if (!c) return fmi3Error;
+    NOT_NULL(n);
+    *n = 0;
+    return fmi3OK;
+}
+
+fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance c, size_t *n) {
+    if (!c) return fmi3Error;
+    NOT_NULL(n);
+    *n = (size_t)model.n_x;
+    return fmi3OK;
+}
+
+/* -- co-simulation */
+
+fmi3Status fmi3EnterStepMode(fmi3Instance c) {
+    NEED(EVENT | STEP);
+    CHECK(!INSTANCE->model_exchange, "is for co-simulation");
+    INSTANCE->mode = STEP;
+    return fmi3OK;
+}
+
+fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3Int32 order[],
+                                    fmi3Float64 value[], size_t n_values) {
+    NEED(STEP);
+    if (n) NOT_NULL(vr && order && value);
+    CHECK(n == n_values, "as many values as references are needed");
+    for (size_t i = 0; i < n; ++i) {
+        CHECK(order[i] == 1, "only the first derivative");
+        const Status status = output_derivative(INSTANCE, vr[i], &value[i]);
+        if (status) return (fmi3Status)status;
+    }
+    return fmi3OK;
+}
+
+fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 size, fmi3Boolean no_set, fmi3Boolean *event,
+                      fmi3Boolean *terminate, fmi3Boolean *early, fmi3Float64 *last) {
+    (void)no_set;
+    NEED(STEP);
+    NOT_NULL(event && terminate && early && last);
+    *event = *terminate = *early = fmi3False;
+    const Status status = step(INSTANCE, time, size);
+    *last = INSTANCE->time;
+    return (fmi3Status)status;
+}
