@@ -20,7 +20,7 @@ from chainunit import ChainUnit, SideLoads
 from chainunit.cosim import Bond, CoSimulation, System, energy_residual, monolithic, port_connections
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.speed_control import tune
-from chainunit.fmu.export import export
+from chainunit.fmu.backends import export
 from chainunit.machines.chain_unit import ChamberForces
 
 SPEED = 6.0  # rad/s of the crank
@@ -50,10 +50,9 @@ def motors():
 def main() -> None:
     console = Console(width=110)
     with tempfile.TemporaryDirectory() as folder:
-        files = {
-            "machine": export(ChamberForces, Path(folder) / "ChamberForces.fmu"),
-            "motor": export(DcMotor, Path(folder) / "DcMotor.fmu"),
-        }
+        files = {"machine": Path(folder) / "ChamberForces.fmu", "motor": Path(folder) / "DcMotor.fmu"}
+        for model, file in zip((ChamberForces, DcMotor), files.values(), strict=True):
+            console.print(f"{model.name}: {export(model, file)}")
         for force in (0.0, 100.0):
             for title, (ratio, motor) in motors().items():
                 table = Table(title=f"{title}; processing force {force:g} N a side", title_justify="left")

@@ -9,7 +9,10 @@ import xarray as xr
 from chainunit import ChainUnit, InputError, RunError, SideLoads
 from chainunit.cosim import Bond, CoSimulation, Profile, System, energy_residual, monolithic, port_connections
 from chainunit.drives.dc_motor import DcMotor
+from chainunit.fmu.native.export import compiler
+from chainunit.fmu.native.export import export as export_native
 from chainunit.machines.chain_unit import ChamberForces
+from chainunit.models import MODELS
 
 RATIO, SPEED = 50.0, 6.0
 FEED = SideLoads()
@@ -116,6 +119,27 @@ def test_varying_loads_act_to_second_order(fmus):
         with CoSimulation(system(fmus), signals) as simulation:
             errors.append(error(simulation.run(0.3, step), exact, "motor.w"))
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.25)
+
+
+@pytest.mark.skipif(compiler() is None, reason="no C compiler")
+def test_native_fmus_run_as_the_python_ones(fmus, tmp_path):
+    native = {
+        name: export_native(MODELS[model], tmp_path / f"{model}.fmu")
+        for name, model in (("machine", "ChamberForces"), ("motor", "DcMotor"))
+    }
+    signals = {"motor.w_ref": 150.0, "machine.left.material_mass": Profile(30.0, ((0.01, 0.05, 60.0),))}
+    runs = []
+    for files in (system(fmus).fmus, native):
+        with CoSimulation(System(files, system(fmus).connections, system(fmus).start), signals) as simulation:
+            first = simulation.run(0.05, 0.001)
+            simulation.save()
+            simulation.run(0.07, 0.001)
+            simulation.restore()
+            runs.append((first, simulation.run(0.1, 0.001)))
+    for one, two in zip(*runs, strict=True):
+        assert set(one) == set(two)
+        for name in one:
+            np.testing.assert_allclose(one[name].values, two[name].values, rtol=1e-9, atol=1e-9, err_msg=name)
 
 
 def test_stable_with_a_light_rotor(fmus):

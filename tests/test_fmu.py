@@ -131,9 +131,9 @@ def test_two_versions_in_one_process_do_not_share_code(fmus, tmp_path, monkeypat
     def changed(model):
         for name, content in shipped(model):
             if name == "machines/chain_unit.py":
-                assert b"torque = s.J * a + s.bias.total" in content
+                assert b"return self.J * a + self.bias.total" in content
                 content = content.replace(
-                    b"torque = s.J * a + s.bias.total", b"torque = 2.0 * (s.J * a + s.bias.total)"
+                    b"return self.J * a + self.bias.total", b"return 2.0 * (self.J * a + self.bias.total)"
                 )
             yield name, content
 

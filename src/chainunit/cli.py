@@ -140,7 +140,7 @@ def reproduce(
 
 @app.command()
 def export(
-    name: Annotated[str, typer.Argument(help="ChamberForces or DcMotor.")],
+    name: Annotated[str, typer.Argument(help="ChamberForces, ChainUnit or DcMotor.")],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="FMU file; NAME.fmu by default.")
     ] = None,

@@ -22,7 +22,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from .drives.dc_motor import DcMotor
 from .errors import InputError
 from .machines.api import ChainUnit, ratios
-from .machines.chain_unit import ChamberForces, Inputs, SideLoads
+from .machines.chain_unit import ChamberForces, DirectChainUnit, Inputs, SideLoads
 from .model import Model
 from .quantities import (
     Layout,
@@ -376,12 +376,22 @@ def start_values(config: Config, model: type[Model]) -> dict[str, float]:
     InputError
         where a study file says nothing of such a model.
     """
-    layout = model.parameter_layout
+    parameters = dict(
+        zip(
+            ChamberForces.parameter_layout.names,
+            ChamberForces.parameter_layout.values(config.machine.p),
+            strict=True,
+        )
+    )
+    motor_speed = config.run.crank_speed * config.machine.p.ratio
     if model is ChamberForces:
-        motor_speed = config.run.crank_speed * config.machine.p.ratio
         inputs = Inputs(w=motor_speed, left=config.feed.left, right=config.feed.right)
         at_start = dict(zip(model.input_layout.names, model.input_layout.values(inputs), strict=True))
-        return dict(zip(layout.names, layout.values(config.machine.p), strict=True)) | at_start
+        return parameters | at_start
+    if model is DirectChainUnit:
+        feed = dict(zip(Layout(Feed).names, Layout(Feed).values(config.feed), strict=True))
+        return parameters | feed | {"w_start": motor_speed}
     if model is DcMotor:
+        layout = model.parameter_layout
         return dict(zip(layout.names, layout.values(config.motor), strict=True))
     raise InputError(f"a study file gives no start values for {model.name}")

@@ -1,7 +1,7 @@
 """The models that become FMUs, by name."""
 
 from .drives.dc_motor import DcMotor
-from .machines.chain_unit import ChamberForces
+from .machines.chain_unit import ChamberForces, DirectChainUnit
 from .model import Model
 
-MODELS: dict[str, type[Model]] = {model.name: model for model in (ChamberForces, DcMotor)}
+MODELS: dict[str, type[Model]] = {model.name: model for model in (ChamberForces, DirectChainUnit, DcMotor)}

@@ -218,10 +218,9 @@ class Frame(Force):
 
 
 @declaration
-class Outputs(PortValues):
-    """Torque, load port, motion and every reaction."""
+class Loads:
+    """Motion of the rocker, and what every part of the machine carries."""
 
-    tau: Value = quantity("N.m", "torque needed at the motor shaft, J a + tau_bias", nominal=100.0)
     rocker: Rocker = group(Rocker, "rocker")
     left: Side = group(Side, "left organ")
     right: Side = group(Side, "right organ")
@@ -236,6 +235,50 @@ class Outputs(PortValues):
     potential_energy: Value = quantity("J", "potential energy, zero at the level of C", nominal=1000.0)
     dissipated_power: Value = quantity("W", "power that friction, damping and processing take", nominal=100.0)
     margin: Value = quantity("1", "least |sin| of the three transmission angles; 0 is a dead position")
+
+
+@declaration
+class Outputs(Loads, PortValues):
+    """Torque, load port, motion and every reaction."""
+
+    tau: Value = quantity("N.m", "torque needed at the motor shaft, J a + tau_bias", nominal=100.0)
+
+
+@declaration
+class DirectParameters(Parameters):
+    """Parameters of the machine that turns by itself."""
+
+    J_added: Value = quantity(
+        "kg.m2", "inertia on the motor shaft beside the machine's", default=0.0, min=0.0, tunable=True
+    )
+    phi_start: Value = quantity("rad", "motor angle at the start", default=0.0)
+    w_start: Value = quantity("rad/s", "motor speed at the start", default=0.0)
+
+
+@declaration
+class DirectInputs:
+    """Torque of the motor and loads of the organs."""
+
+    tau: Value = quantity("N.m", "torque of the motor on the shaft", default=0.0, nominal=100.0)
+    left: SideLoads = group(SideLoads, "left organ", default=SideLoads())
+    right: SideLoads = group(SideLoads, "right organ", default=SideLoads())
+
+
+@declaration
+class DirectStates:
+    """States of the machine; each is an output, too."""
+
+    phi: Value = quantity("rad", "motor angle; crank angle is phi/ratio, from the upward vertical, clockwise")
+    w: Value = quantity("rad/s", "motor speed")
+
+
+@declaration
+class DirectOutputs(Loads):
+    """Acceleration and everything the machine carries."""
+
+    a: Value = quantity("rad/s2", "motor acceleration", nominal=100.0)
+    tau_bias: Value = quantity("N.m", "torque needed at constant speed of the shaft", nominal=100.0)
+    J: Value = quantity("kg.m2", "inertia reflected to the shaft")
 
 
 class Organ:
@@ -409,6 +452,10 @@ class State:
         self.J, self.dJ = self.m.inertia()
         self.bias = Bias(xp, p, u, self.m, self.dJ, w)
 
+    def torque(self, a: Any) -> Any:
+        """The crank torque at crank acceleration `a` [N m]."""
+        return self.J * a + self.bias.total
+
 
 def _force(f: Vec2) -> Force:
     return Force(fx=f.x, fy=f.y)
@@ -440,12 +487,12 @@ def chamber(xp: Any, p: Any, u: Any, psi: Any, psi_w: Any, psi_a: Any) -> Chambe
     return Chamber(rocker=load, left=on_left, right=on_right)
 
 
-def _outputs(xp: Any, p: Any, u: Any, x: Any, s: State) -> Outputs:
+def _loads(xp: Any, p: Any, s: State, a: Any) -> dict[str, Any]:
+    """The fields of `Loads` at crank acceleration `a`."""
     m, w = s.m, s.w
-    a = u.a / p.ratio
     w2 = w * w
     f = Reactions(m, p, w2, a, *s.bias.processing_forces)
-    torque = s.J * a + s.bias.total
+    torque = s.torque(a)
     rocker, drive = m.rocker, m.drive
     force_l, force_r = s.bias.processing_forces
     on_left = m.left.loads(xp, 1.0, rocker, f.left, force_l)
@@ -457,13 +504,7 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, s: State) -> Outputs:
         + m.left.dyad.first.pin.p.cross(f.left[0])
         + m.right.dyad.first.pin.p.cross(f.right[0])
     )
-    return Outputs(
-        tau=torque / p.ratio,
-        tau_bias=s.bias.total / p.ratio,
-        J=s.J / (p.ratio * p.ratio),
-        dJ_dphi=s.dJ / (p.ratio * p.ratio * p.ratio),
-        phi0=u.phi,
-        w0=u.w,
+    loads = Loads(
         rocker=Rocker(
             psi=xp.atan2(rocker.u.x, -rocker.u.y),
             w=rocker.t1 * w,
@@ -486,6 +527,35 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, s: State) -> Outputs:
             xp.abs(drive.transmission),
             xp.minimum(xp.abs(m.left.dyad.transmission), xp.abs(m.right.dyad.transmission)),
         ),
+    )
+    return vars(loads)
+
+
+def _outputs(xp: Any, p: Any, u: Any, x: Any, s: State) -> Outputs:
+    a = u.a / p.ratio
+    return Outputs(
+        tau=s.torque(a) / p.ratio,
+        tau_bias=s.bias.total / p.ratio,
+        J=s.J / (p.ratio * p.ratio),
+        dJ_dphi=s.dJ / (p.ratio * p.ratio * p.ratio),
+        phi0=u.phi,
+        w0=u.w,
+        **_loads(xp, p, s, a),
+    )
+
+
+def _acceleration(p: Any, u: Any, s: State) -> Any:
+    """Motor acceleration: (J_added + J) a = tau - tau_bias, all at the motor shaft."""
+    return (u.tau - s.bias.total / p.ratio) / (p.J_added + s.J / (p.ratio * p.ratio))
+
+
+def _direct_outputs(xp: Any, p: Any, u: Any, x: Any, s: State) -> DirectOutputs:
+    a = _acceleration(p, u, s)
+    return DirectOutputs(
+        a=a,
+        tau_bias=s.bias.total / p.ratio,
+        J=s.J / (p.ratio * p.ratio),
+        **_loads(xp, p, s, a / p.ratio),
     )
 
 
@@ -578,3 +648,54 @@ class ChamberForces(Model):
             derivatives={"tau_bias_dphi": ("tau_bias", "phi"), "tau_bias_dw": ("tau_bias", "w")},
         ),
     )
+
+
+class DirectChainUnit(Model):
+    """The direct model: motor torque in, motion out. As an FMU it is called ChainUnit."""
+
+    name = "ChainUnit"
+    description = (
+        "A chain unit that turns by itself: crank, coupler, rocker and two working organs; "
+        "from motor torque to angle, speed, acceleration and every support reaction"
+    )
+    Parameters = DirectParameters
+    Inputs = DirectInputs
+    States = DirectStates
+    files = ChamberForces.files
+    required = (
+        *ChamberForces.required,
+        Requirement(
+            "inertia of the crank and on its shaft",
+            "kg.m2",
+            "at the dead points of the rocker nothing else carries the torque; give crank.I, crank.m or J_added",
+        ),
+    )
+
+    @staticmethod
+    def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
+        """Those of the inverse model, and an inertia that never vanishes."""
+        yield from ChamberForces.requirements(xp, p)
+        yield p.J_added * p.ratio * p.ratio + p.crank.I + p.crank.m * p.crank.s * p.crank.s, 0.0, math.inf
+
+    @staticmethod
+    def initial_states(p: Any) -> Any:
+        """The start angle and speed."""
+        return DirectStates(phi=p.phi_start, w=p.w_start)
+
+    @staticmethod
+    def internal_step(xp: Any, p: Any) -> Any:
+        """A quarter of a millisecond: the motion is slow, and smoothed friction near rest, its fastest part, takes
+        some milliseconds with the declared `pin.w_smooth`; a much smaller one wants Model Exchange."""
+        return 2.5e-4
+
+    @staticmethod
+    def shared(xp: Any, p: Any, u: Any, x: Any) -> State:
+        """The machine at the crank angle and speed that belong to the motor's."""
+        return State(xp, p, u, x.phi / p.ratio, x.w / p.ratio)
+
+    @staticmethod
+    def derivatives(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+        """Time derivatives of the states, in declared order."""
+        return [x.w, _acceleration(p, u, DirectChainUnit.shared(xp, p, u, x))]
+
+    parts = (Part(DirectOutputs, _direct_outputs, often=frozenset(("a", "tau_bias", "J"))),)
