@@ -419,4 +419,11 @@ def test_no_scaffold_in_the_file(fmus):
     names = zipfile.ZipFile(fmus["ChamberForces"]).namelist()
     assert "modelDescription.xml" in names and "resources/modelDescription.xml" not in names
     assert not [n for n in names if "__pycache__" in n or "\\" in n]
-    assert all(Path(n).suffix in (".py", ".txt", ".xml", ".so", ".dll") for n in names)
+    assert all(Path(n).suffix in (".py", ".txt", ".xml", ".so", ".dll", ".html") for n in names)
+
+
+def test_documentation_names_every_variable(fmus):
+    for file in fmus.values():
+        text = zipfile.ZipFile(file).read("documentation/index.html").decode()
+        for v in fmpy.read_model_description(str(file)).modelVariables:
+            assert f"<code>{v.name}</code>" in text

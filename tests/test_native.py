@@ -354,11 +354,16 @@ def test_backends_say_what_they_took(tmp_path, monkeypatch):
     assert "native code by" in said and "found here" in said
     assert "pythonfmu" in export_any(MODELS["DcMotor"], tmp_path / "b.fmu", backend="python")
     monkeypatch.setattr(module, "compiler", lambda: None)
-    assert "no C compiler found" in export_any(MODELS["DcMotor"], tmp_path / "c.fmu")
+    assert "no C compiler for 64-bit Linux found" in export_any(MODELS["DcMotor"], tmp_path / "c.fmu")
     with pytest.raises(InputError, match="--fmi 3 needs the native backend"):
         export_any(MODELS["DcMotor"], tmp_path / "d.fmu", fmi=3)
-    with pytest.raises(InputError, match="no C compiler found"):
+    with pytest.raises(InputError, match="for 64-bit Linux found: install one there"):
         export_any(MODELS["DcMotor"], tmp_path / "d.fmu", backend="native")
     with pytest.raises(InputError, match="must be 2 or 3"):
         export_any(MODELS["DcMotor"], tmp_path / "d.fmu", fmi=1)
-    assert {p.name for p in tmp_path.iterdir()} == {"a.fmu", "b.fmu", "c.fmu"}
+    # one that is there but does not work
+    monkeypatch.setattr(module, "compiler", lambda: shutil.which("false"))
+    assert "false failed" in export_any(MODELS["DcMotor"], tmp_path / "e.fmu")
+    with pytest.raises(RunError, match=r"the C compiler .*false failed"):
+        export_any(MODELS["DcMotor"], tmp_path / "d.fmu", backend="native")
+    assert {p.name for p in tmp_path.iterdir()} == {"a.fmu", "b.fmu", "c.fmu", "e.fmu"}

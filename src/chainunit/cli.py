@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from . import __version__
-from .errors import InputError
+from .errors import InputError, RunError
 from .files import folder
 
 
@@ -174,6 +174,8 @@ def main() -> None:
         sys.exit(app(sys.argv[1:] or ["--help"], standalone_mode=False))
     except InputError as error:
         _end(str(error), 2)
+    except RunError as error:
+        _end(str(error), 1)
     except (typer.Abort, KeyboardInterrupt):
         _end("interrupted", 130)
     except BrokenPipeError:

@@ -6,8 +6,10 @@ The same model gives the same sources and the same identifier; the binary is as 
 from __future__ import annotations
 
 import hashlib
+import platform
 import shutil
 import subprocess
+import sys
 import tempfile
 import uuid
 from collections.abc import Mapping
@@ -20,6 +22,7 @@ from ...errors import InputError, RunError
 from ...files import folder, whole
 from ...model import Model
 from ..description import model_description, model_description_3
+from ..documentation import page
 from ..pack import checked, pack
 from .generate import sources
 
@@ -77,7 +80,9 @@ _VERSIONS = {
 
 
 def compiler() -> str | None:
-    """The system's C compiler, if there is one."""
+    """The system's C compiler, if there is one that makes code for 64-bit Linux, so far the only platform."""
+    if sys.platform != "linux" or platform.machine() not in ("x86_64", "AMD64"):
+        return None
     return shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 
 
@@ -99,7 +104,8 @@ def export(model: type[Model], file: Path, start: dict[str, float] | None = None
     command = compiler()
     if command is None:
         raise InputError(
-            "no C compiler found (cc, gcc or clang): install one, or export with --backend python"
+            "no C compiler (cc, gcc or clang) for 64-bit Linux found: install one there, or export with "
+            "--backend python"
         )
     interface = checked(model, start)
     file = Path(file)
@@ -124,7 +130,10 @@ def export(model: type[Model], file: Path, start: dict[str, float] | None = None
     ):
         digest.update(text.encode() + b"\0")
     token = f"{{{uuid.UUID(digest.hexdigest()[:32])}}}"
-    contents = {"modelDescription.xml": description(token)}
+    contents = {
+        "modelDescription.xml": description(token),
+        "documentation/index.html": page(interface, version).encode(),
+    }
     for name, text in sources(interface, token, token).items():
         contents[f"sources/{name}"] = text.encode()
     for name in layer:
