@@ -36,7 +36,7 @@ def _table(signals: list[Signal], causality: str) -> str:
     head = (
         "<tr><th>name</th><th>unit</th>"
         + ("<th>start</th><th>allowed</th>" if given else "")
-        + "<th></th></tr>"
+        + "<th>meaning</th></tr>"
     )
     rows = []
     for signal in signals:
