@@ -6,6 +6,7 @@ import math
 import shutil
 import subprocess
 import zipfile
+from contextlib import contextmanager
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -15,6 +16,7 @@ import numpy as np
 import pytest
 from fmpy.fmi2 import FMU2Model
 from fmpy.validation import validate_fmu
+from test_fmu import Running
 from test_reference import POINTS, deviation
 
 from chainunit import ChainUnit, GeometryError, InputError, RunError
@@ -40,19 +42,15 @@ def native(tmp_path_factory):
     return made
 
 
-class Running:
-    def __init__(self, native, name, start=None):
-        self.fmu = Fmu(native[name, 2][0])
-        self.instance = Instance(self.fmu, "unit")
-        self.instance.initialize(start or {}, 0.0)
-        self.instance.finish_initialization()
-
-    def __enter__(self):
-        return self.instance
-
-    def __exit__(self, *_):
-        self.instance.close()
-        self.fmu.close()
+@contextmanager
+def running(native, name, start=None):
+    """An initialised FMI 2.0 instance, closed and its files removed at the end."""
+    fmu = Fmu(native[name, 2][0])
+    try:
+        with Running(fmu, start) as instance:
+            yield instance
+    finally:
+        fmu.close()
 
 
 @pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
@@ -81,7 +79,7 @@ def test_native_and_pythonfmu_agree(native, fmus):
         python = Fmu(fmus[name])
         names = [n for n, v in python.variables.items() if v.causality == "output"]
         inputs = [n for n, v in python.variables.items() if v.causality == "input"]
-        with Running(native, name) as one:
+        with running(native, name) as one:
             two = Instance(python, "unit")
             two.initialize({}, 0.0)
             two.finish_initialization()
@@ -156,7 +154,7 @@ def test_directional_derivatives_are_exact(native, name):
 def test_output_derivatives_and_input_interpolation(native):
     """An input that runs along its derivative inside the step; d/dt of an output against a difference."""
     h = 1e-3
-    with Running(native, "DcMotor", {"w_ref": 0.0}) as unit:
+    with running(native, "DcMotor", {"w_ref": 0.0}) as unit:
         api = unit._fmi
         w_ref, a = (unit.fmu.variables[n].valueReference for n in ("w_ref", "a"))
         api.setRealInputDerivatives([w_ref], [1], [500.0])
@@ -168,7 +166,7 @@ def test_output_derivatives_and_input_interpolation(native):
         api.setRealInputDerivatives([w_ref], [1], [500.0])
         unit.step(0.05, h)
         assert (unit.get(["a"])[0] - before) / h == pytest.approx(rate, rel=0.2)
-    with Running(native, "DcMotor") as unit:
+    with running(native, "DcMotor") as unit:
         for k in range(5000):
             unit.set(["w_ref"], [500.0 * (k + 0.5) * 1e-5])
             unit.step(k * 1e-5, 1e-5)
@@ -195,7 +193,7 @@ def test_model_exchange_and_co_simulation_meet(native):
 
 
 def test_states_are_saved_and_serialised(native):
-    with Running(native, "DcMotor", {"w_ref": 50.0}) as unit:
+    with running(native, "DcMotor", {"w_ref": 50.0}) as unit:
         names = unit.fmu.outputs()
         unit.step(0.0, 0.01)
         state, kept = unit.state(), unit.get(names)
@@ -218,15 +216,18 @@ def test_a_geometry_that_cannot_turn_fails_the_initialisation_in_the_same_words(
     with pytest.raises(GeometryError) as refused:
         ChainUnit(r=0.9)
     with pytest.raises(RunError) as failed:
-        Running(native, "ChamberForces", {"r": 0.9})
+        with running(native, "ChamberForces", {"r": 0.9}):
+            pass
     assert str(refused.value) in str(failed.value)
     with pytest.raises(GeometryError) as refused:
         ChainUnit(z=0.1)
     with pytest.raises(RunError) as failed:
-        Running(native, "ChamberForces", {"z": 0.1})
+        with running(native, "ChamberForces", {"z": 0.1}):
+            pass
     assert str(refused.value) in str(failed.value)
     with pytest.raises(RunError, match=r"rotor\.J = -1 kg\.m2: must be > 0 kg\.m2"):
-        Running(native, "DcMotor", {"rotor.J": -1.0})
+        with running(native, "DcMotor", {"rotor.J": -1.0}):
+            pass
 
 
 def test_bad_calls_end_in_an_error_and_one_line(native):

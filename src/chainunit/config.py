@@ -376,22 +376,13 @@ def start_values(config: Config, model: type[Model]) -> dict[str, float]:
     InputError
         where a study file says nothing of such a model.
     """
-    parameters = dict(
-        zip(
-            ChamberForces.parameter_layout.names,
-            ChamberForces.parameter_layout.values(config.machine.p),
-            strict=True,
-        )
-    )
+    parameters = ChamberForces.parameter_layout.named(config.machine.p)
     motor_speed = config.run.crank_speed * config.machine.p.ratio
     if model is ChamberForces:
         inputs = Inputs(w=motor_speed, left=config.feed.left, right=config.feed.right)
-        at_start = dict(zip(model.input_layout.names, model.input_layout.values(inputs), strict=True))
-        return parameters | at_start
+        return parameters | model.input_layout.named(inputs)
     if model is DirectChainUnit:
-        feed = dict(zip(Layout(Feed).names, Layout(Feed).values(config.feed), strict=True))
-        return parameters | feed | {"w_start": motor_speed}
+        return parameters | Layout(Feed).named(config.feed) | {"w_start": motor_speed}
     if model is DcMotor:
-        layout = model.parameter_layout
-        return dict(zip(layout.names, layout.values(config.motor), strict=True))
+        return model.parameter_layout.named(config.motor)
     raise InputError(f"a study file gives no start values for {model.name}")

@@ -110,7 +110,7 @@ class Model:
         """
         for line in violations(cls.parameter_layout, p):
             raise InputError(line)
-        given = dict(zip(cls.parameter_layout.names, cls.parameter_layout.values(p), strict=True))
+        given = cls.parameter_layout.named(p)
         for required, (value, low, high) in zip(cls.required, cls.requirements(MATH, p), strict=True):
             if not low < value < high:
                 raise GeometryError(required.refusal(value, low, high, given))

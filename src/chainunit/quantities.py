@@ -184,6 +184,10 @@ class Layout:
             return [self._getter(instance)]
         return list(self._getter(instance))
 
+    def named(self, instance: Any) -> dict[str, Any]:
+        """The values of `instance` by name."""
+        return dict(zip(self.names, self.values(instance), strict=True))
+
     def instance(self, values: Any) -> Any:
         """The instance that holds `values`, given in declared order."""
         return _build(self._plan, values)

@@ -131,18 +131,8 @@ def model_description(
     derivatives of the states are variables, too. `sources` are the files that the FMU can be compiled from.
     """
     model = interface.model
-    root = Element(
-        "fmiModelDescription",
-        fmiVersion="2.0",
-        modelName=model.name,
-        guid=guid,
-        description=model.description,
-        version=version,
-        license="MIT",
-        generationTool=f"chainunit {version}",
-        variableNamingConvention="structured",
-        numberOfEventIndicators="0",
-    )
+    root = _root(model, version, {"fmiVersion": "2.0", "guid": guid})
+    root.set("numberOfEventIndicators", "0")
     for kind, options in kinds.items():
         element = SubElement(root, kind, {"modelIdentifier": model.name, **options})
         if sources:
@@ -188,17 +178,7 @@ def model_description_3(
 ) -> Element:
     """The XML tree of an FMI 3.0 FMU, with the same value references as that of FMI 2.0 and, behind them, time."""
     model = interface.model
-    root = Element(
-        "fmiModelDescription",
-        fmiVersion="3.0",
-        modelName=model.name,
-        instantiationToken=token,
-        description=model.description,
-        version=version,
-        license="MIT",
-        generationTool=f"chainunit {version}",
-        variableNamingConvention="structured",
-    )
+    root = _root(model, version, {"fmiVersion": "3.0", "instantiationToken": token})
     for kind, options in kinds.items():
         SubElement(root, kind, {"modelIdentifier": model.name, **options})
     _unit_definitions(
@@ -246,6 +226,26 @@ def model_description_3(
     for reference, (_, at_start) in zip([*references, *derivatives], known, strict=True):
         listed("InitialUnknown", reference, at_start)
     return root
+
+
+def _root(model: type[Model], version: str, own: Mapping[str, str]) -> Element:
+    """The root element, with what both versions of FMI call alike."""
+    fmi, identifier = own.items()
+    return Element(
+        "fmiModelDescription",
+        dict(
+            [
+                fmi,
+                ("modelName", model.name),
+                identifier,
+                ("description", model.description),
+                ("version", version),
+                ("license", "MIT"),
+                ("generationTool", f"chainunit {version}"),
+                ("variableNamingConvention", "structured"),
+            ]
+        ),
+    )
 
 
 def _per_second(unit: str) -> str:

@@ -110,11 +110,9 @@ class ChainUnit:
         u = ChamberForces.input_layout.from_names({**dict.fromkeys(names, 0.0), **inputs})
         u = ChamberForces.input_layout.instance([_array(v) for v in ChamberForces.input_layout.values(u)])
         outputs = ChamberForces.evaluate(_XP, self.p, u)
-        named = {
-            name: value
-            for part, instance in zip(ChamberForces.parts, outputs, strict=True)
-            for name, value in zip(part.layout.names, part.layout.values(instance), strict=True)
-        }
+        named: dict[str, Any] = {}
+        for part, instance in zip(ChamberForces.parts, outputs, strict=True):
+            named |= part.layout.named(instance)
         return dict(zip(named, np.broadcast_arrays(*named.values()), strict=True))
 
     def torque_by_reactions(

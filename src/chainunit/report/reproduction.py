@@ -19,7 +19,7 @@ from rich.table import Table
 
 from .. import __version__
 from ..engines import numpy_
-from ..machines.api import ChainUnit
+from ..machines.api import EMPTY, ChainUnit
 from ..machines.crank_rocker import longest_crank, parallel_frame, pressure_angle_extremes, swing
 from ..studies.cycle import overload_factors
 from ..studies.reproduction import Row
@@ -203,8 +203,6 @@ def _fig_30_31() -> Any:
 
 
 def _overload() -> Any:
-    from ..machines.api import EMPTY
-
     figure, (one, two) = plt.subplots(1, 2, figsize=(12, 5))
     degrees = np.linspace(0.4, 12.0, 200)
     left, right = p0.statics(np.radians(degrees))

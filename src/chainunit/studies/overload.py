@@ -141,7 +141,7 @@ def run_study(
     files = {}
     for name, model, p in (("machine", ChamberForces, config.machine.p), ("motor", DcMotor, motor)):
         files[name] = folder / "fmu" / f"{model.name}.fmu"
-        study.made[name] = export(model, files[name], _named(model, p), backend=backend)
+        study.made[name] = export(model, files[name], model.parameter_layout.named(p), backend=backend)
     try:
         _simulate(study, files, report or (lambda what, done, todo: None), check)
     except RunError as error:
@@ -159,10 +159,6 @@ def _tuned(config: Config) -> tuple[Any, Tuning | None]:
     tuning = tune(config.motor.armature, inertia)
     own = {name: gain for name, gain in tuning.parameters.items() if name not in config.motor_given}
     return DcMotor.parameter_layout.from_names(own, config.motor), tuning if own else None
-
-
-def _named(model: Any, p: Any) -> dict[str, float]:
-    return dict(zip(model.parameter_layout.names, model.parameter_layout.values(p), strict=True))
 
 
 def _statics(study: Study) -> None:

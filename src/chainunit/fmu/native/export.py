@@ -24,7 +24,7 @@ from ...model import Model
 from ..description import model_description, model_description_3
 from ..documentation import page
 from ..pack import checked, pack
-from .generate import sources
+from .generate import kernels, tables
 
 _HERE = Path(__file__).parent
 _LAYER = ("model.h", "runtime.h", "runtime.c")
@@ -124,8 +124,10 @@ def export(model: type[Model], file: Path, start: dict[str, float] | None = None
         return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root)
 
     digest = hashlib.sha256(description(""))
+    functions = kernels(interface)
     for text in (
-        *sources(interface, "", "").values(),
+        functions,
+        tables(interface, "", ""),
         *((_HERE / name).read_text("utf-8") for name in layer),
     ):
         digest.update(text.encode() + b"\0")
@@ -133,9 +135,9 @@ def export(model: type[Model], file: Path, start: dict[str, float] | None = None
     contents = {
         "modelDescription.xml": description(token),
         "documentation/index.html": page(interface, version).encode(),
+        "sources/kernels.c": functions.encode(),
+        "sources/model.c": tables(interface, token, token).encode(),
     }
-    for name, text in sources(interface, token, token).items():
-        contents[f"sources/{name}"] = text.encode()
     for name in layer:
         contents[f"sources/{name}"] = (_HERE / name).read_bytes()
     for name in wanted.headers:

@@ -30,12 +30,8 @@ def groups(interface: Interface) -> list[list[int]]:
     return found
 
 
-def sources(interface: Interface, guid: str, token: str) -> dict[str, str]:
-    """``kernels.c`` and ``model.c`` by name, for the FMI 2.0 GUID and the FMI 3.0 instantiation token given."""
-    return {"kernels.c": _kernels(interface), "model.c": _tables(interface, guid, token)}
-
-
-def _kernels(interface: Interface) -> str:
+def kernels(interface: Interface) -> str:
+    """``kernels.c``: the model's functions, as CasADi writes them."""
     import casadi
 
     model = interface.model
@@ -102,14 +98,15 @@ def _array(kind: str, name: str, items: list[str]) -> str:
     return f"static const {kind} {name}[] = {{\n    {body},\n}};\n"
 
 
-def _tables(interface: Interface, guid: str, token: str) -> str:
+def tables(interface: Interface, guid: str, token: str) -> str:
+    """``model.c``: what model.h asks for, with the FMI 2.0 GUID and the FMI 3.0 instantiation token given."""
     model = interface.model
     groups_ = groups(interface)
-    kernels = ["all", *(f"group_{i}{end}" for i in range(len(groups_)) for end in ("", "_forward"))]
+    functions = ["all", *(f"group_{i}{end}" for i in range(len(groups_)) for end in ("", "_forward"))]
     if interface.states:
-        kernels += ["derivatives", "derivatives_forward", "initial", "internal_step"]
+        functions += ["derivatives", "derivatives_forward", "initial", "internal_step"]
     if model.required:
-        kernels.append("requirements")
+        functions.append("requirements")
 
     def quantity(v: Variable) -> str:
         q = v.quantity
@@ -138,7 +135,7 @@ def _tables(interface: Interface, guid: str, token: str) -> str:
         "",
         *(
             f"int kernel_{k}(const double **arg, double **res, long long int *iw, double *w, int mem);"
-            for k in kernels
+            for k in functions
         ),
         "",
         _array("double", "starts", [_number(x or 0.0) for x in starts]),

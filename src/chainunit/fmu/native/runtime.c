@@ -94,7 +94,6 @@ Status expect(Instance *c, int modes, const char *call) {
                     c->mode == INSTANTIATED     ? "before initialization"
                     : c->mode == INITIALIZATION ? "in initialization"
                     : c->mode == TERMINATED     ? "after termination"
-                    : c->mode == FAILED         ? "after an error; reset or free the instance"
                                                 : "in this mode");
 }
 

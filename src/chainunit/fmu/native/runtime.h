@@ -14,8 +14,7 @@ typedef enum {
     EVENT = 4,      /* Model Exchange */
     CONTINUOUS = 8, /* Model Exchange */
     STEP = 16,      /* Co-Simulation */
-    TERMINATED = 32,
-    FAILED = 64
+    TERMINATED = 32
 } Mode;
 
 typedef struct Instance Instance;

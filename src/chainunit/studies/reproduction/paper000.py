@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ...engines import MATH
-from ...machines.api import ChainUnit
+from ...machines.api import EMPTY, ChainUnit
 from ...machines.chain_unit import half_width_range
 from ..cycle import overload_factors
 from .row import Row
@@ -495,8 +495,6 @@ def _overload_rows() -> list[Row]:
     wanted = ((1e-6, "at rest", 2, 1), (5.0, "at 5 rad/s", 1, 1), (10.0, "at 10 rad/s", 2, 2),
               (20.0, "at 20 rad/s", 2, 2), (50.0, "at 50 rad/s", 2, 2))  # fmt: skip
     cycles = "ratio of cycle maxima, left alone to both; uniform rods, no drive masses: no single factor serves a motor"
-    from ...machines.api import EMPTY
-
     for speed, text, on_rocker, on_crank in wanted:
         f = overload_factors(machine(1.0), speed, EMPTY, EMPTY)
         table += [
@@ -534,8 +532,6 @@ def _overload_rows() -> list[Row]:
 def _crossing(name: str) -> float:
     """Crank speed above which both sides together ask more than the left alone [rad/s]."""
     from scipy.optimize import brentq
-
-    from ...machines.api import EMPTY
 
     return float(
         brentq(
