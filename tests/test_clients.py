@@ -11,7 +11,8 @@ import textwrap
 import fmpy
 import pytest
 
-from chainunit.fmu.native.export import compiler, export
+from chainunit.fmu.native.export import export
+from chainunit.fmu.native.platforms import compiler
 from chainunit.models import MODELS
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")

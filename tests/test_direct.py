@@ -12,7 +12,8 @@ from scipy.integrate import solve_ivp
 
 from chainunit import EMPTY, ChainUnit, GeometryError, engines
 from chainunit.cosim.instance import Fmu, Instance
-from chainunit.fmu.native.export import compiler, export
+from chainunit.fmu.native.export import export
+from chainunit.fmu.native.platforms import compiler
 from chainunit.machines.chain_unit import ChamberForces, DirectChainUnit
 
 MODEL = DirectChainUnit

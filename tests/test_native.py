@@ -23,7 +23,8 @@ from chainunit import ChainUnit, GeometryError, InputError, RunError
 from chainunit.cosim.instance import Fmu, Instance
 from chainunit.fmu.backends import export as export_any
 from chainunit.fmu.description import Interface
-from chainunit.fmu.native.export import compiler, export
+from chainunit.fmu.native.export import export
+from chainunit.fmu.native.platforms import compiler
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.models import MODELS
 

@@ -152,6 +152,13 @@ def export(
         Backend | None, typer.Option("--backend", help="native where a C compiler is found, else python.")
     ] = None,
     fmi: Annotated[int, typer.Option("--fmi", help="Version of FMI: 2, or 3 (native only).")] = 2,
+    platforms: Annotated[
+        str | None,
+        typer.Option(
+            "--platforms",
+            help="Comma-separated, of linux64, win64, darwin64, aarch64-linux, or all; this machine's by default.",
+        ),
+    ] = None,
 ) -> None:
     """Write a model as an FMU."""
     from . import config as configuration
@@ -164,8 +171,30 @@ def export(
     file = output or Path(f"{name}.fmu")
     if file.suffix != ".fmu":
         raise InputError(f"-o {file}: must be a file name that ends in .fmu")
-    made = write(MODELS[name], file, start, backend=backend.value if backend else None, fmi=fmi)
+    with _console(stderr=True).status("exporting") as status:
+        made = write(
+            MODELS[name],
+            file,
+            start,
+            backend=backend.value if backend else None,
+            fmi=fmi,
+            platforms=_platforms(platforms, fmi),
+            report=status.update,
+        )
     print(f"{file}: {name}, {made}")
+
+
+def _platforms(wanted: str | None, fmi: int) -> list[str]:
+    from .fmu.native.platforms import PLATFORMS
+
+    if wanted == "all":
+        return [name for name, platform in PLATFORMS.items() if fmi in platform.folders]
+    if wanted is None:
+        return []
+    names = [name.strip() for name in wanted.split(",") if name.strip()]
+    if not names:
+        raise InputError(f"--platforms: name at least one of {', '.join(PLATFORMS)}, or all")
+    return names
 
 
 def main() -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from .engines import MATH
@@ -39,6 +39,18 @@ class Requirement:
             f"must be {' and '.join(limits)} {self.unit}" if low < high else f"no value fits; {self.remedy}"
         )
         return f"{self.subject} = {value:g} {self.unit}: {reason}; {allowed}"
+
+
+@dataclass(frozen=True)
+class Terminal:
+    """Variables that connect as one. `members` maps the name that both sides know to the model's own; `flows` says
+    which of them flow, and whereto ("inflow", "outflow"); `kind` says what it may be connected with."""
+
+    name: str
+    kind: str
+    description: str
+    members: Mapping[str, str]
+    flows: Mapping[str, str] = field(default_factory=dict)
 
 
 class Part:
@@ -79,6 +91,9 @@ class Model:
     States: ClassVar[type | None] = None
     parts: ClassVar[tuple[Part, ...]]
     required: ClassVar[tuple[Requirement, ...]] = ()
+    terminals: ClassVar[tuple[Terminal, ...]] = ()
+    icon: ClassVar[str]
+    """Name of its icon in `data/icons`, an SVG and a PNG."""
 
     parameter_layout: ClassVar[Layout]
     input_layout: ClassVar[Layout]
@@ -114,6 +129,12 @@ class Model:
         for required, (value, low, high) in zip(cls.required, cls.requirements(MATH, p), strict=True):
             if not low < value < high:
                 raise GeometryError(required.refusal(value, low, high, given))
+
+    @staticmethod
+    def excitation(t: float) -> dict[str, float]:
+        """Inputs at the time `t` [s] of the reference results that an FMU carries; others keep their start values.
+        Models with states keep theirs constant, so that no importer's interpolation matters."""
+        return {}
 
     @staticmethod
     def initial_states(p: Any) -> Any:

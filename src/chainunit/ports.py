@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from .quantities import Value, declaration, quantity
+from .model import Terminal
+from .quantities import Layout, Value, declaration, quantity
 
 
 @declaration
@@ -49,3 +50,16 @@ def load_torque(load: LoadPort, phi: Any, w: Any) -> Any:
 def load_inertia(load: LoadPort, phi: Any) -> Any:
     """Inertia of the load [kg m2], linearised about the port's point."""
     return load.J + load.dJ_dphi * (phi - load.phi0)
+
+
+def flange(flow: str) -> Terminal:
+    """The terminal of a shaft whose torque flows into the model or out of it ("inflow", "outflow")."""
+    names = ("phi", "w", "a", "tau")
+    members = {name: name for name in names}
+    return Terminal("flange", "chainunit.flange", "the shaft and its torque", members, {"tau": flow})
+
+
+def load_terminal(prefix: str = "") -> Terminal:
+    """The terminal of a load port whose variables carry `prefix`."""
+    members = {name: prefix + name for name in Layout(LoadPort).names}
+    return Terminal("load", "chainunit.load", "the load port: a load as the shaft sees it", members)

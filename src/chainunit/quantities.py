@@ -42,6 +42,38 @@ DISPLAY_UNITS: dict[str, tuple[str, float, float]] = {
 }
 """unit -> (display unit, factor, offset), shown = factor * value + offset."""
 
+TYPES: dict[str, str] = {
+    "1": "Ratio",
+    "rad": "Angle",
+    "rad/s": "AngularVelocity",
+    "rad/s2": "AngularAcceleration",
+    "m": "Length",
+    "m/s": "Velocity",
+    "m/s2": "Acceleration",
+    "kg": "Mass",
+    "kg.m2": "MomentOfInertia",
+    "kg.m2/rad": "MomentOfInertiaSlope",
+    "N": "Force",
+    "N.m": "Torque",
+    "N.m/rad": "TorsionalStiffness",
+    "N.m.s/rad": "TorsionalDamping",
+    "N.m/A": "TorqueConstant",
+    "J": "Energy",
+    "W": "Power",
+    "A": "Current",
+    "V": "Voltage",
+    "Ohm": "Resistance",
+    "H": "Inductance",
+    "K": "Temperature",
+    "J/K": "HeatCapacity",
+    "K/W": "ThermalResistance",
+    "1/K": "TemperatureCoefficient",
+    "A.s/rad": "SpeedControlGain",
+    "A/rad": "SpeedControlIntegralGain",
+    "Ohm/s": "CurrentControlIntegralGain",
+}
+"""Name of the kind of quantity of a unit, as the declared type of an FMU's variables."""
+
 
 def base_units(unit: str) -> dict[str, int]:
     """Exponents of the SI base units in `unit`, e.g. ``N.m`` -> ``{kg: 1, m: 2, s: -2}``.

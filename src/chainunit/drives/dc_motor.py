@@ -19,7 +19,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from ..model import Model, Part, Requirement
-from ..ports import NO_LOAD, LoadPort, load_inertia, load_torque
+from ..ports import NO_LOAD, LoadPort, flange, load_inertia, load_terminal, load_torque
 from ..quantities import Value, declaration, group, quantity
 
 _T_RATED = 293.15  # K, where R is given
@@ -193,6 +193,8 @@ class DcMotor(Model):
     Inputs = Inputs
     States = States
     files = ("drives/__init__.py", "drives/dc_motor.py")
+    terminals = (flange("outflow"), load_terminal("load."))
+    icon = "motor"
     required = (
         Requirement(
             "armature.L",
@@ -201,6 +203,11 @@ class DcMotor(Model):
             ("armature.R", "current_control.kp"),
         ),
     )
+
+    @staticmethod
+    def excitation(t: float) -> dict[str, float]:
+        """A run-up to 100 rad/s against a steady load."""
+        return {"w_ref": 100.0, "load.tau_bias": 1.0}
 
     @staticmethod
     def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -9,6 +10,7 @@ from ..errors import InputError, RunError
 from ..model import Model
 from . import export as python
 from .native import export as native
+from .native import platforms as targets
 
 Backend = Literal["native", "python"]
 
@@ -20,6 +22,8 @@ def export(
     *,
     backend: Backend | None = None,
     fmi: int = 2,
+    platforms: Sequence[str] = (),
+    report: Callable[[str], None] = lambda what: None,
 ) -> str:
     """Write `model` as an FMU and say, in words, which backend made it and why.
 
@@ -28,6 +32,7 @@ def export(
     model, file, start : see `chainunit.fmu.export.export`
     backend : "native" or "python"; by default native where a C compiler is found and works
     fmi : 2 or 3; 3 only by the native backend
+    platforms, report : see `chainunit.fmu.native.export.export`; platforms only by the native backend
 
     Raises
     ------
@@ -36,19 +41,39 @@ def export(
     """
     if fmi not in (2, 3):
         raise InputError(f"fmi = {fmi}: must be 2 or 3")
-    command = native.compiler()
-    why = "" if backend else ", no C compiler for 64-bit Linux found"
-    if backend == "native" or (backend is None and command):
-        try:
-            native.export(model, file, start, fmi=fmi)
-        except RunError:
-            if backend or fmi != 2:
-                raise
-            why = f", the C compiler {command} failed"
-        else:
-            how = f"native code by {command}" + ("" if backend else ", the C compiler found here")
-            return f"FMI {fmi}.0, Co-Simulation and Model Exchange, {how}"
+    if backend == "python":
+        return _by_python(model, file, start, fmi, platforms, "")
+    if backend is None and not platforms:
+        found = targets.compiler()
+        if found is None or fmi not in targets.PLATFORMS[targets.host() or "linux64"].folders:
+            return _by_python(model, file, start, fmi, platforms, ", no C compiler for this machine found")
+    names, compiler = targets.chosen(platforms, fmi)
+    try:
+        native.export(model, file, start, fmi=fmi, platforms=platforms, report=report)
+    except RunError:
+        if backend or fmi != 2 or platforms:
+            raise
+        return _by_python(model, file, start, fmi, platforms, f", the C compiler {compiler.name} failed")
+    made = f"FMI {fmi}.0, Co-Simulation and Model Exchange, native code by {compiler.name}"
+    if not platforms:
+        return made + ("" if backend else ", the C compiler found here")
+    return f"{made} for " + ", ".join(f"{name} ({targets.PLATFORMS[name].tried})" for name in names)
+
+
+def _by_python(
+    model: type[Model],
+    file: Path,
+    start: dict[str, float] | None,
+    fmi: int,
+    platforms: Sequence[str],
+    why: str,
+) -> str:
     if fmi != 2:
-        raise InputError("--fmi 3 needs the native backend, that is a C compiler (cc, gcc or clang)")
+        raise InputError(
+            "--fmi 3 needs the native backend, that is a C compiler (cc, gcc, clang, or zig by "
+            "pip install 'chainunit[cross]')"
+        )
+    if platforms:
+        raise InputError("--platforms needs the native backend; a Python FMU runs on Linux and Windows alike")
     python.export(model, file, start)
     return f"FMI 2.0 Co-Simulation, by pythonfmu{why}; needs Python 3.11 in the importing process"

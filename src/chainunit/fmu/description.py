@@ -1,8 +1,8 @@
-"""modelDescription.xml (FMI 2.0) from a model's declarations."""
+"""modelDescription.xml (FMI 2.0 and 3.0) and terminalsAndIcons.xml from a model's declarations."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from ..engines import casadi_
 from ..model import Model
-from ..quantities import DISPLAY_UNITS, Variable, base_units
+from ..quantities import DISPLAY_UNITS, TYPES, Variable, base_units
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,11 @@ def model_description(
     units = {s.variable.unit for s in interface.signals}
     if exchange:
         units |= {_per_second(v.unit) for v in interface.states}
-    _unit_definitions(root, units)
+    _definitions(
+        root,
+        units,
+        lambda types, name, of: SubElement(SubElement(types, "SimpleType", name=name), "Real", of),
+    )
     _log_categories(root)
     SubElement(root, "DefaultExperiment", startTime="0", stopTime="10", stepSize="0.001")
     variables = SubElement(root, "ModelVariables")
@@ -181,13 +185,14 @@ def model_description_3(
     root = _root(model, version, {"fmiVersion": "3.0", "instantiationToken": token})
     for kind, options in kinds.items():
         SubElement(root, kind, {"modelIdentifier": model.name, **options})
-    _unit_definitions(
+    _definitions(
         root,
         {
             "s",
             *(s.variable.unit for s in interface.signals),
             *(_per_second(v.unit) for v in interface.states),
         },
+        lambda types, name, of: SubElement(types, "Float64Type", {"name": name, **of}),
     )
     _log_categories(root)
     SubElement(root, "DefaultExperiment", startTime="0", stopTime="10", stepSize="0.001")
@@ -198,7 +203,10 @@ def model_description_3(
     for i, v in enumerate(interface.states):
         attributes = _derivative_attributes(v, first_derivative + i)
         SubElement(
-            variables, "Float64", attributes, unit=_per_second(v.unit), derivative=str(first_state + i)
+            variables,
+            "Float64",
+            {**attributes, **_unit(_per_second(v.unit))},
+            derivative=str(first_state + i),
         )
     SubElement(
         variables,
@@ -278,10 +286,13 @@ def _derivative_attributes(state: Variable, reference: int) -> dict[str, str]:
 
 def _derivative(variables: Element, state: Variable, of: int, reference: int) -> None:
     node = SubElement(variables, "ScalarVariable", _derivative_attributes(state, reference))
-    SubElement(node, "Real", unit=_per_second(state.unit), derivative=str(of + 1))
+    SubElement(node, "Real", _unit(_per_second(state.unit)), derivative=str(of + 1))
 
 
-def _unit_definitions(root: Element, units: Iterable[str]) -> None:
+def _definitions(
+    root: Element, units: Iterable[str], add_type: Callable[[Element, str, dict[str, str]], Element]
+) -> None:
+    """Definitions of the units, and a declared type for each that has a name of its kind."""
     definitions = SubElement(root, "UnitDefinitions")
     for unit in sorted(units):
         node = SubElement(definitions, "Unit", name=unit)
@@ -292,6 +303,19 @@ def _unit_definitions(root: Element, units: Iterable[str]) -> None:
             if offset:
                 attributes["offset"] = repr(offset)
             SubElement(node, "DisplayUnit", attributes)
+    types = SubElement(root, "TypeDefinitions")
+    for unit in sorted(units):
+        if unit in TYPES:
+            add_type(types, TYPES[unit], {"quantity": TYPES[unit], **_shown(unit)})
+
+
+def _shown(unit: str) -> dict[str, str]:
+    return {"unit": unit} | ({"displayUnit": DISPLAY_UNITS[unit][0]} if unit in DISPLAY_UNITS else {})
+
+
+def _unit(unit: str) -> dict[str, str]:
+    """Attributes of a variable that say what it is measured in; importers that know no types find the unit, too."""
+    return ({"declaredType": TYPES[unit]} if unit in TYPES else {}) | _shown(unit)
 
 
 def _attributes(signal: Signal) -> dict[str, str]:
@@ -310,10 +334,8 @@ def _attributes(signal: Signal) -> dict[str, str]:
 
 
 def _real(signal: Signal) -> dict[str, str]:
-    unit, q = signal.variable.unit, signal.variable.quantity
-    real = {"unit": unit}
-    if unit in DISPLAY_UNITS:
-        real["displayUnit"] = DISPLAY_UNITS[unit][0]
+    q = signal.variable.quantity
+    real = _unit(signal.variable.unit)
     if q.low > float("-inf"):
         real["min"] = repr(q.low)
     if q.high < float("inf"):
@@ -338,3 +360,28 @@ def _unknown(listed: Element, reference: int, known: Sequence[int]) -> None:
         dependencies=" ".join(str(i + 1) for i in sorted(known)),
         dependenciesKind=" ".join("dependent" for _ in known),
     )
+
+
+def terminals(interface: Interface) -> Element:
+    """The XML tree of terminalsAndIcons.xml (FMI 3.0): the model's icon, and what connects as one."""
+    root = Element("fmiTerminalsAndIcons", fmiVersion="3.0")
+    graphics = SubElement(root, "GraphicalRepresentation")
+    box = {"x1": "-100", "y1": "-100", "x2": "100", "y2": "100"}
+    SubElement(graphics, "CoordinateSystem", box, suggestedScalingFactorTo_mm="0.1")
+    SubElement(graphics, "Icon", box)
+    listed = SubElement(root, "Terminals")
+    for terminal in interface.model.terminals:
+        node = SubElement(
+            listed,
+            "Terminal",
+            name=terminal.name,
+            matchingRule="plug",
+            terminalKind=terminal.kind,
+            description=terminal.description,
+        )
+        for member, variable in terminal.members.items():
+            kind = terminal.flows.get(member, "signal")
+            SubElement(
+                node, "TerminalMemberVariable", variableName=variable, memberName=member, variableKind=kind
+            )
+    return root

@@ -18,8 +18,8 @@ from xml.etree.ElementTree import tostring
 
 from ..files import folder, whole
 from ..model import Model
+from .accompany import accompanying
 from .description import model_description
-from .documentation import page
 from .pack import checked, pack
 
 _PACKAGE = Path(__file__).parents[1]
@@ -89,7 +89,7 @@ def export(model: type[Model], file: Path, start: dict[str, float] | None = None
         (work / "modelDescription.xml").write_bytes(tostring(description, "utf-8"))
         raw = _build(recipe, package, work / "modelDescription.xml", work / "raw.fmu")
         with whole(file) as part:
-            pack(_contents(raw) | {"documentation/index.html": page(interface, version).encode()}, part)
+            pack(_contents(raw) | accompanying(interface, version, 2, ("pythonfmu",)), part)
     return file
 
 

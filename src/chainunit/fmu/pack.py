@@ -5,6 +5,7 @@ from __future__ import annotations
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
+from xml.etree.ElementTree import Element, indent, tostring
 
 from ..errors import InputError
 from ..model import Model
@@ -40,3 +41,9 @@ def pack(contents: Mapping[str, bytes], file: Path) -> None:
             entry.compress_type = zipfile.ZIP_DEFLATED
             entry.external_attr = 0o644 << 16
             archive.writestr(entry, contents[name])
+
+
+def written(root: Element) -> bytes:
+    """An XML file of that root, indented."""
+    indent(root)
+    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root)

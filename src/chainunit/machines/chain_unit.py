@@ -25,7 +25,7 @@ from ..groups.driver import crank, driving_torque
 from ..groups.dyad import Dyad
 from ..model import Model, Part, Requirement
 from ..planar import ZERO, Link, Motion, Vec2
-from ..ports import PortSlopes, PortValues
+from ..ports import PortSlopes, PortValues, flange, load_terminal
 from ..quantities import Value, declaration, group, quantity
 from .crank_rocker import TURNS, angle_at_pivot, longest_crank, pressure_angle
 
@@ -598,6 +598,8 @@ class ChamberForces(Model):
     Parameters = Parameters
     Inputs = Inputs
     files = ("machines/__init__.py", "machines/chain_unit.py", "machines/crank_rocker.py", "groups")
+    terminals = (flange("inflow"), load_terminal())
+    icon = "chain_unit"
 
     required = (
         Requirement("c", "m", "the crank circle must stay left of the pivot C"),
@@ -616,6 +618,17 @@ class ChamberForces(Model):
             "lengthen l1 + l2, or lessen the swing by a shorter r or a longer h",
         ),
     )
+
+    @staticmethod
+    def excitation(t: float) -> dict[str, float]:
+        """A crank that runs unevenly, both organs loaded."""
+        loads = {f"{side}.material_mass": 30.0 for side in ("left", "right")}
+        w, ripple = 6.0, 0.5
+        return loads | {
+            "phi": w * t - ripple * math.cos(w * t) / w,
+            "w": w + ripple * math.sin(w * t),
+            "a": ripple * w * math.cos(w * t),
+        }
 
     @staticmethod
     def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
@@ -662,6 +675,8 @@ class DirectChainUnit(Model):
     Inputs = DirectInputs
     States = DirectStates
     files = ChamberForces.files
+    terminals = (flange("inflow"),)
+    icon = ChamberForces.icon
     required = (
         *ChamberForces.required,
         Requirement(
@@ -670,6 +685,11 @@ class DirectChainUnit(Model):
             "at the dead points of the rocker nothing else carries the torque; give crank.I, crank.m or J_added",
         ),
     )
+
+    @staticmethod
+    def excitation(t: float) -> dict[str, float]:
+        """A steady torque sets the machine, empty, in motion."""
+        return {"tau": 20.0}
 
     @staticmethod
     def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:

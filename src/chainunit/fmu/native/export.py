@@ -6,37 +6,23 @@ The same model gives the same sources and the same identifier; the binary is as 
 from __future__ import annotations
 
 import hashlib
-import platform
-import shutil
-import subprocess
-import sys
-import tempfile
 import uuid
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
-from xml.etree.ElementTree import Element, SubElement, indent, tostring
+from xml.etree.ElementTree import Element, SubElement
 
-from ...errors import InputError, RunError
 from ...files import folder, whole
 from ...model import Model
+from ..accompany import accompanying
 from ..description import model_description, model_description_3
-from ..documentation import page
-from ..pack import checked, pack
+from ..pack import checked, pack, written
 from .generate import kernels, tables
+from .platforms import build, chosen
 
 _HERE = Path(__file__).parent
 _LAYER = ("model.h", "runtime.h", "runtime.c")
-_FLAGS = (
-    "-std=c99",
-    "-O2",
-    "-fPIC",
-    "-fvisibility=hidden",
-    "-ffp-contract=off",
-    "-shared",
-    "-Wl,--build-id=none",
-)
 
 
 @dataclass(frozen=True)
@@ -45,7 +31,6 @@ class _Version:
 
     layer: str
     headers: tuple[str, ...]
-    binaries: str
     kinds: Mapping[str, Mapping[str, str]]
 
 
@@ -67,46 +52,42 @@ _VERSIONS = {
     2: _Version(
         "fmi2.c",
         ("fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h"),
-        "linux64",
         {"ModelExchange": _COMMON_2, "CoSimulation": _COMMON_2 | _STEP | {"canInterpolateInputs": "true"}},
     ),
     3: _Version(
         "fmi3.c",
         ("fmi3FunctionTypes.h", "fmi3Functions.h", "fmi3PlatformTypes.h"),
-        "x86_64-linux",
         {"ModelExchange": _COMMON_3, "CoSimulation": _COMMON_3 | _STEP},
     ),
 }
 
 
-def compiler() -> str | None:
-    """The system's C compiler, if there is one that makes code for 64-bit Linux, so far the only platform."""
-    if sys.platform != "linux" or platform.machine() not in ("x86_64", "AMD64"):
-        return None
-    return shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
-
-
-def export(model: type[Model], file: Path, start: dict[str, float] | None = None, *, fmi: int = 2) -> Path:
-    """Write `model` as a native FMU, Co-Simulation and Model Exchange, for 64-bit Linux.
+def export(
+    model: type[Model],
+    file: Path,
+    start: dict[str, float] | None = None,
+    *,
+    fmi: int = 2,
+    platforms: Sequence[str] = (),
+    report: Callable[[str], None] = lambda what: None,
+) -> Path:
+    """Write `model` as a native FMU, Co-Simulation and Model Exchange.
 
     Parameters
     ----------
     model, file, start : see `chainunit.fmu.export.export`
     fmi : version of FMI, 2 or 3
+    platforms : names from `chainunit.fmu.native.platforms.PLATFORMS`; without any, this machine's
+    report : is told what is being done
 
     Raises
     ------
     KeyError, InputError
-        see there.
+        see there; also where there is no compiler for a platform.
     RunError
         where the compiler fails, with what it said.
     """
-    command = compiler()
-    if command is None:
-        raise InputError(
-            "no C compiler (cc, gcc or clang) for 64-bit Linux found: install one there, or export with "
-            "--backend python"
-        )
+    names, compiler = chosen(platforms, fmi)
     interface = checked(model, start)
     file = Path(file)
     folder(file.parent)
@@ -117,61 +98,43 @@ def export(model: type[Model], file: Path, start: dict[str, float] | None = None
 
     def description(token: str) -> bytes:
         if fmi == 2:
-            root = model_description(interface, token, wanted.kinds, version, compiled)
-        else:
-            root = model_description_3(interface, token, wanted.kinds, version)
-        indent(root)
-        return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root)
+            return written(model_description(interface, token, wanted.kinds, version, compiled))
+        return written(model_description_3(interface, token, wanted.kinds, version))
 
-    digest = hashlib.sha256(description(""))
+    report("generating C")
     functions = kernels(interface)
-    for text in (
-        functions,
-        tables(interface, "", ""),
-        *((_HERE / name).read_text("utf-8") for name in layer),
-    ):
-        digest.update(text.encode() + b"\0")
+    layer_texts = {name: (_HERE / name).read_bytes() for name in layer}
+    digest = hashlib.sha256(description(""))
+    for text in (functions.encode(), tables(interface, "", "").encode(), *layer_texts.values()):
+        digest.update(text + b"\0")
     token = f"{{{uuid.UUID(digest.hexdigest()[:32])}}}"
-    contents = {
-        "modelDescription.xml": description(token),
-        "documentation/index.html": page(interface, version).encode(),
-        "sources/kernels.c": functions.encode(),
-        "sources/model.c": tables(interface, token, token).encode(),
+    sources = {
+        "kernels.c": functions.encode(),
+        "model.c": tables(interface, token, token).encode(),
+        **layer_texts,
+        **{name: (_headers() / name).read_bytes() for name in wanted.headers},
     }
-    for name in layer:
-        contents[f"sources/{name}"] = (_HERE / name).read_bytes()
-    for name in wanted.headers:
-        contents[f"sources/{name}"] = (_headers() / name).read_bytes()
+    contents = {f"sources/{name}": text for name, text in sources.items()}
+    contents["modelDescription.xml"] = description(token)
+    contents |= accompanying(interface, version, fmi)
     if fmi == 3:
         contents["sources/buildDescription.xml"] = _build_description(model.name, compiled)
-    contents[f"binaries/{wanted.binaries}/{model.name}.so"] = _compile(command, contents, compiled)
+    for name in names:
+        slow = ", the first time about a minute" if compiler.zig and name == "win64" else ""
+        report(f"compiling for {name}{slow}")
+        contents |= build(compiler, name, fmi, model.name, sources, compiled)
     with whole(file) as part:
         pack(contents, part)
     return file
 
 
-def _compile(command: str, contents: Mapping[str, bytes], names: tuple[str, ...]) -> bytes:
-    with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
-        work = Path(scratch)
-        for name, content in contents.items():
-            if name.startswith("sources/"):
-                (work / Path(name).name).write_bytes(content)
-        built = subprocess.run(
-            [command, *_FLAGS, *names, "-o", "model.so", "-lm"], cwd=work, capture_output=True, text=True
-        )
-        if built.returncode:
-            raise RunError(f"the C compiler {command} failed: {built.stderr.strip()}")
-        return (work / "model.so").read_bytes()
-
-
-def _build_description(identifier: str, names: tuple[str, ...]) -> bytes:
+def _build_description(identifier: str, names: Sequence[str]) -> bytes:
     root = Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = SubElement(root, "BuildConfiguration", modelIdentifier=identifier)
     files = SubElement(configuration, "SourceFileSet", language="C99")
     for name in names:
         SubElement(files, "SourceFile", name=name)
-    indent(root)
-    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root)
+    return written(root)
 
 
 def _headers() -> Path:

@@ -1,0 +1,189 @@
+"""Platforms of native FMUs, and the C compilers that make code for them.
+
+The system's own compiler makes code for this machine. The ``ziglang`` wheel (extra `cross`) makes code for
+every platform, with fixed floors: glibc 2.17, macOS 10.15 on x86_64 and 11.0 on arm64.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import platform
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ...errors import InputError, RunError
+
+_FLAGS = ("-std=c99", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-shared", "-s")
+
+
+@dataclass(frozen=True)
+class Platform:
+    """One platform: suffix of its libraries, and for each FMI version the folders of `binaries` with the zig targets of
+    the library in it; several targets make one fat library. `tried` says how far its binaries are tested."""
+
+    suffix: str
+    folders: Mapping[int, Mapping[str, tuple[str, ...]]]
+    tried: str
+
+
+_LINUX, _ARM_LINUX = "x86_64-linux-gnu.2.17", "aarch64-linux-gnu.2.17"
+_MAC, _ARM_MAC, _WINDOWS = "x86_64-macos.10.15", "aarch64-macos.11.0", "x86_64-windows-gnu"
+PLATFORMS: dict[str, Platform] = {
+    "linux64": Platform(".so", {2: {"linux64": (_LINUX,)}, 3: {"x86_64-linux": (_LINUX,)}}, "run"),
+    "win64": Platform(
+        ".dll", {2: {"win64": (_WINDOWS,)}, 3: {"x86_64-windows": (_WINDOWS,)}}, "run under Wine"
+    ),
+    "darwin64": Platform(
+        ".dylib",
+        {2: {"darwin64": (_MAC, _ARM_MAC)}, 3: {"x86_64-darwin": (_MAC,), "aarch64-darwin": (_ARM_MAC,)}},
+        "built, not run",
+    ),
+    "aarch64-linux": Platform(".so", {3: {"aarch64-linux": (_ARM_LINUX,)}}, "run under QEMU"),
+}
+"""Platforms by the names that ``--platforms`` takes. FMI 2.0 has no folder for Linux on ARM."""
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """A C compiler: its command, and whether it is zig's, which takes a target."""
+
+    command: tuple[str, ...]
+    zig: bool
+
+    @property
+    def name(self) -> str:
+        """How it is called in messages."""
+        return "zig" if self.zig else self.command[0]
+
+
+def host() -> str | None:
+    """This machine's platform, if it is among `PLATFORMS`."""
+    machine = {"AMD64": "x86_64", "arm64": "aarch64"}.get(platform.machine(), platform.machine())
+    return {
+        ("linux", "x86_64"): "linux64",
+        ("linux", "aarch64"): "aarch64-linux",
+        ("win32", "x86_64"): "win64",
+        ("darwin", "x86_64"): "darwin64",
+        ("darwin", "aarch64"): "darwin64",
+    }.get((sys.platform, machine))
+
+
+def compiler() -> Compiler | None:
+    """The compiler for this machine: the system's, else zig's."""
+    if host() is None:
+        return None
+    # elsewhere the layout of libraries is the platform's own, which zig knows
+    if sys.platform == "linux":
+        for name in ("cc", "gcc", "clang"):
+            if found := shutil.which(name):
+                return Compiler((found,), zig=False)
+    return _zig()
+
+
+def _zig() -> Compiler | None:
+    if importlib.util.find_spec("ziglang") is None:
+        return None
+    return Compiler((sys.executable, "-m", "ziglang", "cc"), zig=True)
+
+
+def chosen(names: Sequence[str], fmi: int) -> tuple[tuple[str, ...], Compiler]:
+    """Platforms and the compiler for them; without names, this machine's.
+
+    Raises
+    ------
+    InputError
+        for an unknown platform, one that the FMI version has no folder for, or no compiler for it.
+    """
+    for name in names:
+        if name not in PLATFORMS:
+            raise InputError(f"--platforms {name}: no such platform; there are {', '.join(PLATFORMS)}")
+        if fmi not in PLATFORMS[name].folders:
+            raise InputError(f"--platforms {name}: FMI {fmi}.0 has no folder for it; export with --fmi 3")
+    here = host()
+    if not names:
+        found = compiler()
+        if here is None or found is None:
+            raise InputError(
+                "no C compiler (cc, gcc, clang, or zig by pip install 'chainunit[cross]') for this machine found: "
+                "install one, or export with --backend python"
+            )
+        if fmi not in PLATFORMS[here].folders:
+            raise InputError(f"FMI {fmi}.0 has no folder for {here}; export with --fmi 3 or --backend python")
+        return (here,), found
+    # zig where it is there, for its floors; the system's compiler knows this machine alone
+    found = _zig() or (compiler() if set(names) == {here} else None)
+    if found is None:
+        raise InputError(
+            f"--platforms {' '.join(names)}: needs zig, a C compiler for all of them: pip install 'chainunit[cross]'"
+        )
+    return tuple(dict.fromkeys(names)), found
+
+
+def build(
+    compiler: Compiler,
+    name: str,
+    fmi: int,
+    identifier: str,
+    sources: Mapping[str, bytes],
+    compiled: Sequence[str],
+) -> dict[str, bytes]:
+    """Libraries of one platform, by their path inside the FMU.
+
+    Parameters
+    ----------
+    compiler : see `chosen`
+    name, fmi : platform and version of FMI
+    identifier : model identifier, the library's name
+    sources : files by name; `compiled` names those that the compiler is given
+
+    Raises
+    ------
+    RunError
+        where the compiler fails, with what it said.
+    """
+    described = PLATFORMS[name]
+    made = {}
+    for folder, targets in described.folders[fmi].items():
+        slices = [_compile(compiler, t, identifier + described.suffix, sources, compiled) for t in targets]
+        library = slices[0] if len(slices) == 1 else fat(slices)
+        made[f"binaries/{folder}/{identifier}{described.suffix}"] = library
+    return made
+
+
+def _compile(
+    compiler: Compiler, target: str, library: str, sources: Mapping[str, bytes], compiled: Sequence[str]
+) -> bytes:
+    with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
+        work = Path(scratch)
+        for name, content in sources.items():
+            (work / name).write_bytes(content)
+        own = ("-target", target) if compiler.zig else ("-Wl,--build-id=none",)
+        math = () if "windows" in target else ("-lm",)
+        command = [*compiler.command, *own, *_FLAGS, *compiled, "-o", library, *math]
+        built = subprocess.run(command, cwd=work, capture_output=True, text=True)
+        if built.returncode:
+            raise RunError(f"the C compiler {compiler.name} failed: {built.stderr.strip()}")
+        return (work / library).read_bytes()
+
+
+def fat(slices: Sequence[bytes]) -> bytes:
+    """One Mach-O file for several processors, each slice on a page of its own (Apple's `fat_header`)."""
+    page = 14  # 16 KiB, as arm64 wants
+    head = struct.pack(">II", 0xCAFEBABE, len(slices))
+    at = 8 + 20 * len(slices)
+    body = b""
+    for code in slices:
+        magic, processor, subtype = struct.unpack("<III", code[:12])
+        if magic != 0xFEEDFACF:
+            raise RunError("the C compiler made no 64-bit Mach-O library for macOS")
+        padding = -(at + len(body)) % (1 << page)
+        body += bytes(padding)
+        head += struct.pack(">IIIII", processor, subtype, at + len(body), len(code), page)
+        body += code
+    return head + body
