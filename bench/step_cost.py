@@ -1,15 +1,19 @@
 # %% [markdown]
 # Cost of a step
 #
-# Microseconds of one kernel call under `math` (a point) and `numpy` (per point of an array), and of one FMU
-# step through fmpy, measured side by side in one run. For scale: an empty `fmi2DoStep` of the same FMU, which
-# is the importer's and pythonfmu's own overhead, and the floor of what any Python FMU can do.
+# Microseconds of one kernel call under `math` (a point) and `numpy` (per point of an array), of one FMU step
+# through fmpy, and of one from a C loop, measured side by side in one run. The limits: through fmpy, an empty FMU
+# (one input, its multiple as output), which is the importer's own overhead; from C, the bare generated kernel,
+# which a step with all outputs may exceed by half.
 
 # %%
 from __future__ import annotations
 
+import shutil
+import subprocess
 import tempfile
 import timeit
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -21,12 +25,66 @@ from chainunit.cosim.instance import Fmu, Instance
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.fmu.backends import export
 from chainunit.integrate import rk4
+from chainunit.fmu.native import export as native
 from chainunit.machines.chain_unit import ChamberForces
+from chainunit.model import Model, Part
+from chainunit.quantities import Value, declaration, quantity
+
+
+@declaration
+class Gain:
+    k: Value = quantity("1", "factor", default=1.0)
+
+
+@declaration
+class One:
+    u: Value = quantity("1", "a number", default=0.0)
+
+
+@declaration
+class Same:
+    y: Value = quantity("1", "that number times the factor")
+
+
+class Empty(Model):
+    """A model that does nothing."""
+
+    name = "Empty"
+    description = "one input, its multiple as the output"
+    Parameters, Inputs = Gain, One
+    icon = "motor"
+    parts = (Part(Same, lambda xp, p, u, x, shared: Same(y=p.k * u.u)),)
 
 
 def cost(call, number: int = 1000, repeat: int = 5) -> float:
     """The least time of a call [us] over `repeat` rounds."""
     return 1e6 * min(timeit.repeat(call, number=number, repeat=repeat)) / number
+
+
+def from_c(folder: Path) -> list[tuple[str, float]]:
+    """The FMU's sources with loop.c, compiled as the FMU is."""
+    file = native.export(ChamberForces, folder / "loop.fmu")
+    sources = folder / "sources"
+    with zipfile.ZipFile(file) as archive:
+        for name in archive.namelist():
+            if name.startswith("sources/"):
+                archive.extract(name, folder)
+    command = [shutil.which("cc"), "-std=gnu99", "-O2", "-fPIC", "-ffp-contract=off", "-o", str(folder / "loop")]
+    loop = Path(__file__).parent / "loop.c"
+    subprocess.run([*command, str(loop), *map(str, sources.glob("*.c")), "-I", str(sources), "-lm"], check=True)
+    fmu = Fmu(file)
+    names = ["phi", "w", "a", "tau_bias", "J", "dJ_dphi", "phi0", "w0", "tau_bias_dphi", "tau_bias_dw"]
+    references = [str(fmu.variables[n].valueReference) for n in names]
+    fmu.close()
+    said = subprocess.run([str(folder / "loop"), *references], check=True, capture_output=True, text=True).stdout
+    bare, plain, port, everything = (1e-3 * float(x) for x in said.split())
+    print(f"From C, set + step + get all outputs costs {everything / bare:.2f} times the bare kernel (limit: 1.5).")
+    return [
+        ("bare generated kernel, all outputs, from C", bare),
+        ("native FMU from C, set three inputs + step", plain),
+        ("native FMU from C, set + step + get the load port", port),
+        ("native FMU from C, set + step + get all outputs", everything),
+    ]
 
 
 def main() -> None:
@@ -109,6 +167,24 @@ def main() -> None:
             measure("set + step + get all outputs", lambda step=step, h=everything: step(h))
             unit.close()
             fmu.close()
+
+        empty = Path(folder) / "empty.fmu"
+        native.export(Empty, empty)
+        fmu = Fmu(empty)
+        unit = Instance(fmu, "unit")
+        unit.initialize({}, 0.0)
+        unit.finish_initialization()
+        into, outof = unit.handle(["u"]), unit.handle(["y"])
+
+        def step_empty():
+            unit.write(into, (1.0,))
+            unit.step(0.0, 1e-3)
+            unit.read(outof)
+
+        rows.append(("an empty native FMU through fmpy, set + step + get", cost(step_empty)))
+        unit.close()
+        fmu.close()
+        rows += from_c(Path(folder))
 
     table = Table(title="Cost of a step", title_justify="left")
     table.add_column("what")

@@ -9,8 +9,8 @@ import xarray as xr
 from chainunit import ChainUnit, InputError, RunError, SideLoads
 from chainunit.cosim import Bond, CoSimulation, Profile, System, energy_residual, monolithic, port_connections
 from chainunit.drives.dc_motor import DcMotor
-from chainunit.fmu.native.platforms import compiler
 from chainunit.fmu.native.export import export as export_native
+from chainunit.fmu.native.platforms import compiler
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.models import MODELS
 

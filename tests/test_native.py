@@ -6,29 +6,47 @@ import math
 import shutil
 import subprocess
 import zipfile
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
-from xml.etree import ElementTree
 
 import casadi
 import fmpy
+import fmpy.util
 import numpy as np
 import pytest
 from fmpy.fmi2 import FMU2Model
 from fmpy.validation import validate_fmu
+from lxml import etree
 from test_fmu import Running
 from test_reference import POINTS, deviation
 
-from chainunit import ChainUnit, GeometryError, InputError, RunError
+from chainunit import ChainUnit, GeometryError, RunError
 from chainunit.cosim.instance import Fmu, Instance
-from chainunit.fmu.backends import export as export_any
+from chainunit.fmu.accompany import REFERENCE
 from chainunit.fmu.description import Interface
 from chainunit.fmu.native.export import export
 from chainunit.fmu.native.platforms import compiler
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.models import MODELS
+from chainunit.quantities import TYPES
 
+HERE = Path(__file__).parent
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
+
+
+def host_arguments(folder, library):
+    """What host.c is called with: library, identifier, value references."""
+    description = fmpy.read_model_description(str(folder))
+    reference = {v.name: v.valueReference for v in description.modelVariables}
+    identifier = description.guid or description.instantiationToken
+    return [str(library), identifier, *(str(reference[n]) for n in ("phi", "w", "tau"))]
+
+
+def host_torque():
+    """The torque that host.c prints, by the Python kernels, at the FMU's start values."""
+    loads = {f"{side}.material_mass": 30.0 for side in ("left", "right")}
+    return ChainUnit().evaluate({"phi": 0.5 * np.arange(10), "w": 6.0} | loads)["tau"]
 
 
 @pytest.fixture(scope="module")
@@ -283,44 +301,32 @@ def test_small_enough(native):
         assert file.stat().st_size < 300_000
 
 
-def test_a_plain_c_host(native, tmp_path):
-    file, folder = native["ChamberForces", 2]
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_plain_c_host(native, fmi, tmp_path):
+    _, folder = native["ChamberForces", fmi]
     host = tmp_path / "host"
-    sources = [
-        shutil.which("cc"),
-        "-Wall",
-        "-o",
-        str(host),
-        "tests/host.c",
-        "-I",
-        f"{folder}/sources",
-        "-ldl",
-    ]
-    subprocess.run(sources, check=True, cwd=Path(__file__).parents[1])
-    description = fmpy.read_model_description(str(file))
-    reference = {v.name: v.valueReference for v in description.modelVariables}
-    library = f"{folder}/binaries/linux64/ChamberForces.so"
-    arguments = [library, description.guid, *(str(reference[n]) for n in ("phi", "w", "tau"))]
-    done = subprocess.run([host, *arguments], capture_output=True, text=True)
+    command = [shutil.which("cc"), "-Wall", f"-DFMI={fmi}", "-o", str(host), str(HERE / "host.c")]
+    subprocess.run([*command, "-I", f"{folder}/sources", "-ldl"], check=True)
+    (library,) = Path(folder, "binaries").glob("*/*.so")
+    done = subprocess.run([host, *host_arguments(folder, library)], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    loads = {f"{side}.material_mass": 30.0 for side in ("left", "right")}
-    want = ChainUnit().evaluate({"phi": 0.5 * np.arange(10), "w": 6.0} | loads)["tau"]
-    np.testing.assert_allclose([float(x) for x in done.stdout.split()], want, rtol=1e-12)
+    np.testing.assert_allclose([float(x) for x in done.stdout.split()], host_torque(), rtol=1e-12)
     needs = subprocess.run(["ldd", library], capture_output=True, text=True).stdout
     assert {line.split()[0].split(".")[0] for line in needs.splitlines()} <= {
         "linux-vdso", "libm", "libc", "/lib64/ld-linux-x86-64",
     }  # fmt: skip
 
 
+@pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize("name", list(MODELS))
-def test_a_million_random_calls_under_sanitizers(native, name, tmp_path):
-    sources = Path(native[name, 2][1]) / "sources"
+def test_a_million_random_calls_under_sanitizers(native, name, fmi, tmp_path):
+    sources = Path(native[name, fmi][1]) / "sources"
     fuzz = tmp_path / "fuzz"
     command = [
         shutil.which("cc"), "-std=c99", "-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all",
         "-Wall", "-Wextra", "-Werror", "-Wno-unused-parameter",
-        "-o", str(fuzz), str(Path(__file__).parent / "fuzz.c"),
-        *(str(sources / n) for n in ("model.c", "runtime.c", "fmi2.c")), "-I", str(sources), "-lm",
+        "-o", str(fuzz), str(HERE / f"fuzz{fmi}.c"),
+        *(str(sources / n) for n in ("model.c", "runtime.c", f"fmi{fmi}.c")), "-I", str(sources), "-lm",
     ]  # fmt: skip
     # what CasADi wrote is compiled apart: its warnings are not ours
     kernels = tmp_path / "kernels.o"
@@ -332,40 +338,87 @@ def test_a_million_random_calls_under_sanitizers(native, name, tmp_path):
     assert done.returncode == 0, done.stdout + done.stderr[-3000:]
 
 
-def test_the_sources_build_again(native, tmp_path):
-    """As a host would from the sources alone: with the files that the description lists."""
-    file, folder = native["DcMotor", 2]
-    root = ElementTree.fromstring(zipfile.ZipFile(file).read("modelDescription.xml"))
-    listed = [node.attrib["name"] for node in root.findall("CoSimulation/SourceFiles/File")]
-    assert len(listed) == 4
-    library = tmp_path / "again.so"
-    subprocess.run(
-        [shutil.which("cc"), "-shared", "-fPIC", "-O2", "-o", str(library), *listed, "-lm"],
-        check=True,
-        cwd=f"{folder}/sources",
+def test_threads_do_not_see_each_other(native):
+    """Many instances at once, one a thread: fmpy lets other threads run inside a call."""
+    fmu = Fmu(native["ChainUnit", 2][0])
+
+    def run(start):
+        with Running(fmu, {"phi_start": start}) as unit:
+            for k in range(300):
+                unit.step(1e-3 * k, 1e-3)
+            return unit.get(["phi", "w", "tau_bias"])
+
+    starts = [0.1 * k for k in range(16)]
+    alone = [run(s) for s in starts]
+    assert len({tuple(x) for x in alone}) == len(starts)
+    with ThreadPoolExecutor(8) as pool:
+        assert list(pool.map(run, starts)) == alone
+    fmu.close()
+
+
+@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("name", list(MODELS))
+def test_the_reference_results_inside_are_met(native, name, fmi, kind):
+    """As an importer would check its own work: inputs from the one file, outputs against the other."""
+    folder = Path(native[name, fmi][1])
+    given, wanted = (fmpy.util.read_csv(folder / REFERENCE / f"{name}_{end}.csv") for end in ("in", "ref"))
+    outputs = [n for n in wanted.dtype.names if n != "time"]
+    got = fmpy.simulate_fmu(
+        str(folder),
+        fmi_type=kind,
+        input=given,
+        stop_time=wanted["time"][-1],
+        output_interval=wanted["time"][1],
+        relative_tolerance=1e-10,
+        output=outputs,
     )
-    assert library.stat().st_size > 10_000
-    names = zipfile.ZipFile(native["DcMotor", 3][0]).namelist()
-    assert "sources/buildDescription.xml" in names
+    assert len(got) == len(wanted)
+    tolerance = 1e-5 if MODELS[name].state_layout else 1e-12
+    if kind == "CoSimulation" and not MODELS[name].state_layout:
+        # fmpy sets the inputs of t before the step from t: what it reads at the end belongs to them
+        got, wanted = got[1:], wanted[:-1]
+    for n in outputs:
+        size = np.abs(wanted[n]).max()
+        np.testing.assert_allclose(got[n], wanted[n], rtol=0.0, atol=tolerance * size + 1e-12)
 
 
-def test_backends_say_what_they_took(tmp_path, monkeypatch):
-    from chainunit.fmu.native import export as module
+def test_what_an_fmu_carries(native, fmus):
+    schema = etree.XMLSchema(
+        etree.parse(Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3TerminalsAndIcons.xsd")
+    )
+    for name, model in MODELS.items():
+        names = set(zipfile.ZipFile(native[name, 2][0]).namelist())
+        common = {"documentation/index.html", "documentation/licenses/license.txt"}
+        common |= {f"{REFERENCE}/{name}_{end}.csv" for end in ("in", "ref")}
+        assert {*common, "model.png"} <= names
+        assert {*common, "model.png"} <= set(zipfile.ZipFile(fmus[name]).namelist())
+        with zipfile.ZipFile(native[name, 3][0]) as archive:
+            assert {*common, "terminalsAndIcons/icon.png", "terminalsAndIcons/icon.svg"} <= set(
+                archive.namelist()
+            )
+            root = etree.fromstring(archive.read("terminalsAndIcons/terminalsAndIcons.xml"))
+            assert "MIT License" in archive.read("documentation/licenses/license.txt").decode()
+        schema.assertValid(root)
+        description = fmpy.read_model_description(str(native[name, 3][0]))
+        known = {v.name for v in description.modelVariables}
+        members = {
+            t.get("name"): {m.get("memberName"): m.get("variableName") for m in t}
+            for t in root.iter("Terminal")
+        }
+        assert set(members["flange"]) == {"phi", "w", "a", "tau"}
+        assert all(set(found.values()) <= known for found in members.values())
+        if model.name != "ChainUnit":
+            assert len(members["load"]) == 7
+        for fmi in (2, 3):
+            variables = fmpy.read_model_description(str(native[name, fmi][0])).modelVariables
+            for v in variables:
+                assert v.declaredType is not None or v.unit not in TYPES, v.name
+                if v.declaredType is not None:
+                    assert v.declaredType.name == TYPES[v.unit] and v.declaredType.unit == v.unit
 
-    said = export_any(MODELS["DcMotor"], tmp_path / "a.fmu")
-    assert "native code by" in said and "found here" in said
-    assert "pythonfmu" in export_any(MODELS["DcMotor"], tmp_path / "b.fmu", backend="python")
-    monkeypatch.setattr(module, "compiler", lambda: None)
-    assert "no C compiler for 64-bit Linux found" in export_any(MODELS["DcMotor"], tmp_path / "c.fmu")
-    with pytest.raises(InputError, match="--fmi 3 needs the native backend"):
-        export_any(MODELS["DcMotor"], tmp_path / "d.fmu", fmi=3)
-    with pytest.raises(InputError, match="for 64-bit Linux found: install one there"):
-        export_any(MODELS["DcMotor"], tmp_path / "d.fmu", backend="native")
-    with pytest.raises(InputError, match="must be 2 or 3"):
-        export_any(MODELS["DcMotor"], tmp_path / "d.fmu", fmi=1)
-    # one that is there but does not work
-    monkeypatch.setattr(module, "compiler", lambda: shutil.which("false"))
-    assert "false failed" in export_any(MODELS["DcMotor"], tmp_path / "e.fmu")
-    with pytest.raises(RunError, match=r"the C compiler .*false failed"):
-        export_any(MODELS["DcMotor"], tmp_path / "d.fmu", backend="native")
-    assert {p.name for p in tmp_path.iterdir()} == {"a.fmu", "b.fmu", "c.fmu", "e.fmu"}
+
+def test_every_declared_unit_has_a_type():
+    for model in MODELS.values():
+        interface = Interface(model, {})
+        assert {s.variable.unit for s in interface.signals} <= set(TYPES)

@@ -24,8 +24,8 @@ _FLAGS = ("-std=c99", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off"
 
 @dataclass(frozen=True)
 class Platform:
-    """One platform: suffix of its libraries, and for each FMI version the folders of `binaries` with the zig targets of
-    the library in it; several targets make one fat library. `tried` says how far its binaries are tested."""
+    """One platform: suffix of its libraries, and for each FMI version the folders of `binaries` with the zig targets
+    of the library in it; several targets make one fat library. `tried` says how far its binaries are tested."""
 
     suffix: str
     folders: Mapping[int, Mapping[str, tuple[str, ...]]]
