@@ -24,8 +24,8 @@ from chainunit import ChainUnit, engines
 from chainunit.cosim.instance import Fmu, Instance
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.fmu.backends import export
-from chainunit.integrate import rk4
 from chainunit.fmu.native import export as native
+from chainunit.integrate import rk4
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.model import Model, Part
 from chainunit.quantities import Value, declaration, quantity
