@@ -33,6 +33,8 @@ _NAMED: dict[str, dict[str, int]] = {
     "V": {"kg": 1, "m": 2, "s": -3, "A": -1},
     "Ohm": {"kg": 1, "m": 2, "s": -3, "A": -2},
     "H": {"kg": 1, "m": 2, "s": -2, "A": -2},
+    "Wb": {"kg": 1, "m": 2, "s": -2, "A": -1},
+    "Hz": {"s": -1},
 }
 
 DISPLAY_UNITS: dict[str, tuple[str, float, float]] = {
@@ -71,6 +73,11 @@ TYPES: dict[str, str] = {
     "A.s/rad": "SpeedControlGain",
     "A/rad": "SpeedControlIntegralGain",
     "Ohm/s": "CurrentControlIntegralGain",
+    "Wb": "MagneticFluxLinkage",
+    "1/Wb": "SaturationCoefficient",
+    "Hz": "Frequency",
+    "Hz/s": "FrequencyRate",
+    "Hz/N.m": "SlipCompensation",
 }
 """Name of the kind of quantity of a unit, as the declared type of an FMU's variables."""
 

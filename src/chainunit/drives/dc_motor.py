@@ -21,8 +21,7 @@ from typing import Any
 from ..model import Model, Part, Requirement
 from ..ports import NO_LOAD, LoadPort, flange, load_inertia, load_terminal, load_torque
 from ..quantities import Value, declaration, group, quantity
-
-_T_RATED = 293.15  # K, where R is given
+from .surroundings import T_RATED, Ambient
 
 
 @declaration
@@ -73,15 +72,6 @@ class CurrentControl:
 
     kp: Value = quantity("Ohm", "proportional gain", default=33.0, above=0.0, tunable=True)
     ki: Value = quantity("Ohm/s", "integral gain", default=2850.0, min=0.0, tunable=True)
-
-
-@declaration
-class Ambient:
-    """The surroundings."""
-
-    T: Value = quantity(
-        "K", "temperature, also the winding's at the start", default=_T_RATED, min=200.0, max=500.0
-    )
 
 
 @declaration
@@ -161,7 +151,7 @@ class _Point:
         wanted_v = p.current_control.kp * self.error_i + x.integral.v + arm.k * w
         self.v = xp.maximum(xp.minimum(wanted_v, p.limit.v), -p.limit.v)
         self.cut_v = self.v - wanted_v
-        self.R = arm.R * (1.0 + arm.alpha * (x.armature.T - _T_RATED))
+        self.R = arm.R * (1.0 + arm.alpha * (x.armature.T - T_RATED))
         self.di = (self.v - self.R * i - arm.k * w) / arm.L
         self.air_gap = arm.k * i
         load, inertia = load_torque(u.load, x.phi, w), load_inertia(u.load, x.phi)
@@ -192,7 +182,7 @@ class DcMotor(Model):
     Parameters = Parameters
     Inputs = Inputs
     States = States
-    files = ("drives/__init__.py", "drives/dc_motor.py")
+    files = ("drives/__init__.py", "drives/surroundings.py", "drives/dc_motor.py")
     terminals = (flange("outflow"), load_terminal("load."))
     icon = "motor"
     required = (

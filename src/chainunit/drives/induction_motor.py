@@ -1,0 +1,362 @@
+"""A three-phase squirrel-cage induction motor: on the line, with a soft starter, or on an inverter with V/f control.
+
+The Gamma equivalent circuit in a dq frame that turns with the supply (so that in steady running every state stands
+still). Flux linkages `psi` and currents `i` are space vectors of peak phase quantities; `s` means the stator, `r` the
+rotor seen from it, `m` magnetising, `l` leakage; `p` is the number of pole pairs, `f` the supply's frequency.
+
+    d psi_s/dt = u_s - R_s i_s - j 2 pi f psi_s               i_m = psi_s/L_m
+    d psi_r/dt =     - R_r i_r - j (2 pi f - p w) psi_r       i_r = (psi_r - psi_s)/L_l
+    tau_air = 3/2 p Im(conj(psi_s) i_s)                       i_s = i_m - i_r
+    (J_rotor + J_load) a = tau_air - d w - tau_load
+    C dT/dt = losses - cooling(w) (T - T_ambient)/R_th
+
+All leakage stands on the rotor side (what the Gamma circuit means); saturation of the main path is then a function
+of |psi_s| alone: 1/L_m grows by (beta |psi_s|)^6. The skin effect of a deep bar raises R_r and lowers L_l with the
+slip frequency, quasi-steady, by the factor 2 s^2/(1 + s^2), s = 1 at standstill on the line. Sources: H. R. Slemon,
+"Modelling of induction machines for electric drives", 1989, for the circuit; the saturation curve is that of the
+open-source package motulator, which the tests compare with.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from ..model import Model, Part, Requirement
+from ..ports import NO_LOAD, LoadPort, flange, load_inertia, load_terminal, load_torque
+from ..quantities import Value, declaration, group, quantity
+from .surroundings import T_RATED, Ambient
+
+_TURN = 2.0 * math.pi
+
+
+@declaration
+class Supply:
+    """The line, or the inverter at its corner frequency."""
+
+    V: Value = quantity("V", "line-to-line voltage, RMS", default=400.0, above=0.0, tunable=True)
+    f: Value = quantity("Hz", "frequency", default=50.0, above=0.0)
+
+
+@declaration
+class Stator:
+    """The stator winding."""
+
+    R: Value = quantity("Ohm", "resistance of a phase at 20 degC", default=3.7, above=0.0, tunable=True)
+    alpha: Value = quantity(
+        "1/K", "rise of resistance with temperature", default=0.00393, min=0.0, tunable=True
+    )
+    C: Value = quantity("J/K", "heat capacity of the motor", default=9000.0, above=0.0)
+    R_th: Value = quantity(
+        "K/W", "thermal resistance to the surroundings at rated speed", default=0.18, above=0.0, tunable=True
+    )
+
+
+@declaration
+class Main:
+    """The main path of the flux."""
+
+    L: Value = quantity("H", "magnetising inductance, unsaturated", default=0.245, above=0.0)
+    beta: Value = quantity(
+        "1/Wb", "saturation: 1/L grows by (beta psi)^6; 0 leaves it linear", default=0.0, min=0.0
+    )
+
+
+@declaration
+class Cage:
+    """The rotor's cage, seen from the stator."""
+
+    R: Value = quantity("Ohm", "resistance at 20 degC", default=2.1, above=0.0, tunable=True)
+    L: Value = quantity("H", "leakage inductance", default=0.023, above=0.0)
+    skin_R: Value = quantity("1", "rise of R at standstill by skin effect", default=0.0, min=0.0, max=10.0)
+    skin_L: Value = quantity("1", "fall of L at standstill by skin effect", default=0.0, min=0.0, max=0.9)
+
+
+@declaration
+class Rotor:
+    """The rotor as a body."""
+
+    J: Value = quantity("kg.m2", "inertia", default=0.0081, above=0.0)
+    d: Value = quantity("N.m.s/rad", "viscous friction and windage", default=0.001, min=0.0, tunable=True)
+
+
+@declaration
+class SoftStart:
+    """A ramp of the voltage from switching on; with `voltage` = 1 the motor starts direct on line."""
+
+    voltage: Value = quantity("1", "share of the voltage at the start", default=1.0, above=0.0, max=1.0)
+    time: Value = quantity("s", "time in which the voltage rises to the whole", default=1.0, above=0.0)
+
+
+@declaration
+class Inverter:
+    """V/f control with slip compensation."""
+
+    on: Value = quantity(
+        "1",
+        "1: an inverter feeds the motor and follows w_ref; 0: the line does",
+        default=0.0,
+        min=0.0,
+        max=1.0,
+    )
+    ramp: Value = quantity("Hz/s", "fastest change of frequency", default=50.0, above=0.0, tunable=True)
+    lag: Value = quantity("s", "lag of the frequency behind what is asked", default=0.02, above=0.0)
+    boost: Value = quantity(
+        "1", "share of the voltage at frequency zero", default=0.05, min=0.0, max=0.5, tunable=True
+    )
+    slip: Value = quantity(
+        "Hz/N.m", "slip compensation: frequency added per air-gap torque", default=0.0, min=0.0, tunable=True
+    )
+
+
+@declaration
+class Cooling:
+    """The fan on the shaft."""
+
+    still: Value = quantity(
+        "1", "cooling at rest as a share of that at rated speed", default=0.4, above=0.0, max=1.0
+    )
+
+
+@declaration
+class Parameters:
+    """Parameters of the motor. The start values are a typical 2.2 kW, 4-pole, 400 V machine."""
+
+    pole_pairs: Value = quantity("1", "pole pairs", default=2.0, min=1.0, max=24.0)
+    supply: Supply = group(Supply, "supply", default=Supply())
+    stator: Stator = group(Stator, "stator", default=Stator())
+    main: Main = group(Main, "main flux", default=Main())
+    cage: Cage = group(Cage, "cage", default=Cage())
+    rotor: Rotor = group(Rotor, "rotor", default=Rotor())
+    soft_start: SoftStart = group(SoftStart, "soft starter", default=SoftStart())
+    inverter: Inverter = group(Inverter, "inverter", default=Inverter())
+    cooling: Cooling = group(Cooling, "cooling", default=Cooling())
+    ambient: Ambient = group(Ambient, "surroundings", default=Ambient())
+    phi_start: Value = quantity("rad", "rotor angle at the start", default=0.0)
+    w_start: Value = quantity("rad/s", "rotor speed at the start", default=0.0)
+
+
+@declaration
+class Inputs:
+    """The load, the supply and what is asked of the inverter."""
+
+    load: LoadPort = group(LoadPort, "load", default=NO_LOAD)
+    voltage: Value = quantity(
+        "1", "share of the supply's voltage: 0 is off, a dip lies between", default=1.0, min=0.0, max=2.0
+    )
+    w_ref: Value = quantity("rad/s", "speed asked of the inverter", default=0.0)
+
+
+@declaration
+class Flux:
+    """A flux linkage in the frame of the supply."""
+
+    d: Value = quantity("Wb", "along the voltage")
+    q: Value = quantity("Wb", "across the voltage")
+
+
+@declaration
+class StatorState:
+    """State of the stator."""
+
+    psi: Flux = group(Flux, "flux linkage")
+    T: Value = quantity("K", "winding temperature", nominal=300.0)
+
+
+@declaration
+class CageState:
+    """State of the cage."""
+
+    psi: Flux = group(Flux, "flux linkage")
+
+
+@declaration
+class SupplyState:
+    """State of the supply."""
+
+    frequency: Value = quantity("Hz", "frequency", nominal=50.0)
+    ramp: Value = quantity("1", "share of the voltage that the soft starter lets through")
+
+
+@declaration
+class States:
+    """States of the motor; each is an output, too."""
+
+    phi: Value = quantity("rad", "rotor angle")
+    w: Value = quantity("rad/s", "rotor speed", nominal=100.0)
+    stator: StatorState = group(StatorState, "stator")
+    cage: CageState = group(CageState, "cage")
+    supply: SupplyState = group(SupplyState, "supply")
+    load_energy: Value = quantity("J", "energy given to the load since the start", nominal=1000.0)
+
+
+@declaration
+class Outputs:
+    """What follows from the states."""
+
+    a: Value = quantity("rad/s2", "rotor acceleration", nominal=100.0)
+    tau: Value = quantity("N.m", "torque given to the load at the shaft")
+    air_gap_tau: Value = quantity("N.m", "electromagnetic torque")
+    i: Value = quantity("A", "current of a phase, RMS")
+    v: Value = quantity("V", "line-to-line voltage, RMS", nominal=100.0)
+    slip: Value = quantity("1", "slip against the supply's present frequency; 1 at rest")
+    supply_power: Value = quantity("W", "electric power taken", nominal=1000.0)
+    heat: Value = quantity("W", "copper losses of stator and cage", nominal=100.0)
+    magnetic_energy: Value = quantity("J", "energy of the magnetic field")
+
+
+def skin(s: Any) -> Any:
+    """How far the skin effect has developed at the slip frequency `s`, in parts of the supply's: 0 at 0, 1 at 1."""
+    return 2.0 * s * s / (1.0 + s * s)
+
+
+class _Point:
+    """Everything at one state: supply, circuit, shaft."""
+
+    __slots__ = (
+        "R_r", "R_s", "a", "air_gap", "cooling", "df", "di_d", "di_q", "heat", "i_d", "i_q", "ir_d", "ir_q", "leak",
+        "main", "slip_speed", "tau", "u", "w_s",
+    )  # fmt: skip
+
+    def __init__(self, xp: Any, p: Any, u: Any, x: Any) -> None:
+        psi, psi_r, f = x.stator.psi, x.cage.psi, x.supply.frequency
+        self.w_s = _TURN * f
+        self.slip_speed = self.w_s - p.pole_pairs * x.w
+        developed = skin(self.slip_speed * (1.0 / (_TURN * p.supply.f)))
+        warm = 1.0 + p.stator.alpha * (x.stator.T - T_RATED)
+        self.R_s = p.stator.R * warm
+        self.R_r = p.cage.R * warm * (1.0 + p.cage.skin_R * developed)
+        self.leak = p.cage.L * (1.0 - p.cage.skin_L * developed)
+        squared = psi.d * psi.d + psi.q * psi.q
+        b = p.main.beta * p.main.beta * squared
+        self.main = (1.0 + b * b * b) / p.main.L
+        self.ir_d, self.ir_q = (psi_r.d - psi.d) / self.leak, (psi_r.q - psi.q) / self.leak
+        self.i_d, self.i_q = psi.d * self.main - self.ir_d, psi.q * self.main - self.ir_q
+        # V/f with a boost at low frequency; above the corner the voltage is all there is
+        share = xp.minimum(p.inverter.boost + (1.0 - p.inverter.boost) * f / p.supply.f, 1.0)
+        by_frequency = 1.0 + p.inverter.on * (share - 1.0)
+        self.u = math.sqrt(2.0 / 3.0) * p.supply.V * u.voltage * x.supply.ramp * by_frequency
+        self.air_gap = 1.5 * p.pole_pairs * (psi.d * self.i_q - psi.q * self.i_d)
+        asked = p.pole_pairs * u.w_ref / _TURN + p.inverter.slip * self.air_gap
+        wanted = p.supply.f + p.inverter.on * (xp.maximum(asked, 0.0) - p.supply.f)
+        self.df = xp.maximum(xp.minimum((wanted - f) / p.inverter.lag, p.inverter.ramp), -p.inverter.ramp)
+        self.heat = 1.5 * (
+            self.R_s * (self.i_d * self.i_d + self.i_q * self.i_q)
+            + self.R_r * (self.ir_d * self.ir_d + self.ir_q * self.ir_q)
+        )
+        turning = xp.minimum(xp.abs(x.w) * p.pole_pairs / (_TURN * p.supply.f), 1.0)
+        self.cooling = p.cooling.still + (1.0 - p.cooling.still) * turning
+        load, inertia = load_torque(u.load, x.phi, x.w), load_inertia(u.load, x.phi)
+        self.a = (self.air_gap - p.rotor.d * x.w - load) / (p.rotor.J + inertia)
+        self.tau = inertia * self.a + load
+
+
+def _outputs(xp: Any, p: Any, u: Any, x: Any, s: _Point) -> Outputs:
+    psi = x.stator.psi
+    squared = psi.d * psi.d + psi.q * psi.q
+    b = p.main.beta * p.main.beta * squared
+    # of the main field: the integral of i_m d psi; of the leakage: L i^2/2
+    main = 0.5 * squared * (1.0 + 0.25 * b * b * b) / p.main.L
+    leakage = 0.5 * s.leak * (s.ir_d * s.ir_d + s.ir_q * s.ir_q)
+    return Outputs(
+        a=s.a,
+        tau=s.tau,
+        air_gap_tau=s.air_gap,
+        i=xp.sqrt(0.5 * (s.i_d * s.i_d + s.i_q * s.i_q)),
+        v=math.sqrt(1.5) * s.u,
+        slip=s.slip_speed / xp.maximum(s.w_s, 1e-3 * _TURN * p.supply.f),
+        supply_power=1.5 * s.u * s.i_d,
+        heat=s.heat,
+        magnetic_energy=1.5 * (main + leakage),
+    )
+
+
+class InductionMotor(Model):
+    """A squirrel-cage induction motor, on the line or on an inverter, that owns the shaft and takes the machine's load
+    port.
+
+    Direct on line: the start values. Soft start: `soft_start.voltage` below 1. On an inverter: `inverter.on` = 1; the
+    motor then follows `w_ref`. The input `voltage` switches off (0) and makes dips.
+    """
+
+    name = "InductionMotor"
+    description = (
+        "Squirrel-cage induction motor (dynamic dq model), direct on line, with a soft starter or V/f inverter; "
+        "takes a load port"
+    )
+    Parameters = Parameters
+    Inputs = Inputs
+    States = States
+    files = ("drives/__init__.py", "drives/surroundings.py", "drives/induction_motor.py")
+    terminals = (flange("outflow"), load_terminal("load."))
+    icon = "motor"
+    required = (
+        Requirement(
+            "cage.L",
+            "H",
+            "the fluxes change faster than the internal integrator can follow",
+            ("stator.R", "cage.R", "cage.skin_R", "cage.skin_L"),
+        ),
+    )
+
+    @staticmethod
+    def excitation(t: float) -> dict[str, float]:
+        """A start direct on line against a steady load."""
+        return {"load.tau_bias": 5.0, "load.J": 0.02}
+
+    @staticmethod
+    def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
+        """The fluxes are not faster than 1 MHz."""
+        yield p.cage.L, 1e-6 * _resistance(p) / (1.0 - p.cage.skin_L), math.inf
+
+    @staticmethod
+    def internal_step(xp: Any, p: Any) -> Any:
+        """A quarter of the shortest time constant of the fluxes, a twelfth of a radian of the supply, and at most
+        0.25 ms."""
+        by_flux = 0.25 * p.cage.L * (1.0 - p.cage.skin_L) / _resistance(p)
+        return xp.minimum(xp.minimum(2.5e-4, 1.0 / (12.0 * _TURN * p.supply.f)), by_flux)
+
+    @staticmethod
+    def initial_states(p: Any) -> Any:
+        """Without flux, at the start angle and speed, at ambient temperature; an inverter starts at frequency 0."""
+        return States(
+            phi=p.phi_start,
+            w=p.w_start,
+            stator=StatorState(psi=Flux(d=0.0, q=0.0), T=p.ambient.T),
+            cage=CageState(psi=Flux(d=0.0, q=0.0)),
+            supply=SupplyState(frequency=p.supply.f * (1.0 - p.inverter.on), ramp=p.soft_start.voltage),
+            load_energy=0.0,
+        )
+
+    @staticmethod
+    def shared(xp: Any, p: Any, u: Any, x: Any) -> _Point:
+        """Supply, circuit and shaft at one state."""
+        return _Point(xp, p, u, x)
+
+    @staticmethod
+    def derivatives(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+        """Time derivatives of the states, in declared order."""
+        s = _Point(xp, p, u, x)
+        psi, psi_r = x.stator.psi, x.cage.psi
+        # the soft starter runs once the supply is on, and holds at the whole voltage
+        left = (1.0 - x.supply.ramp) / 2e-3
+        rise = xp.minimum((1.0 - p.soft_start.voltage) / p.soft_start.time, left)
+        return [
+            x.w,
+            s.a,
+            s.u - s.R_s * s.i_d + s.w_s * psi.q,
+            -s.R_s * s.i_q - s.w_s * psi.d,
+            (s.heat - s.cooling * (x.stator.T - p.ambient.T) / p.stator.R_th) / p.stator.C,
+            -s.R_r * s.ir_d + s.slip_speed * psi_r.q,
+            -s.R_r * s.ir_q - s.slip_speed * psi_r.d,
+            p.inverter.on * s.df,
+            rise * xp.minimum(u.voltage * 1e3, 1.0),
+            s.tau * x.w,
+        ]
+
+    parts = (Part(Outputs, _outputs),)
+
+
+def _resistance(p: Any) -> Any:
+    return p.stator.R + p.cage.R * (1.0 + p.cage.skin_R)
