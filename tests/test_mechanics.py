@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from machines import random_loads, random_machine, random_state
 
 from chainunit import EMPTY, ChainUnit, SideLoads, engines
-from chainunit.machines.chain_unit import ChamberForces
+from chainunit.machines.api import FREE
+from chainunit.machines.chain_unit import ChamberForces, Stop
 
 
 def draw(seed: int, lossless: bool = False):
@@ -25,9 +26,9 @@ def draw(seed: int, lossless: bool = False):
             return machine, phi, w, a, left, right
 
 
-def scale_of(machine, phi, w, a, left, right) -> float:
+def scale_of(machine, phi, w, a, left, right, stop=FREE) -> float:
     """What the torque's terms add up to before they cancel: rounding is relative to this."""
-    out = machine.forces(phi, w, a, left, right)
+    out = machine.forces(phi, w, a, left, right, stop)
     forces = [out.crank_pin, out.coupler_pin, out.pivot, out.left.rocker_joint, out.right.rocker_joint]
     size = max(max(abs(float(f.fx)), abs(float(f.fy))) for f in forces)
     return max(1.0, size * machine.p.l / machine.p.ratio)
@@ -65,6 +66,40 @@ def test_power_balance_on_1000_machines():
         worst = max(worst, error / (scale_of(machine, phi, w, a, left, right) * max(1.0, abs(w))))
         assert float(out.dissipated_power) >= 0.0
     assert worst < 1e-9
+
+
+def test_a_stop_holds_and_keeps_every_balance():
+    """Torque by two routes, power, slopes and the frame's moment on machines whose rocker is blocked."""
+    xp = engines.dual(engines.numpy_())
+    for seed in range(200):
+        machine, phi, w, a, left, right = draw(seed)
+        rng = np.random.default_rng(seed)
+        stop = Stop(stiffness=rng.uniform(0, 1e4), damping=rng.uniform(0, 1e3), psi=rng.uniform(-0.5, 0.5))
+        point = (phi, w, a, left, right, stop)
+        out, free = machine.forces(*point), machine.forces(*point[:-1])
+        held = stop.stiffness * (out.rocker.psi - stop.psi) + stop.damping * out.rocker.w
+        size = scale_of(machine, *point)
+        by_work = out.tau - machine.friction_torque(phi, w, left, right, stop)
+        assert abs(float(by_work - machine.torque_by_reactions(*point))) < 1e-9 * size
+        u = ChamberForces.Inputs(
+            phi=engines.Dual(phi, w), w=engines.Dual(w, a), a=0.0, left=left, right=right, stop=stop
+        )
+        rates = ChamberForces.parts[0].equations(
+            xp, machine.p, u, None, ChamberForces.shared(xp, machine.p, u, None)
+        )
+        rate = engines.slope(rates.kinetic_energy) + engines.slope(rates.potential_energy)
+        assert abs(float(out.tau * w - rate - out.dissipated_power)) < 1e-9 * size * max(1.0, abs(w))
+        # the frame bears what the stop holds; the rest of its load comes from bodies and processing
+        difference = float(out.frame.moment - free.frame.moment)
+        assert abs(difference) < 1e-9 * (1.0 + abs(float(held))) * max(1.0, size * machine.p.ratio)
+        slopes = machine.slopes(phi, w, left, right, stop)
+        for got, du in (
+            (slopes.tau_bias_dphi, {"phi": phi + 1e-30j, "w": w}),
+            (slopes.tau_bias_dw, {"phi": phi, "w": w + 1e-30j}),
+        ):
+            u = ChamberForces.Inputs(**du, left=left, right=right, stop=stop)
+            bias = ChamberForces.shared(engines.numpy_(), machine.p, u, None).bias.total / machine.p.ratio
+            assert abs(float(got) - bias.imag / 1e-30) < 1e-9 * max(size, abs(float(got)))
 
 
 def test_forces_balance_gravity_and_inertia():

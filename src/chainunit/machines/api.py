@@ -12,10 +12,11 @@ from ..engines import MATH, numpy_
 from ..errors import GeometryError
 from ..ports import PortSlopes
 from . import chain_unit
-from .chain_unit import Chamber, ChamberForces, Inputs, Outputs, Parameters, SideLoads, State
+from .chain_unit import Chamber, ChamberForces, Inputs, Outputs, Parameters, SideLoads, State, Stop
 
 _XP = numpy_()
 EMPTY = SideLoads(material_mass=0.0, processing_force=0.0)
+FREE = Stop()
 
 
 class ChainUnit:
@@ -77,25 +78,41 @@ class ChainUnit:
         lengths = ratios(rho, lam, mu, zeta, l, l1)
         return cls({**lengths, **(parameters or {}), **values})
 
-    def _inputs(self, phi: Any, w: Any, a: Any, left: SideLoads, right: SideLoads) -> Inputs:
-        return Inputs(phi=_array(phi), w=_array(w), a=_array(a), left=_arrays(left), right=_arrays(right))
+    def _inputs(
+        self, phi: Any, w: Any, a: Any, left: SideLoads, right: SideLoads, stop: Stop = FREE
+    ) -> Inputs:
+        left, right = _arrays(left), _arrays(right)
+        return Inputs(phi=_array(phi), w=_array(w), a=_array(a), left=left, right=right, stop=stop)
 
     def _state(self, u: Inputs) -> State:
         return ChamberForces.shared(_XP, self.p, u, None)
 
     def forces(
-        self, phi: Any, w: Any = 0.0, a: Any = 0.0, left: SideLoads = EMPTY, right: SideLoads = EMPTY
+        self,
+        phi: Any,
+        w: Any = 0.0,
+        a: Any = 0.0,
+        left: SideLoads = EMPTY,
+        right: SideLoads = EMPTY,
+        stop: Stop = FREE,
     ) -> Outputs:
         """Torque, load port (without slopes), energies and every reaction at motor angle `phi` [rad],
         speed `w` [rad/s] and acceleration `a` [rad/s2] (see `Outputs` for names and units)."""
-        u = self._inputs(phi, w, a, left, right)
+        u = self._inputs(phi, w, a, left, right, stop)
         part = ChamberForces.parts[0]
         out = part.equations(_XP, self.p, u, None, self._state(u))
         return part.layout.instance(np.broadcast_arrays(*part.layout.values(out)))
 
-    def slopes(self, phi: Any, w: Any = 0.0, left: SideLoads = EMPTY, right: SideLoads = EMPTY) -> PortSlopes:
+    def slopes(
+        self,
+        phi: Any,
+        w: Any = 0.0,
+        left: SideLoads = EMPTY,
+        right: SideLoads = EMPTY,
+        stop: Stop = FREE,
+    ) -> PortSlopes:
         """Exact derivatives of `tau_bias` by motor angle and speed."""
-        u = self._inputs(phi, w, 0.0, left, right)
+        u = self._inputs(phi, w, 0.0, left, right, stop)
         return ChamberForces.parts[1].equations(_XP, self.p, u, None, self._state(u))
 
     def evaluate(self, inputs: Mapping[str, Any]) -> dict[str, Any]:
@@ -116,17 +133,32 @@ class ChainUnit:
         return dict(zip(named, np.broadcast_arrays(*named.values()), strict=True))
 
     def torque_by_reactions(
-        self, phi: Any, w: Any = 0.0, a: Any = 0.0, left: SideLoads = EMPTY, right: SideLoads = EMPTY
+        self,
+        phi: Any,
+        w: Any = 0.0,
+        a: Any = 0.0,
+        left: SideLoads = EMPTY,
+        right: SideLoads = EMPTY,
+        stop: Stop = FREE,
     ) -> Any:
         """The motor torque without friction [N m], from the reactions, group by group: the second route."""
-        u = self._inputs(phi, w, a, left, right)
+        u = self._inputs(phi, w, a, left, right, stop)
         s = self._state(u)
-        forces = chain_unit.Reactions(s.m, self.p, s.w * s.w, u.a / self.p.ratio, *s.bias.processing_forces)
+        w2, a = s.w * s.w, u.a / self.p.ratio
+        forces = chain_unit.Reactions(s.m, self.p, w2, a, *s.bias.processing_forces, s.bias.stop_moment)
         return forces.torque / self.p.ratio
 
-    def friction_torque(self, phi: Any, w: Any, left: SideLoads = EMPTY, right: SideLoads = EMPTY) -> Any:
+    def friction_torque(
+        self,
+        phi: Any,
+        w: Any,
+        left: SideLoads = EMPTY,
+        right: SideLoads = EMPTY,
+        stop: Stop = FREE,
+    ) -> Any:
         """The part of `tau` that pin friction and joint damping take [N m]."""
-        return self._state(self._inputs(phi, w, 0.0, left, right)).bias.friction / self.p.ratio
+        bias = self._state(self._inputs(phi, w, 0.0, left, right, stop)).bias
+        return bias.friction / self.p.ratio
 
     def energy_per_kg(self, side: str, phi: Any, w: Any) -> Any:
         """Kinetic and potential energy of a kilogram of material on the `side` ("left" or "right") [J/kg]:

@@ -138,6 +138,16 @@ class SideLoads:
 
 
 @declaration
+class Stop:
+    """A spring and damper between rocker and frame, which hold a blocked rocker; off where both are zero. The smoothed
+    friction and processing force hold nothing at rest."""
+
+    stiffness: Value = quantity("N.m/rad", "stiffness", default=0.0, min=0.0, nominal=1e6)
+    damping: Value = quantity("N.m.s/rad", "damping", default=0.0, min=0.0, nominal=1e4)
+    psi: Value = quantity("rad", "rocker angle at which the spring is free", default=0.0)
+
+
+@declaration
 class Inputs:
     """Motion of the motor shaft and loads of the organs."""
 
@@ -148,6 +158,7 @@ class Inputs:
     a: Value = quantity("rad/s2", "motor acceleration", default=0.0)
     left: SideLoads = group(SideLoads, "left organ", default=SideLoads())
     right: SideLoads = group(SideLoads, "right organ", default=SideLoads())
+    stop: Stop = group(Stop, "stop that blocks the rocker", default=Stop())
 
 
 @declaration
@@ -232,8 +243,12 @@ class Loads:
     frame: Frame = group(Frame, "from the machine on its frame")
     power: Value = quantity("W", "power that the motor shaft takes, tau w", nominal=100.0)
     kinetic_energy: Value = quantity("J", "kinetic energy")
-    potential_energy: Value = quantity("J", "potential energy, zero at the level of C", nominal=1000.0)
-    dissipated_power: Value = quantity("W", "power that friction, damping and processing take", nominal=100.0)
+    potential_energy: Value = quantity(
+        "J", "potential energy, of weights zero at the level of C, and of the stop", nominal=1000.0
+    )
+    dissipated_power: Value = quantity(
+        "W", "power that friction, damping, processing and the stop's damper take", nominal=100.0
+    )
     margin: Value = quantity("1", "least |sin| of the three transmission angles; 0 is a dead position")
 
 
@@ -262,6 +277,7 @@ class DirectInputs:
     tau: Value = quantity("N.m", "torque of the motor on the shaft", default=0.0, nominal=100.0)
     left: SideLoads = group(SideLoads, "left organ", default=SideLoads())
     right: SideLoads = group(SideLoads, "right organ", default=SideLoads())
+    stop: Stop = group(Stop, "stop that blocks the rocker", default=Stop())
 
 
 @declaration
@@ -365,6 +381,10 @@ class Mechanism:
             self.right.web,
         )
 
+    def psi(self, xp: Any) -> Any:
+        """Angle of the rocker [rad], which never reaches the horizontal."""
+        return xp.asin(self.rocker.u.x)
+
     def inertia(self) -> tuple[Any, Any]:
         """Reflected inertia at the crank J [kg m2] and dJ/dq."""
         parts = [body.inertia() for body in self.bodies]
@@ -392,13 +412,17 @@ class Reactions:
 
     __slots__ = ("at_a", "at_bd", "at_c", "at_o1", "left", "right", "torque")
 
-    def __init__(self, m: Mechanism, p: Any, w2: Any, a: Any, left: Vec2, right: Vec2) -> None:
+    def __init__(
+        self, m: Mechanism, p: Any, w2: Any, a: Any, left: Vec2, right: Vec2, stop_moment: Any
+    ) -> None:
         g = p.g
         self.left = m.left.reactions(w2, a, g, left)
         self.right = m.right.reactions(w2, a, g, right)
         a2, pivot = m.left.dyad.second.pin, m.rocker.pin
         rocker = total(
-            m.rocker_body.applied(w2, a, g), point_load(a2, pivot, -(self.left[2] + self.right[2]))
+            m.rocker_body.applied(w2, a, g),
+            point_load(a2, pivot, -(self.left[2] + self.right[2])),
+            (ZERO, stop_moment),
         )
         self.at_a, self.at_bd, self.at_c = m.drive.reactions(m.coupler_body.applied(w2, a, g), rocker)
         self.torque, self.at_o1 = driving_torque(m.crank, m.a, m.crank_body.applied(w2, a, g), -self.at_a)
@@ -419,7 +443,10 @@ class Bias:
     Each loss is its power over w, written so that w = 0 is regular.
     """
 
-    __slots__ = ("conservative", "friction", "processing", "processing_forces", "reactions", "total")
+    __slots__ = (
+        "conservative", "friction", "processing", "processing_forces", "reactions", "stop_damping", "stop_moment",
+        "stop_potential", "total",
+    )  # fmt: skip
 
     def __init__(self, xp: Any, p: Any, u: Any, m: Mechanism, dJ: Any, w: Any) -> None:
         w2 = w * w
@@ -427,18 +454,23 @@ class Bias:
         force_r, torque_r = m.right.resistance(xp, p, u.right, w)
         self.processing_forces = (force_l, force_r)
         self.processing = torque_l + torque_r
-        self.reactions = Reactions(m, p, w2, 0.0, force_l, force_r)
+        k, turned = m.rocker.t1, m.psi(xp) - u.stop.psi
+        held = u.stop.stiffness * turned
+        self.stop_potential = 0.5 * held * turned
+        self.stop_damping = u.stop.damping * (k * k) * w
+        self.stop_moment = -(held + u.stop.damping * k * w)
+        self.reactions = Reactions(m, p, w2, 0.0, force_l, force_r, self.stop_moment)
 
         per_newton = 0.5 * p.pin.friction * p.pin.diameter
         smooth2 = p.pin.w_smooth * p.pin.w_smooth
         friction = 0.0
-        for force, k in self.reactions.pins(m):
-            k2 = k * k
+        for force, turn in self.reactions.pins(m):
+            k2 = turn * turn
             size = xp.sqrt(force.squared() + _NO_FORCE)
             friction = friction + k2 * (per_newton * size / xp.sqrt(k2 * w2 + smooth2) + p.joint_damping)
         self.friction = friction * w
-        self.conservative = 0.5 * dJ * w2 + sum(body.weight_slope(p.g) for body in m.bodies)
-        self.total = self.conservative + self.processing + self.friction
+        self.conservative = 0.5 * dJ * w2 + sum(body.weight_slope(p.g) for body in m.bodies) + held * k
+        self.total = self.conservative + self.processing + self.friction + self.stop_damping
 
 
 class State:
@@ -491,7 +523,7 @@ def _loads(xp: Any, p: Any, s: State, a: Any) -> dict[str, Any]:
     """The fields of `Loads` at crank acceleration `a`."""
     m, w = s.m, s.w
     w2 = w * w
-    f = Reactions(m, p, w2, a, *s.bias.processing_forces)
+    f = Reactions(m, p, w2, a, *s.bias.processing_forces, s.bias.stop_moment)
     torque = s.torque(a)
     rocker, drive = m.rocker, m.drive
     force_l, force_r = s.bias.processing_forces
@@ -506,7 +538,7 @@ def _loads(xp: Any, p: Any, s: State, a: Any) -> dict[str, Any]:
     )
     loads = Loads(
         rocker=Rocker(
-            psi=xp.atan2(rocker.u.x, -rocker.u.y),
+            psi=m.psi(xp),
             w=rocker.t1 * w,
             a=rocker.t1 * a + rocker.t2 * w2,
             **_rocker_load(p, on_left, on_right),
@@ -518,11 +550,13 @@ def _loads(xp: Any, p: Any, s: State, a: Any) -> dict[str, Any]:
         crank_pin=_force(f.at_a),
         coupler_pin=_force(f.at_bd),
         pressure_angle=pressure_angle(xp, p.l, p.h, arm.squared()),
-        frame=Frame(fx=-at_frame.x, fy=-at_frame.y, moment=torque - s.bias.friction - moment),
+        frame=Frame(
+            fx=-at_frame.x, fy=-at_frame.y, moment=torque - s.bias.friction - moment - s.bias.stop_moment
+        ),
         power=torque * w,
         kinetic_energy=0.5 * s.J * w2,
-        potential_energy=m.potential(p.g),
-        dissipated_power=(s.bias.friction + s.bias.processing) * w,
+        potential_energy=m.potential(p.g) + s.bias.stop_potential,
+        dissipated_power=(s.bias.friction + s.bias.processing + s.bias.stop_damping) * w,
         margin=xp.minimum(
             xp.abs(drive.transmission),
             xp.minimum(xp.abs(m.left.dyad.transmission), xp.abs(m.right.dyad.transmission)),
