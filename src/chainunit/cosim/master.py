@@ -22,6 +22,7 @@ import xarray as xr
 
 from ..errors import InputError, InterruptedRunError, RunError
 from .instance import Fmu, Instance
+from .signals import Profile
 from .system import System
 
 Progress = Callable[[float], None]
@@ -175,31 +176,34 @@ class CoSimulation:
     def _initialize(self) -> None:
         for name, instance in self._instances.items():
             instance.initialize(self._starts[name], self.time)
-        self._apply_signals(self.time)
+        for instance, handle, values in self._signal_values(np.array([self.time])):
+            instance.write(handle, values[0].tolist())
         self._transfer()
         for instance in self._instances.values():
             instance.finish_initialization()
 
     # -- running
 
-    def _apply_signals(self, time: float) -> bool:
-        """Set the external signals; whether any is a function of time."""
-        varying = False
-        split: dict[str, tuple[list[str], list[float]]] = {}
+    def _signal_values(self, times: Any) -> list[tuple[Instance, Any, Any]]:
+        """The external signals at `times`, shape (n,): of each instance a handle and a table of shape (n, signals)."""
+        split: dict[str, tuple[list[str], list[Any]]] = {}
         for full, given in self.signals.items():
             instance, variable = self._split(full, "input")
             if full in self._driven:
                 raise InputError(f"{full}: is connected, it cannot have a signal")
-            varying = varying or callable(given)
-            names, values = split.setdefault(instance, ([], []))
+            if isinstance(given, Profile):
+                values = given(times)
+            elif callable(given):
+                values = [given(float(t)) for t in times]
+            else:
+                values = np.full(len(times), given, dtype=float)
+            names, columns = split.setdefault(instance, ([], []))
             names.append(variable)
-            values.append(given(time) if callable(given) else given)
-        for instance, (names, values) in split.items():
-            self._instances[instance].set(names, values)
-        return varying
-
-    def _changes(self, t0: float, t1: float) -> bool:
-        return any(callable(s) and s(t0) != s(t1) for s in self.signals.values())
+            columns.append(np.asarray(values, dtype=float))
+        return [
+            (self._instances[name], self._instances[name].handle(names), np.stack(columns, axis=1))
+            for name, (names, columns) in split.items()
+        ]
 
     def _transfer(self) -> None:
         for source, outputs, targets in self._transfers:
@@ -207,8 +211,17 @@ class CoSimulation:
             for target, inputs, order in targets:
                 target.write(inputs, [values[i] for i in order])
 
-    def run(self, stop: float, step: float, progress: Progress | None = None) -> xr.Dataset:
+    def run(
+        self,
+        stop: float,
+        step: float,
+        progress: Progress | None = None,
+        *,
+        guards: Mapping[str, float] | None = None,
+    ) -> xr.Dataset:
         """Simulate to the time `stop` [s] with the communication step `step` [s].
+
+        `guards` are limits by full name of an output: where its size passes the limit, the run ends with that row.
 
         Returns
         -------
@@ -241,29 +254,45 @@ class CoSimulation:
                 table[row, at : at + len(names)] = instance.read(handle)
                 at += len(names)
 
+        places = {name: at for at, name in enumerate(name for r in recorders for name in r[2])}
+        watched = [(places[name], limit) for name, limit in (guards or {}).items()]
+        points = self._signal_values(times)
+        middles = self._signal_values(0.5 * (times[:-1] + times[1:]))
+        # a signal that moves inside a step acts with its value at the middle
+        inside, over = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+        for (_, _, at), (_, _, between) in zip(points, middles, strict=True):
+            inside |= ((between != at[:-1]) | (between != at[1:])).any(axis=1)
+            over |= (at[1:] != at[:-1]).any(axis=1)
+
+        def apply(signals: Any, row: int) -> None:
+            for instance, handle, values in signals:
+                instance.write(handle, values[row].tolist())
+
+        moves_inside, moves_over = inside.tolist(), (inside | over).tolist()
         every = max(1, n // 200)
         done = said = before = 0
         with _stoppable() as stopped:
             try:
-                varying = self._apply_signals(start)
+                apply(points, 0)
                 self._transfer()
                 record(0)
                 for k in range(n):
                     # what leads to a failure may have been said while the values for this step were set
                     said, before = before, len(self._journal)
                     t, after = float(times[k]), float(times[k + 1])
-                    middle = 0.5 * (t + after)
-                    if varying and (self._changes(t, middle) or self._changes(middle, after)):
-                        self._apply_signals(middle)
+                    if moves_inside[k]:
+                        apply(middles, k)
                         self._transfer()
                     for instance in self._instances.values():
                         instance.step(t, after - t)
                     self.time = after
-                    if varying:
-                        self._apply_signals(after)
+                    if moves_over[k]:
+                        apply(points, k + 1)
                     self._transfer()
                     record(k + 1)
                     done = k + 1
+                    if any(abs(table[done, place]) > limit for place, limit in watched):
+                        break
                     if progress and done % every == 0:
                         progress(self.time)
                     if stopped():
@@ -276,7 +305,7 @@ class CoSimulation:
                 raise failed from error
         if progress:
             progress(self.time)
-        return self._dataset(times, table, recorders)
+        return self._dataset(times[: done + 1], table[: done + 1], recorders)
 
     def _recorded(self, name: str) -> list[str]:
         fmu = self._fmus[name]
