@@ -18,10 +18,10 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from ..model import Model, Part, Requirement
+from ..model import Part, Requirement
 from ..ports import NO_LOAD, LoadPort, flange, load_inertia, load_terminal, load_torque
 from ..quantities import Value, declaration, group, quantity
-from .surroundings import T_RATED, Ambient
+from .motor import T_RATED, Ambient, Motor
 
 
 @declaration
@@ -172,7 +172,7 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, s: _Point) -> Outputs:
     )
 
 
-class DcMotor(Model):
+class DcMotor(Motor):
     """A DC motor under speed control that owns the shaft and takes the machine's load port."""
 
     name = "DcMotor"
@@ -182,9 +182,10 @@ class DcMotor(Model):
     Parameters = Parameters
     Inputs = Inputs
     States = States
-    files = ("drives/__init__.py", "drives/surroundings.py", "drives/dc_motor.py")
+    files = ("drives/__init__.py", "drives/motor.py", "drives/dc_motor.py")
     terminals = (flange("outflow"), load_terminal("load."))
     icon = "motor"
+    current, temperature = "armature.i", "armature.T"
     required = (
         Requirement(
             "armature.L",
@@ -198,6 +199,12 @@ class DcMotor(Model):
     def excitation(t: float) -> dict[str, float]:
         """A run-up to 100 rad/s against a steady load."""
         return {"w_ref": 100.0, "load.tau_bias": 1.0}
+
+    @staticmethod
+    def limit(xp: Any, p: Any, w: Any) -> Any:
+        """By the current limit, or what the voltage leaves at a cold winding."""
+        arm = p.armature
+        return arm.k * xp.minimum(p.limit.i, (p.limit.v - arm.k * w) / arm.R)
 
     @staticmethod
     def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:

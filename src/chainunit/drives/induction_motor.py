@@ -23,10 +23,10 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from ..model import Model, Part, Requirement
+from ..model import Part, Requirement
 from ..ports import NO_LOAD, LoadPort, flange, load_inertia, load_terminal, load_torque
 from ..quantities import Value, declaration, group, quantity
-from .surroundings import T_RATED, Ambient
+from .motor import T_RATED, Ambient, Motor
 
 _TURN = 2.0 * math.pi
 
@@ -272,7 +272,7 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, s: _Point) -> Outputs:
     )
 
 
-class InductionMotor(Model):
+class InductionMotor(Motor):
     """A squirrel-cage induction motor, on the line or on an inverter, that owns the shaft and takes the machine's load
     port.
 
@@ -288,9 +288,10 @@ class InductionMotor(Model):
     Parameters = Parameters
     Inputs = Inputs
     States = States
-    files = ("drives/__init__.py", "drives/surroundings.py", "drives/induction_motor.py")
+    files = ("drives/__init__.py", "drives/motor.py", "drives/induction_motor.py")
     terminals = (flange("outflow"), load_terminal("load."))
     icon = "motor"
+    current, temperature = "i", "stator.T"
     required = (
         Requirement(
             "cage.L",
