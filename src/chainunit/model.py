@@ -102,6 +102,8 @@ class Model:
     """Files and folders of the package, beside the common ones, that an FMU of this model needs."""
 
     def __init_subclass__(cls) -> None:
+        if not hasattr(cls, "Parameters"):  # what several models share
+            return
         cls.parameter_layout = Layout(cls.Parameters)
         cls.input_layout = Layout(cls.Inputs)
         cls.state_layout = Layout(cls.States) if cls.States else None
