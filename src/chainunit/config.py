@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
 
@@ -94,6 +94,64 @@ class Overload:
     )
     jam_duration: Value = quantity("s", "time for which the lump holds", default=0.3, min=1e-4, max=1e4)
     jam_rise: Value = quantity("s", "time in which the jam rises and falls", default=0.02, min=1e-4, max=1e4)
+    lumps: Value = quantity(
+        "1", "number of lumps that come one after the other", default=4.0, min=1.0, max=1000.0
+    )
+    lump_pause: Value = quantity("s", "time between two lumps", default=0.4, min=1e-3, max=1e4)
+    block_stiffness: Value = quantity(
+        "N.m/rad", "stiffness of what blocks the rocker", default=2e5, above=0.0, max=1e9
+    )
+    block_damping: Value = quantity(
+        "N.m.s/rad", "damping of what blocks the rocker", default=2e3, min=0.0, max=1e9
+    )
+    dip_depth: Value = quantity(
+        "1", "share of the voltage that a dip takes away", default=0.5, min=0.0, max=1.0
+    )
+    dip_duration: Value = quantity("s", "time for which the voltage is down", default=0.3, min=1e-3, max=1e4)
+
+
+SCENARIOS = {
+    "right_empties": "the right side empties",
+    "feed_left": "all feed moves to the left",
+    "jam_left": "a lump jams the left side",
+    "lumps": "lumps come one after the other",
+    "blocked": "the rocker is blocked",
+    "dip": "the voltage dips",
+    "start_loaded": "start with all feed on the left",
+}
+"""The overloads by the names that `events` takes in a study file."""
+
+
+@declaration
+class Coupling:
+    """A safety coupling or shear pin on the motor shaft."""
+
+    trip_torque: Value = quantity("N.m", "torque of the crank at which it opens", default=1000.0, above=0.0)
+    release_time: Value = quantity(
+        "s",
+        "time from the trip until no torque passes; near 0 for a shear pin",
+        default=0.005,
+        min=0.0,
+        max=1.0,
+    )
+    scatter: Value = quantity(
+        "1",
+        "standard deviation of the trip torque in a Monte Carlo study, as a share",
+        default=0.05,
+        min=0.0,
+        max=0.5,
+    )
+
+
+@declaration
+class MonteCarlo:
+    """Overloads at random crank angles and times."""
+
+    runs: Value = quantity("1", "number of runs; 0 leaves the study out", default=0.0, min=0.0, max=1e6)
+    duration: Value = quantity("s", "length of a run", default=2.0, min=0.05, max=1e4)
+    force_low: Value = quantity("N", "least processing force of the lump", default=1000.0, min=0.0)
+    force_high: Value = quantity("N", "largest processing force of the lump", default=3000.0, min=0.0)
+    seed: Value = quantity("1", "seed of the random numbers", default=1.0, min=0.0, max=1e9)
 
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*")
@@ -199,11 +257,14 @@ _SECTIONS = {
     "motor": DcMotor.Parameters,
     "run": Run,
     "overload": Overload,
+    "coupling": Coupling,
+    "monte_carlo": MonteCarlo,
 }
 _File = create_model(
     "Config",
     __config__=ConfigDict(extra="forbid"),
     title=(str, ""),
+    events=(list[Literal[*SCENARIOS]], ["right_empties", "feed_left", "jam_left"]),
     **{
         name: (schema, Field(default_factory=schema))
         for name, schema in ((n, _schema(d, n, n + ".")) for n, d in _SECTIONS.items())
@@ -221,7 +282,10 @@ class Config:
     motor: Any
     motor_given: frozenset[str]
     run: Run
+    events: tuple[str, ...]
     overload: Overload
+    coupling: Coupling | None
+    monte_carlo: MonteCarlo
     source: str
 
 
@@ -323,7 +387,10 @@ def parse(text: str, source: str = "config") -> Config:
         motor=motor,
         motor_given=frozenset(motor_given),
         run=_instance(Run, _given(checked.run)),
+        events=tuple(dict.fromkeys(checked.events)),
         overload=_instance(Overload, _given(checked.overload)),
+        coupling=_instance(Coupling, _given(checked.coupling)) if "coupling" in data else None,
+        monte_carlo=_instance(MonteCarlo, _given(checked.monte_carlo)),
         source=source,
     )
     run, turn = config.run, 2.0 * math.pi / config.run.crank_speed

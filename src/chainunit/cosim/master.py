@@ -185,7 +185,7 @@ class CoSimulation:
     # -- running
 
     def _signal_values(self, times: Any) -> list[tuple[Instance, Any, Any]]:
-        """The external signals at `times`, shape (n,): of each instance a handle and a table of shape (n, signals)."""
+        """The external signals at `times`, shape (n,): of each instance a handle and a table (n, signals)."""
         split: dict[str, tuple[list[str], list[Any]]] = {}
         for full, given in self.signals.items():
             instance, variable = self._split(full, "input")

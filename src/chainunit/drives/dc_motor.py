@@ -207,6 +207,11 @@ class DcMotor(Motor):
         return arm.k * xp.minimum(p.limit.i, (p.limit.v - arm.k * w) / arm.R)
 
     @staticmethod
+    def largest_torque(p: Any) -> float:
+        """By the current limit, or what the voltage drives through the standing armature."""
+        return float(p.armature.k * min(p.limit.i, p.limit.v / p.armature.R))
+
+    @staticmethod
     def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
         """The armature is not faster than 1 MHz."""
         yield p.armature.L, 1e-6 * (p.armature.R + p.current_control.kp), math.inf

@@ -273,8 +273,7 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, s: _Point) -> Outputs:
 
 
 class InductionMotor(Motor):
-    """A squirrel-cage induction motor, on the line or on an inverter, that owns the shaft and takes the machine's load
-    port.
+    """A squirrel-cage induction motor, on the line or on an inverter, that owns the shaft and takes a load port.
 
     Direct on line: the start values. Soft start: `soft_start.voltage` below 1. On an inverter: `inverter.on` = 1; the
     motor then follows `w_ref`. The input `voltage` switches off (0) and makes dips.

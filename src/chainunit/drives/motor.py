@@ -33,3 +33,8 @@ class Motor(Model):
     def limit(xp: Any, p: Any, w: Any) -> Any:
         """Largest air-gap torque at the speed `w` [rad/s] that the supply allows in steady running [N m]."""
         raise NotImplementedError
+
+    @staticmethod
+    def largest_torque(p: Any) -> float:
+        """Largest steady air-gap torque at any speed [N m]."""
+        raise NotImplementedError

@@ -160,12 +160,25 @@ class ChainUnit:
         bias = self._state(self._inputs(phi, w, 0.0, left, right, stop)).bias
         return bias.friction / self.p.ratio
 
+    def pin_turns(self, phi: Any) -> list[Any]:
+        """Angle through which each of the ten pins O1, A, Bd, C, A2, B, A1 (left, then right) has turned [rad], from
+        the first of the motor angles `phi`, shape (n,); the sum of all turning to and fro is left to the reader."""
+        phi = _array(phi)
+        m = self._state(self._inputs(phi, 0.0, 0.0, EMPTY, EMPTY)).m
+        per_turn = m.pin_rates()
+        step = np.diff(phi / self.p.ratio)
+        turned = []
+        for rate in per_turn:
+            rate = np.broadcast_to(rate, phi.shape)
+            turned.append(np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * step)]))
+        return turned
+
     def energy_per_kg(self, side: str, phi: Any, w: Any) -> Any:
         """Kinetic and potential energy of a kilogram of material on the `side` ("left" or "right") [J/kg]:
         dE/dm, with which the feed enters an energy balance (the energy is linear in the mass)."""
         kilogram = SideLoads(material_mass=1.0, processing_force=0.0)
 
-        def energy(**loads: SideLoads) -> Any:
+        def energy(**loads: Any) -> Any:
             out = self.forces(phi, w, 0.0, **loads)
             return out.kinetic_energy + out.potential_energy
 

@@ -139,8 +139,8 @@ class SideLoads:
 
 @declaration
 class Stop:
-    """A spring and damper between rocker and frame, which hold a blocked rocker; off where both are zero. The smoothed
-    friction and processing force hold nothing at rest."""
+    """A spring and damper between rocker and frame, which hold a blocked rocker; off where both are zero. The
+    smoothed friction and processing force hold nothing at rest."""
 
     stiffness: Value = quantity("N.m/rad", "stiffness", default=0.0, min=0.0, nominal=1e6)
     damping: Value = quantity("N.m.s/rad", "damping", default=0.0, min=0.0, nominal=1e4)
@@ -385,6 +385,15 @@ class Mechanism:
         """Angle of the rocker [rad], which never reaches the horizontal."""
         return xp.asin(self.rocker.u.x)
 
+    def pin_rates(self) -> tuple[Any, ...]:
+        """Relative rotation per crank rotation in the pins O1, A, Bd, C, then A2, B, A1 of each side."""
+        k0, k1, k2 = self.crank.t1, self.drive.first.t1, self.rocker.t1
+        rates = [k0, k1 - k0, k1 - k2, k2]
+        for organ in (self.left, self.right):
+            wall, web = organ.dyad.first.t1, organ.dyad.second.t1
+            rates += [web - k2, web - wall, wall]
+        return tuple(rates)
+
     def inertia(self) -> tuple[Any, Any]:
         """Reflected inertia at the crank J [kg m2] and dJ/dq."""
         parts = [body.inertia() for body in self.bodies]
@@ -428,13 +437,9 @@ class Reactions:
         self.torque, self.at_o1 = driving_torque(m.crank, m.a, m.crank_body.applied(w2, a, g), -self.at_a)
 
     def pins(self, m: Mechanism) -> tuple[tuple[Vec2, Any], ...]:
-        """Reaction and relative rotation per crank rotation of the ten pins O1, A, Bd, C, A1, B, A2 (both sides)."""
-        k0, k1, k2 = m.crank.t1, m.drive.first.t1, m.rocker.t1
-        pins = [(self.at_o1, k0), (self.at_a, k1 - k0), (self.at_bd, k1 - k2), (self.at_c, k2)]
-        for organ, (at_a1, at_b, at_a2) in ((m.left, self.left), (m.right, self.right)):
-            wall, web = organ.dyad.first.t1, organ.dyad.second.t1
-            pins += [(at_a1, wall), (at_b, web - wall), (at_a2, web - k2)]
-        return tuple(pins)
+        """Reaction and relative rotation per crank rotation of the ten pins, as in `Mechanism.pin_rates`."""
+        forces = (self.at_o1, self.at_a, self.at_bd, self.at_c, *self.left[::-1], *self.right[::-1])
+        return tuple(zip(forces, m.pin_rates(), strict=True))
 
 
 class Bias:

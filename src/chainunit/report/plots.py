@@ -9,6 +9,8 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ..drives.dc_motor import DcMotor
+from ..engines import numpy_
 from ..studies.overload import PINS, SCENARIOS, Study
 from .style import LINES, draw
 
@@ -46,13 +48,13 @@ def _torque_angle(study: Study) -> Any:
 
 
 def _series(study: Study, name: str) -> tuple[Any, Any, Any, Any]:
-    run, ratio = study.runs[name], study.config.machine.p.ratio
+    run, ratio = study.runs[name], study.drive.ratio
     time = run["time"].values - study.event.get(name, 0.0)
     return (
         time,
         run["machine.tau"].values * ratio,
         run["motor.w"].values / ratio,
-        run["motor.armature.i"].values,
+        run[f"motor.{study.drive.motor.current}"].values,
     )
 
 
@@ -67,9 +69,10 @@ def _start_up(study: Study) -> Any:
     ):
         axis.plot(time, y, **LINES[0])
         axis.set_ylabel(label)
-    reference = study.runs["start_up"]["motor.w_ref"].values / study.config.machine.p.ratio
-    axes[0].plot(time, reference, label="reference", **LINES[1])
-    axes[0].legend(loc="lower right")
+    if study.drive.follows:
+        reference = study.runs["start_up"]["motor.w_ref"].values / study.drive.ratio
+        axes[0].plot(time, reference, label="reference", **LINES[1])
+        axes[0].legend(loc="lower right")
     axes[0].set_title("Start-up under load and steady running")
     axes[-1].set_xlabel("time [s]")
     axes[-1].set_xlim(time[0], time[-1])
@@ -86,12 +89,13 @@ def _overload_time(study: Study) -> Any:
         time, torque, speed, current = _series(study, name)
         for axis, y in zip(column, (torque, speed, current), strict=True):
             axis.plot(time, y, **LINES[0])
-        limit = study.motor.limit.i
-        column[2].axhline(limit, label="current limit", **LINES[1])
+        if study.drive.motor is DcMotor:
+            column[2].axhline(study.motor.limit.i, label="current limit", **LINES[1])
         column[0].set_title(SCENARIOS[name])
         column[-1].set_xlabel("time after the event [s]")
         column[-1].set_xlim(time[0], time[-1])
-    axes[2, 0].legend(loc="center right", fontsize=9)
+    if study.drive.motor is DcMotor:
+        axes[2, 0].legend(loc="center right", fontsize=9)
     for axis, label in zip(axes[:, 0], labels, strict=True):
         axis.set_ylabel(label)
     return figure
@@ -99,7 +103,6 @@ def _overload_time(study: Study) -> Any:
 
 def _torque_speed(study: Study) -> Any:
     figure, axis = plt.subplots(figsize=(7.5, 5.5))
-    motor = study.motor
     names = ["start_up", *(n for n in SCENARIOS if n in study.runs)]
     fastest = 0.0
     for line, name in zip(LINES, names, strict=False):
@@ -109,10 +112,8 @@ def _torque_speed(study: Study) -> Any:
         )
         fastest = max(fastest, float(run["motor.w"].max()))
     w = np.linspace(0.0, 1.15 * fastest, 200)
-    current = np.minimum(motor.limit.i, (motor.limit.v - motor.armature.k * w) / motor.armature.R)
-    axis.plot(
-        w, motor.armature.k * current, color="#777777", linewidth=3.0, alpha=0.6, label="limit of the drive"
-    )
+    limit = study.drive.motor.limit(numpy_(), study.motor, w)
+    axis.plot(w, limit, color="#777777", linewidth=3.0, alpha=0.6, label="limit of the drive")
     axis.set_xlabel("motor speed [rad/s]")
     axis.set_ylabel("air-gap torque [N m]")
     axis.set_title("Torque-speed trajectory")
@@ -122,11 +123,11 @@ def _torque_speed(study: Study) -> Any:
 
 
 def _reactions(study: Study) -> Any:
-    figure, axis = plt.subplots(figsize=(8, 5.5))
     names = list(study.pins)
+    figure, axis = plt.subplots(figsize=(8, 3.5 + 0.5 * len(names)))
     height = 0.8 / len(names)
-    hatches = ("", "//", "xx", "..")
-    shades = ("#1b1b1b", "#8a8a8a", "#c8c8c8", "#efefef")
+    hatches = ("", "//", "xx", "..", "\\\\", "++", "--", "oo")
+    shades = ("#1b1b1b", "#8a8a8a", "#c8c8c8", "#efefef", "#5a5a5a", "#b0b0b0", "#dcdcdc", "#ffffff")
     rows = np.arange(len(PINS))
     for i, name in enumerate(names):
         peaks = [study.pins[name][pin]["peak"] for pin in PINS]

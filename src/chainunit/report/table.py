@@ -16,9 +16,28 @@ _SHORT = {
     "right_empties": "right empties",
     "feed_left": "feed to left",
     "jam_left": "jam left",
+    "lumps": "lumps",
+    "blocked": "blocked",
+    "dip": "dip",
+    "start_loaded": "loaded start",
 }
 
-_HIDDEN = {"supply_power_mean", "winding_temperature", "speed_mean", "speed_least"}
+_HIDDEN = {
+    "supply_power_mean",
+    "winding_temperature",
+    "speed_mean",
+    "speed_least",
+    "power_mean",
+    "crank_torque_mean",
+}
+_IF_ANY = {
+    "stall_time",
+    "thermal_trip_time",
+    "coupling_trip_time",
+    "energy_after_trip",
+    "energy_behind",
+    "standstill_time",
+}
 
 
 def _number(value: float | None, unit: str) -> str:
@@ -31,9 +50,12 @@ def _number(value: float | None, unit: str) -> str:
 
 
 def _cell(study: Study, run: str, v: Variable) -> str:
+    value = getattr(study.answers[run], v.name)
+    if v.name in _IF_ANY and value is None:
+        return "-"
     if v.name == "recovery_time" and run == "steady":
         return ""
-    return _number(getattr(study.answers[run], v.name), v.unit)
+    return _number(value, v.unit)
 
 
 def show(study: Study, console: Console) -> None:
@@ -46,7 +68,8 @@ def show(study: Study, console: Console) -> None:
         for name in runs:
             table.add_column(_SHORT[name], justify="right")
         for v in Layout(Answers).variables:
-            if v.name not in _HIDDEN:
+            known = any(getattr(study.answers[run], v.name) is not None for run in runs)
+            if v.name not in _HIDDEN and (known or v.name not in _IF_ANY):
                 table.add_row(v.description, *(_cell(study, run, v) for run in runs))
         console.print(table)
     if study.factors:

@@ -71,3 +71,58 @@ def overload_factors(
         ratio(alone.outputs.rocker.tau, both.outputs.rocker.tau),
         ratio(alone.crank_torque, both.crank_torque),
     )
+
+
+@dataclass(frozen=True)
+class Sides:
+    """Cycle maxima of the torques with both organs and with the left one alone over crank speed [rad/s], each of
+    shape (speeds,), and where the two are alike."""
+
+    speed: Any
+    rocker_both: Any
+    rocker_alone: Any
+    crank_both: Any
+    crank_alone: Any
+
+    def crossings(self) -> dict[str, list[float]]:
+        """Crank speeds at which one side alone and both ask the same [rad/s], linear between the points."""
+        found = {}
+        for name in ("rocker", "crank"):
+            excess = getattr(self, f"{name}_alone") - getattr(self, f"{name}_both")
+            at = np.flatnonzero(np.diff(np.sign(excess)) != 0)
+            slope = np.diff(excess)[at]
+            found[name] = [
+                float(self.speed[k] - excess[k] * (self.speed[k + 1] - self.speed[k]) / d)
+                for k, d in zip(at, slope, strict=True)
+            ]
+        return found
+
+    def as_dict(self) -> dict[str, Any]:
+        """Ready for JSON, with units."""
+        torques = ("rocker_both", "rocker_alone", "crank_both", "crank_alone")
+        return {
+            "speed": {"value": self.speed.tolist(), "unit": "rad/s"},
+            **{name: {"value": getattr(self, name).tolist(), "unit": "N.m"} for name in torques},
+            "crossings": {n: {"value": v, "unit": "rad/s"} for n, v in self.crossings().items()},
+        }
+
+
+def sides_over_speed(
+    machine: ChainUnit, left: SideLoads, right: SideLoads, highest: float = 15.0, points: int = 30
+) -> Sides:
+    """Two-sided against one-sided over crank speeds up to `highest` [rad/s]: at low speed one side alone is the
+    heavier case, since nothing balances its weight; at high speed both are, since inertia adds up."""
+    speed = np.linspace(highest / points, highest, points)
+    alone_machine = without_right(machine)
+    peaks: dict[str, list[float]] = {name: [] for name in ("rb", "ra", "cb", "ca")}
+    for w in speed:
+        both = cycle(machine, float(w), left, right, 360)
+        alone = cycle(alone_machine, float(w), left, EMPTY, 360)
+        for name, torque in (
+            ("rb", both.outputs.rocker.tau),
+            ("ra", alone.outputs.rocker.tau),
+            ("cb", both.crank_torque),
+            ("ca", alone.crank_torque),
+        ):
+            peaks[name].append(float(np.max(np.abs(torque))))
+    return Sides(speed, *(np.array(peaks[name]) for name in ("rb", "ra", "cb", "ca")))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,16 +17,18 @@ import numpy as np
 import xarray as xr
 
 from .. import __version__
+from ..config import SCENARIOS as SCENARIOS
 from ..config import Config
 from ..cosim import Bond, CoSimulation, Profile, System, energy_residual, monolithic, port_connections
 from ..drives.dc_motor import DcMotor
 from ..drives.speed_control import Tuning, tune
 from ..errors import RunError
-from ..fmu.backends import Backend, export
+from ..fmu.backends import Backend
 from ..machines.api import ChainUnit
-from ..machines.chain_unit import ChamberForces
 from ..quantities import Layout, Value, declaration, quantity
-from .cycle import OverloadFactors, cycle, overload_factors
+from . import protection
+from .cycle import OverloadFactors, Sides, cycle, overload_factors, sides_over_speed
+from .drive import Drive
 
 PINS = {
     "O1 crank bearing": "crank_bearing",
@@ -39,12 +41,6 @@ PINS = {
     "A2 right web at rocker": "right.rocker_joint",
     "B right hinge": "right.hinge",
     "A1 right support": "right.support",
-}
-
-SCENARIOS = {
-    "right_empties": "the right side empties",
-    "feed_left": "all feed moves to the left",
-    "jam_left": "a lump jams the left side",
 }
 
 
@@ -71,6 +67,16 @@ class Answers:
     recovery_time: Value = quantity("s", "recovery")
     web_pull_least: Value = quantity("N", "least pull in a web")
     wall_pull_least: Value = quantity("N", "least pull in a wall")
+    shaft_share: Value = quantity("1", "peak torque on the machine's shaft over that of the motor")
+    shaking_force: Value = quantity("N", "force on the frame, largest deviation from its mean")
+    shaking_moment: Value = quantity("N.m", "moment on the frame about C, largest deviation from its mean")
+    breakdown_margin: Value = quantity("1", "largest steady torque of the motor over its peak here")
+    stall_time: Value = quantity("s", "time from the event until the crank stands")
+    thermal_trip_time: Value = quantity("s", "time from the event until the motor's thermal relay trips")
+    coupling_trip_time: Value = quantity("s", "time from the event until the safety coupling trips")
+    energy_after_trip: Value = quantity("J", "energy that passes the coupling after its trip")
+    energy_behind: Value = quantity("J", "energy left in the machine when the coupling is open")
+    standstill_time: Value = quantity("s", "time from the event until the machine behind the coupling stands")
 
 
 @declaration
@@ -107,19 +113,26 @@ class Study:
     """What a study found. `runs` holds a Dataset per co-simulation, `failure` why it stopped early, if it did."""
 
     config: Config
-    motor: Any
-    tuning: Tuning | None
+    drive: Drive
+    tuning: Tuning | None = None
     cycles: Any = None
     factors: OverloadFactors | None = None
+    sides: Sides | None = None
     limits: Limits | None = None
     runs: dict[str, xr.Dataset] = field(default_factory=dict)
     event: dict[str, float] = field(default_factory=dict)
     answers: dict[str, Answers] = field(default_factory=dict)
     pins: dict[str, dict[str, dict[str, float]]] = field(default_factory=dict)
+    """By run and pin: peak, RMS and equivalent (ISO 281) load."""
     certificate: dict[str, dict[str, float]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     made: dict[str, str] = field(default_factory=dict)
     failure: RunError | None = None
+
+    @property
+    def motor(self) -> Any:
+        """Parameters of the motor."""
+        return self.drive.parameters
 
 
 def run_study(
@@ -136,14 +149,11 @@ def run_study(
     A run that fails ends the study early: what was computed is in it, and `failure` says why.
     """
     motor, tuning = _tuned(config)
-    study = Study(config, motor, tuning)
+    study = Study(config, Drive(DcMotor, motor, config.machine), tuning)
     _statics(study)
-    files = {}
-    for name, model, p in (("machine", ChamberForces, config.machine.p), ("motor", DcMotor, motor)):
-        files[name] = folder / "fmu" / f"{model.name}.fmu"
-        study.made[name] = export(model, files[name], model.parameter_layout.named(p), backend=backend)
+    files, study.made = study.drive.export(folder / "fmu", backend)
     try:
-        _simulate(study, files, report or (lambda what, done, todo: None), check)
+        _simulate(study, files, folder, report or (lambda what, done, todo: None), check, backend)
     except RunError as error:
         if error.partial is not None:
             study.runs["unfinished"] = error.partial
@@ -164,7 +174,7 @@ def _tuned(config: Config) -> tuple[Any, Tuning | None]:
 def _statics(study: Study) -> None:
     """What needs no co-simulation: the cycle at constant speed, overload factors, limits of the model."""
     config = study.config
-    machine, feed, w = config.machine, config.feed, config.run.crank_speed
+    machine, feed, w = study.drive.machine, config.feed, config.run.crank_speed
     empty_right = type(feed.right)(material_mass=0.0, processing_force=0.0)
     study.cycles = {
         "both sides": cycle(machine, w, feed.left, feed.right),
@@ -172,6 +182,7 @@ def _statics(study: Study) -> None:
         "all feed on the left": cycle(machine, w, _sum(feed.left, feed.right), empty_right),
     }
     study.factors = overload_factors(machine, w, feed.left, feed.right)
+    study.sides = sides_over_speed(machine, feed.left, feed.right)
     (right, _), (left, _) = machine.rocker_extremes()
     g = machine.p.g
     study.limits = Limits(
@@ -201,76 +212,219 @@ def _loads(config: Config) -> dict[str, float]:
 
 
 def scenario_signals(config: Config, name: str, at: float) -> dict[str, Any]:
-    """Loads over time in the overload `name` of `SCENARIOS` that begins at time `at` [s]."""
+    """Loads over time in the overload `name` of `SCENARIOS` that begins at time `at` [s]; what blocks the rocker
+    comes with its own angle, see `_block`."""
     normal, o = _loads(config), config.overload
     signals: dict[str, Any] = dict(normal)
-    if name == "jam_left":
+    if name in ("jam_left", "lumps"):
         force = normal["machine.left.processing_force"]
-        signals["machine.left.processing_force"] = Profile(
-            force,
-            (
-                (at, o.jam_rise, force + o.jam_force),
-                (at + o.jam_rise + o.jam_duration, o.jam_rise, force),
-            ),
+        pulse = 2.0 * o.jam_rise + o.jam_duration + o.lump_pause
+        changes: list[tuple[float, float, float]] = []
+        for k in range(int(o.lumps) if name == "lumps" else 1):
+            begin = at + k * pulse
+            changes += [
+                (begin, o.jam_rise, force + o.jam_force),
+                (begin + o.jam_rise + o.jam_duration, o.jam_rise, force),
+            ]
+        signals["machine.left.processing_force"] = Profile(force, tuple(changes))
+    elif name == "dip":
+        edge = 1e-3
+        signals["motor.voltage"] = Profile(
+            1.0, ((at, edge, 1.0 - o.dip_depth), (at + o.dip_duration, edge, 1.0))
         )
-        return signals
-    for load in ("material_mass", "processing_force"):
-        left, right = normal[f"machine.left.{load}"], normal[f"machine.right.{load}"]
-        signals[f"machine.right.{load}"] = Profile(right, ((at, o.shift, 0.0),))
-        if name == "feed_left":
-            signals[f"machine.left.{load}"] = Profile(left, ((at, o.shift, left + right),))
+    elif name in ("right_empties", "feed_left", "start_loaded"):
+        for load in ("material_mass", "processing_force"):
+            left, right = normal[f"machine.left.{load}"], normal[f"machine.right.{load}"]
+            if name == "start_loaded":
+                signals |= {f"machine.left.{load}": left + right, f"machine.right.{load}": 0.0}
+                continue
+            signals[f"machine.right.{load}"] = Profile(right, ((at, o.shift, 0.0),))
+            if name == "feed_left":
+                signals[f"machine.left.{load}"] = Profile(left, ((at, o.shift, left + right),))
     return signals
 
 
-def _simulate(study: Study, files: Mapping[str, Path], report: Report, check: bool) -> None:
-    config, machine = study.config, study.config.machine
+def follow_time(config: Config, name: str) -> float:
+    """Time that is followed after the event [s]: the turns asked for, and all lumps."""
+    turn, o = 2.0 * math.pi / config.run.crank_speed, config.overload
+    # a little more than asked, so that a dip in speed does not cost a whole turn
+    follow = (o.turns + 0.1) * turn
+    if name == "lumps":
+        follow = max(follow, o.lumps * (2.0 * o.jam_rise + o.jam_duration + o.lump_pause))
+    return follow
+
+
+def _block(config: Config, psi: float) -> dict[str, float]:
+    """The stop that holds the rocker where it stands."""
+    o = config.overload
+    values = {"stiffness": o.block_stiffness, "damping": o.block_damping, "psi": psi}
+    return {f"machine.stop.{name}": value for name, value in values.items()}
+
+
+def _simulate(
+    study: Study,
+    files: Mapping[str, Path],
+    folder: Path,
+    report: Report,
+    check: bool,
+    backend: Backend | None,
+) -> None:
+    config, drive = study.config, study.drive
     run = config.run
-    w = run.crank_speed * machine.p.ratio
     turn = 2.0 * math.pi / run.crank_speed
     settled = run.ramp + run.settle_turns * turn
-    # a little more than asked, so that a dip in speed does not cost a whole turn
     stop = settled + (run.turns + 0.1) * turn
-    follow = (config.overload.turns + 0.1) * turn
-    total = stop + len(SCENARIOS) * (turn + follow)
-    done = 0.0
+    events = [name for name in config.events if name != "start_loaded"]
+    if "dip" in events and "voltage" not in drive.motor.input_layout.names:
+        events.remove("dip")
+        study.notes.append("the voltage dip was left out: this motor's drive has no line voltage of its own.")
+    total = stop + sum(turn + follow_time(config, name) for name in events)
+    total += stop * ("start_loaded" in config.events)
 
-    reference = Profile(0.0, ((0.0, run.ramp, w),))
-    signals = {**_loads(config), "motor.w_ref": reference}
-    system = System(files, port_connections("machine", "motor"))
+    signals = {**_loads(config), **drive.reference(run.crank_speed, run.ramp)}
     bond = Bond(
         "motor",
         "machine",
-        {f"{side}.material_mass": partial(_energy_per_kg, machine, side) for side in ("left", "right")},
+        {f"{s}.material_mass": partial(_energy_per_kg, drive.machine, s) for s in ("left", "right")},
     )
-    with CoSimulation(system, signals) as simulation:
+    guards = _guards(study)
+    with CoSimulation(drive.system(files), signals) as simulation:
         start_up = simulation.run(
-            stop, run.step, partial(_progress, report, "start-up and steady running", 0.0, total)
+            stop,
+            run.step,
+            partial(_progress, report, "start-up and steady running", 0.0, total),
+            guards=guards,
         )
         _certify(study, "start_up", start_up, bond)
+        if simulation.time < stop - 0.5 * run.step:
+            raise RunError(
+                f"the safety coupling opens in the start-up, at t = {simulation.time:.3g} s; coupling.trip_torque "
+                "must be above what starting takes"
+            )
         steady = start_up.sel(time=slice(settled, None))
         study.answers["steady"] = _answers(study, steady, None, steady)
         study.pins["steady"] = _pins(study, steady)
         start = simulation.save()
-        angle = float(start_up["motor.phi"].values[-1]) / machine.p.ratio
+        angle = float(start_up["motor.phi"].values[-1]) / drive.ratio
         lead = _lead(config, angle, study.answers["steady"].speed_mean)
         event = start + lead
-        total = stop + len(SCENARIOS) * (lead + follow)
         done = start
-        for name, title in SCENARIOS.items():
+        for name in events:
             simulation.restore()
-            simulation.signals = {**scenario_signals(config, name, event), "motor.w_ref": w}
-            transient = simulation.run(
-                event + follow, run.step, partial(_progress, report, title, done - start, total)
-            )
+            simulation.signals = {
+                **scenario_signals(config, name, event),
+                **drive.reference(run.crank_speed),
+            }
+            follow = follow_time(config, name)
+            progress = partial(_progress, report, SCENARIOS[name], done - start, total)
+            transient = _event(study, simulation, name, event, follow, progress)
             done += lead + follow
-            _certify(study, name, transient, bond)
-            study.event[name] = event
-            transient_only = transient.sel(time=slice(event, None))
-            study.answers[name] = _answers(study, transient_only, event, steady)
-            study.pins[name] = _pins(study, transient_only)
+            _close(study, name, transient, event, event + follow, bond, simulation, folder, backend)
         if check:
             report("monolithic reference", total, total)
             _compare(study, start_up, signals)
+    if "start_loaded" in config.events:
+        loaded = {
+            **scenario_signals(config, "start_loaded", 0.0),
+            **drive.reference(run.crank_speed, run.ramp),
+        }
+        with CoSimulation(drive.system(files), loaded) as simulation:
+            progress = partial(_progress, report, SCENARIOS["start_loaded"], total - stop, total)
+            transient = simulation.run(stop, run.step, progress, guards=guards)
+            _close(study, "start_loaded", transient, 0.0, stop, bond, simulation, folder, backend)
+
+
+def _guards(study: Study) -> dict[str, float]:
+    coupling = study.config.coupling
+    return {"motor.tau": coupling.trip_torque / study.drive.ratio} if coupling else {}
+
+
+def _event(
+    study: Study, simulation: CoSimulation, name: str, event: float, follow: float, progress: Any
+) -> xr.Dataset:
+    """Run a transient to its end, or until the safety coupling trips."""
+    step = study.config.run.step
+    pieces = []
+    if name == "blocked":
+        simulation.signals |= dict.fromkeys(_block(study.config, 0.0), 0.0)
+        pieces.append(simulation.run(event, step, progress))
+        simulation.signals |= _block(study.config, float(pieces[0]["machine.rocker.psi"][-1]))
+    pieces.append(simulation.run(event + follow, step, progress, guards=_guards(study)))
+    return _joined(pieces)
+
+
+def _joined(pieces: list[xr.Dataset]) -> xr.Dataset:
+    """One run from pieces that follow each other; of the instant that two share the later holds."""
+    kept = [piece.isel(time=slice(None, -1)) for piece in pieces[:-1]]
+    return xr.concat([*kept, pieces[-1]], "time", data_vars="all") if kept else pieces[-1]
+
+
+def _close(
+    study: Study,
+    name: str,
+    run: xr.Dataset,
+    event: float,
+    stop: float,
+    bond: Bond,
+    simulation: CoSimulation,
+    folder: Path,
+    backend: Backend | None,
+) -> None:
+    """What a transient answers; where the coupling tripped, also what passes it after and how the machine behind it
+    comes to rest."""
+    step, coupling = study.config.run.step, study.config.coupling
+    study.event[name] = event
+    tripped = {}
+    if coupling and simulation.time < stop - 0.5 * step:
+        trip = simulation.time
+        if coupling.release_time > 0.0:
+            release = simulation.run(trip + coupling.release_time, min(step, coupling.release_time))
+            run = _joined([run, release])
+            passed = float(np.trapezoid(release["motor.tau"] * release["motor.w"], release["time"]))
+        else:
+            passed = 0.0
+        coasting = _coast(study, name, run, stop, folder, backend)
+        study.runs[f"{name}_coasting"] = coasting
+        speed = np.abs(coasting["machine.w"].values) / study.drive.ratio
+        still = np.flatnonzero(speed < 0.01 * study.config.run.crank_speed)
+        tripped = {
+            "coupling_trip_time": trip - event,
+            "energy_after_trip": passed,
+            "energy_behind": float(coasting["machine.kinetic_energy"][0]),
+            "standstill_time": float(coasting["time"][still[0]]) - event if still.size else None,
+        }
+    _certify(study, name, run, bond)
+    after = run.sel(time=slice(event, None))
+    steady = study.runs["start_up"]
+    settled = (
+        study.config.run.ramp + study.config.run.settle_turns * 2 * math.pi / study.config.run.crank_speed
+    )
+    answers = _answers(study, after, event, steady.sel(time=slice(settled, None)))
+    study.answers[name] = replace(answers, **tripped)
+    study.pins[name] = _pins(study, after)
+
+
+def _coast(
+    study: Study, name: str, run: xr.Dataset, stop: float, folder: Path, backend: Backend | None
+) -> xr.Dataset:
+    """The machine behind the open coupling, with the loads that it had, for as long as the motor would have been
+    followed and a second more."""
+    from_ = float(run["time"][-1])
+    start = {f"machine.{n}": v for n, v in study.drive.machine_parameters().items()}
+    start |= {"machine.phi_start": float(run["motor.phi"][-1]), "machine.w_start": float(run["motor.w"][-1])}
+    loads = {
+        full: given
+        for full, given in scenario_signals(study.config, name, study.event[name]).items()
+        if full.startswith("machine.")
+    }
+    loads |= {full: float(run[full][-1]) for full in _block(study.config, 0.0) if full in run}
+    file = folder / "fmu" / "ChainUnit.fmu"
+    if not file.exists():
+        study.drive.coasting(folder / "fmu", backend)
+    with CoSimulation(
+        System({"machine": file}, [], start), {**loads, "machine.tau": 0.0}, from_
+    ) as simulation:
+        return simulation.run(max(stop, from_) + 1.0, study.config.run.step)
 
 
 def _lead(config: Config, angle: float, speed: float) -> float:
@@ -297,14 +451,14 @@ def _certify(study: Study, name: str, run: xr.Dataset, bond: Bond) -> None:
 
 
 def _compare(study: Study, run: xr.Dataset, signals: Mapping[str, Any]) -> None:
-    models = {"machine": (ChamberForces, study.config.machine.p), "motor": (DcMotor, study.motor)}
     times = run["time"].values[::10]
+    corners = [c for signal in signals.values() if isinstance(signal, Profile) for c in signal.corners]
     reference = monolithic(
-        models,
+        study.drive.models(),
         port_connections("machine", "motor", slopes=False),
         signals,
         times,
-        corners=signals["motor.w_ref"].corners,
+        corners=corners,
     )
     for name in ("machine.tau", "motor.w"):
         difference = np.abs(run[name].values[::10] - reference[name].values)
@@ -316,14 +470,14 @@ def _compare(study: Study, run: xr.Dataset, signals: Mapping[str, Any]) -> None:
 def _whole_turns(study: Study, run: xr.Dataset) -> Any:
     """Which rows belong to whole turns of the crank: over anything else the mean of a cyclic torque means nothing."""
     phi = run["motor.phi"].values
-    turned = (phi - phi[0]) / (2.0 * math.pi * study.config.machine.p.ratio)
+    turned = (phi - phi[0]) / (2.0 * math.pi * study.drive.ratio)
     return turned <= max(1.0, math.floor(turned[-1]))
 
 
 def _answers(study: Study, run: xr.Dataset, event: float | None, steady: xr.Dataset) -> Answers:
     """The numbers of one run."""
-    config = study.config
-    ratio, w_ref = config.machine.p.ratio, config.run.crank_speed
+    config, drive = study.config, study.drive
+    ratio, w_ref = drive.ratio, config.run.crank_speed
     whole = _whole_turns(study, run)
 
     def value(name: str) -> Any:
@@ -338,16 +492,26 @@ def _answers(study: Study, run: xr.Dataset, event: float | None, steady: xr.Data
     def rms(x: Any) -> float:
         return math.sqrt(mean(x * x))
 
-    sides = config.machine.loaded_sides(config.feed.left, config.feed.right)
+    def swing(*names: str) -> float:
+        parts = [value(f"machine.frame.{name}") for name in names]
+        return float(np.max(np.sqrt(sum((x - mean(x)) ** 2 for x in parts))))
+
+    sides = drive.machine.loaded_sides(config.feed.left, config.feed.right)
 
     def least(rod: str) -> float:
         return min((float(np.min(value(f"machine.{side}.{rod}_pull"))) for side in sides), default=math.inf)
 
     crank_torque, motor_torque = value("machine.tau") * ratio, value("motor.air_gap_tau")
-    speed, power, current = value("motor.w") / ratio, value("machine.power"), value("motor.armature.i")
+    speed, power, current = (
+        value("motor.w") / ratio,
+        value("machine.power"),
+        value(f"motor.{drive.motor.current}"),
+    )
+    asked = w_ref if drive.follows or event is None else study.answers["steady"].speed_mean
+    since = value("time") - (event or 0.0)
     recovery = None
-    if event is not None and _settled(study.answers["steady"], w_ref):
-        recovery = _recovery(value("time") - event, speed, steady["motor.w"].values / ratio, w_ref)
+    if event is not None and (not drive.follows or _settled(study.answers["steady"], w_ref)):
+        recovery = _recovery(since, speed, steady["motor.w"].values / ratio, asked)
     return Answers(
         crank_torque_peak=peak(crank_torque),
         crank_torque_rms=rms(crank_torque),
@@ -359,15 +523,35 @@ def _answers(study: Study, run: xr.Dataset, event: float | None, steady: xr.Data
         supply_power_mean=mean(value("motor.supply_power")),
         current_peak=peak(current),
         current_rms=rms(current),
-        winding_temperature=float(value("motor.armature.T")[-1]),
+        winding_temperature=float(value(f"motor.{drive.motor.temperature}")[-1]),
         rocker_torque_peak=peak(value("machine.rocker.tau")),
         speed_mean=mean(speed),
         speed_least=float(np.min(speed)),
-        speed_dip=float((w_ref - np.min(speed)) / w_ref),
+        speed_dip=float((asked - np.min(speed)) / asked),
         recovery_time=recovery,
         web_pull_least=least("web"),
         wall_pull_least=least("wall"),
+        shaft_share=peak(value("motor.tau")) / peak(motor_torque),
+        shaking_force=swing("fx", "fy"),
+        shaking_moment=swing("moment"),
+        breakdown_margin=drive.largest_torque() / peak(motor_torque),
+        stall_time=None if event is None else protection.stall(since, speed, asked),
+        thermal_trip_time=_relay(study, since, current) if event is not None else None,
+        coupling_trip_time=None,
+        energy_after_trip=None,
+        energy_behind=None,
+        standstill_time=None,
     )
+
+
+def _relay(study: Study, since: Any, current: Any) -> float | None:
+    """When the thermal relay, set to the motor's rated current, trips after the event."""
+    setting = study.drive.rated_current
+    if setting is None:
+        return None
+    # what flows at the end is taken to flow on
+    lasts = float(np.sqrt(np.mean(current[-max(1, len(current) // 5) :] ** 2)))
+    return protection.relay_trip(since, current, setting, study.answers["steady"].current_rms, lasts)
 
 
 def _settled(steady: Answers, w_ref: float) -> bool:
@@ -387,11 +571,16 @@ def _recovery(since: Any, speed: Any, steady: Any, w_ref: float) -> float | None
 
 
 def _pins(study: Study, run: xr.Dataset) -> dict[str, dict[str, float]]:
-    """Peak and RMS of the reaction of every pin [N]."""
+    """Peak, RMS and equivalent load (mean of ISO 281 over what the pin turns) of the reaction of every pin [N]."""
     table, whole = {}, _whole_turns(study, run)
-    for title, name in PINS.items():
+    turned = study.drive.machine.pin_turns(run["motor.phi"].values[whole])
+    for (title, name), angle in zip(PINS.items(), turned, strict=True):
         size = np.hypot(run[f"machine.{name}.fx"].values, run[f"machine.{name}.fy"].values)
-        table[title] = {"peak": float(np.max(size)), "rms": float(np.sqrt(np.mean(size[whole] ** 2)))}
+        table[title] = {
+            "peak": float(np.max(size)),
+            "rms": float(np.sqrt(np.mean(size[whole] ** 2))),
+            "equivalent": protection.mean_load(size[whole], angle),
+        }
     return table
 
 
@@ -431,8 +620,17 @@ def _note(study: Study) -> None:
                 f"{title}: web pull down to {answers.web_pull_least:.0f} N; a chain cannot push, it would go slack "
                 "and snatch."
             )
-        if answers.current_peak > 0.999 * study.motor.limit.i:
+        if study.drive.motor is DcMotor and answers.current_peak > 0.999 * study.motor.limit.i:
             note(f"{title}: the motor runs into its current limit of {study.motor.limit.i:g} A.")
+        if answers.stall_time is not None:
+            note(f"{title}: the crank stands {answers.stall_time:.2f} s after the event.")
+        if answers.coupling_trip_time is not None:
+            note(
+                f"{title}: the safety coupling trips {answers.coupling_trip_time:.3f} s after the event; "
+                f"{answers.energy_after_trip:.3g} J pass it while it opens, {answers.energy_behind:.3g} J stay "
+                "behind it."
+            )
+            continue
         if name in SCENARIOS and answers.recovery_time is None:
             note(f"{title}: the speed does not return to its steady band within the time followed.")
     for name, certificate in study.certificate.items():
@@ -473,11 +671,13 @@ def as_dict(study: Study) -> dict[str, Any]:
         else "all gains given",
         "fmus": study.made,
         "notes": study.notes,
-        "machine": entries(config.machine.p),
-        "motor": entries(study.motor),
+        "machine": entries(study.drive.machine.p),
+        "motor": {"kind": study.drive.motor.name, **entries(study.motor)},
         "feed": entries(config.feed),
         "run": entries(config.run),
         "overload": entries(config.overload),
+        "coupling": entries(config.coupling) if config.coupling else None,
+        "sides_over_speed": study.sides.as_dict() if study.sides else None,
     }
 
 

@@ -133,10 +133,16 @@ def tables(interface: Interface, guid: str, token: str) -> str:
         "",
         '#include "model.h"',
         "",
+        "#if defined __GNUC__ && !defined _WIN32",
+        "#pragma GCC visibility push(hidden)",
+        "#endif",
         *(
             f"int kernel_{k}(const double **arg, double **res, long long int *iw, double *w, int mem);"
             for k in functions
         ),
+        "#if defined __GNUC__ && !defined _WIN32",
+        "#pragma GCC visibility pop",
+        "#endif",
         "",
         _array("double", "starts", [_number(x or 0.0) for x in starts]),
         _array("Quantity", "declared", [quantity(v) for v in (*interface.parameters, *interface.inputs)]),

@@ -7,6 +7,11 @@
 #ifndef CHAINUNIT_MODEL_H
 #define CHAINUNIT_MODEL_H
 
+/* A host that compiles the sources shows every name by default; ours must not meet those of libc or of another FMU. */
+#if defined __GNUC__ && !defined _WIN32
+#pragma GCC visibility push(hidden)
+#endif
+
 /* A casadi function on (p, u, x) or (p, u, x, du, dx). */
 typedef int (*Kernel)(const double **arg, double **res, long long int *iw, double *w, int mem);
 
@@ -54,5 +59,9 @@ typedef struct {
 } Model;
 
 extern const Model model;
+
+#if defined __GNUC__ && !defined _WIN32
+#pragma GCC visibility pop
+#endif
 
 #endif

@@ -6,6 +6,10 @@
 
 #include "model.h"
 
+#if defined __GNUC__ && !defined _WIN32
+#pragma GCC visibility push(hidden) /* see model.h */
+#endif
+
 typedef enum { OK = 0, DISCARD = 2, ERROR = 3 } Status;
 
 typedef enum {
@@ -63,5 +67,9 @@ Status states_get(Instance *c, const double *from, double *to, size_t n, const c
 size_t state_size(const Instance *c);
 void state_write(const Instance *c, void *memory);
 Status state_read(Instance *c, const void *memory, size_t size);
+
+#if defined __GNUC__ && !defined _WIN32
+#pragma GCC visibility pop
+#endif
 
 #endif

@@ -1,0 +1,77 @@
+"""A motor and the machine that it drives, as they are co-simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..cosim import Profile, System, port_connections
+from ..drives.motor import Motor
+from ..fmu.backends import Backend, export
+from ..machines.api import ChainUnit
+from ..machines.chain_unit import ChamberForces, DirectChainUnit
+from ..model import Model
+
+
+@dataclass(frozen=True)
+class Drive:
+    """`motor` with its `parameters` turns `machine`; `follows` says whether it follows the reference `w_ref`."""
+
+    motor: type[Motor]
+    parameters: Any
+    machine: ChainUnit
+    follows: bool = True
+    rated_current: float | None = None
+    """[A], where a nameplate tells it"""
+
+    @property
+    def ratio(self) -> float:
+        """Motor turns per crank turn."""
+        return float(self.machine.p.ratio)
+
+    def models(self) -> dict[str, tuple[type[Model], Any]]:
+        """Models and parameters by instance name, the machine first."""
+        return {"machine": (ChamberForces, self.machine.p), "motor": (self.motor, self.parameters)}
+
+    def start(self) -> dict[str, float]:
+        """Parameters of the whole system by full name."""
+        return {
+            f"{name}.{parameter}": value
+            for name, (model, p) in self.models().items()
+            for parameter, value in model.parameter_layout.named(p).items()
+        }
+
+    def export(self, folder: Path, backend: Backend | None = None) -> tuple[dict[str, Path], dict[str, str]]:
+        """Write the FMUs, with these start values; returns files by instance name, and how they were made."""
+        files, made = {}, {}
+        for name, (model, p) in self.models().items():
+            files[name] = folder / f"{model.name}.fmu"
+            made[name] = export(model, files[name], model.parameter_layout.named(p), backend=backend)
+        return files, made
+
+    def system(self, files: Mapping[str, Path]) -> System:
+        """The system of FMUs that were made of these models, whatever start values they carry."""
+        return System(files, port_connections("machine", "motor"), self.start())
+
+    def reference(self, crank_speed: float, ramp: float | None = None) -> dict[str, Any]:
+        """The signal of the speed reference for this crank speed [rad/s], after a ramp from rest where given [s]."""
+        if not self.follows:
+            return {}
+        w = crank_speed * self.ratio
+        return {"motor.w_ref": w if ramp is None else Profile(0.0, ((0.0, ramp, w),))}
+
+    def machine_parameters(self) -> dict[str, float]:
+        """Parameters of the machine by name."""
+        return ChamberForces.parameter_layout.named(self.machine.p)
+
+    def largest_torque(self) -> float:
+        """Largest steady air-gap torque of the motor at any speed [N m]."""
+        return self.motor.largest_torque(self.parameters)
+
+    def coasting(self, folder: Path, backend: Backend | None = None) -> Path:
+        """Write the FMU of the machine that turns by itself."""
+        file = folder / f"{DirectChainUnit.name}.fmu"
+        export(DirectChainUnit, file, self.machine_parameters(), backend=backend)
+        return file
