@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from chainunit import engines
 from chainunit.config import load
 from chainunit.drives.dc_motor import DcMotor
-from chainunit.drives.speed_control import tune
+from chainunit.drives.speed_control import loop, tune
 from chainunit.errors import InputError
 from chainunit.integrate import rk4
 from chainunit.studies.overload import _tuned
@@ -119,3 +119,44 @@ def test_tuning_scales_with_inertia_and_refuses_a_loop_without_margin():
     assert one.crossover == pytest.approx(30.0, rel=0.05)
     with pytest.raises(InputError, match="phase margin"):
         tune(arm, 0.004, crossover_share=1.0)
+
+
+def test_the_loop_is_that_of_the_tuning_and_of_the_motor():
+    """Margins as tuned; the disturbance step against the motor's own equations, limits not met."""
+    p = parameters()
+    inertia = 0.006
+    tuned = tune(p.armature, inertia)
+    p = DcMotor.parameter_layout.from_names({**tuned.parameters, "rotor.d": 0.0, "armature.alpha": 0.0}, p)
+    found = loop(p, inertia)
+    assert found.phase_margin == pytest.approx(tuned.phase_margin, rel=1e-6)
+    assert found.crossover == pytest.approx(tuned.crossover, rel=1e-6)
+    # gain 1 at the crossover, phase there is the margin above -180 deg
+    assert np.interp(found.crossover, found.frequency, found.gain) == pytest.approx(1.0, rel=1e-3)
+    phase = np.interp(found.crossover, found.frequency, found.phase)
+    assert phase + 180.0 == pytest.approx(found.phase_margin, abs=0.1)
+    u = inputs(load__tau_bias=0.5, load__J=inertia - p.rotor.J)
+    solved = solve_ivp(
+        lambda t, x: DcMotor.derivatives(engines.MATH, p, u, LAYOUT.instance(x)),
+        (0.0, found.time[-1]),
+        LAYOUT.values(DcMotor.initial_states(p)),
+        t_eval=found.time,
+        rtol=1e-9,
+        atol=1e-12,
+    )
+    speed = solved.y[LAYOUT.names.index("w")]
+    np.testing.assert_allclose(speed, 0.5 * found.deviation, atol=1e-6 * np.max(np.abs(speed)))
+    assert found.speed_dip == pytest.approx(np.max(np.abs(speed)) / 0.5, rel=1e-4)
+
+
+def test_feed_forward_of_the_whole_torque_leaves_no_dip():
+    p = parameters(armature__alpha=0.0, rotor__d=0.0)
+    dips = []
+    for tau_ff in (0.0, 1.0):
+        x = LAYOUT.values(DcMotor.initial_states(p))
+        u = inputs(load__tau_bias=1.0, tau_ff=tau_ff)
+        least = 0.0
+        for _ in range(400):
+            x = rk4(lambda y: DcMotor.derivatives(engines.MATH, p, u, LAYOUT.instance(y)), x, 1e-3, 2.5e-4)  # noqa: B023
+            least = min(least, x[1])
+        dips.append(least)
+    assert dips[1] > 0.25 * dips[0] and dips[0] < -0.5

@@ -20,6 +20,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
 
 from .drives.dc_motor import DcMotor
+from .drives.induction_motor import Inverter, SoftStart
 from .errors import InputError
 from .machines.api import ChainUnit, ratios
 from .machines.chain_unit import ChamberForces, DirectChainUnit, Inputs, SideLoads
@@ -154,6 +155,52 @@ class MonteCarlo:
     seed: Value = quantity("1", "seed of the random numbers", default=1.0, min=0.0, max=1e9)
 
 
+@declaration
+class Sizing:
+    """What is asked of a motor from the catalogue."""
+
+    one_sided_share: Value = quantity(
+        "1", "share of the running time with all feed on one side", default=0.1, min=0.0, max=1.0
+    )
+    starts_per_hour: Value = quantity("1", "starts per hour", default=6.0, min=0.0, max=1000.0)
+    fluctuation: Value = quantity(
+        "1",
+        "permitted fluctuation of the crank speed, (largest - least)/mean",
+        default=0.05,
+        above=0.0,
+        max=1.0,
+    )
+    breakdown_margin: Value = quantity(
+        "1", "factor between the peak torque and the breakdown torque", default=1.25, min=1.0, max=10.0
+    )
+    inertia_ratio: Value = quantity(
+        "1",
+        "permitted ratio of the reflected inertia to that of rotor and flywheel",
+        default=10.0,
+        above=0.0,
+        max=1000.0,
+    )
+    ambient: Value = quantity("K", "temperature of the surroundings", default=313.15, min=230.0, max=340.0)
+    temperature: Value = quantity(
+        "K", "permitted temperature of the winding", default=393.15, min=330.0, max=500.0
+    )
+    poles_least: Value = quantity("1", "least number of poles", default=2.0, min=2.0, max=48.0)
+    poles_most: Value = quantity("1", "largest number of poles", default=6.0, min=2.0, max=48.0)
+    candidates: Value = quantity(
+        "1", "number of motors that are co-simulated", default=9.0, min=1.0, max=200.0
+    )
+
+
+@declaration
+class Starter:
+    """How an induction motor is started, where `start` is "soft" or "inverter"."""
+
+    soft_start: SoftStart = group(SoftStart, "soft starter", default=SoftStart(voltage=0.5, time=1.0))
+    inverter: Inverter = group(Inverter, "inverter", default=Inverter())
+
+
+STARTS = ("direct", "soft", "inverter")
+
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*")
 _UNIT = re.compile(r"1|(?:1/)?[A-Za-zµΩ°]+(?:\^|\*\*)?-?\d?(?:\s*[.*/·]\s*[A-Za-zµΩ°]+(?:\^|\*\*)?-?\d?)*")
 _ANGLES = frozenset(
@@ -259,11 +306,16 @@ _SECTIONS = {
     "overload": Overload,
     "coupling": Coupling,
     "monte_carlo": MonteCarlo,
+    "sizing": Sizing,
+    "starter": Starter,
 }
 _File = create_model(
     "Config",
     __config__=ConfigDict(extra="forbid"),
     title=(str, ""),
+    feed_forward=(bool, False),
+    start=(Literal[STARTS], "direct"),
+    catalogue=(str, ""),
     events=(list[Literal[*SCENARIOS]], ["right_empties", "feed_left", "jam_left"]),
     **{
         name: (schema, Field(default_factory=schema))
@@ -286,6 +338,11 @@ class Config:
     overload: Overload
     coupling: Coupling | None
     monte_carlo: MonteCarlo
+    feed_forward: bool
+    sizing: Sizing | None
+    start: str
+    starter: Starter
+    catalogue: Path | None
     source: str
 
 
@@ -391,6 +448,11 @@ def parse(text: str, source: str = "config") -> Config:
         overload=_instance(Overload, _given(checked.overload)),
         coupling=_instance(Coupling, _given(checked.coupling)) if "coupling" in data else None,
         monte_carlo=_instance(MonteCarlo, _given(checked.monte_carlo)),
+        sizing=_instance(Sizing, _given(checked.sizing)) if "sizing" in data else None,
+        feed_forward=checked.feed_forward,
+        start=checked.start,
+        starter=_instance(Starter, _given(checked.starter)),
+        catalogue=_beside(checked.catalogue, source),
         source=source,
     )
     run, turn = config.run, 2.0 * math.pi / config.run.crank_speed
@@ -403,6 +465,11 @@ def parse(text: str, source: str = "config") -> Config:
             "lengthen the step, raise the speed, or lessen the turns"
         )
     return config
+
+
+def _beside(name: str, source: str) -> Path | None:
+    """A file that a study file names, relative to the study file."""
+    return (Path(source).parent / name) if name else None
 
 
 MOST_STEPS = 1e6

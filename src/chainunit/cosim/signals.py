@@ -44,6 +44,16 @@ class Profile:
             before = after
         return value if np.ndim(t) else float(value)
 
+    def rate(self, t: Any) -> Any:
+        """Its derivative at time `t` (float or array)."""
+        value: Any = 0.0
+        before = self.start
+        for at, duration, after in self.changes:
+            s = np.clip((np.asarray(t) - at) / duration, 0.0, 1.0)
+            value = value + (after - before) / duration * (30.0 * s * s * (1.0 - s) ** 2)
+            before = after
+        return value if np.ndim(t) else float(value)
+
     @property
     def corners(self) -> list[float]:
         """Times at which a change begins or ends."""

@@ -7,6 +7,8 @@ and `L` armature resistance and inductance, `w` rotor speed, `T` winding tempera
     (J_rotor + J_load) a = k i - d w - tau_load
     C dT/dt = R(T) i^2 - (T - T_ambient)/R_th
 
+`tau_ff` is a torque that is known beforehand, such as that of the machine's angle from a model in the controller.
+
 The load is the port's linearised one (see `chainunit.ports`): the motor solves for the acceleration. The
 speed controller asks for a current, cut at the current limit; the current controller asks for a voltage,
 cut at the supply. A cut-off integrator is led back (back-calculation), so that it does not wind up.
@@ -94,6 +96,7 @@ class Inputs:
 
     load: LoadPort = group(LoadPort, "load", default=NO_LOAD)
     w_ref: Value = quantity("rad/s", "speed reference", default=0.0)
+    tau_ff: Value = quantity("N.m", "torque that the speed control is told of beforehand", default=0.0)
 
 
 @declaration
@@ -144,7 +147,7 @@ class _Point:
     def __init__(self, xp: Any, p: Any, u: Any, x: Any) -> None:
         arm, i, w = p.armature, x.armature.i, x.w
         self.error_w = u.w_ref - w
-        wanted_i = p.speed_control.kp * self.error_w + x.integral.i
+        wanted_i = p.speed_control.kp * self.error_w + x.integral.i + u.tau_ff / arm.k
         self.i_ref = xp.maximum(xp.minimum(wanted_i, p.limit.i), -p.limit.i)
         self.cut_i = self.i_ref - wanted_i
         self.error_i = self.i_ref - i

@@ -39,23 +39,92 @@ def tune(armature: Any, inertia: float, bandwidth: float = 300.0, crossover_shar
     """
     import control
 
-    s = control.tf("s")
-    R, L, k = armature.R, armature.L, armature.k
-    current_kp, current_ki = L * bandwidth, R * bandwidth
-    # the feed-forward of the back-EMF leaves the armature circuit alone as plant
-    current_open = control.minreal((current_kp + current_ki / s) / (L * s + R), verbose=False)
-    current = control.feedback(current_open, 1)
     crossover = bandwidth * crossover_share
-    kp = inertia * crossover / k
-    ki = kp * crossover / 5.0
-    opened = (kp + ki / s) * current * k / (inertia * s)
-    _, phase, _, at = control.margin(opened)
+    kp = inertia * crossover / armature.k
+    speed, current = (kp, kp * crossover / 5.0), (armature.L * bandwidth, armature.R * bandwidth)
+    _, phase, _, at = control.margin(_open_loop(armature, speed, current, inertia))
     if not phase > 45.0:
         raise InputError(f"speed loop: phase margin {phase:.0f} deg, must be > 45 deg; lower crossover_share")
-    gains = {
-        "speed_control.kp": kp,
-        "speed_control.ki": ki,
-        "current_control.kp": current_kp,
-        "current_control.ki": current_ki,
-    }
-    return Tuning(gains, float(phase), float(at), bandwidth)
+    names = ("speed_control.kp", "speed_control.ki", "current_control.kp", "current_control.ki")
+    return Tuning(dict(zip(names, (*speed, *current), strict=True)), float(phase), float(at), bandwidth)
+
+
+def _current_loop(armature: Any, current: tuple[float, float]) -> Any:
+    """Current over its reference; the feed-forward of the back-EMF leaves the armature circuit alone as plant."""
+    import control
+
+    s = control.tf("s")
+    kp, ki = current
+    return control.feedback(control.minreal((kp + ki / s) / (armature.L * s + armature.R), verbose=False), 1)
+
+
+def _open_loop(
+    armature: Any, speed: tuple[float, float], current: tuple[float, float], inertia: float
+) -> Any:
+    """The speed loop opened at the measured speed."""
+    import control
+
+    s = control.tf("s")
+    kp, ki = speed
+    return (kp + ki / s) * _current_loop(armature, current) * armature.k / (inertia * s)
+
+
+@dataclass(frozen=True)
+class Loop:
+    """The linearised speed loop of a motor with one inertia at its shaft."""
+
+    inertia: float
+    """[kg m2]"""
+    phase_margin: float
+    """[deg]"""
+    crossover: float
+    """[rad/s]"""
+    speed_dip: float
+    """largest deviation of the motor speed after a step of the load torque [(rad/s)/(N m)]"""
+    settling: float
+    """time until the deviation stays below a twentieth of that [s]"""
+    frequency: Any
+    """[rad/s], shape (n,)"""
+    gain: Any
+    """of the open loop, shape (n,)"""
+    phase: Any
+    """of the open loop [deg], shape (n,)"""
+    time: Any
+    """[s], shape (m,)"""
+    deviation: Any
+    """of the motor speed after a step of the load torque [(rad/s)/(N m)], shape (m,)"""
+
+
+def loop(motor: Any, inertia: float) -> Loop:
+    """The speed loop of a DC motor with the parameters `motor`, limits and friction left out, at a total `inertia`
+    [kg m2]."""
+    import control
+    import numpy as np
+
+    speed = (motor.speed_control.kp, motor.speed_control.ki)
+    current = (motor.current_control.kp, motor.current_control.ki)
+    opened = control.minreal(_open_loop(motor.armature, speed, current, inertia), verbose=False)
+    _, phase, _, at = control.margin(opened)
+    s = control.tf("s")
+    kp, ki = speed
+    torque = (kp + ki / s) * _current_loop(motor.armature, current) * motor.armature.k
+    disturbed = control.minreal(control.feedback(-1.0 / (inertia * s), -torque), verbose=False)
+    time = np.linspace(0.0, 40.0 / at, 2001)
+    response = control.step_response(disturbed, time)
+    deviation = np.asarray(response.outputs)
+    dip = float(np.max(np.abs(deviation)))
+    outside = np.flatnonzero(np.abs(deviation) > 0.05 * dip)
+    frequency = np.logspace(-2.0, 1.5, 200) * at
+    answer = opened(1j * frequency)
+    return Loop(
+        inertia,
+        float(phase),
+        float(at),
+        dip,
+        float(time[outside[-1]]),
+        frequency,
+        np.abs(answer),
+        np.degrees(np.unwrap(np.angle(answer))),
+        time,
+        deviation,
+    )

@@ -25,6 +25,9 @@ class Drive:
     follows: bool = True
     rated_current: float | None = None
     """[A], where a nameplate tells it"""
+    feed_forward: bool = False
+    """whether the speed control is told the torque of the machine with its normal feed, from a second machine FMU at
+    the motor's angle and speed and the acceleration that is asked for"""
 
     @property
     def ratio(self) -> float:
@@ -53,14 +56,25 @@ class Drive:
 
     def system(self, files: Mapping[str, Path]) -> System:
         """The system of FMUs that were made of these models, whatever start values they carry."""
-        return System(files, port_connections("machine", "motor"), self.start())
+        if not self.feed_forward:
+            return System(files, self.connections(), self.start())
+        told = {f"model.{name}": value for name, value in self.machine_parameters().items()}
+        return System({**files, "model": files["machine"]}, self.connections(), self.start() | told)
+
+    def connections(self, *, slopes: bool = True) -> list[tuple[str, str]]:
+        """The load port and the shaft, see `port_connections`; and what the control is told."""
+        told = [("motor.phi", "model.phi"), ("motor.w", "model.w"), ("model.tau", "motor.tau_ff")]
+        return port_connections("machine", "motor", slopes=slopes) + (told if self.feed_forward else [])
 
     def reference(self, crank_speed: float, ramp: float | None = None) -> dict[str, Any]:
         """The signal of the speed reference for this crank speed [rad/s], after a ramp from rest where given [s]."""
         if not self.follows:
             return {}
         w = crank_speed * self.ratio
-        return {"motor.w_ref": w if ramp is None else Profile(0.0, ((0.0, ramp, w),))}
+        if ramp is None:
+            return {"motor.w_ref": w} | ({"model.a": 0.0} if self.feed_forward else {})
+        rise = Profile(0.0, ((0.0, ramp, w),))
+        return {"motor.w_ref": rise} | ({"model.a": rise.rate} if self.feed_forward else {})
 
     def machine_parameters(self) -> dict[str, float]:
         """Parameters of the machine by name."""

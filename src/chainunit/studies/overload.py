@@ -19,9 +19,9 @@ import xarray as xr
 from .. import __version__
 from ..config import SCENARIOS as SCENARIOS
 from ..config import Config
-from ..cosim import Bond, CoSimulation, Profile, System, energy_residual, monolithic, port_connections
+from ..cosim import Bond, CoSimulation, Profile, System, energy_residual, monolithic
 from ..drives.dc_motor import DcMotor
-from ..drives.speed_control import Tuning, tune
+from ..drives.speed_control import Loop, Tuning, loop, tune
 from ..errors import RunError
 from ..fmu.backends import Backend
 from ..machines.api import ChainUnit
@@ -63,6 +63,7 @@ class Answers:
     rocker_torque_peak: Value = quantity("N.m", "rocker torque, peak")
     speed_mean: Value = quantity("rad/s", "crank speed, mean")
     speed_least: Value = quantity("rad/s", "crank speed, least")
+    speed_ripple: Value = quantity("1", "speed ripple, (largest - least)/mean")
     speed_dip: Value = quantity("1", "speed dip")
     recovery_time: Value = quantity("s", "recovery")
     web_pull_least: Value = quantity("N", "least pull in a web")
@@ -115,6 +116,10 @@ class Study:
     config: Config
     drive: Drive
     tuning: Tuning | None = None
+    loops: dict[str, Loop] = field(default_factory=dict)
+    """the linearised speed loop of a controlled motor, by which inertia"""
+    ripple_without: float | None = None
+    """fluctuation of the speed in steady running without the feed-forward that the study has"""
     cycles: Any = None
     factors: OverloadFactors | None = None
     sides: Sides | None = None
@@ -149,7 +154,8 @@ def run_study(
     A run that fails ends the study early: what was computed is in it, and `failure` says why.
     """
     motor, tuning = _tuned(config)
-    study = Study(config, Drive(DcMotor, motor, config.machine), tuning)
+    study = Study(config, Drive(DcMotor, motor, config.machine, feed_forward=config.feed_forward), tuning)
+    study.loops = _loops(study)
     _statics(study)
     files, study.made = study.drive.export(folder / "fmu", backend)
     try:
@@ -169,6 +175,14 @@ def _tuned(config: Config) -> tuple[Any, Tuning | None]:
     tuning = tune(config.motor.armature, inertia)
     own = {name: gain for name, gain in tuning.parameters.items() if name not in config.motor_given}
     return DcMotor.parameter_layout.from_names(own, config.motor), tuning if own else None
+
+
+def _loops(study: Study) -> dict[str, Loop]:
+    """The speed loop with the mean, the least and the largest inertia of the turn."""
+    config, motor = study.config, study.motor
+    J = cycle(study.drive.machine, config.run.crank_speed, config.feed.left, config.feed.right).outputs.J
+    sizes = {"mean inertia": np.mean(J), "least inertia": np.min(J), "largest inertia": np.max(J)}
+    return {name: loop(motor, motor.rotor.J + float(size)) for name, size in sizes.items()}
 
 
 def _statics(study: Study) -> None:
@@ -281,7 +295,12 @@ def _simulate(
     total = stop + sum(turn + follow_time(config, name) for name in events)
     total += stop * ("start_loaded" in config.events)
 
-    signals = {**_loads(config), **drive.reference(run.crank_speed, run.ramp)}
+    told = {
+        full.replace("machine.", "model.", 1): load
+        for full, load in _loads(config).items()
+        if drive.feed_forward
+    }
+    signals = {**_loads(config), **told, **drive.reference(run.crank_speed, run.ramp)}
     bond = Bond(
         "motor",
         "machine",
@@ -313,6 +332,7 @@ def _simulate(
             simulation.restore()
             simulation.signals = {
                 **scenario_signals(config, name, event),
+                **told,
                 **drive.reference(run.crank_speed),
             }
             follow = follow_time(config, name)
@@ -323,9 +343,16 @@ def _simulate(
         if check:
             report("monolithic reference", total, total)
             _compare(study, start_up, signals)
+    if drive.feed_forward:
+        plain = replace(drive, feed_forward=False)
+        without = {**_loads(config), **plain.reference(run.crank_speed, run.ramp)}
+        with CoSimulation(plain.system(files), without) as simulation:
+            again = simulation.run(stop, run.step).sel(time=slice(settled, None))
+        study.ripple_without = _answers(study, again, None, again).speed_ripple
     if "start_loaded" in config.events:
         loaded = {
             **scenario_signals(config, "start_loaded", 0.0),
+            **told,
             **drive.reference(run.crank_speed, run.ramp),
         }
         with CoSimulation(drive.system(files), loaded) as simulation:
@@ -453,9 +480,12 @@ def _certify(study: Study, name: str, run: xr.Dataset, bond: Bond) -> None:
 def _compare(study: Study, run: xr.Dataset, signals: Mapping[str, Any]) -> None:
     times = run["time"].values[::10]
     corners = [c for signal in signals.values() if isinstance(signal, Profile) for c in signal.corners]
+    models = study.drive.models()
+    if study.drive.feed_forward:
+        models = {"model": models["machine"], **models}
     reference = monolithic(
-        study.drive.models(),
-        port_connections("machine", "motor", slopes=False),
+        models,
+        study.drive.connections(slopes=False),
         signals,
         times,
         corners=corners,
@@ -527,6 +557,7 @@ def _answers(study: Study, run: xr.Dataset, event: float | None, steady: xr.Data
         rocker_torque_peak=peak(value("machine.rocker.tau")),
         speed_mean=mean(speed),
         speed_least=float(np.min(speed)),
+        speed_ripple=float(np.ptp(speed[whole])) / max(abs(mean(speed)), 1e-9),
         speed_dip=float((asked - np.min(speed)) / asked),
         recovery_time=recovery,
         web_pull_least=least("web"),
@@ -633,6 +664,11 @@ def _note(study: Study) -> None:
             continue
         if name in SCENARIOS and answers.recovery_time is None:
             note(f"{title}: the speed does not return to its steady band within the time followed.")
+    if study.ripple_without is not None and steady is not None:
+        note(
+            "Feed-forward of the machine's torque brings the ripple of the speed from "
+            f"{100 * study.ripple_without:.2g} % to {100 * steady.speed_ripple:.2g} %."
+        )
     for name, certificate in study.certificate.items():
         share = certificate["energy_residual_share"]
         if not share < 1e-3:
@@ -669,6 +705,17 @@ def as_dict(study: Study) -> dict[str, Any]:
         }
         if study.tuning
         else "all gains given",
+        "speed_loop": {
+            name: {
+                "inertia": {"value": found.inertia, "unit": "kg.m2"},
+                "phase_margin": {"value": found.phase_margin, "unit": "deg"},
+                "crossover": {"value": found.crossover, "unit": "rad/s"},
+                "speed_dip": {"value": found.speed_dip, "unit": "rad.s-1/N.m"},
+                "settling": {"value": found.settling, "unit": "s"},
+            }
+            for name, found in study.loops.items()
+        },
+        "ripple_without_feed_forward": {"value": study.ripple_without, "unit": "1"},
         "fmus": study.made,
         "notes": study.notes,
         "machine": entries(study.drive.machine.p),

@@ -1,0 +1,477 @@
+"""Sizing of the drive: which motor of the catalogue, behind which gear, with which flywheel.
+
+First the cycle by inverse dynamics, then every candidate is co-simulated by its FMU: a start under load, steady
+running, and steady running with all feed on one side. Each check is a utilisation: what is used of what is
+permitted. Hand formulas (RMS torque, flywheel, relay) stand here and in `protection`; the rest is read from the runs.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..config import Config
+from ..cosim import CoSimulation, Profile
+from ..drives.catalogue import Motor as CatalogueMotor
+from ..drives.catalogue import catalogue
+from ..drives.induction_motor import InductionMotor
+from ..drives.nameplate import breakdown, identify
+from ..errors import RunError
+from ..fmu.backends import Backend
+from ..machines.api import ChainUnit
+from ..machines.chain_unit import SideLoads
+from ..quantities import Layout, Value, declaration, quantity
+from .cycle import Cycle, cycle
+from .drive import Drive
+
+
+def rms(*parts: tuple[float, Any]) -> float:
+    """RMS over parts of the time: pairs of (share of the time, values evenly spaced in that part)."""
+    whole = sum(share for share, _ in parts)
+    return math.sqrt(sum(share * float(np.mean(np.square(x))) for share, x in parts) / whole)
+
+
+def flywheel(torque: Any, speed: float, fluctuation: float) -> float:
+    """Inertia [kg m2] on the shaft that keeps (largest - least)/mean of its speed at `fluctuation`.
+
+    `torque` [N m] is what the shaft needs over a turn at constant `speed` [rad/s], evenly spaced in angle, shape
+    (n,), against a drive that gives its mean: J = (E_max - E_min)/(fluctuation w^2), with E the energy that runs
+    ahead of the mean (Wittenbauer's method with the torque at constant speed).
+    """
+    torque = np.asarray(torque, dtype=float)
+    excess = np.cumsum(torque - np.mean(torque)) * (2.0 * math.pi / len(torque))
+    return float(np.ptp(excess)) / (fluctuation * speed * speed)
+
+
+def start_time(time: Any, speed: Any, share: float = 0.95) -> float | None:
+    """Time at which the speed first reaches `share` of its mean over the last fifth of the run; None where the shaft
+    does not turn by then."""
+    speed = np.asarray(speed)
+    final = float(np.mean(speed[-max(1, len(speed) // 5) :]))
+    if not final > 0.0:
+        return None
+    return float(time[int(np.argmax(speed >= share * final))])
+
+
+@declaration
+class CycleNumbers:
+    """What the machine asks over a turn at constant crank speed; at the crank."""
+
+    power_mean: Value = quantity("W", "mean power")
+    torque_mean: Value = quantity("N.m", "mean torque, both sides loaded")
+    torque_peak: Value = quantity("N.m", "peak torque, both sides loaded")
+    torque_peak_one_sided: Value = quantity("N.m", "peak torque, all feed on one side")
+    torque_rms: Value = quantity("N.m", "RMS torque of the duty, both cases in their shares of time")
+    inertia_least: Value = quantity("kg.m2", "reflected inertia, least")
+    inertia_mean: Value = quantity("kg.m2", "reflected inertia, mean")
+    inertia_largest: Value = quantity("kg.m2", "reflected inertia, largest")
+    inertia_wanted: Value = quantity(
+        "kg.m2", "inertia that the wanted fluctuation takes (rotor, gear and flywheel)"
+    )
+
+
+@declaration
+class Flywheel:
+    """The flywheel of the chosen motor."""
+
+    J: Value = quantity("kg.m2", "flywheel on the motor shaft")
+    fluctuation: Value = quantity("1", "fluctuation of the crank speed in the run")
+
+
+@declaration
+class Protection:
+    """Settings that follow from the runs of the chosen motor."""
+
+    trip_torque: Value = quantity("N.m", "safety coupling, trip torque at the crank")
+    relay_current: Value = quantity("A", "thermal relay, setting")
+    breakdown_torque: Value = quantity("N.m", "breakdown torque of the motor at the crank")
+
+
+@dataclass(frozen=True)
+class Check:
+    """What is used of what is permitted, in one unit."""
+
+    title: str
+    value: float | None
+    limit: float
+    unit: str
+
+    @property
+    def utilisation(self) -> float | None:
+        """value/limit; None where there is no value: the candidate does not get that far."""
+        return None if self.value is None else self.value / self.limit
+
+    def as_dict(self) -> dict[str, Any]:
+        """Ready for JSON."""
+        return {
+            "title": self.title,
+            "utilisation": {"value": self.utilisation, "unit": "1"},
+            "value": {"value": self.value, "unit": self.unit},
+            "limit": {"value": self.limit, "unit": self.unit},
+        }
+
+
+@dataclass
+class Candidate:
+    """A motor behind a gear, with what its runs gave."""
+
+    motor: CatalogueMotor
+    drive: Drive
+    flywheel: float
+    """[kg m2], on the motor shaft"""
+    checks: dict[str, Check]
+    peak_torque: float
+    """of the crank, over start and steady running with either load [N m]"""
+    breakdown_torque: float
+    """of the motor [N m]"""
+    fluctuation: float
+    verdict: str = ""
+    reason: str = ""
+
+    @property
+    def worst(self) -> tuple[str, float]:
+        """The check that is used most."""
+        sizes = {n: math.inf if c.utilisation is None else c.utilisation for n, c in self.checks.items()}
+        name = max(sizes, key=lambda n: sizes[n])
+        return name, sizes[name]
+
+
+@dataclass
+class SizingResult:
+    """Cycle, candidates in the order of their rank, and which of them is chosen."""
+
+    config: Config
+    cycle: CycleNumbers
+    candidates: list[Candidate]
+    notes: list[str]
+
+    @property
+    def chosen(self) -> Candidate | None:
+        """The candidate that was chosen, if one fits."""
+        return next((c for c in self.candidates if c.verdict == "chosen"), None)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Ready for JSON, each number with its unit."""
+        chosen = self.chosen
+        wheel = protection = {}
+        if chosen:
+            wheel = _entries(Flywheel(J=chosen.flywheel, fluctuation=chosen.fluctuation))
+            protection = _entries(recommended(self.config, chosen))
+        assert self.config.sizing is not None
+        return {
+            "asked": _entries(self.config.sizing),
+            "cycle": _entries(self.cycle),
+            "flywheel": wheel,
+            "protection": protection,
+            "candidates": [
+                {
+                    "motor": c.motor.designation,
+                    "ratio": {"value": c.drive.ratio, "unit": "1"},
+                    "verdict": c.verdict,
+                    "reason": c.reason,
+                    "checks": {name: check.as_dict() for name, check in c.checks.items()},
+                }
+                for c in self.candidates
+            ],
+            "chosen": self.candidates.index(chosen) if chosen else None,
+            "notes": self.notes,
+        }
+
+
+def _entries(declared: Any) -> dict[str, Any]:
+    layout = Layout(type(declared))
+    return {
+        v.name: {"value": value, "unit": v.unit, "title": v.description}
+        for v, value in zip(layout.variables, layout.values(declared), strict=True)
+    }
+
+
+def duty_cycles(machine: ChainUnit, config: Config) -> tuple[Cycle, Cycle]:
+    """The turn with both sides loaded, and with all feed on the left."""
+    feed, w = config.feed, config.run.crank_speed
+    left = SideLoads(
+        material_mass=feed.left.material_mass + feed.right.material_mass,
+        processing_force=feed.left.processing_force + feed.right.processing_force,
+    )
+    empty = SideLoads(material_mass=0.0, processing_force=0.0)
+    return cycle(machine, w, feed.left, feed.right), cycle(machine, w, left, empty)
+
+
+def cycle_numbers(machine: ChainUnit, config: Config) -> CycleNumbers:
+    """What the machine asks of any drive, by inverse dynamics."""
+    assert config.sizing is not None
+    both, one_sided = duty_cycles(machine, config)
+    w, share = config.run.crank_speed, config.sizing.one_sided_share
+    inertia = both.outputs.J * machine.p.ratio**2
+    mean = float(np.mean(both.crank_torque))
+    return CycleNumbers(
+        power_mean=mean * w,
+        torque_mean=mean,
+        torque_peak=float(np.max(np.abs(both.crank_torque))),
+        torque_peak_one_sided=float(np.max(np.abs(one_sided.crank_torque))),
+        torque_rms=rms((1.0 - share, both.crank_torque), (share, one_sided.crank_torque)),
+        inertia_least=float(np.min(inertia)),
+        inertia_mean=float(np.mean(inertia)),
+        inertia_largest=float(np.max(inertia)),
+        inertia_wanted=flywheel(both.crank_torque, w, config.sizing.fluctuation),
+    )
+
+
+def size(
+    config: Config,
+    folder: Path,
+    report: Callable[[str, float, float], None],
+    backend: Backend | None = None,
+) -> SizingResult:
+    """Choose a motor of the catalogue for the study.
+
+    Parameters
+    ----------
+    config : a study with `sizing`
+    folder : where the FMUs are written
+    report, backend : see `chainunit.studies.overload.run_study`
+
+    Raises
+    ------
+    InputError
+        for a catalogue that cannot be read.
+    """
+    asked = config.sizing
+    assert asked is not None
+    numbers = cycle_numbers(config.machine, config)
+    notes = [
+        "Catalogue data are typical; iron losses are not in the motor model.",
+        "The gear's losses act as viscous drag on the motor shaft, equal at rated speed to those of its efficiency.",
+    ]
+    motors = [
+        m for m in catalogue(config.catalogue) if asked.poles_least <= m.nameplate.poles <= asked.poles_most
+    ]
+    # from below what the mean power and RMS torque need, so that the first that fits is the smallest
+    needed = max(numbers.power_mean, numbers.torque_rms * config.run.crank_speed)
+    motors.sort(key=lambda m: (m.nameplate.power, abs(m.nameplate.poles - 4.0)))
+    first = next((k for k, m in enumerate(motors) if m.nameplate.power >= 0.7 * needed), len(motors))
+    shortlist = motors[first : first + int(asked.candidates)]
+    if not shortlist:
+        notes.append(f"No motor of the catalogue has 0.7 times the power of the cycle, {0.7 * needed:.3g} W.")
+    found: list[Candidate] = []
+    files: Mapping[str, Path] = {}
+    for k, motor in enumerate(shortlist):
+        report(f"co-simulating {motor.designation}", float(k), float(len(shortlist)))
+        candidate = proposed(config, motor, numbers)
+        if not files:
+            files, _ = candidate.drive.export(folder, backend)
+        judge(config, candidate, numbers, files)
+        found.append(candidate)
+    rank(found)
+    return SizingResult(config, numbers, found, notes)
+
+
+def proposed(config: Config, motor: CatalogueMotor, numbers: CycleNumbers) -> Candidate:
+    """A motor with the gear ratio at which the crank has its speed, and the flywheel that it needs."""
+    asked, gear = config.sizing, config.gear
+    assert asked is not None
+    plate = motor.nameplate
+    p = identify(plate).parameters
+    synchronous = 4.0 * math.pi * plate.frequency / plate.poles
+    rated_speed = plate.speed
+    rated_torque = plate.power / rated_speed
+    w = config.run.crank_speed
+    follows = config.start == "inverter"
+    # the slip goes with the torque; an inverter makes up for it
+    mean = numbers.power_mean / gear.efficiency / rated_speed
+    speed = rated_speed if follows else synchronous - (synchronous - rated_speed) * mean / rated_torque
+    ratio = speed / w
+    drag = (1.0 - gear.efficiency) * rated_torque / rated_speed
+    wheel = max(0.0, numbers.inertia_wanted / ratio**2 - p.rotor.J - gear.inertia)
+    soft = config.starter.soft_start if config.start == "soft" else p.soft_start
+    slip_hz = (synchronous - rated_speed) * plate.poles / (4.0 * math.pi)
+    inverter = config.starter.inverter
+    if follows:
+        given = inverter.slip or slip_hz / rated_torque
+        inverter = dataclasses.replace(inverter, on=1.0, slip=given)
+    p = dataclasses.replace(
+        p,
+        rotor=dataclasses.replace(p.rotor, J=p.rotor.J + gear.inertia + wheel, d=p.rotor.d + drag),
+        soft_start=soft,
+        inverter=inverter,
+        ambient=dataclasses.replace(p.ambient, T=asked.ambient),
+    )
+    machine = config.machine.replace({"ratio": ratio})
+    drive = Drive(InductionMotor, p, machine, follows, rated_current=plate.current)
+    return Candidate(motor, drive, wheel, {}, math.nan, breakdown(p).torque, math.nan)
+
+
+def judge(config: Config, c: Candidate, numbers: CycleNumbers, files: Mapping[str, Path]) -> None:
+    """Co-simulate a candidate and fill in its checks."""
+    asked, gear, plate, drive = config.sizing, config.gear, c.motor.nameplate, c.drive
+    assert asked is not None
+    w, turn = config.run.crank_speed, 2.0 * math.pi / config.run.crank_speed
+    rated_torque = plate.power / plate.speed
+    ramp = config.run.ramp if drive.follows else None
+    signals = {**feed_signals(config, None), **drive.reference(w, ramp)}
+    # three times what the rated torque needs to bring everything up to speed, and at least the ramp
+    inertia = drive.parameters.rotor.J + numbers.inertia_mean / drive.ratio**2
+    window = max(
+        1.0, 3.0 * inertia * plate.speed / rated_torque, 1.5 * config.run.ramp if drive.follows else 0.0
+    )
+    try:
+        with CoSimulation(drive.system(files), signals) as simulation:
+            start = simulation.run(window, config.run.step)
+            steady = simulation.run(window + 2.0 * turn, config.run.step)
+            event = simulation.time
+            simulation.signals = {**feed_signals(config, event), **drive.reference(w)}
+            simulation.run(event + config.overload.shift + turn, config.run.step)
+            one_sided = simulation.run(simulation.time + turn, config.run.step)
+    except RunError as error:
+        c.verdict, c.reason = "rejected", f"its run failed: {error}"
+        return
+    speed = np.concatenate([start["motor.w"].values, steady["motor.w"].values])
+    times = np.concatenate([start["time"].values, steady["time"].values])
+    expected = w * drive.ratio
+    started = start_time(times, speed) if float(np.mean(steady["motor.w"])) > 0.8 * expected else None
+    c.checks = _checks(config, c, start, steady, one_sided, started, rated_torque, expected)
+    torque = max(float(np.max(np.abs(r["machine.tau"]))) for r in (start, steady, one_sided))
+    c.peak_torque = torque * drive.ratio
+
+
+def feed_signals(config: Config, shift_at: float | None) -> dict[str, Any]:
+    """Loads of both sides; from `shift_at` [s] on all feed moves to the left."""
+    signals: dict[str, Any] = {}
+    for load in ("material_mass", "processing_force"):
+        left, right = getattr(config.feed.left, load), getattr(config.feed.right, load)
+        if shift_at is None:
+            signals |= {f"machine.left.{load}": left, f"machine.right.{load}": right}
+        else:
+            change = (shift_at, config.overload.shift)
+            signals[f"machine.left.{load}"] = Profile(left, ((*change, left + right),))
+            signals[f"machine.right.{load}"] = Profile(right, ((*change, 0.0),))
+    return signals
+
+
+def _checks(
+    config: Config,
+    c: Candidate,
+    start: xr.Dataset,
+    steady: xr.Dataset,
+    one_sided: xr.Dataset,
+    started: float | None,
+    rated_torque: float,
+    expected: float,
+) -> dict[str, Check]:
+    asked, gear, plate, p = config.sizing, config.gear, c.motor.nameplate, c.drive.parameters
+    assert asked is not None
+    share = asked.one_sided_share
+    gap = "motor.air_gap_tau"
+    running = steady["motor.w"].values
+    mean_speed = float(np.mean(running))
+    c.fluctuation = float(np.ptp(running[len(running) // 2 :])) / mean_speed if mean_speed > 0.0 else math.inf
+    cooling = p.cooling.still + (1.0 - p.cooling.still) * min(mean_speed / plate.speed, 1.0)
+
+    def checked(value: float | None) -> float | None:
+        return value if started is not None else None
+
+    # heat of a start beyond that of running, as if spread over the hour
+    time, heat = start["time"].values, start["motor.heat"].values
+    steady_heat = (1.0 - share) * float(np.mean(steady["motor.heat"])) + share * float(
+        np.mean(one_sided["motor.heat"])
+    )
+    extra = max(0.0, float(np.trapezoid(heat - steady_heat, time)))
+    mean_heat = steady_heat + asked.starts_per_hour * extra / 3600.0
+    temperature = p.ambient.T + mean_heat * p.stator.R_th / cooling
+    peak = max(float(np.max(np.abs(r[gap]))) for r in (steady, one_sided))
+    shaft_peak = (
+        max(float(np.max(np.abs(r["machine.tau"]))) for r in (start, steady, one_sided)) * c.drive.ratio
+    )
+    reflected = float(np.max(steady["machine.J"]))
+    torque = rms((1.0 - share, steady[gap].values), (share, one_sided[gap].values))
+    locked = plate.locked_rotor_time
+    checks = {
+        "start": Check("time to start", started, locked, "s"),
+        "rms_torque": Check("RMS torque", checked(torque), rated_torque * math.sqrt(cooling), "N.m"),
+        "peak_torque": Check(
+            "peak torque", checked(peak), c.breakdown_torque / asked.breakdown_margin, "N.m"
+        ),
+        "temperature": Check(
+            "rise of temperature", checked(temperature - p.ambient.T), asked.temperature - p.ambient.T, "K"
+        ),
+        "starts": Check(
+            "starts per hour",
+            asked.starts_per_hour,
+            permitted_starts(p, steady_heat, extra, cooling, asked.temperature),
+            "1",
+        ),
+        "inertia": Check("inertia ratio", reflected / p.rotor.J, asked.inertia_ratio, "1"),
+        "speed": Check("speed fluctuation", checked(c.fluctuation), asked.fluctuation, "1"),
+    }
+    if math.isfinite(gear.torque_limit):
+        checks["gear"] = Check("torque of the gear", shaft_peak, gear.torque_limit, "N.m")
+    return checks
+
+
+def permitted_starts(
+    p: Any, running_heat: float, start_heat: float, cooling: float, temperature: float
+) -> float:
+    """Starts per hour that bring the winding to its permitted `temperature` [K], beside `running_heat` [W], with
+    `start_heat` [J] each; a ten-thousandth where running alone is too hot."""
+    spare = (temperature - p.ambient.T) * cooling / p.stator.R_th - running_heat
+    return max(1e-4, 3600.0 * spare / start_heat) if start_heat > 0.0 else 1e6
+
+
+def rank(candidates: list[Candidate]) -> None:
+    """Order by rank and say why: what fits by size, then what does not by how far it is off."""
+    for c in candidates:
+        if c.verdict:
+            continue
+        name, used = c.worst
+        check = c.checks[name]
+        if math.isinf(used):
+            c.verdict, c.reason = "rejected", "it does not bring the machine up to speed"
+        elif used > 1.0:
+            c.verdict = "rejected"
+            over = [
+                f"{k.title} {100 * (k.utilisation or 0):.0f} %"
+                for k in c.checks.values()
+                if (k.utilisation or 0) > 1
+            ]
+            c.reason = (
+                f"{check.title} {check.value:.3g} {check.unit} of {check.limit:.3g} permitted"
+                if len(over) == 1
+                else "above 100 %: " + ", ".join(over)
+            )
+        else:
+            c.verdict, c.reason = "fits", f"most used: {check.title}, {100 * used:.0f} %"
+    candidates.sort(
+        key=lambda c: (
+            c.verdict == "rejected",
+            c.motor.nameplate.power if c.verdict == "fits" else c.worst[1] if c.checks else math.inf,
+            c.worst[1] if c.checks else math.inf,
+        )
+    )
+    if candidates and candidates[0].verdict == "fits":
+        best = candidates[0]
+        best.verdict = "chosen"
+        best.reason = f"the smallest that fits; {best.reason}"
+        for c in candidates[1:]:
+            if c.verdict == "fits":
+                larger = c.motor.nameplate.power > best.motor.nameplate.power
+                c.reason = (
+                    f"{'larger than needed' if larger else 'more used than the chosen one'}; {c.reason}"
+                )
+
+
+def recommended(config: Config, c: Candidate) -> Protection:
+    """Settings of the protection: the coupling trips a quarter above the largest torque of normal duty, at most at
+    what the gear may carry; the relay is set to the rated current."""
+    trip = 1.25 * c.peak_torque
+    return Protection(
+        trip_torque=min(trip, config.gear.torque_limit),
+        relay_current=c.motor.nameplate.current,
+        breakdown_torque=c.breakdown_torque * c.drive.ratio,
+    )
