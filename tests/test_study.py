@@ -14,6 +14,7 @@ import xarray as xr
 from fmpy.validation import validate_fmu
 
 from chainunit import EMPTY, ChainUnit, SideLoads
+from chainunit.report import plots
 from chainunit.studies.cycle import cycle, overload_factors, without_right
 
 SHORT = """
@@ -52,9 +53,7 @@ def done(tmp_path_factory):
 def test_study_writes_numbers_series_plots_and_fmus(done):
     result, folder = done
     names = {p.name for p in folder.iterdir()}
-    assert names == {"result.json", "result.nc", "fmu"} | {
-        f"{n}.png" for n in ("torque_angle", "overload_time", "torque_speed", "reactions", "start_up")
-    }
+    assert names == {"report.html", "result.json", "result.nc", "load_cycle.csv", "fmu", *plots.NAMES}
     for name in ("ChamberForces", "DcMotor"):
         assert validate_fmu(str(folder / "fmu" / f"{name}.fmu")) == []
     for word in (

@@ -1,4 +1,4 @@
-"""The command line: ``chainunit study``, ``chainunit reproduce``, ``chainunit export``."""
+"""The command line: ``chainunit study``, ``chainunit reproduce``, ``chainunit export``, ``chainunit export-ssp``."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def study(
 ) -> None:
     """Run the machine with its motor: start-up, steady running, one-sided overloads.
 
-    Writes result.json, result.nc, plots and the FMUs into the output folder.
+    Writes report.html, result.json, result.nc, plots and the FMUs into the output folder.
     """
     from . import config as configuration
 
@@ -82,10 +82,10 @@ def study(
     folder(output)
 
     from .errors import InterruptedRunError
-    from .report import files, plots, table
+    from .report import files, page, plots, table
     from .studies.overload import run_study
 
-    for stale in ("result.json", "result.nc", *plots.NAMES):
+    for stale in ("result.json", "result.nc", page.NAME, *plots.NAMES):
         if (output / stale).exists() and not (output / stale).is_file():
             raise InputError(f"{output / stale}: is not a regular file; name another folder")
         (output / stale).unlink(missing_ok=True)
@@ -104,7 +104,7 @@ def study(
             bar.update(task, description=what, completed=done, total=todo)
 
         result = run_study(loaded, output, report, check=check, backend=backend.value if backend else None)
-    written = [*files.write(result, output), *plots.write(result, output)]
+    written = [*files.write(result, output), *plots.write(result, output), page.write(result, output)]
     table.show(result, console)
     console.print("Written: " + ", ".join(str(path) for path in written), soft_wrap=True)
     if result.failure is not None:
@@ -182,6 +182,28 @@ def export(
             report=status.update,
         )
     print(f"{file}: {name}, {made}")
+
+
+@app.command("export-ssp")
+def export_ssp(
+    config: Annotated[
+        Path | None, typer.Argument(help="Study file (TOML); without one, the packaged example.")
+    ] = None,
+    output: Annotated[Path, typer.Option("-o", "--output", help="SSP file.")] = Path("ChainUnitDrive.ssp"),
+    backend: Annotated[
+        Backend | None, typer.Option("--backend", help="native where a C compiler is found, else python.")
+    ] = None,
+) -> None:
+    """Write motor and machine, connected, with their parameter sets, as an SSP 1.0 package of FMUs 2.0."""
+    from . import config as configuration
+    from .fmu.ssp import export_study
+
+    if output.suffix != ".ssp":
+        raise InputError(f"-o {output}: must be a file name that ends in .ssp")
+    loaded = configuration.load(config)
+    with _console(stderr=True).status("exporting") as status:
+        made = export_study(loaded, output, backend=backend.value if backend else None, report=status.update)
+    print(f"{output}: {made}")
 
 
 def _platforms(wanted: str | None, fmi: int) -> list[str]:

@@ -20,6 +20,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
 
 from .drives.dc_motor import DcMotor
+from .drives.gearing import KINDS, Transmission
 from .drives.induction_motor import Inverter, SoftStart
 from .errors import InputError
 from .machines.api import ChainUnit, ratios
@@ -162,7 +163,7 @@ class Sizing:
     one_sided_share: Value = quantity(
         "1", "share of the running time with all feed on one side", default=0.1, min=0.0, max=1.0
     )
-    starts_per_hour: Value = quantity("1", "starts per hour", default=6.0, min=0.0, max=1000.0)
+    starts_per_hour: Value = quantity("1", "starts per hour", default=2.0, min=0.0, max=1000.0)
     fluctuation: Value = quantity(
         "1",
         "permitted fluctuation of the crank speed, (largest - least)/mean",
@@ -307,21 +308,22 @@ _SECTIONS = {
     "coupling": Coupling,
     "monte_carlo": MonteCarlo,
     "sizing": Sizing,
+    "gear": Transmission,
     "starter": Starter,
 }
 _File = create_model(
     "Config",
     __config__=ConfigDict(extra="forbid"),
     title=(str, ""),
-    feed_forward=(bool, False),
-    start=(Literal[STARTS], "direct"),
-    catalogue=(str, ""),
-    events=(list[Literal[*SCENARIOS]], ["right_empties", "feed_left", "jam_left"]),
     **{
         name: (schema, Field(default_factory=schema))
         for name, schema in ((n, _schema(d, n, n + ".")) for n, d in _SECTIONS.items())
-    },  # type: ignore[call-overload]
-)
+    },
+    feed_forward=(bool, False),
+    start=(Literal[STARTS], "direct"),
+    catalogue=(str, ""),
+    events=(list[Literal[*SCENARIOS]], ["right_empties", "feed_left", "jam_left"]),  # type: ignore[valid-type]
+)  # type: ignore[call-overload]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -340,6 +342,8 @@ class Config:
     monte_carlo: MonteCarlo
     feed_forward: bool
     sizing: Sizing | None
+    gear: Transmission
+    gear_given: frozenset[str]
     start: str
     starter: Starter
     catalogue: Path | None
@@ -450,6 +454,8 @@ def parse(text: str, source: str = "config") -> Config:
         monte_carlo=_instance(MonteCarlo, _given(checked.monte_carlo)),
         sizing=_instance(Sizing, _given(checked.sizing)) if "sizing" in data else None,
         feed_forward=checked.feed_forward,
+        gear=_instance(Transmission, {**Layout(Transmission).named(KINDS["gear"]), **_given(checked.gear)}),
+        gear_given=frozenset(_given(checked.gear)),
         start=checked.start,
         starter=_instance(Starter, _given(checked.starter)),
         catalogue=_beside(checked.catalogue, source),

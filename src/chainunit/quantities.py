@@ -49,6 +49,7 @@ TYPES: dict[str, str] = {
     "rad": "Angle",
     "rad/s": "AngularVelocity",
     "rad/s2": "AngularAcceleration",
+    "s": "Time",
     "m": "Length",
     "m/s": "Velocity",
     "m/s2": "Acceleration",

@@ -21,8 +21,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
+from ..engines import MATH
 from ..model import Part, Requirement
 from ..ports import NO_LOAD, LoadPort, flange, load_inertia, load_terminal, load_torque
 from ..quantities import Value, declaration, group, quantity
@@ -143,7 +144,11 @@ class Inputs:
 
     load: LoadPort = group(LoadPort, "load", default=NO_LOAD)
     voltage: Value = quantity(
-        "1", "share of the supply's voltage: 0 is off, a dip lies between", default=1.0, min=0.0, max=2.0
+        "1",
+        "share of the supply's voltage; at 0 the terminals are short-circuited, as in a deep dip",
+        default=1.0,
+        min=0.0,
+        max=2.0,
     )
     w_ref: Value = quantity("rad/s", "speed asked of the inverter", default=0.0)
 
@@ -211,6 +216,127 @@ def skin(s: Any) -> Any:
     return 2.0 * s * s / (1.0 + s * s)
 
 
+def _circuit(p: Any, slip_speed: Any, T: Any) -> tuple[Any, Any, Any]:
+    """Resistances of stator and cage [Ohm] and the leakage inductance [H] at this slip [rad/s, electrical] and
+    temperature [K]."""
+    developed = skin(slip_speed * (1.0 / (_TURN * p.supply.f)))
+    warm = 1.0 + p.stator.alpha * (T - T_RATED)
+    return (
+        p.stator.R * warm,
+        p.cage.R * warm * (1.0 + p.cage.skin_R * developed),
+        p.cage.L * (1.0 - p.cage.skin_L * developed),
+    )
+
+
+def volts_per_hertz(xp: Any, p: Any, f: Any) -> Any:
+    """Share of the voltage that the inverter gives at the frequency `f` [Hz]: V/f with a boost at low frequency;
+    above the corner the voltage is all there is."""
+    return xp.minimum(p.inverter.boost + (1.0 - p.inverter.boost) * f / p.supply.f, 1.0)
+
+
+class Steady(NamedTuple):
+    """Steady running at one speed. What is also an output of the model has its name and unit; `psi` and `psi_r` are
+    the states."""
+
+    air_gap_tau: Any
+    tau: Any
+    """torque that is left for a load, behind friction and windage"""
+    i: Any
+    power_factor: Any
+    supply_power: Any
+    heat: Any
+    slip: Any
+    psi: Flux
+    psi_r: Flux
+
+
+_ITERATIONS = 20
+
+
+def steady(xp: Any, p: Any, w: Any, voltage_share: Any = 1.0, f: Any = None, T: Any = T_RATED) -> Steady:
+    """The state in which every flux stands still, at the rotor speed `w` [rad/s].
+
+    `voltage_share` is the share of the supply's voltage, `f` the frequency [Hz] (the supply's where left out), `T`
+    the temperature of the windings [K]. With all derivatives 0 the model's equations are the Gamma circuit,
+
+        i_r = -(g + j b) psi_s        g + j b = j w_r/(R_r + j w_r L_l)        w_r = 2 pi f - p w
+        u_s = (R_s (1/L_m + g) + j (2 pi f + R_s b)) psi_s
+
+    and |psi_s|^2, which L_m depends on, follows by Newton's method: from the flux without saturation it falls to the
+    root steadily, because |u_s|^2 grows with it and ever faster. It is exact where saturation lowers the flux at this
+    voltage to not less than a third.
+    """
+    w_s = _TURN * (p.supply.f if f is None else f)
+    slip_speed = w_s - p.pole_pairs * w
+    R_s, R_r, leak = _circuit(p, slip_speed, T)
+    rotor = slip_speed / (R_r * R_r + slip_speed * slip_speed * leak * leak)
+    g, b = rotor * slip_speed * leak, rotor * R_r
+    u = math.sqrt(2.0 / 3.0) * p.supply.V * voltage_share
+    quadrature = w_s + R_s * b
+    beta_2 = p.main.beta * p.main.beta
+    beta_6 = beta_2 * beta_2 * beta_2
+    phase = R_s * (1.0 / p.main.L + g)
+    squared = u * u / (phase * phase + quadrature * quadrature)
+    for _ in range(_ITERATIONS):
+        cube = beta_6 * squared * squared * squared
+        phase = R_s * ((1.0 + cube) / p.main.L + g)
+        impedance = phase * phase + quadrature * quadrature
+        slope = impedance + 6.0 * phase * R_s * cube / p.main.L
+        squared = squared - (squared * impedance - u * u) / slope
+    main = (1.0 + beta_6 * squared * squared * squared) / p.main.L
+    phase = R_s * (main + g)
+    impedance = phase * phase + quadrature * quadrature
+    psi = Flux(d=u * phase / impedance, q=-u * quadrature / impedance)
+    ir_d, ir_q = psi.q * b - psi.d * g, -psi.q * g - psi.d * b
+    i_d, i_q = psi.d * main - ir_d, psi.q * main - ir_q
+    current = xp.sqrt(i_d * i_d + i_q * i_q)
+    air_gap = 1.5 * p.pole_pairs * squared * b
+    return Steady(
+        air_gap_tau=air_gap,
+        tau=air_gap - p.rotor.d * w,
+        i=math.sqrt(0.5) * current,
+        power_factor=i_d / current,
+        supply_power=1.5 * u * i_d,
+        heat=1.5 * (R_s * (i_d * i_d + i_q * i_q) + R_r * (ir_d * ir_d + ir_q * ir_q)),
+        slip=slip_speed / xp.maximum(w_s, 1e-3 * _TURN * p.supply.f),
+        psi=psi,
+        psi_r=Flux(d=psi.d + leak * ir_d, q=psi.q + leak * ir_q),
+    )
+
+
+_SLIPS = tuple(10.0 ** (k / 10.0) for k in range(-30, 1))
+_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+
+
+def breakdown(p: Any, voltage_share: float = 1.0, f: float | None = None, T: float = T_RATED) -> Steady:
+    """Where the torque at the shaft is largest, between standstill and synchronous speed; arguments as in `steady`.
+
+    The first maximum from synchronous speed on: with much skin effect the torque rises again towards standstill. The
+    slip is found to 1e-5 of itself, the torque therefore to about 1e-10.
+    """
+    synchronous = _TURN * (p.supply.f if f is None else f) / p.pole_pairs
+
+    def at(slip: float) -> Steady:
+        return steady(MATH, p, (1.0 - slip) * synchronous, voltage_share, f, T)
+
+    k, tau = 0, at(_SLIPS[0]).tau
+    while k + 1 < len(_SLIPS) and (next_tau := at(_SLIPS[k + 1]).tau) >= tau:
+        k, tau = k + 1, next_tau
+    low, high = _SLIPS[max(k - 1, 0)], _SLIPS[min(k + 1, len(_SLIPS) - 1)]
+    left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+    at_left, at_right = at(left), at(right)
+    while high - low > 1e-5 * high:
+        if at_left.tau < at_right.tau:
+            low, left, at_left = left, right, at_right
+            right = low + _GOLDEN * (high - low)
+            at_right = at(right)
+        else:
+            high, right, at_right = right, left, at_left
+            left = high - _GOLDEN * (high - low)
+            at_left = at(left)
+    return max(at_left, at_right, at(high), key=lambda s: s.tau)
+
+
 class _Point:
     """Everything at one state: supply, circuit, shaft."""
 
@@ -223,19 +349,13 @@ class _Point:
         psi, psi_r, f = x.stator.psi, x.cage.psi, x.supply.frequency
         self.w_s = _TURN * f
         self.slip_speed = self.w_s - p.pole_pairs * x.w
-        developed = skin(self.slip_speed * (1.0 / (_TURN * p.supply.f)))
-        warm = 1.0 + p.stator.alpha * (x.stator.T - T_RATED)
-        self.R_s = p.stator.R * warm
-        self.R_r = p.cage.R * warm * (1.0 + p.cage.skin_R * developed)
-        self.leak = p.cage.L * (1.0 - p.cage.skin_L * developed)
+        self.R_s, self.R_r, self.leak = _circuit(p, self.slip_speed, x.stator.T)
         squared = psi.d * psi.d + psi.q * psi.q
         b = p.main.beta * p.main.beta * squared
         self.main = (1.0 + b * b * b) / p.main.L
         self.ir_d, self.ir_q = (psi_r.d - psi.d) / self.leak, (psi_r.q - psi.q) / self.leak
         self.i_d, self.i_q = psi.d * self.main - self.ir_d, psi.q * self.main - self.ir_q
-        # V/f with a boost at low frequency; above the corner the voltage is all there is
-        share = xp.minimum(p.inverter.boost + (1.0 - p.inverter.boost) * f / p.supply.f, 1.0)
-        by_frequency = 1.0 + p.inverter.on * (share - 1.0)
+        by_frequency = 1.0 + p.inverter.on * (volts_per_hertz(xp, p, f) - 1.0)
         self.u = math.sqrt(2.0 / 3.0) * p.supply.V * u.voltage * x.supply.ramp * by_frequency
         self.air_gap = 1.5 * p.pole_pairs * (psi.d * self.i_q - psi.q * self.i_d)
         asked = p.pole_pairs * u.w_ref / _TURN + p.inverter.slip * self.air_gap
@@ -304,6 +424,22 @@ class InductionMotor(Motor):
     def excitation(t: float) -> dict[str, float]:
         """A start direct on line against a steady load."""
         return {"load.tau_bias": 5.0, "load.J": 0.02}
+
+    @staticmethod
+    def limit(xp: Any, p: Any, w: Any) -> Any:
+        """On the line what a cold motor gives at this speed; on an inverter the most that any frequency gives, to
+        about 1 % (the inverter's own current limit is not in the model)."""
+        on_line = steady(xp, p, w).air_gap_tau
+        most = on_line * 0.0
+        for slip in _SLIPS:
+            f = xp.maximum(p.pole_pairs * w / _TURN, 0.0) + slip * p.supply.f
+            most = xp.maximum(most, steady(xp, p, w, volts_per_hertz(xp, p, f), f).air_gap_tau)
+        return on_line + p.inverter.on * (most - on_line)
+
+    @staticmethod
+    def largest_torque(p: Any) -> float:
+        """The breakdown torque of a cold motor at the supply's whole voltage and frequency."""
+        return float(breakdown(p).air_gap_tau)
 
     @staticmethod
     def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:

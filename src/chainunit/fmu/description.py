@@ -208,16 +208,14 @@ def model_description_3(
             {**attributes, **_unit(_per_second(v.unit))},
             derivative=str(first_state + i),
         )
-    SubElement(
-        variables,
-        "Float64",
-        name="time",
-        valueReference=str(first_derivative + len(interface.states)),
-        description="time",
-        causality="independent",
-        variability="continuous",
-        unit="s",
-    )
+    time = {
+        "name": "time",
+        "valueReference": str(first_derivative + len(interface.states)),
+        "description": "time",
+        "causality": "independent",
+        "variability": "continuous",
+    }
+    SubElement(variables, "Float64", time | _unit("s"))
     structure = SubElement(root, "ModelStructure")
     known = interface.dependencies
     references = [s.reference for s in interface.of("output")]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import json
+import math
 from pathlib import Path
 
 import xarray as xr
@@ -10,6 +12,24 @@ import xarray as xr
 from .. import __version__
 from ..files import whole
 from ..studies.overload import SCENARIOS, Study, as_dict
+
+
+LOAD_CYCLE = "load_cycle.csv"
+
+
+def _load_cycle(study: Study, file: Path) -> Path:
+    """The load that the motor shaft sees in steady running, in the form that sizing tools import: a row per instant
+    with time, speed, torque of the load and inertia of the load, units in the head."""
+    run, settings = study.runs["start_up"], study.config.run
+    settled = settings.ramp + settings.settle_turns * 2.0 * math.pi / settings.crank_speed
+    steady = run.sel(time=slice(settled, None))
+    names = {"time": "time", "motor.w": "speed", "machine.tau": "torque", "machine.J": "inertia"}
+    with whole(file) as part, part.open("w", newline="", encoding="utf-8") as out:
+        writer = csv.writer(out)
+        writer.writerow(f"{title} [{steady[name].attrs['units']}]" for name, title in names.items())
+        columns = [steady[name].values - (settled if name == "time" else 0.0) for name in names]
+        writer.writerows([f"{x:.9g}" for x in row] for row in zip(*columns, strict=True))
+    return file
 
 
 def write(study: Study, folder: Path) -> list[Path]:
@@ -22,6 +42,8 @@ def write(study: Study, folder: Path) -> list[Path]:
     with whole(numbers) as part:
         part.write_text(json.dumps(as_dict(study), indent=2, allow_nan=False) + "\n", "utf-8")
     written = [numbers]
+    if "steady" in study.answers:
+        written.append(_load_cycle(study, folder / LOAD_CYCLE))
     if study.runs:
         series = folder / "result.nc"
         tree = xr.DataTree.from_dict(

@@ -14,12 +14,22 @@ from ..engines import numpy_
 from ..studies.overload import PINS, SCENARIOS, Study
 from .style import LINES, draw
 
-NAMES = ("torque_angle.png", "overload_time.png", "torque_speed.png", "reactions.png", "start_up.png")
+NAMES = (
+    "torque_angle.png",
+    "sides_over_speed.png",
+    "speed_loop.png",
+    "overload_time.png",
+    "torque_speed.png",
+    "reactions.png",
+    "start_up.png",
+)
 
 
 def write(study: Study, folder: Path) -> list[Path]:
     """Write every plot that the study has data for; returns the files."""
-    plots = {"torque_angle.png": _torque_angle}
+    plots = {"torque_angle.png": _torque_angle, "sides_over_speed.png": _sides_over_speed}
+    if study.loops:
+        plots["speed_loop.png"] = _speed_loop
     if any(name in study.runs for name in SCENARIOS):
         plots |= {
             "overload_time.png": _overload_time,
@@ -44,6 +54,51 @@ def _torque_angle(study: Study) -> Any:
     bottom.set_xlim(0, 360)
     top.set_title(f"One turn at constant {study.config.run.crank_speed:g} rad/s")
     top.legend(loc="upper center", ncols=3, bbox_to_anchor=(0.5, -0.02), fontsize=9)
+    return figure
+
+
+def _sides_over_speed(study: Study) -> Any:
+    sides = study.sides
+    assert sides is not None
+    figure, axes = plt.subplots(1, 2, figsize=(10, 4.2), sharex=True)
+    for axis, name in zip(axes, ("rocker", "crank"), strict=True):
+        for line, (which, title) in zip(
+            LINES, (("both", "both organs"), ("alone", "left organ alone")), strict=False
+        ):
+            axis.plot(sides.speed, getattr(sides, f"{name}_{which}"), label=title, **line)
+        for at in sides.crossings()[name]:
+            axis.axvline(at, color="#777777", linewidth=0.8)
+            axis.annotate(f" {at:.1f} rad/s", (at, 0.02), xycoords=("data", "axes fraction"), fontsize=9)
+        axis.set_xlabel("crank speed [rad/s]")
+        axis.set_ylabel(f"{name} torque, largest of the turn [N m]")
+        axis.set_xlim(0.0, sides.speed[-1])
+        axis.set_ylim(bottom=0.0)
+    axes[0].legend(loc="upper left")
+    figure.suptitle("One side alone against both")
+    return figure
+
+
+def _speed_loop(study: Study) -> Any:
+    figure, axes = plt.subplots(1, 2, figsize=(10, 4.6), width_ratios=(1.0, 1.0))
+    gain, step = axes
+    phase = gain.twinx()
+    for line, (name, found) in zip(LINES, study.loops.items(), strict=False):
+        gain.loglog(found.frequency, found.gain, label=name, **line)
+        phase.semilogx(found.frequency, found.phase, **{**line, "linewidth": 0.8})
+        step.plot(found.time, found.deviation, label=name, **line)
+    gain.axhline(1.0, color="#777777", linewidth=0.8)
+    gain.set_xlabel("frequency [rad/s]")
+    gain.set_ylabel("gain of the open speed loop [1], bold")
+    phase.set_ylabel("phase [deg], thin")
+    phase.set_ylim(-270.0, 0.0)
+    phase.set_yticks(range(-270, 1, 45))
+    phase.grid(visible=False)
+    gain.set_title("Bode plot")
+    step.set_xlabel("time after a step of the load torque [s]")
+    step.set_ylabel("deviation of the motor speed [(rad/s)/(N m)]")
+    step.set_title("Disturbance step")
+    step.set_xlim(0.0, max(found.settling for found in study.loops.values()) * 1.5)
+    step.legend(loc="lower right")
     return figure
 
 

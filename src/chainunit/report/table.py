@@ -9,7 +9,9 @@ from rich.table import Table
 from rich.text import Text
 
 from ..quantities import Layout, Variable
+from ..studies.monte_carlo import QUANTILES, MonteCarloResult, Sample
 from ..studies.overload import SCENARIOS, Answers, Study
+from ..studies.sizing import recommended
 
 _SHORT = {
     "steady": "steady",
@@ -51,7 +53,7 @@ def _number(value: float | None, unit: str) -> str:
 
 def _cell(study: Study, run: str, v: Variable) -> str:
     value = getattr(study.answers[run], v.name)
-    if v.name in _IF_ANY and value is None:
+    if value is None and v.name != "recovery_time":
         return "-"
     if v.name == "recovery_time" and run == "steady":
         return ""
@@ -61,6 +63,8 @@ def _cell(study: Study, run: str, v: Variable) -> str:
 def show(study: Study, console: Console) -> None:
     """Print tables and notes."""
     config = study.config
+    if study.sizing is not None:
+        _show_sizing(study, console)
     runs = [name for name in ("steady", *SCENARIOS) if name in study.answers]
     if runs:
         table = Table(title=Text(config.title) if config.title else None, title_justify="left")
@@ -72,6 +76,8 @@ def show(study: Study, console: Console) -> None:
             if v.name not in _HIDDEN and (known or v.name not in _IF_ANY):
                 table.add_row(v.description, *(_cell(study, run, v) for run in runs))
         console.print(table)
+    if study.monte_carlo is not None:
+        _show_monte_carlo(study.monte_carlo, console)
     if study.factors:
         f = study.factors
         table = Table(title="Overload factor, left organ alone against both", title_justify="left")
@@ -84,12 +90,13 @@ def show(study: Study, console: Console) -> None:
     if study.pins:
         heaviest = {pin: max(t[pin]["peak"] for t in study.pins.values()) for pin in study.pins["steady"]}
         table = Table(title="What the bearings carry", title_justify="left")
-        for column in ("pin", "steady RMS", "steady peak", "largest peak", "in"):
+        for column in ("pin", "equivalent (ISO 281)", "steady RMS", "steady peak", "largest peak", "in"):
             table.add_column(column, justify="left" if column in ("pin", "in") else "right")
         for pin, steady in study.pins["steady"].items():
             worst = max(study.pins, key=lambda run: study.pins[run][pin]["peak"])
             table.add_row(
                 pin,
+                f"{steady['equivalent']:.0f} N",
                 f"{steady['rms']:.0f} N",
                 f"{steady['peak']:.0f} N",
                 f"{heaviest[pin]:.0f} N",
@@ -114,3 +121,46 @@ def show(study: Study, console: Console) -> None:
             console.print(f"Difference of {quantity} to the monolithic solution: {value:.1e} of its peak.")
     for note in study.notes:
         console.print(f"Note: {note}")
+
+
+def _show_sizing(study: Study, console: Console) -> None:
+    """The candidates in their order, with how much of each limit they use."""
+    sized = study.sizing
+    assert sized is not None
+    chosen = sized.chosen
+    if chosen is not None:
+        settings = recommended(study.config, chosen)
+        wheel = f"flywheel {chosen.flywheel:.3g} kg m2" if chosen.flywheel else "no flywheel"
+        console.print(
+            f"Motor: {chosen.motor.designation}, ratio {chosen.drive.ratio:.2f}, {wheel}; safety coupling at "
+            f"{settings.trip_torque:.0f} N m of the crank, relay at {settings.relay_current:.2f} A."
+        )
+    else:
+        console.print("No motor of the catalogue fits.")
+    table = Table(title="Candidates, best first", title_justify="left")
+    table.add_column("motor", no_wrap=True)
+    table.add_column("ratio", justify="right")
+    table.add_column("verdict", no_wrap=True)
+    table.add_column("because")
+    for c in sized.candidates:
+        table.add_row(c.motor.designation, f"{c.drive.ratio:.2f}", c.verdict, c.reason)
+    console.print(table)
+
+
+def _show_monte_carlo(found: MonteCarloResult, console: Console) -> None:
+    """Quantiles of the random overloads."""
+    columns = [f"q{100 * q:.0f}" for q in QUANTILES]
+    table = Table(title=f"Overloads at random, {len(found.rows)} runs", title_justify="left")
+    table.add_column("quantile")
+    for column in columns:
+        table.add_column(f"{column[1:]} %", justify="right")
+    declared = {v.name: v for v in Layout(Sample).variables}
+    for name, sizes in found.quantiles().items():
+        v = declared[name]
+        if "share" in sizes:
+            console.print(
+                f"{v.description.removeprefix('1 where ').capitalize()}: {100 * sizes['share']:.1f} % of runs."
+            )
+        else:
+            table.add_row(v.description, *(_number(sizes[c], v.unit) for c in columns))
+    console.print(table)

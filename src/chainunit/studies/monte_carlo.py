@@ -219,7 +219,8 @@ def run(
     InterruptedRunError
         after Ctrl-C; likewise.
     """
-    import dask
+    from dask.base import compute
+    from dask.delayed import delayed
 
     digest = task.digest()
     file = folder / f"monte_carlo_{digest}.jsonl"
@@ -241,9 +242,9 @@ def run(
         try:
             for first in range(0, len(batches), workers):
                 tasks = [
-                    dask.delayed(batch)(task, digest, numbers) for numbers in batches[first : first + workers]
+                    delayed(batch)(task, digest, numbers) for numbers in batches[first : first + workers]
                 ]
-                for found in dask.compute(*tasks, scheduler="processes", pool=pool):
+                for found in compute(*tasks, scheduler="processes", pool=pool):
                     for row in found:
                         rows[row["run"]] = row
                         out.write(json.dumps(row) + "\n")

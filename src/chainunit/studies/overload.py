@@ -29,6 +29,9 @@ from ..quantities import Layout, Value, declaration, quantity
 from . import protection
 from .cycle import OverloadFactors, Sides, cycle, overload_factors, sides_over_speed
 from .drive import Drive
+from .monte_carlo import MonteCarloResult, Task
+from .monte_carlo import run as run_monte_carlo
+from .sizing import SizingResult, size
 
 PINS = {
     "O1 crank bearing": "crank_bearing",
@@ -116,6 +119,8 @@ class Study:
     config: Config
     drive: Drive
     tuning: Tuning | None = None
+    sizing: SizingResult | None = None
+    monte_carlo: MonteCarloResult | None = None
     loops: dict[str, Loop] = field(default_factory=dict)
     """the linearised speed loop of a controlled motor, by which inertia"""
     ripple_without: float | None = None
@@ -153,13 +158,25 @@ def run_study(
     With `check`, the start-up and steady running are also compared with the monolithic solution.
     A run that fails ends the study early: what was computed is in it, and `failure` says why.
     """
-    motor, tuning = _tuned(config)
-    study = Study(config, Drive(DcMotor, motor, config.machine, feed_forward=config.feed_forward), tuning)
-    study.loops = _loops(study)
+    report = report or (lambda what, done, todo: None)
+    if config.sizing is None:
+        motor, tuning = _tuned(config)
+        drive = Drive(DcMotor, motor, config.machine, feed_forward=config.feed_forward)
+        study = Study(config, drive, tuning)
+        study.loops = _loops(study)
+    else:
+        sized = size(config, folder / "fmu", report, backend)
+        # where none fits, the first of the list stands for the machine's own numbers
+        best = sized.chosen or (sized.candidates[0] if sized.candidates else None)
+        drive = best.drive if best else Drive(DcMotor, config.motor, config.machine)
+        study = Study(config, drive, sizing=sized)
     _statics(study)
+    if study.sizing is not None and study.sizing.chosen is None:
+        _note(study)
+        return study
     files, study.made = study.drive.export(folder / "fmu", backend)
     try:
-        _simulate(study, files, folder, report or (lambda what, done, todo: None), check, backend)
+        _simulate(study, files, folder, report, check, backend)
     except RunError as error:
         if error.partial is not None:
             study.runs["unfinished"] = error.partial
@@ -359,6 +376,8 @@ def _simulate(
             progress = partial(_progress, report, SCENARIOS["start_loaded"], total - stop, total)
             transient = simulation.run(stop, run.step, progress, guards=guards)
             _close(study, "start_loaded", transient, 0.0, stop, bond, simulation, folder, backend)
+    if config.monte_carlo.runs:
+        study.monte_carlo = run_monte_carlo(Task(config, drive, files, stop), folder, report)
 
 
 def _guards(study: Study) -> dict[str, float]:
@@ -557,8 +576,9 @@ def _answers(study: Study, run: xr.Dataset, event: float | None, steady: xr.Data
         rocker_torque_peak=peak(value("machine.rocker.tau")),
         speed_mean=mean(speed),
         speed_least=float(np.min(speed)),
-        speed_ripple=float(np.ptp(speed[whole])) / max(abs(mean(speed)), 1e-9),
-        speed_dip=float((asked - np.min(speed)) / asked),
+        speed_ripple=float(np.ptp(speed[whole])) / max(abs(mean(speed)), 1e-9) if event is None else None,
+        # a start begins at rest
+        speed_dip=float((asked - np.min(speed)) / asked) if event != 0.0 else None,
         recovery_time=recovery,
         web_pull_least=least("web"),
         wall_pull_least=least("wall"),
@@ -644,6 +664,10 @@ def _note(study: Study) -> None:
             "motor's voltage or current is at its limit, or the run is too short to settle. Overloads are those "
             "of this state."
         )
+    if study.sizing is not None:
+        study.notes.extend(study.sizing.notes)
+        if study.sizing.chosen is None:
+            note("no motor of the catalogue fits; the list says why each is rejected.")
     for name, answers in study.answers.items():
         title = SCENARIOS.get(name, "steady running")
         if answers.web_pull_least < 0.0:
@@ -723,6 +747,8 @@ def as_dict(study: Study) -> dict[str, Any]:
         "feed": entries(config.feed),
         "run": entries(config.run),
         "overload": entries(config.overload),
+        **({"sizing": study.sizing.as_dict()} if study.sizing else {}),
+        **({"monte_carlo": study.monte_carlo.as_dict()} if study.monte_carlo else {}),
         "coupling": entries(config.coupling) if config.coupling else None,
         "sides_over_speed": study.sides.as_dict() if study.sides else None,
     }

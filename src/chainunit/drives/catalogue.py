@@ -1,0 +1,204 @@
+"""Standard motors: the packaged table, and rows of the user's own.
+
+The packaged table holds cage motors for 400 V, 50 Hz, 0.55 to 75 kW, with 2, 4 and 6 poles, in the frames of
+EN 50347. Their efficiencies are the limits of class IE3 in IEC 60034-30-1. Everything else is typical of such motors
+and of no maker's: it varies smoothly with size, and stands in for the catalogue of whoever delivers the motor.
+
+A user's file has the same columns. In CSV a heading is the name of a value, with its unit in brackets where it
+has one ("power [kW]", "speed [rev/min]"); in TOML each motor is a table ``[[motor]]``, a number is in the
+declared SI unit, and a text may carry a unit ("1455 rev/min"). Columns that have a start value may be left out.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..quantities import DISPLAY_UNITS, Layout, Value, Variable, declaration, quantity
+from .nameplate import Identified, Nameplate, check, identify
+
+
+@declaration
+class CatalogueData(Nameplate):
+    """A nameplate, with what else a catalogue says."""
+
+    mass: Value = quantity("kg", "mass; 0: unknown", default=0.0, min=0.0)
+    # no catalogue of standard motors gives it; common practice against a load of about the rotor's own inertia
+    starts: Value = quantity(
+        "1", "permitted starts direct on line in an hour, spread evenly", default=6.0, above=0.0, max=3600.0
+    )
+
+
+LAYOUT = Layout(CatalogueData)
+_VARIABLES = {v.name: v for v in LAYOUT.variables}
+_TEXTS = ("designation", "source")
+_HEADING = re.compile(r"\s*(\w+)\s*(?:\[\s*(.*?)\s*\])?\s*")
+
+
+@dataclass(frozen=True)
+class CatalogueMotor:
+    """A motor of the catalogue; `origin` is the file and row it comes from, `source` what its values are."""
+
+    designation: str
+    nameplate: CatalogueData
+    source: str
+    origin: str
+
+    def identify(self) -> Identified:
+        """Its equivalent circuit; see `chainunit.drives.nameplate.identify`.
+
+        Raises
+        ------
+        InputError
+            in one line, where no circuit meets its nameplate.
+        """
+        try:
+            return identify(self.nameplate)
+        except InputError as error:
+            raise InputError(f"{self.origin}: {self.designation}: {error}") from error
+
+
+def heading(variable: Variable) -> str:
+    """Name and unit of a column, in the unit that engineers read."""
+    unit = DISPLAY_UNITS.get(variable.unit, (variable.unit,))[0]
+    return variable.name if unit == "1" else f"{variable.name} [{unit}]"
+
+
+def catalogue(extra: Path | None = None) -> list[CatalogueMotor]:
+    """The packaged motors, and behind them those of the file `extra` (CSV; TOML where it is called so).
+
+    Raises
+    ------
+    InputError
+        in one line: the file, the row, the field, its value and what is allowed.
+    """
+    motors = list(_packaged())
+    if extra is not None:
+        try:
+            text = extra.read_text("utf-8-sig")
+        except OSError as error:
+            raise InputError(f"{extra}: cannot be read ({error.strerror or error})") from error
+        except UnicodeDecodeError as error:
+            raise InputError(f"{extra}: is not UTF-8 text") from error
+        read = _toml_rows if extra.suffix.lower() == ".toml" else _csv_rows
+        motors += _motors(read(text, str(extra)), {m.designation for m in motors})
+    return motors
+
+
+@cache
+def _packaged() -> tuple[CatalogueMotor, ...]:
+    name = "motors.csv"
+    text = (resources.files("chainunit") / "data" / name).read_text("utf-8")
+    return tuple(_motors(_csv_rows(text, name), set()))
+
+
+def _motors(rows: Iterator[tuple[str, Mapping[str, Any]]], taken: set[str]) -> list[CatalogueMotor]:
+    found = []
+    for origin, given in rows:
+        try:
+            found.append(_motor(origin, given, taken))
+        except ValueError as error:
+            raise InputError(f"{origin}: {error}") from error
+        taken.add(found[-1].designation)
+    return found
+
+
+def _motor(origin: str, given: Mapping[str, Any], taken: set[str]) -> CatalogueMotor:
+    # of the study files, which may come to import the catalogue
+    from ..config import to_number
+
+    for name in given:
+        if name not in _VARIABLES and name not in _TEXTS:
+            raise InputError(f"{_quoted(name)}: unknown; known here: {', '.join((*_TEXTS, *_VARIABLES))}")
+    texts = {}
+    for name in _TEXTS:
+        text = given.get(name, origin if name == "source" else "")
+        if not isinstance(text, str) or not text.strip() or not text.isprintable():
+            raise InputError(f"{name} = {_quoted(text)}: must be a text of one line")
+        texts[name] = text.strip()
+    if texts["designation"] in taken:
+        raise InputError(f"designation = {_quoted(texts['designation'])}: stands in the catalogue already")
+    values = {}
+    for name, variable in _VARIABLES.items():
+        if name in given:
+            values[name] = to_number(variable, given[name])
+        elif variable.quantity.start is None:
+            raise InputError(
+                f"{name}: is missing; must be {variable.quantity.allowed} ({variable.description})"
+            )
+    nameplate = LAYOUT.from_names(values)
+    check(nameplate)
+    return CatalogueMotor(nameplate=nameplate, origin=origin, **texts)
+
+
+def _csv_rows(text: str, file: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    try:
+        rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
+    except csv.Error as error:
+        raise InputError(f"{file}: line {reader.line_num}: no valid CSV: {error}") from error
+    if not rows:
+        raise InputError(f"{file}: is empty; must begin with a row of headings, parted by commas")
+    columns = [_column(cell, file) for cell in rows[0][1]]
+    names = [name for name, _ in columns]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"{file}: {name}: has two columns")
+    for line, row in rows[1:]:
+        origin = f"{file}: line {line}"
+        if len(row) != len(columns):
+            raise InputError(f"{origin}: has {len(row)} cells; must have {len(columns)}, as the headings")
+        yield (
+            origin,
+            {
+                name: _with_unit(cell.strip(), unit)
+                for (name, unit), cell in zip(columns, row, strict=True)
+                if cell.strip()
+            },
+        )
+
+
+def _column(cell: str, file: str) -> tuple[str, str]:
+    match = _HEADING.fullmatch(cell)
+    if match is None or (match[1] not in _VARIABLES and match[1] not in _TEXTS):
+        known = ", ".join((*_TEXTS, *(heading(v) for v in _VARIABLES.values())))
+        raise InputError(f"{file}: heading {_quoted(cell)}: unknown; known here: {known}")
+    return match[1], match[2] or ""
+
+
+def _with_unit(cell: str, unit: str) -> str:
+    try:
+        float(cell)
+    except ValueError:
+        return cell
+    return f"{cell} {unit}" if unit else cell
+
+
+def _toml_rows(text: str, file: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    try:
+        data = tomllib.loads(text)
+    except ValueError as error:  # TOMLDecodeError, and numbers that are too long
+        raise InputError(f"{file}: no valid TOML: {error}") from error
+    tables = data.pop("motor", None)
+    for name in data:
+        raise InputError(f"{file}: {_quoted(name)}: unknown; each motor is a table [[motor]]")
+    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
+        raise InputError(f"{file}: motor = {_quoted(tables)}: each motor must be a table [[motor]]")
+    for number, table in enumerate(tables, 1):
+        yield f"{file}: motor {number}", table
+
+
+def _quoted(given: Any) -> str:
+    """A value as it was given, in one line of bearable length."""
+    text = json.dumps(given, ensure_ascii=True, default=str)
+    return text if len(text) <= 80 else text[:77] + "..."

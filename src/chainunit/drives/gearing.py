@@ -1,0 +1,56 @@
+"""What stands between the motor and the machine: a gear, a belt, or nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+from ..quantities import Value, declaration, quantity
+
+W_REST = 1e-3
+"""Speed of the motor [rad/s] below which friction in the transmission fades out: at rest it has no direction."""
+
+
+@declaration
+class Transmission:
+    """A transmission of constant ratio between the motor's shaft and the output."""
+
+    ratio: Value = quantity("1", "motor turns per turn of the output", default=1.0, above=0.0, max=1e4)
+    efficiency: Value = quantity(
+        "1",
+        "efficiency where the motor drives, without the drag",
+        default=1.0,
+        min=0.05,
+        max=1.0,
+    )
+    d: Value = quantity("N.m.s/rad", "drag that grows with speed, at the motor's shaft", default=0.0, min=0.0)
+    J: Value = quantity("kg.m2", "inertia at the motor's shaft", default=0.0, min=0.0)
+    torque_limit: Value = quantity("N.m", "permitted torque of the output", default=1e6, above=0.0)
+
+
+KINDS: Mapping[str, Transmission] = MappingProxyType(
+    {
+        "direct": Transmission(),
+        "gear": Transmission(ratio=10.0, efficiency=0.96),
+        "belt": Transmission(ratio=3.0, efficiency=0.95),
+    }
+)
+"""Typical start values by kind: a coupling, a two-stage helical gear, a V-belt."""
+
+
+def motor_side(xp: Any, t: Transmission, torque: Any, w: Any) -> Any:
+    """Torque at the motor's shaft [N m] for the torque `torque` that the machine takes at the output, at the
+    speed `w` of the motor [rad/s], without what speeds up `t.J`.
+
+    The teeth or the belt lose a share of the torque, in whatever direction the power flows:
+
+        tau = (torque + (1/efficiency - 1) |torque| sign(w))/ratio + d w
+
+    Where the motor drives (torque w > 0) that is torque/(ratio efficiency). Where the machine drives it is
+    torque (2 - 1/efficiency)/ratio: the same loss, which now relieves the motor. Below an efficiency of 1/2 this
+    changes sign, and the transmission locks itself: the motor must help to turn it. At rest there is no loss.
+    """
+    direction = w / xp.maximum(xp.abs(w), W_REST)
+    lost = (1.0 / t.efficiency - 1.0) * xp.abs(torque) * direction
+    return (torque + lost) / t.ratio + t.d * w

@@ -1,0 +1,460 @@
+"""The plots of the page, by plotly: the same lines as in print, to zoom into."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go  # type: ignore[import-untyped]
+from plotly.subplots import make_subplots  # type: ignore[import-untyped]
+
+from ..drives.dc_motor import DcMotor
+from ..engines import numpy_
+from ..machines.chain_unit import ChamberForces
+from ..studies.overload import PINS, SCENARIOS, Study
+from .style import LINES
+
+COASTING = "_coasting"
+"""Ends the name of a run of the machine alone, behind the safety coupling that opened in the run named before it."""
+_TITLES = {
+    "start_up": "start-up and steady running",
+    "steady": "steady running",
+    **SCENARIOS,
+    "unfinished": "the run that stopped early",
+}
+
+_DASH = {"-": "solid", "--": "dash", "-.": "dashdot", ":": "dot"}
+
+
+def _as_in_print(line: dict[str, Any]) -> dict[str, Any]:
+    return {"color": line["color"], "width": line["linewidth"] + 0.2, "dash": _DASH[line["linestyle"]]}
+
+
+_STYLES: list[dict[str, Any]] = [
+    *map(_as_in_print, LINES),
+    {"color": "#7b3f98", "width": 2.0, "dash": "longdash"},
+    {"color": "#8a6d00", "width": 2.0, "dash": "longdashdot"},
+    {"color": "#4d4d4d", "width": 2.6, "dash": "2px 6px"},
+    {"color": "#00796b", "width": 2.0, "dash": "12px 3px 2px 3px 2px 3px"},
+]
+_INK = "#1b1b1b"
+_LIMIT = {"color": "#777777", "width": 3.5}
+_MARK = {"color": "#555555", "width": 1.2, "dash": "dash"}
+_AXIS = {
+    "gridcolor": "#e4e4e4",
+    "zerolinecolor": "#a8a8a8",
+    "zerolinewidth": 1,
+    "linecolor": "#666666",
+    "showline": True,
+    "ticks": "outside",
+    "tickcolor": "#666666",
+    "title": {"standoff": 8, "font": {"size": 13}},
+    "automargin": True,
+    "exponentformat": "power",
+    "separatethousands": True,
+}
+_TEMPLATE = go.layout.Template(
+    layout={
+        "font": {
+            "family": "system-ui, 'Segoe UI', Roboto, 'Liberation Sans', Arial, sans-serif",
+            "size": 13,
+            "color": _INK,
+        },
+        "paper_bgcolor": "#ffffff",
+        "plot_bgcolor": "#ffffff",
+        "xaxis": _AXIS,
+        "yaxis": _AXIS,
+        # room for the buttons above and the legend below
+        "margin": {"l": 64, "r": 16, "t": 34, "b": 52},
+        "legend": {"orientation": "h", "x": 0.0, "y": 0.0, "yref": "container", "yanchor": "bottom"},
+        "hoverlabel": {"bgcolor": "#ffffff", "font": {"size": 12}},
+        "dragmode": "zoom",
+        "separators": ".\u202f",
+    }
+)
+_MOTION = ("phi", "w", "a")
+_GIVEN = [
+    *(f"machine.{name}" for name in ChamberForces.input_layout.names if name not in _MOTION),
+    "motor.voltage",
+]
+_MOST = 6000  # samples of a line
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A plot with what a reader who does not see it is told."""
+
+    name: str
+    title: str
+    seen: str
+    figure: Any
+    run: str = ""
+    marked: bool = False
+    """Whether the event of the run is marked."""
+
+
+def called(run: str) -> str:
+    """What a run is called."""
+    if run.endswith(COASTING):
+        return f"{called(run.removesuffix(COASTING))}: behind the open coupling"
+    return _TITLES.get(run, run.replace("_", " "))
+
+
+def event_of(study: Study, run: str) -> float | None:
+    """When the overload of a run begins [s]; None where it has none, or is one from the start."""
+    return study.event.get(run.removesuffix(COASTING)) or None
+
+
+def in_order(study: Study) -> list[str]:
+    """The runs, each followed by that of the machine behind the open coupling, where there is one."""
+    driven = [name for name in study.runs if not name.endswith(COASTING)]
+    return [run for name in driven for run in (name, name + COASTING) if run in study.runs]
+
+
+def plots(study: Study) -> Iterator[Plot]:
+    """Every plot that the study has data for."""
+    driven = [name for name in study.runs if not name.endswith(COASTING)]
+    if driven:
+        yield _torque_speed(study, driven)
+    if study.cycles:
+        yield _turn(study)
+    if study.sides is not None:
+        yield _sides(study)
+    for name in driven:
+        yield _transient(study, name)
+    if study.pins:
+        yield _reactions(study)
+
+
+def settled(study: Study) -> float:
+    """When running counts as steady [s]."""
+    run = study.config.run
+    return run.ramp + run.settle_turns * 2.0 * math.pi / run.crank_speed
+
+
+def crank(run: Any, ratio: float) -> tuple[Any, Any]:
+    """Angle [rad] and speed [rad/s] of the crank: the machine's own, which are not the motor's once a coupling is
+    open."""
+    phi, w = ("phi0", "w0") if "machine.phi0" in run else ("phi", "w")
+    return run[f"machine.{phi}"].values / ratio, run[f"machine.{w}"].values / ratio
+
+
+def _style(i: int) -> dict[str, Any]:
+    return _STYLES[i % len(_STYLES)]
+
+
+def _small(x: Any) -> Any:
+    # plotly packs arrays as they are: single precision halves the page
+    return np.asarray(x, np.float32)
+
+
+def _thin(*signals: Any) -> Any:
+    """Which samples to draw: those from which straight lines run within a thousandth of the range of each signal."""
+    values = np.array([s / (np.ptp(s) or 1.0) for s in signals])
+    tolerance = 1e-3
+    kept = _corners(values, tolerance)
+    while len(kept) > _MOST:
+        tolerance *= 2.0
+        kept = _corners(values, tolerance)
+    return kept
+
+
+def _corners(values: Any, tolerance: float) -> Any:
+    """Samples of `values`, shape (signals, samples), that a polyline needs to stay within `tolerance` of all."""
+    last = values.shape[1] - 1
+    kept, todo = {0, last}, [(0, last)]
+    while todo:
+        start, stop = todo.pop()
+        if stop - start < 2:
+            continue
+        along = np.arange(1, stop - start) / (stop - start)
+        chord = values[:, [start]] + (values[:, [stop]] - values[:, [start]]) * along
+        off = np.max(np.abs(values[:, start + 1 : stop] - chord), axis=0)
+        furthest = int(np.argmax(off))
+        if off[furthest] > tolerance:
+            corner = start + 1 + furthest
+            kept.add(corner)
+            todo += [(start, corner), (corner, stop)]
+    return np.array(sorted(kept))
+
+
+def _torque_speed(study: Study, names: list[str]) -> Plot:
+    figure = go.Figure()
+    slowest = fastest = 0.0
+    hover = "%{x:.4g} rad/s, %{y:.3g} N m"
+    for i, name in enumerate(names):
+        run = study.runs[name].sel(time=slice(event_of(study, name), None))
+        speed, torque = run["motor.w"].values, run["motor.air_gap_tau"].values
+        slowest, fastest = min(slowest, float(speed.min())), max(fastest, float(speed.max()))
+        kept = _thin(speed, torque)
+        figure.add_scatter(
+            x=_small(speed[kept]),
+            y=_small(torque[kept]),
+            name=called(name),
+            mode="lines",
+            line=_style(i),
+            hovertemplate=hover,
+        )
+    w = np.linspace(slowest, fastest + 0.1 * (fastest - slowest), 301)
+    figure.add_scatter(
+        x=_small(w),
+        y=_small(np.broadcast_to(study.drive.motor.limit(numpy_(), study.drive.parameters, w), w.shape)),
+        name="most that the drive gives, steady",
+        mode="lines",
+        line=_LIMIT,
+        hovertemplate=hover,
+    )
+    figure.update_layout(
+        template=_TEMPLATE,
+        height=530,
+        hovermode="closest",
+        xaxis={"title": {"text": "motor speed [rad/s]"}, "rangemode": "tozero"},
+        yaxis={"title": {"text": "air-gap torque [N m]"}},
+    )
+    return Plot(
+        "torque-speed",
+        "Torque-speed plane",
+        "Air-gap torque of the motor over its speed, a line for each run, with the most that the drive gives in "
+        "steady running.",
+        figure,
+    )
+
+
+def _turn(study: Study) -> Plot:
+    figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.07)
+    for i, (name, c) in enumerate(study.cycles.items()):
+        degrees = _small(np.degrees(np.append(c.angle, 2.0 * math.pi)))
+        for row, y in ((1, c.crank_torque), (2, c.outputs.rocker.tau)):
+            figure.add_scatter(
+                x=degrees,
+                y=_small(np.append(y, y[0])),
+                name=name,
+                legendgroup=name,
+                showlegend=row == 1,
+                mode="lines",
+                line=_style(i),
+                hovertemplate="%{y:.3g} N m",
+                row=row,
+                col=1,
+            )
+    figure.update_layout(template=_TEMPLATE, height=590, hovermode="x unified")
+    figure.update_xaxes(range=[0, 360], dtick=45)
+    figure.update_xaxes(title_text="crank angle from the upward vertical [deg]", row=2)
+    figure.update_yaxes(title_text="crank torque [N m]", row=1)
+    figure.update_yaxes(title_text="rocker torque [N m]", row=2)
+    return Plot(
+        "turn",
+        "Torque over a crank turn at constant speed",
+        "Crank torque and, below, the torque that both organs ask of the rocker, over the crank angle: both "
+        "sides loaded, the right side empty, all feed on the left.",
+        figure,
+    )
+
+
+def _sides(study: Study) -> Plot:
+    assert study.sides is not None
+    figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.07)
+    for row, what in ((1, "crank"), (2, "rocker")):
+        for i, (which, words) in enumerate((("both", "both sides"), ("alone", "left side alone"))):
+            figure.add_scatter(
+                x=_small(study.sides.speed),
+                y=_small(getattr(study.sides, f"{what}_{which}")),
+                name=words,
+                legendgroup=which,
+                showlegend=row == 1,
+                mode="lines",
+                line=_style(i),
+                hovertemplate="%{y:.3g} N m",
+                row=row,
+                col=1,
+            )
+        figure.update_yaxes(title_text=f"{what} torque, peak [N m]", rangemode="tozero", row=row)
+    _mark(figure, study.config.run.crank_speed, "normal running")
+    figure.update_layout(template=_TEMPLATE, height=610, hovermode="x unified", margin={"t": 52})
+    figure.update_xaxes(title_text="crank speed [rad/s]", row=2)
+    return Plot(
+        "sides",
+        "One side against both, over the speed",
+        "Largest crank torque and rocker torque in a turn over the crank speed, with both sides and with the left "
+        "side alone; the speed of normal running is marked.",
+        figure,
+    )
+
+
+def _transient(study: Study, name: str) -> Plot:
+    run, ratio = study.runs[name], study.drive.ratio
+    event = event_of(study, name)
+    current = run[f"motor.{study.drive.motor.current}"].values
+    time = run["time"].values - (event or 0.0)
+    series = [
+        ("crank torque [N m]", "%{y:.3g} N m", run["machine.tau"].values * ratio),
+        ("crank speed [rad/s]", "%{y:.4g} rad/s", crank(run, ratio)[1]),
+        ("motor current [A]", "%{y:.3g} A", current),
+    ]
+    kept = _thin(*(y for _, _, y in series))
+    figure = make_subplots(rows=len(series), cols=1, shared_xaxes=True, vertical_spacing=0.05)
+    x = _small(time[kept])
+    for row, (label, hover, y) in enumerate(series, 1):
+        figure.add_scatter(
+            x=x,
+            y=_small(y[kept]),
+            name=label.partition(" [")[0],
+            showlegend=False,
+            mode="lines",
+            line=_style(0) | {"width": 1.7},
+            hovertemplate=hover,
+            row=row,
+            col=1,
+        )
+        figure.update_yaxes(title_text=label, row=row)
+    if event is None and study.drive.follows:
+        figure.add_scatter(
+            x=x,
+            y=_small(run["motor.w_ref"].values[kept] / ratio),
+            name="speed asked for",
+            mode="lines",
+            line=_style(1),
+            hovertemplate="%{y:.4g} rad/s",
+            row=2,
+            col=1,
+        )
+    limit = study.drive.parameters.limit.i if study.drive.motor is DcMotor else math.inf
+    if np.max(np.abs(current)) > 0.5 * limit:
+        figure.add_scatter(
+            x=x[[0, -1]],
+            y=[limit, limit],
+            name="current limit",
+            mode="lines",
+            line=_LIMIT | {"width": 2.5, "dash": "dot"},
+            hovertemplate="%{y:.3g} A",
+            row=3,
+            col=1,
+        )
+    behind = study.runs.get(name + COASTING)
+    if behind is not None:
+        figure.add_scatter(
+            x=_small(behind["time"].values - (event or 0.0)),
+            y=_small(crank(behind, ratio)[1]),
+            name="crank behind the open coupling",
+            mode="lines",
+            line=_style(1),
+            hovertemplate="%{y:.4g} rad/s",
+            row=2,
+            col=1,
+        )
+    shown = time[0], time[-1] if behind is None else float(behind["time"][-1]) - (event or 0.0)
+    if event is not None:
+        # the last quarter turn before the event says enough of steady running
+        shown = max(time[0], -0.5 * math.pi / study.config.run.crank_speed), shown[1]
+        changing = _changing(run)
+        if changing is not None:
+            figure.add_vrect(
+                x0=changing[0] - event,
+                x1=changing[1] - event,
+                fillcolor="#000000",
+                opacity=0.07,
+                line_width=0,
+                row="all",
+                col=1,
+            )
+        _mark(figure, 0.0, "event")
+    elif name == "start_up" and study.answers:
+        _mark(figure, settled(study), "steady from here")
+    figure.update_layout(
+        template=_TEMPLATE, height=190 * len(series) + 75, hovermode="x unified", margin={"t": 52}
+    )
+    figure.update_xaxes(range=shown)
+    since = "time [s]" if event is None else "time after the event [s]"
+    figure.update_xaxes(title_text=since, row=len(series))
+    words = called(name)
+    return Plot(
+        f"time-{name.replace('_', '-')}",
+        words[0].upper() + words[1:],
+        f"Crank torque, crank speed and motor current over time: {words}."
+        + ("" if event is None else " The event is marked by a dashed line; the loads change in the shade."),
+        figure,
+        name,
+        event is not None,
+    )
+
+
+def _mark(figure: Any, time: float, words: str) -> None:
+    figure.add_vline(x=time, line=_MARK, row="all", col=1)
+    figure.add_annotation(
+        x=time,
+        xref="x",
+        y=1.0,
+        yref="paper",
+        yanchor="bottom",
+        text=words,
+        showarrow=False,
+        font={"size": 12},
+    )
+
+
+def _changing(run: Any) -> tuple[float, float] | None:
+    """From when to when the loads differ from one sample to the next [s]."""
+    changes = np.zeros(len(run["time"]) - 1, bool)
+    for name in _GIVEN:
+        if name in run:
+            changes |= np.diff(run[name].values) != 0.0
+    found = np.flatnonzero(changes)
+    if not found.size:
+        return None
+    time = run["time"].values
+    return float(time[found[0]]), float(time[found[-1] + 1])
+
+
+_BARS = (
+    {"color": "#ffffff", "shape": ""},
+    {"color": "#d4d4d4", "shape": ""},
+    {"color": "#ffffff", "shape": "/"},
+    {"color": "#e9c3b2", "shape": "x"},
+    {"color": "#ffffff", "shape": "|"},
+    {"color": "#c9dbe6", "shape": "."},
+    {"color": "#ffffff", "shape": "-"},
+    {"color": "#d9e4d0", "shape": "+"},
+)
+
+
+def _reactions(study: Study) -> Plot:
+    figure = go.Figure()
+    runs, pins = list(study.pins), list(PINS)
+    height = 0.84 / len(runs)
+    for i, name in enumerate(runs):
+        bar, top = _BARS[i % len(_BARS)], -0.42 + i * height
+        for size, width, offset in (("peak", 0.92 * height, 0.0), ("rms", 0.34 * height, 0.29 * height)):
+            peak = size == "peak"
+            figure.add_bar(
+                y=pins,
+                x=[study.pins[name][pin][size] for pin in pins],
+                orientation="h",
+                width=width,
+                offset=top + offset,
+                name=f"{called(name)}: peak" if peak else "dark inner bar: RMS",
+                showlegend=peak or i == 0,
+                legendrank=100 + i if peak else 200,
+                marker={
+                    "color": bar["color"] if peak else _INK,
+                    "line": {"color": _INK, "width": 0.8},
+                    "pattern": {"shape": bar["shape"], "fgcolor": "#666666", "size": 6} if peak else {},
+                },
+                hovertemplate=f"%{{y}}, {called(name)}: {'peak' if peak else 'RMS'} %{{x:.4g}} N<extra></extra>",
+            )
+    figure.update_layout(
+        template=_TEMPLATE,
+        barmode="overlay",
+        height=120 + max(11, 20 - len(runs)) * len(runs) * len(pins),
+        hovermode="closest",
+        xaxis={"title": {"text": "reaction [N]"}},
+        yaxis={"title": {"text": "pin"}, "autorange": "reversed", "showgrid": False, "ticks": ""},
+    )
+    return Plot(
+        "reactions",
+        "What the pins carry",
+        "Bars of the reaction of every pin in every run: the wide bar is the peak, the dark one inside the RMS.",
+        figure,
+    )

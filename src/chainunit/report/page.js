@@ -1,0 +1,298 @@
+"use strict";
+(function () {
+  const byId = (name) => document.getElementById(name);
+  const read = (name) => JSON.parse(byId(name).textContent);
+
+  /* plots */
+  const figures = read("figures");
+  const config = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["lasso2d", "select2d"] };
+  const drawn = [];
+  for (const box of document.querySelectorAll(".plot")) {
+    const figure = figures[box.dataset.figure];
+    Plotly.newPlot(box, figure.data, figure.layout, config);
+    drawn.push([box, figure.layout.height]);
+  }
+  // paper is narrower than a screen: a plot is laid out anew for it, so that its letters keep their size
+  const PAPER = { width: 690, height: 440, letters: 10.5 };
+  const resize = (box, width, height, letters) => {
+    const layout = { width, height, autosize: width === null, "font.size": letters };
+    for (const axis of Object.keys(box.layout).filter((name) => /^[xy]axis/.test(name))) {
+      layout[axis + ".title.font.size"] = letters;
+    }
+    box.style.height = height + "px";
+    Plotly.relayout(box, layout);
+  };
+  window.addEventListener("beforeprint", () => {
+    for (const [box, height] of drawn) {
+      // two on a page; what is tall for its many rows stays so
+      resize(box, PAPER.width, height > 1.6 * PAPER.height ? Math.min(height, 900) : PAPER.height, PAPER.letters);
+    }
+  });
+  window.addEventListener("afterprint", () => {
+    for (const [box, height] of drawn) resize(box, null, height, 13);
+  });
+
+  /* the machine in motion */
+  const motion = read("pictures");
+  const stage = byId("stage");
+  if (!motion || !stage) return;
+  const SVG = "http://www.w3.org/2000/svg";
+  const WIDTH = 900;
+  // where the name of a joint stands beside it, clear of its links; those of a side stand outside
+  const LABEL = { O1: [-26, 16], C: [26, 20], Bd: [22, 26], A2: [30, 8] };
+  const add = (parent, tag, attributes, text) => {
+    const element = document.createElementNS(SVG, tag);
+    for (const [name, value] of Object.entries(attributes || {})) element.setAttribute(name, value);
+    if (text !== undefined) element.textContent = text;
+    parent.appendChild(element);
+    return element;
+  };
+  const of = (list, i) => list[Math.min(i, list.length - 1)];
+
+  const crank = motion.links.find((link) => link.kind === "crank"), crankPin = crank.to;
+  let run, frame, played, playing = false, last = null, parts, scale, origin, perNewton, height;
+  const select = byId("run"), factor = byId("factor"), arrows = byId("arrows"), slider = byId("slider");
+  motion.runs.forEach((r, i) => select.add(new Option(r.title, i)));
+  const factors = [0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1, 2];
+  for (const f of factors) factor.add(new Option("× " + f, f));
+  // a crank turn lasts a second at least
+  factor.value = factors.filter((f) => f <= 1 && motion.turn / f >= 1).pop() || factors[0];
+
+  const at = (joint) => {
+    const j = run.joints[joint];
+    return [origin[0] + scale * of(j.x, frame), origin[1] - scale * of(j.y, frame)];
+  };
+  const pointed = (x) => {
+    const power = 10 ** Math.floor(Math.log10(x));
+    return [5, 2, 1].map((m) => m * power).find((y) => y <= x * 1.0001) || power;
+  };
+
+  function build() {
+    stage.replaceChildren();
+    const x = [], y = [];
+    for (const r of motion.runs)
+      for (const j of Object.values(r.joints))
+        for (const [list, all] of [[j.x, x], [j.y, y]]) {
+          all.push(list.reduce((a, b) => Math.min(a, b)), list.reduce((a, b) => Math.max(a, b)));
+        }
+    const [x0, x1] = [Math.min(...x), Math.max(...x)], [y0, y1] = [Math.min(...y), Math.max(...y)];
+    const size = Math.max(x1 - x0, y1 - y0);
+    const arrow = 0.28 * size;
+    const left = 0.11 * size, right = 0.13 * size, above = 1.2 * arrow, below = 0.1 * size;
+    scale = WIDTH / (x1 - x0 + left + right);
+    height = Math.round(scale * (y1 - y0 + above + below));
+    origin = [scale * (left - x0), scale * (y1 + above)];
+    stage.setAttribute("viewBox", `0 0 ${WIDTH} ${height}`);
+    parts = { arrow: arrow * scale };
+
+    const ground = add(stage, "g");
+    frame = 0;
+    for (const name of motion.fixed) {
+      const [px, py] = at(name);
+      // what hangs has its support above, what stands below
+      const up = name.startsWith("A1") || name === "C" ? -1 : 1;
+      add(ground, "path", { class: "ground", d: `M${px} ${py} l-14 ${22 * up} h28 z` });
+      add(ground, "path", {
+        class: "hatch",
+        d: `M${px - 22} ${py + 22 * up} h44` + [-18, -8, 2, 12].map((s) => `M${px + s} ${py + 22 * up} l8 ${8 * up}`).join(""),
+      });
+    }
+    const [ox, oy] = at(crank.from);
+    add(stage, "circle", { class: "orbit", cx: ox, cy: oy, r: crank.length * scale });
+    parts.material = {};
+    for (const side of ["left", "right"]) parts.material[side] = add(stage, "g", { class: side });
+    for (const side of ["left", "right"]) {
+      parts.material[side].web = add(parts.material[side], "line", { class: "material" });
+      parts.material[side].wall = add(parts.material[side], "line", { class: "material" });
+    }
+    parts.links = motion.links.map((link) => add(stage, "line", { class: "link " + link.kind }));
+    parts.joints = {};
+    for (const name of Object.keys(run.joints)) {
+      parts.joints[name] = [
+        add(stage, "circle", { class: "joint", r: 5 }),
+        add(stage, "text", { "text-anchor": "middle" }, name.split(" ")[0]),
+      ];
+    }
+    parts.forces = run.forces.map((force) => {
+      const group = add(stage, "g", { class: `arrow ${force.side} ${force.kind}` });
+      add(group, "title", {}, force.title);
+      return {
+        line: add(group, "path", { class: "force" }),
+        head: add(group, "path", { class: "head" }),
+        name: add(group, "text", { "text-anchor": "middle" }),
+      };
+    });
+    parts.legend = add(stage, "g", { class: "arrow legend" });
+    parts.legendLine = add(parts.legend, "path", { class: "force" });
+    parts.legendHead = add(parts.legend, "path", { class: "head" });
+    parts.legendText = add(parts.legend, "text", {});
+    parts.caption = add(stage, "text", { x: 16, y: 28, class: "where" });
+
+    const rows = byId("read-forces");
+    rows.replaceChildren();
+    parts.rows = run.forces.map((force) => {
+      const row = rows.insertRow();
+      row.className = force.side;
+      const head = document.createElement("th");
+      head.scope = "row";
+      head.textContent = force.title;
+      row.appendChild(head);
+      return row.insertCell();
+    });
+  }
+
+  function head(x, y, dx, dy) {
+    const length = Math.hypot(dx, dy), h = Math.min(13, 0.6 * length), w = 0.38 * h;
+    const ux = dx / length, uy = dy / length, bx = x + dx - h * ux, by = y + dy - h * uy;
+    return [bx, by, `M${x + dx} ${y + dy} L${bx - w * uy} ${by + w * ux} L${bx + w * uy} ${by - w * ux} z`];
+  }
+
+  function arrow(part, x, y, dx, dy, label) {
+    const length = Math.hypot(dx, dy);
+    if (length < 3) {
+      part.line.setAttribute("d", "");
+      part.head.setAttribute("d", "");
+      part.name.textContent = "";
+      return;
+    }
+    const [bx, by, d] = head(x, y, dx, dy);
+    part.line.setAttribute("d", `M${x} ${y} L${bx} ${by}`);
+    part.head.setAttribute("d", d);
+    part.name.textContent = length > 34 ? label : "";
+    part.name.setAttribute("x", x + dx + (16 * dx) / length);
+    part.name.setAttribute("y", y + dy + (14 * dy) / length + 5);
+  }
+
+  const digits = (x, n) => {
+    const shown = x === 0 ? "0" : Math.abs(x) >= 100 ? x.toFixed(0) : x.toPrecision(n);
+    return shown.replace("-", "−");
+  };
+
+  function draw() {
+    motion.links.forEach((link, i) => {
+      const [x1, y1] = at(link.from), [x2, y2] = at(link.to);
+      for (const [name, value] of Object.entries({ x1, y1, x2, y2 })) parts.links[i].setAttribute(name, value);
+    });
+    const heaviest = Math.max(1e-9, ...motion.runs.flatMap((r) => Object.values(r.material).flat()));
+    for (const side of ["left", "right"]) {
+      const mass = of(run.material[side], frame);
+      for (const [kind, share] of [["web", motion.web_share], ["wall", 1 - motion.web_share]]) {
+        const link = motion.links.find((l) => l.kind === kind && (l.from + l.to).includes(side));
+        const [x1, y1] = at(link.from), [x2, y2] = at(link.to), band = parts.material[side][kind];
+        for (const [name, value] of Object.entries({ x1, y1, x2, y2 })) band.setAttribute(name, value);
+        band.setAttribute("stroke-width", (34 * mass * share) / heaviest);
+      }
+      byId("read-" + side).textContent = digits(mass, 3) + " kg";
+    }
+    for (const [name, [dot, text]] of Object.entries(parts.joints)) {
+      const [x, y] = at(name);
+      dot.setAttribute("cx", x);
+      dot.setAttribute("cy", y);
+      const side = name.endsWith("left") ? -1 : name.endsWith("right") ? 1 : 0;
+      let [dx, dy] = LABEL[name] || [24 * side, 6];
+      if (name === crankPin) {
+        // outside the circle that it runs on
+        const [ox, oy] = at(crank.from), length = Math.hypot(x - ox, y - oy);
+        [dx, dy] = [(22 * (x - ox)) / length, (22 * (y - oy)) / length + 6];
+      }
+      text.setAttribute("x", x + dx);
+      text.setAttribute("y", y + dy);
+    }
+    perNewton = run.largest > 0 ? (parts.arrow * Number(arrows.value)) / run.largest : 0;
+    run.forces.forEach((force, i) => {
+      const [x, y] = at(force.at), fx = of(force.x, frame), fy = of(force.y, frame);
+      arrow(parts.forces[i], x, y, perNewton * fx, -perNewton * fy, force.short);
+      parts.rows[i].textContent = Math.hypot(fx, fy).toFixed(0) + " N";
+    });
+    if (perNewton) {
+      const newton = pointed((0.75 * parts.arrow) / perNewton), x = 20, y = height - 18;
+      const [bx, by, d] = head(x, y, newton * perNewton, 0);
+      parts.legendLine.setAttribute("d", `M${x} ${y} L${bx} ${by} M${x} ${y - 6} v12`);
+      parts.legendHead.setAttribute("d", d);
+      parts.legendText.textContent = `${newton} N`;
+      parts.legendText.setAttribute("x", x + newton * perNewton + 8);
+      parts.legendText.setAttribute("y", y + 5);
+    }
+    const time = of(run.time, frame).toFixed(3).replace("-", "−") + " s";
+    byId("read-time").textContent = time;
+    byId("read-angle").textContent = of(run.angle, frame).toFixed(1) + "°";
+    byId("read-speed").textContent = digits(of(run.speed, frame), 3) + " rad/s";
+    byId("read-torque").textContent = digits(of(run.torque, frame), 3) + " N m";
+    parts.caption.textContent = `${run.title}, ${run.event ? "event" : "start"} ${run.time[frame] < 0 ? "−" : "+"} ` +
+      `${Math.abs(run.time[frame]).toFixed(2)} s`;
+    slider.value = frame;
+    slider.setAttribute("aria-valuetext", time);
+    stage.dataset.frame = frame;
+    stage.dataset.run = run.name;
+  }
+
+  function show(i) {
+    frame = Math.max(0, Math.min(run.time.length - 1, i));
+    played = run.time[frame];
+    draw();
+  }
+
+  function choose(i) {
+    run = motion.runs[i];
+    build();
+    slider.max = run.time.length - 1;
+    byId("time-name").textContent = run.event ? "Time after the event" : "Time";
+    const still = Math.min(run.still, run.time.length - 1), tick = byId("tick");
+    tick.textContent = run.event ? "▾ event" : still > 0 ? "▾ steady" : "";
+    tick.style.left = `calc(8px + (100% - 16px) * ${still / Math.max(1, run.time.length - 1)})`;
+    show(run.event ? 0 : still);
+  }
+
+  function frameAt(time) {
+    let low = 0, high = run.time.length - 1;
+    while (low < high) {
+      const middle = (low + high + 1) >> 1;
+      if (run.time[middle] <= time) low = middle;
+      else high = middle - 1;
+    }
+    return low;
+  }
+
+  function advance(now) {
+    if (!playing) return;
+    // after a pause, or a while in another tab, it goes on from where it was
+    if (last !== null) played += (Math.min(now - last, 250) / 1000) * Number(factor.value);
+    last = now;
+    if (played > run.time[run.time.length - 1]) played = run.time[0];
+    const next = frameAt(played);
+    if (next !== frame) {
+      frame = next;
+      draw();
+    }
+    requestAnimationFrame(advance);
+  }
+
+  function play(on) {
+    playing = on;
+    const button = byId("play");
+    button.textContent = on ? "❚❚ Pause" : "▶ Play";
+    button.setAttribute("aria-label", on ? "Pause" : "Play");
+    if (on) {
+      last = null;
+      requestAnimationFrame(advance);
+    }
+  }
+
+  byId("play").addEventListener("click", () => play(!playing));
+  select.addEventListener("change", () => choose(Number(select.value)));
+  arrows.addEventListener("change", draw);
+  slider.addEventListener("input", () => show(Number(slider.value)));
+  choose(0);
+  // report.html#play=jam_left plays that run by itself, report.html#at=jam_left,0.2 shows it at that time
+  const wanted = /^#(play|at)(?:=([^,]*)(?:,(.*))?)?$/.exec(location.hash);
+  if (wanted) {
+    const found = motion.runs.findIndex((r) => r.name === wanted[2]);
+    if (found >= 0) {
+      select.value = found;
+      choose(found);
+    }
+    if (wanted[3]) show(frameAt(Number(wanted[3])));
+    byId("machine").scrollIntoView({ behavior: "instant" });
+    play(wanted[1] === "play");
+  }
+})();

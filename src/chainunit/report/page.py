@@ -1,0 +1,700 @@
+"""report.html: the study as one page that needs nothing else, neither files nor a network.
+
+Every number in its text is an element that names its place in result.json, which the page carries whole
+(``<script id="result">``). Curves and the moving machine are of the series in result.nc, thinned out.
+
+Where the result has a key ``sizing``, the page shows what a drive was sized for, its candidates with the utilisation
+of each check, and which was chosen.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import platform
+from collections.abc import Iterable, Iterator, Mapping
+from html import escape
+from importlib import metadata, resources
+from pathlib import Path
+from typing import Any
+
+from plotly.offline import get_plotlyjs  # type: ignore[import-untyped]
+
+from .. import __version__
+from ..files import whole
+from ..quantities import Layout, Variable
+from ..studies.monte_carlo import Sample
+from ..studies.overload import SCENARIOS, Answers, Limits, Study, as_dict
+from .interactive import Plot, called, plots
+from .motion import motion
+from .trace import Traced, at
+
+NAME = "report.html"
+
+# the families of answers that are shown large, each by its first field
+_KEY = ("crank_torque_peak", "motor_torque_peak", "power_peak", "current_peak", "winding_temperature")
+_FACTORS = {
+    "static_at_extreme": "R_left/(R_left - R_right) at the right extreme, at rest",
+    "rocker_torque": "rocker torque, ratio of cycle maxima",
+    "crank_torque": "crank torque, ratio of cycle maxima",
+}
+_VERSIONS = ("numpy", "casadi", "fmpy", "plotly")
+_POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; "
+    "font-src data:"
+)
+
+
+def write(study: Study, folder: Path) -> Path:
+    """Write the page into `folder`; returns the file."""
+    file = folder / NAME
+    page = render(study, as_dict(study))
+    with whole(file) as part:
+        part.write_text(page, "utf-8")
+    return file
+
+
+def render(study: Study, result: Mapping[str, Any]) -> str:
+    """The page of a study whose numbers are `result` (`chainunit.studies.overload.as_dict`)."""
+    t = Traced(result)
+    drawn = list(plots(study))
+    moving = motion(study) if study.runs else None
+    sections = [
+        ("answer", "The answer", _answer(t, study)),
+        ("sizing", "The drive", _sizing(t) if "sizing" in result else ""),
+        ("runs", "Every run in numbers", _runs(t)),
+        ("plots", "Plots", _figures(t, drawn)),
+        ("motion", "The machine in motion", _motion() if moving else ""),
+        ("basis", "What this rests on", _basis(t, study)),
+        ("given", "All that was given", _all_given(t, study)),
+    ]
+    sections = [section for section in sections if section[2]]
+    title = study.config.title or "Study of a chain unit"
+    figures = ",".join(f"{json.dumps(plot.name)}:{plot.figure.to_json()}" for plot in drawn)
+    embedded = {
+        "result": json.dumps(result, allow_nan=False, ensure_ascii=False),
+        "figures": f"{{{figures}}}",
+        "pictures": json.dumps(moving, allow_nan=False, separators=(",", ":")),
+    }
+    return "\n".join(
+        [
+            "<!DOCTYPE html>",
+            '<html lang="en">',
+            "<head>",
+            '<meta charset="utf-8">',
+            f'<meta http-equiv="Content-Security-Policy" content="{escape(_POLICY)}">',
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            f'<meta name="generator" content="chainunit {__version__}">',
+            f"<title>{escape(title)}</title>",
+            '<link rel="icon" href="data:,">',
+            f"<style>\n{_resource('page.css')}</style>",
+            "</head>",
+            "<body>",
+            _header(t, study, title, sections),
+            "<main>",
+            *(
+                f'<section id="{name}" aria-labelledby="{name}-title">\n'
+                f'<h2 id="{name}-title">{heading}</h2>\n{content}\n</section>'
+                for name, heading, content in sections
+            ),
+            "</main>",
+            # no text can end the element early
+            *(
+                f'<script type="application/json" id="{name}">{text.replace("<", chr(92) + "u003c")}</script>'
+                for name, text in embedded.items()
+            ),
+            f'<script id="plotly">{get_plotlyjs()}</script>',
+            f"<script>\n{_resource('page.js')}</script>",
+            "</body>",
+            "</html>\n",
+        ]
+    )
+
+
+def _resource(name: str) -> str:
+    return (resources.files(__package__) / name).read_text("utf-8")
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _variables(declared: Any, names: Iterable[str]) -> list[Variable]:
+    """The declared scalars of an instance that the result has, in declared order."""
+    have = set(names)
+    return [v for v in Layout(type(declared)).variables if v.name in have]
+
+
+def _table(
+    head: Iterable[str], rows: Iterable[Iterable[str]], *, caption: str = "", numeric: bool = True
+) -> str:
+    """A table whose first column names the row; the cells are HTML."""
+    cells = "".join(f'<th scope="col">{cell}</th>' for cell in head)
+    lines = []
+    for first, *rest in rows:
+        lines.append(
+            f'<tr><th scope="row">{first}</th>' + "".join(f"<td>{cell}</td>" for cell in rest) + "</tr>"
+        )
+    return (
+        f'<div class="wide"><table class="{"numbers" if numeric else "words"}">'
+        + (f"<caption>{caption}</caption>" if caption else "")
+        + (f"<thead><tr>{cells}</tr></thead>" if cells else "")
+        + f"<tbody>{''.join(lines)}</tbody></table></div>"
+    )
+
+
+def _given(t: Traced, section: str, declared: Any, caption: str) -> str:
+    """The table of what was given for a declaration."""
+    rows = [
+        (escape(_capital(v.description)), t.number(f"{section}.{v.name}", given=True, form=_angle(v.unit)))
+        for v in _variables(declared, t.result[section])
+    ]
+    return _table((), rows, caption=caption)
+
+
+def _angle(unit: str) -> str:
+    return "display" if unit in ("rad", "K") else ""
+
+
+def _header(t: Traced, study: Study, title: str, sections: list[tuple[str, str, str]]) -> str:
+    def n(path: str, form: str = "", *, given: bool = True) -> str:
+        return t.number(path, form=form, given=given)
+
+    overloads = [called(name) for name in study.answers if name in SCENARIOS]
+    if "sizing" in t.result:
+        asked = "Which motor, gear and flywheel does this chain unit need? Its crank turns at "
+    else:
+        asked = (
+            "What does the drive of this chain unit have to give? A motor turns the crank through a gear of ratio "
+            f"{n('machine.ratio')}, in normal running at "
+        )
+    asked += (
+        f"{n('run.crank_speed')} ({n('run.crank_speed', 'display', given=False)}). The left organ carries "
+        f"{n('feed.left.material_mass')} of material and works against {n('feed.left.processing_force')}, the right "
+        f"one {n('feed.right.material_mass')} and {n('feed.right.processing_force')}."
+    )
+    if study.answers:
+        ramp = f" in {n('run.ramp')}" if study.drive.follows else ""
+        asked += (
+            f" The machine starts from rest{ramp} and is evaluated over {n('run.turns')} turns when steady."
+        )
+    if overloads:
+        asked += (
+            " Then come overloads, each by itself, which begin at a crank angle of "
+            f"{n('overload.crank_angle', 'display')} and are followed for {n('overload.turns')} turns or longer: "
+            f"{escape('; '.join(overloads))}."
+        )
+    status = ""
+    if t.result["status"] != "complete":
+        status = (
+            f'<p class="alarm"><strong>The run stopped early.</strong> {t.text("status")}. What was computed '
+            "before is shown.</p>"
+        )
+    links = "".join(f'<a href="#{name}">{heading}</a>' for name, heading, _ in sections)
+    return (
+        "<header>\n"
+        f'<p class="kind">Chain unit: forces, torque and one-sided overload</p>\n<h1>{escape(title)}</h1>\n'
+        f'<p class="from">Study file: {t.text("source")} · chainunit {t.text("chainunit")} · '
+        f"status: {'complete' if not status else 'stopped early'}</p>\n"
+        f'{status}\n<nav aria-label="Sections">{links}</nav>\n'
+        f'<h2 id="asked">What was asked</h2>\n<div class="asked"><p>{asked}</p>{_key_table(t, study)}</div>\n'
+        "</header>"
+    )
+
+
+def _all_given(t: Traced, study: Study) -> str:
+    config = study.config
+    tables = "".join(
+        _given(t, section, declared, caption)
+        for section, declared, caption in (
+            ("run", config.run, "Run"),
+            ("feed", config.feed, "Feed in normal running"),
+            ("overload", config.overload, "Overloads"),
+            ("coupling", config.coupling, "Safety coupling"),
+            ("machine", study.drive.machine.p, "Machine"),
+            ("motor", study.drive.parameters, "Motor"),
+        )
+        if t.result.get(section)
+    )
+    return f'<div class="given">{tables}</div>'
+
+
+def _key_table(t: Traced, study: Study) -> str:
+    """The few inputs that the answer turns on."""
+    config = study.config
+    rows = []
+    for section, declared, wanted in (
+        ("run", config.run, ("crank_speed",)),
+        ("machine", study.drive.machine.p, () if "sizing" in t.result else ("ratio",)),
+        ("feed", config.feed, Layout(type(config.feed)).names),
+    ):
+        rows += [
+            (escape(_capital(v.description)), t.number(f"{section}.{v.name}", given=True))
+            for v in _variables(declared, wanted)
+        ]
+    more = '<p class="also"><a href="#given">All that was given</a></p>'
+    return f"<div>{_table((), rows, caption='In short')}{more}</div>"
+
+
+def _families(names: Iterable[str]) -> dict[str, list[tuple[str, Variable]]]:
+    """Answers by what they are of: {"crank torque": [("peak", ..), ("RMS", ..)]}, as their descriptions say."""
+    families: dict[str, list[tuple[str, Variable]]] = {}
+    have = set(names)
+    for v in Layout(Answers).variables:
+        if v.name in have:
+            family, _, kind = v.description.partition(", ")
+            families.setdefault(family, []).append((kind, v))
+    return families
+
+
+def _answer(t: Traced, study: Study) -> str:
+    answers = t.result["answers"]
+    parts, cards = [], []
+    if answers:
+        reference = "steady" if "steady" in answers else next(iter(answers))
+        cards = [
+            _card(t, family, members, reference)
+            for family, members in _families(answers[reference]).items()
+            if members[0][1].name in _KEY
+        ]
+        large = f"Large: {called(reference)} at {t.number('run.crank_speed', given=True)} of the crank."
+        worst = " Below: the overload that asks most." if any(run in SCENARIOS for run in answers) else ""
+        parts.append(f'<p class="lead">{large}{worst}</p>')
+    elif t.result["status"] == "complete":
+        parts.append('<p class="lead">No motor was found to run the machine with; the reason is below.</p>')
+    else:
+        parts.append('<p class="lead">The study ended before any run could be evaluated.</p>')
+    if t.result["overload_factors"]:
+        cards.append(_factor_card(t))
+    parts.append(f'<div class="cards">{"".join(cards)}</div>')
+    verdicts = [path for path, verdict in _notes(t) if verdict]
+    if verdicts:
+        parts.append(
+            '<ul class="verdicts">'
+            + "".join(
+                f'<li><span class="sign" aria-hidden="true">!</span> {t.text(p)}</li>' for p in verdicts
+            )
+            + "</ul>"
+        )
+    elif answers:
+        parts.append('<p class="fine">No run gives cause for a warning.</p>')
+    return "\n".join(parts)
+
+
+def _runs(t: Traced) -> str:
+    """Every answer of every run, what the pins carry, and where the model ends."""
+    answers, parts = t.result["answers"], []
+    if answers:
+        rows = []
+        for v in Layout(Answers).variables:
+            found = [run for run in answers if v.name in answers[run]]
+            # nothing to say of a coupling that is not there, or that did not open
+            if all(answers[run][v.name]["value"] is None for run in found):
+                continue
+            cells = [_answer_number(t, run, v) if run in found else "" for run in answers]
+            rows.append((escape(_capital(v.description)), *cells))
+        heads = [escape(_capital(called(run))) for run in answers]
+        parts.append(_table(("", *heads), rows, caption="What each run asks of the drive"))
+    if t.result["pins"]:
+        parts.append(_pins(t))
+    if t.result.get("speed_loop"):
+        loops = t.result["speed_loop"]
+        names = list(dict.fromkeys(name for loop in loops.values() for name in loop))
+        rows = [
+            (escape(_capital(_words(loop))), *(t.number(f"speed_loop.{loop}.{name}") for name in names))
+            for loop in loops
+        ]
+        heads = ["", *(escape(_capital(_words(name))) for name in names)]
+        parts.append(_table(heads, rows, caption="The speed loop, linearised"))
+    if t.result.get("monte_carlo"):
+        parts.append(_random(t))
+    if t.result["limits"]:
+        rows = [
+            (
+                escape(_capital(v.description)),
+                t.number(f"limits.{v.name}", form=_angle(v.unit), none="none"),
+            )
+            for v in Layout(Limits).variables
+            if v.name in t.result["limits"]
+        ]
+        parts.append(_table((), rows, caption="Where the model ends"))
+    return "\n".join(parts)
+
+
+def _random(t: Traced) -> str:
+    """The quantiles of overloads at random."""
+    found = t.result["monte_carlo"]["quantiles"]
+    named = {v.name: v.description for v in Layout(Sample).variables}
+    columns = list(dict.fromkeys(k for sizes in found.values() for k in sizes))
+    rows = [
+        (
+            escape(_capital(named.get(name, _words(name)).removeprefix("1 where "))),
+            *(
+                t.number(f"monte_carlo.quantiles.{name}.{k}", form="percent" if k == "share" else "")
+                if k in sizes
+                else ""
+                for k in columns
+            ),
+        )
+        for name, sizes in found.items()
+    ]
+    heads = ("", *(f"{k[1:]} % of runs below" if k.startswith("q") else "Share of runs" for k in columns))
+    runs = t.number("monte_carlo.runs", given=True)
+    return _table(heads, rows, caption=f"Overloads at random angles and of random hardness, {runs} runs")
+
+
+def _pins(t: Traced) -> str:
+    tables = t.result["pins"]
+    reference = "steady" if "steady" in tables else next(iter(tables))
+    pins = tables[reference]
+    sizes = list(next(iter(pins.values())))
+    rows = []
+    for pin in pins:
+        worst = max(tables, key=lambda run: tables[run][pin]["peak"]["value"])
+        rows.append(
+            (
+                escape(pin),
+                *(t.number(f"pins.{reference}.{pin}.{size}") for size in sizes),
+                t.number(f"pins.{worst}.{pin}.peak"),
+                escape(called(worst)),
+            )
+        )
+    named = (f"{_capital(called(reference))}, {'RMS' if size == 'rms' else _words(size)}" for size in sizes)
+    heads = ("", *map(escape, named), "Largest peak", "In")
+    return _table(heads, rows, caption="What the pins carry")
+
+
+def _card(t: Traced, family: str, members: list[tuple[str, Variable]], run: str) -> str:
+    """An answer, large: its first two numbers in the run `run`, and the worst overload."""
+    large, small = members[:2], members[2:]
+    figures = "".join(
+        f'<div class="figure"><span class="large">{_answer_number(t, run, v)}</span>'
+        f'<span class="which">{escape(kind or called(run))}</span></div>'
+        for kind, v in large
+    )
+    lines = []
+    if small:
+        also = ", ".join(f"{escape(kind)} {_answer_number(t, run, v)}" for kind, v in small)
+        lines.append(also)
+    kind, v = large[0]
+    sizes = {name: t.value(f"answers.{name}.{v.name}") for name in t.result["answers"] if name in SCENARIOS}
+    found = {name: size for name, size in sizes.items() if size is not None}
+    if found:
+        worst = max(found, key=lambda name: abs(found[name]))
+        lines.append(
+            f"overload: {escape(kind)} <strong>{_answer_number(t, worst, v)}</strong>, {escape(SCENARIOS[worst])}"
+        )
+    return (
+        f'<article class="card"><h3>{escape(_capital(family))}</h3><div class="figures">{figures}</div>'
+        + "".join(f'<p class="also">{line}</p>' for line in lines)
+        + "</article>"
+    )
+
+
+def _answer_number(t: Traced, run: str, v: Variable) -> str:
+    none = "not reached" if v.name == "recovery_time" and run != "steady" else "–"
+    form = "percent" if v.name in ("speed_dip", "speed_ripple") else _angle(v.unit)
+    return t.number(f"answers.{run}.{v.name}", form=form, none=none)
+
+
+def _factor_card(t: Traced) -> str:
+    rows = "".join(
+        f'<div class="factor"><span class="large">{t.number(f"overload_factors.{name}", none="none")}</span>'
+        f'<span class="which">{escape(_FACTORS.get(name, _words(name)))}</span></div>'
+        for name in t.result["overload_factors"]
+    )
+    return (
+        '<article class="card"><h3>Overload factor</h3>'
+        f'{rows}<p class="also">left organ alone against both</p></article>'
+    )
+
+
+def _notes(t: Traced) -> Iterator[tuple[str, bool]]:
+    """Path of each note, and whether it is a verdict on a run (it begins with the run's name)."""
+    starts = tuple(f"{called(run)}:" for run in ("start_up", "steady", *SCENARIOS))
+    for i, note in enumerate(t.result["notes"]):
+        yield f"notes.{i}", note.startswith(starts)
+
+
+def _sizing(t: Traced) -> str:
+    sizing = t.result["sizing"]
+    chosen, candidates = sizing.get("chosen"), sizing.get("candidates", [])
+    parts = []
+    if chosen is not None:
+        best = f"sizing.candidates.{chosen}"
+        cards = [
+            _large("Motor", t.text(f"{best}.motor"), "chosen", css=" name"),
+            _large(
+                "Gear ratio", t.number(f"{best}.ratio", digits=4, given=True), "motor turns per crank turn"
+            ),
+        ]
+        for section in ("flywheel", "protection"):
+            path = _leading(sizing.get(section), f"sizing.{section}")
+            if path:
+                name = path.rsplit(".", 1)[1]
+                entry = sizing[section][name]
+                cards.append(
+                    _large(
+                        _capital(section),
+                        t.number(path, none="none"),
+                        entry.get("title", _words(name)),
+                    )
+                )
+        parts.append(f'<div class="cards four">{"".join(cards)}</div>')
+        parts.append(f'<p class="reason">Chosen because: {t.text(f"{best}.reason")}</p>')
+    elif candidates:
+        reasons = "".join(
+            f"<li><strong>{t.text(f'sizing.candidates.{i}.motor')}</strong>: "
+            f"{t.text(f'sizing.candidates.{i}.reason')}</li>"
+            for i in _ranked(candidates, None)
+        )
+        parts.append(
+            f'<div class="alarm"><strong>No candidate fits, because</strong><ul>{reasons}</ul></div>'
+        )
+    parts.extend(
+        f'<p class="note">{t.text(f"sizing.notes.{i}")}</p>' for i in range(len(sizing.get("notes", [])))
+    )
+    if candidates:
+        parts.append(_candidates(t, candidates, chosen))
+    groups = [
+        (_capital(_words(name)), list(_leaves(sizing[name], f"sizing.{name}")))
+        for name in ("asked", "cycle", "flywheel", "protection")
+        if sizing.get(name)
+    ]
+    tables = "".join(
+        _table((), [(escape(_capital(title)), _leaf(t, path)) for title, path in rows], caption=caption)
+        for caption, rows in groups
+        if rows
+    )
+    return "\n".join(parts) + f'\n<div class="given whole">{tables}</div>'
+
+
+def _large(title: str, shown: str, which: str, css: str = "") -> str:
+    return (
+        f'<article class="card"><h3>{escape(title)}</h3><div class="figures"><div class="figure">'
+        f'<span class="large{css}">{shown}</span><span class="which">{escape(which)}</span></div></div></article>'
+    )
+
+
+def _leading(section: Any, path: str) -> str | None:
+    """The number that stands for a section: the torque at which it trips, else its first."""
+    numbers = [
+        name for name, entry in (section or {}).items() if isinstance(entry, dict) and "value" in entry
+    ]
+    trips = [name for name in numbers if "trip" in name and section[name]["unit"] == "N.m"]
+    names = [*trips, *numbers]
+    return f"{path}.{names[0]}" if names else None
+
+
+def _leaves(node: Any, path: str, title: str = "") -> Iterator[tuple[str, str]]:
+    """Title and path of everything below a node that is a number with its unit, or words."""
+    if isinstance(node, Mapping) and "value" in node:
+        yield node.get("title", title), path
+    elif isinstance(node, Mapping | list):
+        items = node.items() if isinstance(node, Mapping) else ((str(i), x) for i, x in enumerate(node))
+        for name, below in items:
+            yield from _leaves(below, f"{path}.{name}", f"{title}, {_words(name)}" if title else _words(name))
+    elif isinstance(node, str):
+        yield title, path
+
+
+def _leaf(t: Traced, path: str) -> str:
+    try:
+        entry = t.value(path)
+    except TypeError:
+        return t.text(path)
+    if isinstance(entry, str):
+        return t.text(f"{path}.value")
+    # a rise of temperature is in K, too, but never as large as a temperature
+    hot = at(t.result, path)["unit"] == "K" and (entry or 0.0) > 200.0
+    form = "display" if hot else ""
+    return t.number(path, given=path.startswith("sizing.asked"), form=form, none="none")
+
+
+_RANK = {"chosen": 0, "fits": 1, "rejected": 2}
+_SIGN = {"chosen": "✓", "fits": "○", "rejected": "✗"}
+
+
+def _ranked(candidates: list[Any], chosen: int | None) -> list[int]:
+    """The chosen candidate, what fits, then the rest by how much it fails."""
+
+    def utilisation(candidate: Any) -> float:
+        sizes = [check["utilisation"]["value"] for check in candidate["checks"].values()]
+        return max((math.inf if size is None else size for size in sizes), default=0.0)
+
+    return sorted(
+        range(len(candidates)),
+        key=lambda i: (i != chosen, _RANK.get(candidates[i]["verdict"], 9), utilisation(candidates[i])),
+    )
+
+
+def _candidates(t: Traced, candidates: list[Any], chosen: int | None) -> str:
+    """The table of candidates, best first."""
+    order = _ranked(candidates, chosen)
+    checks: dict[str, str] = {}
+    for candidate in candidates:
+        for name, check in candidate["checks"].items():
+            checks.setdefault(name, check.get("title", _words(name)))
+    rows = []
+    for i in order:
+        candidate, path = candidates[i], f"sizing.candidates.{i}"
+        verdict = candidate["verdict"]
+        cells = "".join(
+            _check(t, candidate["checks"][name], f"{path}.checks.{name}")
+            if name in candidate["checks"]
+            else "<td></td>"
+            for name in checks
+        )
+        rows.append(
+            f'<tbody class="{escape(verdict)}"><tr><th scope="rowgroup" rowspan="2">{t.text(f"{path}.motor")}'
+            f'<span class="of">ratio {t.number(f"{path}.ratio", digits=4, given=True)}</span></th>{cells}</tr>'
+            f'<tr><td class="why" colspan="{len(checks)}"><strong><span aria-hidden="true">'
+            f"{_SIGN.get(verdict, '')}</span> {t.text(f'{path}.verdict')}</strong>: {t.text(f'{path}.reason')}</td>"
+            "</tr></tbody>"
+        )
+    heads = ("Motor", *(escape(_capital(title)) for title in checks.values()))
+    return (
+        '<div class="wide"><table class="candidates"><caption>Candidates, best first. A cell shows how much of '
+        "its limit a check takes; the line in the bar is the limit, and what is above it is "
+        "<strong>▲ bold</strong>.</caption><thead><tr>"
+        + "".join(f'<th scope="col">{head}</th>' for head in heads)
+        + f"</tr></thead>{''.join(rows)}</table></div>"
+    )
+
+
+def _check(t: Traced, check: Any, path: str) -> str:
+    size = check["utilisation"]["value"]
+    shown = t.number(
+        f"{path}.utilisation", form="percent", none="no value", prefix="▲ " if size and size > 1.0 else ""
+    )
+    over = size is not None and size > 1.0
+    width = 0.0 if size is None else 100.0 * min(max(size, 0.0), 1.5) / 1.5
+    bar = f'<span class="bar" aria-hidden="true"><span style="width:{width:.1f}%"></span></span>'
+    of = ""
+    if "value" in check and "limit" in check:
+        of = f'<span class="of">{t.number(f"{path}.value")} of {t.number(f"{path}.limit")}</span>'
+    label = f"<strong>{shown}</strong>" if over else shown
+    return f'<td class="check{" over" if over else ""}">{label}{bar}{of}</td>'
+
+
+def _figures(t: Traced, drawn: list[Plot]) -> str:
+    captions = {
+        "torque-speed": "Steady running is a closed loop; overloads are drawn from the event on. Grey: "
+        "the most that the drive gives in steady running.",
+        "turn": f"Inverse dynamics at {t.number('run.crank_speed', given=True)} of the crank, without a motor.",
+        "sides": "Largest torques of a turn by inverse dynamics. Where the lines cross, one side alone asks as much "
+        "as both.",
+        "reactions": "Peak and RMS of the force in each pin, frame x right, y up; means over whole crank turns.",
+    }
+    html = []
+    for plot in drawn:
+        caption = captions.get(plot.name, "")
+        if plot.marked:
+            caption = "Upright, dashed: the event. Shaded: what the machine is given changes."
+            if plot.run in t.result["answers"]:
+                caption += (
+                    f" The speed dips by {t.number(f'answers.{plot.run}.speed_dip', form='percent')}; recovery: "
+                    f"{t.number(f'answers.{plot.run}.recovery_time', none='not reached')}."
+                )
+        height = plot.figure.layout.height
+        half = " half" if plot.run else ""
+        html.append(
+            f'<figure class="plot-box{half}"><h3 id="{plot.name}-title">{escape(plot.title)}</h3>'
+            f'<div class="plot" id="plot-{plot.name}" data-figure="{plot.name}" role="img" '
+            f'aria-label="{escape(plot.seen)}" style="height:{height}px"></div>'
+            f"<figcaption>{caption}</figcaption></figure>"
+        )
+    if not html:
+        return ""
+    return (
+        "<noscript><p>Plots and the moving machine need JavaScript; the numbers of this page do not.</p></noscript>"
+        f'<div class="plots">{"".join(html)}</div>'
+        '<p class="hint">Drag to zoom, double-click to zoom out, click a name in a legend to hide its line. Every '
+        "sample is in result.nc.</p>"
+    )
+
+
+def _motion() -> str:
+    return """<figure class="motion" id="machine" aria-labelledby="motion-title">
+<div class="stage">
+<svg id="stage" role="img" aria-label="The machine with the forces on its pins, in motion" data-frame="0"></svg>
+</div>
+<div class="readings">
+<table class="numbers"><tbody>
+<tr><th scope="row" id="time-name">Time</th><td id="read-time"></td></tr>
+<tr><th scope="row">Crank angle</th><td id="read-angle"></td></tr>
+<tr><th scope="row">Crank speed</th><td id="read-speed"></td></tr>
+<tr><th scope="row">Crank torque</th><td id="read-torque"></td></tr>
+<tr><th scope="row">Material left</th><td id="read-left"></td></tr>
+<tr><th scope="row">Material right</th><td id="read-right"></td></tr>
+</tbody></table>
+<table class="numbers forces"><caption>Forces</caption><tbody id="read-forces"></tbody></table>
+</div>
+<div class="controls" role="group" aria-label="Playback">
+<button type="button" id="play" aria-label="Play">▶ Play</button>
+<label>Run <select id="run"></select></label>
+<label>Speed <select id="factor"></select></label>
+<label>Arrows <select id="arrows"><option value="0.5">× ½</option><option value="1" selected>× 1</option>
+<option value="2">× 2</option><option value="4">× 4</option></select></label>
+<div class="slide"><label for="slider" class="hidden">Time</label>
+<input type="range" id="slider" min="0" max="1" step="1" value="0"><span id="tick" aria-hidden="true"></span></div>
+</div>
+<figcaption>Blue, full: left side; red, dashed: right side; black: crank bearing O1 and rocker pivot C. An arrow
+is the force on the machine part from its support or neighbour: at A1 on the wall, at B on the wall from the web, at
+A2 on the web from the rocker; P, dotted, is the processing force on the web. The brown band is the material; its
+width goes with its mass. Joints are those of the simulated run.</figcaption>
+</figure>"""
+
+
+def _basis(t: Traced, study: Study) -> str:
+    parts = []
+    assumptions = [path for path, verdict in _notes(t) if not verdict]
+    if assumptions:
+        items = "".join(f"<li>{t.text(path)}</li>" for path in assumptions)
+        parts.append(f"<h3>Assumptions</h3><ul>{items}</ul>")
+    certificate = t.result["certificate"]
+    if certificate:
+        names = list(dict.fromkeys(name for shares in certificate.values() for name in shares))
+        rows = [
+            (
+                escape(_capital(called(run))),
+                *(t.number(f"certificate.{run}.{name}") if name in shares else "" for name in names),
+            )
+            for run, shares in certificate.items()
+        ]
+        parts.append(
+            "<h3>Energy certificate</h3><p>What the motor gave to the shaft, computed in the motor, against what "
+            "the machine stored and dissipated, computed in the machine: the share of the energy moved that is "
+            "missing.</p>" + _table(("Run", *(escape(_capital(_words(name))) for name in names)), rows)
+        )
+    made = t.result["fmus"]
+    control = t.result["control"]
+    if isinstance(control, Mapping):
+        tuned = ", ".join(f"{escape(_words(name))} {t.number(f'control.{name}')}" for name in control)
+    else:
+        tuned = t.text("control")
+    python = platform.python_version()
+    versions = [("chainunit", t.text("chainunit")), ("Python", escape(python))]
+    versions += [(name, escape(_version(name))) for name in _VERSIONS]
+    rows_made = [
+        *((escape(_capital(name)) + " FMU", t.text(f"fmus.{name}")) for name in made),
+        ("Speed control", tuned),
+        ("Versions", ", ".join(f"{name}&nbsp;{version}" for name, version in versions)),
+    ]
+    parts.append("<h3>How it was made</h3>" + _table((), rows_made, numeric=False))
+    parts.append(
+        '<p class="hint">Every number in the text of this page is taken from result.json, which is embedded here '
+        "whole; point at a number to see where it stands there, and with more digits.</p>"
+    )
+    return f'<div class="basis">{"".join(parts)}</div>'
+
+
+def _version(name: str) -> str:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return "not installed"

@@ -1,0 +1,376 @@
+"""The table of motors, their circuits, files of the user's, and the transmission."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import io
+import math
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chainunit import engines
+from chainunit.drives.catalogue import LAYOUT, catalogue, heading
+from chainunit.drives.gearing import KINDS, W_REST, Transmission, motor_side
+from chainunit.drives.induction_motor import InductionMotor, breakdown, steady
+from chainunit.drives.nameplate import LAYOUT as NAMEPLATE
+from chainunit.drives.nameplate import TYPICAL, Assumptions, Nameplate, check, identify
+from chainunit.errors import InputError
+from chainunit.integrate import rk4
+from chainunit.quantities import Layout
+
+MOTORS = catalogue()
+STATES = InductionMotor.state_layout
+RPM = math.pi / 30.0
+PLATE = {
+    "power": 2200.0,
+    "poles": 4.0,
+    "speed": 1455.0 * RPM,
+    "efficiency": 0.867,
+    "power_factor": 0.80,
+    "breakdown_ratio": 3.0,
+    "locked_torque_ratio": 2.4,
+    "locked_current_ratio": 6.9,
+    "J": 0.0086,
+    "locked_time": 12.0,
+}
+
+
+def plate(**given) -> Nameplate:
+    return NAMEPLATE.from_names(PLATE | given)
+
+
+# --- the table ---
+
+
+def test_table_is_whole():
+    powers = [0.55, 0.75, 1.1, 1.5, 2.2, 3, 4, 5.5, 7.5, 11, 15, 18.5, 22, 30, 37, 45, 55, 75]
+    wanted = [(1000.0 * power, poles) for poles in (2.0, 4.0, 6.0) for power in powers]
+    assert [(m.nameplate.power, m.nameplate.poles) for m in MOTORS] == wanted
+    assert len({m.designation for m in MOTORS}) == 54
+    for m in MOTORS:
+        assert f"{m.nameplate.poles:g}-pole {m.nameplate.power / 1000:g} kW, " in m.designation
+        assert (m.nameplate.voltage, m.nameplate.frequency) == (400.0, 50.0)
+        assert "typical" in m.source and m.origin.startswith("motors.csv: line ")
+
+
+def test_headings_are_the_declarations():
+    text = (resources.files("chainunit") / "data" / "motors.csv").read_text("utf-8")
+    declared = {heading(v) for v in LAYOUT.variables}
+    assert set(next(csv.reader(io.StringIO(text)))) - {"designation", "source"} <= declared
+    assert heading(LAYOUT.variables[LAYOUT.names.index("speed")]) == "speed [rev/min]"
+
+
+IE3 = {  # IEC 60034-30-1: coefficients of the limits at 50 Hz from 0.75 kW, by number of poles
+    2.0: (0.3569, -3.3076, 11.6108, 82.2503),
+    4.0: (0.0773, -1.8951, 9.2984, 83.7025),
+    6.0: (0.1252, -2.613, 11.9963, 80.4769),
+}
+
+
+def test_efficiencies_are_the_standards():
+    for m in MOTORS:
+        if m.nameplate.power >= 750.0:
+            limit = np.polyval(IE3[m.nameplate.poles], math.log10(m.nameplate.power / 1000.0))
+            assert 100.0 * m.nameplate.efficiency == pytest.approx(limit, abs=0.11), m.designation
+
+
+def test_values_vary_smoothly_with_size():
+    """Each rises or falls along a number of poles, but for rounding."""
+    rising = "speed efficiency power_factor breakdown_ratio locked_current_ratio J mass".split()
+    for poles in (2.0, 4.0, 6.0):
+        rows = [m.nameplate for m in MOTORS if m.nameplate.poles == poles]
+        for name in rising:
+            values = [getattr(row, name) for row in rows]
+            assert values == sorted(values), (poles, name)
+        for name in ("locked_torque_ratio", "locked_time"):
+            values = [getattr(row, name) for row in rows]
+            assert values == sorted(values, reverse=True), (poles, name)
+
+
+# --- circuits ---
+
+
+@pytest.mark.parametrize("motor", MOTORS, ids=lambda m: m.designation)
+def test_every_motor_has_its_circuit(motor):
+    """Residuals are rounding, below 1e-9; the parameters are those of a motor and no artefact of a bound."""
+    found = motor.identify()
+    assert abs(found.worst[1]) < 1e-9, found.worst
+    p, n = found.parameters, motor.nameplate
+    InductionMotor.check(p)
+    base = n.voltage**2 / n.apparent_power
+    X_l, X_m = (100.0 * math.pi * L / base for L in (p.cage.L, p.main.L))
+    assert 0.015 < p.stator.R / base < 0.11 and 0.005 < p.cage.R / base < 0.08
+    assert 0.08 < X_l < 0.3 and 1.2 < X_m < 3.5
+    assert 0.0 < p.cage.skin_R < 4.0 and 0.0 < p.cage.skin_L < 0.35
+    assert 0.05 < found.breakdown.slip < 0.5
+    # what was fitted is what the model does, by functions of their own
+    warm = p.ambient.T + TYPICAL.rise
+    assert breakdown(p, T=warm).tau == pytest.approx(n.breakdown_ratio * n.torque, rel=1e-8)
+    locked = steady(engines.MATH, p, 0.0)
+    assert locked.i == pytest.approx(n.locked_current_ratio * n.rated_current, rel=1e-8)
+    assert locked.tau == pytest.approx(n.locked_torque_ratio * n.torque, rel=1e-8)
+
+
+@pytest.mark.parametrize("k", [0, 22, 53], ids=lambda k: MOTORS[k].designation)
+def test_rated_running_is_the_dynamic_models(k):
+    """A warm motor under rated torque settles at rated speed, current, power factor, and stays as warm."""
+    n, p = MOTORS[k].nameplate, MOTORS[k].identify().parameters
+    u = InductionMotor.input_layout.from_names({"load.tau_bias": n.torque})
+    held = InductionMotor.parameter_layout.from_names({"stator.C": 1e12}, p)  # keeps its temperature
+    x = STATES.values(InductionMotor.initial_states(p))
+    T = STATES.names.index("stator.T")
+    x[T], x[STATES.names.index("w")] = p.ambient.T + TYPICAL.rise, n.synchronous
+
+    def rates(y, p=held):
+        return InductionMotor.derivatives(engines.MATH, p, u, STATES.instance(y))
+
+    x = rk4(rates, x, 3.0, InductionMotor.internal_step(engines.MATH, p))
+    out = InductionMotor.evaluate(engines.MATH, held, u, STATES.instance(x))[0]
+    assert STATES.instance(x).w == pytest.approx(n.speed, rel=1e-6)
+    assert (out.i, out.supply_power) == pytest.approx((n.rated_current, n.power / n.efficiency), rel=1e-6)
+    assert out.supply_power / (math.sqrt(3.0) * out.v * out.i) == pytest.approx(n.power_factor, rel=1e-6)
+    assert abs(rates(x, p)[T]) < 1e-5 * out.heat / p.stator.C
+
+
+def test_fit_is_deterministic_and_kept():
+    assert identify(plate()) is identify(plate())
+    again = identify.__wrapped__(plate())
+    assert again.parameters == identify(plate()).parameters
+    assert set(identify(plate()).residuals) == {
+        *("power", "current", "power_factor", "efficiency"),
+        *("breakdown_ratio", "locked_torque_ratio", "locked_current_ratio"),
+    }
+
+
+def test_given_current_is_met():
+    derived = plate().rated_current
+    assert derived == pytest.approx(2200.0 / (0.867 * 0.80 * math.sqrt(3.0) * 400.0))
+    found = identify(plate(current=1.02 * derived))
+    assert found.rated.i == pytest.approx(1.02 * derived, rel=1e-9)
+    # the supply power follows the current; the efficiency on the nameplate is off by as much
+    assert found.worst == ("efficiency", pytest.approx(1.0 / 1.02 - 1.0, rel=1e-6))
+
+
+def test_other_supply_and_assumptions():
+    american = plate(voltage=460.0, frequency=60.0, speed=1755.0 * RPM)
+    assumed = Assumptions(friction=0.02, rise=60.0, time_constant=1800.0, growth=0.0)
+    found = identify(american, assumed)
+    p = found.parameters
+    assert abs(found.worst[1]) < 1e-9 and (p.supply.V, p.supply.f) == (460.0, 60.0)
+    assert p.rotor.d * american.speed**2 == pytest.approx(0.02 * 2200.0)
+    assert p.stator.R_th * p.stator.C == pytest.approx(1800.0)
+
+
+def test_what_small_motors_lose_in_iron_shows_as_a_residual():
+    """Their stator cannot make up for iron losses and still have the breakdown torque: the fit leaves that to the
+    efficiency, and says so."""
+    small = plate(
+        power=750.0,
+        poles=2.0,
+        speed=2885.0 * RPM,
+        efficiency=0.807,
+        breakdown_ratio=3.3,
+        locked_torque_ratio=2.7,
+        locked_current_ratio=6.6,
+    )
+    found = identify(small)
+    assert found.worst[0] == "efficiency" and 0.03 < found.worst[1] < 0.07
+    assert abs(found.residuals["power_factor"]) < 0.06
+    rest = set(found.residuals) - {"efficiency", "power_factor"}
+    assert max(abs(found.residuals[name]) for name in rest) < 0.02
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (
+            {"speed": 1505.0 * RPM},
+            r"speed = 157\.\d+ rad/s \(1505 rev/min\).*synchronous speed \(1200 and 1500",
+        ),
+        ({"speed": 1100.0 * RPM}, r"speed = .*\(1100 rev/min\)"),
+        ({"poles": 3.0}, "poles = 3: must be an even number"),
+        ({"poles": 50.0}, "poles = 50: must be >= 2 and <= 48"),
+        ({"efficiency": 1.1}, "efficiency = 1.1: must be > 0 and <= 1"),
+        ({"efficiency": 0.97}, "efficiency = 0.97: a slip of 0.03 and friction of 0.01.*must be < 0.96"),
+        ({"power_factor": 0.0}, "power_factor = 0: must be > 0 and <= 1"),
+        ({"locked_current_ratio": 0.9}, "locked_current_ratio = 0.9: must be > 1"),
+        ({"locked_torque_ratio": 9.9}, r"locked_torque_ratio = 9.9: .*must be < 9\."),
+        ({"breakdown_ratio": 1.0}, "breakdown_ratio = 1: must be > 1"),
+        ({"current": 6.0}, r"current = 6 A: .*make it 4\.578 A; must be > 4\.12 and < 5\.036 A"),
+        ({"J": 0.0}, "J = 0 kg.m2: must be > 0 kg.m2"),
+        ({"power": math.nan}, "power = nan W: must be finite, > 0 W"),
+        (
+            {"locked_current_ratio": 3.2, "locked_torque_ratio": 1.2},
+            r"breakdown_ratio = 3: no circuit meets it.*closest has 2\.\d+; must be within 10% of that",
+        ),
+    ],
+)
+def test_contradictory_nameplates_are_refused(given, said):
+    with pytest.raises(InputError, match=said) as refused:
+        identify(plate(**given))
+    assert "\n" not in str(refused.value)
+
+
+def test_assumptions_out_of_bounds_are_refused():
+    with pytest.raises(InputError, match=r"friction = 0.5: must be >= 0 and <= 0.1"):
+        check(plate(), Assumptions(friction=0.5))
+
+
+# --- files of the user's ---
+
+ROW = {
+    "designation": "pump, old",
+    "power [kW]": "2.2",
+    "poles": "4",
+    "speed [rev/min]": "1455",
+    "efficiency": "0.867",
+    "power_factor": "0.80",
+    "breakdown_ratio": "3",
+    "locked_torque_ratio": "2.4",
+    "locked_current_ratio": "6.9",
+    "J [kg.m2]": "0.0086",
+    "locked_time [s]": "12",
+}
+TOML = "[[motor]]\n" + "\n".join(
+    f'{name} = "{value} rad/s"' if name == "speed" else f"{name} = {value!r}"
+    for name, value in ({"designation": "pump, old"} | PLATE).items()
+)
+
+
+def csv_file(folder: Path, *rows: dict[str, str]) -> Path:
+    file = folder / "own.csv"
+    with file.open("w", newline="", encoding="utf-8-sig") as stream:
+        writer = csv.DictWriter(stream, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+    return file
+
+
+def test_own_motors_stand_behind_the_packaged(tmp_path):
+    toml = tmp_path / "own.toml"
+    toml.write_text(TOML)
+    csv_ = csv_file(tmp_path, ROW, ROW | {"designation": "fan", "power [kW]": "2200 W"})
+    for file, where in ((csv_, "line 2"), (toml, "motor 1")):
+        own = catalogue(file)[54:]
+        assert (own[0].designation, own[0].origin) == ("pump, old", f"{file}: {where}")
+        assert own[0].source == own[0].origin
+        for name, value in PLATE.items():
+            assert getattr(own[0].nameplate, name) == pytest.approx(value, rel=1e-12)
+        assert own[0].nameplate.mass == 0.0
+        assert abs(own[0].identify().worst[1]) < 1e-9
+    assert [m.designation for m in catalogue(csv_)[54:]] == ["pump, old", "fan"]
+    assert len(catalogue()) == 54
+
+
+def test_columns_may_have_any_unit_of_their_kind(tmp_path):
+    given = {name: value for name, value in ROW.items() if "[" not in name}
+    given |= {
+        "power [W]": "2200",
+        "speed [rad/s]": str(PLATE["speed"]),
+        "J [g.m2]": "8.6",
+        "locked_time [min]": "0.2",
+    }
+    (own,) = catalogue(csv_file(tmp_path, given))[54:]
+    for name, value in PLATE.items():
+        assert getattr(own.nameplate, name) == pytest.approx(value, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("column", "cell", "said"),
+    [
+        ("power [kW]", "-1", r"line 3: power = -1000 W: must be > 0 W \(rated power at the shaft\)"),
+        ("power [kW]", "much", 'line 3: power = "much": must be a number in W'),
+        ("power [kW]", "nan", 'line 3: power = "nan kW": must be a number in W'),
+        ("power [kW]", "", "line 3: power: is missing; must be > 0 W"),
+        ("poles", "5", "line 3: poles = 5: must be an even number"),
+        ("speed [rev/min]", "1555", r"line 3: speed = .* \(1555 rev/min\)"),
+        ("efficiency", "86.7", "line 3: efficiency = 86.7: must be > 0 and <= 1"),
+        ("designation", "", 'line 3: designation = "": must be a text of one line'),
+        ("designation", "a\nb", r"line 4: designation = \"a\\nb\": must be a text of one line"),
+        ("designation", "pump, old", 'line 3: designation = "pump, old": stands in the catalogue already'),
+        ("designation", MOTORS[0].designation, "line 3: designation = .* stands in the catalogue already"),
+    ],
+)
+def test_bad_rows_are_refused(tmp_path, column, cell, said):
+    file = csv_file(tmp_path, ROW, ROW | {"designation": "fan"} | {column: cell})
+    with pytest.raises(InputError, match=said) as refused:
+        catalogue(file)
+    assert str(refused.value).startswith(f"{file}: ") and "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        ("a.csv", "", "is empty; must begin with a row of headings"),
+        (
+            "a.csv",
+            "designation;power\n",
+            'heading "designation;power": unknown; known here: designation, source, pow',
+        ),
+        ("a.csv", "designation,colour\n", 'heading "colour": unknown'),
+        ("a.csv", "power [W],power [kW]\n", "power: has two columns"),
+        ("a.csv", "designation,power [V]\nx,1\n", 'power = "1 V": must be a number in W'),
+        ("a.csv", "designation,poles\nx\n", "line 2: has 1 cells; must have 2"),
+        ("a.csv", 'designation\n"x\n', "no valid CSV"),
+        ("a.toml", "x = ", "no valid TOML"),
+        ("a.toml", "x = 1", '"x": unknown; each motor is a table'),
+        ("a.toml", "", "motor = null: each motor must be a table"),
+        ("a.toml", "motor = 1", "motor = 1: each motor must be a table"),
+        ("a.toml", "[[motor]]\ncolour = 1", 'motor 1: "colour": unknown; known here: designation'),
+        ("a.toml", TOML.replace("'pump, old'", "1"), "motor 1: designation = 1: must be a text of one line"),
+        ("a.toml", TOML.replace("2200.0", "true"), "motor 1: power = True: must be a number in W"),
+        ("a.toml", f"{TOML}\nmass = -1", "motor 1: mass = -1 kg: must be >= 0 kg"),
+    ],
+)
+def test_bad_files_are_refused(tmp_path, name, text, said):
+    file = tmp_path / name
+    file.write_text(text)
+    with pytest.raises(InputError) as refused:
+        catalogue(file)
+    assert str(refused.value).startswith(f"{file}: ") and said in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_unreadable_files_are_refused(tmp_path):
+    with pytest.raises(InputError, match="cannot be read"):
+        catalogue(tmp_path / "none.csv")
+    file = tmp_path / "a.csv"
+    file.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match="is not UTF-8 text"):
+        catalogue(file)
+
+
+# --- transmission ---
+
+
+def test_transmission_loses_power_whichever_way_it_flows():
+    xp = engines.MATH
+    t = Transmission(ratio=12.0, efficiency=0.9, d=0.002)
+    for torque in (-50.0, 0.0, 80.0):
+        for w in (-100.0, -1.0, 1.0, 100.0):
+            lost = motor_side(xp, t, torque, w) * w - torque * w / t.ratio
+            by_torque = (1.0 / 0.9 - 1.0) * abs(torque * w) / t.ratio
+            assert lost == pytest.approx(by_torque + 0.002 * w * w, rel=1e-9)
+    forward = motor_side(xp, t, 80.0, 100.0) - t.d * 100.0
+    assert forward == pytest.approx(80.0 / (12.0 * 0.9))
+    assert motor_side(xp, t, -80.0, 100.0) - t.d * 100.0 == pytest.approx(-80.0 * (2.0 - 1.0 / 0.9) / 12.0)
+    # a worm gear locks itself: the motor must help even where the load would drive
+    assert motor_side(xp, Transmission(ratio=50.0, efficiency=0.4), -80.0, 100.0) > 0.0
+
+
+def test_transmission_at_rest_and_in_arrays():
+    t = KINDS["gear"]
+    assert motor_side(engines.MATH, t, 60.0, 0.0) == 60.0 / t.ratio
+    w = np.array([-W_REST, 0.0, W_REST, 10.0])
+    every = motor_side(engines.numpy_(), t, np.array([60.0]), w)
+    np.testing.assert_array_equal(every, [motor_side(engines.MATH, t, 60.0, float(x)) for x in w])
+    assert np.all(np.diff(every[:3]) > 0.0)
+    direct = KINDS["direct"]
+    assert motor_side(engines.MATH, direct, 60.0, 10.0) == 60.0
+    for kind in KINDS.values():
+        for v, x in zip(Layout(Transmission).variables, dataclasses.astuple(kind), strict=True):
+            assert v.quantity.admits(x)

@@ -1,0 +1,77 @@
+"""The study files of `examples/` say what their titles promise; run by the command line, as a user does."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+RUNS = {}
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory):
+    """result.json of an example and what was printed; each runs once."""
+
+    def run(name):
+        if name not in RUNS:
+            folder = tmp_path_factory.mktemp(name)
+            command = [
+                sys.executable,
+                "-m",
+                "chainunit.cli",
+                "study",
+                str(EXAMPLES / f"{name}.toml"),
+                "-o",
+                "out",
+            ]
+            done = subprocess.run(command, capture_output=True, text=True, cwd=folder)
+            assert done.returncode == 0, done.stderr
+            RUNS[name] = json.loads((folder / "out" / "result.json").read_text()), done.stdout, folder / "out"
+        return RUNS[name]
+
+    return run
+
+
+def test_a_motor_is_picked(result):
+    numbers, said, folder = result("motor_from_catalogue")
+    sizing = numbers["sizing"]
+    chosen = sizing["candidates"][sizing["chosen"]]
+    assert chosen["verdict"] == "chosen" and f"Motor: {chosen['motor']}" in said
+    assert all(check["utilisation"]["value"] <= 1.0 for check in chosen["checks"].values())
+    rejected = [c for c in sizing["candidates"] if c["verdict"] == "rejected"]
+    assert rejected and all(c["reason"] in said for c in rejected)
+    assert numbers["motor"]["kind"] == "InductionMotor"
+    # the study goes on with it, at the speed that was asked
+    steady = numbers["answers"]["steady"]
+    assert steady["speed_mean"]["value"] == pytest.approx(3.0, rel=0.01)
+    assert steady["speed_ripple"]["value"] <= 0.04
+    blocked = numbers["answers"]["blocked"]
+    assert blocked["stall_time"]["value"] < 2.0 and 5.0 < blocked["thermal_trip_time"]["value"] < 20.0
+    assert (folder / "report.html").exists()
+
+
+def test_none_fits_and_the_reason_is_told(result):
+    numbers, said, _ = result("motor_rejected")
+    sizing = numbers["sizing"]
+    assert sizing["chosen"] is None and "No motor of the catalogue fits" in said
+    for c in sizing["candidates"]:
+        assert c["verdict"] == "rejected" and "starts per hour" in c["reason"]
+        assert c["checks"]["starts"]["utilisation"]["value"] > 1.0
+
+
+def test_the_jam_trips_the_coupling(result):
+    numbers, said, folder = result("jam_trips_coupling")
+    jam, feed = numbers["answers"]["jam_left"], numbers["answers"]["feed_left"]
+    assert 0.0 < jam["coupling_trip_time"]["value"] < 0.1 and jam["energy_after_trip"]["value"] > 0.0
+    assert jam["standstill_time"]["value"] > jam["coupling_trip_time"]["value"]
+    assert feed["coupling_trip_time"]["value"] is None and "the safety coupling trips" in said
+    assert jam["crank_torque_peak"]["value"] > 350.0
+    random = numbers["monte_carlo"]
+    assert random["runs"]["value"] == 50 and 0.0 < random["quantiles"]["trips"]["share"]["value"] < 1.0
+    assert (folder / random["file"]).exists()
+    assert len((folder / "load_cycle.csv").read_text().splitlines()) > 1000

@@ -1,0 +1,368 @@
+"""The page of a study: what it shows, where each number comes from, and that it works by itself."""
+
+from __future__ import annotations
+
+import copy
+import json
+import re
+import shutil
+import subprocess
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from chainunit import RunError, config
+from chainunit.quantities import DISPLAY_UNITS
+from chainunit.report import motion, page
+from chainunit.report.trace import at, digits_text, unit_text
+from chainunit.studies.overload import as_dict, run_study
+
+SHORT = """
+title = "A mill <b>& more</b> </script><!--"
+events = ["feed_left", "jam_left"]
+[run]
+ramp = 0.3
+settle_turns = 1
+turns = 1
+step = 0.004
+crank_speed = 6
+[overload]
+turns = 1
+[machine]
+ratio = 25
+"""
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    return run_study(config.parse(SHORT), tmp_path_factory.mktemp("page study"))
+
+
+@pytest.fixture(scope="module")
+def written(study, tmp_path_factory):
+    return page.write(study, tmp_path_factory.mktemp("a page"))
+
+
+def number(value, unit, **more):
+    return {"value": value, "unit": unit, **more}
+
+
+def candidate(motor, verdict, reason, **utilisations):
+    return {
+        "motor": motor,
+        "ratio": number(25.0, "1"),
+        "verdict": verdict,
+        "reason": reason,
+        "checks": {
+            name: {
+                "title": name.replace("_", "-"),
+                "utilisation": number(used, "1"),
+                "value": number(None if used is None else 8.0 * used, "N.m"),
+                "limit": number(8.0, "N.m"),
+            }
+            for name, used in utilisations.items()
+        },
+    }
+
+
+SIZING = {
+    "asked": {"service_factor": number(1.25, "1", title="service factor")},
+    "cycle": {"torque_rms": number(28.7, "N.m")},
+    "flywheel": {"inertia": number(0.0, "kg.m2", title="inertia on the motor shaft")},
+    "protection": {"setting": number(1.6, "A"), "trip_torque": number(210.0, "N.m")},
+    "candidates": [
+        candidate("0.25 kW", "rejected", "too weak by 31 %", pull_out=1.31, heat=0.83),
+        candidate("0.55 kW", "fits", "larger than it must be", pull_out=0.61, heat=None),
+        candidate("0.37 kW <IE3>", "chosen", "the least that fits", pull_out=0.87),
+    ],
+    "chosen": 2,
+    "notes": ["Typical values."],
+}
+
+
+class Reader(HTMLParser):
+    """Collects traced numbers and words, other text by section, elements, and what the page would load."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.numbers, self.words, self.loads, self.scripts = [], [], [], {}
+        self.rest = {}
+        self.stack = []
+        self.open = []  # traced elements: [tag, depth, record]
+        self.section = "head"
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag, attributes):
+        given = dict(attributes)
+        self.loads += [given[name] for name in ("src", "href", "action", "data") if name in given]
+        if tag in ("section", "header", "script", "style"):
+            self.section = given.get("id", tag)
+        if "data-path" in given:
+            record = {**given, "tag": tag, "text": ""}
+            (self.numbers if tag == "data" else self.words).append(record)
+            self.open.append([len(self.stack), record])
+        if tag not in ("meta", "link", "input", "br"):
+            self.stack.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.stack.pop() == tag
+        if self.open and self.open[-1][0] == len(self.stack):
+            self.open.pop()
+
+    def handle_data(self, data):
+        if self.stack and self.stack[-1] == "script":
+            self.scripts[self.section] = self.scripts.get(self.section, "") + data
+        elif self.open:
+            for _, record in self.open:
+                record["text"] += data
+        elif self.stack and self.stack[-1] != "style":
+            self.rest[self.section] = self.rest.get(self.section, "") + " " + data
+
+
+def shown_number(text):
+    """The number that a reader sees."""
+    plain = text.replace("−", "-").replace("\u202f", "").replace("\u00a0", " ").replace("▲ ", "")
+    power = re.match(r"(-?[\d.]+) × 10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)", plain)
+    if power:
+        return float(power[1]) * 10.0 ** int(power[2].translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")))
+    return float(re.match(r"-?[\d.]+", plain)[0])
+
+
+def check_traced(reader, result):
+    """Every traced element says what stands at its path, and shows it."""
+    assert len(reader.numbers) > 100 and len(reader.words) > 5
+    for n in reader.numbers:
+        entry = at(result, n["data-path"])
+        assert json.loads(n["value"]) == entry["value"], n
+        if entry["value"] is None:
+            assert not re.search(r"\d", n["text"]), n
+            continue
+        factor, offset = 1.0, 0.0
+        if entry["unit"] in DISPLAY_UNITS and unit_text(DISPLAY_UNITS[entry["unit"]][0]) in n["text"]:
+            _, factor, offset = DISPLAY_UNITS[entry["unit"]]
+        elif "%" in n["text"]:
+            factor = 100.0
+        else:
+            assert n["text"].endswith(unit_text(entry["unit"])), n
+        assert shown_number(n["text"]) == pytest.approx(factor * entry["value"] + offset, rel=5.1e-3), n
+    for w in reader.words:
+        assert w["text"] == at(result, w["data-path"]), w
+
+
+def test_every_number_is_traced_to_result_json(study, written):
+    reader = Reader(written.read_text("utf-8"))
+    result = json.loads(json.dumps(as_dict(study)))
+    assert json.loads(reader.scripts["result"]) == result
+    check_traced(reader, result)
+    paths = {n["data-path"] for n in reader.numbers}
+    for run, answers in result["answers"].items():
+        assert {f"answers.{run}.{a}" for a, entry in answers.items() if entry["value"] is not None} <= paths
+    for section in ("machine", "motor", "feed", "run", "overload", "limits", "overload_factors"):
+        wanted = {f"{section}.{n}" for n, e in result[section].items() if isinstance(e, dict)}
+        assert wanted <= paths, section
+    for path in ("answers.steady.crank_torque_peak", "certificate.jam_left.energy_residual_share"):
+        assert path in paths
+    assert {f"notes.{i}" for i in range(len(result["notes"]))} <= {w["data-path"] for w in reader.words}
+    # what is not traced holds no number, but for the names of pins
+    for section in ("header", "answer", "runs", "plots"):
+        rest = re.sub(r"\b(A1|A2|O1)\b", "", reader.rest[section])
+        assert not re.search(r"\d", rest), (section, re.findall(r".{20}\d.{20}", rest))
+
+
+def test_the_page_needs_nothing_else(written):
+    text = written.read_text("utf-8")
+    assert written.stat().st_size < 8e6
+    assert [p.name for p in written.parent.iterdir()] == ["report.html"]
+    reader = Reader(text)
+    assert reader.loads and all(link.startswith(("#", "data:")) for link in reader.loads)
+    own = text.replace(reader.scripts["plotly"], "")
+    assert "@import" not in own and "url(" not in own
+    assert set(re.findall(r"https?://[\w./]+", own)) == {"http://www.w3.org/2000/svg"}
+    assert "default-src 'none'" in text.replace("&#x27;", "'")
+    assert "A mill &lt;b&gt;&amp; more&lt;/b&gt;" in text and "<b>& more" not in own
+    # every reference to an element of the page has its element
+    ids = set(re.findall(r'\bid="([^"]+)"', own))
+    assert {link[1:] for link in reader.loads if link.startswith("#")} <= ids
+    assert len(ids) == len(re.findall(r'\bid="[^"]+"', own))
+
+
+def test_every_axis_says_what_it_shows_in_which_unit(study, written):
+    figures = json.loads(Reader(written.read_text("utf-8")).scripts["figures"])
+    assert set(figures) == {
+        "torque-speed", "turn", "sides", "time-start-up", "time-feed-left", "time-jam-left", "reactions"
+    }  # fmt: skip
+    for name, figure in figures.items():
+        axes = {
+            k: v["title"]["text"] for k, v in figure["layout"].items() if k[1:5] == "axis" and "title" in v
+        }
+        for axis, title in axes.items():
+            assert re.fullmatch(r".+ \[(N m|N|rad/s|A|s|deg)\]|pin", title), (name, axis)
+        assert sum(axis.startswith("x") for axis in axes) == 1
+        drawn = {trace.get("yaxis", "y") for trace in figure["data"]}
+        assert {f"yaxis{y[1:]}" for y in drawn} <= set(axes)
+        assert all(trace["name"] for trace in figure["data"])
+        looks = [
+            (t["line"]["dash"] if "dash" in t.get("line", {}) else t.get("marker", t.get("line")).__str__())
+            for t in figure["data"]
+            if t.get("showlegend") is not False
+        ]
+        # not by colour alone
+        assert len(set(looks)) == len(looks), name
+    jam = figures["time-jam-left"]["layout"]
+    assert any(shape["x0"] == 0.0 == shape["x1"] for shape in jam["shapes"])
+    assert [a["text"] for a in jam["annotations"]] == ["event"]
+
+
+def test_the_moving_machine_is_the_simulated_one(study, written):
+    moving = json.loads(Reader(written.read_text("utf-8")).scripts["pictures"])
+    assert [r["name"] for r in moving["runs"]] == ["start_up", "feed_left", "jam_left"]
+    for run in moving["runs"]:
+        series = study.runs[run["name"]]
+        event = study.event.get(run["name"], 0.0)
+        time = np.array(run["time"])
+        assert np.all(np.diff(time) > 0.0) and np.max(np.diff(time)) < 0.02
+        count = len(time)
+
+        def full(numbers, count=count):
+            assert len(numbers) in (1, count)
+            return np.broadcast_to(numbers, count)
+
+        def joint(name, run=run, full=full):
+            return np.array([full(run["joints"][name][axis]) for axis in "xy"])
+
+        for link in moving["links"]:
+            length = np.hypot(*(joint(link["from"]) - joint(link["to"])))
+            assert np.max(np.abs(length - link["length"])) < 2e-4, link
+        for name in moving["fixed"]:
+            assert len(run["joints"][name]["x"]) == 1
+        whole = series.sel(time=time + event, method="nearest")
+        psi = np.arctan2(*(joint("A2") * [[1.0], [-1.0]]))
+        assert np.max(np.abs(psi - whole["machine.rocker.psi"].values)) < 1e-3
+        forces = {force["title"]: force for force in run["forces"]}
+        pivot = np.array([full(forces["C rocker pivot"][axis]) for axis in "xy"])
+        wanted = np.array([whole["machine.pivot.fx"].values, whole["machine.pivot.fy"].values])
+        assert np.max(np.abs(pivot - wanted)) < 1e-3 * run["largest"]
+        assert {force["at"] for force in run["forces"]} <= set(run["joints"])
+        torque = whole["machine.tau"].values * 25.0
+        assert np.max(np.abs(full(run["torque"]) - torque)) < 1e-3 * np.max(np.abs(torque))
+    loads = moving["runs"][1]["material"]
+    assert loads["right"][-1] == 0 and loads["left"][-1] == 60
+
+
+def test_a_long_study_is_thinned_out(study, monkeypatch):
+    monkeypatch.setattr(motion, "MOST", 50)
+    pictures = [len(run["time"]) for run in motion.motion(study)["runs"]]
+    assert sum(pictures) < 60 and min(pictures) > 5
+
+
+def test_sizing_is_shown_after_the_answer(study):
+    result = {**as_dict(study), "sizing": SIZING}
+    text = page.render(study, result)
+    reader = Reader(text)
+    check_traced(reader, result)
+    assert text.index('id="answer"') < text.index('id="sizing"') < text.index('id="plots"')
+    paths = [n["data-path"] for n in reader.numbers]
+    large = re.findall(r'<span class="large[^>]*><(?:data|span)[^>]*data-path="(sizing[^"]+)"', text)
+    assert large == [
+        "sizing.candidates.2.motor",
+        "sizing.candidates.2.ratio",
+        "sizing.flywheel.inertia",
+        "sizing.protection.trip_torque",
+    ]
+    assert "0.37 kW &lt;IE3&gt;" in text
+    # ranked: chosen, fits, rejected
+    ratios = [p for p in paths if p.endswith(".ratio") and "candidates" in p]
+    assert ratios[1:] == [f"sizing.candidates.{i}.ratio" for i in (2, 1, 0)]
+    over = re.findall(r"<strong><data[^>]*>([^<]*)", text[text.index('class="candidates"') :])
+    assert over == ["▲ 131\u00a0"]
+    assert "service factor" in text.lower() and "Typical values." in text
+
+
+def test_no_candidate_fits(study):
+    sizing = copy.deepcopy(SIZING)
+    sizing["chosen"] = None
+    sizing["candidates"] = sizing["candidates"][:1]
+    text = page.render(study, {**as_dict(study), "sizing": sizing})
+    assert "No candidate fits, because" in text and "too weak by 31 %" in text
+
+
+def test_a_run_that_stopped_early_has_a_page(study, tmp_path):
+    stopped = copy.copy(study)
+    stopped.failure = RunError("motor: it <broke>")
+    stopped.runs = {"unfinished": study.runs["start_up"].isel(time=slice(0, 1))}
+    stopped.answers, stopped.pins, stopped.event, stopped.certificate = {}, {}, {}, {}
+    text = page.write(stopped, tmp_path).read_text("utf-8")
+    assert "The run stopped early" in text and "it &lt;broke&gt;" in text
+    stopped.runs = {}
+    assert json.loads(Reader(page.render(stopped, as_dict(stopped))).scripts["pictures"]) is None
+
+
+def test_an_error_leaves_the_old_page(study, tmp_path, monkeypatch):
+    (tmp_path / "report.html").write_text("old")
+
+    def fails():
+        raise OSError("no plotly")
+
+    monkeypatch.setattr(page, "get_plotlyjs", fails)
+    with pytest.raises(OSError):
+        page.write(study, tmp_path)
+    assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("report.html", "old")]
+
+
+def test_paths_numbers_and_units():
+    result = {"machine": {"crank.m": {"value": 1}, "crank": {"x": [{"value": 2}]}}}
+    assert at(result, "machine.crank.m.value") == 1 and at(result, "machine.crank.x.0.value") == 2
+    with pytest.raises(KeyError):
+        at(result, "machine.crank.m.unit")
+    shown = {
+        44.2248: "44.2",
+        0.5: "0.500",
+        99.97: "100",
+        1374.4: "1374",
+        -995.2: "−995",
+        0.0: "0",
+        12345.6: "12\u202f346",
+    }
+    assert {x: digits_text(x) for x in shown} == shown
+    assert (
+        digits_text(2.3392e-7) == "2.34\u00a0×\u00a010⁻⁷"
+        and digits_text(2e6, full=False) == "2\u00a0×\u00a010⁶"
+    )
+    assert digits_text(1.5, 6, full=False) == "1.5" and digits_text(0.853815, 6, full=False) == "0.853815"
+    units = {
+        "N.m": "N\u00a0m",
+        "kg.m2": "kg\u00a0m²",
+        "1": "",
+        "Ohm/s": "Ω/s",
+        "rad/s2": "rad/s²",
+        "deg": "°",
+        "degC": "°C",
+    }
+    assert {unit: unit_text(unit) for unit in units} == units
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium here")
+def test_the_page_in_a_browser(study, written, tmp_path):
+    arguments = (
+        "--headless --no-sandbox --disable-gpu --enable-logging=stderr --virtual-time-budget=1000 --dump-dom"
+    )
+    done = subprocess.run(
+        ["chromium", *arguments.split(), f"--user-data-dir={tmp_path}", written.as_uri() + "#play=jam_left"],
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 0
+    assert not [line for line in done.stderr.splitlines() if "CONSOLE" in line]
+    figures = done.stdout.split('data-figure="')[1:]
+    assert len(figures) == 7
+    for figure in figures:
+        box = figure.partition("<figcaption>")[0]
+        assert 'class="main-svg"' in box and ('class="scatterlayer' in box or 'class="barlayer' in box)
+    stage = re.search(r'<svg id="stage".*?</svg>', done.stdout, re.S)[0]
+    played = int(re.search(r'data-frame="(\d+)"', stage)[1])
+    assert 0 < played and 'data-run="jam_left"' in stage
+    assert stage.count('class="link') == 8 and stage.count('class="arrow') == 11

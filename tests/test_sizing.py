@@ -1,0 +1,159 @@
+"""Sizing: what can be worked out by hand, and what the catalogue's motors then do."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from chainunit.config import parse
+from chainunit.cosim import CoSimulation, Profile, System
+from chainunit.drives.dc_motor import DcMotor
+from chainunit.fmu.backends import export
+from chainunit.studies import sizing
+from chainunit.studies.sizing import Check, flywheel, permitted_starts, rms, start_time
+
+ANGLE = np.linspace(0.0, 2.0 * math.pi, 7200, endpoint=False)
+
+
+def test_rms_by_hand():
+    assert rms((1.0, np.full(10, 3.0))) == 3.0
+    # a quarter of the time 8, three quarters 4: sqrt(16 + 12)
+    assert rms((0.25, np.full(7, 8.0)), (0.75, np.full(3, 4.0))) == pytest.approx(math.sqrt(28.0))
+    assert rms((1.0, 5.0 * np.sin(ANGLE))) == pytest.approx(5.0 / math.sqrt(2.0))
+
+
+def test_flywheel_by_hand():
+    """A torque M0 + M1 sin(n a): the energy swings by 2 M1/n, so J = 2 M1/(n delta w^2)."""
+    for n in (1, 2, 5):
+        torque = 40.0 + 12.0 * np.sin(n * ANGLE)
+        assert flywheel(torque, 6.0, 0.05) == pytest.approx(2.0 * 12.0 / (n * 0.05 * 36.0), rel=1e-3)
+    assert flywheel(np.full(360, 40.0), 6.0, 0.05) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.fixture(scope="module")
+def dc(tmp_path_factory):
+    return export_dc(tmp_path_factory.mktemp("sizing"))
+
+
+def export_dc(folder):
+    export(DcMotor, folder / "motor.fmu")
+    return folder / "motor.fmu"
+
+
+def test_a_flywheel_of_that_size_keeps_the_speed(dc):
+    """The co-simulated shaft with a constant inertia, a constant drive torque and a load that swings with time."""
+    mean, swing, w, delta = 1.0, 0.4, 100.0, 0.02
+    # one swing of the load a turn of the shaft
+    J = flywheel(mean + swing * np.sin(ANGLE), w, delta)
+    k, limit = 1.27, (mean + 0.001 * w) / 1.27
+    start = {
+        "motor.w_start": w,
+        "motor.rotor.J": J,
+        "motor.limit.i": limit,  # the current limit makes the torque constant
+        "motor.armature.alpha": 0.0,
+    }
+    assert k == DcMotor.Parameters().armature.k
+    load = {"motor.w_ref": 200.0, "motor.load.tau_bias": lambda t: mean + swing * math.cos(w * t)}
+    with CoSimulation(System({"motor": dc}, [], start), load) as simulation:
+        run = simulation.run(2.0, 1e-4)
+    # the last turn: the drag brings the mean back slowly after the current has risen
+    speed = run["motor.w"].values[run["time"].values > 2.0 - 2.0 * math.pi / w]
+    assert np.ptp(speed) / np.mean(speed) == pytest.approx(delta, rel=0.03)
+
+
+def test_start_up_time_by_hand(dc):
+    """A constant torque against a constant load and inertia: t = J w/(M - M_L)."""
+    J, load, w, k, limit = 0.05, 1.5, 120.0, 1.27, 4.4
+    start = {"motor.rotor.d": 0.0, "motor.limit.v": 1000.0, "motor.speed_control.ki": 0.0}
+    signals = {"motor.w_ref": w / 0.9, "motor.load.tau_bias": load, "motor.load.J": J}
+    with CoSimulation(System({"motor": dc}, [], start), signals) as simulation:
+        run = simulation.run(3.0, 1e-3)
+    inertia = J + DcMotor.Parameters().rotor.J
+    reached = float(np.interp(0.5 * w, run["motor.w"].values[:800], run["time"].values[:800]))
+    assert reached == pytest.approx(inertia * 0.5 * w / (k * limit - load), rel=0.01)
+    time = np.linspace(0.0, 4.0, 401)
+    assert start_time(time, np.minimum(100.0 * time, 200.0)) == pytest.approx(1.9, abs=0.011)
+    assert start_time(time, np.zeros(401)) is None
+
+
+def test_permitted_starts_by_hand():
+    p = SimpleNamespace(ambient=SimpleNamespace(T=313.15), stator=SimpleNamespace(R_th=0.1))
+    # 80 K over 0.1 K/W leaves 800 W; 300 W are taken; a start brings 36 kJ: 3600*500/36000
+    assert permitted_starts(p, 300.0, 36000.0, 1.0, 393.15) == pytest.approx(50.0)
+    assert permitted_starts(p, 900.0, 36000.0, 1.0, 393.15) == pytest.approx(1e-4)
+
+
+def test_a_check_is_what_is_used_of_what_is_permitted():
+    assert Check("x", 3.0, 4.0, "N.m").utilisation == 0.75
+    assert Check("x", None, 4.0, "N.m").utilisation is None
+
+
+HEAVY = """
+[machine]
+crank = { m = 160, s = 0.05, I = 4 }
+coupler = { m = 120, s = 0.7, I = 24 }
+rocker = { m = 480, s = 0.5, I = 60 }
+left = { wall_mass = 540, web_mass = 216 }
+right = { wall_mass = 540, web_mass = 216 }
+[feed]
+left = { material_mass = 300, processing_force = 120 }
+right = { material_mass = 300, processing_force = 120 }
+[run]
+step = 0.002
+[sizing]
+candidates = 5
+poles_least = 4
+poles_most = 4
+"""
+
+
+@pytest.fixture(scope="module")
+def sized(tmp_path_factory):
+    return sizing.size(parse(HEAVY), tmp_path_factory.mktemp("sized"), lambda *said: None)
+
+
+def test_the_smallest_that_fits_is_chosen_and_the_others_are_told_why(sized):
+    chosen = sized.chosen
+    assert chosen is not None and sized.candidates[0] is chosen
+    for c in sized.candidates:
+        assert c.reason
+        used = [check.utilisation for check in c.checks.values()]
+        fits = all(u is not None and u <= 1.0 for u in used)
+        assert fits == (c.verdict != "rejected")
+        if c.verdict == "fits":
+            assert c.motor.nameplate.power >= chosen.motor.nameplate.power
+    assert {c.verdict for c in sized.candidates} >= {"chosen", "fits"}
+
+
+def test_the_crank_turns_as_asked(sized, tmp_path):
+    drive = sized.chosen.drive
+    files, _ = drive.export(tmp_path)
+    config = parse(HEAVY)
+    with CoSimulation(drive.system(files), sizing.feed_signals(config, None)) as simulation:
+        simulation.run(1.0, 1e-3)
+        run = simulation.run(1.0 + 4.0 * math.pi / 3.0, 1e-3)
+    assert float(run["motor.w"].mean()) / drive.ratio == pytest.approx(3.0, rel=0.01)
+
+
+def test_a_fixed_ratio_is_kept_and_a_weak_gear_rejects(tmp_path):
+    config = parse(HEAVY + "[gear]\nratio = 60\ntorque_limit = 150\n".replace("60", "50"))
+    config = dataclasses.replace(config, sizing=dataclasses.replace(config.sizing, candidates=2.0))
+    found = sizing.size(config, tmp_path, lambda *said: None)
+    assert found.chosen is None
+    for c in found.candidates:
+        assert c.drive.ratio == 50.0
+        assert c.checks["gear"].utilisation > 1.0 and "torque of the gear" in c.reason
+
+
+def test_the_shift_of_the_feed_keeps_its_mass():
+    config = parse(HEAVY)
+    signals = sizing.feed_signals(config, 2.0)
+    left, right = (signals[f"machine.{side}.material_mass"] for side in ("left", "right"))
+    assert isinstance(left, Profile)
+    for t in (0.0, 2.1, 2.2, 5.0):
+        assert left(t) + right(t) == pytest.approx(600.0)
+    assert right(5.0) == pytest.approx(0.0)

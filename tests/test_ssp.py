@@ -1,0 +1,403 @@
+"""SSP packages: schemas, connections, parameter sets, and runs in libcosim and ecos beside the own master."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import re
+import subprocess
+import sys
+import textwrap
+import zipfile
+from pathlib import Path
+from xml.etree import ElementTree
+
+import fmpy
+import numpy as np
+import pytest
+
+# a Python FMU that runs in this process brings a pythonfmu without binaries, which a later export would find
+import pythonfmu  # noqa: F401
+from fmpy.ssp.ssd import read_ssd, read_ssv
+
+from chainunit import InputError, cli, config
+from chainunit.cosim import CoSimulation, System, port_connections
+from chainunit.fmu import ssp
+from chainunit.models import MODELS
+from chainunit.studies.overload import _tuned
+
+MINE = """
+title = "Mine, with \\u0001 and <marks>"
+[run]
+crank_speed = 2.4
+[feed]
+left = { material_mass = 45 }
+[motor]
+limit = { i = 3.9 }
+"""
+# what a user would write over in the parameter sets: fixed, tunable, an input
+OTHERS = {
+    "machine.ratio": 40.0,
+    "motor.limit.i": 3.0,
+    "motor.w_ref": 110.0,
+    "machine.left.material_mass": 80.0,
+}
+
+
+def here(package):
+    return pytest.mark.skipif(importlib.util.find_spec(package) is None, reason=f"{package} is not installed")
+
+
+@pytest.fixture(scope="module")
+def package(tmp_path_factory):
+    """A package by the command line, in a folder whose name has spaces."""
+    folder = tmp_path_factory.mktemp("ssp")
+    (folder / "mine.toml").write_text(MINE)
+    command = [sys.executable, "-m", "chainunit.cli", "export-ssp", "mine.toml", "-o", "out dir/mine.ssp"]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=folder)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert re.fullmatch(
+        r"out dir/mine\.ssp: SSP 1\.0, machine \(ChamberForces\), motor \(DcMotor\), 10 connections; FMI 2\.0.*\n",
+        done.stdout,
+    )
+    return folder / "out dir" / "mine.ssp"
+
+
+def test_schemas(package):
+    """read_ssd and read_ssv validate by the schemas of SSP 1.0."""
+    assert read_ssd(str(package)).version == "1.0"
+    with zipfile.ZipFile(package) as archive:
+        sets = [name for name in archive.namelist() if name.endswith(".ssv")]
+    assert sets == ["resources/machine.ssv", "resources/motor.ssv"]
+    for name in sets:
+        assert read_ssv(str(package), name).name == ssp.PARAMETER_SET
+
+
+@here("pyssp_standard")
+def test_pyssp_finds_nothing(package):
+    from pyssp_standard.ssp import SSP
+
+    with SSP(package, mode="r") as opened:
+        with opened.system_structure as ssd:
+            ssd.__check_compliance__()
+            assert ssd.check_connections(connector_not_in_system=True) == []
+            parameters = {
+                f"{e.name}.{c.name}"
+                for e in ssd.system.elements
+                for c in e.connectors
+                if c.kind == "parameter"
+            }
+            told = ssd.check_connections(unconnected_inputs=True)
+            assert len(ssd.connections()) == 10
+        given = set()
+        for ssv in opened.ssv:
+            ssv.__check_compliance__()
+            given |= {f"{ssv.file_path.stem}.{p['name']}" for p in ssv.parameters}
+    # an input without a source has its value in a parameter set, and no other has
+    assert {line.rsplit(" ", 1)[1] for line in told} == given > parameters
+    loads = {f"machine.{s}.{x}" for s in ("left", "right") for x in ("material_mass", "processing_force")}
+    assert given - parameters >= {"motor.w_ref", *loads}
+
+
+def connections(file):
+    return [
+        (f"{c.startElement}.{c.startConnector}", f"{c.endElement}.{c.endConnector}")
+        for c in read_ssd(str(file)).system.connections
+    ]
+
+
+def test_connectors_are_the_fmus_variables(package, tmp_path):
+    """Names, kinds and units, unit definitions included, are those of the FMU's own description."""
+    assert connections(package) == port_connections("machine", "motor")
+    with zipfile.ZipFile(package) as archive:
+        archive.extractall(tmp_path)
+    root = ElementTree.parse(tmp_path / "SystemStructure.ssd").getroot()
+    ns = {
+        p: f"http://ssp-standard.org/SSP1/SystemStructure{n}"
+        for p, n in (("ssd", "Description"), ("ssc", "Common"))
+    }
+    units = {
+        u.get("name"): u.find("ssc:BaseUnit", ns).attrib for u in root.iterfind("ssd:Units/ssc:Unit", ns)
+    }
+    for component in root.iterfind("ssd:System/ssd:Elements/ssd:Component", ns):
+        described = fmpy.read_model_description(str(tmp_path / component.get("source")))
+        connectors = {
+            c.get("name"): (c.get("kind"), c.find("ssc:Real", ns).get("unit"))
+            for c in component.iterfind("ssd:Connectors/ssd:Connector", ns)
+        }
+        causal = {v.name: (v.causality, v.unit) for v in described.modelVariables if v.causality != "local"}
+        assert connectors == causal
+        for unit in described.unitDefinitions:
+            if unit.name in units:
+                powers = {
+                    b: getattr(unit.baseUnit, b) for b in ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+                }
+                assert {b: int(n) for b, n in units[unit.name].items()} == {
+                    b: n for b, n in powers.items() if n
+                }
+
+
+def test_parameter_sets_and_fmus_hold_the_studys_values(package, tmp_path):
+    loaded = config.parse(MINE)
+    motor, _ = _tuned(loaded)
+    assert motor.limit.i == 3.9 and motor.speed_control.kp != loaded.motor.speed_control.kp
+    start = {
+        "machine": config.start_values(loaded, MODELS["ChamberForces"]),
+        "motor": MODELS["DcMotor"].parameter_layout.named(motor) | {"w_ref": 2.4 * 50.0},
+    }
+    with zipfile.ZipFile(package) as archive:
+        archive.extractall(tmp_path)
+    for name, model in (("machine", "ChamberForces"), ("motor", "DcMotor")):
+        values = {p.name: float(p.value) for p in read_ssv(str(package), f"resources/{name}.ssv").parameters}
+        wanted = start[name]
+        assert {n: wanted.get(n, v) for n, v in values.items()} == values
+        described = fmpy.read_model_description(str(tmp_path / "resources" / f"{model}.fmu"))
+        burnt = {v.name: float(v.start) for v in described.modelVariables if v.name in values}
+        assert burnt == values
+
+
+# -- runs
+
+LIBCOSIM = """
+    import json, sys
+    from libcosimpy.CosimExecution import CosimExecution
+    from libcosimpy.CosimObserver import CosimObserver
+
+    file, stop, step, names = sys.argv[1], float(sys.argv[2]), float(sys.argv[3]), sys.argv[4:]
+    # without a step of its own it must find the one in the package
+    execution = CosimExecution.from_ssp_file(file, **({"step_size": step * 1e9} if step else {}))
+    observer = CosimObserver.create_last_value()
+    execution.add_observer(observer=observer)
+    places = []
+    slaves = {info.name.decode(): info.index for info in execution.slave_infos()}
+    for instance, _, variable in (name.partition(".") for name in names):
+        variables = {v.name.decode(): v.reference for v in execution.slave_variables(slave_index=slaves[instance])}
+        places.append((slaves[instance], variables[variable]))
+    rows = []
+    for _ in range(round(stop / (step or 1e-3))):
+        assert execution.step(step_count=1)
+        rows.append([list(observer.last_real_values(slave_index=i, variable_references=[v]))[0] for i, v in places])
+    print("values", json.dumps(rows))
+"""
+ECOS = """
+    import json, os, sys
+    from ecospy import EcosSimulation
+
+    file, stop, step, names = sys.argv[1], float(sys.argv[2]), float(sys.argv[3]), sys.argv[4:]
+    with EcosSimulation(step_size=step or 1e-3, ssp_path=file) as simulation:
+        assert simulation.init(parameter_set="start" if step else None)
+        rows = []
+        for _ in range(round(stop / (step or 1e-3))):
+            simulation.step()
+            rows.append([simulation.get_real(name.replace(".", "::", 1)) for name in names])
+        simulation.terminate()
+    print("values", json.dumps(rows), flush=True)
+    # one process in some hundred crashes in the exit handlers of TBB, which ecos runs on, with whatever FMUs
+    os._exit(0)
+"""
+TOOLS = [
+    pytest.param(LIBCOSIM, id="libcosim", marks=here("libcosimpy")),
+    pytest.param(ECOS, id="ecos", marks=here("ecospy")),
+]
+
+
+def run(tool, file, names, stop, step=0.0):
+    """`names` in a process of its own, shape (steps, names); without a step, with what the package itself gives."""
+    command = [sys.executable, "-c", textwrap.dedent(tool), str(file), str(stop), str(step), *names]
+    # ecos needs libtbb, which pip puts there
+    libraries = f"{sys.prefix}/lib:{os.environ.get('LD_LIBRARY_PATH', '')}".rstrip(":")
+    environment = os.environ | {"LD_LIBRARY_PATH": libraries}
+    done = subprocess.run(command, capture_output=True, text=True, env=environment)
+    assert done.returncode == 0, done.stdout[-1000:] + done.stderr[-1000:]
+    (line,) = [line for line in done.stdout.splitlines() if line.startswith("values ")]
+    return np.array(json.loads(line.removeprefix("values ")))
+
+
+def own(file, folder, names, stop, step):
+    """The same package in the own master: its FMUs, its parameter sets, its connections."""
+    with zipfile.ZipFile(file) as archive:
+        archive.extractall(folder)
+    system = read_ssd(str(file)).system
+    start = {
+        f"{e.name}.{p.name}": float(p.value)
+        for e in system.elements
+        for p in e.parameterBindings[0].parameterValues[0].parameters
+    }
+    files = {e.name: folder / e.source for e in system.elements}
+    with CoSimulation(System(files, connections(file), start)) as simulation:
+        out = simulation.run(stop, step)
+    return np.stack([out[name].values[1:] for name in names], axis=1)
+
+
+def rewritten(package, file):
+    """The package with the values OTHERS in its parameter sets, and nothing else changed."""
+    left = dict(OTHERS)
+    with zipfile.ZipFile(package) as given, zipfile.ZipFile(file, "w") as changed:
+        for name in given.namelist():
+            content = given.read(name)
+            for full in [n for n in left if name == f"resources/{n.partition('.')[0]}.ssv"]:
+                pattern = rf'(name="{re.escape(full.partition(".")[2])}"[^>]*>\s*<ssv:Real value=")[^"]*'
+                text, n = re.subn(pattern, rf"\g<1>{left.pop(full)}", content.decode())
+                assert n == 1, full
+                content = text.encode()
+            changed.writestr(name, content)
+    assert not left
+    return file
+
+
+@pytest.mark.parametrize("tool", TOOLS)
+def test_runs_near_the_own_master_with_the_values_of_the_parameter_sets(tool, package, tmp_path):
+    """Start-up from rest. The tools exchange once a step, so that the motor sees a load port that is one step
+    older, and extrapolates it: second order as before, 1e-4 of the largest speed at 1 ms."""
+    other = rewritten(package, tmp_path / "other.ssp")
+    names = ["motor.w", "motor.phi"]
+    errors = []
+    for step in (1e-3, 5e-4):
+        got = run(tool, other, names, 1.0, step)
+        wanted = own(other, tmp_path / "out", names, 1.0, step)
+        errors.append(np.max(np.abs(got - wanted), axis=0) / np.max(np.abs(wanted), axis=0))
+    assert np.all(errors[0] < 1e-4), errors
+    assert np.all(errors[1] < errors[0] / 3.0), errors
+    before = own(package, tmp_path / "as it was", names, 1.0, 1e-3)
+    assert abs(before[-1, 0] - got[-1, 0]) > 5.0
+
+
+@pytest.mark.parametrize("tool", TOOLS)
+def test_runs_as_it_is(tool, package, tmp_path):
+    """libcosim with the package's step; ecos with the FMUs' start values alone."""
+    names = ["motor.w", "machine.ratio", "machine.left.material_mass", "motor.w_ref", "motor.limit.i"]
+    got = run(tool, package, names, 0.5)
+    wanted = own(package, tmp_path, names[:1], 0.5, 1e-3)
+    assert np.max(np.abs(got[:, :1] - wanted)) < 1e-4 * np.max(np.abs(wanted))
+    np.testing.assert_array_equal(got[-1, 1:], [50.0, 45.0, 120.0, 3.9])
+
+
+# a second motor that follows the first: two instances of one model, each with its own start values
+ANOTHER = ssp.ModelSystem(
+    "Another",
+    {"machine": MODELS["ChamberForces"], "motor": MODELS["DcMotor"], "second": MODELS["DcMotor"]},
+    [*port_connections("machine", "motor"), ("motor.w", "second.w_ref")],
+    {"machine.ratio": 30.0, "motor.w_ref": 90.0, "second.rotor.J": 0.02, "second.w_start": 10.0},
+)
+
+
+@pytest.fixture(scope="module")
+def another(tmp_path_factory):
+    file = tmp_path_factory.mktemp("another") / "another.ssp"
+    ssp.export(ANOTHER, file, stop=1.0, backend="python")
+    return file
+
+
+@pytest.mark.parametrize("tool", TOOLS)
+def test_another_system_by_pythonfmu(tool, another, tmp_path):
+    with zipfile.ZipFile(another) as archive:
+        fmus = {name for name in archive.namelist() if name.endswith(".fmu")}
+    assert fmus == {f"resources/{name}.fmu" for name in ("ChamberForces", "DcMotor", "DcMotor_second")}
+    names = ["motor.w", "second.w"]
+    got = run(tool, another, names, 0.3, 1e-3)
+    wanted = own(another, tmp_path / "out", names, 0.3, 1e-3)
+    # what the second motor follows is one step old: first order
+    assert np.max(np.abs(got - wanted)) < 1e-3 * np.max(wanted)
+
+
+# -- the file, and what is refused
+
+
+def test_feed_forward_and_sizing(tmp_path):
+    """The machine that the control asks is in the package, and shares the machine's FMU."""
+    ssp.export_study(config.parse("feed_forward = true"), tmp_path / "x.ssp", backend="python")
+    elements = read_ssd(str(tmp_path / "x.ssp")).system.elements
+    assert [(e.name, e.source) for e in elements] == [
+        ("machine", "resources/ChamberForces.fmu"),
+        ("motor", "resources/DcMotor.fmu"),
+        ("model", "resources/ChamberForces.fmu"),
+    ]
+    assert ("model.tau", "motor.tau_ff") in connections(tmp_path / "x.ssp")
+    with pytest.raises(InputError, match=r"\[sizing\] picks the motor"):
+        ssp.export_study(config.parse("[sizing]"), tmp_path / "y.ssp")
+
+
+def test_two_alike_share_their_fmu(tmp_path):
+    system = ssp.ModelSystem("Two", {"a": MODELS["DcMotor"], "b": MODELS["DcMotor"]}, [])
+    said = ssp.export(system, tmp_path / "two.ssp", backend="python")
+    assert said.startswith(
+        "SSP 1.0, a (DcMotor), b (DcMotor), 0 connections; FMI 2.0 Co-Simulation, by pythonfmu;"
+    )
+    elements = read_ssd(str(tmp_path / "two.ssp")).system.elements
+    assert [e.source for e in elements] == ["resources/DcMotor.fmu"] * 2
+
+
+def test_same_system_same_file(another, tmp_path):
+    """Identical, byte for byte; that native FMUs are, too, is tested with them."""
+    ssp.export(ANOTHER, tmp_path / "again.ssp", stop=1.0, backend="python")
+    assert (tmp_path / "again.ssp").read_bytes() == another.read_bytes()
+
+
+def test_whole_or_not_at_all(tmp_path, monkeypatch):
+    file = tmp_path / "x.ssp"
+    file.write_text("before")
+
+    def breaks(contents, part):
+        part.write_text("half")
+        raise OSError("disk full")
+
+    monkeypatch.setattr(ssp, "pack", breaks)
+    with pytest.raises(OSError, match="disk full"):
+        ssp.export_study(config.load(), file, backend="python")
+    assert [p.name for p in tmp_path.iterdir()] == ["x.ssp"] and file.read_text() == "before"
+
+
+def test_default_name_and_what_the_command_refuses(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+
+    def command(*arguments):
+        monkeypatch.setattr(sys, "argv", ["chainunit", "export-ssp", *arguments])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        return ended.value.code, *capsys.readouterr()
+
+    status, out, _ = command("--backend", "python")
+    assert not status and out.startswith("ChainUnitDrive.ssp: SSP 1.0, ") and out.count("\n") == 1
+    before = Path("ChainUnitDrive.ssp").read_bytes()
+    Path("wrong.toml").write_text("[machine]\nr = 0.9")
+    for arguments, said in (
+        (["-o", "x.fmu"], "-o x.fmu: must be a file name that ends in .ssp"),
+        (["none.toml"], "none.toml: cannot be read"),
+        (["wrong.toml"], "wrong.toml: machine: r = 0.9 m: the crank cannot turn"),
+        (["--backend", "fortran"], "'fortran' is not one of"),
+        (["--backend", "python", "-o", "wrong.toml/x.ssp"], "wrong.toml: cannot be written to"),
+    ):
+        status, out, error = command(*arguments)
+        assert (status, out, error.count("\n")) == (2, "", 1) and said in error
+    assert {p.name for p in tmp_path.iterdir()} == {"ChainUnitDrive.ssp", "wrong.toml"}
+    assert Path("ChainUnitDrive.ssp").read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    "models, connected, start, said",
+    [
+        ({"a.b": "DcMotor"}, [], {}, r"'a\.b': an instance's name must be of letters"),
+        ({"m": "DcMotor"}, [], {"m.w": 1.0}, r"m\.w: no such parameter or input"),
+        ({"m": "DcMotor"}, [], {"n.w_ref": 1.0}, r"n\.w_ref: no such parameter or input"),
+        ({"m": "DcMotor"}, [], {"m.rotor.J": -1.0}, r"m: rotor\.J = -1 kg\.m2: must be > 0"),
+        ({"c": "ChamberForces"}, [], {"c.r": 0.9}, r"c: r = 0\.9 m: the crank cannot turn"),
+        ({"m": "DcMotor"}, [], {"m.w_ref": float("nan")}, r"m: w_ref = nan rad/s: must be finite"),
+        ({"m": "DcMotor"}, [("m.w", "m.speed")], {}, r"m\.speed: no such input"),
+        ({"m": "DcMotor"}, [("m.w_ref", "m.w_ref")], {}, r"m\.w_ref: no such output"),
+        ({"m": "DcMotor"}, [("m.tau", "m.w_ref")], {}, r"m\.tau in N\.m cannot be connected to m\.w_ref"),
+        (
+            {"m": "DcMotor"},
+            [("m.w", "m.w_ref"), ("m.w", "m.w_ref")],
+            {},
+            r"m\.w_ref: is connected to m\.w and to m\.w",
+        ),
+    ],
+)
+def test_systems_that_contradict_themselves(models, connected, start, said, tmp_path):
+    system = ssp.ModelSystem("X", {n: MODELS[model] for n, model in models.items()}, connected, start)
+    with pytest.raises(InputError, match=said):
+        ssp.export(system, tmp_path / "x.ssp")
+    with pytest.raises(InputError, match="must go forward"):
+        ssp.export(system, tmp_path / "x.ssp", step=0.0)
+    assert not list(tmp_path.iterdir())
