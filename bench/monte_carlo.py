@@ -1,8 +1,8 @@
 # %% [markdown]
 # Random overloads
 #
-# 1,000 runs of 2 s each with a step of 1 ms, on all processors, with native FMUs; the limit is 120 s on two cores. The
-# floor beside it is the importer's own: the same number of steps in which fmpy only calls the FMUs (set, step, get).
+# 1,000 runs of 2 s each with a step of 1 ms, on two processes, with native FMUs; the limit is 120 s on two cores.
+# The floor beside it is the importer's own: as many steps in which fmpy only calls the FMUs (set, step, get).
 
 # %%
 from __future__ import annotations

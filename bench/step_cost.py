@@ -69,16 +69,30 @@ def from_c(folder: Path) -> list[tuple[str, float]]:
         for name in archive.namelist():
             if name.startswith("sources/"):
                 archive.extract(name, folder)
-    command = [shutil.which("cc"), "-std=gnu99", "-O2", "-fPIC", "-ffp-contract=off", "-o", str(folder / "loop")]
+    command = [
+        shutil.which("cc"),
+        "-std=gnu99",
+        "-O2",
+        "-fPIC",
+        "-ffp-contract=off",
+        "-o",
+        str(folder / "loop"),
+    ]
     loop = Path(__file__).parent / "loop.c"
-    subprocess.run([*command, str(loop), *map(str, sources.glob("*.c")), "-I", str(sources), "-lm"], check=True)
+    subprocess.run(
+        [*command, str(loop), *map(str, sources.glob("*.c")), "-I", str(sources), "-lm"], check=True
+    )
     fmu = Fmu(file)
     names = ["phi", "w", "a", "tau_bias", "J", "dJ_dphi", "phi0", "w0", "tau_bias_dphi", "tau_bias_dw"]
     references = [str(fmu.variables[n].valueReference) for n in names]
     fmu.close()
-    said = subprocess.run([str(folder / "loop"), *references], check=True, capture_output=True, text=True).stdout
+    said = subprocess.run(
+        [str(folder / "loop"), *references], check=True, capture_output=True, text=True
+    ).stdout
     bare, plain, port, everything = (1e-3 * float(x) for x in said.split())
-    print(f"From C, set + step + get all outputs costs {everything / bare:.2f} times the bare kernel (limit: 1.5).")
+    print(
+        f"From C, set + step + get all outputs costs {everything / bare:.2f} times the bare kernel (limit: 1.5)."
+    )
     return [
         ("bare generated kernel, all outputs, from C", bare),
         ("native FMU from C, set three inputs + step", plain),

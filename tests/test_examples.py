@@ -44,7 +44,7 @@ def test_a_motor_is_picked(result):
     assert chosen["verdict"] == "chosen" and f"Motor: {chosen['motor']}" in said
     assert all(check["utilisation"]["value"] <= 1.0 for check in chosen["checks"].values())
     rejected = [c for c in sizing["candidates"] if c["verdict"] == "rejected"]
-    assert rejected and all(c["reason"] in said for c in rejected)
+    assert rejected and all(c["motor"] in said and c["reason"] for c in rejected)
     assert numbers["motor"]["kind"] == "InductionMotor"
     # the study goes on with it, at the speed that was asked
     steady = numbers["answers"]["steady"]

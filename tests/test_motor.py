@@ -14,7 +14,7 @@ from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.speed_control import loop, tune
 from chainunit.errors import InputError
 from chainunit.integrate import rk4
-from chainunit.studies.overload import _tuned
+from chainunit.studies.choice import tuned as tuned_motor
 
 LAYOUT = DcMotor.state_layout
 
@@ -100,7 +100,7 @@ def test_internal_integrator_against_an_error_controlled_solver():
 
 def test_declared_gains_are_the_tuned_ones_of_the_packaged_drive():
     config = load()
-    tuned, tuning = _tuned(config)
+    tuned, tuning = tuned_motor(config)
     declared = DcMotor.Parameters()
     for name in ("kp", "ki"):
         assert getattr(declared.speed_control, name) == pytest.approx(

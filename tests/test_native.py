@@ -343,17 +343,23 @@ def test_threads_do_not_see_each_other(native):
     """Many instances at once, one a thread: fmpy lets other threads run inside a call."""
     fmu = Fmu(native["ChainUnit", 2][0])
 
-    def run(start):
-        with Running(fmu, {"phi_start": start}) as unit:
-            for k in range(300):
-                unit.step(1e-3 * k, 1e-3)
-            return unit.get(["phi", "w", "tau_bias"])
+    def run(unit):
+        for k in range(300):
+            unit.step(1e-3 * k, 1e-3)
+        return unit.get(["phi", "w", "tau_bias"])
 
-    starts = [0.1 * k for k in range(16)]
-    alone = [run(s) for s in starts]
-    assert len({tuple(x) for x in alone}) == len(starts)
+    # fmpy changes the working directory while it loads: one after the other
+    first, second = ([Instance(fmu, "unit") for _ in range(16)] for _ in range(2))
+    for group in (first, second):
+        for k, unit in enumerate(group):
+            unit.initialize({"phi_start": 0.1 * k}, 0.0)
+            unit.finish_initialization()
+    alone = [run(unit) for unit in first]
+    assert len({tuple(x) for x in alone}) == len(first)
     with ThreadPoolExecutor(8) as pool:
-        assert list(pool.map(run, starts)) == alone
+        assert list(pool.map(run, second)) == alone
+    for unit in (*first, *second):
+        unit.close()
     fmu.close()
 
 

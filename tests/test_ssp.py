@@ -16,16 +16,14 @@ from xml.etree import ElementTree
 import fmpy
 import numpy as np
 import pytest
-
-# a Python FMU that runs in this process brings a pythonfmu without binaries, which a later export would find
-import pythonfmu  # noqa: F401
 from fmpy.ssp.ssd import read_ssd, read_ssv
 
 from chainunit import InputError, cli, config
 from chainunit.cosim import CoSimulation, System, port_connections
 from chainunit.fmu import ssp
 from chainunit.models import MODELS
-from chainunit.studies.overload import _tuned
+from chainunit.studies.choice import tuned as tuned_motor
+from chainunit.studies.package import export_study
 
 MINE = """
 title = "Mine, with \\u0001 and <marks>"
@@ -140,7 +138,7 @@ def test_connectors_are_the_fmus_variables(package, tmp_path):
 
 def test_parameter_sets_and_fmus_hold_the_studys_values(package, tmp_path):
     loaded = config.parse(MINE)
-    motor, _ = _tuned(loaded)
+    motor, _ = tuned_motor(loaded)
     assert motor.limit.i == 3.9 and motor.speed_control.kp != loaded.motor.speed_control.kp
     start = {
         "machine": config.start_values(loaded, MODELS["ChamberForces"]),
@@ -306,7 +304,7 @@ def test_another_system_by_pythonfmu(tool, another, tmp_path):
 
 def test_feed_forward_and_sizing(tmp_path):
     """The machine that the control asks is in the package, and shares the machine's FMU."""
-    ssp.export_study(config.parse("feed_forward = true"), tmp_path / "x.ssp", backend="python")
+    export_study(config.parse("feed_forward = true"), tmp_path / "x.ssp", backend="python")
     elements = read_ssd(str(tmp_path / "x.ssp")).system.elements
     assert [(e.name, e.source) for e in elements] == [
         ("machine", "resources/ChamberForces.fmu"),
@@ -314,8 +312,21 @@ def test_feed_forward_and_sizing(tmp_path):
         ("model", "resources/ChamberForces.fmu"),
     ]
     assert ("model.tau", "motor.tau_ff") in connections(tmp_path / "x.ssp")
-    with pytest.raises(InputError, match=r"\[sizing\] picks the motor"):
-        ssp.export_study(config.parse("[sizing]"), tmp_path / "y.ssp")
+    with pytest.raises(InputError, match=r"no motor of the catalogue fits \(IE3 .*inertia"):
+        export_study(
+            config.parse("[sizing]\ncandidates = 1\ninertia_ratio = 1e-6"),
+            tmp_path / "y.ssp",
+            backend="python",
+        )
+
+
+def test_the_motor_that_sizing_chooses_is_packaged(tmp_path):
+    sizing = "[run]\nstep = 0.002\n[sizing]\ncandidates = 1\npoles_least = 4\npoles_most = 4"
+    said = export_study(config.parse(sizing), tmp_path / "z.ssp", backend="python")
+    assert "motor (InductionMotor)" in said
+    elements = read_ssd(str(tmp_path / "z.ssp")).system.elements
+    assert [e.source for e in elements] == ["resources/ChamberForces.fmu", "resources/InductionMotor.fmu"]
+    assert ("machine.J", "motor.load.J") in connections(tmp_path / "z.ssp")
 
 
 def test_two_alike_share_their_fmu(tmp_path):
@@ -344,7 +355,7 @@ def test_whole_or_not_at_all(tmp_path, monkeypatch):
 
     monkeypatch.setattr(ssp, "pack", breaks)
     with pytest.raises(OSError, match="disk full"):
-        ssp.export_study(config.load(), file, backend="python")
+        export_study(config.load(), file, backend="python")
     assert [p.name for p in tmp_path.iterdir()] == ["x.ssp"] and file.read_text() == "before"
 
 

@@ -236,9 +236,9 @@ def test_every_number_has_its_unit(done):
 
 def test_gains_that_are_not_given_are_tuned():
     from chainunit import config
-    from chainunit.studies.overload import _tuned
+    from chainunit.studies.choice import tuned as tuned_motor
 
-    motor, _ = _tuned(config.parse("[motor]\nspeed_control = { kp = 0.2 }\narmature = { L = 0.22 }"))
+    motor, _ = tuned_motor(config.parse("[motor]\nspeed_control = { kp = 0.2 }\narmature = { L = 0.22 }"))
     assert motor.speed_control.kp == 0.2
     assert motor.current_control.kp == pytest.approx(0.22 * 300.0)
 

@@ -196,7 +196,7 @@ def export_ssp(
 ) -> None:
     """Write motor and machine, connected, with their parameter sets, as an SSP 1.0 package of FMUs 2.0."""
     from . import config as configuration
-    from .fmu.ssp import export_study
+    from .studies.package import export_study
 
     if output.suffix != ".ssp":
         raise InputError(f"-o {output}: must be a file name that ends in .ssp")

@@ -16,6 +16,9 @@ from importlib import metadata
 from pathlib import Path
 from xml.etree.ElementTree import tostring
 
+# now, not at need: a Python FMU that has run in this process brings a pythonfmu of its own, without binaries
+from pythonfmu import FmuBuilder
+
 from ..files import folder, whole
 from ..model import Model
 from .accompany import accompanying
@@ -117,8 +120,6 @@ def _recipe(model: type[Model], package: str, given: dict[str, float]) -> str:
 
 def _build(recipe: Path, package: Path, description: Path, file: Path) -> Path:
     """pythonfmu's build, which leaves its traces in `sys.path` and `sys.modules` behind."""
-    from pythonfmu import FmuBuilder
-
     path = list(sys.path)
     modules = set(sys.modules)
     try:

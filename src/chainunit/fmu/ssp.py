@@ -17,15 +17,10 @@ from importlib import metadata
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
-from ..config import Config, start_values
-from ..drives.dc_motor import DcMotor
 from ..errors import InputError
 from ..files import folder, whole
-from ..machines.chain_unit import ChamberForces
 from ..model import Model
 from ..quantities import base_units
-from ..studies.drive import Drive
-from ..studies.overload import _tuned
 from .backends import Backend
 from .backends import export as export_fmu
 from .description import Interface, Signal
@@ -117,56 +112,6 @@ def export(
         pack(contents, part)
     parts = ", ".join(f"{name} ({model.name})" for name, model in system.models.items())
     return f"SSP 1.0, {parts}, {len(system.connections)} connections; {'; '.join(dict.fromkeys(made))}"
-
-
-def study_system(config: Config) -> ModelSystem:
-    """Machine and motor of a study, from rest: the speed reference is the crank speed at the motor from the start
-    on, feed and processing forces are those of normal running. Gains that the study file does not give are tuned,
-    as in the study; with feed-forward, the machine that the control asks is in the system, too.
-
-    Raises
-    ------
-    InputError
-        for a study that picks its motor by sizing.
-    """
-    if config.sizing is not None:
-        raise InputError(
-            "[sizing] picks the motor by co-simulation; an SSP package holds the motor of [motor]: leave [sizing] out"
-        )
-    motor, _ = _tuned(config)
-    drive = Drive(DcMotor, motor, config.machine, feed_forward=config.feed_forward)
-    machine = start_values(config, ChamberForces)
-    models: dict[str, type[Model]] = {"machine": ChamberForces, "motor": DcMotor}
-    start = {"machine": machine, "motor": DcMotor.parameter_layout.named(motor) | {"w_ref": machine["w"]}}
-    if config.feed_forward:
-        models["model"], start["model"] = ChamberForces, machine
-    return ModelSystem(
-        "ChainUnitDrive",
-        models,
-        drive.connections(),
-        {f"{name}.{variable}": x for name, values in start.items() for variable, x in values.items()},
-        config.title,
-    )
-
-
-def export_study(
-    config: Config,
-    file: Path,
-    *,
-    backend: Backend | None = None,
-    report: Callable[[str], None] = lambda what: None,
-) -> str:
-    """Write machine and motor of a study as an SSP package and say, in words, what is in it. The default experiment
-    is as long as the study's start-up and steady running.
-
-    Raises
-    ------
-    InputError, RunError
-        see `study_system` and `export`.
-    """
-    run = config.run
-    stop = run.ramp + (run.settle_turns + run.turns) * 2.0 * math.pi / run.crank_speed
-    return export(study_system(config), file, stop=stop, step=run.step, backend=backend, report=report)
 
 
 # -- checks

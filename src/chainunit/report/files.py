@@ -13,7 +13,6 @@ from .. import __version__
 from ..files import whole
 from ..studies.overload import SCENARIOS, Study, as_dict
 
-
 LOAD_CYCLE = "load_cycle.csv"
 
 

@@ -21,17 +21,18 @@ from ..config import SCENARIOS as SCENARIOS
 from ..config import Config
 from ..cosim import Bond, CoSimulation, Profile, System, energy_residual, monolithic
 from ..drives.dc_motor import DcMotor
-from ..drives.speed_control import Loop, Tuning, loop, tune
+from ..drives.speed_control import Loop, Tuning, loop
 from ..errors import RunError
 from ..fmu.backends import Backend
 from ..machines.api import ChainUnit
 from ..quantities import Layout, Value, declaration, quantity
 from . import protection
+from .choice import choose
 from .cycle import OverloadFactors, Sides, cycle, overload_factors, sides_over_speed
 from .drive import Drive
 from .monte_carlo import MonteCarloResult, Task
 from .monte_carlo import run as run_monte_carlo
-from .sizing import SizingResult, size
+from .sizing import SizingResult
 
 PINS = {
     "O1 crank bearing": "crank_bearing",
@@ -159,17 +160,10 @@ def run_study(
     A run that fails ends the study early: what was computed is in it, and `failure` says why.
     """
     report = report or (lambda what, done, todo: None)
-    if config.sizing is None:
-        motor, tuning = _tuned(config)
-        drive = Drive(DcMotor, motor, config.machine, feed_forward=config.feed_forward)
-        study = Study(config, drive, tuning)
+    choice = choose(config, folder / "fmu", report, backend)
+    study = Study(config, choice.drive, choice.tuning, choice.sizing)
+    if study.drive.motor is DcMotor:
         study.loops = _loops(study)
-    else:
-        sized = size(config, folder / "fmu", report, backend)
-        # where none fits, the first of the list stands for the machine's own numbers
-        best = sized.chosen or (sized.candidates[0] if sized.candidates else None)
-        drive = best.drive if best else Drive(DcMotor, config.motor, config.machine)
-        study = Study(config, drive, sizing=sized)
     _statics(study)
     if study.sizing is not None and study.sizing.chosen is None:
         _note(study)
@@ -183,15 +177,6 @@ def run_study(
         study.failure = error
     _note(study)
     return study
-
-
-def _tuned(config: Config) -> tuple[Any, Tuning | None]:
-    """The motor with controller gains tuned to this machine, where the config does not give them."""
-    both = cycle(config.machine, config.run.crank_speed, config.feed.left, config.feed.right)
-    inertia = config.motor.rotor.J + float(np.mean(both.outputs.J))
-    tuning = tune(config.motor.armature, inertia)
-    own = {name: gain for name, gain in tuning.parameters.items() if name not in config.motor_given}
-    return DcMotor.parameter_layout.from_names(own, config.motor), tuning if own else None
 
 
 def _loops(study: Study) -> dict[str, Loop]:

@@ -1,0 +1,52 @@
+"""The drive of a study: the DC motor that it gives, tuned, or the motor that sizing chooses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..config import Config
+from ..drives.dc_motor import DcMotor
+from ..drives.speed_control import Tuning, tune
+from ..fmu.backends import Backend
+from .cycle import cycle
+from .drive import Drive
+from .sizing import SizingResult, size
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The drive, and how it came about: tuned gains, or the list of candidates."""
+
+    drive: Drive
+    tuning: Tuning | None = None
+    sizing: SizingResult | None = None
+
+
+def choose(
+    config: Config,
+    folder: Path,
+    report: Callable[[str, float, float], None],
+    backend: Backend | None = None,
+) -> Choice:
+    """The drive of a study; FMUs that sizing needs are written to `folder`. Where no candidate fits, the first of the
+    list stands for the machine's own numbers."""
+    if config.sizing is None:
+        motor, tuning = tuned(config)
+        return Choice(Drive(DcMotor, motor, config.machine, feed_forward=config.feed_forward), tuning)
+    sized = size(config, folder, report, backend)
+    best = sized.chosen or (sized.candidates[0] if sized.candidates else None)
+    return Choice(best.drive if best else Drive(DcMotor, config.motor, config.machine), sizing=sized)
+
+
+def tuned(config: Config) -> tuple[Any, Tuning | None]:
+    """The motor with controller gains tuned to this machine, where the config does not give them."""
+    both = cycle(config.machine, config.run.crank_speed, config.feed.left, config.feed.right)
+    inertia = config.motor.rotor.J + float(np.mean(both.outputs.J))
+    tuning = tune(config.motor.armature, inertia)
+    own = {name: gain for name, gain in tuning.parameters.items() if name not in config.motor_given}
+    return DcMotor.parameter_layout.from_names(own, config.motor), tuning if own else None
