@@ -4,12 +4,12 @@ import re
 from pathlib import Path
 
 from chainunit.report.reproduction import markdown
-from chainunit.studies.reproduction import reproduce
+from chainunit.studies.reproduction import PAPERS, reproduce
 
 PAGE = Path(__file__).parent / "papers.md"
 
 text = PAGE.read_text("utf-8")
-for paper in ("000", "001"):
+for paper in PAPERS:
     table = markdown([row for row in reproduce() if row.paper == paper])
     text = re.sub(
         rf"(<!-- rows of paper {paper} -->\n).*?(<!-- end -->)",

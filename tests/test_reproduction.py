@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from chainunit.report.reproduction import markdown
-from chainunit.studies.reproduction import paper000, reproduce
+from chainunit.studies.reproduction import PAPERS, paper000, reproduce
 
 ROWS = reproduce()
 
@@ -175,7 +175,7 @@ def test_command_line(tmp_path):
 
 def test_the_documentation_shows_these_rows():
     text = (Path(__file__).parents[1] / "docs" / "papers.md").read_text()
-    for paper in ("000", "001"):
+    for paper in PAPERS:
         (block,) = re.findall(rf"<!-- rows of paper {paper} -->\n(.*?)<!-- end -->", text, re.S)
         # the last digit of a rounding error is the machine's own
         wanted = markdown([r for r in ROWS if r.paper == paper])

@@ -22,7 +22,7 @@ from ..engines import numpy_
 from ..machines.api import EMPTY, ChainUnit
 from ..machines.crank_rocker import longest_crank, parallel_frame, pressure_angle_extremes, swing
 from ..studies.cycle import overload_factors
-from ..studies.reproduction import Row
+from ..studies.reproduction import PAPERS, Row
 from ..studies.reproduction import paper000 as p0
 from ..studies.reproduction import paper001 as p1
 from .style import LINES, draw
@@ -61,8 +61,7 @@ def write(rows: Sequence[Row], folder: Path) -> list[Path]:
     table = folder / "reproduction.md"
     table.write_text(
         "\n".join(
-            f"## Paper {paper}\n\n{markdown([r for r in rows if r.paper == paper])}"
-            for paper in ("000", "001")
+            f"## Paper {paper}\n\n{markdown([r for r in rows if r.paper == paper])}" for paper in PAPERS
         ),
         "utf-8",
     )
@@ -71,7 +70,7 @@ def write(rows: Sequence[Row], folder: Path) -> list[Path]:
 
 def show(rows: Sequence[Row], console: Console) -> None:
     """Print the rows that a paper prints, and count the rest."""
-    for paper in ("000", "001"):
+    for paper in PAPERS:
         table = Table(title=f"Paper {paper}: what it prints", title_justify="left")
         for column, side in (
             ("item", "left"),
