@@ -112,6 +112,13 @@ def show(study: Study, console: Console) -> None:
             f"({limits.slack_speed_empty:.2f} rad/s empty); lowest chain mode near "
             f"{limits.chain_resonance:.1f} rad/s."
         )
+    for name, found in study.loops.items():
+        console.print(
+            f"Speed loop, {name} ({found.inertia:.3g} kg m2): phase margin {found.phase_margin:.0f} deg at "
+            f"{found.crossover:.3g} rad/s; a step of 1 N m takes {found.speed_dip:.2g} rad/s off the motor speed, "
+            f"settled after {found.settling:.2g} s.",
+            soft_wrap=True,
+        )
     if study.certificate:
         worst_share = max(c["energy_residual_share"] for c in study.certificate.values())
         console.print(f"Energy residual of the shaft: at most {worst_share:.1e} of the energy moved.")
