@@ -1,10 +1,10 @@
 """A cardan shaft with two Hooke joints between a motor and a machine: exact kinematics, torsional frequencies.
 
-Shaft 2 -> joint (bend alpha1) -> middle shaft 0 with splines -> joint (bend alpha2) -> shaft 3, as in paper 002.
-`J1` is the rotor on shaft 2, `J4` the driven inertia on shaft 3, `c2`, `c3` the torsional stiffnesses of the two
-shafts; the cardan itself has no mass. Angles of yokes are counted from the plane of the two shafts that a joint
-connects: `phi2` is the paper's gamma1, and `gamma2` is that of the yoke on shaft 3, where alone the paper's formula is
-right. `i23` is d phi3/d phi2: it varies twice a turn, its mean is 1.
+Shaft 2 -> joint (bend alpha1) -> middle shaft 0 with splines -> joint (bend alpha2) -> shaft 3, as in paper
+002. `J1` is the rotor on shaft 2, `J4` the driven inertia on shaft 3, `c2`, `c3` the torsional stiffnesses of
+the two shafts; the cardan itself has no mass. Angles of yokes are counted from the plane of the two shafts that
+a joint connects: `phi2` is the paper's gamma1, and `gamma2` is that of the yoke on shaft 3, where alone the
+paper's formula is right. `i23` is d phi3/d phi2: it varies twice a turn, its mean is 1.
 """
 
 from __future__ import annotations
