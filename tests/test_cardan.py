@@ -136,7 +136,7 @@ def test_the_range_has_a_condition(J1):
 
 
 def test_a_bend_near_a_right_angle_makes_it_low_or_high():
-    """docs/papers.md, item 4: 89/10 deg at gamma = 60 deg gives 3.94, 10/89 deg 99.97; at gamma = 0 the other way round."""
+    """Item 4: 89/10 deg at gamma = 60 deg gives 3.94 rad/s, 10/89 deg 99.97; at gamma = 0 the other way round."""
     found = {}
     for a1, a2 in ((89.0, 10.0), (10.0, 89.0)):
         for gamma in (0.0, 60.0):
