@@ -60,8 +60,9 @@ def test_none_fits_and_the_reason_is_told(result):
     sizing = numbers["sizing"]
     assert sizing["chosen"] is None and "No motor of the catalogue fits" in said
     for c in sizing["candidates"]:
-        assert c["verdict"] == "rejected" and "starts per hour" in c["reason"]
-        assert c["checks"]["starts"]["utilisation"]["value"] > 1.0
+        assert c["verdict"] == "rejected" and "torque of the gear" in c["reason"]
+        assert c["checks"]["gear"]["utilisation"]["value"] > 1.0
+    assert any("larger ones were not tried" in note for note in numbers["notes"])
 
 
 def test_the_jam_trips_the_coupling(result):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
+import math
 import os
 import signal
 import subprocess
@@ -15,6 +17,7 @@ import pytest
 from chainunit.config import parse
 from chainunit.cosim import CoSimulation
 from chainunit.drives.dc_motor import DcMotor
+from chainunit.errors import RunError
 from chainunit.studies import monte_carlo
 from chainunit.studies.drive import Drive
 
@@ -101,13 +104,13 @@ def test_a_row_is_what_its_number_says(killed):
     drive = Drive(DcMotor, config.motor, config.machine)
     files = {name: file.parent / f"{model.name}.fmu" for name, (model, _) in drive.models().items()}
     task = monte_carlo.Task(config, drive, files, 1.0)
-    signals = {**monte_carlo._loads(config), **drive.reference(config.run.crank_speed, config.run.ramp)}
+    signals = {**drive.loads(config.feed), **drive.reference(config.run.crank_speed, config.run.ramp)}
     with CoSimulation(drive.system(files), signals) as simulation:
         simulation.run(1.0, config.run.step)
         simulation.save()
         for number in (7, 3, 20):
             got = monte_carlo.Layout(monte_carlo.Sample).named(monte_carlo.one(task, number, simulation))
-            assert {"run": number, **got} == before[number]
+            assert {"run": number, "failed": None, **got} == before[number]
 
 
 def test_answers_hang_together(killed):
@@ -120,3 +123,43 @@ def test_answers_hang_together(killed):
     sizes = result.quantiles()["crank_torque_peak"]
     assert sizes["q5"] < sizes["q50"] < sizes["q95"] <= sizes["q99"]
     assert result.as_dict()["quantiles"]["trips"]["share"]["unit"] == "1"
+
+
+def test_lumps_come_anywhere_in_a_turn(killed):
+    angles = sorted(row["crank_angle"] for row in killed[1].values())
+    gaps = [b - a for a, b in zip(angles, [*angles[1:], angles[0] + 2.0 * math.pi], strict=True)]
+    # of n uniform angles the largest gap is about 2 pi (ln n + 3)/n at most
+    n = len(angles)
+    assert max(gaps) < 2.0 * math.pi * (math.log(n) + 3.0) / n
+
+
+def test_what_the_numbers_depend_on_is_in_the_name(killed):
+    config = parse(STUDY.format(runs=10))
+    drive = Drive(DcMotor, config.motor, config.machine)
+    files = {name: killed[0].parent / f"{model.name}.fmu" for name, (model, _) in drive.models().items()}
+    digest = monte_carlo.Task(config, drive, files, 1.0).digest()
+    assert killed[0].name == f"monte_carlo_{digest}.jsonl"
+    other = dataclasses.replace(drive, feed_forward=True)
+    assert monte_carlo.Task(config, other, files, 1.0).digest() != digest
+    more = parse(STUDY.format(runs=20))
+    assert monte_carlo.Task(more, drive, files, 1.0).digest() == digest
+
+
+def test_a_run_that_fails_is_a_row(killed, monkeypatch):
+    config = parse(STUDY.format(runs=10))
+    drive = Drive(DcMotor, config.motor, config.machine)
+    files = {name: killed[0].parent / f"{model.name}.fmu" for name, (model, _) in drive.models().items()}
+    task = monte_carlo.Task(config, drive, files, 1.0)
+    good = monte_carlo.one
+
+    def fails(task, number, simulation):
+        if number == 2:
+            raise RunError("machine: it broke")
+        return good(task, number, simulation)
+
+    monkeypatch.setattr(monte_carlo, "one", fails)
+    rows = monte_carlo.batch(task, task.digest(), [1, 2, 3])
+    monte_carlo._worker.popitem()[1].close()
+    assert [row["failed"] for row in rows] == [None, "machine: it broke", None]
+    result = monte_carlo.MonteCarloResult(rows, killed[0], 0)
+    assert result.failed == 1 and result.quantiles()["crank_torque_peak"]["q50"] > 0.0

@@ -11,10 +11,15 @@ import pytest
 
 from chainunit.config import parse
 from chainunit.cosim import CoSimulation, Profile, System
+from chainunit.drives.catalogue import catalogue
 from chainunit.drives.dc_motor import DcMotor
+from chainunit.drives.induction_motor import breakdown, steady
+from chainunit.drives.motor import T_RATED
+from chainunit.engines import MATH
+from chainunit.errors import InterruptedRunError
 from chainunit.fmu.backends import export
 from chainunit.studies import sizing
-from chainunit.studies.sizing import Check, flywheel, permitted_starts, rms, start_time
+from chainunit.studies.sizing import Check, flywheel, permitted_starts, rms, start_time, warm_temperature
 
 ANGLE = np.linspace(0.0, 2.0 * math.pi, 7200, endpoint=False)
 
@@ -139,14 +144,64 @@ def test_the_crank_turns_as_asked(sized, tmp_path):
     assert float(run["motor.w"].mean()) / drive.ratio == pytest.approx(3.0, rel=0.01)
 
 
-def test_a_fixed_ratio_is_kept_and_a_weak_gear_rejects(tmp_path):
-    config = parse(HEAVY + "[gear]\nratio = 60\ntorque_limit = 150\n".replace("60", "50"))
-    config = dataclasses.replace(config, sizing=dataclasses.replace(config.sizing, candidates=2.0))
-    found = sizing.size(config, tmp_path, lambda *said: None)
-    assert found.chosen is None
-    for c in found.candidates:
-        assert c.drive.ratio == 50.0
-        assert c.checks["gear"].utilisation > 1.0 and "torque of the gear" in c.reason
+def one_candidate(more, **asked):
+    config = parse(HEAVY + more)
+    return dataclasses.replace(config, sizing=dataclasses.replace(config.sizing, candidates=1.0, **asked))
+
+
+def test_a_fixed_ratio_is_kept_and_must_give_the_speed(tmp_path):
+    """With 62 in place of 52 the crank turns a sixth too slowly."""
+    found = sizing.size(one_candidate("[gear]\nratio = 62\n", fluctuation=0.5), tmp_path, lambda *said: None)
+    (c,) = found.candidates
+    assert c.drive.ratio == 62.0 and c.verdict == "rejected"
+    assert c.checks["crank_speed"].value == pytest.approx(1.0 - 52.0 / 62.0, abs=0.02)
+
+
+def test_a_weak_gear_rejects(tmp_path):
+    found = sizing.size(
+        one_candidate("[gear]\ntorque_limit = 150\n", fluctuation=0.5), tmp_path, lambda *said: None
+    )
+    (c,) = found.candidates
+    assert found.chosen is None and found.untried > 10
+    assert c.checks["gear"].utilisation > 1.0 and "torque of the gear" in c.reason
+
+
+def test_ctrl_c_ends_sizing(tmp_path, monkeypatch):
+    """It must not count as a candidate that failed."""
+
+    def stopped(*arguments, **options):
+        raise InterruptedRunError("interrupted at t = 1 s")
+
+    monkeypatch.setattr(CoSimulation, "run", stopped)
+    with pytest.raises(InterruptedRunError):
+        sizing.size(one_candidate(""), tmp_path, lambda *said: None)
+
+
+def test_a_motor_at_its_rated_load_is_as_warm_as_its_nameplate_says():
+    """The heat of a run with a cold winding, brought to the temperature at which it is in balance, 80 K above."""
+    motor = next(m for m in catalogue() if m.nameplate.power == 1100.0 and m.nameplate.poles == 4.0)
+    p, plate = motor.identify().parameters, motor.nameplate
+    cooling = p.cooling.still + (1.0 - p.cooling.still) * plate.speed / plate.synchronous
+    # at the slip that the cold motor needs for its rated torque
+    slips = np.linspace(0.0, 0.1, 2001)
+    cold = [steady(MATH, p, plate.synchronous * (1.0 - s), T=T_RATED) for s in slips]
+    k = int(np.argmin([abs(c.tau - plate.torque) for c in cold]))
+    rise = warm_temperature(p, cold[k].heat, T_RATED, cooling) - p.ambient.T
+    assert rise == pytest.approx(80.0, rel=0.06)
+    # without growth of the losses the balance is the plain one, and a hopeless one is bounded
+    plain = dataclasses.replace(p, stator=dataclasses.replace(p.stator, alpha=0.0))
+    assert warm_temperature(plain, 100.0, T_RATED, 1.0) == pytest.approx(p.ambient.T + 100.0 * p.stator.R_th)
+    assert warm_temperature(p, 1e6, T_RATED, 1.0) == 2000.0
+
+
+def test_above_the_corner_an_inverter_has_less_torque(tmp_path):
+    """Twice the rated frequency: the breakdown torque of the check is a quarter, roughly, of that at 50 Hz."""
+    config = dataclasses.replace(one_candidate("[gear]\nratio = 104\n", fluctuation=0.9), start="inverter")
+    (c,) = sizing.size(config, tmp_path, lambda *said: None).candidates
+    at_50_hz = float(breakdown(c.drive.parameters, T=config.sizing.temperature).air_gap_tau)
+    assert 0.15 * at_50_hz < c.breakdown_torque < 0.4 * at_50_hz
+    rated = c.motor.nameplate.torque
+    assert c.checks["rms_torque"].limit == pytest.approx(0.5 * rated, rel=0.1)
 
 
 def test_the_shift_of_the_feed_keeps_its_mass():

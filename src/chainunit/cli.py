@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from . import __version__
-from .errors import InputError, RunError
+from .errors import InputError, InterruptedRunError, RunError
 from .files import folder
 
 
@@ -79,13 +79,17 @@ def study(
         print(configuration.example(), end="")
         return
     loaded = configuration.load(config)
+    if loaded.sizing is not None:
+        from .drives.catalogue import check_own
+
+        # before anything of an earlier run is taken away
+        check_own(loaded.catalogue)
     folder(output)
 
-    from .errors import InterruptedRunError
     from .report import files, page, plots, table
     from .studies.overload import run_study
 
-    for stale in ("result.json", "result.nc", page.NAME, *plots.NAMES):
+    for stale in ("result.json", "result.nc", files.LOAD_CYCLE, page.NAME, *plots.NAMES):
         if (output / stale).exists() and not (output / stale).is_file():
             raise InputError(f"{output / stale}: is not a regular file; name another folder")
         (output / stale).unlink(missing_ok=True)
@@ -140,7 +144,7 @@ def reproduce(
 
 @app.command()
 def export(
-    name: Annotated[str, typer.Argument(help="ChamberForces, ChainUnit or DcMotor.")],
+    name: Annotated[str, typer.Argument(help="ChamberForces, ChainUnit, DcMotor or InductionMotor.")],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="FMU file; NAME.fmu by default.")
     ] = None,
@@ -225,6 +229,8 @@ def main() -> None:
         sys.exit(app(sys.argv[1:] or ["--help"], standalone_mode=False))
     except InputError as error:
         _end(str(error), 2)
+    except InterruptedRunError as error:
+        _end(str(error), 130)
     except RunError as error:
         _end(str(error), 1)
     except (typer.Abort, KeyboardInterrupt):

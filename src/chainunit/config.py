@@ -150,7 +150,7 @@ class MonteCarlo:
     """Overloads at random crank angles and times."""
 
     runs: Value = quantity("1", "number of runs; 0 leaves the study out", default=0.0, min=0.0, max=1e6)
-    duration: Value = quantity("s", "length of a run", default=2.0, min=0.05, max=1e4)
+    duration: Value = quantity("s", "time that is followed after a lump", default=2.0, min=0.05, max=1e4)
     force_low: Value = quantity("N", "least processing force of the lump", default=1000.0, min=0.0)
     force_high: Value = quantity("N", "largest processing force of the lump", default=3000.0, min=0.0)
     seed: Value = quantity("1", "seed of the random numbers", default=1.0, min=0.0, max=1e9)
@@ -176,7 +176,7 @@ class Sizing:
     )
     inertia_ratio: Value = quantity(
         "1",
-        "permitted ratio of the reflected inertia to that of rotor and flywheel",
+        "permitted ratio of all other inertia at the motor shaft, flywheel included, to that of the rotor",
         default=10.0,
         above=0.0,
         max=1000.0,
@@ -419,6 +419,7 @@ def parse(text: str, source: str = "config") -> Config:
         checked: Any = _File.model_validate(_over_example(data))
     except ValidationError as error:
         raise InputError(_first_line(error)) from error
+    _consistent(data, checked)
     machine_given = _given(checked.machine)
     if checked.ratios.model_fields_set:
         try:
@@ -461,16 +462,51 @@ def parse(text: str, source: str = "config") -> Config:
         catalogue=_beside(checked.catalogue, source),
         source=source,
     )
-    run, turn = config.run, 2.0 * math.pi / config.run.crank_speed
-    steps = (
-        run.ramp + (run.settle_turns + run.turns + 3.0 * (config.overload.turns + 2.0)) * turn
-    ) / run.step
+    run, turn, o = config.run, 2.0 * math.pi / config.run.crank_speed, config.overload
+    lumps = o.lumps * (2.0 * o.jam_rise + o.jam_duration + o.lump_pause) if "lumps" in config.events else 0.0
+    seconds = run.ramp + (run.settle_turns + run.turns + len(config.events) * (o.turns + 2.0)) * turn + lumps
+    steps = max(seconds, config.monte_carlo.duration) / run.step
     if not steps <= MOST_STEPS:
         raise InputError(
             f"run.step = {run.step:g} s: the study would take {steps:.2g} steps, more than {MOST_STEPS:.0e}; "
             "lengthen the step, raise the speed, or lessen the turns"
         )
     return config
+
+
+def _consistent(data: Mapping[str, Any], checked: Any) -> None:
+    """Refuse what would be passed over in silence, and limits that leave nothing between them."""
+    if "sizing" in data:
+        for name in ("motor", "feed_forward"):
+            if data.get(name):
+                raise InputError(
+                    f"{name}: is of the DC motor, and [sizing] picks another; leave out one of the two"
+                )
+        if "ratio" in data.get("machine", {}):
+            raise InputError("machine.ratio: [sizing] finds it; to have it kept, give gear.ratio")
+    else:
+        for name in ("gear", "start", "starter", "catalogue"):
+            if name in data:
+                raise InputError(
+                    f"{name}: is of the motor that [sizing] picks; add [sizing], or leave it out"
+                )
+    sizing, random = (
+        _instance(Sizing, _given(checked.sizing)),
+        _instance(MonteCarlo, _given(checked.monte_carlo)),
+    )
+    for low, high, what in (
+        (sizing.poles_least, sizing.poles_most, "sizing.poles_most"),
+        (random.force_low, random.force_high, "monte_carlo.force_high"),
+    ):
+        if high < low:
+            raise InputError(f"{what} = {high:g}: must be >= {low:g}, the least")
+    if not sizing.temperature > sizing.ambient:
+        raise InputError(
+            f"sizing.temperature = {sizing.temperature:g} K: must be > sizing.ambient, {sizing.ambient:g} K"
+        )
+    for name, number in (("runs", random.runs), ("seed", random.seed)):
+        if number != int(number):
+            raise InputError(f"monte_carlo.{name} = {number:g}: must be a whole number")
 
 
 def _beside(name: str, source: str) -> Path | None:

@@ -33,9 +33,12 @@ class CatalogueData(Nameplate):
     """A nameplate, with what else a catalogue says."""
 
     mass: Value = quantity("kg", "mass; 0: unknown", default=0.0, min=0.0)
-    # no catalogue of standard motors gives it; common practice against a load of about the rotor's own inertia
     starts: Value = quantity(
-        "1", "permitted starts direct on line in an hour, spread evenly", default=6.0, above=0.0, max=3600.0
+        "1",
+        "permitted starts direct on line in an hour, without load; 0: not told",
+        default=0.0,
+        min=0.0,
+        max=1e5,
     )
 
 
@@ -93,6 +96,18 @@ def catalogue(extra: Path | None = None) -> list[CatalogueMotor]:
         read = _toml_rows if extra.suffix.lower() == ".toml" else _csv_rows
         motors += _motors(read(text, str(extra)), {m.designation for m in motors})
     return motors
+
+
+def check_own(extra: Path | None) -> None:
+    """Read the user's rows and fit a circuit to each.
+
+    Raises
+    ------
+    InputError
+        see `catalogue` and `CatalogueMotor.identify`.
+    """
+    for motor in catalogue(extra)[len(_packaged()) :]:
+        motor.identify()
 
 
 @cache

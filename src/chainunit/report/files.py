@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import math
 from pathlib import Path
 
 import xarray as xr
@@ -19,9 +18,8 @@ LOAD_CYCLE = "load_cycle.csv"
 def _load_cycle(study: Study, file: Path) -> Path:
     """The load that the motor shaft sees in steady running, in the form that sizing tools import: a row per instant
     with time, speed, torque of the load and inertia of the load, units in the head."""
-    run, settings = study.runs["start_up"], study.config.run
-    settled = settings.ramp + settings.settle_turns * 2.0 * math.pi / settings.crank_speed
-    steady = run.sel(time=slice(settled, None))
+    settled = study.settled
+    steady = study.runs["start_up"].sel(time=slice(settled, None))
     names = {"time": "time", "motor.w": "speed", "machine.tau": "torque", "machine.J": "inertia"}
     with whole(file) as part, part.open("w", newline="", encoding="utf-8") as out:
         writer = csv.writer(out)

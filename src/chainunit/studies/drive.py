@@ -13,6 +13,7 @@ from ..fmu.backends import Backend, export
 from ..machines.api import ChainUnit
 from ..machines.chain_unit import ChamberForces, DirectChainUnit
 from ..model import Model
+from ..quantities import Layout
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,12 @@ class Drive:
             return {"motor.w_ref": w} | ({"model.a": 0.0} if self.feed_forward else {})
         rise = Profile(0.0, ((0.0, ramp, w),))
         return {"motor.w_ref": rise} | ({"model.a": rise.rate} if self.feed_forward else {})
+
+    def loads(self, feed: Any) -> dict[str, Any]:
+        """Signals of the loads in normal running: of the machine, and of the one that the control asks."""
+        named = Layout(type(feed)).named(feed)
+        told = {f"model.{name}": value for name, value in named.items()} if self.feed_forward else {}
+        return {f"machine.{name}": value for name, value in named.items()} | told
 
     def machine_parameters(self) -> dict[str, float]:
         """Parameters of the machine by name."""

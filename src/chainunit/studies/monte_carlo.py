@@ -13,6 +13,7 @@ import math
 import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass
 from multiprocessing import get_context
 from pathlib import Path
@@ -20,9 +21,10 @@ from typing import Any
 
 import numpy as np
 
+from .. import __version__
 from ..config import Config
 from ..cosim import CoSimulation, Profile
-from ..errors import InterruptedRunError
+from ..errors import InterruptedRunError, RunError
 from ..quantities import Layout, Value, declaration, quantity
 from . import protection
 from .drive import Drive
@@ -62,6 +64,8 @@ class Task:
         """Name of what the results depend on: every parameter, and the content of the FMUs."""
         config, drive = self.config, self.drive
         relevant = {
+            "chainunit": __version__,
+            "connections": drive.connections(),
             "start": drive.start(),
             "feed": asdict(config.feed),
             "run": asdict(config.run),
@@ -86,7 +90,7 @@ def _prepared(task: Task, digest: str) -> CoSimulation:
             other.close()
         _worker.clear()
         run = task.config.run
-        signals = {**_loads(task.config), **task.drive.reference(run.crank_speed, run.ramp)}
+        signals = {**task.drive.loads(task.config.feed), **task.drive.reference(run.crank_speed, run.ramp)}
         simulation = CoSimulation(task.drive.system(task.files), signals)
         simulation.run(task.steady, run.step)
         simulation.save()
@@ -94,19 +98,13 @@ def _prepared(task: Task, digest: str) -> CoSimulation:
     return _worker[digest]
 
 
-def _loads(config: Config) -> dict[str, float]:
-    return {f"machine.{name}": value for name, value in Layout(type(config.feed)).named(config.feed).items()}
-
-
 def one(task: Task, number: int, simulation: CoSimulation) -> Sample:
     """Run the overload of that number from the steady state that `simulation` has saved."""
     config, drive = task.config, task.drive
     mc, o, run = config.monte_carlo, config.overload, config.run
     random = np.random.default_rng([int(mc.seed), number])
-    pulse = 2.0 * o.jam_rise + o.jam_duration
-    latest = max(mc.duration - pulse, 0.25 * mc.duration)
-    offset = random.uniform(0.0, min(latest, 2.0 * math.pi / run.crank_speed))
-    force = random.uniform(mc.force_low, max(mc.force_low, mc.force_high))
+    offset = random.uniform(0.0, 2.0 * math.pi / run.crank_speed)
+    force = random.uniform(mc.force_low, mc.force_high)
     spread = random.standard_normal()
     trip = (
         config.coupling.trip_torque * max(0.1, 1.0 + config.coupling.scatter * spread)
@@ -119,11 +117,11 @@ def one(task: Task, number: int, simulation: CoSimulation) -> Sample:
     rise, hold = o.jam_rise, o.jam_duration
     lump = Profile(normal, ((event, rise, normal + force), (event + rise + hold, rise, normal)))
     simulation.signals = {
-        **_loads(config),
+        **drive.loads(config.feed),
         **drive.reference(run.crank_speed),
         "machine.left.processing_force": lump,
     }
-    stop = task.steady + mc.duration
+    stop = event + mc.duration
     guards = {"motor.tau": trip / drive.ratio} if config.coupling else None
     done = simulation.run(stop, run.step, guards=guards)
     time = done["time"].values
@@ -153,7 +151,16 @@ def batch(task: Task, digest: str, numbers: list[int]) -> list[dict[str, Any]]:
     """Results of several runs, as rows of the file."""
     simulation = _prepared(task, digest)
     layout = Layout(Sample)
-    return [{"run": k, **layout.named(one(task, k, simulation))} for k in numbers]
+    rows: list[dict[str, Any]] = []
+    for k in numbers:
+        try:
+            rows.append({"run": k, "failed": None, **layout.named(one(task, k, simulation))})
+        except InterruptedRunError:
+            raise
+        except RunError as error:
+            # one run that fails is an answer, too; the next starts from the saved state again
+            rows.append({"run": k, "failed": str(error), **dict.fromkeys(layout.names)})
+    return rows
 
 
 def read(file: Path) -> dict[int, dict[str, Any]]:
@@ -192,11 +199,17 @@ class MonteCarloResult:
             found[v.name] = {f"q{100 * q:.0f}": float(x) for q, x in zip(QUANTILES, sizes, strict=True)}
         return found
 
+    @property
+    def failed(self) -> int:
+        """Number of runs in which an FMU failed."""
+        return sum(row["failed"] is not None for row in self.rows)
+
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON, each number with its unit."""
         units = {v.name: v.unit for v in Layout(Sample).variables}
         return {
             "runs": {"value": len(self.rows), "unit": "1"},
+            "failed": {"value": self.failed, "unit": "1"},
             "file": self.file.name,
             "quantiles": {
                 name: {
@@ -250,6 +263,11 @@ def run(
                         out.write(json.dumps(row) + "\n")
                     out.flush()
                 report(what, len(rows), wanted)
+        except BrokenProcessPool as error:
+            raise RunError(
+                f"a process of the random overloads was ended from outside after {len(rows)} of {wanted} runs; "
+                "run the study again to go on"
+            ) from error
         except KeyboardInterrupt as error:
             pool.shutdown(wait=False, cancel_futures=True)
             raise InterruptedRunError(

@@ -138,7 +138,16 @@ class Study:
     certificate: dict[str, dict[str, float]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     made: dict[str, str] = field(default_factory=dict)
+    coasting: Path | None = None
+    """the FMU of the machine behind an open coupling, where one tripped"""
     failure: RunError | None = None
+
+    @property
+    def settled(self) -> float:
+        """Time from which running counts as steady [s]: after the ramp of the reference or of the soft starter."""
+        run, config = self.config.run, self.config
+        soft = config.starter.soft_start.time if config.start == "soft" else 0.0
+        return float(max(run.ramp, soft) + run.settle_turns * 2.0 * math.pi / run.crank_speed)
 
     @property
     def motor(self) -> Any:
@@ -219,18 +228,10 @@ def _sum(one: Any, other: Any) -> Any:
     )
 
 
-def _loads(config: Config) -> dict[str, float]:
-    return {
-        f"machine.{side}.{name}": getattr(getattr(config.feed, side), name)
-        for side in ("left", "right")
-        for name in ("material_mass", "processing_force")
-    }
-
-
-def scenario_signals(config: Config, name: str, at: float) -> dict[str, Any]:
+def scenario_signals(config: Config, drive: Drive, name: str, at: float) -> dict[str, Any]:
     """Loads over time in the overload `name` of `SCENARIOS` that begins at time `at` [s]; what blocks the rocker
     comes with its own angle, see `_block`."""
-    normal, o = _loads(config), config.overload
+    normal, o = drive.loads(config.feed), config.overload
     signals: dict[str, Any] = dict(normal)
     if name in ("jam_left", "lumps"):
         force = normal["machine.left.processing_force"]
@@ -288,7 +289,7 @@ def _simulate(
     config, drive = study.config, study.drive
     run = config.run
     turn = 2.0 * math.pi / run.crank_speed
-    settled = run.ramp + run.settle_turns * turn
+    settled = study.settled
     stop = settled + (run.turns + 0.1) * turn
     events = [name for name in config.events if name != "start_loaded"]
     if "dip" in events and "voltage" not in drive.motor.input_layout.names:
@@ -297,12 +298,7 @@ def _simulate(
     total = stop + sum(turn + follow_time(config, name) for name in events)
     total += stop * ("start_loaded" in config.events)
 
-    told = {
-        full.replace("machine.", "model.", 1): load
-        for full, load in _loads(config).items()
-        if drive.feed_forward
-    }
-    signals = {**_loads(config), **told, **drive.reference(run.crank_speed, run.ramp)}
+    signals = {**drive.loads(config.feed), **drive.reference(run.crank_speed, run.ramp)}
     bond = Bond(
         "motor",
         "machine",
@@ -333,8 +329,7 @@ def _simulate(
         for name in events:
             simulation.restore()
             simulation.signals = {
-                **scenario_signals(config, name, event),
-                **told,
+                **scenario_signals(config, drive, name, event),
                 **drive.reference(run.crank_speed),
             }
             follow = follow_time(config, name)
@@ -347,14 +342,13 @@ def _simulate(
             _compare(study, start_up, signals)
     if drive.feed_forward:
         plain = replace(drive, feed_forward=False)
-        without = {**_loads(config), **plain.reference(run.crank_speed, run.ramp)}
+        without = {**plain.loads(config.feed), **plain.reference(run.crank_speed, run.ramp)}
         with CoSimulation(plain.system(files), without) as simulation:
             again = simulation.run(stop, run.step).sel(time=slice(settled, None))
         study.ripple_without = _answers(study, again, None, again).speed_ripple
     if "start_loaded" in config.events:
         loaded = {
-            **scenario_signals(config, "start_loaded", 0.0),
-            **told,
+            **scenario_signals(config, drive, "start_loaded", 0.0),
             **drive.reference(run.crank_speed, run.ramp),
         }
         with CoSimulation(drive.system(files), loaded) as simulation:
@@ -420,6 +414,8 @@ def _close(
         still = np.flatnonzero(speed < 0.01 * study.config.run.crank_speed)
         tripped = {
             "coupling_trip_time": trip - event,
+            # behind an open coupling no load is left that could trip it
+            "thermal_trip_time": None,
             "energy_after_trip": passed,
             "energy_behind": float(coasting["machine.kinetic_energy"][0]),
             "standstill_time": float(coasting["time"][still[0]]) - event if still.size else None,
@@ -427,10 +423,7 @@ def _close(
     _certify(study, name, run, bond)
     after = run.sel(time=slice(event, None))
     steady = study.runs["start_up"]
-    settled = (
-        study.config.run.ramp + study.config.run.settle_turns * 2 * math.pi / study.config.run.crank_speed
-    )
-    answers = _answers(study, after, event, steady.sel(time=slice(settled, None)))
+    answers = _answers(study, after, event, steady.sel(time=slice(study.settled, None)))
     study.answers[name] = replace(answers, **tripped)
     study.pins[name] = _pins(study, after)
 
@@ -445,13 +438,13 @@ def _coast(
     start |= {"machine.phi_start": float(run["motor.phi"][-1]), "machine.w_start": float(run["motor.w"][-1])}
     loads = {
         full: given
-        for full, given in scenario_signals(study.config, name, study.event[name]).items()
+        for full, given in scenario_signals(study.config, study.drive, name, study.event[name]).items()
         if full.startswith("machine.")
     }
     loads |= {full: float(run[full][-1]) for full in _block(study.config, 0.0) if full in run}
-    file = folder / "fmu" / "ChainUnit.fmu"
-    if not file.exists():
-        study.drive.coasting(folder / "fmu", backend)
+    if study.coasting is None:
+        study.coasting = study.drive.coasting(folder / "fmu", backend)
+    file = study.coasting
     with CoSimulation(
         System({"machine": file}, [], start), {**loads, "machine.tau": 0.0}, from_
     ) as simulation:
@@ -645,14 +638,26 @@ def _note(study: Study) -> None:
     steady = study.answers.get("steady")
     if steady is not None and not _settled(steady, speed):
         note(
-            f"steady running: the crank turns at {steady.speed_mean:.3g} rad/s in place of {speed:g} rad/s; the "
-            "motor's voltage or current is at its limit, or the run is too short to settle. Overloads are those "
-            "of this state."
+            f"steady running: the crank turns at {steady.speed_mean:.3g} rad/s in place of {speed:g} rad/s; "
+            + (
+                "the motor's voltage or current is at its limit, or the run is too short to settle."
+                if study.drive.follows
+                else "a motor on the line takes the speed that gear ratio and slip give."
+            )
+            + " Overloads are those of this state."
         )
     if study.sizing is not None:
         study.notes.extend(study.sizing.notes)
         if study.sizing.chosen is None:
-            note("no motor of the catalogue fits; the list says why each is rejected.")
+            left = study.sizing.untried
+            note(
+                f"none of the {len(study.sizing.candidates)} motors that were tried fits; the list says why. "
+                + (
+                    f"{left} larger ones were not tried (sizing.candidates)."
+                    if left
+                    else "There is no larger one."
+                )
+            )
     for name, answers in study.answers.items():
         title = SCENARIOS.get(name, "steady running")
         if answers.web_pull_least < 0.0:
