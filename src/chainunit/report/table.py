@@ -139,8 +139,8 @@ def _show_sizing(study: Study, console: Console) -> None:
         settings = recommended(study.config, chosen)
         wheel = f"flywheel {chosen.flywheel:.3g} kg m2" if chosen.flywheel else "no flywheel"
         console.print(
-            f"Motor: {chosen.motor.designation}, ratio {chosen.drive.ratio:.2f}, {wheel}; recommended: safety coupling "
-            f"at {settings.trip_torque:.0f} N m of the crank, relay at {settings.relay_current:.2f} A."
+            f"Motor: {chosen.motor.designation}, ratio {chosen.drive.ratio:.2f}, {wheel}; recommended: safety "
+            f"coupling at {settings.trip_torque:.0f} N m of the crank, relay at {settings.relay_current:.2f} A."
         )
     else:
         console.print("No motor of the catalogue fits.")
