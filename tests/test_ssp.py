@@ -23,7 +23,7 @@ from chainunit.cosim import CoSimulation, System, port_connections
 from chainunit.fmu import ssp
 from chainunit.models import MODELS
 from chainunit.studies.choice import tuned as tuned_motor
-from chainunit.studies.package import export_study
+from chainunit.studies.package import export_study, start_of
 
 MINE = """
 title = "Mine, with \\u0001 and <marks>"
@@ -141,7 +141,7 @@ def test_parameter_sets_and_fmus_hold_the_studys_values(package, tmp_path):
     motor, _ = tuned_motor(loaded)
     assert motor.limit.i == 3.9 and motor.speed_control.kp != loaded.motor.speed_control.kp
     start = {
-        "machine": config.start_values(loaded, MODELS["ChamberForces"]),
+        "machine": start_of(loaded, MODELS["ChamberForces"]),
         "motor": MODELS["DcMotor"].parameter_layout.named(motor) | {"w_ref": 2.4 * 50.0},
     }
     with zipfile.ZipFile(package) as archive:

@@ -255,6 +255,25 @@ def test_export_with_a_config_burns_the_start_values_in(tmp_path):
     assert float(starts["r"]) == 0.14 and float(starts["left.material_mass"]) == 12.0
 
 
+def test_export_with_a_config_has_the_motor_of_the_study(tmp_path):
+    import fmpy
+
+    (tmp_path / "mine.toml").write_text("[run]\nstep = 0.002\n[sizing]\ncandidates = 1\npoles_most = 4\n")
+    for name, parameter in (("InductionMotor", "pole_pairs"), ("ChainUnit", "ratio")):
+        result = chainunit("export", name, "--config", "mine.toml", "-o", f"{name}.fmu", cwd=tmp_path)
+        assert result.returncode == 0, result.stderr
+        description = fmpy.read_model_description(str(tmp_path / f"{name}.fmu"))
+        start = {v.name: v.start for v in description.modelVariables}
+        if name == "ChainUnit":
+            assert 50.0 < float(start["ratio"]) < 54.0 and float(start["w_start"]) == 3.0 * float(
+                start["ratio"]
+            )
+        else:
+            assert float(start[parameter]) == 2.0
+    refused = chainunit("export", "DcMotor", "--config", "mine.toml", "-o", "x.fmu", cwd=tmp_path)
+    assert refused.returncode == 2 and "the study's motor is InductionMotor, not DcMotor" in refused.stderr
+
+
 def test_overload_factors_are_the_erratas():
     """Errata, paper 000, item 14b: left alone to both, cycle maxima; uniform rods, no drive masses."""
     bare = {f"{body}.{x}": 0.0 for body in ("crank", "coupler", "rocker") for x in ("m", "I")}

@@ -168,19 +168,24 @@ def export(
     from . import config as configuration
     from .fmu.backends import export as write
     from .models import MODELS
+    from .studies.package import start_of
 
     if name not in MODELS:
         raise InputError(f"{name}: no such model; there are {', '.join(MODELS)}")
-    start = configuration.start_values(configuration.load(config), MODELS[name]) if config else {}
     file = output or Path(f"{name}.fmu")
     if file.suffix != ".fmu":
         raise InputError(f"-o {file}: must be a file name that ends in .fmu")
+    kind: Any = backend.value if backend else None
     with _console(stderr=True).status("exporting") as status:
+        start = {}
+        if config:
+            loaded = configuration.load(config)
+            start = start_of(loaded, MODELS[name], backend=kind, report=status.update)
         made = write(
             MODELS[name],
             file,
             start,
-            backend=backend.value if backend else None,
+            backend=kind,
             fmi=fmi,
             platforms=_platforms(platforms, fmi),
             report=status.update,

@@ -24,8 +24,7 @@ from .drives.gearing import KINDS, Transmission
 from .drives.induction_motor import Inverter, SoftStart
 from .errors import InputError
 from .machines.api import ChainUnit, ratios
-from .machines.chain_unit import ChamberForces, DirectChainUnit, Inputs, SideLoads
-from .model import Model
+from .machines.chain_unit import ChamberForces, SideLoads
 from .quantities import (
     Layout,
     Value,
@@ -542,23 +541,3 @@ def _filled(declared: type, given: Mapping[str, float]) -> dict[str, Any]:
 
 def _instance(declared: type, given: Mapping[str, float]) -> Any:
     return Layout(declared).from_names(dict(given))
-
-
-def start_values(config: Config, model: type[Model]) -> dict[str, float]:
-    """Start values of `model`'s parameters and inputs in this study, by name.
-
-    Raises
-    ------
-    InputError
-        where a study file says nothing of such a model.
-    """
-    parameters = ChamberForces.parameter_layout.named(config.machine.p)
-    motor_speed = config.run.crank_speed * config.machine.p.ratio
-    if model is ChamberForces:
-        inputs = Inputs(w=motor_speed, left=config.feed.left, right=config.feed.right)
-        return parameters | model.input_layout.named(inputs)
-    if model is DirectChainUnit:
-        return parameters | Layout(Feed).named(config.feed) | {"w_start": motor_speed}
-    if model is DcMotor:
-        return model.parameter_layout.named(config.motor)
-    raise InputError(f"a study file gives no start values for {model.name}")

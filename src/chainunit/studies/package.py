@@ -1,4 +1,4 @@
-"""The drive and machine of a study as an SSP package."""
+"""The drive and machine of a study as FMUs with its start values, and as an SSP package."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-from ..config import Config, start_values
+from ..config import Config
+from ..drives.motor import Motor
 from ..errors import InputError
 from ..fmu.backends import Backend
 from ..fmu.ssp import ModelSystem, export
-from ..machines.chain_unit import ChamberForces
+from ..machines.chain_unit import ChamberForces, DirectChainUnit
 from ..model import Model
+from ..quantities import Layout
 from .choice import choose
 from .drive import Drive
 
@@ -21,10 +23,8 @@ def study_system(config: Config, drive: Drive) -> ModelSystem:
     """Machine and motor of a study, from rest: the speed reference is the crank speed at the motor from the start on,
     feed and processing forces are those of normal running; with feed-forward, the machine that the control asks is in
     the system, too."""
-    loads = start_values(config, ChamberForces)
-    speed = config.run.crank_speed * drive.ratio
-    machine = {**loads, **drive.machine_parameters(), "w": speed}
-    motor = {**drive.motor.parameter_layout.named(drive.parameters), "w_ref": speed}
+    machine = _machine(config, drive, ChamberForces)
+    motor = {**drive.motor.parameter_layout.named(drive.parameters), "w_ref": machine["w"]}
     models: dict[str, type[Model]] = {"machine": ChamberForces, "motor": drive.motor}
     start = {"machine": machine, "motor": motor}
     if drive.feed_forward:
@@ -36,6 +36,45 @@ def study_system(config: Config, drive: Drive) -> ModelSystem:
         {f"{name}.{variable}": x for name, values in start.items() for variable, x in values.items()},
         config.title,
     )
+
+
+def start_of(
+    config: Config,
+    model: type[Model],
+    *,
+    backend: Backend | None = None,
+    report: Callable[[str], None] = lambda what: None,
+) -> dict[str, float]:
+    """Start values of `model`'s parameters and inputs, by name, as the study has them: gains tuned, or the motor and
+    the ratio that sizing chooses.
+
+    Raises
+    ------
+    InputError
+        where the study's motor is another, or sizing finds none.
+    """
+    drive = _drive(config, backend, report)
+    if not issubclass(model, Motor):
+        return _machine(config, drive, model)
+    if drive.motor is not model:
+        raise InputError(f"the study's motor is {drive.motor.name}, not {model.name}")
+    return model.parameter_layout.named(drive.parameters)
+
+
+def _machine(config: Config, drive: Drive, model: type[Model]) -> dict[str, float]:
+    """The machine with its feed, at the speed of the study."""
+    speed = config.run.crank_speed * drive.ratio
+    turning = {"w_start": speed} if model is DirectChainUnit else {"phi": 0.0, "w": speed, "a": 0.0}
+    return drive.machine_parameters() | Layout(type(config.feed)).named(config.feed) | turning
+
+
+def _drive(config: Config, backend: Backend | None, report: Callable[[str], None]) -> Drive:
+    with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
+        choice = choose(config, Path(scratch), lambda what, done, todo: report(what), backend)
+    if choice.sizing is not None and choice.sizing.chosen is None:
+        why = "; ".join(f"{c.motor.designation}: {c.reason}" for c in choice.sizing.candidates[:3])
+        raise InputError(f"[sizing]: no motor of the catalogue fits ({why})")
+    return choice.drive
 
 
 def export_study(
@@ -53,13 +92,7 @@ def export_study(
     InputError, RunError
         see `chainunit.fmu.ssp.export`; also where sizing finds no motor.
     """
-    with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
-        choice = choose(config, Path(scratch), lambda what, done, todo: report(what), backend)
-    if choice.sizing is not None and choice.sizing.chosen is None:
-        why = "; ".join(f"{c.motor.designation}: {c.reason}" for c in choice.sizing.candidates[:3])
-        raise InputError(f"[sizing]: no motor of the catalogue fits ({why})")
+    drive = _drive(config, backend, report)
     run = config.run
     stop = run.ramp + (run.settle_turns + run.turns) * 2.0 * math.pi / run.crank_speed
-    return export(
-        study_system(config, choice.drive), file, stop=stop, step=run.step, backend=backend, report=report
-    )
+    return export(study_system(config, drive), file, stop=stop, step=run.step, backend=backend, report=report)
