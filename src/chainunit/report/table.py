@@ -89,15 +89,14 @@ def show(study: Study, console: Console) -> None:
         console.print(table)
     if study.pins:
         heaviest = {pin: max(t[pin]["peak"] for t in study.pins.values()) for pin in study.pins["steady"]}
-        table = Table(title="What the bearings carry", title_justify="left")
-        for column in ("pin", "equivalent (ISO 281)", "steady RMS", "steady peak", "largest peak", "in"):
+        table = Table(title="What the bearings carry (equivalent: ISO 281, steady)", title_justify="left")
+        for column in ("pin", "equivalent", "steady peak", "largest", "in"):
             table.add_column(column, justify="left" if column in ("pin", "in") else "right")
         for pin, steady in study.pins["steady"].items():
             worst = max(study.pins, key=lambda run: study.pins[run][pin]["peak"])
             table.add_row(
                 pin,
                 f"{steady['equivalent']:.0f} N",
-                f"{steady['rms']:.0f} N",
                 f"{steady['peak']:.0f} N",
                 f"{heaviest[pin]:.0f} N",
                 _SHORT[worst],

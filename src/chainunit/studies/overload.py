@@ -51,7 +51,13 @@ PINS = {
 @declaration
 class Answers:
     """What a run asks of the drive; torques and speeds are the crank's unless they are called the motor's. Means
-    and RMS are over whole turns of the crank."""
+    and RMS are over whole turns of the crank.
+
+    The ripple is (largest - least)/mean of the speed; `shaft_share` the peak torque on the machine's shaft over
+    that of the motor (the rest is the rotor's inertia); `shaking_*` the largest deviation of the frame's load
+    from its mean, the moment about C; `breakdown_margin` the largest steady torque of the motor over its peak;
+    times count from the event; `energy_after_trip` passes the safety coupling while it opens, `energy_behind`
+    stays in the machine."""
 
     crank_torque_peak: Value = quantity("N.m", "crank torque, peak")
     crank_torque_rms: Value = quantity("N.m", "crank torque, RMS")
@@ -67,21 +73,21 @@ class Answers:
     rocker_torque_peak: Value = quantity("N.m", "rocker torque, peak")
     speed_mean: Value = quantity("rad/s", "crank speed, mean")
     speed_least: Value = quantity("rad/s", "crank speed, least")
-    speed_ripple: Value = quantity("1", "speed ripple, (largest - least)/mean")
+    speed_ripple: Value = quantity("1", "speed ripple")
     speed_dip: Value = quantity("1", "speed dip")
     recovery_time: Value = quantity("s", "recovery")
     web_pull_least: Value = quantity("N", "least pull in a web")
     wall_pull_least: Value = quantity("N", "least pull in a wall")
-    shaft_share: Value = quantity("1", "peak torque on the machine's shaft over that of the motor")
-    shaking_force: Value = quantity("N", "force on the frame, largest deviation from its mean")
-    shaking_moment: Value = quantity("N.m", "moment on the frame about C, largest deviation from its mean")
-    breakdown_margin: Value = quantity("1", "largest steady torque of the motor over its peak here")
-    stall_time: Value = quantity("s", "time from the event until the crank stands")
-    thermal_trip_time: Value = quantity("s", "time from the event until the motor's thermal relay trips")
-    coupling_trip_time: Value = quantity("s", "time from the event until the safety coupling trips")
-    energy_after_trip: Value = quantity("J", "energy that passes the coupling after its trip")
-    energy_behind: Value = quantity("J", "energy left in the machine when the coupling is open")
-    standstill_time: Value = quantity("s", "time from the event until the machine behind the coupling stands")
+    shaft_share: Value = quantity("1", "shaft over motor torque")
+    shaking_force: Value = quantity("N", "shaking force")
+    shaking_moment: Value = quantity("N.m", "shaking moment")
+    breakdown_margin: Value = quantity("1", "reserve of torque")
+    stall_time: Value = quantity("s", "crank stands after")
+    thermal_trip_time: Value = quantity("s", "thermal relay trips after")
+    coupling_trip_time: Value = quantity("s", "safety coupling trips after")
+    energy_after_trip: Value = quantity("J", "energy after the trip")
+    energy_behind: Value = quantity("J", "energy behind it")
+    standstill_time: Value = quantity("s", "machine stands after")
 
 
 @declaration
