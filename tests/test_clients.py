@@ -173,7 +173,7 @@ def ecos(test):
 
 
 def in_ecos(script, *arguments):
-    """`values` of a script that finds ecos' TBB; it leaves past the exit handlers of TBB, which crash now and then."""
+    """`values` of a script that finds TBB, and leaves past its exit handlers, which crash now and then."""
     path = os.pathsep.join(filter(None, [str(LIBRARIES), os.environ.get("LD_LIBRARY_PATH")]))
     leave = "\nimport os\nsys.stdout.flush()\nos._exit(0)\n"
     return values(textwrap.dedent(script) + leave, *arguments, LD_LIBRARY_PATH=path)
