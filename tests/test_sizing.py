@@ -166,6 +166,17 @@ def test_a_weak_gear_rejects(tmp_path):
     assert c.checks["gear"].utilisation > 1.0 and "torque of the gear" in c.reason
 
 
+def test_a_long_soft_start_is_waited_for(tmp_path):
+    """At a third of the voltage, rising over 15 s, the machine is judged when it runs."""
+    config = one_candidate("", fluctuation=0.9)
+    soft = dataclasses.replace(config.starter.soft_start, voltage=0.3, time=15.0)
+    config = dataclasses.replace(
+        config, start="soft", starter=dataclasses.replace(config.starter, soft_start=soft)
+    )
+    (c,) = sizing.size(config, tmp_path, lambda *said: None).candidates
+    assert c.checks["start"].value is not None and c.checks["crank_speed"].utilisation < 1.0
+
+
 def test_ctrl_c_ends_sizing(tmp_path, monkeypatch):
     """It must not count as a candidate that failed."""
 

@@ -32,6 +32,14 @@ def cycle(
     return Cycle(angle, out.tau * ratio, out)
 
 
+def all_on_one(one: SideLoads, other: SideLoads) -> SideLoads:
+    """What both organs carry, on one of them."""
+    return SideLoads(
+        material_mass=one.material_mass + other.material_mass,
+        processing_force=one.processing_force + other.processing_force,
+    )
+
+
 def without_right(machine: ChainUnit) -> ChainUnit:
     """The machine with its left organ alone: the papers' one-sided loading."""
     return machine.replace({"right.wall_mass": 0.0, "right.web_mass": 0.0})

@@ -24,11 +24,11 @@ from ..drives.dc_motor import DcMotor
 from ..drives.speed_control import Loop, Tuning, loop
 from ..errors import RunError
 from ..fmu.backends import Backend
-from ..machines.api import ChainUnit
+from ..machines.api import EMPTY, ChainUnit
 from ..quantities import Layout, Value, declaration, quantity
 from . import protection
 from .choice import choose
-from .cycle import OverloadFactors, Sides, cycle, overload_factors, sides_over_speed
+from .cycle import OverloadFactors, Sides, all_on_one, cycle, overload_factors, sides_over_speed
 from .drive import Drive
 from .monte_carlo import MonteCarloResult, Task
 from .monte_carlo import run as run_monte_carlo
@@ -206,11 +206,10 @@ def _statics(study: Study) -> None:
     """What needs no co-simulation: the cycle at constant speed, overload factors, limits of the model."""
     config = study.config
     machine, feed, w = study.drive.machine, config.feed, config.run.crank_speed
-    empty_right = type(feed.right)(material_mass=0.0, processing_force=0.0)
     study.cycles = {
         "both sides": cycle(machine, w, feed.left, feed.right),
-        "right side empty": cycle(machine, w, feed.left, empty_right),
-        "all feed on the left": cycle(machine, w, _sum(feed.left, feed.right), empty_right),
+        "right side empty": cycle(machine, w, feed.left, EMPTY),
+        "all feed on the left": cycle(machine, w, all_on_one(feed.left, feed.right), EMPTY),
     }
     study.factors = overload_factors(machine, w, feed.left, feed.right)
     study.sides = sides_over_speed(machine, feed.left, feed.right)
@@ -224,13 +223,6 @@ def _statics(study: Study) -> None:
         rocker_extreme_right=right,
         rocker_extreme_left=left,
         margin=float(np.min(study.cycles["both sides"].outputs.margin)),
-    )
-
-
-def _sum(one: Any, other: Any) -> Any:
-    return type(one)(
-        material_mass=one.material_mass + other.material_mass,
-        processing_force=one.processing_force + other.processing_force,
     )
 
 

@@ -26,10 +26,9 @@ from ..drives.motor import T_RATED
 from ..engines import MATH, numpy_
 from ..errors import InterruptedRunError, RunError
 from ..fmu.backends import Backend
-from ..machines.api import ChainUnit
-from ..machines.chain_unit import SideLoads
+from ..machines.api import EMPTY, ChainUnit
 from ..quantities import Layout, Value, declaration, quantity
-from .cycle import Cycle, cycle
+from .cycle import Cycle, all_on_one, cycle
 from .drive import Drive
 
 
@@ -202,12 +201,8 @@ def _entries(declared: Any) -> dict[str, Any]:
 def duty_cycles(machine: ChainUnit, config: Config) -> tuple[Cycle, Cycle]:
     """The turn with both sides loaded, and with all feed on the left."""
     feed, w = config.feed, config.run.crank_speed
-    left = SideLoads(
-        material_mass=feed.left.material_mass + feed.right.material_mass,
-        processing_force=feed.left.processing_force + feed.right.processing_force,
-    )
-    empty = SideLoads(material_mass=0.0, processing_force=0.0)
-    return cycle(machine, w, feed.left, feed.right), cycle(machine, w, left, empty)
+    together = all_on_one(feed.left, feed.right)
+    return cycle(machine, w, feed.left, feed.right), cycle(machine, w, together, EMPTY)
 
 
 def cycle_numbers(machine: ChainUnit, config: Config) -> CycleNumbers:
@@ -365,11 +360,10 @@ def judge(config: Config, c: Candidate, numbers: CycleNumbers, files: Mapping[st
     w, turn = config.run.crank_speed, 2.0 * math.pi / config.run.crank_speed
     ramp = config.run.ramp if drive.follows else None
     signals = {**feed_signals(config, None), **drive.reference(w, ramp)}
-    # three times what the rated torque needs to bring everything up to speed, and at least the ramp
+    # three times what the rated torque needs to bring everything up to speed, and at least the ramp of the start
     inertia = drive.parameters.rotor.J + numbers.inertia_mean / drive.ratio**2
-    window = max(
-        1.0, 3.0 * inertia * plate.speed / plate.torque, 1.5 * config.run.ramp if drive.follows else 0.0
-    )
+    rise = config.starter.soft_start.time if config.start == "soft" else ramp or 0.0
+    window = max(1.0, 3.0 * inertia * plate.speed / plate.torque, 1.5 * rise)
     try:
         with CoSimulation(drive.system(files), signals) as simulation:
             start = simulation.run(window, config.run.step)
@@ -387,9 +381,9 @@ def judge(config: Config, c: Candidate, numbers: CycleNumbers, files: Mapping[st
     times = np.concatenate([start["time"].values, steady["time"].values])
     expected = w * drive.ratio
     started = start_time(times, speed) if float(np.mean(steady["motor.w"])) > 0.5 * expected else None
-    c.checks = _checks(config, c, start, steady, one_sided, started)
     torque = max(float(np.max(np.abs(r["machine.tau"]))) for r in (start, steady, one_sided))
     c.peak_torque = torque * drive.ratio
+    c.checks = _checks(config, c, start, steady, one_sided, started)
 
 
 def feed_signals(config: Config, shift_at: float | None) -> dict[str, Any]:
@@ -437,9 +431,6 @@ def _checks(
     ran_at = float(np.mean(steady[f"motor.{c.drive.motor.temperature}"]))
     temperature = warm_temperature(p, mean_heat, ran_at, cooling)
     peak = max(float(np.max(np.abs(r[gap]))) for r in (steady, one_sided))
-    shaft_peak = (
-        max(float(np.max(np.abs(r["machine.tau"]))) for r in (start, steady, one_sided)) * c.drive.ratio
-    )
     reflected = float(np.max(steady["machine.J"]))
     torque = rms((1.0 - share, steady[gap].values), (share, one_sided[gap].values))
     hot = (1.0 + p.stator.alpha * (asked.temperature - T_RATED)) / (1.0 + p.stator.alpha * (ran_at - T_RATED))
@@ -479,7 +470,7 @@ def _checks(
         "speed": Check("speed fluctuation", checked(c.fluctuation), asked.fluctuation, "1"),
     }
     if "torque_limit" in config.gear_given:
-        checks["gear"] = Check("torque of the gear", shaft_peak, gear.torque_limit, "N.m")
+        checks["gear"] = Check("torque of the gear", c.peak_torque, gear.torque_limit, "N.m")
     return checks
 
 
