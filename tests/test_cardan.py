@@ -12,8 +12,8 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 
 from chainunit import InputError
-from chainunit.drives import cardan
-from chainunit.drives.cardan import Cardan
+from chainunit.drives import cardan, shafts
+from chainunit.drives.cardan import Cardan, Twist
 from chainunit.engines import MATH, numpy_
 
 POINTS = json.loads((Path(__file__).parent / "data" / "cardan.json").read_text())["points"]
@@ -172,8 +172,8 @@ def free(p, start, stop, rtol, **options):
     """The undamped free line: states phi1, w1, phi4, w4."""
 
     def rates(_, x):
-        tau2, tau3, _ = cardan.torques(MATH, p, x[0], x[2])
-        return [x[1], -tau2 / p.J1, x[3], tau3 / p.J4]
+        line = Twist(MATH, p, *x)
+        return [x[1], -line.tau1 / p.J1, x[3], line.tau4 / p.J4]
 
     return solve_ivp(rates, (0.0, stop), start, method="DOP853", rtol=rtol, atol=rtol * 1e-3, **options)
 
@@ -211,7 +211,7 @@ def test_energy_over_a_thousand_periods(speed):
     solved = free(p, start, 1000 * 2.0 * math.pi / k, 1e-11)
     assert solved.success
     phi1, w1, phi4, w4 = solved.y[:, :: max(1, solved.y.shape[1] // 2000)]
-    _, _, springs = cardan.torques(numpy_(), p, phi1, phi4)
+    springs = Twist(numpy_(), p, phi1, w1, phi4, w4).energy
     kinetic = 0.5 * (p.J1 * w1**2 + p.J4 * w4**2)
     energy = kinetic + springs
     assert np.ptp(energy) < 1e-8 * energy[0]
@@ -240,19 +240,19 @@ def test_bad_cases_are_refused_in_one_line(values, named):
 
 
 def test_torsion_constants():
-    assert cardan.hollow(0.08) == pytest.approx(math.pi * 0.08**4 / 32.0)
-    assert cardan.hollow(0.08, 0.06) == pytest.approx(cardan.hollow(0.08) - cardan.hollow(0.06))
+    assert shafts.hollow(0.08) == pytest.approx(math.pi * 0.08**4 / 32.0)
+    assert shafts.hollow(0.08, 0.06) == pytest.approx(shafts.hollow(0.08) - shafts.hollow(0.06))
     # Roark: 0.1406 a^4 for a square, 0.229 b^3 a at 2:1, b^3 a/3 for a long strip
-    assert cardan.rectangle(0.05, 0.05) == pytest.approx(0.140577 * 0.05**4, rel=1e-5)
-    assert cardan.rectangle(0.04, 0.08) == pytest.approx(0.228682 * 0.08 * 0.04**3, rel=1e-5)
-    assert cardan.rectangle(10.0, 0.01) == pytest.approx(10.0 * 0.01**3 / 3.0, rel=1e-3)
+    assert shafts.rectangle(0.05, 0.05) == pytest.approx(0.140577 * 0.05**4, rel=1e-5)
+    assert shafts.rectangle(0.04, 0.08) == pytest.approx(0.228682 * 0.08 * 0.04**3, rel=1e-5)
+    assert shafts.rectangle(10.0, 0.01) == pytest.approx(10.0 * 0.01**3 / 3.0, rel=1e-3)
     # a thin round tube and a thin square box of the same middle line differ as Bredt says
-    assert cardan.box(0.1, 0.1, 1e-4) == pytest.approx(1e-4 * (0.1 - 1e-4) ** 3, rel=1e-12)
+    assert shafts.box(0.1, 0.1, 1e-4) == pytest.approx(1e-4 * (0.1 - 1e-4) ** 3, rel=1e-12)
     for wrong in (
-        lambda: cardan.hollow(0.05, 0.05),
-        lambda: cardan.rectangle(0.0, 1.0),
-        lambda: cardan.box(0.1, 0.1, 0.05),
+        lambda: shafts.hollow(0.05, 0.05),
+        lambda: shafts.rectangle(0.0, 1.0),
+        lambda: shafts.box(0.1, 0.1, 0.05),
     ):
         with pytest.raises(InputError):
             wrong()
-    assert cardan.stiffness(cardan.hollow(0.05), 0.5) == pytest.approx(8e10 * math.pi * 0.05**4 / 32 / 0.5)
+    assert shafts.stiffness(shafts.hollow(0.05), 0.5) == pytest.approx(8e10 * math.pi * 0.05**4 / 32 / 0.5)

@@ -15,12 +15,12 @@ from typing import Any, NamedTuple
 from ..errors import InputError
 from ..quantities import Layout, Value, declaration, quantity, violations
 
-_RIGHT = 0.5 * math.pi
+RIGHT = 0.5 * math.pi
 
 
 @declaration
-class Cardan:
-    """The shaft line of paper 002. The start values are ours: the paper prints no dimensions."""
+class Line:
+    """Two shafts and the cardan between them. The start values are ours: the paper prints no dimensions."""
 
     alpha1: Value = quantity("rad", "bend of the joint on shaft 2", default=0.3, min=0.0)
     alpha2: Value = quantity("rad", "bend of the joint on shaft 3", default=0.3, min=0.0)
@@ -28,13 +28,24 @@ class Cardan:
         "rad", "angle between the planes of the joints, about the middle shaft", default=0.0
     )
     delta_yokes: Value = quantity("rad", "angle between the two yokes of the middle shaft", default=0.0)
-    J1: Value = quantity("kg.m2", "inertia of the rotor", default=0.4, above=0.0)
-    J4: Value = quantity("kg.m2", "driven inertia", default=40.0, above=0.0)
     c2: Value = quantity("N.m/rad", "torsional stiffness of shaft 2", default=8000.0, above=0.0)
     c3: Value = quantity("N.m/rad", "torsional stiffness of shaft 3", default=8000.0, above=0.0)
+    d2: Value = quantity("N.m.s/rad", "damping of the twist of shaft 2", default=0.0, min=0.0)
+    d3: Value = quantity("N.m.s/rad", "damping of the twist of shaft 3", default=0.0, min=0.0)
+
+
+@declaration
+class Cardan(Line):
+    """The system of paper 002: the shaft line between two inertias."""
+
+    J1: Value = quantity("kg.m2", "inertia of the rotor", default=0.4, above=0.0)
+    J4: Value = quantity("kg.m2", "driven inertia", default=40.0, above=0.0)
 
 
 LAYOUT = Layout(Cardan)
+
+
+BENDS = ("alpha1", "alpha2")
 
 
 def check(p: Cardan) -> None:
@@ -47,12 +58,12 @@ def check(p: Cardan) -> None:
     """
     for line in violations(LAYOUT, p):
         raise InputError(line)
-    for name in ("alpha1", "alpha2"):
+    for name in BENDS:
         bend = getattr(p, name)
-        if not bend < _RIGHT:
+        if not bend < RIGHT:
             raise InputError(
                 f"{name} = {bend:g} rad ({math.degrees(bend):g} deg): a Hooke joint turns only below 90 deg; must be "
-                f"< {_RIGHT:.6g} rad"
+                f"< {RIGHT:.6g} rad"
             )
 
 
@@ -71,16 +82,16 @@ def hooke(xp: Any, bend: Any, angle: Any) -> tuple[Any, Any, Any]:
     return driven, ratio, -2.0 * k * s * c * (1.0 - k * k) / (spread * spread)
 
 
-def two_joints(xp: Any, p: Cardan, phi2: Any) -> tuple[Any, Any, Any]:
+def two_joints(xp: Any, p: Line, phi2: Any) -> tuple[Any, Any, Any]:
     """Angle of shaft 3 [rad], i23 and its derivative by `phi2`; the angle of shaft 3 is gamma2, up to half turns."""
     middle, first, first_slope = hooke(xp, p.alpha1, phi2)
     # seen from shaft 3 the second joint is one that is driven backwards: a right angle on, and inverse
     entering = middle + p.delta_yokes - p.beta_planes
-    out, second, second_slope = hooke(xp, p.alpha2, entering - _RIGHT)
-    return out + _RIGHT, first * second, first_slope * second + first * first * second_slope
+    out, second, second_slope = hooke(xp, p.alpha2, entering - RIGHT)
+    return out + RIGHT, first * second, first_slope * second + first * first * second_slope
 
 
-def ratio_of_paper(xp: Any, p: Cardan, gamma1: Any, gamma2: Any) -> Any:
+def ratio_of_paper(xp: Any, p: Line, gamma1: Any, gamma2: Any) -> Any:
     """i23 as paper 002 prints it, with gamma2 at the driven yoke."""
     s1, s2, c1, c2 = xp.sin(p.alpha1), xp.sin(p.alpha2), xp.cos(gamma1), xp.cos(gamma2)
     return (xp.cos(p.alpha1) / xp.cos(p.alpha2)) * (1.0 - s2 * s2 * c2 * c2) / (1.0 - s1 * s1 * c1 * c1)
@@ -149,16 +160,17 @@ def sensitivity(p: Cardan, i: float = 1.0) -> dict[str, float]:
     return found
 
 
-_NEWTON = 8
+_NEWTON = 6
 
 
-def middle_angle(xp: Any, p: Cardan, phi1: Any, phi4: Any) -> Any:
+def middle_angle(xp: Any, p: Line, phi1: Any, phi4: Any, near: Any = None, steps: int = _NEWTON) -> Any:
     """The angle phi2 [rad] at which the massless cardan is in balance, c2 (phi1 - phi2) = i23 c3 (phi3 - phi4).
 
-    Newton's method from phi1, a fixed number of steps: twists are small against the turn over which i23 changes.
+    Newton's method from `near`, by default from where equal ratios would put it; a fixed number of steps, as twists are
+    small against the turn over which i23 changes.
     """
-    phi2 = phi1
-    for _ in range(_NEWTON):
+    phi2 = phi1 if near is None else near
+    for _ in range(steps):
         phi3, i, di = two_joints(xp, p, phi2)
         twist = phi3 - phi4
         wrong = p.c2 * (phi1 - phi2) - i * p.c3 * twist
@@ -166,60 +178,31 @@ def middle_angle(xp: Any, p: Cardan, phi1: Any, phi4: Any) -> Any:
     return phi2
 
 
-def torques(xp: Any, p: Cardan, phi1: Any, phi4: Any) -> tuple[Any, Any, Any]:
-    """Torque in shaft 2 and in shaft 3 [N m], and the energy of both springs [J], without damping."""
-    phi2 = middle_angle(xp, p, phi1, phi4)
-    phi3, _, _ = two_joints(xp, p, phi2)
-    twist2, twist3 = phi1 - phi2, phi3 - phi4
-    return p.c2 * twist2, p.c3 * twist3, 0.5 * (p.c2 * twist2 * twist2 + p.c3 * twist3 * twist3)
+class Twist:
+    """The line at given angles and speeds of its two ends, `phi1, w1` and `phi4, w4`.
 
-
-# -- stiffness of shafts: torsion constants [m4]; c = G I_t/length
-
-
-def stiffness(torsion_constant: float, length: float, shear_modulus: float = 8.0e10) -> float:
-    """Torsional stiffness [N m/rad] of a shaft of the `length` [m]; steel by default."""
-    return shear_modulus * torsion_constant / length
-
-
-def hollow(outer: float, inner: float = 0.0) -> float:
-    """Torsion constant of a round shaft with diameters `outer` and `inner` [m]; solid without the latter.
-
-    Raises
-    ------
-    InputError
-        where the wall is not there.
+    The cardan has no mass: phi2 follows from the balance of the two springs, and w2 from its change. Damping is
+    that of the twist speeds, v2 = w1 - w2 and v3 = i23 w2 - w4; from its dissipation function (d2 v2^2 + d3 v3^2)/2
+    come the torques at both ends, so that tau1 w1 - tau4 w4 is the growth of `energy` plus `dissipated`, exactly. What is
+    left out is that damping moves the balance of the cardan: nothing where d2/c2 = d3/c3, else a share of the order of
+    (k d/c)^2.
     """
-    if not 0.0 <= inner < outer:
-        raise InputError(f"inner = {inner:g} m: must be >= 0 and < the outer diameter, {outer:g} m")
-    return math.pi / 32.0 * (outer**4 - inner**4)
 
+    __slots__ = ("dissipated", "energy", "i", "phi2", "phi3", "tau1", "tau4", "twist2", "twist3")
 
-def rectangle(a: float, b: float, terms: int = 12) -> float:
-    """Torsion constant of a rectangular shaft with the sides `a`, `b` [m], by Saint-Venant's series.
-
-    Raises
-    ------
-    InputError
-        for a side that is not above zero.
-    """
-    if not (a > 0.0 and b > 0.0):
-        raise InputError(f"sides {a:g} m and {b:g} m: must be > 0 m")
-    long, short = max(a, b), min(a, b)
-    series = sum(math.tanh(0.5 * n * math.pi * long / short) / n**5 for n in range(1, 2 * terms, 2))
-    return long * short**3 / 3.0 * (1.0 - 192.0 / math.pi**5 * short / long * series)
-
-
-def box(a: float, b: float, wall: float) -> float:
-    """Torsion constant of a thin-walled box with outer sides `a`, `b` and the `wall` thickness [m], by Bredt's second
-    formula on the middle line.
-
-    Raises
-    ------
-    InputError
-        where the wall leaves no hollow.
-    """
-    if not 0.0 < wall < 0.5 * min(a, b):
-        raise InputError(f"wall = {wall:g} m: must be > 0 and < {0.5 * min(a, b):g} m, half the shorter side")
-    width, height = a - wall, b - wall
-    return 2.0 * wall * (width * height) ** 2 / (width + height)
+    def __init__(
+        self, xp: Any, p: Line, phi1: Any, w1: Any, phi4: Any, w4: Any, near: Any = None, steps: int = _NEWTON
+    ) -> None:
+        self.phi2 = phi2 = middle_angle(xp, p, phi1, phi4, near, steps)
+        self.phi3, self.i, di = two_joints(xp, p, phi2)
+        i = self.i
+        self.twist2, self.twist3 = phi1 - phi2, self.phi3 - phi4
+        below = p.c2 + p.c3 * (i * i + di * self.twist3)
+        by_1, by_4 = p.c2 / below, p.c3 * i / below  # of phi2 by phi1 and phi4
+        w2 = by_1 * w1 + by_4 * w4
+        v2, v3 = w1 - w2, i * w2 - w4
+        damping2, damping3 = p.d2 * v2, p.d3 * v3
+        self.tau1 = p.c2 * self.twist2 + damping2 * (1.0 - by_1) + damping3 * i * by_1
+        self.tau4 = p.c3 * self.twist3 + damping2 * by_4 + damping3 * (1.0 - i * by_4)
+        self.energy = 0.5 * (p.c2 * self.twist2 * self.twist2 + p.c3 * self.twist3 * self.twist3)
+        self.dissipated = damping2 * v2 + damping3 * v3
