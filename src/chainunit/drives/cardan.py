@@ -166,8 +166,8 @@ _NEWTON = 6
 def middle_angle(xp: Any, p: Line, phi1: Any, phi4: Any, near: Any = None, steps: int = _NEWTON) -> Any:
     """The angle phi2 [rad] at which the massless cardan is in balance, c2 (phi1 - phi2) = i23 c3 (phi3 - phi4).
 
-    Newton's method from `near`, by default from where equal ratios would put it; a fixed number of steps, as twists are
-    small against the turn over which i23 changes.
+    Newton's method from `near`, by default from phi1; a fixed number of steps, as twists are small against the turn
+    over which i23 changes.
     """
     phi2 = phi1 if near is None else near
     for _ in range(steps):
@@ -181,11 +181,11 @@ def middle_angle(xp: Any, p: Line, phi1: Any, phi4: Any, near: Any = None, steps
 class Twist:
     """The line at given angles and speeds of its two ends, `phi1, w1` and `phi4, w4`.
 
-    The cardan has no mass: phi2 follows from the balance of the two springs, and w2 from its change. Damping is
-    that of the twist speeds, v2 = w1 - w2 and v3 = i23 w2 - w4; from its dissipation function (d2 v2^2 + d3 v3^2)/2
-    come the torques at both ends, so that tau1 w1 - tau4 w4 is the growth of `energy` plus `dissipated`, exactly. What is
-    left out is that damping moves the balance of the cardan: nothing where d2/c2 = d3/c3, else a share of the order of
-    (k d/c)^2.
+    The cardan has no mass: phi2 follows from the balance of the two springs, and w2 from its change. Damping is that
+    of the twist speeds, v2 = w1 - w2 and v3 = i23 w2 - w4; from its dissipation function (d2 v2^2 + d3 v3^2)/2 come
+    the torques at both ends, so that tau1 w1 - tau4 w4 is the growth of `energy` plus `dissipated`, exactly. What is
+    left out is that damping moves the balance of the cardan: nothing where d2/c2 = d3/c3, else a share of the order
+    of (k d/c)^2.
     """
 
     __slots__ = ("dissipated", "energy", "i", "phi2", "phi3", "tau1", "tau4", "twist2", "twist3")
