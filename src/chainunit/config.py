@@ -1,23 +1,14 @@
-"""Configuration files: TOML, validated by pydantic models that are generated from the declarations.
-
-A number is in the declared SI unit; a text may carry a unit ("150 mm", "30 rev/min", "20 degC") and is
-converted. Every refusal is one line that names the field, its value and what is allowed.
-"""
+"""Study files: what they hold, and what must fit together in them; `reading` says how they are read."""
 
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
-import re
-import tomllib
 from collections.abc import Mapping
-from functools import cache
-from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
+from pydantic import ConfigDict, Field, ValidationError, create_model
 
 from .drives.dc_motor import DcMotor
 from .drives.gearing import KINDS, Transmission
@@ -25,17 +16,8 @@ from .drives.induction_motor import Inverter, SoftStart
 from .errors import InputError
 from .machines.api import ChainUnit, ratios
 from .machines.chain_unit import ChamberForces, SideLoads
-from .quantities import (
-    Layout,
-    Value,
-    Variable,
-    base_units,
-    complaint,
-    declaration,
-    group,
-    quantity,
-    variables,
-)
+from .quantities import Layout, Value, declaration, group, quantity
+from .reading import filled, first_line, given_values, instance, merged, packaged, read, schema, toml
 
 
 @declaration
@@ -201,102 +183,6 @@ class Starter:
 
 STARTS = ("direct", "soft", "inverter")
 
-_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*")
-_UNIT = re.compile(r"1|(?:1/)?[A-Za-zµΩ°]+(?:\^|\*\*)?-?\d?(?:\s*[.*/·]\s*[A-Za-zµΩ°]+(?:\^|\*\*)?-?\d?)*")
-_ANGLES = frozenset(
-    "rad mrad radian radians deg degree degrees ° rev revolution revolutions turn turns rpm".split()
-)
-
-
-@cache
-def _unit_registry() -> Any:
-    import pint
-
-    registry: Any = pint.UnitRegistry()
-    registry.define("@alias revolution = rev")
-    registry.define("@alias ohm = Ohm")
-    return registry
-
-
-def _pint_unit(unit: str) -> str:
-    """A unit as FMI or an engineer writes it ("kg.m2", "rev/min"), as pint reads it."""
-    if unit in ("", "1"):
-        return "dimensionless"
-    spaced = re.sub(r"\s*[.·]\s*", "*", unit).replace("^", "**")
-    powers = re.sub(r"([A-Za-zµΩ°])(-?\d)", r"\1**\2", spaced)
-    # in FMI everything behind a stroke is below it
-    top, *below = powers.split("/")
-    return top + "".join(f"/({part})" for part in below)
-
-
-def to_number(variable: Variable, given: Any) -> float:
-    """The value of a config entry in the declared unit.
-
-    Raises
-    ------
-    ValueError
-        for what is no number, a unit of another kind, or a value out of bounds.
-    """
-    if isinstance(given, bool) or not isinstance(given, int | float | str):
-        raise ValueError(f"{variable.name} = {given!r}: must be {_kind(variable)}")
-    try:
-        value = _converted(variable, given) if isinstance(given, str) else float(given)
-    except OverflowError:
-        raise ValueError(f"{variable.name}: the number is too large; must be {_kind(variable)}") from None
-    if not variable.quantity.admits(value):
-        raise ValueError(complaint(variable, value))
-    return value
-
-
-def _converted(variable: Variable, text: str) -> float:
-    import pint
-
-    refusal = ValueError(
-        f"{variable.name} = {json.dumps(text, ensure_ascii=False)}: must be {_kind(variable)}"
-    )
-    match = _NUMBER.fullmatch(text)
-    if match is None:
-        raise refusal
-    number, unit = float(match[1]), match[2]
-    if not unit:
-        return number
-    if _UNIT.fullmatch(unit) is None:
-        raise refusal
-    # pint takes an angle for a pure number: "1/min" would pass for an angular speed, in radians
-    angular = base_units(variable.unit).get("rad", 0)
-    named = set(re.findall(r"[A-Za-zµΩ°]+", unit)) & _ANGLES
-    if (angular > 0 and not named) or (angular == 0 and named):
-        raise refusal
-    try:
-        return float(
-            _unit_registry().Quantity(number, _pint_unit(unit)).to(_pint_unit(variable.unit)).magnitude
-        )
-    except (pint.PintError, ValueError, TypeError, AttributeError, AssertionError) as error:
-        raise refusal from error
-
-
-def _kind(variable: Variable) -> str:
-    if variable.unit == "1":
-        return f"a pure number ({variable.description})"
-    return f'a number in {variable.unit}, or a text such as "2 {variable.unit}" ({variable.description})'
-
-
-def _schema(declared: type, title: str, prefix: str) -> type[BaseModel]:
-    """The pydantic model of a declaration: the same fields, none required, none unknown."""
-    scalars = {v.name: v for v in variables(declared, prefix)}
-    fields: dict[str, Any] = {}
-    for field in dataclasses.fields(declared):
-        name = prefix + field.name
-        if name in scalars:
-            variable = scalars[name]
-            check = BeforeValidator(lambda given, variable=variable: to_number(variable, given))
-            fields[field.name] = (Annotated[float, check], Field(None, description=variable.description))
-        else:
-            inner = _schema(field.metadata["of"], f"{title}_{field.name}", name + ".")
-            fields[field.name] = (inner, Field(default_factory=inner))
-    return create_model(title, __config__=ConfigDict(extra="forbid"), **fields)
-
-
 _SECTIONS = {
     "machine": ChamberForces.Parameters,
     "ratios": Ratios,
@@ -315,8 +201,8 @@ _File = create_model(
     __config__=ConfigDict(extra="forbid"),
     title=(str, ""),
     **{
-        name: (schema, Field(default_factory=schema))
-        for name, schema in ((n, _schema(d, n, n + ".")) for n, d in _SECTIONS.items())
+        name: (section, Field(default_factory=section))
+        for name, section in ((n, schema(d, n, n + ".")) for n, d in _SECTIONS.items())
     },
     feed_forward=(bool, False),
     start=(Literal[STARTS], "direct"),
@@ -349,33 +235,6 @@ class Config:
     source: str
 
 
-def _given(section: BaseModel) -> dict[str, float]:
-    """Names and values that were set in a section."""
-    flat: dict[str, float] = {}
-    for name in section.model_fields_set:
-        value = getattr(section, name)
-        if isinstance(value, BaseModel):
-            flat.update({f"{name}.{inner}": v for inner, v in _given(value).items()})
-        else:
-            flat[name] = value
-    return flat
-
-
-def _first_line(error: ValidationError) -> str:
-    first = error.errors()[0]
-    where = ".".join(str(part) for part in first["loc"]).encode("unicode_escape").decode()
-    if first["type"] == "extra_forbidden":
-        section: Any = _File
-        for part in first["loc"][:-1]:
-            section = section.model_fields[part].annotation
-        return f"{where}: unknown key; known here: {', '.join(section.model_fields)}"
-    if first["type"] == "model_type":
-        return f"{where} = {first['input']!r}: must be a table"
-    if first["type"] == "value_error":
-        return str(first["ctx"]["error"])
-    return f"{where} = {first['input']!r}: {first['msg'].lower()}"
-
-
 def load(file: Path | None = None) -> Config:
     """Read and check a study file; without one, the packaged example.
 
@@ -384,21 +243,12 @@ def load(file: Path | None = None) -> Config:
     InputError
         in one line: the file, the field, its value and what is allowed.
     """
-    source = str(file) if file else "packaged example"
-    try:
-        text = file.read_text("utf-8") if file else example()
-        return parse(text, source)
-    except OSError as error:
-        raise InputError(f"{source}: cannot be read ({error.strerror or error})") from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{source}: is not UTF-8 text") from error
-    except InputError as error:
-        raise InputError(f"{source}: {error}") from error
+    return read(file, example, parse)
 
 
 def example() -> str:
     """The packaged study file."""
-    return (resources.files("chainunit") / "data" / "example.toml").read_text("utf-8")
+    return packaged("example.toml")
 
 
 def parse(text: str, source: str = "config") -> Config:
@@ -409,20 +259,17 @@ def parse(text: str, source: str = "config") -> Config:
     InputError
         see `load`.
     """
-    try:
-        data = tomllib.loads(text)
-    except ValueError as error:  # TOMLDecodeError, and numbers that are too long
-        raise InputError(f"no valid TOML: {error}") from error
+    data = toml(text)
     try:
         _File.model_validate(data)
         checked: Any = _File.model_validate(_over_example(data))
     except ValidationError as error:
-        raise InputError(_first_line(error)) from error
+        raise InputError(first_line(error, _File)) from error
     _consistent(data, checked)
-    machine_given = _given(checked.machine)
+    machine_given = given_values(checked.machine)
     if checked.ratios.model_fields_set:
         try:
-            lengths = ratios(**_filled(Ratios, _given(checked.ratios)))
+            lengths = ratios(**filled(Ratios, given_values(checked.ratios)))
         except InputError as error:
             raise InputError(f"ratios: {error}") from error
         twice = sorted(set(lengths) & set(machine_given))
@@ -435,7 +282,7 @@ def parse(text: str, source: str = "config") -> Config:
         machine = ChainUnit(machine_given)
     except InputError as error:
         raise InputError(f"machine: {error}") from error
-    motor_given = _given(checked.motor)
+    motor_given = given_values(checked.motor)
     motor = DcMotor.parameter_layout.from_names(motor_given)
     try:
         DcMotor.check(motor)
@@ -444,20 +291,22 @@ def parse(text: str, source: str = "config") -> Config:
     config = Config(
         title=checked.title,
         machine=machine,
-        feed=_instance(Feed, _given(checked.feed)),
+        feed=instance(Feed, given_values(checked.feed)),
         motor=motor,
         motor_given=frozenset(motor_given),
-        run=_instance(Run, _given(checked.run)),
+        run=instance(Run, given_values(checked.run)),
         events=tuple(dict.fromkeys(checked.events)),
-        overload=_instance(Overload, _given(checked.overload)),
-        coupling=_instance(Coupling, _given(checked.coupling)) if "coupling" in data else None,
-        monte_carlo=_instance(MonteCarlo, _given(checked.monte_carlo)),
-        sizing=_instance(Sizing, _given(checked.sizing)) if "sizing" in data else None,
+        overload=instance(Overload, given_values(checked.overload)),
+        coupling=instance(Coupling, given_values(checked.coupling)) if "coupling" in data else None,
+        monte_carlo=instance(MonteCarlo, given_values(checked.monte_carlo)),
+        sizing=instance(Sizing, given_values(checked.sizing)) if "sizing" in data else None,
         feed_forward=checked.feed_forward,
-        gear=_instance(Transmission, {**Layout(Transmission).named(KINDS["gear"]), **_given(checked.gear)}),
-        gear_given=frozenset(_given(checked.gear)),
+        gear=instance(
+            Transmission, {**Layout(Transmission).named(KINDS["gear"]), **given_values(checked.gear)}
+        ),
+        gear_given=frozenset(given_values(checked.gear)),
         start=checked.start,
-        starter=_instance(Starter, _given(checked.starter)),
+        starter=instance(Starter, given_values(checked.starter)),
         catalogue=_beside(checked.catalogue, source),
         source=source,
     )
@@ -490,8 +339,8 @@ def _consistent(data: Mapping[str, Any], checked: Any) -> None:
                     f"{name}: is of the motor that [sizing] picks; add [sizing], or leave it out"
                 )
     sizing, random = (
-        _instance(Sizing, _given(checked.sizing)),
-        _instance(MonteCarlo, _given(checked.monte_carlo)),
+        instance(Sizing, given_values(checked.sizing)),
+        instance(MonteCarlo, given_values(checked.monte_carlo)),
     )
     for low, high, what in (
         (sizing.poles_least, sizing.poles_most, "sizing.poles_most"),
@@ -520,24 +369,8 @@ _LENGTHS = ("r", "l", "h", "c", "hy", "e", "l1", "l2", "z")
 def _over_example(data: Mapping[str, Any]) -> dict[str, Any]:
     """A study file laid over the packaged example: what is not named is the example's. Its ratios give way to
     lengths of the user's own."""
-    base = tomllib.loads(example())
+    base = toml(example())
     if any(name in data.get("machine", {}) for name in _LENGTHS) and "ratios" not in data:
         del base["ratios"]
     base["title"] = ""
-    return _merged(base, data)
-
-
-def _merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    merged = dict(base)
-    for name, value in over.items():
-        below = merged.get(name)
-        merged[name] = _merged(below, value) if isinstance(below, dict) and isinstance(value, dict) else value
-    return merged
-
-
-def _filled(declared: type, given: Mapping[str, float]) -> dict[str, Any]:
-    return {v.name: given.get(v.name, v.quantity.start) for v in variables(declared)}
-
-
-def _instance(declared: type, given: Mapping[str, float]) -> Any:
-    return Layout(declared).from_names(dict(given))
+    return merged(base, data)

@@ -130,7 +130,7 @@ def _motors(rows: Iterator[tuple[str, Mapping[str, Any]]], taken: set[str]) -> l
 
 def _motor(origin: str, given: Mapping[str, Any], taken: set[str]) -> CatalogueMotor:
     # of the study files, which may come to import the catalogue
-    from ..config import to_number
+    from ..reading import to_number
 
     for name in given:
         if name not in _VARIABLES and name not in _TEXTS:

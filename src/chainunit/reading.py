@@ -1,0 +1,204 @@
+"""TOML tables read by declarations, through pydantic models that are generated from them.
+
+A number is in the declared SI unit; a text may carry a unit ("150 mm", "30 rev/min", "20 degC") and is
+converted. Every refusal is one line that names the field, its value and what is allowed.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import re
+import tomllib
+from collections.abc import Callable, Mapping
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
+
+from .errors import InputError
+from .quantities import Layout, Variable, base_units, complaint, variables
+
+T = TypeVar("T")
+
+_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*")
+_UNIT = re.compile(r"1|(?:1/)?[A-Za-zµΩ°]+(?:\^|\*\*)?-?\d?(?:\s*[.*/·]\s*[A-Za-zµΩ°]+(?:\^|\*\*)?-?\d?)*")
+_ANGLES = frozenset(
+    "rad mrad radian radians deg degree degrees ° rev revolution revolutions turn turns rpm".split()
+)
+
+
+@cache
+def _unit_registry() -> Any:
+    import pint
+
+    registry: Any = pint.UnitRegistry()
+    registry.define("@alias revolution = rev")
+    registry.define("@alias ohm = Ohm")
+    return registry
+
+
+def _pint_unit(unit: str) -> str:
+    """A unit as FMI or an engineer writes it ("kg.m2", "rev/min"), as pint reads it."""
+    if unit in ("", "1"):
+        return "dimensionless"
+    spaced = re.sub(r"\s*[.·]\s*", "*", unit).replace("^", "**")
+    powers = re.sub(r"([A-Za-zµΩ°])(-?\d)", r"\1**\2", spaced)
+    # in FMI everything behind a stroke is below it
+    top, *below = powers.split("/")
+    return top + "".join(f"/({part})" for part in below)
+
+
+def to_number(variable: Variable, given: Any) -> float:
+    """The value of a config entry in the declared unit.
+
+    Raises
+    ------
+    ValueError
+        for what is no number, a unit of another kind, or a value out of bounds.
+    """
+    if isinstance(given, bool) or not isinstance(given, int | float | str):
+        raise ValueError(f"{variable.name} = {given!r}: must be {_kind(variable)}")
+    try:
+        value = _converted(variable, given) if isinstance(given, str) else float(given)
+    except OverflowError:
+        raise ValueError(f"{variable.name}: the number is too large; must be {_kind(variable)}") from None
+    if not variable.quantity.admits(value):
+        raise ValueError(complaint(variable, value))
+    return value
+
+
+def _converted(variable: Variable, text: str) -> float:
+    import pint
+
+    refusal = ValueError(
+        f"{variable.name} = {json.dumps(text, ensure_ascii=False)}: must be {_kind(variable)}"
+    )
+    match = _NUMBER.fullmatch(text)
+    if match is None:
+        raise refusal
+    number, unit = float(match[1]), match[2]
+    if not unit:
+        return number
+    if _UNIT.fullmatch(unit) is None:
+        raise refusal
+    # pint takes an angle for a pure number: "1/min" would pass for an angular speed, in radians
+    angular = base_units(variable.unit).get("rad", 0)
+    named = set(re.findall(r"[A-Za-zµΩ°]+", unit)) & _ANGLES
+    if (angular > 0 and not named) or (angular == 0 and named):
+        raise refusal
+    try:
+        return float(
+            _unit_registry().Quantity(number, _pint_unit(unit)).to(_pint_unit(variable.unit)).magnitude
+        )
+    except (pint.PintError, ValueError, TypeError, AttributeError, AssertionError) as error:
+        raise refusal from error
+
+
+def _kind(variable: Variable) -> str:
+    if variable.unit == "1":
+        return f"a pure number ({variable.description})"
+    return f'a number in {variable.unit}, or a text such as "2 {variable.unit}" ({variable.description})'
+
+
+def schema(declared: type, title: str, prefix: str) -> type[BaseModel]:
+    """The pydantic model of a declaration: the same fields, none required, none unknown."""
+    scalars = {v.name: v for v in variables(declared, prefix)}
+    fields: dict[str, Any] = {}
+    for field in dataclasses.fields(declared):
+        name = prefix + field.name
+        if name in scalars:
+            variable = scalars[name]
+            check = BeforeValidator(lambda given, variable=variable: to_number(variable, given))
+            fields[field.name] = (Annotated[float, check], Field(None, description=variable.description))
+        else:
+            inner = schema(field.metadata["of"], f"{title}_{field.name}", name + ".")
+            fields[field.name] = (inner, Field(default_factory=inner))
+    return create_model(title, __config__=ConfigDict(extra="forbid"), **fields)
+
+
+def given_values(section: BaseModel) -> dict[str, float]:
+    """Names and values that were set in a section."""
+    flat: dict[str, float] = {}
+    for name in section.model_fields_set:
+        value = getattr(section, name)
+        if isinstance(value, BaseModel):
+            flat.update({f"{name}.{inner}": v for inner, v in given_values(value).items()})
+        else:
+            flat[name] = value
+    return flat
+
+
+def first_line(error: ValidationError, file: type[BaseModel]) -> str:
+    """The line that says what is wrong with a table of the form `file`."""
+    first = error.errors()[0]
+    where = ".".join(str(part) for part in first["loc"]).encode("unicode_escape").decode()
+    if first["type"] == "extra_forbidden":
+        section: Any = file
+        for part in first["loc"][:-1]:
+            section = section.model_fields[part].annotation
+        return f"{where}: unknown key; known here: {', '.join(section.model_fields)}"
+    if first["type"] == "model_type":
+        return f"{where} = {first['input']!r}: must be a table"
+    if first["type"] == "value_error":
+        return str(first["ctx"]["error"])
+    return f"{where} = {first['input']!r}: {first['msg'].lower()}"
+
+
+def merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """The table `over` laid over `base`: what it does not name is the base's."""
+    result = dict(base)
+    for name, value in over.items():
+        below = result.get(name)
+        result[name] = merged(below, value) if isinstance(below, dict) and isinstance(value, dict) else value
+    return result
+
+
+def filled(declared: type, given: Mapping[str, float]) -> dict[str, Any]:
+    """Every value of a declaration by name: as given, else at its start."""
+    return {v.name: given.get(v.name, v.quantity.start) for v in variables(declared)}
+
+
+def instance(declared: type, given: Mapping[str, float]) -> Any:
+    """A declaration with the values given by name; others are at their start."""
+    return Layout(declared).from_names(dict(given))
+
+
+def packaged(name: str) -> str:
+    """The text of a file that comes with the package."""
+    return (resources.files("chainunit") / "data" / name).read_text("utf-8")
+
+
+def toml(text: str) -> dict[str, Any]:
+    """The tables in a TOML text.
+
+    Raises
+    ------
+    InputError
+        in one line, where it is none.
+    """
+    try:
+        return tomllib.loads(text)
+    except ValueError as error:  # TOMLDecodeError, and numbers that are too long
+        raise InputError(f"no valid TOML: {error}") from error
+
+
+def read(file: Path | None, example: Callable[[], str], parse: Callable[[str, str], T]) -> T:
+    """What `parse` makes of the text of a file and its name; without a file, of the packaged `example`.
+
+    Raises
+    ------
+    InputError
+        in one line that begins with the name of the file.
+    """
+    source = str(file) if file else "packaged example"
+    try:
+        return parse(file.read_text("utf-8") if file else example(), source)
+    except OSError as error:
+        raise InputError(f"{source}: cannot be read ({error.strerror or error})") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{source}: is not UTF-8 text") from error
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from error
