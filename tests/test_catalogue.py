@@ -121,11 +121,11 @@ def test_rated_running_is_the_dynamic_models(k):
     n, p = MOTORS[k].nameplate, MOTORS[k].identify().parameters
     u = InductionMotor.input_layout.from_names({"load.tau_bias": n.torque})
     held = InductionMotor.parameter_layout.from_names({"stator.C": 1e12}, p)  # keeps its temperature
-    x = STATES.values(InductionMotor.initial_states(p))
+    x = STATES.values(InductionMotor.initial_states(engines.MATH, p))
     T = STATES.names.index("stator.T")
     x[T], x[STATES.names.index("w")] = p.ambient.T + TYPICAL.rise, n.synchronous
 
-    def rates(y, p=held):
+    def rates(_, y, p=held):
         return InductionMotor.derivatives(engines.MATH, p, u, STATES.instance(y))
 
     x = rk4(rates, x, 3.0, InductionMotor.internal_step(engines.MATH, p))

@@ -55,7 +55,7 @@ def test_energy_is_kept_when_nothing_drives_or_brakes():
     machine = ChainUnit({"pin.friction": 0.0})
     p, u = parameters(machine, w_start=4.0), MODEL.Inputs(tau=0.0, left=EMPTY, right=EMPTY)
     layout = MODEL.state_layout
-    x0 = layout.values(MODEL.initial_states(p))
+    x0 = layout.values(MODEL.initial_states(engines.MATH, p))
     solution = solve_ivp(
         lambda t, y: MODEL.derivatives(engines.MATH, p, u, layout.instance(list(map(float, y)))),
         (0.0, 20.0), x0, method="DOP853", rtol=1e-11, atol=1e-12,
@@ -79,7 +79,7 @@ def test_the_fmu_falls_and_swings_as_the_equations(tmp_path):
     layout = MODEL.state_layout
     exact = solve_ivp(
         lambda t, y: MODEL.derivatives(engines.MATH, p, u, layout.instance(list(map(float, y)))),
-        (0.0, 1.0), layout.values(MODEL.initial_states(p)), method="Radau", rtol=1e-9, atol=1e-11,
+        (0.0, 1.0), layout.values(MODEL.initial_states(engines.MATH, p)), method="Radau", rtol=1e-9, atol=1e-11,
     ).y[:, -1]  # fmt: skip
     for fmi in (2, 3):
         file = export(MODEL, tmp_path / f"ChainUnit{fmi}.fmu", fmi=fmi)

@@ -38,10 +38,15 @@ def outputs(p, u, y, xp=engines.MATH):
     return InductionMotor.evaluate(xp, p, u, LAYOUT.instance(y))[0]
 
 
+def advanced(p, u, start, stop, longest):
+    of = rates(p, u)
+    return rk4(lambda _, y: of(y), start, stop, longest)
+
+
 def run(p, u, stop, start=None, step=None):
     """States at the end, with the integrator of the FMU."""
-    start = LAYOUT.values(InductionMotor.initial_states(p)) if start is None else start
-    return rk4(rates(p, u), start, stop, step or InductionMotor.internal_step(engines.MATH, p))
+    start = LAYOUT.values(InductionMotor.initial_states(engines.MATH, p)) if start is None else start
+    return advanced(p, u, start, stop, step or InductionMotor.internal_step(engines.MATH, p))
 
 
 def standing(p, w, share=1.0, f=None):
@@ -114,13 +119,13 @@ def motulator_start(p, u):
 def test_start_is_motulators(beta):
     """Torque, current and speed at every half millisecond of a start direct on line, in parts of their peaks."""
     p, u = parameters({**COLD, **beta}), inputs(LOAD)
-    start = LAYOUT.values(InductionMotor.initial_states(p))
+    start = LAYOUT.values(InductionMotor.initial_states(engines.MATH, p))
     tight = solve_ivp(
         lambda t, y: rates(p, u)(y.tolist()), (0.0, START), start, "DOP853", TIMES, rtol=1e-9, atol=1e-9
     )
     coarse, step = [start], InductionMotor.internal_step(engines.MATH, p)
     for h in np.diff(TIMES):
-        coarse.append(rk4(rates(p, u), coarse[-1], h, step))
+        coarse.append(advanced(p, u, coarse[-1], h, step))
     wanted = motulator_start(p, u)
     assert wanted[2][-1] > 145.0 and max(wanted[1]) > 4.0 * wanted[1][-1]
     for states, allowed in ((tight.y, 1e-6), (np.array(coarse).T, 1e-5)):
@@ -196,7 +201,7 @@ def test_steady_running_is_the_equivalent_circuit(given):
     fluxes = [LAYOUT.names.index(f"{side}.psi.{axis}") for side in ("stator", "cage") for axis in "dq"]
     for slip in SLIPS:
         w = (1.0 - slip) * math.pi * p.supply.f * 2.0 / p.pole_pairs
-        x = LAYOUT.values(InductionMotor.initial_states(p))
+        x = LAYOUT.values(InductionMotor.initial_states(engines.MATH, p))
         x[LAYOUT.names.index("w")] = w
 
         def flux_rates(four, x=x):

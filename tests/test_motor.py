@@ -24,9 +24,9 @@ def outputs(p, u, x):
 
 
 def run(p, u, stop, longest=2.5e-4):
-    x = LAYOUT.values(DcMotor.initial_states(p))
+    x = LAYOUT.values(DcMotor.initial_states(engines.MATH, p))
     return LAYOUT.instance(
-        rk4(lambda y: DcMotor.derivatives(engines.MATH, p, u, LAYOUT.instance(y)), x, stop, longest)
+        rk4(lambda _, y: DcMotor.derivatives(engines.MATH, p, u, LAYOUT.instance(y)), x, stop, longest)
     )
 
 
@@ -64,9 +64,9 @@ def test_steady_state_is_the_hand_calculation():
 def test_current_and_voltage_limits_hold_and_do_not_wind_up():
     gains = tune(DcMotor.Parameters().armature, 0.05 + DcMotor.Parameters().rotor.J).parameters
     p, u = DcMotor.parameter_layout.from_names(gains), inputs(w_ref=100.0, load__tau_bias=1.0, load__J=0.05)
-    x, currents, voltages, speeds = LAYOUT.values(DcMotor.initial_states(p)), [], [], []
+    x, currents, voltages, speeds = LAYOUT.values(DcMotor.initial_states(engines.MATH, p)), [], [], []
     for _ in range(3000):
-        x = rk4(lambda y: DcMotor.derivatives(engines.MATH, p, u, LAYOUT.instance(y)), x, 1e-3, 2.5e-4)
+        x = rk4(lambda _, y: DcMotor.derivatives(engines.MATH, p, u, LAYOUT.instance(y)), x, 1e-3, 2.5e-4)
         s = LAYOUT.instance(x)
         currents.append(s.armature.i)
         speeds.append(s.w)
@@ -89,7 +89,7 @@ def test_blocked_motor_heats_as_the_closed_form():
 
 def test_internal_integrator_against_an_error_controlled_solver():
     p, u = parameters(), inputs(w_ref=100.0, load__tau_bias=0.5, load__J=0.002)
-    x0 = LAYOUT.values(DcMotor.initial_states(p))
+    x0 = LAYOUT.values(DcMotor.initial_states(engines.MATH, p))
     exact = solve_ivp(
         lambda t, y: DcMotor.derivatives(engines.MATH, p, u, LAYOUT.instance(y)),
         (0.0, 0.3), x0, method="Radau", rtol=1e-11, atol=1e-12,
@@ -138,7 +138,7 @@ def test_the_loop_is_that_of_the_tuning_and_of_the_motor():
     solved = solve_ivp(
         lambda t, x: DcMotor.derivatives(engines.MATH, p, u, LAYOUT.instance(x)),
         (0.0, found.time[-1]),
-        LAYOUT.values(DcMotor.initial_states(p)),
+        LAYOUT.values(DcMotor.initial_states(engines.MATH, p)),
         t_eval=found.time,
         rtol=1e-9,
         atol=1e-12,
@@ -152,11 +152,11 @@ def test_feed_forward_of_the_whole_torque_leaves_no_dip():
     p = parameters(armature__alpha=0.0, rotor__d=0.0)
     dips = []
     for tau_ff in (0.0, 1.0):
-        x = LAYOUT.values(DcMotor.initial_states(p))
+        x = LAYOUT.values(DcMotor.initial_states(engines.MATH, p))
         u = inputs(load__tau_bias=1.0, tau_ff=tau_ff)
         least = 0.0
         for _ in range(400):
-            x = rk4(lambda y: DcMotor.derivatives(engines.MATH, p, u, LAYOUT.instance(y)), x, 1e-3, 2.5e-4)  # noqa: B023
+            x = rk4(lambda _, y: DcMotor.derivatives(engines.MATH, p, u, LAYOUT.instance(y)), x, 1e-3, 2.5e-4)  # noqa: B023
             least = min(least, x[1])
         dips.append(least)
     assert dips[1] > 0.25 * dips[0] and dips[0] < -0.5

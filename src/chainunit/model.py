@@ -92,6 +92,9 @@ class Model:
     parts: ClassVar[tuple[Part, ...]]
     required: ClassVar[tuple[Requirement, ...]] = ()
     terminals: ClassVar[tuple[Terminal, ...]] = ()
+    input_rates: ClassVar[Mapping[str, str]] = {}
+    """Inputs of a co-simulation FMU that run along another one, their time derivative, inside a step (``phi`` along
+    ``w`` along ``a``): else what turns would stand still in each step."""
     icon: ClassVar[str]
     """Name of its icon in `data/icons`, an SVG and a PNG."""
 
@@ -139,7 +142,7 @@ class Model:
         return {}
 
     @staticmethod
-    def initial_states(p: Any) -> Any:
+    def initial_states(xp: Any, p: Any) -> Any:
         """States at the start (models with states)."""
         raise NotImplementedError
 

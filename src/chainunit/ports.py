@@ -59,7 +59,7 @@ def flange(flow: str) -> Terminal:
     return Terminal("flange", "chainunit.flange", "the shaft and its torque", members, {"tau": flow})
 
 
-def load_terminal(prefix: str = "") -> Terminal:
-    """The terminal of a load port whose variables carry `prefix`."""
-    members = {name: prefix + name for name in Layout(LoadPort).names}
-    return Terminal("load", "chainunit.load", "the load port: a load as the shaft sees it", members)
+def load_terminal(prefix: str = "", name: str = "load") -> Terminal:
+    """The terminal, called `name`, of a load port whose variables carry `prefix`."""
+    members = {member: prefix + member for member in Layout(LoadPort).names}
+    return Terminal(name, "chainunit.load", "the load port: a load as the shaft sees it", members)

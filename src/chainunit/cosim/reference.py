@@ -58,7 +58,7 @@ def monolithic(
     for name, (model, p) in models.items():
         if model.state_layout:
             offsets[name] = n
-            start += model.state_layout.values(model.initial_states(p))
+            start += model.state_layout.values(model.initial_states(MATH, p))
             sizes = [v.quantity.nominal or 1.0 for v in model.state_layout.variables]
             tolerances += [max(1e-12, rtol * 1e-3 * size) for size in sizes]
             n = len(start)

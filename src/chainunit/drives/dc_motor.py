@@ -226,7 +226,7 @@ class DcMotor(Motor):
         return xp.minimum(2.5e-4, 0.25 * p.armature.L / (p.armature.R + p.current_control.kp))
 
     @staticmethod
-    def initial_states(p: Any) -> Any:
+    def initial_states(xp: Any, p: Any) -> Any:
         """At rest electrically, at the start angle and speed, winding at ambient temperature."""
         return States(
             phi=p.phi_start,

@@ -454,7 +454,7 @@ class InductionMotor(Motor):
         return xp.minimum(xp.minimum(2.5e-4, 1.0 / (12.0 * _TURN * p.supply.f)), by_flux)
 
     @staticmethod
-    def initial_states(p: Any) -> Any:
+    def initial_states(xp: Any, p: Any) -> Any:
         """Without flux, at the start angle and speed, at ambient temperature; an inverter starts at frequency 0."""
         return States(
             phi=p.phi_start,

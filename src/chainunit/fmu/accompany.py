@@ -61,7 +61,7 @@ def _reference(interface: Interface) -> dict[str, bytes]:
 
     states: list[Any] = [None] * _ROWS
     if layout := model.state_layout:
-        first = layout.values(model.initial_states(p))
+        first = layout.values(model.initial_states(MATH, p))
         solved = solve_ivp(
             lambda t, x: model.derivatives(MATH, p, inputs(t), layout.instance(x.tolist())),
             (0.0, _STOP),

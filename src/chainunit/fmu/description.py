@@ -95,7 +95,7 @@ class Interface:
         rows_at_start = [*outputs, *derivatives]
         if model.state_layout:
             states = model.state_layout.values(x)
-            first = model.initial_states(p)
+            first = model.initial_states(casadi_(), p)
             started = model.state_layout.values(first)
             rows_at_start = [*self._outputs(p, u, first), *model.derivatives(casadi_(), p, u, first)]
         in_run = self._influences(symbols, [*states, *outputs, *derivatives])

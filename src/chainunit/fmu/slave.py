@@ -126,7 +126,7 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
             return False
 
     def _integrate(self, time: float, step: float) -> bool:
-        p, u, model = self._p, self._inputs(), self.model
+        p, model, run = self._p, self.model, self._running()
         layout = model.state_layout
         assert layout is not None
         longest = model.internal_step(MATH, p)
@@ -134,14 +134,18 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
             self._tell(f"step of {step:g} s: must be < {_LONGEST_STEP * longest:g} s")
             return False
 
-        def rates(x: Any) -> list[float]:
-            return model.derivatives(MATH, p, u, layout.instance(x))
+        def rates(since: float, x: Any) -> list[float]:
+            return model.derivatives(MATH, p, self._inputs(run, since), layout.instance(x))
 
         x = rk4(rates, self._x, step, longest)
         if not all(map(math.isfinite, x)):
             self._tell(f"the states left all bounds in the step from t = {time:g} s")
             return False
         self._x = x
+        for at, rate, half in run:
+            self._set[at] += step * (rate + step * half)
+        if run:
+            self._u = None
         self._touch()
         return True
 
@@ -229,16 +233,32 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
                 p = self._p = self.model.parameter_layout.instance(self._set[: self._n_p])
                 self.model.check(p)
                 if self.model.state_layout and not self._initialized:
-                    self._x = self.model.state_layout.values(self.model.initial_states(p))
+                    self._x = self.model.state_layout.values(self.model.initial_states(MATH, p))
             except BaseException as reason:
                 self._refused = str(reason) or repr(reason)
                 self._tell(self._refused)
         return self._refused
 
-    def _inputs(self) -> Any:
+    def _inputs(self, run: list[tuple[int, float, float]] | None = None, since: float = 0.0) -> Any:
+        """The inputs, those that run on `since` [s] after they were set."""
+        if run:
+            values = self._set[self._n_p :]
+            for at, rate, half in run:
+                values[at - self._n_p] += since * (rate + since * half)
+            return self.model.input_layout.instance(values)
         if self._u is None:
             self._u = self.model.input_layout.instance(self._set[self._n_p :])
         return self._u
+
+    def _running(self) -> list[tuple[int, float, float]]:
+        """Place, rate and half of the rate's rate of each input that runs along another one."""
+        along, names = self.model.input_rates, self.model.input_layout.names
+
+        def rate(name: str | None) -> float:
+            other = along.get(name or "")
+            return self._set[self._n_p + names.index(other)] if other else 0.0
+
+        return [(self._n_p + names.index(name), rate(name), 0.5 * rate(along[name])) for name in along]
 
     def _bad_input(self) -> str:
         if self._u is None:

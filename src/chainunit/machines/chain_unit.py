@@ -737,7 +737,7 @@ class DirectChainUnit(Model):
         yield p.J_added * p.ratio * p.ratio + p.crank.I + p.crank.m * p.crank.s * p.crank.s, 0.0, math.inf
 
     @staticmethod
-    def initial_states(p: Any) -> Any:
+    def initial_states(xp: Any, p: Any) -> Any:
         """The start angle and speed."""
         return DirectStates(phi=p.phi_start, w=p.w_start)
 

@@ -64,7 +64,7 @@ def kernels(interface: Interface) -> str:
         add("derivatives", symbols, rates)
         add("derivatives_forward", [*symbols, du, dx], forward(rates))
         assert model.state_layout is not None
-        add("initial", [ps], casadi.vertcat(*model.state_layout.values(model.initial_states(p))))
+        add("initial", [ps], casadi.vertcat(*model.state_layout.values(model.initial_states(casadi_(), p))))
         add("internal_step", [ps], casadi.SX(model.internal_step(casadi_(), p)))
     limits = [casadi.SX(v) for row in model.requirements(casadi_(), p) for v in row]
     if limits:
@@ -115,6 +115,9 @@ def tables(interface: Interface, guid: str, token: str) -> str:
             f"{int(q.open_low)}, {int(q.tunable)}}}"
         )
 
+    def rate_of(name: str) -> int:
+        return model.input_layout.names.index(model.input_rates[name]) if name in model.input_rates else -1
+
     place, group_of = {}, {}
     first = 0
     group_rows = []
@@ -147,6 +150,7 @@ def tables(interface: Interface, guid: str, token: str) -> str:
         _array("double", "starts", [_number(x or 0.0) for x in starts]),
         _array("Quantity", "declared", [quantity(v) for v in (*interface.parameters, *interface.inputs)]),
         _array("double", "nominal", [_number(v.quantity.nominal or 1.0) for v in interface.states]),
+        _array("int", "rate_of", [str(rate_of(v.name)) for v in interface.inputs]),
         _array("int", "place", [str(place[i]) for i in range(n_y)]),
         _array("int", "group_of", [str(group_of[i]) for i in range(n_y)]),
         _array("Group", "group", group_rows),
@@ -173,6 +177,7 @@ def tables(interface: Interface, guid: str, token: str) -> str:
         "start": "starts",
         "declared": "declared",
         "nominal": "nominal",
+        "rate_of": "rate_of",
         "place": "place",
         "group_of": "group_of",
         "groups": "group",

@@ -46,6 +46,7 @@ typedef struct {
     const double *start;          /* parameters, inputs */
     const Quantity *declared;     /* parameters, inputs */
     const double *nominal;        /* of the states */
+    const int *rate_of;           /* of each input: the input that is its time derivative, or -1 */
     const int *place;             /* of each output, by value reference, as they are stored */
     const int *group_of;          /* of each output, by value reference */
     const Group *groups;

@@ -23,7 +23,7 @@ static unsigned guard(void) {
 
 Instance *instance_new(const char *name, Report report) {
     const int n_in = model.n_u + model.n_x;
-    int work = 4 * model.n_x + 2 * n_in + model.n_y + model.n_x + 3 * model.n_required;
+    int work = 4 * model.n_x + 3 * n_in + model.n_y + model.n_x + 3 * model.n_required;
     if (work < model.n_p + n_in + model.n_u) work = model.n_p + n_in + model.n_u; /* for a saved state */
     const size_t n = (size_t)(model.n_p + 2 * model.n_u + 2 * model.n_x + model.n_y + work + 1);
     Instance *c = calloc(1, sizeof *c);
@@ -319,6 +319,16 @@ Status forward(Instance *c, const unsigned *unknown, size_t n_unknown, const uns
     return OK;
 }
 
+/* The time derivative of an input: as the host gave it, else the input that the model declares to be it. */
+static double input_rate(const Instance *c, int i) {
+    if (c->du[i] != 0.0) return c->du[i];
+    return model.rate_of[i] < 0 ? 0.0 : c->u[model.rate_of[i]];
+}
+
+static double input_curvature(const Instance *c, int i) {
+    return c->du[i] != 0.0 || model.rate_of[i] < 0 ? 0.0 : input_rate(c, model.rate_of[i]);
+}
+
 Status output_derivative(Instance *c, unsigned reference, double *value) {
     Status status = derivatives(c);
     if (status) return status;
@@ -332,7 +342,7 @@ Status output_derivative(Instance *c, unsigned reference, double *value) {
     }
     for (int i = 0; i < n; ++i) {
         known[i] = (unsigned)(model.n_p + i);
-        seed[i] = i < model.n_u ? c->du[i] : c->dx[i - model.n_u];
+        seed[i] = i < model.n_u ? input_rate(c, i) : c->dx[i - model.n_u];
     }
     status = forward(c, &reference, 1, known, (size_t)n, seed, value);
     free(known);
@@ -341,7 +351,7 @@ Status output_derivative(Instance *c, unsigned reference, double *value) {
 }
 
 /* -- co-simulation: the classical Runge-Kutta method with equal steps, its cost known beforehand; inputs run
- * along their derivatives */
+ * along their derivatives, to the end of the step */
 
 static int slope(Instance *c, double *u, const double *x, double *dx) {
     const double *arg[3] = {c->p, u, x};
@@ -354,12 +364,17 @@ Status step(Instance *c, double time, double size) {
     if (!isfinite(time) || !isfinite(size) || size < 0.0)
         return complain(c, ERROR, "step of %g s from t = %g s: must be finite and not negative", size, time);
     const int n_x = model.n_x, n_u = model.n_u;
-    for (int i = 0; i < n_u; ++i)
-        if (!isfinite(c->u[i] + c->du[i] * size))
+    double *u = c->work, *rate = u + n_u, *half = rate + n_u, *x = half + n_u;
+    for (int i = 0; i < n_u; ++i) {
+        rate[i] = input_rate(c, i);
+        half[i] = 0.5 * input_curvature(c, i);
+        u[i] = c->u[i] + size * (rate[i] + size * half[i]);
+        if (!isfinite(u[i]))
             return complain(c, DISCARD, "%s leaves all bounds in the step from t = %g s",
                             model.declared[model.n_p + i].name, time);
+    }
     if (n_x && size > 0.0) {
-        double *x = c->work, *k = x + n_x, *sum = k + n_x, *at = sum + n_x, *u = at + n_x;
+        double *k = x + n_x, *sum = k + n_x, *at = sum + n_x;
         double longest = 0.0;
         const double *of[1] = {c->p};
         double *into[1] = {&longest};
@@ -373,7 +388,8 @@ Status step(Instance *c, double time, double size) {
         for (long s = 0; s < n; ++s) {
             for (int i = 0; i < n_x; ++i) sum[i] = 0.0;
             for (int stage = 0; stage < 4; ++stage) {
-                for (int i = 0; i < n_u; ++i) u[i] = c->u[i] + c->du[i] * h * ((double)s + node[stage]);
+                const double since = h * ((double)s + node[stage]);
+                for (int i = 0; i < n_u; ++i) u[i] = c->u[i] + since * (rate[i] + since * half[i]);
                 for (int i = 0; i < n_x; ++i) at[i] = stage ? x[i] + node[stage] * h * k[i] : x[i];
                 if (!slope(c, u, at, k))
                     return complain(c, DISCARD, "the states left all bounds in the step from t = %g s", time);
@@ -385,8 +401,8 @@ Status step(Instance *c, double time, double size) {
         c->fresh = 0;
     }
     for (int i = 0; i < n_u; ++i)
-        if (c->du[i] != 0.0) {
-            c->u[i] += c->du[i] * size;
+        if (rate[i] != 0.0 || half[i] != 0.0) {
+            c->u[i] += size * (rate[i] + size * half[i]);
             c->fresh = 0;
         }
     c->time = time + size;

@@ -1,0 +1,241 @@
+"""A cardan driveline between motor and machine: paper 002's shaft line with the driven inertia, as a model with states.
+
+It takes the machine's load port and shows one to the motor. Symbols as in `chainunit.drives.cardan`: 1 the motor's
+end of shaft 2, 4 the driven end of shaft 3. `phi w a tau` and the port are the motor's, `ratio` a gear between it and
+shaft 2; `driven.*` is the shaft of the machine, whose angle is 0 where the untwisted line has phi = 0.
+
+The port has no inertia: tau depends on angle and speed alone. Its slope by the speed is the plain derivative. Its
+slope by the angle is taken along the motion: while the motor turns by dphi = w dt, the driven side turns, too, so that
+
+    tau_bias_dphi = d tau/d phi + (rate of tau with the motor held) w^3/(w^4 + W_SMALL^4)
+
+which is the plain derivative where the driven side stands, and (d tau/dt)/w where both turn. With the plain one, a
+driver would feel the whole stiffness of a shaft whose other end runs away at the same speed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from ..engines import Dual, dual, slope, value
+from ..model import Model, Part, Requirement
+from ..ports import (
+    NO_LOAD,
+    LoadPort,
+    PortSlopes,
+    PortValues,
+    flange,
+    load_inertia,
+    load_terminal,
+    load_torque,
+)
+from ..quantities import Value, declaration, group, quantity
+from .cardan import BENDS, RIGHT, Line, Twist, two_joints
+
+W_SMALL = 0.1
+"""Speed of the motor [rad/s] below which the slope by the angle tends to the plain derivative."""
+
+
+@declaration
+class Parameters(Line):
+    """Parameters of the driveline. The start values are ours: the paper prints no dimensions."""
+
+    J4: Value = quantity("kg.m2", "inertia on shaft 3, beside the machine's", default=0.5, above=0.0)
+    ratio: Value = quantity("1", "gear ratio, motor turns per turn of shaft 2", default=1.0, above=0.0, max=1e6)
+    gamma1: Value = quantity(
+        "rad", "angle of the yoke of shaft 2 from the plane of its joint, untwisted and at phi = 0", default=0.0
+    )
+    phi_start: Value = quantity(
+        "rad", "angle of the motor at the start, where the line is untwisted", default=0.0
+    )
+    w_start: Value = quantity("rad/s", "speed of the motor at the start", default=0.0)
+
+
+@declaration
+class Inputs:
+    """The motor's shaft, and the load of the machine."""
+
+    phi: Value = quantity("rad", "motor angle", default=0.0)
+    w: Value = quantity("rad/s", "motor speed", default=0.0)
+    a: Value = quantity("rad/s2", "motor acceleration", default=0.0)
+    load: LoadPort = group(LoadPort, "load", default=NO_LOAD)
+
+
+@declaration
+class DrivenState:
+    """State of the driven shaft."""
+
+    phi: Value = quantity("rad", "angle")
+    w: Value = quantity("rad/s", "speed", nominal=10.0)
+
+
+@declaration
+class States:
+    """States of the driveline; each is an output, too."""
+
+    driven: DrivenState = group(DrivenState, "driven shaft")
+    load_energy: Value = quantity("J", "energy given to the load since the start", nominal=1000.0)
+
+
+@declaration
+class Driven:
+    """What follows from the states, at the driven shaft."""
+
+    a: Value = quantity("rad/s2", "acceleration", nominal=100.0)
+    tau: Value = quantity("N.m", "torque given to the load")
+
+
+@declaration
+class Joint:
+    """The two joints in series."""
+
+    phi2: Value = quantity("rad", "angle of the yoke on shaft 2")
+    phi3: Value = quantity("rad", "angle of the yoke on shaft 3")
+    i23: Value = quantity("1", "ratio d phi3/d phi2")
+
+
+@declaration
+class Outputs(PortValues):
+    """The port, the torques in the shafts and the energies."""
+
+    tau: Value = quantity("N.m", "torque that the motor has to give", nominal=100.0)
+    tau2: Value = quantity("N.m", "torque in shaft 2", nominal=100.0)
+    tau3: Value = quantity("N.m", "torque in shaft 3", nominal=100.0)
+    twist2: Value = quantity("rad", "twist of shaft 2", nominal=0.01)
+    twist3: Value = quantity("rad", "twist of shaft 3", nominal=0.01)
+    joint: Joint = group(Joint, "cardan")
+    driven: Driven = group(Driven, "driven shaft")
+    power: Value = quantity("W", "power that the motor gives", nominal=100.0)
+    kinetic_energy: Value = quantity("J", "kinetic energy of the inertia on shaft 3", nominal=100.0)
+    potential_energy: Value = quantity("J", "energy of both twists")
+    dissipated_power: Value = quantity("W", "power that damping takes")
+
+
+def _assembled(xp: Any, p: Any) -> Any:
+    """Angle phi3 of the untwisted line at phi = 0, where the driven shaft has its angle 0."""
+    return two_joints(xp, p, p.gamma1)[0]
+
+
+class _Point:
+    """The line between a motor at `phi, w` and the states."""
+
+    __slots__ = ("a4", "ends", "load", "load_inertia", "twist")
+
+    def __init__(self, xp: Any, p: Any, u: Any, x: Any) -> None:
+        self.ends = (
+            p.gamma1 + u.phi / p.ratio,
+            u.w / p.ratio,
+            _assembled(xp, p) + x.driven.phi,
+            x.driven.w,
+        )
+        self.twist = Twist(xp, p, *self.ends)
+        self.load, self.load_inertia = load_torque(u.load, x.driven.phi, x.driven.w), load_inertia(u.load, x.driven.phi)
+        self.a4 = (self.twist.tau4 - self.load) / (p.J4 + self.load_inertia)
+
+
+def _outputs(xp: Any, p: Any, u: Any, x: Any, s: _Point) -> Outputs:
+    line, tau = s.twist, s.twist.tau1 / p.ratio
+    given = s.load_inertia * s.a4 + s.load
+    return Outputs(
+        tau_bias=tau,
+        J=0.0 * tau,
+        dJ_dphi=0.0 * tau,
+        phi0=u.phi,
+        w0=u.w,
+        tau=tau,
+        tau2=line.tau1,
+        tau3=line.tau4,
+        twist2=line.twist2,
+        twist3=line.twist3,
+        joint=Joint(phi2=line.phi2, phi3=line.phi3, i23=line.i),
+        driven=Driven(a=s.a4, tau=given),
+        power=tau * u.w,
+        kinetic_energy=0.5 * p.J4 * x.driven.w * x.driven.w,
+        potential_energy=line.energy,
+        dissipated_power=line.dissipated,
+    )
+
+
+def _slopes(xp: Any, p: Any, u: Any, x: Any, s: _Point) -> PortSlopes:
+    phi1, w1, phi4, w4 = s.ends
+    engine = dual(xp)
+
+    def tau1(*ends: Any) -> Any:
+        # one more Newton step from the balance that is known carries the exact derivative
+        return slope(Twist(engine, p, *ends, near=value(s.twist.phi2), steps=1).tau1)
+
+    by_phi = tau1(Dual(phi1, 1.0), w1, phi4, w4)
+    by_w = tau1(phi1, Dual(w1, 1.0), phi4, w4)
+    driven = tau1(phi1, w1, Dual(phi4, w4), Dual(w4, s.a4))
+    w2, small2 = w1 * w1, (W_SMALL / p.ratio) * (W_SMALL / p.ratio)
+    along = by_phi + driven * w1 * w2 / (w2 * w2 + small2 * small2)
+    per_motor_turn = 1.0 / (p.ratio * p.ratio)
+    return PortSlopes(tau_bias_dphi=along * per_motor_turn, tau_bias_dw=by_w * per_motor_turn)
+
+
+class CardanDriveline(Model):
+    """A cardan shaft with two Hooke joints and two elastic shafts between a motor and a machine, with the inertia on
+    the driven side.
+
+    Connect the motor's phi, w, a to the inputs of these names and the port tau_bias ... w0 to the motor's load; driven.phi,
+    driven.w, driven.a to the machine's phi, w, a and the machine's port to load. In a co-simulation the inputs
+    phi and w run along w and a inside a step. The communication step must be well below the period of the torsional
+    vibration: 0.3/k at most, k the natural frequency in rad/s.
+    """
+
+    name = "CardanDriveline"
+    description = (
+        "Cardan shaft with two Hooke joints between motor and machine: elastic shafts, uneven ratio, damping; "
+        "takes a load port and shows one"
+    )
+    Parameters = Parameters
+    Inputs = Inputs
+    States = States
+    files = ("drives/__init__.py", "drives/cardan.py", "drives/driveline.py")
+    terminals = (flange("inflow"), load_terminal(), load_terminal("load.", "machine"))
+    icon = "cardan"
+    input_rates = {"phi": "w", "w": "a"}
+    required = tuple(
+        Requirement(name, "rad", "a Hooke joint turns only with a bend below 90 deg") for name in BENDS
+    )
+
+    @staticmethod
+    def excitation(t: float) -> dict[str, float]:
+        """A motor held fast, a load that twists the line and lets it swing."""
+        return {"load.tau_bias": 100.0}
+
+    @staticmethod
+    def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
+        """Both bends are below a right angle."""
+        for name in BENDS:
+            yield getattr(p, name), -math.inf, RIGHT
+
+    @staticmethod
+    def internal_step(xp: Any, p: Any) -> Any:
+        """A tenth of the time in which the driven inertia alone swings by a radian on shaft 3, or of its decay, and at
+        most 0.25 ms."""
+        slowest = xp.minimum(2.5e-4, 0.1 * xp.sqrt(p.J4 / p.c3))
+        return 1.0 / (1.0 / slowest + 2.0 * p.d3 / p.J4)
+
+    @staticmethod
+    def initial_states(xp: Any, p: Any) -> Any:
+        """Untwisted, both ends in the same motion."""
+        angle, i, _ = two_joints(xp, p, p.gamma1 + p.phi_start / p.ratio)
+        return States(
+            driven=DrivenState(phi=angle - _assembled(xp, p), w=i * p.w_start / p.ratio), load_energy=0.0
+        )
+
+    @staticmethod
+    def shared(xp: Any, p: Any, u: Any, x: Any) -> _Point:
+        """The line at one state."""
+        return _Point(xp, p, u, x)
+
+    @staticmethod
+    def derivatives(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+        """Time derivatives of the states, in declared order."""
+        s = _Point(xp, p, u, x)
+        return [x.driven.w, s.a4, (s.load_inertia * s.a4 + s.load) * x.driven.w]
+
+    parts = (Part(Outputs, _outputs), Part(PortSlopes, _slopes))
