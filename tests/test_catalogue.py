@@ -133,7 +133,7 @@ def test_rated_running_is_the_dynamic_models(k):
     assert STATES.instance(x).w == pytest.approx(n.speed, rel=1e-6)
     assert (out.i, out.supply_power) == pytest.approx((n.rated_current, n.power / n.efficiency), rel=1e-6)
     assert out.supply_power / (math.sqrt(3.0) * out.v * out.i) == pytest.approx(n.power_factor, rel=1e-6)
-    assert abs(rates(x, p)[T]) < 1e-5 * out.heat / p.stator.C
+    assert abs(rates(0.0, x, p)[T]) < 1e-5 * out.heat / p.stator.C
 
 
 def test_fit_is_deterministic_and_kept():

@@ -12,10 +12,13 @@ from collections.abc import Callable, Sequence
 
 
 def rk4(
-    rates: Callable[[float, Sequence[float]], Sequence[float]], x: Sequence[float], step: float, longest: float
+    rates: Callable[[float, Sequence[float]], Sequence[float]],
+    x: Sequence[float],
+    step: float,
+    longest: float,
 ) -> list[float]:
-    """The states `step` later, in equal substeps of at most `longest`; `rates` gives their derivatives at a time since
-    the start of the step and the states there."""
+    """The states `step` later, in equal substeps of at most `longest`; `rates` gives their derivatives at a time
+    since the start of the step, and the states there."""
     n = max(1, math.ceil(step / longest - 1e-9))
     h = step / n
     now = list(x)

@@ -17,7 +17,8 @@ from scipy.integrate import cumulative_simpson
 
 @dataclass(frozen=True)
 class Bond:
-    """A shaft between `driver` and `machine`, by instance name.
+    """A shaft between `driver` and `machine`, by instance name. A machine that drives another one, such as a
+    driveline, has the output `load_energy` for what it passes on.
 
     `feed` gives, for each mass input of the machine that changes in the run, dE/dm [J/kg] as a function of the
     run's Dataset: the energy that a kilogram has on its place in the machine.
@@ -44,6 +45,8 @@ def energy_residual(run: xr.Dataset, bond: Bond) -> tuple[xr.DataArray, float]:
 
     given = run[f"{bond.driver}.load_energy"].values
     stored = value("kinetic_energy") + value("potential_energy")
+    if f"{bond.machine}.load_energy" in run:
+        stored = stored + value("load_energy")
     fed = np.zeros_like(given)
     for mass, per_kg in bond.feed.items():
         fed += _stieltjes(per_kg(run), value(mass))

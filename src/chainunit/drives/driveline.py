@@ -1,11 +1,11 @@
-"""A cardan driveline between motor and machine: paper 002's shaft line with the driven inertia, as a model with states.
+"""A cardan driveline between motor and machine: paper 002's shaft line with the driven inertia, a model with states.
 
 It takes the machine's load port and shows one to the motor. Symbols as in `chainunit.drives.cardan`: 1 the motor's
 end of shaft 2, 4 the driven end of shaft 3. `phi w a tau` and the port are the motor's, `ratio` a gear between it and
 shaft 2; `driven.*` is the shaft of the machine, whose angle is 0 where the untwisted line has phi = 0.
 
 The port has no inertia: tau depends on angle and speed alone. Its slope by the speed is the plain derivative. Its
-slope by the angle is taken along the motion: while the motor turns by dphi = w dt, the driven side turns, too, so that
+slope by the angle is taken along the motion: while the motor turns by w dt, the driven side turns, too, so that
 
     tau_bias_dphi = d tau/d phi + (rate of tau with the motor held) w^3/(w^4 + W_SMALL^4)
 
@@ -17,9 +17,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from types import MappingProxyType
 from typing import Any
 
-from ..engines import Dual, dual, slope, value
+from ..engines import Dual, dual, slope
 from ..model import Model, Part, Requirement
 from ..ports import (
     NO_LOAD,
@@ -43,9 +44,13 @@ class Parameters(Line):
     """Parameters of the driveline. The start values are ours: the paper prints no dimensions."""
 
     J4: Value = quantity("kg.m2", "inertia on shaft 3, beside the machine's", default=0.5, above=0.0)
-    ratio: Value = quantity("1", "gear ratio, motor turns per turn of shaft 2", default=1.0, above=0.0, max=1e6)
+    ratio: Value = quantity(
+        "1", "gear ratio, motor turns per turn of shaft 2", default=1.0, above=0.0, max=1e6
+    )
     gamma1: Value = quantity(
-        "rad", "angle of the yoke of shaft 2 from the plane of its joint, untwisted and at phi = 0", default=0.0
+        "rad",
+        "angle of the yoke of shaft 2 from the plane of its joint, untwisted and at phi = 0",
+        default=0.0,
     )
     phi_start: Value = quantity(
         "rad", "angle of the motor at the start, where the line is untwisted", default=0.0
@@ -131,7 +136,8 @@ class _Point:
             x.driven.w,
         )
         self.twist = Twist(xp, p, *self.ends)
-        self.load, self.load_inertia = load_torque(u.load, x.driven.phi, x.driven.w), load_inertia(u.load, x.driven.phi)
+        self.load = load_torque(u.load, x.driven.phi, x.driven.w)
+        self.load_inertia = load_inertia(u.load, x.driven.phi)
         self.a4 = (self.twist.tau4 - self.load) / (p.J4 + self.load_inertia)
 
 
@@ -162,9 +168,9 @@ def _slopes(xp: Any, p: Any, u: Any, x: Any, s: _Point) -> PortSlopes:
     phi1, w1, phi4, w4 = s.ends
     engine = dual(xp)
 
-    def tau1(*ends: Any) -> Any:
+    def tau1(phi1: Any, w1: Any, phi4: Any, w4: Any) -> Any:
         # one more Newton step from the balance that is known carries the exact derivative
-        return slope(Twist(engine, p, *ends, near=value(s.twist.phi2), steps=1).tau1)
+        return slope(Twist(engine, p, phi1, w1, phi4, w4, near=s.twist.phi2, steps=1).tau1)
 
     by_phi = tau1(Dual(phi1, 1.0), w1, phi4, w4)
     by_w = tau1(phi1, Dual(w1, 1.0), phi4, w4)
@@ -179,10 +185,10 @@ class CardanDriveline(Model):
     """A cardan shaft with two Hooke joints and two elastic shafts between a motor and a machine, with the inertia on
     the driven side.
 
-    Connect the motor's phi, w, a to the inputs of these names and the port tau_bias ... w0 to the motor's load; driven.phi,
-    driven.w, driven.a to the machine's phi, w, a and the machine's port to load. In a co-simulation the inputs
-    phi and w run along w and a inside a step. The communication step must be well below the period of the torsional
-    vibration: 0.3/k at most, k the natural frequency in rad/s.
+    Connect the motor's phi, w, a to the inputs of these names and the port tau_bias ... w0 to the motor's load;
+    driven.phi, driven.w, driven.a to the machine's phi, w, a and the machine's port to load. In a co-simulation the
+    inputs phi and w run along w and a inside a step. The communication step must be well below the period of the
+    torsional vibration: 0.3/k at most, k the natural frequency in rad/s.
     """
 
     name = "CardanDriveline"
@@ -196,7 +202,7 @@ class CardanDriveline(Model):
     files = ("drives/__init__.py", "drives/cardan.py", "drives/driveline.py")
     terminals = (flange("inflow"), load_terminal(), load_terminal("load.", "machine"))
     icon = "cardan"
-    input_rates = {"phi": "w", "w": "a"}
+    input_rates = MappingProxyType({"phi": "w", "w": "a"})
     required = tuple(
         Requirement(name, "rad", "a Hooke joint turns only with a bend below 90 deg") for name in BENDS
     )
@@ -214,8 +220,8 @@ class CardanDriveline(Model):
 
     @staticmethod
     def internal_step(xp: Any, p: Any) -> Any:
-        """A tenth of the time in which the driven inertia alone swings by a radian on shaft 3, or of its decay, and at
-        most 0.25 ms."""
+        """A tenth of the time in which the driven inertia alone swings by a radian on shaft 3, half of that in which
+        it decays, and at most 0.25 ms."""
         slowest = xp.minimum(2.5e-4, 0.1 * xp.sqrt(p.J4 / p.c3))
         return 1.0 / (1.0 / slowest + 2.0 * p.d3 / p.J4)
 

@@ -20,7 +20,8 @@ def _load_cycle(study: Study, file: Path) -> Path:
     with time, speed, torque of the load and inertia of the load, units in the head."""
     settled = study.settled
     steady = study.runs["start_up"].sel(time=slice(settled, None))
-    names = {"time": "time", "motor.w": "speed", "machine.tau": "torque", "machine.J": "inertia"}
+    load = study.drive.loading
+    names = {"time": "time", "motor.w": "speed", f"{load}.tau": "torque", "machine.J": "inertia"}
     with whole(file) as part, part.open("w", newline="", encoding="utf-8") as out:
         writer = csv.writer(out)
         writer.writerow(f"{title} [{steady[name].attrs['units']}]" for name, title in names.items())

@@ -135,13 +135,6 @@ def settled(study: Study) -> float:
     return run.ramp + run.settle_turns * 2.0 * math.pi / run.crank_speed
 
 
-def crank(run: Any, ratio: float) -> tuple[Any, Any]:
-    """Angle [rad] and speed [rad/s] of the crank: the machine's own, which are not the motor's once a coupling is
-    open."""
-    phi, w = ("phi0", "w0") if "machine.phi0" in run else ("phi", "w")
-    return run[f"machine.{phi}"].values / ratio, run[f"machine.{w}"].values / ratio
-
-
 def _style(i: int) -> dict[str, Any]:
     return _STYLES[i % len(_STYLES)]
 
@@ -285,13 +278,13 @@ def _sides(study: Study) -> Plot:
 
 
 def _transient(study: Study, name: str) -> Plot:
-    run, ratio = study.runs[name], study.drive.ratio
+    run, drive = study.runs[name], study.drive
     event = event_of(study, name)
     current = run[f"motor.{study.drive.motor.current}"].values
     time = run["time"].values - (event or 0.0)
     series = [
-        ("crank torque [N m]", "%{y:.3g} N m", run["machine.tau"].values * ratio),
-        ("crank speed [rad/s]", "%{y:.4g} rad/s", crank(run, ratio)[1]),
+        ("crank torque [N m]", "%{y:.3g} N m", drive.crank_torque(run)),
+        ("crank speed [rad/s]", "%{y:.4g} rad/s", drive.crank_motion(run)[1]),
         ("motor current [A]", "%{y:.3g} A", current),
     ]
     kept = _thin(*(y for _, _, y in series))
@@ -313,7 +306,7 @@ def _transient(study: Study, name: str) -> Plot:
     if event is None and study.drive.follows:
         figure.add_scatter(
             x=x,
-            y=_small(run["motor.w_ref"].values[kept] / ratio),
+            y=_small(run["motor.w_ref"].values[kept] / drive.ratio),
             name="speed asked for",
             mode="lines",
             line=_style(1),
@@ -337,7 +330,7 @@ def _transient(study: Study, name: str) -> Plot:
     if behind is not None:
         figure.add_scatter(
             x=_small(behind["time"].values - (event or 0.0)),
-            y=_small(crank(behind, ratio)[1]),
+            y=_small(drive.crank_motion(behind)[1]),
             name="crank behind the open coupling",
             mode="lines",
             line=_style(1),

@@ -10,7 +10,7 @@ import numpy as np
 from ..engines import numpy_
 from ..machines.chain_unit import ChamberForces, Inputs, SideLoads
 from ..studies.overload import PINS, Study
-from .interactive import called, crank, event_of, in_order, settled
+from .interactive import called, event_of, in_order, settled
 
 _XP = numpy_()
 _PER_SECOND = 60
@@ -81,7 +81,7 @@ def _run(study: Study, name: str, interval: float) -> dict[str, Any]:
         )
         for side in ("left", "right")
     }
-    angle, speed = crank(part, p.ratio)
+    angle, speed = study.drive.crank_motion(part)
     inputs = Inputs(phi=angle * p.ratio, w=speed * p.ratio, a=0.0, left=loads["left"], right=loads["right"])
     state = ChamberForces.shared(_XP, p, inputs, None)
     m = state.m
@@ -117,7 +117,7 @@ def _run(study: Study, name: str, interval: float) -> dict[str, Any]:
         "time": _list(since, max(since[-1] - since[0], 1e-9), 5),
         "angle": _list(np.degrees(angle) % 360.0, 360.0, 4),
         "speed": _list(speed, study.config.run.crank_speed, 4),
-        "torque": _list(value("machine.tau") * p.ratio, None, 4),
+        "torque": _list(study.drive.crank_torque(part), None, 4),
         "material": {side: _list(load.material_mass, None, 3) for side, load in loads.items()},
         "joints": {
             joint: {"x": _list(v.x, reach, 5), "y": _list(v.y, reach, 5)} for joint, v in joints.items()

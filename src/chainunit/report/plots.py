@@ -103,12 +103,12 @@ def _speed_loop(study: Study) -> Any:
 
 
 def _series(study: Study, name: str) -> tuple[Any, Any, Any, Any]:
-    run, ratio = study.runs[name], study.drive.ratio
+    run, drive = study.runs[name], study.drive
     time = run["time"].values - study.event.get(name, 0.0)
     return (
         time,
-        run["machine.tau"].values * ratio,
-        run["motor.w"].values / ratio,
+        drive.crank_torque(run),
+        drive.crank_motion(run)[1],
         run[f"motor.{study.drive.motor.current}"].values,
     )
 

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import xarray as xr
+
 from ..cosim import Profile, System, port_connections
+from ..drives.driveline import CardanDriveline
 from ..drives.motor import Motor
 from ..fmu.backends import Backend, export
 from ..machines.api import ChainUnit
@@ -30,14 +34,43 @@ class Drive:
     """whether the speed control is told the torque of the machine with its normal feed, from a second machine FMU at
     the motor's angle and speed and the acceleration that is asked for"""
 
+    line: Any = None
+    """parameters of the driveline between motor and machine, if there is one; its `ratio` is the gear before it"""
+
     @property
     def ratio(self) -> float:
         """Motor turns per crank turn."""
         return float(self.machine.p.ratio)
 
+    @cached_property
+    def driven(self) -> ChainUnit:
+        """The machine as its FMU is: with the gear that is left behind the driveline."""
+        return self.machine if self.line is None else self.machine.replace(ratio=self.ratio / self.line.ratio)
+
+    @property
+    def loading(self) -> str:
+        """Name of the instance that loads the motor."""
+        return "machine" if self.line is None else "driveline"
+
     def models(self) -> dict[str, tuple[type[Model], Any]]:
-        """Models and parameters by instance name, the machine first."""
-        return {"machine": (ChamberForces, self.machine.p), "motor": (self.motor, self.parameters)}
+        """Models and parameters by instance name, each before what drives it."""
+        line = {} if self.line is None else {"driveline": (CardanDriveline, self.line)}
+        return {
+            "machine": (ChamberForces, self.driven.p),
+            **line,
+            "motor": (self.motor, self.parameters),
+        }
+
+    def crank_torque(self, run: xr.Dataset) -> Any:
+        """Torque at the crank in a run [N m], shape (time,)."""
+        return run["machine.tau"].values * self.driven.p.ratio
+
+    def crank_motion(self, run: xr.Dataset) -> tuple[Any, Any]:
+        """Angle [rad] and speed [rad/s] of the crank in a run, shape (time,), also of a machine that turns by
+        itself."""
+        phi, w = ("phi0", "w0") if "machine.phi0" in run else ("phi", "w")
+        ratio = self.driven.p.ratio
+        return run[f"machine.{phi}"].values / ratio, run[f"machine.{w}"].values / ratio
 
     def start(self) -> dict[str, float]:
         """Parameters of the whole system by full name."""
@@ -65,7 +98,10 @@ class Drive:
     def connections(self, *, slopes: bool = True) -> list[tuple[str, str]]:
         """The load port and the shaft, see `port_connections`; and what the control is told."""
         told = [("motor.phi", "model.phi"), ("motor.w", "model.w"), ("model.tau", "motor.tau_ff")]
-        return port_connections("machine", "motor", slopes=slopes) + (told if self.feed_forward else [])
+        shafts = port_connections(self.loading, "motor", slopes=slopes)
+        if self.line is not None:
+            shafts += port_connections("machine", "driveline", slopes=slopes, shaft="driven.")
+        return shafts + (told if self.feed_forward else [])
 
     def reference(self, crank_speed: float, ramp: float | None = None) -> dict[str, Any]:
         """The signal of the speed reference for this crank speed [rad/s], after a ramp from rest where given [s]."""
@@ -92,7 +128,12 @@ class Drive:
         return self.motor.largest_torque(self.parameters)
 
     def coasting(self, folder: Path, backend: Backend | None = None) -> Path:
-        """Write the FMU of the machine that turns by itself."""
+        """Write the FMU of the machine that turns by itself, and with it what is on its shaft."""
         file = folder / f"{DirectChainUnit.name}.fmu"
-        export(DirectChainUnit, file, self.machine_parameters(), backend=backend)
+        export(DirectChainUnit, file, self.coasting_parameters(), backend=backend)
         return file
+
+    def coasting_parameters(self) -> dict[str, float]:
+        """Its parameters by name."""
+        added = {} if self.line is None else {"J_added": self.line.J4}
+        return ChamberForces.parameter_layout.named(self.driven.p) | added

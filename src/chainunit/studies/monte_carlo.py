@@ -125,19 +125,19 @@ def one(task: Task, number: int, simulation: CoSimulation) -> Sample:
     guards = {"motor.tau": trip / drive.ratio} if config.coupling else None
     done = simulation.run(stop, run.step, guards=guards)
     time = done["time"].values
-    speed = done["motor.w"].values / drive.ratio
+    turned, speed = drive.crank_motion(done)
 
     def peak(name: str) -> float:
         return float(np.max(np.abs(done[name].values)))
 
-    angle = float(np.interp(event, time, done["motor.phi"].values)) / drive.ratio
+    angle = float(np.interp(event, time, turned))
     tripped = simulation.time < stop - 0.5 * run.step
     return Sample(
         crank_angle=angle % (2.0 * math.pi),
         event=event,
         force=force,
         trip_torque=trip if config.coupling else None,
-        crank_torque_peak=peak("machine.tau") * drive.ratio,
+        crank_torque_peak=float(np.max(np.abs(drive.crank_torque(done)))),
         motor_torque_peak=peak("motor.air_gap_tau"),
         current_peak=peak(f"motor.{drive.motor.current}"),
         rocker_torque_peak=peak("machine.rocker.tau"),

@@ -300,7 +300,7 @@ def _simulate(
     bond = Bond(
         "motor",
         "machine",
-        {f"{s}.material_mass": partial(_energy_per_kg, drive.machine, s) for s in ("left", "right")},
+        {f"{s}.material_mass": partial(_energy_per_kg, drive.driven, s) for s in ("left", "right")},
     )
     guards = _guards(study)
     with CoSimulation(drive.system(files), signals) as simulation:
@@ -320,7 +320,7 @@ def _simulate(
         study.answers["steady"] = _answers(study, steady, None, steady)
         study.pins["steady"] = _pins(study, steady)
         start = simulation.save()
-        angle = float(start_up["motor.phi"].values[-1]) / drive.ratio
+        angle = float(drive.crank_motion(start_up)[0][-1])
         lead = _lead(config, angle, study.answers["steady"].speed_mean)
         event = start + lead
         done = start
@@ -408,7 +408,7 @@ def _close(
             passed = 0.0
         coasting = _coast(study, name, run, stop, folder, backend)
         study.runs[f"{name}_coasting"] = coasting
-        speed = np.abs(coasting["machine.w"].values) / study.drive.ratio
+        speed = np.abs(study.drive.crank_motion(coasting)[1])
         still = np.flatnonzero(speed < 0.01 * study.config.run.crank_speed)
         tripped = {
             "coupling_trip_time": trip - event,
@@ -432,8 +432,8 @@ def _coast(
     """The machine behind the open coupling, with the loads that it had, for as long as the motor would have been
     followed and a second more."""
     from_ = float(run["time"][-1])
-    start = {f"machine.{n}": v for n, v in study.drive.machine_parameters().items()}
-    start |= {"machine.phi_start": float(run["motor.phi"][-1]), "machine.w_start": float(run["motor.w"][-1])}
+    start = {f"machine.{n}": v for n, v in study.drive.coasting_parameters().items()}
+    start |= {f"machine.{x}_start": float(run[f"machine.{x}0"][-1]) for x in ("phi", "w")}
     loads = {
         full: given
         for full, given in scenario_signals(study.config, study.drive, name, study.event[name]).items()
@@ -494,15 +494,15 @@ def _compare(study: Study, run: xr.Dataset, signals: Mapping[str, Any]) -> None:
 
 def _whole_turns(study: Study, run: xr.Dataset) -> Any:
     """Which rows belong to whole turns of the crank: over anything else the mean of a cyclic torque means nothing."""
-    phi = run["motor.phi"].values
-    turned = (phi - phi[0]) / (2.0 * math.pi * study.drive.ratio)
+    angle, _ = study.drive.crank_motion(run)
+    turned = (angle - angle[0]) / (2.0 * math.pi)
     return turned <= max(1.0, math.floor(turned[-1]))
 
 
 def _answers(study: Study, run: xr.Dataset, event: float | None, steady: xr.Dataset) -> Answers:
     """The numbers of one run."""
     config, drive = study.config, study.drive
-    ratio, w_ref = drive.ratio, config.run.crank_speed
+    w_ref = config.run.crank_speed
     whole = _whole_turns(study, run)
 
     def value(name: str) -> Any:
@@ -526,17 +526,14 @@ def _answers(study: Study, run: xr.Dataset, event: float | None, steady: xr.Data
     def least(rod: str) -> float:
         return min((float(np.min(value(f"machine.{side}.{rod}_pull"))) for side in sides), default=math.inf)
 
-    crank_torque, motor_torque = value("machine.tau") * ratio, value("motor.air_gap_tau")
-    speed, power, current = (
-        value("motor.w") / ratio,
-        value("machine.power"),
-        value(f"motor.{drive.motor.current}"),
-    )
+    crank_torque, motor_torque = drive.crank_torque(run), value("motor.air_gap_tau")
+    _, speed = drive.crank_motion(run)
+    power, current = value(f"{drive.loading}.power"), value(f"motor.{drive.motor.current}")
     asked = w_ref if drive.follows or event is None else study.answers["steady"].speed_mean
     since = value("time") - (event or 0.0)
     recovery = None
     if event is not None and (not drive.follows or _settled(study.answers["steady"], w_ref)):
-        recovery = _recovery(since, speed, steady["motor.w"].values / ratio, asked)
+        recovery = _recovery(since, speed, drive.crank_motion(steady)[1], asked)
     return Answers(
         crank_torque_peak=peak(crank_torque),
         crank_torque_rms=rms(crank_torque),
@@ -600,7 +597,7 @@ def _recovery(since: Any, speed: Any, steady: Any, w_ref: float) -> float | None
 def _pins(study: Study, run: xr.Dataset) -> dict[str, dict[str, float]]:
     """Peak, RMS and equivalent load (mean of ISO 281 over what the pin turns) of the reaction of every pin [N]."""
     table, whole = {}, _whole_turns(study, run)
-    turned = study.drive.machine.pin_turns(run["motor.phi"].values[whole])
+    turned = study.drive.driven.pin_turns(run["machine.phi0"].values[whole])
     for (title, name), angle in zip(PINS.items(), turned, strict=True):
         size = np.hypot(run[f"machine.{name}.fx"].values, run[f"machine.{name}.fy"].values)
         table[title] = {

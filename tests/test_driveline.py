@@ -1,0 +1,306 @@
+"""The cardan driveline as a model: power, slopes, limit cases, and in a system between motor and machine."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from chainunit import InputError, engines
+from chainunit.cosim import Bond, CoSimulation, Profile, System, energy_residual, monolithic, port_connections
+from chainunit.drives import cardan
+from chainunit.drives.cardan import Line, Twist
+from chainunit.drives.dc_motor import DcMotor
+from chainunit.drives.driveline import CardanDriveline
+from chainunit.errors import GeometryError
+from chainunit.machines.chain_unit import ChamberForces
+
+LAYOUT = CardanDriveline.state_layout
+BENT = {"alpha1": 0.5, "alpha2": 0.2, "delta_yokes": 0.7, "beta_planes": 0.2, "gamma1": 0.3}
+
+
+def parameters(**given):
+    p = CardanDriveline.parameter_layout.from_names(given)
+    CardanDriveline.check(p)
+    return p
+
+
+def inputs(**given):
+    return CardanDriveline.input_layout.from_names({n.replace("__", "."): v for n, v in given.items()})
+
+
+def at(p, u, x):
+    return CardanDriveline.evaluate(engines.MATH, p, u, LAYOUT.instance(x))
+
+
+def random_case(rng):
+    p = parameters(
+        alpha1=rng.uniform(0.0, 0.8),
+        alpha2=rng.uniform(0.0, 0.8),
+        beta_planes=rng.uniform(-3.0, 3.0),
+        delta_yokes=rng.uniform(-3.0, 3.0),
+        gamma1=rng.uniform(-3.0, 3.0),
+        c2=10.0 ** rng.uniform(2.0, 5.0),
+        c3=10.0 ** rng.uniform(2.0, 5.0),
+        d2=rng.uniform(0.0, 5.0),
+        d3=rng.uniform(0.0, 5.0),
+        J4=10.0 ** rng.uniform(-2.0, 2.0),
+        ratio=rng.uniform(0.5, 50.0),
+    )
+    phi, w = rng.uniform(-100.0, 100.0), rng.uniform(-200.0, 200.0)
+    phi3, i, _ = cardan.two_joints(engines.MATH, p, p.gamma1 + phi / p.ratio)
+    start, _, _ = cardan.two_joints(engines.MATH, p, p.gamma1)
+    x = [phi3 - start + rng.uniform(-0.02, 0.02), i * w / p.ratio + rng.uniform(-1.0, 1.0), 0.0]
+    u = inputs(
+        phi=phi, w=w, load__tau_bias=rng.uniform(-500.0, 500.0), load__J=rng.uniform(0.0, 50.0),
+        load__tau_bias_dphi=rng.uniform(-50.0, 50.0), load__phi0=x[0], load__w0=x[1] + 0.1,
+        load__tau_bias_dw=rng.uniform(0.0, 5.0), load__dJ_dphi=rng.uniform(-5.0, 5.0),
+    )  # fmt: skip
+    return p, u, x
+
+
+def test_power_in_is_power_out_and_stored_and_lost():
+    """At random points, to rounding; the storage's growth by a complex step along the motion."""
+    rng = np.random.default_rng(6)
+    for _ in range(300):
+        p, u, x = random_case(rng)
+        out, _ = at(p, u, x)
+        rates = CardanDriveline.derivatives(engines.MATH, p, u, LAYOUT.instance(x))
+        dual = engines.dual(engines.MATH)
+        moving = CardanDriveline.evaluate(
+            dual,
+            p,
+            dataclasses.replace(u, phi=engines.Dual(u.phi, u.w)),
+            LAYOUT.instance([engines.Dual(v, d) for v, d in zip(x, rates, strict=True)]),
+        )[0]
+        grows = engines.slope(moving.kinetic_energy) + engines.slope(moving.potential_energy)
+        given = out.driven.tau * x[1]
+        terms = (out.power, given, grows, out.dissipated_power)
+        assert out.power - given - grows - out.dissipated_power == pytest.approx(
+            0.0, abs=1e-9 * sum(map(abs, terms))
+        )
+        assert rates[2] == given
+
+
+def test_slopes_of_the_port():
+    """By the speed the plain derivative, by the angle the one along the motion, against central differences."""
+    rng = np.random.default_rng(7)
+    for _ in range(50):
+        p, u, x = random_case(rng)
+        out, port = at(p, u, x)
+        h = 1e-6
+
+        def tau(p, u, x, t=0.0, dw=0.0, held=False):
+            _, w4 = x[:2]
+            a4 = 0.0 if held else at(p, u, x)[0].driven.a
+            u = dataclasses.replace(u, phi=u.phi + (0.0 if held else u.w * t), w=u.w + dw)
+            return at(p, u, [x[0] + w4 * t + 0.5 * a4 * t * t, w4 + a4 * t, 0.0])[0].tau
+
+        by_w = (tau(p, u, x, dw=h, held=True) - tau(p, u, x, dw=-h, held=True)) / (2.0 * h)
+        assert port.tau_bias_dw == pytest.approx(by_w, rel=1e-5, abs=1e-6 * abs(out.tau))
+        along = (tau(p, u, x, t=h) - tau(p, u, x, t=-h)) / (2.0 * h * u.w)
+        scale = abs(along) + (p.c2 + p.c3) / p.ratio**2 * 1e-3
+        assert port.tau_bias_dphi == pytest.approx(along, rel=1e-4, abs=1e-4 * scale)
+        # where nothing turns it is the stiffness
+        still = [x[0], 0.0, 0.0]
+        standing = dataclasses.replace(u, w=0.0)
+        ends = [
+            at(p, dataclasses.replace(standing, phi=standing.phi + sign * h), still)[0].tau
+            for sign in (1, -1)
+        ]
+        plain = (ends[0] - ends[1]) / (2.0 * h)
+        assert at(p, standing, still)[1].tau_bias_dphi == pytest.approx(plain, rel=1e-4, abs=1e-4)
+
+
+def test_damping_is_that_of_a_cardan_without_mass():
+    """Against the exact massless cardan, whose angle phi2 is a state: alike where d2/c2 = d3/c3; else they differ by
+    the order of (k d/c)^2."""
+
+    def exact(p, J1, J4, start, stop):
+        def rates(_, y):
+            phi1, w1, phi4, w4, phi2 = y
+            phi3, i, _ = cardan.two_joints(engines.MATH, p, phi2)
+            pull2, pull3 = p.c2 * (phi1 - phi2), p.c3 * (phi3 - phi4)
+            # d2 (w1 - w2) + pull2 = i (d3 (i w2 - w4) + pull3)
+            w2 = (pull2 + p.d2 * w1 - i * (pull3 - p.d3 * w4)) / (p.d2 + i * i * p.d3)
+            tau2, tau3 = pull2 + p.d2 * (w1 - w2), pull3 + p.d3 * (i * w2 - w4)
+            return [w1, -tau2 / J1, w4, tau3 / J4, w2]
+
+        return solve_ivp(rates, (0.0, stop), start, method="LSODA", rtol=1e-10, atol=1e-13).y[:, -1]
+
+    def ours(p, J1, J4, start, stop):
+        def rates(_, y):
+            line = Twist(engines.MATH, p, *y)
+            return [y[1], -line.tau1 / J1, y[3], line.tau4 / J4]
+
+        return solve_ivp(rates, (0.0, stop), start, method="DOP853", rtol=1e-11, atol=1e-14).y[:, -1]
+
+    J1, J4 = 0.4, 2.0
+    for d2, d3, allowed in ((2.0, 4.0, 2e-5), (2.0, 0.5, 2e-4)):
+        p = Line(c2=8000.0, c3=16000.0, alpha1=0.4, alpha2=0.1, d2=d2, d3=d3)
+        phi3, i, _ = cardan.two_joints(engines.MATH, p, 0.2)
+        start = [0.2 + 1e-3, 20.0, phi3, 20.0 * i]
+        phi2 = cardan.middle_angle(engines.MATH, p, start[0], phi3)
+        found = ours(p, J1, J4, start, 0.2)
+        wanted = exact(p, J1, J4, [*start, phi2], 0.2)[:4]
+        moved = np.abs(found - wanted) / [1e-3, 0.2, 1e-3, 0.2]
+        assert np.max(moved) < allowed / 1e-2, (d2, d3, moved)
+
+
+@pytest.fixture(scope="module")
+def system(tmp_path_factory):
+    """Motor, a line on its fast shaft, and the machine behind a gear; as FMUs, models and connections."""
+    from chainunit.fmu.native.export import export
+
+    machine = ChamberForces.parameter_layout.from_names({"ratio": 50.0})
+    line = parameters(c2=60.0, c3=60.0, d2=0.02, d3=0.02, J4=0.002, **BENT)
+    motor = DcMotor.parameter_layout.from_names({})
+    models = {
+        "machine": (ChamberForces, machine),
+        "driveline": (CardanDriveline, line),
+        "motor": (DcMotor, motor),
+    }
+    folder = tmp_path_factory.mktemp("system")
+    files = {name: export(model, folder / f"{name}.fmu") for name, (model, _) in models.items()}
+    start = {
+        f"{name}.{variable}": value
+        for name, (model, p) in models.items()
+        for variable, value in model.parameter_layout.named(p).items()
+    }
+    return models, files, start
+
+
+def connections(slopes=True):
+    return [
+        *port_connections("machine", "driveline", slopes=slopes, shaft="driven."),
+        *port_connections("driveline", "motor", slopes=slopes),
+    ]
+
+
+RISE = Profile(0.0, ((0.0, 0.4, 150.0),))
+SIGNALS = {"motor.w_ref": RISE}
+
+
+def test_the_coupling_converges_to_the_monolithic_solution(system):
+    """Of second order, through both ports, with the shafts turning and bent joints at 150 rad/s."""
+    models, files, start = system
+    times = np.linspace(0.0, 0.8, 401)
+    exact = monolithic(models, connections(False), SIGNALS, times, rtol=1e-9, corners=RISE.corners)
+    errors = []
+    for step in (1e-3, 5e-4, 2.5e-4):
+        with CoSimulation(System(files, connections(), start), SIGNALS) as simulation:
+            run = simulation.run(0.8, step)
+        every = round(2e-3 / step)
+        errors.append(
+            [
+                float(
+                    np.max(np.abs(run[name].values[::every] - exact[name].values))
+                    / np.ptp(exact[name].values)
+                )
+                for name in (
+                    "motor.w",
+                    "driveline.driven.w",
+                    "driveline.tau2",
+                    "driveline.tau3",
+                    "machine.tau",
+                )
+            ]
+        )
+    finer, finest = np.log2(np.array(errors[0]) / errors[1]), np.log2(np.array(errors[1]) / errors[2])
+    assert np.all(finer > 1.7) and np.all(finest > 1.85), (errors, finer, finest)
+    assert max(errors[0]) < 2e-2 and max(errors[2]) < 1e-3, errors
+
+
+def test_energy_of_both_bonds(system):
+    _, files, start = system
+    with CoSimulation(System(files, connections(), start), SIGNALS) as simulation:
+        run = simulation.run(0.8, 2.5e-4)
+    for bond in (Bond("motor", "driveline"), Bond("driveline", "machine")):
+        _, share = energy_residual(run, bond)
+        assert share < 2e-4, bond
+    assert float(np.max(np.abs(run["driveline.load_energy"]))) > 10.0
+
+
+def test_a_stiff_line_is_a_rigid_shaft(system):
+    """With straight joints and a stiff line the machine's torque tends to that without a line, J4 beside."""
+    models, _, _ = system
+    machine, motor = models["machine"], models["motor"]
+    line = parameters(alpha1=0.0, alpha2=0.0, c2=4e4, c3=4e4, d2=2.0, d3=2.0, J4=1e-4)
+    times = np.linspace(0.0, 0.8, 401)
+    signals = {"motor.w_ref": Profile(0.0, ((0.0, 0.4, 150.0),))}
+    elastic = monolithic(
+        {"machine": machine, "driveline": (CardanDriveline, line), "motor": motor},
+        connections(False),
+        signals,
+        times,
+        rtol=1e-8,
+        corners=[0.4],
+    )
+    heavier = dataclasses.replace(
+        motor[1], rotor=dataclasses.replace(motor[1].rotor, J=motor[1].rotor.J + 1e-4)
+    )
+    rigid = monolithic(
+        {"machine": machine, "motor": (DcMotor, heavier)},
+        port_connections("machine", "motor", slopes=False),
+        signals,
+        times,
+        rtol=1e-8,
+        corners=[0.4],
+    )
+    for name in ("machine.tau", "machine.w0"):
+        difference = np.max(np.abs(elastic[name].values - rigid[name].values))
+        assert difference < 2e-3 * np.max(np.abs(rigid[name].values)), name
+
+
+def test_both_backends_agree_also_in_a_turning_step(tmp_path):
+    """The inputs run along w and a inside each step, in the native FMU as in that of pythonfmu."""
+    from chainunit.fmu.export import export as python
+    from chainunit.fmu.native.export import export as native
+
+    start = {**BENT, "w_start": 30.0, "d3": 3.0, "ratio": 2.0}
+    signals = {"line.load.tau_bias": 40.0, "line.load.J": 3.0, "line.w": 30.0, "line.a": 5.0, "line.phi": 0.0}
+    runs = []
+    for name, make in (("n", native), ("p", python)):
+        file = make(CardanDriveline, tmp_path / f"{name}.fmu", start)
+        # the signals are set once: between, phi and w run by themselves
+        with CoSimulation(System({"line": file}, [], {}), {}) as simulation:
+            simulation.signals = signals
+            simulation.run(0.001, 0.001)
+            simulation.signals = {}
+            runs.append(simulation.run(0.2, 0.002))
+    for name in runs[0].data_vars:
+        wanted = runs[0][name].values
+        np.testing.assert_allclose(
+            runs[1][name].values, wanted, rtol=1e-9, atol=1e-9 * np.max(np.abs(wanted)) + 1e-12
+        )
+    out = runs[0]
+    t = float(out["time"][-1]) - float(out["time"][0])
+    assert float(out["line.w0"][-1]) == pytest.approx(float(out["line.w0"][0]) + 5.0 * t, rel=1e-12)
+    advanced = float(out["line.phi0"][-1] - out["line.phi0"][0])
+    assert advanced == pytest.approx(float(out["line.w0"][0]) * t + 2.5 * t * t, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("values", "named"),
+    [
+        (
+            {"alpha1": 1.6},
+            "alpha1 = 1.6 rad: a Hooke joint turns only with a bend below 90 deg; must be < 1.5708 rad",
+        ),
+        ({"alpha2": 0.5 * np.pi}, "alpha2 = 1.5708 rad"),
+        ({"c2": 0.0}, "c2 = 0 N.m/rad: must be > 0"),
+        ({"c3": -1.0}, "c3 = -1 N.m/rad: must be > 0"),
+        ({"J4": 0.0}, "J4 = 0 kg.m2: must be > 0"),
+        ({"d2": -0.1}, "d2 = -0.1 N.m.s/rad: must be >= 0"),
+        ({"ratio": 0.0}, "ratio = 0: must be > 0"),
+    ],
+)
+def test_bad_parameters_are_refused_in_one_line(values, named, tmp_path):
+    from chainunit.fmu.native.export import export
+
+    with pytest.raises((InputError, GeometryError)) as refused:
+        export(CardanDriveline, tmp_path / "x.fmu", values)
+    assert named in str(refused.value) and "\n" not in str(refused.value)
+    assert not (tmp_path / "x.fmu").exists()
