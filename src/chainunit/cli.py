@@ -1,9 +1,11 @@
-"""The command line: ``chainunit study``, ``chainunit reproduce``, ``chainunit export``, ``chainunit export-ssp``."""
+"""The command line: ``chainunit`` with ``study``, ``driveline``, ``reproduce``, ``export``, ``export-ssp``."""
 
 from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -89,24 +91,9 @@ def study(
     from .report import files, page, plots, table
     from .studies.overload import run_study
 
-    for stale in ("result.json", "result.nc", files.LOAD_CYCLE, page.NAME, *plots.NAMES):
-        if (output / stale).exists() and not (output / stale).is_file():
-            raise InputError(f"{output / stale}: is not a regular file; name another folder")
-        (output / stale).unlink(missing_ok=True)
+    _clear(output, "result.json", "result.nc", files.LOAD_CYCLE, page.NAME, *plots.NAMES)
     console, errors = _console(), _console(stderr=True)
-    bar = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-        console=errors,
-    )
-    with bar:
-        task = bar.add_task("exporting FMUs", total=1.0)
-
-        def report(what: str, done: float, todo: float) -> None:
-            bar.update(task, description=what, completed=done, total=todo)
-
+    with _progress("exporting FMUs", errors) as report:
         result = run_study(loaded, output, report, check=check, backend=backend.value if backend else None)
     written = [*files.write(result, output), *plots.write(result, output), page.write(result, output)]
     table.show(result, console)
@@ -117,6 +104,67 @@ def study(
             soft_wrap=True,
         )
         raise typer.Exit(130 if isinstance(result.failure, InterruptedRunError) else 1)
+
+
+@contextmanager
+def _progress(begin: str, console: Console) -> Iterator[Callable[[str, float, float], None]]:
+    """A bar, and what to tell it: what is done, how much of it, of how much."""
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        console=console,
+    )
+    with bar:
+        task = bar.add_task(begin, total=1.0)
+
+        def report(what: str, done: float, todo: float) -> None:
+            bar.update(task, description=what, completed=done, total=todo)
+
+        yield report
+
+
+def _clear(folder: Path, *names: str) -> None:
+    """Take away what an earlier run left."""
+    for stale in (folder / name for name in names):
+        if stale.exists() and not stale.is_file():
+            raise InputError(f"{stale}: is not a regular file; name another folder")
+        stale.unlink(missing_ok=True)
+
+
+@app.command()
+def driveline(
+    config: Annotated[
+        Path | None, typer.Argument(help="Driveline file (TOML); without one, the packaged example.")
+    ] = None,
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path("driveline"),
+    example: Annotated[
+        bool,
+        typer.Option("--example", help="Print the packaged driveline file, to start one's own, and stop."),
+    ] = False,
+) -> None:
+    """A machine behind a cardan shaft: natural frequency, resonance and stability in rotation.
+
+    Writes driveline.json, driveline.md and plots into the output folder.
+    """
+    from .studies import driveline as lines
+
+    if example:
+        print(lines.example(), end="")
+        return
+    loaded = lines.load(config)
+    folder(output)
+
+    from .report import driveline as page
+
+    _clear(output, *page.NAMES)
+    console, errors = _console(), _console(stderr=True)
+    with _progress("steady motion", errors) as report:
+        result = lines.run_driveline(loaded, report)
+    written = page.write(result, output)
+    page.show(result, console)
+    console.print("Written: " + ", ".join(str(path) for path in written), soft_wrap=True)
 
 
 @app.command()
@@ -144,7 +192,9 @@ def reproduce(
 
 @app.command()
 def export(
-    name: Annotated[str, typer.Argument(help="ChamberForces, ChainUnit, DcMotor or InductionMotor.")],
+    name: Annotated[
+        str, typer.Argument(help="ChamberForces, ChainUnit, DcMotor, InductionMotor or CardanDriveline.")
+    ],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="FMU file; NAME.fmu by default.")
     ] = None,

@@ -103,20 +103,24 @@ def _kind(variable: Variable) -> str:
     return f'a number in {variable.unit}, or a text such as "2 {variable.unit}" ({variable.description})'
 
 
-def schema(declared: type, title: str, prefix: str) -> type[BaseModel]:
-    """The pydantic model of a declaration: the same fields, none required, none unknown."""
+def number(variable: Variable) -> Any:
+    """The pydantic field of one scalar."""
+    check = BeforeValidator(lambda given: to_number(variable, given))
+    return Annotated[float, check], Field(None, description=variable.description)
+
+
+def schema(declared: type, title: str, prefix: str, **more: Any) -> type[BaseModel]:
+    """The pydantic model of a declaration: the same fields and the fields `more`, none required, none unknown."""
     scalars = {v.name: v for v in variables(declared, prefix)}
     fields: dict[str, Any] = {}
     for field in dataclasses.fields(declared):
         name = prefix + field.name
         if name in scalars:
-            variable = scalars[name]
-            check = BeforeValidator(lambda given, variable=variable: to_number(variable, given))
-            fields[field.name] = (Annotated[float, check], Field(None, description=variable.description))
+            fields[field.name] = number(scalars[name])
         else:
             inner = schema(field.metadata["of"], f"{title}_{field.name}", name + ".")
             fields[field.name] = (inner, Field(default_factory=inner))
-    return create_model(title, __config__=ConfigDict(extra="forbid"), **fields)
+    return create_model(title, __config__=ConfigDict(extra="forbid"), **fields, **more)
 
 
 def given_values(section: BaseModel) -> dict[str, float]:

@@ -2,12 +2,35 @@
 
 from __future__ import annotations
 
+import importlib.util
 import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 from ..errors import InputError
+from ..quantities import Value, declaration, quantity
+
+Point = tuple[float, float]
+STEEL = 8.0e10
+"""Shear modulus [N/m2]."""
 
 
-def stiffness(torsion_constant: float, length: float, shear_modulus: float = 8.0e10) -> float:
+@declaration
+class Shaft:
+    """A shaft of one section over its whole length; which dimensions it takes, `SECTIONS` says."""
+
+    outer: Value = quantity("m", "outer diameter", default=0.06, above=0.0, max=10.0)
+    inner: Value = quantity("m", "inner diameter", default=0.0, min=0.0, max=10.0)
+    a: Value = quantity("m", "outer width", default=0.06, above=0.0, max=10.0)
+    b: Value = quantity("m", "outer height", default=0.06, above=0.0, max=10.0)
+    wall: Value = quantity("m", "thickness of the wall", default=0.005, above=0.0, max=1.0)
+    length: Value = quantity("m", "length that is twisted", default=1.0, above=0.0, max=1000.0)
+    shear_modulus: Value = quantity(
+        "N/m2", "shear modulus; that of steel by default", default=STEEL, above=0.0, max=1e13
+    )
+
+
+def stiffness(torsion_constant: float, length: float, shear_modulus: float = STEEL) -> float:
     """Torsional stiffness [N m/rad] of a shaft of the `length` [m]; steel by default."""
     return shear_modulus * torsion_constant / length
 
@@ -53,3 +76,82 @@ def box(a: float, b: float, wall: float) -> float:
         raise InputError(f"wall = {wall:g} m: must be > 0 and < {0.5 * min(a, b):g} m, half the shorter side")
     width, height = a - wall, b - wall
     return 2.0 * wall * (width * height) ** 2 / (width + height)
+
+
+_ELEMENTS = 1000
+"""of the mesh: the torsion constants of rectangles and rings come out within 1e-3"""
+
+
+def polygon(outline: Sequence[Point], holes: Sequence[Sequence[Point]] = ()) -> float:
+    """Torsion constant of any section, by finite elements (sectionproperties, extra ``sections``).
+
+    `outline` and each of `holes` are corners [m] in order, shape (corners, 2).
+
+    Raises
+    ------
+    InputError
+        without the extra, and for lines that bound no one piece.
+    """
+    if importlib.util.find_spec("sectionproperties") is None:
+        raise InputError('section: "polygon" needs the extra sections: pip install "chainunit[sections]"')
+    from sectionproperties.analysis import Section
+    from sectionproperties.pre import Geometry
+    from shapely import Polygon
+
+    for corners in (outline, *holes):
+        if len(corners) < 3:
+            raise InputError(f"outline: {len(corners)} corners; an outline or a hole needs at least 3")
+    shape = Polygon(outline, holes)
+    if not shape.is_valid or not shape.area > 0.0:
+        raise InputError("outline: crosses itself, or a hole is not inside it; give its corners in order")
+    geometry = Geometry(shape)
+    geometry.create_mesh(mesh_sizes=[shape.area / _ELEMENTS])
+    section = Section(geometry)
+    section.calculate_geometric_properties()
+    section.calculate_warping_properties()
+    return float(section.get_j())
+
+
+class Section(NamedTuple):
+    """A kind of section: what it takes, in the order of its formula, and its torsion constant."""
+
+    takes: tuple[str, ...]
+    constant: Callable[..., float]
+    also: tuple[str, ...] = ()
+    """what may be left out"""
+
+
+SECTIONS = {
+    "round": Section(("outer",), hollow),
+    "hollow": Section(("outer", "inner"), hollow),
+    "rectangle": Section(("a", "b"), rectangle),
+    "box": Section(("a", "b", "wall"), box),
+    "polygon": Section(("outline",), polygon, ("holes",)),
+}
+
+
+def stiffness_of(given: Mapping[str, Any]) -> float:
+    """Torsional stiffness [N m/rad] from the keys of a shaft's table: `section`, its dimensions, `length`, and
+    `shear_modulus` if it is not steel.
+
+    Raises
+    ------
+    InputError
+        in one line, for what is missing, of another section, or impossible.
+    """
+    name = given.get("section")
+    if name is None:
+        raise InputError(f"section: missing; one of {', '.join(SECTIONS)}")
+    section = SECTIONS[name]
+    needed = (*section.takes, "length")
+    for key in needed:
+        if key not in given:
+            raise InputError(f'{key}: missing; section "{name}" needs {", ".join(needed)}')
+    for key in given:
+        if key not in (*needed, *section.also, "section", "shear_modulus"):
+            raise InputError(
+                f'{key}: not of section "{name}", which takes {", ".join((*needed, *section.also))}'
+            )
+    constant = section.constant(*(given[key] for key in (*section.takes, *section.also) if key in given))
+    modulus = {"shear_modulus": given["shear_modulus"]} if "shear_modulus" in given else {}
+    return stiffness(constant, given["length"], **modulus)

@@ -1,0 +1,104 @@
+"""The TOML table of a shaft line: bends, and stiffness and damping either as such or from the shafts' geometry.
+
+`form` is its pydantic model, `values` what it comes to. A study file and a driveline file read it alike::
+
+    [driveline]
+    alpha1 = "12 deg"
+    shaft2 = { section = "hollow", outer = "90 mm", inner = "70 mm", length = "1.2 m" }
+    c3 = 8e4
+    damping_ratio = 0.02
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, Field
+
+from ..errors import InputError
+from ..quantities import Quantity, Value, Variable, declaration, quantity, variables
+from ..reading import number, schema, to_number
+from .cardan import Cardan, Line
+from .shafts import SECTIONS, Shaft, stiffness_of
+from .torsion import with_damping_ratio
+
+SHAFTS = {"shaft2": "c2", "shaft3": "c3"}
+
+
+@declaration
+class Damping:
+    """Damping of both shafts by one number."""
+
+    damping_ratio: Value = quantity(
+        "1",
+        "damping ratio of the torsional vibration at i23 = 1; sets d2 and d3, in proportion to c2 and c3",
+        default=0.02,
+        min=0.0,
+        max=0.5,
+    )
+
+
+def form(declared: type[Line], title: str, prefix: str) -> type[BaseModel]:
+    """The pydantic model of the table: the fields of `declared`, tables `shaft2`, `shaft3`, and `damping_ratio`.
+
+    `prefix` is what messages put before a name, such as "driveline.".
+    """
+    more: dict[str, Any] = {v.name.removeprefix(prefix): number(v) for v in variables(Damping, prefix)}
+    for name in SHAFTS:
+        inner = _shaft(name, prefix + name + ".")
+        more[name] = (inner, Field(default_factory=inner))
+    return schema(declared, title, prefix, **more)
+
+
+def _shaft(title: str, prefix: str) -> type[BaseModel]:
+    corner = Variable(prefix + "outline", "coordinate of a corner", Quantity("m", "", None, -10.0, 10.0))
+    coordinate = Annotated[float, BeforeValidator(lambda given: to_number(corner, given))]
+    outline = list[tuple[coordinate, coordinate]]
+    return schema(
+        Shaft,
+        title,
+        prefix,
+        section=(Literal[*SECTIONS], None),
+        outline=(outline, None),
+        holes=(list[outline], None),
+    )
+
+
+def values(
+    table: BaseModel, prefix: str, J1: float | None = None, J4: float | None = None
+) -> dict[str, float]:
+    """Numbers of a `Line` (or of what `form` was asked for) that the table gives, by name.
+
+    `J1`, `J4` [kg.m2] are the inertias at the two ends; needed where the table itself has none, as a damping ratio
+    goes with the natural frequency.
+
+    Raises
+    ------
+    InputError
+        in one line: for a stiffness or a damping that is given twice, and see `shafts.stiffness_of`.
+    """
+    given = {name: getattr(table, name) for name in table.model_fields_set}
+    for shaft, stiffness in SHAFTS.items():
+        described = given.pop(shaft, None)
+        if described is None:
+            continue
+        if stiffness in given:
+            raise InputError(
+                f"{prefix}{stiffness}: given beside {prefix}{shaft}, which sets it; leave out one of the two"
+            )
+        keys = {name: getattr(described, name) for name in described.model_fields_set}
+        try:
+            given[stiffness] = stiffness_of(keys)
+        except InputError as error:
+            raise InputError(f"{prefix}{shaft}.{error}") from error
+    ratio = given.pop("damping_ratio", None)
+    if ratio is None:
+        return given
+    for name in ("d2", "d3"):
+        if name in given:
+            raise InputError(
+                f"{prefix}{name}: given beside {prefix}damping_ratio, which sets it; leave out one of the two"
+            )
+    ends = {name: x for name, x in (("J1", J1), ("J4", J4)) if x is not None}
+    damped = with_damping_ratio(Cardan(**{**given, **ends}), ratio)
+    return {**given, "d2": damped.d2, "d3": damped.d3}

@@ -1,0 +1,424 @@
+"""A driveline with a cardan shaft in rotation: its steady motion, Floquet stability, and time simulation.
+
+Two inertias and the line between them (`cardan.Twist`), a constant torque on either: J1 w1' = M1 - tau1,
+J4 w4' = tau4 - M4, states phi1, w1, phi4, w4. The ratio i23 varies twice a turn. That shakes the line (orders 2, 4,
+... of the speed), and it changes its stiffness in step with the motion: parametric excitation. Both are in the exact
+equations; Hill's equation with the frozen frequency k(t) alone would be wrong, since a disturbance of phi1 also moves
+the kinematic excitation.
+
+A steady motion repeats itself after half a turn. It is found by shooting: Newton's method with the exact variational
+equations (dual numbers), which also give the Floquet multipliers, in two ways. Free, with constant torques: four, of
+which one is 1, the shift along the orbit. Held: the common speed of both inertias, (J1 w1 + J4 w4)/(J1 + J4), follows
+the steady motion, as under a good speed control; two are left, and they are torsional. The difference is the drive's
+matter: above a resonance faster running takes less torque, so that a constant one does not hold the speed
+(Sommerfeld's effect). Everything is vectorised: speeds, bends, dampings
+and loads may be arrays of one shape (n,).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..engines import Dual, dual, numpy_
+from ..integrate import rk4
+from .cardan import Cardan, Twist, frozen_frequency, middle_angle, two_joints
+
+HALF_TURN = np.array([math.pi, 0.0, math.pi, 0.0])
+STEPS_PER_PERIOD = 32
+"""of the natural vibration"""
+STEPS_PER_HARMONIC = 12
+"""of the ratio i23"""
+
+_ITERATIONS = 12
+_CLOSED = 1e-9
+_NOISE = 1e-5  # of a multiplier: that of an undamped line is 1 but for the steps
+_LARGEST_STEP = 0.3  # of the unknowns of shooting, in rad and shares of the speed
+_NEWTON = 2  # from the twist of the stage before, 1e-3 away: to 1e-12
+
+Progress = Callable[[float], None]
+
+
+def _nothing(_: float) -> None:
+    pass
+
+
+def expand(p: Cardan, n: int) -> Cardan:
+    """The same line with every value an array of shape (n,)."""
+    return dataclasses.replace(
+        p, **{f.name: np.broadcast_to(getattr(p, f.name), (n,)) for f in dataclasses.fields(p)}
+    )
+
+
+def _pick(p: Cardan, chosen: Any) -> Cardan:
+    return dataclasses.replace(p, **{f.name: getattr(p, f.name)[chosen] for f in dataclasses.fields(p)})
+
+
+def largest_frequency(p: Cardan) -> Any:
+    """An upper bound of the natural frequency over the turn [rad/s]: the extremes of i23 that the bends allow."""
+    xp = numpy_()
+    least = np.cos(p.alpha1) * np.cos(p.alpha2)
+    return np.maximum(frozen_frequency(xp, p, least), frozen_frequency(xp, p, 1.0 / least))
+
+
+def half_turn_steps(p: Cardan, speed: Any) -> Any:
+    """Steps of a half turn that resolve the vibration and the ratio, shape of `speed`.
+
+    Harmonic n of i23 of a joint goes with tan(bend/2)^(2n); those down to 1e-4 are counted.
+    """
+    steep = np.maximum(np.tan(0.5 * np.maximum(p.alpha1, p.alpha2)), 0.05)
+    harmonics = 1.0 + 0.5 * math.log(1e-4) / np.log(steep)
+    periods = largest_frequency(p) / (2.0 * np.asarray(speed))
+    return np.ceil(np.maximum(STEPS_PER_HARMONIC * harmonics, STEPS_PER_PERIOD * periods)).astype(int)
+
+
+class _Equations:
+    """Right-hand sides over `duration` as the unit of time; keeps the twist of shaft 2, from which the balance of the
+    cardan is sought next, and both torques at the start of each step. `held`: 1 for the slopes of dual numbers that
+    leave the common speed alone, else 0, (slopes, 1)."""
+
+    def __init__(self, p: Cardan, load: Any, duration: Any, drive: Any, held: Any = None) -> None:
+        self.p, self.load, self.duration, self.drive, self.held = p, load, duration, drive, held
+        self.plain = numpy_()
+        self.dual = dual(self.plain)
+        self.twist: Any = 0.0
+        self.torque2: list[Any] = []
+        self.torque3: list[Any] = []
+
+    def __call__(self, time: float, x: Sequence[Any]) -> list[Any]:
+        phi1, w1, phi4, w4 = x
+        lifted = isinstance(phi1, Dual)
+        at1, at4 = (phi1.v, phi4.v) if lifted else (phi1, phi4)
+        near = at1 - self.twist
+        if lifted:
+            # at the root one more step of Newton carries the exact slopes
+            near = middle_angle(self.plain, self.p, at1, at4, near, _NEWTON)
+            line = Twist(self.dual, self.p, phi1, w1, phi4, w4, near, 1)
+            self.twist = line.twist2.v
+        else:
+            line = Twist(self.plain, self.p, phi1, w1, phi4, w4, near, _NEWTON)
+            self.twist = line.twist2
+        if time == 0.0:
+            for kept, torque in (
+                (self.torque2, line.twist2 * self.p.c2),
+                (self.torque3, line.twist3 * self.p.c3),
+            ):
+                kept.append(torque.v if lifted else torque)
+        a1, a4 = (self.drive - line.tau1) / self.p.J1, (line.tau4 - self.load) / self.p.J4
+        if lifted and self.held is not None:
+            # what holds the common speed pulls both inertias in proportion to themselves
+            common = (self.p.J1 * a1.d + self.p.J4 * a4.d) / (self.p.J1 + self.p.J4) * self.held
+            a1, a4 = Dual(a1.v, a1.d - common), Dual(a4.v, a4.d - common)
+        return [rate * self.duration for rate in (w1, a1, w4, a4)]
+
+    def steps(self, x: list[Any], count: int, size: float, done: Progress = _nothing) -> list[Any]:
+        for i in range(count):
+            x = rk4(self, x, size, size)
+            done((i + 1) / count)
+        return x
+
+
+class Steady(NamedTuple):
+    """Steady motions at n points; what was not found is NaN, its `found` False."""
+
+    found: Any
+    """bool, (n,)"""
+    start: Any
+    """phi1, w1, phi4, w4 where phi1 = 0 [rad, rad/s], (4, n)"""
+    drive: Any
+    """torque on J1 that keeps the mean speed [N.m], (n,)"""
+    largest2: Any
+    """of the elastic torque c2 (phi1 - phi2) of shaft 2 over the turn [N.m], (n,)"""
+    least2: Any
+    largest3: Any
+    least3: Any
+    multiplier: Any
+    """larger size of the two torsional Floquet multipliers of half a turn, common speed held [1], (n,)"""
+    growth: Any
+    """rate at which a small torsional disturbance grows [1/s], negative where it dies, (n,)"""
+    frequency: Any
+    """of the damped torsional vibration [rad/s], (n,): the branch next to k at i23 = 1"""
+    free_growth: Any
+    """the same with constant torques, of whatever grows fastest but the shift along the orbit [1/s], (n,)"""
+    monodromy: Any
+    """of phi1, w1, phi4, w4 over half a turn, free, (4, 4, n)"""
+
+    @property
+    def unstable(self) -> Any:
+        """Whether a torsional disturbance grows, bool, (n,); False where nothing was found."""
+        return self.multiplier > 1.0 + _NOISE
+
+    @property
+    def peak2(self) -> Any:
+        """Largest torque of shaft 2, either way [N.m], (n,)."""
+        return np.maximum(np.abs(self.largest2), np.abs(self.least2))
+
+    @property
+    def peak3(self) -> Any:
+        """Largest torque of shaft 3, either way [N.m], (n,)."""
+        return np.maximum(np.abs(self.largest3), np.abs(self.least3))
+
+
+def steady(p: Cardan, speed: Any, load: Any = 0.0, progress: Progress = _nothing, chunk: int = 256) -> Steady:
+    """The motion that repeats itself after half a turn at the mean `speed` [rad/s], with the torque `load` [N.m] on
+    J4, and its stability.
+
+    Values of `p` may be numbers or arrays of the shape (n,) of `speed`. Points that need alike numbers of steps are
+    computed together, at most `chunk` at a time.
+    """
+    speed = np.atleast_1d(np.asarray(speed, dtype=float))
+    n = len(speed)
+    p, load = expand(p, n), np.broadcast_to(np.asarray(load, dtype=float), (n,))
+    phi3, ratio, _ = two_joints(numpy_(), p, np.zeros(n))
+    guess = np.stack([np.zeros(n), speed, phi3 - load / p.c3, speed * np.sqrt(ratio), load])
+    found = _all(p, speed, load, guess, chunk, lambda x: progress(0.8 * x))
+    # near a resonance Newton's method may need a neighbour to start from
+    for step in (-1, 1):
+        missing = np.flatnonzero(~found.found)
+        beside = missing + step
+        usable = (beside >= 0) & (beside < n)
+        missing, beside = missing[usable], beside[usable]
+        usable = found.found[beside]
+        missing, beside = missing[usable], beside[usable]
+        if len(missing):
+            guess = np.concatenate([found.start[:, beside], found.drive[None, beside]])
+            again = _all(_pick(p, missing), speed[missing], load[missing], guess, chunk, _nothing)
+            for name in Steady._fields:
+                whole, part = getattr(found, name), getattr(again, name)
+                whole[..., missing] = part
+    progress(1.0)
+    return found
+
+
+def _all(p: Cardan, speed: Any, load: Any, guess: Any, chunk: int, progress: Progress) -> Steady:
+    counts = half_turn_steps(p, speed)
+    order = np.argsort(counts, kind="stable")
+    parts, done = [], 0.0
+    for first in range(0, len(speed), chunk):
+        chosen = order[first : first + chunk]
+        share = len(chosen) / len(speed)
+
+        def report(x: float, done: float = done, share: float = share) -> None:
+            progress(done + share * x)
+
+        count = int(max(counts[chosen]))
+        parts.append(_shoot(_pick(p, chosen), speed[chosen], load[chosen], guess[:, chosen], count, report))
+        done += share
+    back = np.argsort(order, kind="stable")
+    return Steady(
+        *(np.concatenate([getattr(part, name) for part in parts], -1)[..., back] for name in Steady._fields)
+    )
+
+
+def _shoot(p: Cardan, speed: Any, load: Any, guess: Any, count: int, progress: Progress) -> Steady:
+    n = len(speed)
+    period = math.pi / speed
+    scale = np.stack([np.ones(n), speed, np.ones(n), speed])
+    # phi1 = 0 is the phase; to be found are the rest and the torque on J1
+    x, drive = guess[:4].copy(), guess[4].copy()
+    reference = np.maximum(np.abs(load), p.J1 * speed**2)
+    closed = np.zeros(n, dtype=bool)
+    active = np.arange(n)
+    keep = {name: np.full(n, np.nan) for name in ("largest2", "least2", "largest3", "least3")}
+    monodromy, held = np.full((4, 4, n), np.nan), np.full((2, 2, n), np.nan)
+    with np.errstate(all="ignore"):
+        for iteration in range(_ITERATIONS):
+            q = _pick(p, active)
+            end, by, equations = _half_turn(
+                q, x[:, active], drive[active], load[active], period[active], count
+            )
+            wrong = (end - x[:, active] - HALF_TURN[:, None]) / scale[:, active]
+            good = np.max(np.abs(wrong), axis=0) < _CLOSED
+            done = active[good]
+            closed[done] = True
+            for number in ("2", "3"):
+                torque = np.array(getattr(equations, f"torque{number}"))[:, good]
+                keep[f"largest{number}"][done], keep[f"least{number}"][done] = torque.max(0), torque.min(0)
+            monodromy[:, :, done] = by[:, :4, good]
+            held[:, :, done] = (by[:2, 5:] - by[2:, 5:])[:, :, good]
+            progress((iteration + 1) / _ITERATIONS)
+            # what has run away does not come back
+            left = ~good & np.all(np.isfinite(wrong), axis=0) & np.all(np.isfinite(by), axis=(0, 1))
+            if not np.any(left):
+                break
+            active, wrong, by = active[left], wrong[:, left], by[:, :5, left]
+            weights = np.concatenate([scale[1:, active], reference[None, active]])
+            matrix = by[:, 1:, :] - np.eye(4, 5)[:, 1:, None]
+            matrix = np.moveaxis(matrix * weights[None] / scale[:, None, active], 2, 0)
+            change = -(np.linalg.pinv(matrix) @ wrong.T[:, :, None])[:, :, 0].T
+            change *= np.minimum(1.0, _LARGEST_STEP / np.max(np.abs(change[:3]), axis=0))
+            x[1:, active] += change[:3] * weights[:3]
+            drive[active] += change[3] * weights[3]
+    progress(1.0)
+    x[:, ~closed], drive[~closed] = np.nan, np.nan
+    multiplier, turned, free = np.full(n, np.nan), np.full(n, np.nan), np.full(n, np.nan)
+    if np.any(closed):
+        torsional = np.linalg.eigvals(np.moveaxis(held[:, :, closed], 2, 0))
+        multiplier[closed] = np.max(np.abs(torsional), axis=1)
+        turned[closed] = np.abs(np.angle(torsional[:, 0]))
+        q = _pick(p, closed)
+        free[closed] = _free(q, x[:, closed], drive[closed], load[closed], monodromy[:, :, closed])
+    k = frozen_frequency(numpy_(), p, 1.0)
+    return Steady(
+        found=closed,
+        start=x,
+        drive=drive,
+        **keep,
+        multiplier=multiplier,
+        growth=np.log(multiplier) / period,
+        frequency=_branch(turned, k * period) / period,
+        free_growth=np.log(free) / period,
+        monodromy=monodromy,
+    )
+
+
+def _branch(angle: Any, near: Any) -> Any:
+    """Of all angles with this cosine the one next to `near`."""
+    turn = 2.0 * math.pi
+    first = angle + turn * np.round((near - angle) / turn)
+    second = -angle + turn * np.round((near + angle) / turn)
+    return np.where(np.abs(first - near) < np.abs(second - near), first, second)
+
+
+def _half_turn(
+    p: Cardan, x: Any, drive: Any, load: Any, period: Any, count: int
+) -> tuple[Any, Any, _Equations]:
+    """States (4, n) after half a turn and their slopes (4, 7, n): by the states at its start and the drive, then by
+    the twist phi1 - phi4 and its speed with the common speed held."""
+    seeds = np.zeros((5, 7, x.shape[1]))
+    seeds[range(5), range(5)] = 1.0
+    share = p.J1 / (p.J1 + p.J4)
+    for i in range(2):
+        seeds[i, 5 + i], seeds[2 + i, 5 + i] = 1.0 - share, -share
+    states: list[Any] = [Dual(x[i], seeds[i]) for i in range(4)]
+    held = np.array([[0.0]] * 5 + [[1.0]] * 2)
+    equations = _Equations(p, load, period, Dual(drive, seeds[4]), held)
+    states = equations.steps(states, count, 1.0 / count)
+    return np.stack([s.v for s in states]), np.stack([s.d for s in states]), equations
+
+
+def _free(p: Cardan, x: Any, drive: Any, load: Any, monodromy: Any) -> Any:
+    """Largest size of the multipliers of the line with constant torques, but for the shift along the orbit, (n,).
+
+    That one, x' itself, has the multiplier 1. It is taken out exactly: the mean speed lies so near that roundoff
+    would mix the two.
+    """
+    k = np.sqrt(p.c2 / p.J1)
+    scale = np.stack([np.ones_like(k), k, np.ones_like(k), k])
+    along = np.stack(_Equations(p, load, 1.0, drive)(1.0, list(x))) / scale
+    basis = np.repeat(np.eye(4)[None], len(k), axis=0)
+    basis[:, :, 0] = along.T
+    turned, _ = np.linalg.qr(basis)
+    scaled = np.moveaxis(monodromy * scale[None] / scale[:, None], 2, 0)
+    rest = np.linalg.eigvals((np.swapaxes(turned, 1, 2) @ scaled @ turned)[:, 1:, 1:])
+    return np.max(np.abs(rest), axis=1)
+
+
+def with_damping_ratio(p: Cardan, ratio: float) -> Cardan:
+    """The line with both shafts damped in proportion to their stiffness, so that the torsional vibration at i23 = 1
+    has the damping `ratio`: it keeps its shape, and 2 ratio k = (d/c) k^2."""
+    k = float(frozen_frequency(numpy_(), p, 1.0))
+    return dataclasses.replace(p, d2=2.0 * ratio * p.c2 / k, d3=2.0 * ratio * p.c3 / k)
+
+
+class Simulated(NamedTuple):
+    """Peaks of the last half turns of a time simulation at n speeds."""
+
+    speed: Any
+    """the mean speed that was reached [rad/s], (n,)"""
+    peak2: Any
+    """largest elastic torque of shaft 2, either way [N.m], (n,)"""
+    peak3: Any
+
+
+def settling_time(p: Cardan, share: float = 1e-3) -> float:
+    """Time [s] in which a torsional disturbance falls to `share` by the shafts' own damping; inf without any."""
+    rate = damping_ratio(p) * float(frozen_frequency(numpy_(), p, 1.0))
+    return -math.log(share) / rate if rate > 0.0 else math.inf
+
+
+def damping_ratio(p: Cardan) -> float:
+    """Of the torsional vibration at i23 = 1, to first order in the damping: twist shares of both shafts, weighted."""
+    k = float(frozen_frequency(numpy_(), p, 1.0))
+    soft2, soft3 = 1.0 / p.c2, 1.0 / p.c3
+    return 0.5 * k * (p.d2 * soft2**2 + p.d3 * soft3**2) / (soft2 + soft3)
+
+
+def simulate(
+    p: Cardan, speed: Any, load: float, settle: float, half_turns: int = 2, progress: Progress = _nothing
+) -> Simulated:
+    """Time simulation at each mean `speed` [rad/s] from an untwisted start; peaks of the last `half_turns`, after
+    the time `settle` [s], or 80 half turns where that is longer.
+
+    A soft PI control of the torque on J1 holds the mean speed. It sees the common speed of both inertias through a
+    low pass of three half turns, so that neither vibration nor ripple passes it.
+    """
+    speed = np.atleast_1d(np.asarray(speed, dtype=float))
+    n = len(speed)
+    q = expand(p, n)
+    period = math.pi / speed
+    counts = half_turn_steps(q, speed)
+    settled = np.maximum(settle, 80.0 * period)
+    steps = int(np.max(np.ceil(settled / period) * counts))
+    window = half_turns * counts
+    gain, slow = 5.0 / settled, 3.0 * period
+    h = period / counts
+    inertia = p.J1 + p.J4
+    equations = _Equations(q, load, h, load)
+
+    def rates(time: float, x: Sequence[Any]) -> list[Any]:
+        common, bias = x[4], x[5]
+        wrong = common - speed
+        equations.drive = load - inertia * (gain * wrong + bias)
+        now = (p.J1 * x[1] + p.J4 * x[3]) / inertia
+        return [*equations(time, x[:4]), (now - common) / slow * h, 0.25 * gain * gain * wrong * h]
+
+    phi3, i, _ = two_joints(numpy_(), q, np.zeros(n))
+    w1 = speed * np.sqrt(inertia / (p.J1 + i * i * p.J4))
+    x: list[Any] = [np.zeros(n), w1, phi3, i * w1, speed.copy(), np.zeros(n)]
+    peak2, peak3, begin, end = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
+    whole = steps + int(np.max(window)) + 1
+    for step in range(whole):
+        now, angle = step - steps, x[0]
+        x = rk4(rates, x, 1.0, 1.0)
+        torque2, torque3 = np.abs(equations.torque2.pop()), np.abs(equations.torque3.pop())
+        if now >= 0:
+            peak2 = np.where(now < window, np.maximum(peak2, torque2), peak2)
+            peak3 = np.where(now < window, np.maximum(peak3, torque3), peak3)
+            begin = np.where(now == 0, angle, begin)
+            end = np.where(now == window, angle, end)
+        if step % 50 == 0:
+            progress(step / whole)
+    progress(1.0)
+    return Simulated((end - begin) / (half_turns * period), peak2, peak3)
+
+
+class Rigid(NamedTuple):
+    """Largest torques of shafts 2 and 3 of the line without its elasticity [N.m], each (n,)."""
+
+    peak2: Any
+    peak3: Any
+
+
+def rigid(p: Cardan, speed: Any, load: float, points: int = 720) -> Rigid:
+    """The same line with rigid shafts, by its energy: (J1 + i23^2 J4) w1^2/2 = E + M4 (phi1 - phi3)."""
+    speed = np.atleast_1d(np.asarray(speed, dtype=float))[:, None]
+    phi = np.linspace(0.0, math.pi, points, endpoint=False)
+    phi3, i, slope = two_joints(numpy_(), p, phi)
+    inertia = p.J1 + i * i * p.J4
+    work = load * (phi - phi3)
+    # Newton for the time of half a turn, which falls with E and is convex: from below it never oversteps
+    excess = np.full_like(speed, 0.5 * np.min(inertia)) * speed**2
+    work = work - np.min(work)
+    for _ in range(60):
+        time = np.mean(np.sqrt(0.5 * inertia / (excess + work)), axis=1, keepdims=True)
+        by = -0.5 * np.mean(np.sqrt(0.5 * inertia) * (excess + work) ** -1.5, axis=1, keepdims=True)
+        excess = np.maximum(excess - (time - 1.0 / speed) / by, 0.2 * excess)
+    square = 2.0 * (excess + work) / inertia
+    acceleration = (load * (1.0 - i) - i * slope * p.J4 * square) / inertia
+    torque3 = load + p.J4 * (i * acceleration + slope * square)
+    return Rigid(np.max(np.abs(i * torque3), axis=1), np.max(np.abs(torque3), axis=1))
