@@ -76,3 +76,10 @@ def test_the_jam_trips_the_coupling(result):
     assert random["runs"]["value"] == 50 and 0.0 < random["quantiles"]["trips"]["share"]["value"] < 1.0
     assert (folder / random["file"]).exists()
     assert len((folder / "load_cycle.csv").read_text().splitlines()) > 1000
+
+
+def test_a_lump_swings_the_cardan_shaft(result):
+    numbers, said, folder = result("jam_with_driveline")
+    jam = numbers["shaft"]["jam_left"]
+    assert jam["amplification"]["value"] == pytest.approx(1.5, abs=0.1)
+    assert "the line's torque peaks at" in said and (folder / "driveline.png").exists()

@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 from pydantic import ConfigDict, Field, ValidationError, create_model
 
+from .drives.cardan import Line, check
 from .drives.dc_motor import DcMotor
 from .drives.gearing import KINDS, Transmission
 from .drives.induction_motor import Inverter, SoftStart
@@ -181,6 +182,26 @@ class Starter:
     inverter: Inverter = group(Inverter, "inverter", default=Inverter())
 
 
+@declaration
+class Driveline(Line):
+    """A cardan driveline between motor and machine. The start values are ours: the paper prints no dimensions."""
+
+    J4: Value = quantity("kg.m2", "inertia on shaft 3, beside the machine's", default=0.5, above=0.0)
+    gamma1: Value = quantity(
+        "rad", "angle of the yoke of shaft 2 from the plane of its joint at crank angle 0", default=0.0
+    )
+    exponent: Value = quantity(
+        "1",
+        "exponent of Woehler's line for the damage of torque cycles; assumed",
+        default=5.0,
+        min=1.0,
+        max=20.0,
+    )
+
+
+PLACES = ("crank", "motor")
+"""Where a driveline is: on the crank's shaft, behind the gear, or on the motor's, before it."""
+
 STARTS = ("direct", "soft", "inverter")
 
 _SECTIONS = {
@@ -196,6 +217,7 @@ _SECTIONS = {
     "gear": Transmission,
     "starter": Starter,
 }
+_Driveline = schema(Driveline, "driveline", "driveline.", place=(Literal[PLACES], "crank"))
 _File = create_model(
     "Config",
     __config__=ConfigDict(extra="forbid"),
@@ -204,6 +226,7 @@ _File = create_model(
         name: (section, Field(default_factory=section))
         for name, section in ((n, schema(d, n, n + ".")) for n, d in _SECTIONS.items())
     },
+    driveline=(_Driveline, Field(default_factory=_Driveline)),
     feed_forward=(bool, False),
     start=(Literal[STARTS], "direct"),
     catalogue=(str, ""),
@@ -232,6 +255,9 @@ class Config:
     start: str
     starter: Starter
     catalogue: Path | None
+    driveline: Driveline | None
+    place: str
+    """of the driveline, one of `PLACES`"""
     source: str
 
 
@@ -308,6 +334,8 @@ def parse(text: str, source: str = "config") -> Config:
         start=checked.start,
         starter=instance(Starter, given_values(checked.starter)),
         catalogue=_beside(checked.catalogue, source),
+        driveline=_driveline(checked.driveline) if "driveline" in data else None,
+        place=checked.driveline.place,
         source=source,
     )
     run, turn, o = config.run, 2.0 * math.pi / config.run.crank_speed, config.overload
@@ -320,6 +348,17 @@ def parse(text: str, source: str = "config") -> Config:
             "lengthen the step, raise the speed, or lessen the turns"
         )
     return config
+
+
+def _driveline(section: Any) -> Driveline:
+    given = given_values(section)
+    given.pop("place", None)
+    line: Driveline = instance(Driveline, given)
+    try:
+        check(line)
+    except InputError as error:
+        raise InputError(f"driveline.{error}") from error
+    return line
 
 
 def _consistent(data: Mapping[str, Any], checked: Any) -> None:

@@ -48,15 +48,15 @@ LAYOUT = Layout(Cardan)
 BENDS = ("alpha1", "alpha2")
 
 
-def check(p: Cardan) -> None:
-    """Refuse what cannot turn.
+def check(p: Line) -> None:
+    """Refuse what cannot turn; `p` may declare more than a `Line`.
 
     Raises
     ------
     InputError
         in one line, for a bend of 90 degrees or more, an inertia or a stiffness that is not above zero.
     """
-    for line in violations(LAYOUT, p):
+    for line in violations(Layout(type(p)), p):
         raise InputError(line)
     for name in BENDS:
         bend = getattr(p, name)

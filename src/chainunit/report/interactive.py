@@ -15,6 +15,7 @@ from ..drives.dc_motor import DcMotor
 from ..engines import numpy_
 from ..machines.chain_unit import ChamberForces
 from ..studies.overload import PINS, SCENARIOS, Study
+from ..studies.shaft import RIGID
 from .style import LINES
 
 COASTING = "_coasting"
@@ -287,7 +288,11 @@ def _transient(study: Study, name: str) -> Plot:
         ("crank speed [rad/s]", "%{y:.4g} rad/s", drive.crank_motion(run)[1]),
         ("motor current [A]", "%{y:.3g} A", current),
     ]
-    kept = _thin(*(y for _, _, y in series))
+    rigid = None
+    if drive.line is not None:
+        series.append(("torque in shaft 2 [N m]", "%{y:.3g} N m", run["driveline.tau2"].values))
+        rigid = run[RIGID].values if RIGID in run else None
+    kept = _thin(*(y for _, _, y in series), *([] if rigid is None else [rigid]))
     figure = make_subplots(rows=len(series), cols=1, shared_xaxes=True, vertical_spacing=0.05)
     x = _small(time[kept])
     for row, (label, hover, y) in enumerate(series, 1):
@@ -303,6 +308,17 @@ def _transient(study: Study, name: str) -> Plot:
             col=1,
         )
         figure.update_yaxes(title_text=label, row=row)
+    if rigid is not None:
+        figure.add_scatter(
+            x=x,
+            y=_small(rigid[kept]),
+            name="with a rigid shaft",
+            mode="lines",
+            line=_style(1),
+            hovertemplate="%{y:.3g} N m",
+            row=len(series),
+            col=1,
+        )
     if event is None and study.drive.follows:
         figure.add_scatter(
             x=x,

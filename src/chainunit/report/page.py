@@ -25,6 +25,7 @@ from ..files import whole
 from ..quantities import Layout, Variable
 from ..studies.monte_carlo import Sample
 from ..studies.overload import SCENARIOS, Answers, Limits, Study, as_dict
+from ..studies.shaft import ShaftAnswers, Torsion
 from .interactive import Plot, called, plots
 from .motion import motion
 from .trace import Traced, at
@@ -216,6 +217,7 @@ def _all_given(t: Traced, study: Study) -> str:
             ("overload", config.overload, "Overloads"),
             ("coupling", config.coupling, "Safety coupling"),
             ("machine", study.drive.machine.p, "Machine"),
+            ("driveline", config.driveline, "Driveline"),
             ("motor", study.drive.parameters, "Motor"),
         )
         if t.result.get(section)
@@ -301,6 +303,8 @@ def _runs(t: Traced) -> str:
         parts.append(_table(("", *heads), rows, caption="What each run asks of the drive"))
     if t.result["pins"]:
         parts.append(_pins(t))
+    if t.result.get("shaft"):
+        parts.append(_shaft(t))
     if t.result.get("speed_loop"):
         loops = t.result["speed_loop"]
         names = list(dict.fromkeys(name for loop in loops.values() for name in loop))
@@ -366,6 +370,25 @@ def _pins(t: Traced) -> str:
     named = (f"{_capital(called(reference))}, {'RMS' if size == 'rms' else _words(size)}" for size in sizes)
     heads = ("", *map(escape, named), "Largest peak", "In")
     return _table(heads, rows, caption="What the pins carry")
+
+
+def _shaft(t: Traced) -> str:
+    """What each run asks of the driveline, and its natural frequencies."""
+    runs = t.result["shaft"]
+    rows = [
+        (
+            escape(_capital(v.description)),
+            *(t.number(f"shaft.{run}.{v.name}", form=_angle(v.unit)) for run in runs),
+        )
+        for v in Layout(ShaftAnswers).variables
+    ]
+    heads = ("", *(escape(_capital(called(run))) for run in runs))
+    frequencies = [
+        (escape(_capital(v.description)), t.number(f"driveline.{v.name}")) for v in Layout(Torsion).variables
+    ]
+    return _table(heads, rows, caption="What the driveline carries") + _table(
+        (), frequencies, caption="The driveline's torsion"
+    )
 
 
 def _card(t: Traced, family: str, members: list[tuple[str, Variable]], run: str) -> str:

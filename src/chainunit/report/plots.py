@@ -12,6 +12,7 @@ import numpy as np
 from ..drives.dc_motor import DcMotor
 from ..engines import numpy_
 from ..studies.overload import PINS, SCENARIOS, Study
+from ..studies.shaft import RIGID
 from .style import LINES, draw
 
 NAMES = (
@@ -22,6 +23,7 @@ NAMES = (
     "torque_speed.png",
     "reactions.png",
     "start_up.png",
+    "driveline.png",
 )
 
 
@@ -38,6 +40,8 @@ def write(study: Study, folder: Path) -> list[Path]:
         }
     if "start_up" in study.runs:
         plots["start_up.png"] = _start_up
+    if study.shaft:
+        plots["driveline.png"] = _driveline
     return draw({name: partial(make, study) for name, make in plots.items()}, folder)
 
 
@@ -153,6 +157,45 @@ def _overload_time(study: Study) -> Any:
         axes[2, 0].legend(loc="center right", fontsize=9)
     for axis, label in zip(axes[:, 0], labels, strict=True):
         axis.set_ylabel(label)
+    return figure
+
+
+def _driveline(study: Study) -> Any:
+    names = list(study.shaft)
+    largest = max(answers.range_largest for answers in study.shaft.values())
+    figure, axes = plt.subplots(
+        2,
+        len(names),
+        figsize=(3.6 * len(names) + 1.0, 6.5),
+        squeeze=False,
+        sharey="row",
+        height_ratios=(1.6, 1.0),
+        layout="constrained",
+    )
+    for (top, bottom), name in zip(axes.T, names, strict=True):
+        run = study.runs["start_up" if name == "steady" else name]
+        since = study.settled if name == "steady" else study.event[name]
+        run = run.sel(time=slice(since, None))
+        time = run["time"].values - since
+        top.plot(time, run["driveline.tau2"], label="with this driveline", **LINES[0])
+        top.plot(time, run[RIGID], label="with a rigid shaft", **LINES[1])
+        top.set_title(SCENARIOS.get(name, "steady running"), fontsize=10)
+        top.set_xlabel("time [s]")
+        top.set_xlim(time[0], time[-1])
+        rows = study.cycles_of[name].classes(largest)
+        bottom.barh(
+            [0.5 * (row["from"] + row["to"]) for row in rows],
+            [row["count"] for row in rows],
+            [0.9 * (row["to"] - row["from"]) for row in rows],
+            color="#8a8a8a",
+            edgecolor="#1b1b1b",
+            linewidth=0.6,
+        )
+        bottom.set_xlabel("cycles counted (rainflow)")
+        bottom.set_xlim(left=0.0)
+    axes[0, 0].set_ylabel("torque in shaft 2 [N m]")
+    axes[1, 0].set_ylabel("range of torque [N m]")
+    axes[0, 0].legend(loc="best", fontsize=9)
     return figure
 
 

@@ -11,6 +11,7 @@ from rich.text import Text
 from ..quantities import Layout, Variable
 from ..studies.monte_carlo import QUANTILES, MonteCarloResult, Sample
 from ..studies.overload import SCENARIOS, Answers, Study
+from ..studies.shaft import ShaftAnswers
 from ..studies.sizing import recommended
 
 _SHORT = {
@@ -102,6 +103,8 @@ def show(study: Study, console: Console) -> None:
                 _SHORT[worst],
             )
         console.print(table)
+    if study.shaft:
+        _show_shaft(study, console)
     limits = study.limits
     if limits is not None:
         swing = (math.degrees(limits.rocker_extreme_left), math.degrees(limits.rocker_extreme_right))
@@ -119,7 +122,12 @@ def show(study: Study, console: Console) -> None:
             soft_wrap=True,
         )
     if study.certificate:
-        worst_share = max(c["energy_residual_share"] for c in study.certificate.values())
+        worst_share = max(
+            share
+            for certificate in study.certificate.values()
+            for kind, share in certificate.items()
+            if kind.endswith("energy_residual_share")
+        )
         console.print(f"Energy residual of the shaft: at most {worst_share:.1e} of the energy moved.")
     for name, value in study.certificate.get("start_up", {}).items():
         if name.endswith("_difference_to_monolithic"):
@@ -127,6 +135,28 @@ def show(study: Study, console: Console) -> None:
             console.print(f"Difference of {quantity} to the monolithic solution: {value:.1e} of its peak.")
     for note in study.notes:
         console.print(f"Note: {note}")
+
+
+def _show_shaft(study: Study, console: Console) -> None:
+    """What the runs ask of the driveline."""
+    table = Table(title="What the driveline carries", title_justify="left")
+    table.add_column("")
+    for name in study.shaft:
+        table.add_column(_SHORT[name], justify="right")
+    for v in Layout(ShaftAnswers).variables:
+        values = [getattr(answers, v.name) for answers in study.shaft.values()]
+        table.add_row(v.description, *("-" if x is None else _plain(x, v.unit) for x in values))
+    console.print(table)
+    found = study.torsion
+    assert found is not None
+    console.print(
+        f"Natural frequency of torsion: {found.k_least:.4g} to {found.k_largest:.4g} rad/s; communication step at "
+        f"most {found.step_longest:.2g} s."
+    )
+
+
+def _plain(value: float, unit: str) -> str:
+    return f"{value:.3g}" if unit == "1" else _number(value, unit)
 
 
 def _show_sizing(study: Study, console: Console) -> None:

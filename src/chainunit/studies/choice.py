@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +11,10 @@ import numpy as np
 
 from ..config import Config
 from ..drives.dc_motor import DcMotor
+from ..drives.driveline import CardanDriveline
 from ..drives.speed_control import Tuning, tune
 from ..fmu.backends import Backend
+from ..quantities import Layout
 from .cycle import cycle
 from .drive import Drive
 from .sizing import SizingResult, size
@@ -37,16 +39,30 @@ def choose(
     list stands for the machine's own numbers."""
     if config.sizing is None:
         motor, tuning = tuned(config)
-        return Choice(Drive(DcMotor, motor, config.machine, feed_forward=config.feed_forward), tuning)
+        drive = Drive(DcMotor, motor, config.machine, feed_forward=config.feed_forward)
+        return Choice(with_line(config, drive), tuning)
     sized = size(config, folder, report, backend)
     best = sized.chosen or (sized.candidates[0] if sized.candidates else None)
-    return Choice(best.drive if best else Drive(DcMotor, config.motor, config.machine), sizing=sized)
+    drive = best.drive if best else Drive(DcMotor, config.motor, config.machine)
+    return Choice(with_line(config, drive), sizing=sized)
+
+
+def with_line(config: Config, drive: Drive) -> Drive:
+    """The drive with the driveline of the study, if it has one: on the crank's shaft behind the gear, or before."""
+    if config.driveline is None:
+        return drive
+    given = Layout(type(config.driveline)).named(config.driveline)
+    values = {name: x for name, x in given.items() if name in CardanDriveline.parameter_layout.names}
+    gear = {"ratio": drive.ratio if config.place == "crank" else 1.0}
+    return replace(drive, line=CardanDriveline.parameter_layout.from_names(values | gear))
 
 
 def tuned(config: Config) -> tuple[Any, Tuning | None]:
     """The motor with controller gains tuned to this machine, where the config does not give them."""
     both = cycle(config.machine, config.run.crank_speed, config.feed.left, config.feed.right)
     inertia = config.motor.rotor.J + float(np.mean(both.outputs.J))
+    if config.driveline is not None:
+        inertia += config.driveline.J4 / (config.machine.p.ratio**2 if config.place == "crank" else 1.0)
     tuning = tune(config.motor.armature, inertia)
     own = {name: gain for name, gain in tuning.parameters.items() if name not in config.motor_given}
     return DcMotor.parameter_layout.from_names(own, config.motor), tuning if own else None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -46,6 +46,12 @@ class Drive:
     def driven(self) -> ChainUnit:
         """The machine as its FMU is: with the gear that is left behind the driveline."""
         return self.machine if self.line is None else self.machine.replace(ratio=self.ratio / self.line.ratio)
+
+    def rigid(self) -> Drive:
+        """The same without the elastic line, its inertia on the rotor."""
+        rotor = self.parameters.rotor
+        heavier = replace(rotor, J=rotor.J + self.line.J4 / self.line.ratio**2)
+        return replace(self, line=None, parameters=replace(self.parameters, rotor=heavier))
 
     @property
     def loading(self) -> str:

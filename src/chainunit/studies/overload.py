@@ -20,9 +20,11 @@ from .. import __version__
 from ..config import SCENARIOS as SCENARIOS
 from ..config import Config
 from ..cosim import Bond, CoSimulation, Profile, System, energy_residual, monolithic
+from ..drives.cardan import two_joints
 from ..drives.dc_motor import DcMotor
 from ..drives.speed_control import Loop, Tuning, loop
-from ..errors import RunError
+from ..engines import numpy_
+from ..errors import InputError, RunError
 from ..fmu.backends import Backend
 from ..machines.api import EMPTY, ChainUnit
 from ..quantities import Layout, Value, declaration, quantity
@@ -32,6 +34,7 @@ from .cycle import OverloadFactors, Sides, all_on_one, cycle, overload_factors, 
 from .drive import Drive
 from .monte_carlo import MonteCarloResult, Task
 from .monte_carlo import run as run_monte_carlo
+from .shaft import Cycles, ShaftAnswers, Torsion, shaft_answers, torsion, with_rigid
 from .sizing import SizingResult
 
 PINS = {
@@ -144,6 +147,11 @@ class Study:
     certificate: dict[str, dict[str, float]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     made: dict[str, str] = field(default_factory=dict)
+    torsion: Torsion | None = None
+    shaft: dict[str, ShaftAnswers] = field(default_factory=dict)
+    """what each run asks of the driveline, where there is one"""
+    cycles_of: dict[str, Cycles] = field(default_factory=dict)
+    """rainflow cycles of the torque in shaft 2 by run"""
     coasting: Path | None = None
     """the FMU of the machine behind an open coupling, where one tripped"""
     failure: RunError | None = None
@@ -183,6 +191,8 @@ def run_study(
     if study.sizing is not None and study.sizing.chosen is None:
         _note(study)
         return study
+    if study.drive.line is not None:
+        study.torsion = _torsion(study)
     files, study.made = study.drive.export(folder / "fmu", backend)
     try:
         _simulate(study, files, folder, report, check, backend)
@@ -200,6 +210,25 @@ def _loops(study: Study) -> dict[str, Loop]:
     J = cycle(study.drive.machine, config.run.crank_speed, config.feed.left, config.feed.right).outputs.J
     sizes = {"mean inertia": np.mean(J), "least inertia": np.min(J), "largest inertia": np.max(J)}
     return {name: loop(motor, motor.rotor.J + float(size)) for name, size in sizes.items()}
+
+
+def _torsion(study: Study) -> Torsion:
+    """The line's natural frequencies.
+
+    Raises
+    ------
+    InputError
+        where the communication step is too long for them.
+    """
+    config, run = study.config, study.config.run
+    J = cycle(study.drive.machine, run.crank_speed, config.feed.left, config.feed.right).outputs.J
+    found = torsion(study.drive, J)
+    if run.step > found.step_longest:
+        raise InputError(
+            f"run.step = {run.step:g} s: the driveline swings at {found.k_largest:.4g} rad/s; must be <= "
+            f"{found.step_longest:.3g} s"
+        )
+    return found
 
 
 def _statics(study: Study) -> None:
@@ -298,7 +327,7 @@ def _simulate(
 
     signals = {**drive.loads(config.feed), **drive.reference(run.crank_speed, run.ramp)}
     bond = Bond(
-        "motor",
+        "motor" if drive.line is None else "driveline",
         "machine",
         {f"{s}.material_mass": partial(_energy_per_kg, drive.driven, s) for s in ("left", "right")},
     )
@@ -332,7 +361,7 @@ def _simulate(
             }
             follow = follow_time(config, name)
             progress = partial(_progress, report, SCENARIOS[name], done - start, total)
-            transient = _event(study, simulation, name, event, follow, progress)
+            transient = _event(config, simulation, name, event, event + follow, progress, guards)
             done += lead + follow
             _close(study, name, transient, event, event + follow, bond, simulation, folder, backend)
         if check:
@@ -353,8 +382,52 @@ def _simulate(
             progress = partial(_progress, report, SCENARIOS["start_loaded"], total - stop, total)
             transient = simulation.run(stop, run.step, progress, guards=guards)
             _close(study, "start_loaded", transient, 0.0, stop, bond, simulation, folder, backend)
+    if drive.line is not None:
+        report("the same with a rigid shaft", total, total)
+        _shaft(study, _rigid(study, files, stop))
     if config.monte_carlo.runs:
         study.monte_carlo = run_monte_carlo(Task(config, drive, files, stop), folder, report)
+
+
+def _rigid(study: Study, files: Mapping[str, Path], stop: float) -> dict[str, xr.Dataset]:
+    """Every run again without the line's elasticity and unevenness, at the same times; no coupling opens."""
+    config, drive = study.config, study.drive.rigid()
+    step, reference = config.run.step, drive.reference(config.run.crank_speed, config.run.ramp)
+    system = drive.system({name: files[name] for name in drive.models()})
+    runs = {}
+    with CoSimulation(system, {**drive.loads(config.feed), **reference}) as simulation:
+        runs["start_up"] = simulation.run(stop, step)
+        simulation.save()
+        for name, event in study.event.items():
+            if name != "start_loaded":
+                simulation.restore()
+                simulation.signals = {
+                    **scenario_signals(config, drive, name, event),
+                    **drive.reference(config.run.crank_speed),
+                }
+                end = float(study.runs[name]["time"][-1])
+                runs[name] = _event(config, simulation, name, event, end)
+    if "start_loaded" in study.event:
+        loaded = scenario_signals(config, drive, "start_loaded", 0.0)
+        with CoSimulation(system, {**loaded, **reference}) as simulation:
+            runs["start_loaded"] = simulation.run(float(study.runs["start_loaded"]["time"][-1]), step)
+    return runs
+
+
+def _shaft(study: Study, rigid: Mapping[str, xr.Dataset]) -> None:
+    """What each run asks of the line."""
+    assert study.config.driveline is not None
+    per_turn = None
+    for name, run in [("steady", "start_up"), *((name, name) for name in study.event)]:
+        study.runs[run] = with_rigid(study.drive, study.runs[run], rigid[run])
+        since = slice(study.settled if name == "steady" else study.event[name], None)
+        elastic = study.runs[run].sel(time=since)
+        if name == "steady":
+            elastic = elastic.isel(time=_whole_turns(study, elastic))
+        study.shaft[name], study.cycles_of[name], damage = shaft_answers(
+            study.drive, elastic, study.config.driveline.exponent, per_turn
+        )
+        per_turn = per_turn or damage
 
 
 def _guards(study: Study) -> dict[str, float]:
@@ -363,16 +436,22 @@ def _guards(study: Study) -> dict[str, float]:
 
 
 def _event(
-    study: Study, simulation: CoSimulation, name: str, event: float, follow: float, progress: Any
+    config: Config,
+    simulation: CoSimulation,
+    name: str,
+    event: float,
+    stop: float,
+    progress: Any = None,
+    guards: Mapping[str, float] | None = None,
 ) -> xr.Dataset:
-    """Run a transient to its end, or until the safety coupling trips."""
-    step = study.config.run.step
+    """Run a transient to the time `stop`, or until a guard ends it."""
+    step = config.run.step
     pieces = []
     if name == "blocked":
-        simulation.signals |= dict.fromkeys(_block(study.config, 0.0), 0.0)
+        simulation.signals |= dict.fromkeys(_block(config, 0.0), 0.0)
         pieces.append(simulation.run(event, step, progress))
-        simulation.signals |= _block(study.config, float(pieces[0]["machine.rocker.psi"][-1]))
-    pieces.append(simulation.run(event + follow, step, progress, guards=_guards(study)))
+        simulation.signals |= _block(config, float(pieces[0]["machine.rocker.psi"][-1]))
+    pieces.append(simulation.run(stop, step, progress, guards=guards))
     return _joined(pieces)
 
 
@@ -468,8 +547,12 @@ def _progress(report: Report, what: str, before: float, todo: float, time: float
 
 def _certify(study: Study, name: str, run: xr.Dataset, bond: Bond) -> None:
     run["residual"], share = energy_residual(run, bond)
-    study.runs[name] = run
     study.certificate[name] = {"energy_residual_share": share}
+    if bond.driver != "motor":
+        before = Bond("motor", bond.driver)
+        run["driveline_residual"], share = energy_residual(run, before)
+        study.certificate[name]["driveline_energy_residual_share"] = share
+    study.runs[name] = run
 
 
 def _compare(study: Study, run: xr.Dataset, signals: Mapping[str, Any]) -> None:
@@ -678,12 +761,47 @@ def _note(study: Study) -> None:
             "Feed-forward of the machine's torque brings the ripple of the speed from "
             f"{100 * study.ripple_without:.2g} % to {100 * steady.speed_ripple:.2g} %."
         )
+    if study.torsion is not None:
+        _note_shaft(study)
     for name, certificate in study.certificate.items():
-        share = certificate["energy_residual_share"]
+        share = max(x for kind, x in certificate.items() if kind.endswith("energy_residual_share"))
         if not share < 1e-3:
             note(
                 f"{SCENARIOS.get(name, 'start-up and steady running')}: the energy residual is {share:.1e} of "
                 "the energy moved; the step is too long for this run, lessen run.step."
+            )
+
+
+def _note_shaft(study: Study) -> None:
+    """What the reader has to know of the driveline."""
+    note, line, found = study.notes.append, study.drive.line, study.torsion
+    assert found is not None
+    if study.sizing is not None:
+        note("Sizing took the shafts for rigid and the driveline for massless; the runs have it.")
+    if line.d2 == 0.0 and line.d3 == 0.0:
+        note("The driveline has no damping: a vibration that was set off goes on; give d2 and d3.")
+    fastest = max((found_loop.crossover for found_loop in study.loops.values()), default=0.0)
+    if fastest > found.k_least / 3.0:
+        note(
+            f"The speed loop crosses over at {fastest:.3g} rad/s, near the line's natural frequency of "
+            f"{found.k_least:.3g} rad/s: control and shaft disturb each other; lower the gains or stiffen the line."
+        )
+    speed = study.config.run.crank_speed * study.drive.driven.p.ratio
+    _, i, _ = two_joints(numpy_(), line, np.linspace(0.0, np.pi, 361))
+    unevenness = float(np.ptp(i))
+    if unevenness > 1e-6:
+        note(f"The joints turn unevenly: i23 varies by {100 * unevenness:.2g} % twice a turn of the shaft.")
+        for order in (2, 4):
+            if 0.8 * found.k_least < order * speed < 1.2 * found.k_largest:
+                note(
+                    f"The shaft turns at {speed:.3g} rad/s: order {order} of the joints, {order * speed:.3g} rad/s, "
+                    f"lies near the line's natural frequency, {found.k_least:.3g} to {found.k_largest:.3g} rad/s."
+                )
+    for name, shaft in study.shaft.items():
+        if shaft.amplification is not None and shaft.amplification > 1.2:
+            note(
+                f"{SCENARIOS.get(name, 'steady running')}: the line's torque peaks at {shaft.amplification:.2f} "
+                "times that of a rigid drive."
             )
 
 
@@ -735,7 +853,23 @@ def as_dict(study: Study) -> dict[str, Any]:
         **({"sizing": study.sizing.as_dict()} if study.sizing else {}),
         **({"monte_carlo": study.monte_carlo.as_dict()} if study.monte_carlo else {}),
         "coupling": entries(config.coupling) if config.coupling else None,
+        **(_driveline(study) if study.drive.line is not None else {}),
         "sides_over_speed": study.sides.as_dict() if study.sides else None,
+    }
+
+
+def _driveline(study: Study) -> dict[str, Any]:
+    units = {"from": "N.m", "to": "N.m", "count": "1"}
+    largest = max(answers.range_largest for answers in study.shaft.values()) if study.shaft else 0.0
+    return {
+        "driveline": entries(study.config.driveline) | entries(study.drive.line) | entries(study.torsion),
+        "shaft": {name: entries(answers) for name, answers in study.shaft.items()},
+        "torque_cycles": {
+            name: [
+                {k: {"value": x, "unit": units[k]} for k, x in row.items()} for row in cycles.classes(largest)
+            ]
+            for name, cycles in study.cycles_of.items()
+        },
     }
 
 

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..config import Config
+from ..drives.driveline import CardanDriveline
 from ..drives.motor import Motor
 from ..errors import InputError
 from ..fmu.backends import Backend
@@ -20,13 +21,14 @@ from .drive import Drive
 
 
 def study_system(config: Config, drive: Drive) -> ModelSystem:
-    """Machine and motor of a study, from rest: the speed reference is the crank speed at the motor from the start on,
-    feed and processing forces are those of normal running; with feed-forward, the machine that the control asks is in
-    the system, too."""
+    """Machine, driveline and motor of a study, from rest: the speed reference is the crank speed at the motor from the
+    start on, feed and processing forces are those of normal running; with feed-forward, the machine that the control
+    asks is in the system, too."""
     machine = _machine(config, drive, ChamberForces)
-    motor = {**drive.motor.parameter_layout.named(drive.parameters), "w_ref": machine["w"]}
-    models: dict[str, type[Model]] = {"machine": ChamberForces, "motor": drive.motor}
-    start = {"machine": machine, "motor": motor}
+    models = {name: model for name, (model, _) in drive.models().items()}
+    start = {name: model.parameter_layout.named(p) for name, (model, p) in drive.models().items()}
+    start["motor"] |= {"w_ref": machine["w"]}
+    start["machine"] = machine | start["machine"] | {"w": machine["w"] / drive.ratio * drive.driven.p.ratio}
     if drive.feed_forward:
         models["model"], start["model"] = ChamberForces, machine
     return ModelSystem(
@@ -51,9 +53,13 @@ def start_of(
     Raises
     ------
     InputError
-        where the study's motor is another, or sizing finds none.
+        where the study's motor is another, it has no driveline, or sizing finds none.
     """
     drive = _drive(config, backend, report)
+    if model is CardanDriveline:
+        if drive.line is None:
+            raise InputError("the study has no [driveline]; add the table, or export without --config")
+        return model.parameter_layout.named(drive.line)
     if not issubclass(model, Motor):
         return _machine(config, drive, model)
     if drive.motor is not model:

@@ -1,0 +1,138 @@
+"""What a shaft line between motor and machine carries in a study: peaks, amplification, cycles for fatigue.
+
+`tau2` is the torque in shaft 2, which the motor turns, `tau3` that in shaft 3, on the machine's side.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..drives.cardan import Cardan, frozen_frequency
+from ..engines import MATH
+from ..quantities import Value, declaration, quantity
+from .drive import Drive
+
+LONGEST_STEP = 0.3
+"""Communication step times natural frequency: above it the coupling feeds the vibration more than it damps."""
+RIGID = "driveline.tau2_rigid"
+"""Name in a run's Dataset of the torque in shaft 2 in the same run of the rigid drive."""
+CLASSES = 10
+"""Classes of torque range that a table of cycles has."""
+
+
+@declaration
+class ShaftAnswers:
+    """What a run asks of the shaft line. The rigid drive is the same without elasticity and uneven ratio, inertia
+    kept. `amplification` is the peak torque over that of the rigid drive. `range_equivalent` does, once a turn of
+    the crank, the damage of steady running by Woehler's line with the exponent `driveline.exponent`; `turns_of_steady`
+    is the number of turns of steady running that do the damage of an event."""
+
+    tau2_peak: Value = quantity("N.m", "shaft 2, peak torque")
+    tau3_peak: Value = quantity("N.m", "shaft 3, peak torque")
+    tau2_rigid: Value = quantity("N.m", "rigid shaft 2, peak torque")
+    amplification: Value = quantity("1", "amplification by the shafts")
+    twist_peak: Value = quantity("rad", "twist of both, peak")
+    range_largest: Value = quantity("N.m", "shaft 2, largest range")
+    cycles: Value = quantity("1", "shaft 2, cycles")
+    range_equivalent: Value = quantity("N.m", "range of equal damage")
+    turns_of_steady: Value = quantity("1", "damage in steady turns")
+
+
+@declaration
+class Torsion:
+    """The line's torsional vibration with this motor and machine, by the formula of paper 002 at i23 = 1, over the
+    machine's inertia in a turn."""
+
+    k_least: Value = quantity("rad/s", "least natural frequency of torsion")
+    k_largest: Value = quantity("rad/s", "largest natural frequency of torsion")
+    step_longest: Value = quantity("s", "longest communication step")
+
+
+@dataclass(frozen=True)
+class Cycles:
+    """Rainflow cycles (ASTM E1049) of a torque: range and mean [N m], count (1, or 0.5 of an open cycle)."""
+
+    range: Any
+    mean: Any
+    count: Any
+
+    def damage(self, exponent: float) -> float:
+        """Sum of count times range to the power of `exponent`."""
+        return float(np.sum(self.count * self.range**exponent))
+
+    def classes(self, largest: float) -> list[dict[str, float]]:
+        """Number of cycles in equal classes of range up to the `largest`, from above; empty ones are left out."""
+        edges = np.linspace(0.0, largest, CLASSES + 1)
+        counts, _ = np.histogram(self.range, edges, weights=self.count)
+        rows = zip(edges[:-1], edges[1:], counts, strict=True)
+        return [{"from": float(a), "to": float(b), "count": float(n)} for a, b, n in rows if n][::-1]
+
+
+def rainflow(torque: Any) -> Cycles:
+    """Cycles of a torque [N m], shape (time,)."""
+    import rainflow as library
+
+    rows = np.array([row[:3] for row in library.extract_cycles(np.asarray(torque, float))]).reshape(-1, 3)
+    return Cycles(rows[:, 0], rows[:, 1], rows[:, 2])
+
+
+def torsion(drive: Drive, inertia: Any) -> Torsion:
+    """Natural frequencies of the drive's line with the machine's `inertia` at the motor [kg m2], an array over the
+    turn."""
+    line = drive.line
+    ends = []
+    for J in (float(np.min(inertia)), float(np.max(inertia))):
+        two_masses = Cardan(
+            c2=line.c2,
+            c3=line.c3,
+            J1=drive.parameters.rotor.J * line.ratio**2,
+            J4=line.J4 + J * line.ratio**2,
+        )
+        ends.append(float(frozen_frequency(MATH, two_masses, 1.0)))
+    return Torsion(k_least=min(ends), k_largest=max(ends), step_longest=LONGEST_STEP / max(ends))
+
+
+def with_rigid(drive: Drive, run: xr.Dataset, rigid: xr.Dataset) -> xr.Dataset:
+    """The `run` with the torque in shaft 2 of the same run of ``drive.rigid()`` beside it."""
+    line = drive.line
+    torque = line.ratio * rigid["machine.tau"].values + line.J4 / line.ratio * rigid["motor.a"].values
+    # a coupling that opened ends a run between two communication points
+    there = np.interp(run["time"].values, rigid["time"].values, torque)
+    attributes = {"units": "N.m", "long_name": "torque in shaft 2 of the same drive with a rigid shaft"}
+    return run.assign({RIGID: ("time", there, attributes)})
+
+
+def shaft_answers(
+    drive: Drive,
+    run: xr.Dataset,
+    exponent: float,
+    steady_damage_per_turn: float | None = None,
+) -> tuple[ShaftAnswers, Cycles, float]:
+    """What a `run` from `with_rigid` asks of the line; its cycles, and their damage per turn of the crank, in the
+    unit (N m)^exponent."""
+    tau2 = run["driveline.tau2"].values
+    peak2, peak_rigid = float(np.max(np.abs(tau2))), float(np.max(np.abs(run[RIGID].values)))
+    cycles = rainflow(tau2)
+    angle, _ = drive.crank_motion(run)
+    turns = max(float(angle[-1] - angle[0]) / (2.0 * np.pi), 1e-9)
+    damage = cycles.damage(exponent)
+    twist = run["driveline.twist2"].values + run["driveline.twist3"].values
+    return (
+        ShaftAnswers(
+            tau2_peak=peak2,
+            tau3_peak=float(np.max(np.abs(run["driveline.tau3"].values))),
+            tau2_rigid=peak_rigid,
+            amplification=peak2 / peak_rigid if peak_rigid > 0.0 else None,
+            twist_peak=float(np.max(np.abs(twist))),
+            range_largest=float(np.max(cycles.range, initial=0.0)),
+            cycles=float(np.sum(cycles.count)),
+            range_equivalent=None if steady_damage_per_turn else (damage / turns) ** (1.0 / exponent),
+            turns_of_steady=damage / steady_damage_per_turn if steady_damage_per_turn else None,
+        ),
+        cycles,
+        damage / turns,
+    )

@@ -1,0 +1,235 @@
+"""A study with a driveline: where it stands, what it carries, and what the report says of it."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.linalg import eigh
+from test_page import Reader, check_traced
+
+from chainunit import InputError, config
+from chainunit.models import MODELS
+from chainunit.report import files, page, plots
+from chainunit.studies.choice import choose
+from chainunit.studies.overload import as_dict, run_study
+from chainunit.studies.package import export_study, start_of
+from chainunit.studies.shaft import RIGID, Cycles, rainflow, shaft_answers, torsion
+
+SHORT = """
+events = ["jam_left"]
+[run]
+ramp = 0.3
+turns = 1
+step = 0.001
+crank_speed = 6
+[overload]
+turns = 1
+[machine]
+ratio = 25
+"""
+LINE = """
+[driveline]
+alpha1 = "12 deg"
+alpha2 = "8 deg"
+d2 = 20
+d3 = 20
+"""
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    return run_study(config.parse(SHORT + LINE), tmp_path_factory.mktemp("line"), check=True)
+
+
+def test_the_run_has_its_certificates(study):
+    for name in ("start_up", "jam_left"):
+        shares = study.certificate[name]
+        assert shares["energy_residual_share"] < 1e-4
+        assert shares["driveline_energy_residual_share"] < 1e-4
+    assert study.certificate["start_up"]["machine.tau_difference_to_monolithic"] < 1e-3
+
+
+def test_the_line_amplifies_a_jam(study):
+    """Peaks are those of the series; the rigid drive's torque is that of a study without a line but with its
+    inertia."""
+    steady, jam = study.shaft["steady"], study.shaft["jam_left"]
+    run = study.runs["jam_left"].sel(time=slice(study.event["jam_left"], None))
+    assert jam.tau2_peak == np.max(np.abs(run["driveline.tau2"])) > 2.0 * steady.tau2_peak
+    assert jam.amplification == pytest.approx(jam.tau2_peak / np.max(np.abs(run[RIGID])))
+    assert jam.amplification > 1.2 and 1.0 < steady.amplification < 1.3
+    assert jam.turns_of_steady > 10.0 and jam.range_equivalent is None
+    assert any("times that of a rigid drive" in note for note in study.notes)
+    before = run[RIGID].attrs
+    assert before["units"] == "N.m"
+
+
+def test_a_rigid_drive_carries_what_the_machine_and_the_inertia_take(study, tmp_path):
+    """The same study without a driveline, the crank heavier by J4: its crank torque is the rigid shaft's."""
+    J4, crank = study.drive.line.J4, study.drive.machine.p.crank
+    heavier = f"{SHORT}crank = {{ I = {crank.I + J4} }}"
+    gains = {
+        n: v
+        for n, v in study.drive.motor.parameter_layout.named(study.motor).items()
+        if ".k" in n and "control" in n
+    }
+    motor = "".join(
+        f"[motor.{n.rpartition('.')[0]}]\nkp = {gains[n]}\nki = {gains[n[:-1] + 'i']}\n"
+        for n in gains
+        if n.endswith("kp")
+    )
+    plain = run_study(config.parse(f"{heavier}\n{motor}"), tmp_path)
+    for name in ("start_up", "jam_left"):
+        wanted = plain.drive.crank_torque(plain.runs[name])
+        # the crank without the line is heavier by J4, so that this torque holds that of J4, too
+        found = study.runs[name][RIGID].values
+        if name == "start_up":
+            np.testing.assert_allclose(found, wanted, atol=2e-4 * np.max(np.abs(wanted)))
+        else:  # its event comes at the same crank angle, a little later than in the elastic drive
+            assert np.max(np.abs(found)) == pytest.approx(np.max(np.abs(wanted)), rel=0.02)
+
+
+def test_before_or_behind_the_gear(tmp_path):
+    """Straight joints on the motor's shaft, seen through the gear, are those on the crank's with stiffness, damping
+    and inertia times the square of the ratio."""
+    runs = []
+    for place, by in (("crank", 1.0), ("motor", 1.0 / 25.0**2)):
+        values = {"c2": 8e3, "c3": 6e3, "d2": 20.0, "d3": 10.0, "J4": 0.5}
+        table = "".join(f"{name} = {by * x!r}\n" for name, x in values.items())
+        text = f'{SHORT}[driveline]\nplace = "{place}"\nalpha1 = 0\nalpha2 = 0\n{table}'
+        runs.append(run_study(config.parse(text), tmp_path / place))
+    crank, motor = runs
+    assert (crank.drive.line.ratio, motor.drive.line.ratio) == (25.0, 1.0)
+    for name in ("start_up", "jam_left"):
+        a, b = crank.runs[name], motor.runs[name]
+        np.testing.assert_allclose(a["motor.w"], b["motor.w"], rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(a["driveline.tau2"], 25.0 * b["driveline.tau2"], rtol=1e-7, atol=1e-6)
+        np.testing.assert_allclose(
+            crank.drive.crank_torque(a), motor.drive.crank_torque(b), rtol=1e-7, atol=1e-6
+        )
+    assert crank.torsion.k_largest == pytest.approx(motor.torsion.k_largest, rel=1e-12)
+    assert crank.answers["jam_left"].speed_least == pytest.approx(
+        motor.answers["jam_left"].speed_least, rel=1e-9
+    )
+
+
+def test_the_frequency_is_that_of_rotor_gear_shafts_and_machine(study):
+    """The eigenproblem in the angles of rotor (behind the gear) and driven shaft, the straight cardan condensed."""
+    drive = study.drive
+    line, rotor, found = drive.line, drive.parameters.rotor.J, torsion(drive, [2e-3, 9e-3])
+    for J, expected in zip((2e-3, 9e-3), (found.k_largest, found.k_least), strict=True):
+        c = 1.0 / (1.0 / line.c2 + 1.0 / line.c3)
+        # twist = phi_motor/ratio - phi_driven; both inertias where they turn
+        stiffness = c * np.array([[1.0 / line.ratio**2, -1.0 / line.ratio], [-1.0 / line.ratio, 1.0]])
+        inertia = np.diag([rotor, line.J4 + J * line.ratio**2])
+        assert np.sqrt(eigh(stiffness, inertia, eigvals_only=True)[1]) == pytest.approx(expected, rel=1e-12)
+
+
+def test_rainflow_is_that_of_the_standard():
+    """The example of ASTM E1049-85, 5.4.4.2: ranges and counts as the standard prints them."""
+    found = rainflow([-2, 1, -3, 5, -1, 3, -4, 4, -2])
+    counted = {}
+    for size, count in zip(found.range, found.count, strict=True):
+        counted[float(size)] = counted.get(float(size), 0.0) + float(count)
+    assert counted == {3.0: 0.5, 4.0: 1.5, 6.0: 0.5, 8.0: 1.0, 9.0: 0.5}
+    assert found.damage(2.0) == 0.5 * 9 + 1.5 * 16 + 0.5 * 36 + 64 + 0.5 * 81
+    rows = found.classes(9.0)
+    assert sum(row["count"] for row in rows) == 4.0 and rows[0]["to"] == 9.0
+    assert rainflow([1.0, 1.0]).damage(5.0) == 0.0
+
+
+def test_damage_of_a_steady_swing(study):
+    """A sine of range 2 A once a turn: the equivalent range is 2 A."""
+    turns, points = 20, 400
+    angle = np.linspace(0.0, turns, turns * points + 1)
+    swing = ("time", 7.0 * np.sin(2.0 * np.pi * angle))
+    zero = ("time", np.zeros_like(angle))
+    ratio = study.drive.driven.p.ratio
+    run = xr.Dataset(
+        {
+            "driveline.tau2": swing, "driveline.tau3": swing, RIGID: swing,
+            "driveline.twist2": zero, "driveline.twist3": zero,
+            "machine.phi0": ("time", 2.0 * np.pi * angle * ratio), "machine.w0": zero,
+        },
+        {"time": angle},
+    )  # fmt: skip
+    answers, cycles, damage = shaft_answers(study.drive, run, 5.0)
+    assert answers.range_equivalent == pytest.approx(14.0, rel=0.01)
+    assert isinstance(cycles, Cycles) and damage == pytest.approx(14.0**5, rel=0.05)
+    event, _, _ = shaft_answers(study.drive, run, 5.0, damage)
+    assert event.turns_of_steady == pytest.approx(turns)
+
+
+def test_the_report_shows_it(study, tmp_path):
+    written = [*files.write(study, tmp_path), *plots.write(study, tmp_path)]
+    assert (tmp_path / "driveline.png") in written
+    text = page.write(study, tmp_path).read_text("utf-8")
+    reader = Reader(text)
+    check_traced(reader, json.loads((tmp_path / "result.json").read_text()))
+    paths = {n["data-path"] for n in reader.numbers}
+    assert {
+        "shaft.jam_left.amplification",
+        "driveline.k_least",
+        "driveline.alpha1",
+        "driveline.exponent",
+    } <= paths
+    assert "with a rigid shaft" in text
+    assert as_dict(study)["torque_cycles"]["jam_left"]
+    head = (tmp_path / "load_cycle.csv").read_text().splitlines()[0]
+    assert head == "time [s],speed [rad/s],torque [N.m],inertia [kg.m2]"
+
+
+def test_a_coupling_that_opens_lets_line_and_machine_coast(tmp_path):
+    """What is behind the coupling keeps the inertia of the line; the energy certificate holds in its run, too."""
+    study = run_study(config.parse(f"{SHORT}{LINE}[coupling]\ntrip_torque = 150\n"), tmp_path)
+    assert study.failure is None
+    jam = study.answers["jam_left"]
+    assert 0.0 < jam.coupling_trip_time < 0.2
+    coasting = study.runs["jam_left_coasting"]
+    w = float(study.runs["jam_left"]["machine.w0"][-1])
+    assert float(coasting["machine.w"][0]) == pytest.approx(w, rel=1e-12)
+    assert study.drive.coasting_parameters()["J_added"] == study.drive.line.J4
+    assert study.certificate["jam_left"]["driveline_energy_residual_share"] < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("[driveline]\nalpha1 = \"90 deg\"", "driveline.alpha1 = 1.5708 rad (90 deg): a Hooke joint turns only"),
+        ("[driveline]\nc2 = 0", "driveline.c2 = 0 N.m/rad: must be > 0 N.m/rad"),
+        ("[driveline]\nc3 = -1", "driveline.c3 = -1 N.m/rad: must be > 0 N.m/rad"),
+        ("[driveline]\nJ4 = 0", "driveline.J4 = 0 kg.m2: must be > 0 kg.m2"),
+        ("[driveline]\nJ1 = 2", "driveline.J1: unknown key; known here: alpha1"),
+        ("[driveline]\nexponent = 0", "driveline.exponent = 0: must be >= 1"),
+        ('[driveline]\nplace = "roof"', "driveline.place = 'roof': input should be 'crank' or 'motor'"),
+    ],
+)  # fmt: skip
+def test_bad_tables_are_refused(text, line):
+    with pytest.raises(InputError) as refused:
+        config.parse(text)
+    assert str(refused.value).startswith(line) and "\n" not in str(refused.value)
+
+
+def test_a_step_that_is_too_long_for_the_shaft_is_refused(tmp_path):
+    stiff = config.parse(f"{SHORT}[driveline]\nc2 = 1e7\nc3 = 1e7\n")
+    with pytest.raises(
+        InputError, match=r"run.step = 0.001 s: the driveline swings at \d+ rad/s; must be <= 0.000"
+    ):
+        run_study(stiff, tmp_path)
+
+
+def test_export_of_the_studys_line(tmp_path):
+    loaded = config.parse(SHORT + LINE)
+    start = start_of(loaded, MODELS["CardanDriveline"])
+    assert (
+        start["ratio"] == 25.0 and start["d2"] == 20.0 and start["alpha2"] == pytest.approx(np.radians(8.0))
+    )
+    with pytest.raises(InputError, match=r"the study has no \[driveline\]"):
+        start_of(config.parse(SHORT), MODELS["CardanDriveline"])
+    said = export_study(loaded, tmp_path / "x.ssp", backend="python")
+    assert "driveline (CardanDriveline)" in said
+    drive = choose(loaded, tmp_path, lambda *_: None).drive
+    assert ("driveline.driven.w", "machine.w") in drive.connections()
+    assert ("driveline.tau_bias", "motor.load.tau_bias") in drive.connections()
