@@ -163,12 +163,15 @@ class Steady(NamedTuple):
         return np.maximum(np.abs(self.largest3), np.abs(self.least3))
 
 
-def steady(p: Cardan, speed: Any, load: Any = 0.0, progress: Progress = _nothing, chunk: int = 256) -> Steady:
+def steady(
+    p: Cardan, speed: Any, load: Any = 0.0, progress: Progress = _nothing, chunk: int = 1024, tries: int = 4
+) -> Steady:
     """The motion that repeats itself after half a turn at the mean `speed` [rad/s], with the torque `load` [N.m] on
     J4, and its stability.
 
     Values of `p` may be numbers or arrays of the shape (n,) of `speed`. Points that need alike numbers of steps are
-    computed together, at most `chunk` at a time.
+    computed together, at most `chunk` at a time. What is not found is tried again from its neighbours, up to `tries`
+    times.
     """
     speed = np.atleast_1d(np.asarray(speed, dtype=float))
     n = len(speed)
@@ -177,19 +180,20 @@ def steady(p: Cardan, speed: Any, load: Any = 0.0, progress: Progress = _nothing
     guess = np.stack([np.zeros(n), speed, phi3 - load / p.c3, speed * np.sqrt(ratio), load])
     found = _all(p, speed, load, guess, chunk, lambda x: progress(0.8 * x))
     # near a resonance Newton's method may need a neighbour to start from
-    for step in (-1, 1):
-        missing = np.flatnonzero(~found.found)
-        beside = missing + step
-        usable = (beside >= 0) & (beside < n)
-        missing, beside = missing[usable], beside[usable]
-        usable = found.found[beside]
-        missing, beside = missing[usable], beside[usable]
-        if len(missing):
-            guess = np.concatenate([found.start[:, beside], found.drive[None, beside]])
-            again = _all(_pick(p, missing), speed[missing], load[missing], guess, chunk, _nothing)
-            for name in Steady._fields:
-                whole, part = getattr(found, name), getattr(again, name)
-                whole[..., missing] = part
+    for _ in range(tries):
+        before = found.found.copy()
+        for side in (-1, 1):
+            missing = np.flatnonzero(~found.found)
+            missing = missing[(missing + side >= 0) & (missing + side < n)]
+            missing = missing[found.found[missing + side]]
+            if len(missing):
+                beside = missing + side
+                guess = np.concatenate([found.start[:, beside], found.drive[None, beside]])
+                again = _all(_pick(p, missing), speed[missing], load[missing], guess, chunk, _nothing)
+                for whole, part in zip(found, again, strict=True):
+                    whole[..., missing] = part
+        if np.all(found.found == before):
+            break
     progress(1.0)
     return found
 

@@ -161,14 +161,19 @@ def _campbell(study: DrivelineStudy) -> Any:
         if running.speed_low < 0.5 * (first + last) < running.speed_high:
             axis.plot([middle], [0.5 * (low + high)], "o", color="#1b1b1b", fillstyle="none", markersize=9.0)
             shown = f"{rev(first):.0f} to {rev(last):.0f}" if rev(last - first) >= 1.0 else f"{middle:.0f}"
-            above = n != 3
+            place, side, base = {
+                1: ((-14, 10), "right", "bottom"),
+                2: ((-14, 10), "right", "bottom"),
+                3: ((8, -10), "center", "top"),
+                4: ((-8, -10), "center", "top"),
+            }[n]
             axis.annotate(
                 ("k" if n == 1 else f"k/{n}") + f"\n{shown}",
-                (middle, high if above else low),
-                (-14, 10) if above else (0, -10),
+                (middle, high if base == "bottom" else low),
+                place,
                 textcoords="offset points",
-                ha="right" if above else "center",
-                va="bottom" if above else "top",
+                ha=side,
+                va=base,
                 fontsize=9,
             )
     _speed_axis(axis, study)
@@ -225,7 +230,7 @@ def _resonance(study: DrivelineStudy) -> Any:
         axis.semilogy(x, getattr(found, f"peak{number}"), label="steady motion", **LINES[0])
         if simulated is not None:
             axis.semilogy(
-                rev(study.asked),
+                rev(simulated.speed),
                 getattr(simulated, f"peak{number}"),
                 "o",
                 color=LINES[1]["color"],

@@ -42,8 +42,8 @@ LEAST_DAMPING = 0.003
 """below which time simulation would take too long"""
 DRIFT = 0.01
 """growth of a deviation of the mean speed [1/s] from which on it is worth a word"""
-FINE = 200
-"""points of the resonance curve; simulated are a fifth of them"""
+SIMULATED = 5
+"""every so many points of the resonance curve are simulated"""
 
 
 @declaration
@@ -55,6 +55,9 @@ class Running:
     speed_low: Value = quantity("rad/s", "least speed that is looked at", default=40.0, above=0.0, max=1e4)
     speed_high: Value = quantity(
         "rad/s", "largest speed that is looked at", default=300.0, above=0.0, max=1e4
+    )
+    points: Value = quantity(
+        "1", "number of speeds of the resonance curve", default=200.0, min=10.0, max=5000.0
     )
     margin: Value = quantity(
         "1",
@@ -193,10 +196,13 @@ def _consistent(config: Config) -> None:
     ):
         if not high > low:
             raise InputError(f"{name} = {high:g} {unit}: must be > {low:g} {unit}, the least")
-    for name in ("speeds", "bends"):
-        number = getattr(map_, name)
+    for name, number in (
+        ("running.points", running.points),
+        ("stability.speeds", map_.speeds),
+        ("stability.bends", map_.bends),
+    ):
         if number != int(number):
-            raise InputError(f"stability.{name} = {number:g}: must be a whole number")
+            raise InputError(f"{name} = {number:g}: must be a whole number")
     slowest = frequency_band(config.line).largest / 50.0
     for name in ("speed", "speed_low"):
         given = getattr(running, name)
@@ -290,8 +296,8 @@ class DrivelineStudy:
 
     def resonances(self) -> list[tuple[float, float]]:
         """Speed [rad/s] and torque of shaft 2 [N.m] of each peak of the resonance curve, by speed."""
-        peak = np.where(self.steady.found, self.steady.peak2, -1.0)
-        inner = np.flatnonzero((peak[1:-1] > peak[:-2]) & (peak[1:-1] >= peak[2:])) + 1
+        peak = self.steady.peak2  # NaN compares as false: beside a gap nothing counts as a peak
+        inner = np.flatnonzero((peak[1:-1] > 1.001 * peak[:-2]) & (peak[1:-1] >= peak[2:])) + 1
         return [(float(self.speed[j]), float(peak[j])) for j in inner]
 
 
@@ -315,11 +321,11 @@ def run_driveline(config: Config, report: Report = lambda what, done, todo: None
     phi3, ratio, _ = two_joints(xp, line, angle)
     lead = phi3 - angle
     excitation = {n: float(2.0 * abs(np.mean(lead[:-1] * np.exp(-1j * n * angle[:-1])))) for n in ORDERS}
-    speed = speeds(running.speed_low, running.speed_high, k, FINE)
+    speed = speeds(running.speed_low, running.speed_high, k, int(running.points))
     curve = steady(line, speed, running.load, lambda done: report("steady motion", done, 1.0))
     operating = steady(line, running.speed, running.load)
     zeta = damping_ratio(line)
-    asked = speed[::5]
+    asked = speed[::SIMULATED]
     simulated = None
     if zeta >= LEAST_DAMPING:
         simulated = simulate(
@@ -364,7 +370,7 @@ def stability_map(config: Config, progress: Callable[[float], None] = lambda don
     varied: dict[str, Any] = dict.fromkeys(JOINTS[config.joint], each_bend)
     damped = with_damping_ratio(line, 1.0)
     p = dataclasses.replace(line, d2=damped.d2 * each_ratio, d3=damped.d3 * each_ratio, **varied)
-    found = steady(p, each_speed, running.load, progress)
+    found = steady(p, each_speed, running.load, progress, tries=1)
     shape = (len(ratios), len(bend), len(speed))
     return StabilityMap(
         speed, bend, config.damping_ratios, found.growth.reshape(shape), found.unstable.reshape(shape)
@@ -440,7 +446,9 @@ def _warnings(study: DrivelineStudy) -> list[str]:
             "vibration grows by itself (parametric resonance); more damping or less uneven joints end it."
         )
     for low, high in study.missing_ranges():
-        warnings.append(f"No steady motion found from {both_units(low, high)}: do not run there.")
+        warnings.append(
+            f"No steady motion found from {both_units(low, high)}, a strong resonance: do not run there."
+        )
     return warnings
 
 
