@@ -160,8 +160,11 @@ def driveline(
 
     _clear(output, *page.NAMES)
     console, errors = _console(), _console(stderr=True)
-    with _progress("steady motion", errors) as report:
-        result = lines.run_driveline(loaded, report)
+    try:
+        with _progress("steady motion", errors) as report:
+            result = lines.run_driveline(loaded, report)
+    except KeyboardInterrupt:
+        raise InterruptedRunError("interrupted before anything was written") from None
     written = page.write(result, output)
     page.show(result, console)
     console.print("Written: " + ", ".join(str(path) for path in written), soft_wrap=True)

@@ -74,6 +74,8 @@ def values(
 
     Raises
     ------
+    ValueError
+        for a damping ratio where an inertia is neither in the table nor given.
     InputError
         in one line: for a stiffness or a damping that is given twice, and see `shafts.stiffness_of`.
     """
@@ -100,5 +102,8 @@ def values(
                 f"{prefix}{name}: given beside {prefix}damping_ratio, which sets it; leave out one of the two"
             )
     ends = {name: x for name, x in (("J1", J1), ("J4", J4)) if x is not None}
+    for name in ("J1", "J4"):
+        if name not in ends and name not in type(table).model_fields:
+            raise ValueError(f"{name}: a damping ratio needs it")
     damped = with_damping_ratio(Cardan(**{**given, **ends}), ratio)
     return {**given, "d2": damped.d2, "d3": damped.d3}

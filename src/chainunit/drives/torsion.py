@@ -356,20 +356,20 @@ def simulate(
     p: Cardan, speed: Any, load: float, settle: float, half_turns: int = 2, progress: Progress = _nothing
 ) -> Simulated:
     """Time simulation at each mean `speed` [rad/s] from an untwisted start; peaks of the last `half_turns`, after
-    the time `settle` [s], or 80 half turns where that is longer.
+    the time `settle` [s], or 50 half turns where that is longer.
 
     A soft PI control of the torque on J1 holds the mean speed. It sees the common speed of both inertias through a
-    low pass of three half turns, so that neither vibration nor ripple passes it.
+    low pass of two half turns, so that neither vibration nor ripple passes it.
     """
     speed = np.atleast_1d(np.asarray(speed, dtype=float))
     n = len(speed)
     q = expand(p, n)
     period = math.pi / speed
     counts = half_turn_steps(q, speed)
-    settled = np.maximum(settle, 80.0 * period)
+    settled = np.maximum(settle, 50.0 * period)
     steps = int(np.max(np.ceil(settled / period) * counts))
     window = half_turns * counts
-    gain, slow = 5.0 / settled, 3.0 * period
+    gain, slow = 10.0 / settled, 2.0 * period
     h = period / counts
     inertia = p.J1 + p.J4
     equations = _Equations(q, load, h, load)
