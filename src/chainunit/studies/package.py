@@ -21,9 +21,9 @@ from .drive import Drive
 
 
 def study_system(config: Config, drive: Drive) -> ModelSystem:
-    """Machine, driveline and motor of a study, from rest: the speed reference is the crank speed at the motor from the
-    start on, feed and processing forces are those of normal running; with feed-forward, the machine that the control
-    asks is in the system, too."""
+    """Machine, driveline and motor of a study, from rest: the speed reference is the crank speed at the motor from
+    the start on, feed and processing forces are those of normal running; with feed-forward, the machine that the
+    control asks is in the system, too."""
     machine = _machine(config, drive, ChamberForces)
     models = {name: model for name, (model, _) in drive.models().items()}
     start = {name: model.parameter_layout.named(p) for name, (model, p) in drive.models().items()}

@@ -28,8 +28,8 @@ CLASSES = 10
 class ShaftAnswers:
     """What a run asks of the shaft line. The rigid drive is the same without elasticity and uneven ratio, inertia
     kept. `amplification` is the peak torque over that of the rigid drive. `range_equivalent` does, once a turn of
-    the crank, the damage of steady running by Woehler's line with the exponent `driveline.exponent`; `turns_of_steady`
-    is the number of turns of steady running that do the damage of an event."""
+    the crank, the damage of steady running by Woehler's line with the exponent `driveline.exponent`;
+    `turns_of_steady` is the number of turns of steady running that do the damage of an event."""
 
     tau2_peak: Value = quantity("N.m", "shaft 2, peak torque")
     tau3_peak: Value = quantity("N.m", "shaft 3, peak torque")
