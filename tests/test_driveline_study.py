@@ -406,6 +406,18 @@ def study():
     return run_driveline(small("[driveline]\nalpha1 = '35 deg'\ndamping_ratio = 0.015\n"))
 
 
+def test_the_orders_of_one_joint_have_a_closed_form():
+    """The series of atan(tan(x)/cos(alpha)) - x."""
+    study = run_driveline(small("[driveline]\nalpha1 = '30 deg'\nalpha2 = 0\n", "load = 0\n"))
+    square = math.tan(math.radians(15.0)) ** 2
+    assert study.excitation == {
+        2: pytest.approx(square, rel=1e-9),
+        4: pytest.approx(square**2 / 2.0, rel=1e-9),
+    }
+    # without a load there is nothing to compare the peaks with
+    assert not said(study, "Shaft 2 carries") and study.static2 == 0.0
+
+
 def said(study, beginning):
     return [line for line in study.warnings if line.startswith(beginning)]
 

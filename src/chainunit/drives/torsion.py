@@ -35,6 +35,7 @@ STEPS_PER_HARMONIC = 12
 """of the ratio i23"""
 
 _ITERATIONS = 12
+_AGAIN = 8  # from a neighbour, which is near
 _CLOSED = 1e-9
 _NOISE = 1e-5  # of a multiplier: that of an undamped line is 1 but for the steps
 _LARGEST_STEP = 0.3  # of the unknowns of shooting, in rad and shares of the speed
@@ -178,7 +179,7 @@ def steady(
     p, load = expand(p, n), np.broadcast_to(np.asarray(load, dtype=float), (n,))
     phi3, ratio, _ = two_joints(numpy_(), p, np.zeros(n))
     guess = np.stack([np.zeros(n), speed, phi3 - load / p.c3, speed * np.sqrt(ratio), load])
-    found = _all(p, speed, load, guess, chunk, lambda x: progress(0.8 * x))
+    found = _all(p, speed, load, guess, chunk, _ITERATIONS, lambda x: progress(0.8 * x))
     # near a resonance Newton's method may need a neighbour to start from
     for _ in range(tries):
         before = found.found.copy()
@@ -189,7 +190,7 @@ def steady(
             if len(missing):
                 beside = missing + side
                 guess = np.concatenate([found.start[:, beside], found.drive[None, beside]])
-                again = _all(_pick(p, missing), speed[missing], load[missing], guess, chunk, _nothing)
+                again = _all(_pick(p, missing), speed[missing], load[missing], guess, chunk, _AGAIN, _nothing)
                 for whole, part in zip(found, again, strict=True):
                     whole[..., missing] = part
         if np.all(found.found == before):
@@ -198,7 +199,9 @@ def steady(
     return found
 
 
-def _all(p: Cardan, speed: Any, load: Any, guess: Any, chunk: int, progress: Progress) -> Steady:
+def _all(
+    p: Cardan, speed: Any, load: Any, guess: Any, chunk: int, iterations: int, progress: Progress
+) -> Steady:
     counts = half_turn_steps(p, speed)
     order = np.argsort(counts, kind="stable")
     parts, done = [], 0.0
@@ -210,7 +213,9 @@ def _all(p: Cardan, speed: Any, load: Any, guess: Any, chunk: int, progress: Pro
             progress(done + share * x)
 
         count = int(max(counts[chosen]))
-        parts.append(_shoot(_pick(p, chosen), speed[chosen], load[chosen], guess[:, chosen], count, report))
+        parts.append(
+            _shoot(_pick(p, chosen), speed[chosen], load[chosen], guess[:, chosen], count, iterations, report)
+        )
         done += share
     back = np.argsort(order, kind="stable")
     return Steady(
@@ -218,7 +223,9 @@ def _all(p: Cardan, speed: Any, load: Any, guess: Any, chunk: int, progress: Pro
     )
 
 
-def _shoot(p: Cardan, speed: Any, load: Any, guess: Any, count: int, progress: Progress) -> Steady:
+def _shoot(
+    p: Cardan, speed: Any, load: Any, guess: Any, count: int, iterations: int, progress: Progress
+) -> Steady:
     n = len(speed)
     period = math.pi / speed
     scale = np.stack([np.ones(n), speed, np.ones(n), speed])
@@ -230,7 +237,7 @@ def _shoot(p: Cardan, speed: Any, load: Any, guess: Any, count: int, progress: P
     keep = {name: np.full(n, np.nan) for name in ("largest2", "least2", "largest3", "least3")}
     monodromy, held = np.full((4, 4, n), np.nan), np.full((2, 2, n), np.nan)
     with np.errstate(all="ignore"):
-        for iteration in range(_ITERATIONS):
+        for iteration in range(iterations):
             q = _pick(p, active)
             end, by, equations = _half_turn(
                 q, x[:, active], drive[active], load[active], period[active], count
@@ -244,7 +251,7 @@ def _shoot(p: Cardan, speed: Any, load: Any, guess: Any, count: int, progress: P
                 keep[f"largest{number}"][done], keep[f"least{number}"][done] = torque.max(0), torque.min(0)
             monodromy[:, :, done] = by[:, :4, good]
             held[:, :, done] = (by[:2, 5:] - by[2:, 5:])[:, :, good]
-            progress((iteration + 1) / _ITERATIONS)
+            progress((iteration + 1) / iterations)
             # what has run away does not come back
             left = ~good & np.all(np.isfinite(wrong), axis=0) & np.all(np.isfinite(by), axis=(0, 1))
             if not np.any(left):

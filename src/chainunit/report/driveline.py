@@ -10,6 +10,7 @@ from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter
 from rich.console import Console
 from rich.table import Table
@@ -25,6 +26,11 @@ NUMBERS, TEXT = "driveline.json", "driveline.md"
 PLOTS = ("campbell.png", "stability.png", "resonance.png", "ratio.png")
 NAMES = (NUMBERS, TEXT, *PLOTS)
 _GREY = "#777777"
+_NOTHING = 1e-9  # amplitude of an order that is roundoff [rad]
+_RUNNING = {"color": _GREY, "linewidth": 1.2, "linestyle": (0, (6, 2)), "label": "running"}
+_MISSING = {"color": "#c1440e", "marker": "x", "markersize": 4.0, "linestyle": ""}
+_AS_GIVEN: dict[str, Any] = {**LINES[3], "color": _GREY, "label": "bend as given"}
+_WHITE = {"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.85}
 
 
 def write(study: DrivelineStudy, folder: Path) -> list[Path]:
@@ -48,14 +54,14 @@ def answers(study: DrivelineStudy) -> list[tuple[str, str]]:
         ("ratio i23", f"{np.min(study.ratio):.4f} to {np.max(study.ratio):.4f}"),
     ]
     rows += [
-        (f"amplitude of shaft 3 at order {n}", f"{math.degrees(x):.3g} deg")
+        (f"amplitude of shaft 3 at order {n}", f"{math.degrees(x) if x > _NOTHING else 0.0:.3g} deg")
         for n, x in study.excitation.items()
     ]
     rows.append(("damping ratio", f"{study.damping_ratio:.3g}"))
     rows += [
         (f"order {n} meets it at", both_units(*study.crossings()[n]))
         for n in ORDERS
-        if study.excitation[n] > 1e-9
+        if study.excitation[n] > _NOTHING
     ]
     rows += [
         (f"resonance peak at {both_units(at)}", f"{peak:.0f} N m in shaft 2")
@@ -64,8 +70,8 @@ def answers(study: DrivelineStudy) -> list[tuple[str, str]]:
     at = both_units(running.speed)
     if found.found[0]:
         rows += [
-            (f"shaft 2 at {at}", f"{found.least2[0]:.0f} to {found.largest2[0]:.0f} N m"),
-            (f"shaft 3 at {at}", f"{found.least3[0]:.0f} to {found.largest3[0]:.0f} N m"),
+            (f"shaft 2 at {at}", _torques(found.least2[0], found.largest2[0])),
+            (f"shaft 3 at {at}", _torques(found.least3[0], found.largest3[0])),
             ("Floquet multiplier there, per half turn", f"{found.multiplier[0]:.4f}"),
         ]
     else:
@@ -114,6 +120,11 @@ def _shown(x: float, unit: str) -> str:
     return f"{text} ({factor * x + offset:.5g} {other})"
 
 
+def _torques(least: float, largest: float) -> str:
+    # rounded to whole numbers, as a float may leave a minus before zero
+    return f"{round(least):d} to {round(largest):d} N m"
+
+
 def _frequency(k: float) -> str:
     return f"{k / (2.0 * math.pi):.3f} Hz ({k:.2f} rad/s)"
 
@@ -126,7 +137,7 @@ def _speed_axis(axis: Any, study: DrivelineStudy, mark: bool = True) -> None:
     above = axis.secondary_xaxis("top", functions=(lambda n: n * math.pi / 30.0, rev))
     above.set_xlabel("speed [rad/s]")
     if mark:
-        axis.axvline(rev(running.speed), color=_GREY, linewidth=1.2, linestyle=(0, (6, 2)), label="running")
+        axis.axvline(rev(running.speed), **_RUNNING)
 
 
 def _campbell(study: DrivelineStudy) -> Any:
@@ -175,6 +186,7 @@ def _campbell(study: DrivelineStudy) -> Any:
                 ha=side,
                 va=base,
                 fontsize=9,
+                bbox=_WHITE,
             )
     _speed_axis(axis, study)
     axis.set_ylim(0.0, 1.7 * high)
@@ -191,33 +203,35 @@ def _stability(study: DrivelineStudy) -> Any:
     )
     k, degrees = study.at_even, np.degrees(map_.bend)
     speed = rev(map_.speed)
-    for axis, ratio, growth in zip(axes[0], map_.ratio, map_.growth, strict=True):
-        shown = np.ma.masked_invalid(growth / k)
-        levels = [-1.0, 0.0, 0.01, 0.03, 10.0]
-        shades = ["#ffffff", "#d4d4d4", "#9a9a9a", "#4d4d4d"]
+    levels, shades = [-1.0, 0.0, 0.01, 0.03, 10.0], ["#ffffff", "#d4d4d4", "#9a9a9a", "#4d4d4d"]
+    names = ["stable", "grows below 0.01 k", "0.01 to 0.03 k", "faster"]
+    for axis, ratio, growth, unstable in zip(axes[0], map_.ratio, map_.growth, map_.unstable, strict=True):
+        # what does not count as unstable is not drawn so, however near
+        shown = np.ma.masked_invalid(np.where(unstable, growth / k, np.minimum(growth / k, -1e-9)))
         axis.contourf(speed, degrees, shown, levels=levels, colors=shades)
-        if np.any(growth > 0.0):
+        if np.any(unstable):
             axis.contour(speed, degrees, shown, levels=[0.0], colors="#1b1b1b", linewidths=1.3)
         rows, columns = np.nonzero(~np.isfinite(growth))
-        axis.plot(speed[columns], degrees[rows], "x", color="#c1440e", markersize=4.0)
+        axis.plot(speed[columns], degrees[rows], label="no steady motion found", **_MISSING)
         axis.set_title(f"damping ratio {ratio:g}")
         _speed_axis(axis, study)
         if study.config.joint != "both":
-            axis.axhline(
-                math.degrees(getattr(study.config.line, study.config.joint)), **{**LINES[3], "color": _GREY}
-            )
+            axis.axhline(math.degrees(getattr(study.config.line, study.config.joint)), **_AS_GIVEN)
     joint = {
         "alpha1": "bend of the joint on shaft 2",
         "alpha2": "bend of the joint on shaft 3",
         "both": "both bends",
     }
     axes[0][0].set_ylabel(f"{joint[study.config.joint]} [deg]")
-    handles = [plt.Rectangle((0, 0), 1, 1, facecolor=s, edgecolor="#1b1b1b") for s in shades]
-    labels = ["stable", "grows below 0.01 k", "0.01 to 0.03 k", "faster"]
-    handles.append(plt.Line2D([], [], color="#c1440e", marker="x", linestyle=""))
-    handles += axes[0][0].get_lines()[-2:]
-    labels += ["no steady motion found", "running", "bend as given"]
-    figure.legend(handles[: len(labels)], labels, loc="outside lower center", ncols=7, fontsize=9)
+    patches = [
+        Patch(facecolor=s, edgecolor="#1b1b1b", label=name) for s, name in zip(shades, names, strict=True)
+    ]
+    figure.legend(
+        handles=[*patches, *axes[0][0].get_legend_handles_labels()[0]],
+        loc="outside lower center",
+        ncols=7 if len(map_.ratio) > 2 else 2 + len(map_.ratio),
+        fontsize=9,
+    )
     figure.suptitle("Torsional stability (Floquet)")
     return figure
 
@@ -254,11 +268,13 @@ def _resonance(study: DrivelineStudy) -> Any:
             label="running",
         )
         axis.set_ylabel(f"peak torque of shaft {number} [N m]")
+        if np.nanmax(getattr(found, f"peak{number}"), initial=0.0) < 1e-3:
+            axis.set_ylim(1e-3, 1.0)  # nothing to see, not even roundoff
         axis.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:g}"))
         axis.yaxis.set_minor_formatter(FuncFormatter(_some))
     for at, peak in study.resonances():
-        axes[0].annotate(f"{rev(at):.0f} rev/min, {peak:.0f} N m", (rev(at), peak), (0, 5),
-                         textcoords="offset points", ha="center", fontsize=9)  # fmt: skip
+        axes[0].annotate(f"{rev(at):.0f} rev/min, {peak:.0f} N m", (rev(at), peak), (-8, 2),
+                         textcoords="offset points", ha="right", fontsize=9, bbox=_WHITE)  # fmt: skip
     axes[0].margins(y=0.1)
     _speed_axis(axes[0], study, mark=False)
     axes[0].set_xlabel("")

@@ -370,7 +370,7 @@ def stability_map(config: Config, progress: Callable[[float], None] = lambda don
     varied: dict[str, Any] = dict.fromkeys(JOINTS[config.joint], each_bend)
     damped = with_damping_ratio(line, 1.0)
     p = dataclasses.replace(line, d2=damped.d2 * each_ratio, d3=damped.d3 * each_ratio, **varied)
-    found = steady(p, each_speed, running.load, progress, tries=1)
+    found = steady(p, each_speed, running.load, progress)
     shape = (len(ratios), len(bend), len(speed))
     return StabilityMap(
         speed, bend, config.damping_ratios, found.growth.reshape(shape), found.unstable.reshape(shape)
@@ -430,7 +430,7 @@ def _warnings(study: DrivelineStudy) -> list[str]:
                 warnings.append(
                     f"Running at {both_units(at)} is {100.0 * near:.1f} % from where order {n} meets the natural "
                     f"frequency, {both_units(low, high)}; permitted is {100.0 * margin:.0f} %: change "
-                    "the speed or the shafts."
+                    f"the speed or the shafts. Amplitude of the order: {math.degrees(study.excitation[n]):.2g} deg."
                 )
     warnings += _even_running(line, study.ratio)
     found = study.operating
