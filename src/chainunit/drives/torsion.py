@@ -36,6 +36,7 @@ STEPS_PER_HARMONIC = 12
 
 _ITERATIONS = 12
 _AGAIN = 8  # from a neighbour, which is near
+_WALKS = (1, 1, 6)
 _CLOSED = 1e-9
 _NOISE = 1e-5  # of a multiplier: that of an undamped line is 1 but for the steps
 _LARGEST_STEP = 0.3  # of the unknowns of shooting, in rad and shares of the speed
@@ -165,14 +166,14 @@ class Steady(NamedTuple):
 
 
 def steady(
-    p: Cardan, speed: Any, load: Any = 0.0, progress: Progress = _nothing, chunk: int = 1024, tries: int = 4
+    p: Cardan, speed: Any, load: Any = 0.0, progress: Progress = _nothing, chunk: int = 1024
 ) -> Steady:
     """The motion that repeats itself after half a turn at the mean `speed` [rad/s], with the torque `load` [N.m] on
     J4, and its stability.
 
     Values of `p` may be numbers or arrays of the shape (n,) of `speed`. Points that need alike numbers of steps are
-    computed together, at most `chunk` at a time. What is not found is tried again from its neighbours, up to `tries`
-    times.
+    computed together, at most `chunk` at a time. What is not found is tried again from its neighbours: give speeds in
+    order.
     """
     speed = np.atleast_1d(np.asarray(speed, dtype=float))
     n = len(speed)
@@ -180,21 +181,22 @@ def steady(
     phi3, ratio, _ = two_joints(numpy_(), p, np.zeros(n))
     guess = np.stack([np.zeros(n), speed, phi3 - load / p.c3, speed * np.sqrt(ratio), load])
     found = _all(p, speed, load, guess, chunk, _ITERATIONS, lambda x: progress(0.8 * x))
-    # near a resonance Newton's method may need a neighbour to start from
-    for _ in range(tries):
-        before = found.found.copy()
+    # near a resonance Newton's method needs a neighbour to start from, and steps of the speed from there
+    for walk in _WALKS:
         for side in (-1, 1):
             missing = np.flatnonzero(~found.found)
             missing = missing[(missing + side >= 0) & (missing + side < n)]
             missing = missing[found.found[missing + side]]
-            if len(missing):
-                beside = missing + side
-                guess = np.concatenate([found.start[:, beside], found.drive[None, beside]])
-                again = _all(_pick(p, missing), speed[missing], load[missing], guess, chunk, _AGAIN, _nothing)
-                for whole, part in zip(found, again, strict=True):
-                    whole[..., missing] = part
-        if np.all(found.found == before):
-            break
+            if not len(missing):
+                continue
+            beside, q = missing + side, _pick(p, missing)
+            guess = np.concatenate([found.start[:, beside], found.drive[None, beside]])
+            for part in range(1, walk + 1):
+                there = speed[beside] + part / walk * (speed[missing] - speed[beside])
+                again = _all(q, there, load[missing], guess, chunk, _AGAIN, _nothing)
+                guess = np.concatenate([again.start, again.drive[None]])
+            for whole, new in zip(found, again, strict=True):
+                whole[..., missing] = new
     progress(1.0)
     return found
 
