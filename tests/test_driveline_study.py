@@ -15,8 +15,7 @@ from scipy.linalg import expm
 
 from chainunit import InputError, cli
 from chainunit.drives import shafts, torsion
-from chainunit.drives.cardan import Cardan, Line, Twist, frozen_frequency, two_joints
-from chainunit.drives.line_table import form, values
+from chainunit.drives.cardan import Cardan, Twist, frozen_frequency, two_joints
 from chainunit.drives.torsion import rigid, settling_time, simulate, steady, with_damping_ratio
 from chainunit.engines import MATH
 from chainunit.studies import driveline
@@ -305,24 +304,6 @@ def test_a_damping_ratio_sets_both_dampings():
     assert p.d2 / p.c2 == pytest.approx(p.d3 / p.c3)
     assert torsion.damping_ratio(p) == pytest.approx(0.07, rel=1e-12)
     assert (parse("[driveline]\nd2 = 5").line.d2, parse("[driveline]\nd2 = 5").line.d3) == (5.0, 0.0)
-
-
-def test_the_table_of_a_line_without_inertias():
-    """What a study file uses: the inertias are those of its motor and its machine."""
-    table = form(Line, "driveline", "driveline.").model_validate(
-        {"alpha1": "10 deg", "c2": 8000, "c3": 8000, "damping_ratio": 0.02}
-    )
-    given = values(table, "driveline.", J1=0.4, J4=40.0)
-    want = line(0.02)
-    assert given == {
-        "alpha1": pytest.approx(math.radians(10.0)),
-        "c2": 8000.0,
-        "c3": 8000.0,
-        "d2": pytest.approx(want.d2),
-        "d3": pytest.approx(want.d3),
-    }
-    with pytest.raises(ValueError, match="J1"):
-        values(table, "driveline.")
 
 
 # the driveline file

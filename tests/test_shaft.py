@@ -11,9 +11,11 @@ from scipy.linalg import eigh
 from test_page import Reader, check_traced
 
 from chainunit import InputError, config
+from chainunit.drives.shafts import hollow, stiffness
 from chainunit.models import MODELS
 from chainunit.report import files, page, plots
 from chainunit.studies.choice import choose
+from chainunit.studies.cycle import cycle
 from chainunit.studies.overload import as_dict, run_study
 from chainunit.studies.package import export_study, start_of
 from chainunit.studies.shaft import RIGID, Cycles, rainflow, shaft_answers, torsion
@@ -202,6 +204,9 @@ def test_a_coupling_that_opens_lets_line_and_machine_coast(tmp_path):
         ("[driveline]\nc3 = -1", "driveline.c3 = -1 N.m/rad: must be > 0 N.m/rad"),
         ("[driveline]\nJ4 = 0", "driveline.J4 = 0 kg.m2: must be > 0 kg.m2"),
         ("[driveline]\nJ1 = 2", "driveline.J1: unknown key; known here: alpha1"),
+        ("[driveline]\nc2 = 1\nshaft2 = { section = \"round\" }", "driveline.c2: given beside driveline.shaft2"),
+        ("[driveline]\nd2 = 1\ndamping_ratio = 0.1", "driveline.d2: given beside driveline.damping_ratio"),
+        ("[driveline]\nshaft3 = { section = \"round\", outer = \"40 mm\" }", "driveline.shaft3.length"),
         ("[driveline]\nexponent = 0", "driveline.exponent = 0: must be >= 1"),
         ('[driveline]\nplace = "roof"', "driveline.place = 'roof': input should be 'crank' or 'motor'"),
     ],
@@ -210,6 +215,26 @@ def test_bad_tables_are_refused(text, line):
     with pytest.raises(InputError) as refused:
         config.parse(text)
     assert str(refused.value).startswith(line) and "\n" not in str(refused.value)
+
+
+def test_stiffness_from_geometry_and_damping_from_a_ratio(tmp_path):
+    """The ratio is that of the vibration of rotor, line and machine at their mean inertia."""
+    table = """[driveline]
+shaft2 = { section = "hollow", outer = "60 mm", inner = "40 mm", length = "1 m" }
+c3 = 5e4
+damping_ratio = 0.04
+"""
+    drive = choose(config.parse(SHORT + table), tmp_path, lambda *_: None).drive
+    line = drive.line
+    assert line.c2 == pytest.approx(stiffness(hollow(0.06, 0.04), 1.0)) and line.c3 == 5e4
+    feed = config.parse(SHORT).feed
+    J = cycle(drive.machine, 6.0, feed.left, feed.right).outputs.J
+    c = 1.0 / (1.0 / line.c2 + 1.0 / line.c3)
+    J1, J4 = drive.parameters.rotor.J * line.ratio**2, line.J4 + float(np.mean(J)) * line.ratio**2
+    k = np.sqrt(c * (1.0 / J1 + 1.0 / J4))
+    d = 1.0 / (1.0 / line.d2 + 1.0 / line.d3)
+    # of one degree of freedom with the reduced inertia
+    assert d * (1.0 / J1 + 1.0 / J4) / (2.0 * k) == pytest.approx(0.04, rel=1e-12)
 
 
 def test_a_step_that_is_too_long_for_the_shaft_is_refused(tmp_path):

@@ -14,6 +14,7 @@ from .drives.cardan import Line, check
 from .drives.dc_motor import DcMotor
 from .drives.gearing import KINDS, Transmission
 from .drives.induction_motor import Inverter, SoftStart
+from .drives.line_table import form, given_line
 from .errors import InputError
 from .machines.api import ChainUnit, ratios
 from .machines.chain_unit import ChamberForces, SideLoads
@@ -217,7 +218,7 @@ _SECTIONS = {
     "gear": Transmission,
     "starter": Starter,
 }
-_Driveline = schema(Driveline, "driveline", "driveline.", place=(Literal[PLACES], "crank"))
+_Driveline = form(Driveline, "driveline", "driveline.", place=(Literal[PLACES], "crank"))
 _File = create_model(
     "Config",
     __config__=ConfigDict(extra="forbid"),
@@ -258,6 +259,8 @@ class Config:
     driveline: Driveline | None
     place: str
     """of the driveline, one of `PLACES`"""
+    damping_ratio: float | None
+    """of the driveline's torsion, in place of d2 and d3"""
     source: str
 
 
@@ -336,6 +339,7 @@ def parse(text: str, source: str = "config") -> Config:
         catalogue=_beside(checked.catalogue, source),
         driveline=_driveline(checked.driveline) if "driveline" in data else None,
         place=checked.driveline.place,
+        damping_ratio=checked.driveline.damping_ratio,
         source=source,
     )
     run, turn, o = config.run, 2.0 * math.pi / config.run.crank_speed, config.overload
@@ -351,9 +355,9 @@ def parse(text: str, source: str = "config") -> Config:
 
 
 def _driveline(section: Any) -> Driveline:
-    given = given_values(section)
-    given.pop("place", None)
-    line: Driveline = instance(Driveline, given)
+    given = given_line(section, "driveline.")
+    names = Layout(Driveline).names
+    line: Driveline = instance(Driveline, {name: x for name, x in given.items() if name in names})
     try:
         check(line)
     except InputError as error:

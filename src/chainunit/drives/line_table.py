@@ -38,12 +38,15 @@ class Damping:
     )
 
 
-def form(declared: type[Line], title: str, prefix: str) -> type[BaseModel]:
-    """The pydantic model of the table: the fields of `declared`, tables `shaft2`, `shaft3`, and `damping_ratio`.
+def form(declared: type[Line], title: str, prefix: str, **others: Any) -> type[BaseModel]:
+    """The pydantic model of the table: the fields of `declared`, tables `shaft2`, `shaft3`, `damping_ratio`,
+    `others`.
 
     `prefix` is what messages put before a name, such as "driveline.".
     """
-    more: dict[str, Any] = {v.name.removeprefix(prefix): number(v) for v in variables(Damping, prefix)}
+    more: dict[str, Any] = {
+        v.name.removeprefix(prefix): number(v) for v in variables(Damping, prefix)
+    } | others
     for name in SHAFTS:
         inner = _shaft(name, prefix + name + ".")
         more[name] = (inner, Field(default_factory=inner))
@@ -64,18 +67,12 @@ def _shaft(title: str, prefix: str) -> type[BaseModel]:
     )
 
 
-def values(
-    table: BaseModel, prefix: str, J1: float | None = None, J4: float | None = None
-) -> dict[str, float]:
-    """Numbers of a `Line` (or of what `form` was asked for) that the table gives, by name.
-
-    `J1`, `J4` [kg.m2] are the inertias at the two ends; needed where the table itself has none, as a damping ratio
-    goes with the natural frequency.
+def given_line(table: BaseModel, prefix: str) -> dict[str, Any]:
+    """What the table gives by name, the stiffness of its shafts worked out; a `damping_ratio` as it is, as it goes
+    with inertias that the table may not have.
 
     Raises
     ------
-    ValueError
-        for a damping ratio where an inertia is neither in the table nor given.
     InputError
         in one line: for a stiffness or a damping that is given twice, and see `shafts.stiffness_of`.
     """
@@ -93,17 +90,25 @@ def values(
             given[stiffness] = stiffness_of(keys)
         except InputError as error:
             raise InputError(f"{prefix}{shaft}.{error}") from error
-    ratio = given.pop("damping_ratio", None)
-    if ratio is None:
-        return given
     for name in ("d2", "d3"):
-        if name in given:
+        if name in given and "damping_ratio" in given:
             raise InputError(
                 f"{prefix}{name}: given beside {prefix}damping_ratio, which sets it; leave out one of the two"
             )
-    ends = {name: x for name, x in (("J1", J1), ("J4", J4)) if x is not None}
-    for name in ("J1", "J4"):
-        if name not in ends and name not in type(table).model_fields:
-            raise ValueError(f"{name}: a damping ratio needs it")
-    damped = with_damping_ratio(Cardan(**{**given, **ends}), ratio)
+    return given
+
+
+def values(table: BaseModel, prefix: str) -> dict[str, float]:
+    """Numbers of a `Cardan` that the table gives, by name.
+
+    Raises
+    ------
+    InputError
+        see `given_line`.
+    """
+    given = given_line(table, prefix)
+    ratio = given.pop("damping_ratio", None)
+    if ratio is None:
+        return given
+    damped = with_damping_ratio(Cardan(**given), ratio)
     return {**given, "d2": damped.d2, "d3": damped.d3}

@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 
 from ..config import Config
+from ..drives.cardan import Cardan
 from ..drives.dc_motor import DcMotor
 from ..drives.driveline import CardanDriveline
 from ..drives.speed_control import Tuning, tune
+from ..drives.torsion import with_damping_ratio
 from ..fmu.backends import Backend
 from ..quantities import Layout
 from .cycle import cycle
@@ -53,8 +55,14 @@ def with_line(config: Config, drive: Drive) -> Drive:
         return drive
     given = Layout(type(config.driveline)).named(config.driveline)
     values = {name: x for name, x in given.items() if name in CardanDriveline.parameter_layout.names}
-    gear = {"ratio": drive.ratio if config.place == "crank" else 1.0}
-    return replace(drive, line=CardanDriveline.parameter_layout.from_names(values | gear))
+    gear = drive.ratio if config.place == "crank" else 1.0
+    if config.damping_ratio is not None:
+        J = cycle(drive.machine, config.run.crank_speed, config.feed.left, config.feed.right).outputs.J
+        ends = {"J1": drive.parameters.rotor.J * gear**2, "J4": values["J4"] + float(np.mean(J)) * gear**2}
+        undamped = Cardan(**{name: x for name, x in values.items() if name in Layout(Cardan).names} | ends)
+        damped = with_damping_ratio(undamped, config.damping_ratio)
+        values |= {"d2": damped.d2, "d3": damped.d3}
+    return replace(drive, line=CardanDriveline.parameter_layout.from_names(values | {"ratio": gear}))
 
 
 def tuned(config: Config) -> tuple[Any, Tuning | None]:
