@@ -82,7 +82,13 @@ class Link:
 
     def at(self, s: Any) -> Motion:
         """Motion of the point at distance `s` from the pin along the link."""
-        r = self.u * s
+        return self._carried(self.u * s)
+
+    def beside(self, s: Any, t: Any) -> Motion:
+        """Motion of the point at distance `s` along the link and `t` to its left."""
+        return self._carried(self.u * s + self.u.turned() * t)
+
+    def _carried(self, r: Vec2) -> Motion:
         n = r.turned()
         return Motion(
             self.pin.p + r,

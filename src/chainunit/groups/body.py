@@ -12,15 +12,15 @@ from ..planar import Link, Motion, Vec2
 
 
 class Body:
-    """A mass `m` with inertia `I` at distance `s` from the pin of `link`, along it."""
+    """A mass `m` with inertia `I` at distance `s` from the pin of `link`, along it, and `t` to its left."""
 
     __slots__ = ("I", "c", "link", "m")
 
-    def __init__(self, link: Link, m: Any, s: Any, I: Any) -> None:
+    def __init__(self, link: Link, m: Any, s: Any, I: Any, t: Any = None) -> None:
         self.link = link
         self.m = m
         self.I = I
-        self.c = link.at(s)
+        self.c = link.at(s) if t is None else link.beside(s, t)
 
     def inertia(self) -> tuple[Any, Any]:
         """Reflected inertia J [kg m2] and its derivative dJ/dq by the coordinate."""

@@ -23,25 +23,13 @@ from ..engines import Dual, dual, slope
 from ..groups.body import Body, point_load, total
 from ..groups.driver import crank, driving_torque
 from ..groups.dyad import Dyad
+from ..groups.friction import pin_losses
 from ..model import Model, Part, Requirement
 from ..planar import ZERO, Link, Motion, Vec2
 from ..ports import PortSlopes, PortValues, flange, load_terminal
 from ..quantities import Value, declaration, group, quantity
 from .crank_rocker import TURNS, angle_at_pivot, longest_crank, pressure_angle
-
-# A pin that carries nothing has no direction: without a floor the slope of |R| is 0/0 there.
-_NO_FORCE = 1e-60  # N2
-
-
-@declaration
-class Rod:
-    """A link of the drive as a body."""
-
-    m: Value = quantity("kg", "mass", default=0.0, min=0.0, tunable=True)
-    s: Value = quantity(
-        "m", "distance of the centroid from the first pin, along the link", default=0.0, tunable=True
-    )
-    I: Value = quantity("kg.m2", "moment of inertia about the centroid", default=0.0, min=0.0, tunable=True)
+from .parts import Force, Pin, Rod
 
 
 @declaration
@@ -50,17 +38,6 @@ class SideMasses:
 
     wall_mass: Value = quantity("kg", "mass of the wall (rod l1)", default=54.0, min=0.0, tunable=True)
     web_mass: Value = quantity("kg", "mass of the web (rod l2)", default=21.6, min=0.0, tunable=True)
-
-
-@declaration
-class Pin:
-    """The pins, all alike."""
-
-    friction: Value = quantity("1", "coefficient of friction", default=0.12, min=0.0, tunable=True)
-    diameter: Value = quantity("m", "diameter", default=0.06, min=0.0, tunable=True)
-    w_smooth: Value = quantity(
-        "rad/s", "relative speed below which friction is smoothed", default=0.02, min=1e-9, tunable=True
-    )
 
 
 @declaration
@@ -159,14 +136,6 @@ class Inputs:
     left: SideLoads = group(SideLoads, "left organ", default=SideLoads())
     right: SideLoads = group(SideLoads, "right organ", default=SideLoads())
     stop: Stop = group(Stop, "stop that blocks the rocker", default=Stop())
-
-
-@declaration
-class Force:
-    """A force in the frame x right, y up."""
-
-    fx: Value = quantity("N", "force along x", nominal=1000.0)
-    fy: Value = quantity("N", "force along y", nominal=1000.0)
 
 
 @declaration
@@ -466,14 +435,7 @@ class Bias:
         self.stop_moment = -(held + u.stop.damping * k * w)
         self.reactions = Reactions(m, p, w2, 0.0, force_l, force_r, self.stop_moment)
 
-        per_newton = 0.5 * p.pin.friction * p.pin.diameter
-        smooth2 = p.pin.w_smooth * p.pin.w_smooth
-        friction = 0.0
-        for force, turn in self.reactions.pins(m):
-            k2 = turn * turn
-            size = xp.sqrt(force.squared() + _NO_FORCE)
-            friction = friction + k2 * (per_newton * size / xp.sqrt(k2 * w2 + smooth2) + p.joint_damping)
-        self.friction = friction * w
+        self.friction = pin_losses(xp, p.pin, p.joint_damping, w, self.reactions.pins(m))
         self.conservative = 0.5 * dJ * w2 + sum(body.weight_slope(p.g) for body in m.bodies) + held * k
         self.total = self.conservative + self.processing + self.friction + self.stop_damping
 
@@ -636,7 +598,13 @@ class ChamberForces(Model):
     )
     Parameters = Parameters
     Inputs = Inputs
-    files = ("machines/__init__.py", "machines/chain_unit.py", "machines/crank_rocker.py", "groups")
+    files = (
+        "machines/__init__.py",
+        "machines/chain_unit.py",
+        "machines/crank_rocker.py",
+        "machines/parts.py",
+        "groups",
+    )
     terminals = (flange("inflow"), load_terminal())
     icon = "chain_unit"
 

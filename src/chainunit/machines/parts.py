@@ -1,0 +1,35 @@
+"""What machines declare alike: links as bodies, pins, forces."""
+
+from __future__ import annotations
+
+from ..quantities import Value, declaration, quantity
+
+
+@declaration
+class Rod:
+    """A link of the drive as a body."""
+
+    m: Value = quantity("kg", "mass", default=0.0, min=0.0, tunable=True)
+    s: Value = quantity(
+        "m", "distance of the centroid from the first pin, along the link", default=0.0, tunable=True
+    )
+    I: Value = quantity("kg.m2", "moment of inertia about the centroid", default=0.0, min=0.0, tunable=True)
+
+
+@declaration
+class Pin:
+    """The pins, all alike."""
+
+    friction: Value = quantity("1", "coefficient of friction", default=0.12, min=0.0, tunable=True)
+    diameter: Value = quantity("m", "diameter", default=0.06, min=0.0, tunable=True)
+    w_smooth: Value = quantity(
+        "rad/s", "relative speed below which friction is smoothed", default=0.02, min=1e-9, tunable=True
+    )
+
+
+@declaration
+class Force:
+    """A force in the frame x right, y up."""
+
+    fx: Value = quantity("N", "force along x", nominal=1000.0)
+    fy: Value = quantity("N", "force along y", nominal=1000.0)
