@@ -23,6 +23,7 @@ from test_reference import POINTS, deviation
 
 from chainunit import ChainUnit, GeometryError, RunError
 from chainunit.cosim.instance import Fmu, Instance
+from chainunit.engines import MATH
 from chainunit.fmu.accompany import REFERENCE
 from chainunit.fmu.description import Interface
 from chainunit.fmu.native.export import export
@@ -117,13 +118,14 @@ def test_native_and_pythonfmu_agree(native, fmus):
 def jacobian(model, values):
     """Outputs, and derivatives of the states, by inputs and states, by CasADi from the same kernels."""
     interface = Interface(model, {})
-    (ps, us, xs), _, _, x, outputs, derivatives = interface.traced
+    symbols, _, _, x, outputs, derivatives = interface.traced
+    _, us, xs, _ = symbols
     states = model.state_layout.values(x) if model.state_layout else []
     rows = casadi.vertcat(*states, *outputs, *derivatives)
-    f = casadi.Function("j", [ps, us, xs], [casadi.jacobian(rows, casadi.vertcat(us, xs))])
+    f = casadi.Function("j", symbols, [casadi.jacobian(rows, casadi.vertcat(us, xs))])
     n_p, n_u = len(interface.parameters), len(interface.inputs)
     p, u, x0 = values[:n_p], values[n_p : n_p + n_u], values[n_p + n_u : n_p + n_u + len(interface.states)]
-    return np.array(f(p, u, x0))
+    return np.array(f(p, u, x0, model.derive(MATH, model.parameter_layout.instance(p))))
 
 
 @pytest.mark.parametrize("name", list(MODELS))

@@ -5,6 +5,7 @@ Standard library only: FMUs carry this file.
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -92,6 +93,8 @@ class Model:
     parts: ClassVar[tuple[Part, ...]]
     required: ClassVar[tuple[Requirement, ...]] = ()
     terminals: ClassVar[tuple[Terminal, ...]] = ()
+    derived: ClassVar[int] = 0
+    """How many values follow from the fixed parameters alone and are computed once, before a run: see `derive`."""
     input_rates: ClassVar[Mapping[str, str]] = {}
     """Inputs of a co-simulation FMU that run along another one, their time derivative, inside a step (``phi`` along
     ``w`` along ``a``): else what turns would stand still in each step."""
@@ -117,6 +120,20 @@ class Model:
         earlier one is not met."""
         return iter(())
 
+    @staticmethod
+    def derive(xp: Any, p: Any) -> list[Any]:
+        """What is computed once from the fixed parameters; the equations find it as ``p.derived``."""
+        return []
+
+    @classmethod
+    def prepared(cls, xp: Any, p: Any, derived: list[Any] | None = None) -> Any:
+        """Parameters with what `derive` finds, or with those values of it."""
+        if not cls.derived:
+            return p
+        ready = copy.copy(p)
+        object.__setattr__(ready, "derived", cls.derive(xp, p) if derived is None else derived)
+        return ready
+
     @classmethod
     def check(cls, p: Any) -> None:
         """Refuse parameters out of bounds, or that make no machine.
@@ -131,6 +148,11 @@ class Model:
         for line in violations(cls.parameter_layout, p):
             raise InputError(line)
         given = cls.parameter_layout.named(p)
+        try:
+            p = cls.prepared(MATH, p)
+        except (ArithmeticError, ValueError):
+            # `math` raises where other engines give NaN, which no requirement admits
+            p = cls.prepared(MATH, p, [math.nan] * cls.derived)
         for required, (value, low, high) in zip(cls.required, cls.requirements(MATH, p), strict=True):
             if not low < value < high:
                 raise GeometryError(required.refusal(value, low, high, given))

@@ -52,6 +52,7 @@ def monolithic(
         where the solver gives up.
     """
     xp = numpy_()
+    models = {name: (model, model.prepared(MATH, p)) for name, (model, p) in models.items()}
     offsets, n = {}, 0
     start: list[float] = []
     tolerances: list[float] = []

@@ -52,7 +52,7 @@ def _reference(interface: Interface) -> dict[str, bytes]:
     """Inputs and outputs over a second, from the Python kernels: outputs at points, or along an accurate integration
     of the states. Nothing where the start values let the states run away."""
     model = interface.model
-    p = model.parameter_layout.instance([s.start for s in interface.of("parameter")])
+    p = model.prepared(MATH, model.parameter_layout.instance([s.start for s in interface.of("parameter")]))
     start = {s.name: s.start for s in interface.of("input")}
     times = np.linspace(0.0, _STOP, _ROWS)
 

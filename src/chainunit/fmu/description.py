@@ -64,8 +64,8 @@ class Interface:
 
     @cached_property
     def traced(self) -> tuple[list[Any], Any, Any, Any, list[Any], list[Any]]:
-        """The model in symbols: (p, u, x as casadi vectors), p, u and x as declarations, outputs part by part in
-        declared order, and derivatives of the states."""
+        """The model in symbols: (p, u, x, what is derived from p, as casadi vectors), p, u and x as declarations,
+        outputs part by part in declared order, and derivatives of the states."""
         import casadi
 
         model = self.model
@@ -73,7 +73,10 @@ class Interface:
             casadi.SX.sym(name, len(group))
             for name, group in (("p", self.parameters), ("u", self.inputs), ("x", self.states))
         ]
+        symbols.append(casadi.SX.sym("k", model.derived))
         p = model.parameter_layout.instance(casadi.vertsplit(symbols[0]))
+        if model.derived:
+            p = model.prepared(casadi_(), p, casadi.vertsplit(symbols[3]))
         u = model.input_layout.instance(casadi.vertsplit(symbols[1]))
         x = model.state_layout.instance(casadi.vertsplit(symbols[2])) if model.state_layout else None
         outputs = self._outputs(p, u, x)
@@ -103,9 +106,42 @@ class Interface:
         n = len(self.parameters)
         return [([i for i in known if i >= n], first) for known, first in zip(in_run, at_start, strict=True)]
 
+    @cached_property
+    def derived(self) -> list[Any]:
+        """What is derived from the parameters, in symbols.
+
+        Raises
+        ------
+        ValueError
+            where it depends on a parameter that may change in a run.
+        """
+        import casadi
+
+        if not self.model.derived:
+            return []
+        symbols, p, *_ = self.traced
+        rows = [casadi.SX(v) for v in self.model.derive(casadi_(), p)]
+        known = {i for row in self._known(symbols[:1], rows) for i in row}
+        for i in sorted(known):
+            if self.parameters[i].quantity.tunable:
+                raise ValueError(
+                    f"{self.model.name}: {self.parameters[i].name} is tunable, but `derive` takes it"
+                )
+        return rows
+
+    def _influences(self, symbols: list[Any], rows: list[Any]) -> list[list[int]]:
+        """Value references of parameters, inputs and states that each row depends on, also through what is derived
+        from parameters."""
+        known = self._known(symbols, rows)
+        first = sum(symbol.shape[0] for symbol in symbols[:3])
+        through = self._known(symbols[:1], self.derived) if self.model.derived else []
+        return [
+            sorted({j for i in row for j in (through[i - first] if i >= first else (i,))}) for row in known
+        ]
+
     @staticmethod
-    def _influences(symbols: list[Any], rows: list[Any]) -> list[list[int]]:
-        """Value references of parameters, inputs and states that each row depends on."""
+    def _known(symbols: list[Any], rows: list[Any]) -> list[list[int]]:
+        """Places among the symbols that each row depends on."""
         import casadi
 
         f = casadi.Function("rows", symbols, [casadi.vertcat(*rows)])

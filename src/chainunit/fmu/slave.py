@@ -232,6 +232,7 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
             try:
                 p = self._p = self.model.parameter_layout.instance(self._set[: self._n_p])
                 self.model.check(p)
+                p = self._p = self.model.prepared(MATH, p)
                 if self.model.state_layout and not self._initialized:
                     self._x = self.model.state_layout.values(self.model.initial_states(MATH, p))
             except BaseException as reason:

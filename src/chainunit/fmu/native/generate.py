@@ -35,8 +35,10 @@ def kernels(interface: Interface) -> str:
     import casadi
 
     model = interface.model
-    symbols, p, _, _, outputs, derivatives = interface.traced
-    ps, us, xs = symbols
+    (ps, us, xs, ks), p, _, _, outputs, derivatives = interface.traced
+    # what is derived from parameters comes last, and only where there is something
+    more = [ks] if model.derived else []
+    symbols = [ps, us, xs, *more]
     outputs = list(outputs)
     names = [v.name for v in interface.others]
     for part in model.parts:
@@ -58,17 +60,19 @@ def kernels(interface: Interface) -> str:
     for i, group in enumerate(groups(interface)):
         values = casadi.vertcat(*(outputs[k] for k in group))
         add(f"group_{i}", symbols, values)
-        add(f"group_{i}_forward", [*symbols, du, dx], forward(values))
+        add(f"group_{i}_forward", [ps, us, xs, du, dx, *more], forward(values))
     if interface.states:
         rates = casadi.vertcat(*derivatives)
         add("derivatives", symbols, rates)
-        add("derivatives_forward", [*symbols, du, dx], forward(rates))
+        add("derivatives_forward", [ps, us, xs, du, dx, *more], forward(rates))
         assert model.state_layout is not None
         add("initial", [ps], casadi.vertcat(*model.state_layout.values(model.initial_states(casadi_(), p))))
         add("internal_step", [ps], casadi.SX(model.internal_step(casadi_(), p)))
     limits = [casadi.SX(v) for row in model.requirements(casadi_(), p) for v in row]
     if limits:
-        add("requirements", [ps], casadi.vertcat(*limits))
+        add("requirements", [ps, *more], casadi.vertcat(*limits))
+    if model.derived:
+        add("derive", [ps], casadi.vertcat(*interface.derived))
 
     generator = casadi.CodeGenerator("kernels.c", {"with_header": False, "verbose": False})
     for function in functions:
@@ -107,6 +111,8 @@ def tables(interface: Interface, guid: str, token: str) -> str:
         functions += ["derivatives", "derivatives_forward", "initial", "internal_step"]
     if model.required:
         functions.append("requirements")
+    if model.derived:
+        functions.append("derive")
 
     def quantity(v: Variable) -> str:
         q = v.quantity
@@ -172,6 +178,7 @@ def tables(interface: Interface, guid: str, token: str) -> str:
         "n_u": len(interface.inputs),
         "n_x": len(interface.states),
         "n_y": n_y,
+        "n_k": model.derived,
         "n_groups": len(groups_),
         "n_required": len(model.required),
         "start": "starts",
@@ -184,6 +191,7 @@ def tables(interface: Interface, guid: str, token: str) -> str:
         "all": "kernel_all",
         "required": "required" if rows else "NULL",
         "requirements": "kernel_requirements" if rows else "NULL",
+        "derive": "kernel_derive" if model.derived else "NULL",
         "initial": "kernel_initial" if states else "NULL",
         "derivatives": "kernel_derivatives" if states else "NULL",
         "derivatives_forward": "kernel_derivatives_forward" if states else "NULL",

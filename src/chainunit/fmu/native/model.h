@@ -12,7 +12,7 @@
 #pragma GCC visibility push(hidden)
 #endif
 
-/* A casadi function on (p, u, x) or (p, u, x, du, dx). */
+/* A casadi function on (p, u, x, k) or (p, u, x, du, dx, k); k is what `derive` found. */
 typedef int (*Kernel)(const double **arg, double **res, long long int *iw, double *w, int mem);
 
 typedef struct {
@@ -42,7 +42,7 @@ typedef struct {
     const char *name;
     const char *guid; /* of the FMI 2.0 description */
     const char *token; /* of the FMI 3.0 description */
-    int n_p, n_u, n_x, n_y, n_groups, n_required;
+    int n_p, n_u, n_x, n_y, n_k, n_groups, n_required;
     const double *start;          /* parameters, inputs */
     const Quantity *declared;     /* parameters, inputs */
     const double *nominal;        /* of the states */
@@ -52,7 +52,8 @@ typedef struct {
     const Group *groups;
     Kernel all;                   /* (p, u, x) -> outputs of all groups; cheaper than one after the other */
     const Requirement *required;
-    Kernel requirements;          /* (p) -> value, low, high of each */
+    Kernel requirements;          /* (p, k) -> value, low, high of each */
+    Kernel derive;                /* (p) -> what follows from fixed parameters and is computed once */
     Kernel initial;               /* (p) -> states at the start */
     Kernel derivatives;           /* (p, u, x) */
     Kernel derivatives_forward;   /* (p, u, x, du, dx) */

@@ -24,8 +24,9 @@ static unsigned guard(void) {
 Instance *instance_new(const char *name, Report report) {
     const int n_in = model.n_u + model.n_x;
     int work = 4 * model.n_x + 3 * n_in + model.n_y + model.n_x + 3 * model.n_required;
-    if (work < model.n_p + n_in + model.n_u) work = model.n_p + n_in + model.n_u; /* for a saved state */
-    const size_t n = (size_t)(model.n_p + 2 * model.n_u + 2 * model.n_x + model.n_y + work + 1);
+    const int saved = model.n_p + n_in + model.n_u + model.n_k;
+    if (work < saved) work = saved;
+    const size_t n = (size_t)(model.n_p + 2 * model.n_u + 2 * model.n_x + model.n_k + model.n_y + work + 1);
     Instance *c = calloc(1, sizeof *c);
     if (!c) return NULL;
     c->block_size = (n - 1 - (size_t)work) * sizeof(double);
@@ -42,7 +43,8 @@ Instance *instance_new(const char *name, Report report) {
     c->u = c->p + model.n_p;
     c->du = c->u + model.n_u;
     c->x = c->du + model.n_u;
-    c->dx = c->x + model.n_x;
+    c->k = c->x + model.n_x;
+    c->dx = c->k + model.n_k;
     c->y = c->dx + model.n_x;
     c->work = c->y + model.n_y;
     c->needs = c->slot + c->n_references + 1;
@@ -114,9 +116,13 @@ static Status check(Instance *c) {
             return complain(c, ERROR, "%s = %g %s: must be %s%s", q->name, v, q->unit, isfinite(v) ? "" : "finite, ",
                             q->allowed);
     }
+    const double *arg[2] = {c->p, c->k};
+    if (model.n_k) {
+        double *into[1] = {c->k};
+        model.derive(arg, into, NULL, NULL, 0);
+    }
     if (!model.n_required) return OK;
     double *limits = c->work;
-    const double *arg[1] = {c->p};
     double *res[1] = {limits};
     model.requirements(arg, res, NULL, NULL, 0);
     for (int i = 0; i < model.n_required; ++i) {
@@ -135,6 +141,7 @@ static Status check(Instance *c) {
         else
             snprintf(range, sizeof range, "must be %s %g %s", isfinite(low) ? ">" : "<", isfinite(low) ? low : high,
                      r->unit);
+        memset(c->k, 0, (size_t)model.n_k * sizeof(double)); /* nothing that is not finite stays behind */
         return complain(c, ERROR, "%s = %g %s: %s%s; %s", r->subject, value, r->unit, r->why, given, range);
     }
     return OK;
@@ -174,7 +181,7 @@ static int all_finite(const double *v, int n) {
 static Status evaluate(Instance *c, unsigned wanted) {
     wanted &= ~c->fresh;
     if (!wanted) return OK;
-    const double *arg[3] = {c->p, c->u, c->x};
+    const double *arg[4] = {c->p, c->u, c->x, c->k};
     double *res[1] = {c->y};
     if (wanted & (wanted - 1)) { /* more than one */
         model.all(arg, res, NULL, NULL, 0);
@@ -195,7 +202,7 @@ static Status evaluate(Instance *c, unsigned wanted) {
 
 Status derivatives(Instance *c) {
     if (!model.n_x || (c->fresh >> DERIVATIVES_BIT)) return OK;
-    const double *arg[3] = {c->p, c->u, c->x};
+    const double *arg[4] = {c->p, c->u, c->x, c->k};
     double *res[1] = {c->dx};
     model.derivatives(arg, res, NULL, NULL, 0);
     if (!all_finite(c->dx, model.n_x)) return complain(c, ERROR, "a derivative is not a finite number at t = %g s", c->time);
@@ -286,7 +293,7 @@ Status forward(Instance *c, const unsigned *unknown, size_t n_unknown, const uns
             return complain(c, ERROR, "directional derivative: value reference %u is neither input nor state", known[k]);
         du[i] += seed[k]; /* inputs and states follow each other in both */
     }
-    const double *arg[5] = {c->p, c->u, c->x, du, dx};
+    const double *arg[6] = {c->p, c->u, c->x, du, dx, c->k};
     unsigned done = 0;
     for (size_t k = 0; k < n_unknown; ++k) {
         int i = (int)unknown[k] - model.n_p - model.n_u;
@@ -354,7 +361,7 @@ Status output_derivative(Instance *c, unsigned reference, double *value) {
  * along their derivatives, to the end of the step */
 
 static int slope(Instance *c, double *u, const double *x, double *dx) {
-    const double *arg[3] = {c->p, u, x};
+    const double *arg[4] = {c->p, u, x, c->k};
     double *res[1] = {dx};
     model.derivatives(arg, res, NULL, NULL, 0);
     return all_finite(dx, model.n_x);

@@ -28,8 +28,8 @@ struct Instance {
     Mode mode;
     int model_exchange;
     double time;
-    /* one block: parameters, inputs, their derivatives, states, derivatives, outputs, work */
-    double *block, *p, *u, *du, *x, *dx, *y, *work;
+    /* one block: parameters, inputs, their derivatives, states, derived from parameters, derivatives, outputs, work */
+    double *block, *p, *u, *du, *x, *k, *dx, *y, *work;
     size_t block_size;
     unsigned n_references;
     unsigned *slot, *needs; /* of each value reference: place in the block, and what must be evaluated for it */
