@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from chainunit.report.reproduction import markdown
-from chainunit.studies.reproduction import PAPERS, paper000, reproduce
+from chainunit.studies.reproduction import PAPERS, paper000, paper003, reproduce
 
 ROWS = reproduce()
 
@@ -180,3 +180,28 @@ def test_the_documentation_shows_these_rows():
         # the last digit of a rounding error is the machine's own
         wanted = markdown([r for r in ROWS if r.paper == paper])
         assert re.sub(r"\d\.\de-\d\d", "tiny", block) == re.sub(r"\d\.\de-\d\d", "tiny", wanted)
+
+
+def test_the_scheme_of_paper_003_is_the_model_once_corrected():
+    """The paper's nine equations without the constant, with the cut: a second route to the forces of the triad, around
+    the whole turn; with the constant they depend on the unit of length."""
+    p = paper003.machine()
+    for angle in np.radians(np.arange(0.0, 360.0, 15.0)):
+        s = paper003.state(p, float(angle), cut=paper003.CUT)
+        wanted = paper003.ours(p, s)
+        size = np.max(np.abs(wanted))
+        np.testing.assert_allclose(paper003.as_the_paper(p, s, 0.0), wanted, atol=1e-12 * size)
+        metres, millimetres = (paper003.as_the_paper(p, s, line) - wanted for line in (1.0, 1000.0))
+        np.testing.assert_allclose(millimetres, 1000.0 * metres, atol=1e-8 * size)
+        assert np.max(np.abs(metres)) > 1e-4 * size
+
+
+def test_paper_003_shows_what_each_slip_does():
+    found = {r.quantity: r for r in ROWS if r.paper == "003"}
+    assert 0.03 < found["largest error of R_C, R_D, R_E in a turn, lengths in m"].computed < 1.7
+    assert 29.0 < found["largest error in a turn, lengths in mm"].computed < 1700.0
+    assert found["largest error in a turn without the constant"].computed < 1e-10
+    arm = found["force across O4E at E, crank angle 0"]
+    assert float(arm.printed) > 4.0 * arm.computed > 0.0
+    assert found["rank of the three moments with C, D, E on one line"].computed == 2.0
+    assert found["margin of the same triad, two forces and one moment"].computed > 0.1
