@@ -1,4 +1,4 @@
-"""The command line: ``chainunit`` with ``study``, ``driveline``, ``reproduce``, ``export``, ``export-ssp``."""
+"""The command line: ``study``, ``driveline``, ``knife``, ``reproduce``, ``export``, ``export-ssp``."""
 
 from __future__ import annotations
 
@@ -99,11 +99,7 @@ def study(
     table.show(result, console)
     console.print("Written: " + ", ".join(str(path) for path in written), soft_wrap=True)
     if result.failure is not None:
-        errors.print(
-            f"The run stopped early: {result.failure}. What was computed before is in {output}.",
-            soft_wrap=True,
-        )
-        raise typer.Exit(130 if isinstance(result.failure, InterruptedRunError) else 1)
+        _stopped_early(result.failure, output, errors)
 
 
 @contextmanager
@@ -168,6 +164,55 @@ def driveline(
     written = page.write(result, output)
     page.show(result, console)
     console.print("Written: " + ", ".join(str(path) for path in written), soft_wrap=True)
+
+
+@app.command()
+def knife(
+    config: Annotated[
+        Path | None, typer.Argument(help="Knife file (TOML); without one, the packaged example.")
+    ] = None,
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path("knife"),
+    backend: Annotated[
+        Backend | None, typer.Option("--backend", help="Of the FMUs; native where a C compiler is found.")
+    ] = None,
+    example: Annotated[
+        bool,
+        typer.Option("--example", help="Print the packaged knife file, to start one's own, and stop."),
+    ] = False,
+) -> None:
+    """A paper cutter's knife drive with motor and flywheel: blade, reactions, cut, speed fluctuation.
+
+    Writes knife.json, knife.md, plots and the FMUs into the output folder.
+    """
+    from .studies import knife as knives
+
+    if example:
+        print(knives.example(), end="")
+        return
+    loaded = knives.load(config)
+    folder(output)
+
+    from .report import knife as page
+
+    _clear(output, *page.NAMES)
+    console, errors = _console(), _console(stderr=True)
+    try:
+        with _progress("the turn at constant speed", errors) as report:
+            result = knives.run_knife(loaded, output, report, backend.value if backend else None)
+    except KeyboardInterrupt:
+        raise InterruptedRunError("interrupted before anything was written") from None
+    written = page.write(result, output)
+    page.show(result, console)
+    console.print("Written: " + ", ".join(str(path) for path in written), soft_wrap=True)
+    if result.failure is not None:
+        _stopped_early(result.failure, output, errors)
+
+
+def _stopped_early(failure: RunError, output: Path, errors: Console) -> None:
+    errors.print(
+        f"The run stopped early: {failure}. What was computed before is in {output}.", soft_wrap=True
+    )
+    raise typer.Exit(130 if isinstance(failure, InterruptedRunError) else 1)
 
 
 @app.command()
