@@ -530,9 +530,14 @@ def simulated(study: KnifeStudy, files: Mapping[str, Path], wheel: float) -> Whe
 
 
 def running(study: KnifeStudy, files: Mapping[str, Path], wheel: float) -> Wheel:
-    """Cutting only, from the rated speed with the blade at its top."""
-    config = study.config
-    start = {"w_start": config.motor.nameplate.speed, "phi_start": study.statics.top * config.machine.ratio}
+    """Cutting only; begins with the blade at its top, at the speed where the motor gives the mean torque."""
+    config, plate = study.config, study.config.motor.nameplate
+    ratio = config.machine.ratio
+    share = study.statics.turn.torque_mean / ratio / plate.torque
+    start = {
+        "w_start": plate.synchronous - (plate.synchronous - plate.speed) * min(share, 1.0),
+        "phi_start": study.statics.top * ratio,
+    }
     with CoSimulation(system(study, files, wheel, **start), {CUT: config.cut.force}) as simulation:
         return _measured(study, simulation, wheel, start["phi_start"])
 
