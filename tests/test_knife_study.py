@@ -205,7 +205,7 @@ turns = 1
 
 @pytest.fixture
 def study(exported, tmp_path):
-    said = []
+    said: list = []
     found = run_knife(parse(SMALL), tmp_path, lambda what, done, todo: said.append((what, done, todo)))
     assert said[0][0] == "exporting FMUs" and all(0.0 <= done <= todo for _, done, todo in said)
     return found
@@ -225,6 +225,9 @@ def test_the_study_and_its_files(study, tmp_path):
     assert study.by_hand(study.flywheel_by_hand) == pytest.approx(0.05, rel=1e-9)
     assert any(line.startswith("A fluctuation of 5 % takes a flywheel of") for line in study.notes)
     # rated current is passed by the light flywheels alone
+    assert any(
+        f"fluctuates by {100 * by[1].fluctuation:.3g} % with the flywheel that" in w for w in study.warnings
+    )
     hot = [line for line in study.warnings if "the RMS current is" in line]
     assert len(hot) == sum(a.current_rms > study.config.motor.nameplate.rated_current for a in by) > 0
 
@@ -257,13 +260,33 @@ def test_a_run_that_fails_keeps_what_was_computed(exported, tmp_path, monkeypatc
     assert not [line for line in study.warnings if line.startswith("No flywheel")]
 
 
+def test_a_flywheel_that_does_not_start_is_not_too_light(exported, tmp_path):
+    study = run_knife(
+        parse("[drive]\nflywheel = 9\nflywheels = []\n[run]\nsettle_turns = 2\nturns = 1\n"), tmp_path
+    )
+    (wheel,) = study.wheels
+    assert wheel.answers.start_time is None and not wheel.stalled
+    assert any("does not come to 95 % of its rated speed in 30 s" in line for line in study.warnings)
+    assert 0.4 < study.least.flywheel < 1.2 and study.least.keeps(0.05)
+
+
+def test_a_large_motor_needs_no_flywheel(exported, tmp_path):
+    big = "[drive]\nmotor = 'IE3 4-pole 75 kW, 280S'\nflywheel = 0.1\nflywheels = []\n"
+    study = run_knife(parse(big + "[run]\nsettle_turns = 1\nturns = 1\n"), tmp_path)
+    assert study.least.flywheel == 0.0 and study.flywheel_by_hand == 0.0
+    assert study.notes[0].startswith(
+        "For a fluctuation of 5 % no flywheel is needed; nor is it by hand. Without "
+    )
+
+
 def test_a_motor_that_stalls(exported, tmp_path):
     study = run_knife(parse(SMALL.replace("[0.1, 1.2]", "[]") + "[cut]\nforce = 1e5\n"), tmp_path)
     (wheel,) = study.wheels
     assert wheel.stalled and wheel.answers.fluctuation is None and wheel.answers.start_time is not None
     assert any("the motor stalls under the cut" in line for line in study.warnings)
     assert study.least is None
-    assert any("nor does the one by the hand formula" in line for line in study.warnings)
+    assert any("of the motor on average, rated is 14.4 N m" in line for line in study.warnings)
+    assert any("nor does a larger one that was tried" in line for line in study.warnings)
     written = [file.name for file in page.write(study, tmp_path)]
     assert "flywheel.png" not in written and "stalls" in (tmp_path / page.TEXT).read_text()
 

@@ -60,7 +60,7 @@ def _value(x: float | None, unit: str) -> str:
     if unit in DISPLAY_UNITS:
         unit, factor, offset = DISPLAY_UNITS[unit]
         x = factor * x + offset
-        return f"{x:.4g} {unit}"
+        return f"{x:.{4 if abs(x) >= 1.0 else 2}g} {unit}"
     return f"{x:.3g} {unit.replace('.', ' ')}" if abs(x) < 1e3 else f"{x:.0f} {unit.replace('.', ' ')}"
 
 
@@ -262,17 +262,7 @@ def _blade_path(study: KnifeStudy) -> Any:
 
     path, tilt = figure.add_subplot(grid[1, 0]), figure.add_subplot(grid[1, 1])
     x, y = 1e3 * np.append(s.x, s.x[0]), 1e3 * np.append(s.y, s.y[0])
-    middle = 0.5 * (np.min(x) + np.max(x))
-    half = 0.62 * float(np.ptp(x)) + 5.0
-    path.add_patch(
-        Rectangle(
-            (middle - half, 1e3 * stack.table),
-            2.0 * half,
-            1e3 * (stack.top - stack.table),
-            zorder=1,
-            **_STACK,
-        )
-    )
+    path.axhspan(1e3 * stack.table, 1e3 * stack.top, zorder=1, **_STACK)
     path.plot(x, y, **LINES[0])
     # on the way down alone: the way up may run along the same line
     for k in range(7):
@@ -289,7 +279,7 @@ def _blade_path(study: KnifeStudy) -> Any:
             fontsize=9,
             bbox=_WHITE,
         )
-    path.set_xlim(middle - half, middle + half)
+    path.margins(x=0.3, y=0.2)
     path.set_aspect("equal", adjustable="datalim")
     path.set_xlabel("x [mm]")
     path.set_ylabel("y [mm]")
