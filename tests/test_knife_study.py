@@ -122,7 +122,7 @@ def test_fluctuation_by_hand_with_a_large_flywheel(files):
 def test_cutting_against_the_static_torque_of_the_motor(files):
     """The co-simulated cut beside an ODE of one state: the circuit's steady torque, the machine's torque and inertia
     over the angle by table, by another integrator."""
-    study, wheel = bare(), 0.6
+    study, wheel = bare(), 0.8
     s, p = study.statics, study.config.machine
     inertia, base = s.inertia / p.ratio**2, study.motor.rotor.J + wheel
     # torque at the speed asked for; what goes with the square of the speed is small here
@@ -150,7 +150,7 @@ def test_cutting_against_the_static_torque_of_the_motor(files):
 
 def test_energy_over_a_cut(files):
     """What flywheel and machine lose, and what comes through the air gap, is the work of the cut."""
-    study, wheel = bare(), 0.6
+    study, wheel = bare(), 0.8
     found = knife.running(study, files, wheel)
     run = found.turns
     power, time = knife.cutting_power(run), run["time"].values

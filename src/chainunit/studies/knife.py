@@ -479,8 +479,9 @@ def run_knife(
         for k, wheel in enumerate(config.flywheels):
             report(f"cutting with a flywheel of {wheel:g} kg m2", k + 1.0, todo)
             study.wheels.append(simulated(study, files, wheel))
-        report("least flywheel", todo - 1.0, todo)
-        study.least = _least(study, files)
+        study.least = _least(
+            study, files, lambda wheel: report(f"least flywheel: {_kg_m2(wheel)}", todo - 1.0, todo)
+        )
     except RunError as error:
         study.failure, study.unfinished = error, error.partial
     study.warnings, study.notes = _warnings(study), _notes(study)
@@ -643,25 +644,31 @@ def stored_shares(study: KnifeStudy, run: xr.Dataset, wheel: float) -> tuple[flo
     return net / work, most / work
 
 
-def _least(study: KnifeStudy, files: Mapping[str, Path]) -> Wheel | None:
+def _least(study: KnifeStudy, files: Mapping[str, Path], tell: Callable[[float], None]) -> Wheel | None:
     """The least flywheel that keeps the permitted fluctuation, to `CLOSE` of the fluctuation; None where none of the
-    list does, nor the one by hand or a fifth more than the largest. It need not start.
+    list does, nor the one by hand or a fifth more than the largest. It need not start. `tell`
+    is told each flywheel that is tried.
 
     The fluctuation falls with the inertia, and between two flywheels nearly as a power of it.
     """
+
+    def tried(run: Callable[..., Wheel], wheel: float) -> Wheel:
+        tell(wheel)
+        return run(study, files, wheel)
+
     permitted = study.config.run.fluctuation
     above = next((wheel for wheel in study.wheels if wheel.keeps(permitted)), None)
     # what does not start is not too light
-    tried = [wheel for wheel in study.wheels if wheel.answers.start_time is not None]
-    below = next((w for w in reversed(tried) if above is None or w.flywheel < above.flywheel), None)
+    started = [wheel for wheel in study.wheels if wheel.answers.start_time is not None]
+    below = next((w for w in reversed(started) if above is None or w.flywheel < above.flywheel), None)
     if below is None:
-        below = running(study, files, 0.0)
+        below = tried(running, 0.0)
         if above is not None and above.flywheel == 0.0:
             return above
         if below.keeps(permitted):
-            return simulated(study, files, 0.0)
+            return tried(simulated, 0.0)
     if above is None:
-        above = running(study, files, max(study.flywheel_by_hand, 1.2 * below.flywheel))
+        above = tried(running, max(study.flywheel_by_hand, 1.2 * below.flywheel))
         if not above.keeps(permitted):
             return None
     for _ in range(8):
@@ -674,7 +681,7 @@ def _least(study: KnifeStudy, files: Mapping[str, Path]) -> Wheel | None:
             # a little below what is permitted, so that the next one is likely to keep it
             wanted = math.log((1.0 - 0.5 * CLOSE) * permitted)
             share = min(max((y[0] - wanted) / (y[0] - y[1]), 0.05), 0.95)
-        middle = running(study, files, math.exp(x[0] + share * (x[1] - x[0])) - study.inertia(0.0))
+        middle = tried(running, math.exp(x[0] + share * (x[1] - x[0])) - study.inertia(0.0))
         if middle.keeps(permitted):
             above = middle
         else:
@@ -682,12 +689,12 @@ def _least(study: KnifeStudy, files: Mapping[str, Path]) -> Wheel | None:
     if above.start is not None:
         return above
     # the start warms the windings, and the motor slips a little more
-    found = simulated(study, files, above.flywheel)
+    found = tried(simulated, above.flywheel)
     for _ in range(4):
         if found.answers.fluctuation is None or found.keeps(permitted):
             break
         heavier = found.answers.inertia * found.answers.fluctuation / permitted * (1.0 + CLOSE)
-        found = simulated(study, files, heavier - study.inertia(0.0))
+        found = tried(simulated, heavier - study.inertia(0.0))
     return found
 
 
