@@ -115,8 +115,8 @@ def test_slopes_of_the_port():
 
 
 def test_damping_is_that_of_a_cardan_without_mass():
-    """Against the exact massless cardan, whose angle phi2 is a state: alike where d2/c2 = d3/c3; else they differ by
-    the order of (k d/c)^2."""
+    """Against the exact massless cardan, whose angle phi2 is a state, in parts of the start's twist: alike where
+    d2/c2 = d3/c3; else they differ by the order of (k d/c)^2, a quarter with half the damping."""
 
     def exact(p, J1, J4, start, stop):
         def rates(_, y):
@@ -137,16 +137,18 @@ def test_damping_is_that_of_a_cardan_without_mass():
 
         return solve_ivp(rates, (0.0, stop), start, method="DOP853", rtol=1e-11, atol=1e-14).y[:, -1]
 
-    J1, J4 = 0.4, 2.0
-    for d2, d3, allowed in ((2.0, 4.0, 2e-5), (2.0, 0.5, 2e-4)):
+    J1, J4, differences = 0.4, 2.0, []
+    for d2, d3 in ((2.0, 4.0), (2.0, 0.0), (1.0, 0.0)):
         p = Line(c2=8000.0, c3=16000.0, alpha1=0.4, alpha2=0.1, d2=d2, d3=d3)
         phi3, i, _ = cardan.two_joints(engines.MATH, p, 0.2)
         start = [0.2 + 1e-3, 20.0, phi3, 20.0 * i]
         phi2 = cardan.middle_angle(engines.MATH, p, start[0], phi3)
         found = ours(p, J1, J4, start, 0.2)
         wanted = exact(p, J1, J4, [*start, phi2], 0.2)[:4]
-        moved = np.abs(found - wanted) / [1e-3, 0.2, 1e-3, 0.2]
-        assert np.max(moved) < allowed / 1e-2, (d2, d3, moved)
+        differences.append(float(np.max(np.abs(found - wanted) / [1e-3, 0.2, 1e-3, 0.2])))
+    alike, other, half = differences
+    print(differences)
+    assert alike < 1e-5 and 1e-4 < other < 1e-2 and 3.0 < other / half < 5.0, differences
 
 
 @pytest.fixture(scope="module")

@@ -85,7 +85,8 @@ def test_reference_points_by_the_native_fmu(fmi, tmp_path):
 
 
 def random_machine(rng):
-    """A knife drive around the packaged one: any triad, hung at any angle, with any bodies; None if it does not turn."""
+    """A knife drive around the packaged one: any triad, hung at any angle, with any bodies; None if it does not
+    turn."""
     given = {f"knife.{pin}.{axis}": rng.uniform(-0.6, 0.6) for pin in "cde" for axis in "xy"}
     given |= {
         "r": rng.uniform(0.02, 0.09),

@@ -183,8 +183,8 @@ def test_the_documentation_shows_these_rows():
 
 
 def test_the_scheme_of_paper_003_is_the_model_once_corrected():
-    """The paper's nine equations without the constant, with the cut: a second route to the forces of the triad, around
-    the whole turn; with the constant they depend on the unit of length."""
+    """The paper's nine equations without the constant, with the cut: a second route to the forces of the triad,
+    around the whole turn; with the constant they depend on the unit of length."""
     p = paper003.machine()
     for angle in np.radians(np.arange(0.0, 360.0, 15.0)):
         s = paper003.state(p, float(angle), cut=paper003.CUT)

@@ -142,26 +142,29 @@ def test_rainflow_is_that_of_the_standard():
     assert rainflow([1.0, 1.0]).damage(5.0) == 0.0
 
 
-def test_damage_of_a_steady_swing(study):
-    """A sine of range 2 A once a turn: the equivalent range is 2 A."""
-    turns, points = 20, 400
-    angle = np.linspace(0.0, turns, turns * points + 1)
-    swing = ("time", 7.0 * np.sin(2.0 * np.pi * angle))
-    zero = ("time", np.zeros_like(angle))
-    ratio = study.drive.driven.p.ratio
-    run = xr.Dataset(
-        {
-            "driveline.tau2": swing, "driveline.tau3": swing, RIGID: swing,
-            "driveline.twist2": zero, "driveline.twist3": zero,
-            "machine.phi0": ("time", 2.0 * np.pi * angle * ratio), "machine.w0": zero,
-        },
-        {"time": angle},
-    )  # fmt: skip
-    answers, cycles, damage = shaft_answers(study.drive, run, 5.0)
-    assert answers.range_equivalent == pytest.approx(14.0, rel=0.01)
-    assert isinstance(cycles, Cycles) and damage == pytest.approx(14.0**5, rel=0.05)
-    event, _, _ = shaft_answers(study.drive, run, 5.0, damage)
-    assert event.turns_of_steady == pytest.approx(turns)
+@pytest.mark.parametrize("turns", [1, 2, 20])
+@pytest.mark.parametrize("phase", [0.0, 0.4, 2.0])
+def test_damage_of_a_steady_swing(study, turns, phase):
+    """A sine of range 2 A once a turn: the equivalent range is 2 A, whatever the window; an event of as many turns
+    does that of as many, but for its open ends."""
+    angle = np.linspace(0.0, turns, turns * 400 + 1)
+    swing = 7.0 * np.sin(2.0 * np.pi * angle + phase)
+    zero, gear = np.zeros_like(angle), study.drive.driven.p.ratio
+    series = {
+        "driveline.tau2": swing, "driveline.tau3": swing, "driveline.twist2": zero, "driveline.twist3": zero,
+        "machine.phi0": 2.0 * np.pi * angle * gear, "machine.w0": zero,
+        # the torque of a rigid shaft twice as small
+        "machine.tau": 0.5 * swing / study.drive.line.ratio, "motor.a": zero,
+    }  # fmt: skip
+    run = xr.Dataset({name: ("time", y) for name, y in series.items()}, {"time": angle})
+    answers, cycles, damage = shaft_answers(study.drive, run, run, 5.0)
+    assert answers.range_equivalent == pytest.approx(14.0, rel=1e-4) and answers.cycles == pytest.approx(
+        turns, abs=1
+    )
+    assert isinstance(cycles, Cycles) and damage == pytest.approx(14.0**5, rel=1e-3)
+    assert answers.amplification == pytest.approx(2.0)
+    event, _, _ = shaft_answers(study.drive, run, run, 5.0, damage)
+    assert event.turns_of_steady == pytest.approx(turns, abs=0.6) and event.range_equivalent is None
 
 
 def test_the_report_shows_it(study, tmp_path):
@@ -179,8 +182,15 @@ def test_the_report_shows_it(study, tmp_path):
     } <= paths
     assert "with a rigid shaft" in text
     assert as_dict(study)["torque_cycles"]["jam_left"]
-    head = (tmp_path / "load_cycle.csv").read_text().splitlines()[0]
+    head, first = (tmp_path / "load_cycle.csv").read_text().splitlines()[:2]
     assert head == "time [s],speed [rad/s],torque [N.m],inertia [kg.m2]"
+    # at the motor: J4 and the machine's inertia through the gear
+    steady = study.runs["start_up"].sel(time=slice(study.settled, None))
+    inertia = (float(steady["machine.J"][0]) + study.drive.line.J4) / 25.0**2
+    assert float(first.split(",")[3]) == pytest.approx(inertia, rel=1e-8)
+    assert float(first.split(",")[2]) == pytest.approx(float(steady["driveline.tau"][0]), rel=1e-8)
+    result = as_dict(study)["driveline"]
+    assert result["place"] == "crank" and result["damping_ratio"]["value"] is None
 
 
 def test_a_coupling_that_opens_lets_line_and_machine_coast(tmp_path):
@@ -194,6 +204,31 @@ def test_a_coupling_that_opens_lets_line_and_machine_coast(tmp_path):
     assert float(coasting["machine.w"][0]) == pytest.approx(w, rel=1e-12)
     assert study.drive.coasting_parameters()["J_added"] == study.drive.line.J4
     assert study.certificate["jam_left"]["driveline_energy_residual_share"] < 1e-3
+
+
+def test_the_rigid_drive_has_the_same_coupling(tmp_path):
+    """Where it opens, both peak near the trip torque: what comes after it is in neither."""
+    events = SHORT.replace("jam_left", "blocked")
+    study = run_study(config.parse(f"{events}{LINE}[coupling]\ntrip_torque = 150\n"), tmp_path)
+    blocked = study.shaft["blocked"]
+    assert study.answers["blocked"].coupling_trip_time is not None
+    assert 140.0 < blocked.tau2_rigid < 300.0 and 0.6 < blocked.amplification < 1.5
+
+
+def test_without_a_motor_there_is_nothing_to_say_of_the_shaft(tmp_path):
+    text = f"{LINE}[sizing]\ncandidates = 1\ninertia_ratio = 1e-6\n[run]\nstep = 0.002\n"
+    study = run_study(config.parse(text), tmp_path)
+    assert study.sizing.chosen is None and "shaft" not in as_dict(study)
+    files.write(study, tmp_path)
+    page.write(study, tmp_path)
+
+
+def test_the_speed_loop_is_tuned_and_shown_with_the_line(tmp_path):
+    """A heavy J4: the gains are those of rotor, J4 and machine, and so is the loop that is shown."""
+    study = run_study(config.parse(f"{SHORT}[driveline]\nJ4 = 20\n"), tmp_path)
+    loop, drive = study.loops["mean inertia"], study.drive
+    assert loop.inertia > drive.parameters.rotor.J + 20.0 / 25.0**2
+    assert loop.crossover == pytest.approx(study.tuning.crossover, rel=0.05)
 
 
 @pytest.mark.parametrize(
@@ -247,6 +282,7 @@ def test_a_step_that_is_too_long_for_the_shaft_is_refused(tmp_path):
 
 def test_export_of_the_studys_line(tmp_path):
     loaded = config.parse(SHORT + LINE)
+    assert start_of(loaded, MODELS["ChamberForces"])["ratio"] == 1.0
     start = start_of(loaded, MODELS["CardanDriveline"])
     assert (
         start["ratio"] == 25.0 and start["d2"] == 20.0 and start["alpha2"] == pytest.approx(np.radians(8.0))

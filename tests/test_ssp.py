@@ -22,7 +22,7 @@ from chainunit import InputError, cli, config
 from chainunit.cosim import CoSimulation, System, port_connections
 from chainunit.fmu import ssp
 from chainunit.models import MODELS
-from chainunit.studies.choice import tuned as tuned_motor
+from chainunit.studies.choice import choose
 from chainunit.studies.package import export_study, start_of
 
 MINE = """
@@ -138,7 +138,7 @@ def test_connectors_are_the_fmus_variables(package, tmp_path):
 
 def test_parameter_sets_and_fmus_hold_the_studys_values(package, tmp_path):
     loaded = config.parse(MINE)
-    motor, _ = tuned_motor(loaded)
+    motor = choose(loaded, tmp_path, lambda *_: None).drive.parameters
     assert motor.limit.i == 3.9 and motor.speed_control.kp != loaded.motor.speed_control.kp
     start = {
         "machine": start_of(loaded, MODELS["ChamberForces"]),

@@ -236,11 +236,12 @@ def test_every_number_has_its_unit(done):
     check(json.loads((done[1] / "result.json").read_text()), "result")
 
 
-def test_gains_that_are_not_given_are_tuned():
+def test_gains_that_are_not_given_are_tuned(tmp_path):
     from chainunit import config
-    from chainunit.studies.choice import tuned as tuned_motor
+    from chainunit.studies.choice import choose
 
-    motor, _ = tuned_motor(config.parse("[motor]\nspeed_control = { kp = 0.2 }\narmature = { L = 0.22 }"))
+    given = config.parse("[motor]\nspeed_control = { kp = 0.2 }\narmature = { L = 0.22 }")
+    motor = choose(given, tmp_path, lambda *_: None).drive.parameters
     assert motor.speed_control.kp == 0.2
     assert motor.current_control.kp == pytest.approx(0.22 * 300.0)
 

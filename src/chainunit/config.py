@@ -10,8 +10,9 @@ from typing import Any, Literal
 
 from pydantic import ConfigDict, Field, ValidationError, create_model
 
-from .drives.cardan import Line, check
+from .drives.cardan import check
 from .drives.dc_motor import DcMotor
+from .drives.driveline import Mounted
 from .drives.gearing import KINDS, Transmission
 from .drives.induction_motor import Inverter, SoftStart
 from .drives.line_table import form, given_line
@@ -184,13 +185,9 @@ class Starter:
 
 
 @declaration
-class Driveline(Line):
+class Driveline(Mounted):
     """A cardan driveline between motor and machine. The start values are ours: the paper prints no dimensions."""
 
-    J4: Value = quantity("kg.m2", "inertia on shaft 3, beside the machine's", default=0.5, above=0.0)
-    gamma1: Value = quantity(
-        "rad", "angle of the yoke of shaft 2 from the plane of its joint at crank angle 0", default=0.0
-    )
     exponent: Value = quantity(
         "1",
         "exponent of Woehler's line for the damage of torque cycles; assumed",

@@ -185,7 +185,8 @@ class Model:
 
     @classmethod
     def evaluate(cls, xp: Any, p: Any, u: Any, x: Any = None) -> tuple[Any, ...]:
-        """Every part's outputs at one point (or array of points); parameters that are not `prepared` are, each time."""
+        """Every part's outputs at one point (or array of points); parameters that are not `prepared` are, each
+        time."""
         if cls.derived and not hasattr(p, "derived"):
             p = cls.prepared(MATH, p)
         shared = cls.shared(xp, p, u, x)

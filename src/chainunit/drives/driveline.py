@@ -40,17 +40,23 @@ W_SMALL = 0.1
 
 
 @declaration
-class Parameters(Line):
-    """Parameters of the driveline. The start values are ours: the paper prints no dimensions."""
+class Mounted(Line):
+    """A line with what turns on its driven side, as it is mounted."""
 
     J4: Value = quantity("kg.m2", "inertia on shaft 3, beside the machine's", default=0.5, above=0.0)
-    ratio: Value = quantity(
-        "1", "gear ratio, motor turns per turn of shaft 2", default=1.0, above=0.0, max=1e6
-    )
     gamma1: Value = quantity(
         "rad",
-        "angle of the yoke of shaft 2 from the plane of its joint, untwisted and at phi = 0",
+        "angle of the yoke of shaft 2 from the plane of its joint, untwisted and with the motor at 0",
         default=0.0,
+    )
+
+
+@declaration
+class Parameters(Mounted):
+    """Parameters of the driveline. The start values are ours: the paper prints no dimensions."""
+
+    ratio: Value = quantity(
+        "1", "gear ratio, motor turns per turn of shaft 2", default=1.0, above=0.0, max=1e6
     )
     phi_start: Value = quantity(
         "rad", "angle of the motor at the start, where the line is untwisted", default=0.0
@@ -221,9 +227,11 @@ class CardanDriveline(Model):
     @staticmethod
     def internal_step(xp: Any, p: Any) -> Any:
         """A tenth of the time in which the driven inertia alone swings by a radian on shaft 3, half of that in which
-        it decays, and at most 0.25 ms."""
+        it decays at any i23, and at most 0.25 ms."""
         slowest = xp.minimum(2.5e-4, 0.1 * xp.sqrt(p.J4 / p.c3))
-        return 1.0 / (1.0 / slowest + 2.0 * p.d3 / p.J4)
+        # of d2 the share (d phi2/d phi4)^2 = (i c3/(c2 + i^2 c3))^2 acts, at most c3/(4 c2)
+        damping = p.d3 + p.d2 * xp.maximum(1.0, p.c3 / (4.0 * p.c2))
+        return 1.0 / (1.0 / slowest + 2.0 * damping / p.J4)
 
     @staticmethod
     def initial_states(xp: Any, p: Any) -> Any:

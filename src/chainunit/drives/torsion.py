@@ -361,6 +361,17 @@ def damping_ratio(p: Cardan) -> float:
     return 0.5 * k * (p.d2 * soft2**2 + p.d3 * soft3**2) / (soft2 + soft3)
 
 
+def simulation_steps(p: Cardan, speed: Any, settle: float) -> float:
+    """Steps that `simulate` takes until all speeds have settled."""
+    speed = np.atleast_1d(np.asarray(speed, dtype=float))
+    counts, settled = half_turn_steps(expand(p, len(speed)), speed), _settled(speed, settle)
+    return float(np.max(np.ceil(settled * speed / math.pi) * counts))
+
+
+def _settled(speed: Any, settle: float) -> Any:
+    return np.maximum(settle, 50.0 * math.pi / speed)
+
+
 def simulate(
     p: Cardan, speed: Any, load: float, settle: float, half_turns: int = 2, progress: Progress = _nothing
 ) -> Simulated:
@@ -375,8 +386,8 @@ def simulate(
     q = expand(p, n)
     period = math.pi / speed
     counts = half_turn_steps(q, speed)
-    settled = np.maximum(settle, 50.0 * period)
-    steps = int(np.max(np.ceil(settled / period) * counts))
+    settled = _settled(speed, settle)
+    steps = int(simulation_steps(p, speed, settle))
     window = half_turns * counts
     gain, slow = 10.0 / settled, 2.0 * period
     h = period / counts

@@ -76,8 +76,11 @@ def answers(study: DrivelineStudy) -> list[tuple[str, str]]:
         ]
     else:
         rows.append((f"steady motion at {at}", "not found"))
-    unstable = study.unstable_ranges()
-    rows.append(("unstable", "; ".join(both_units(*ends) for ends in unstable) or "nowhere in the range"))
+    unstable = "; ".join(both_units(*ends) for ends in study.unstable_ranges())
+    unknown = "; ".join(both_units(*ends) for ends in study.missing_ranges())
+    rows.append(("unstable", unstable or ("nowhere else" if unknown else "nowhere in the range")))
+    if unknown:
+        rows.append(("whether it is stable is not known", unknown))
     return rows
 
 
@@ -244,8 +247,8 @@ def _resonance(study: DrivelineStudy) -> Any:
         axis.semilogy(x, getattr(found, f"peak{number}"), label="steady motion", **LINES[0])
         if simulated is not None:
             axis.semilogy(
-                rev(simulated.speed),
-                getattr(simulated, f"peak{number}"),
+                rev(simulated.speed[study.kept]),
+                getattr(simulated, f"peak{number}")[study.kept],
                 "o",
                 color=LINES[1]["color"],
                 fillstyle="none",
@@ -260,21 +263,19 @@ def _resonance(study: DrivelineStudy) -> Any:
                 rev(low), rev(high), facecolor="#eeeeee", edgecolor=_GREY, hatch="//", linewidth=0.0,
                 label=None if i else "unstable",
             )  # fmt: skip
-        axis.axvline(
-            rev(study.config.running.speed),
-            color=_GREY,
-            linewidth=1.2,
-            linestyle=(0, (6, 2)),
-            label="running",
-        )
+        axis.axvline(rev(study.config.running.speed), **_RUNNING)
         axis.set_ylabel(f"peak torque of shaft {number} [N m]")
-        if np.nanmax(getattr(found, f"peak{number}"), initial=0.0) < 1e-3:
+        drawn = [getattr(each, f"peak{number}") for each in (found, study.rigid)]
+        if max(static, *(float(np.nanmax(y, initial=0.0)) for y in drawn)) < 1e-3:
             axis.set_ylim(1e-3, 1.0)  # nothing to see, not even roundoff
         axis.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:g}"))
         axis.yaxis.set_minor_formatter(FuncFormatter(_some))
     for at, peak in study.resonances():
-        axes[0].annotate(f"{rev(at):.0f} rev/min, {peak:.0f} N m", (rev(at), peak), (-8, 2),
-                         textcoords="offset points", ha="right", fontsize=9, bbox=_WHITE)  # fmt: skip
+        running = study.config.running
+        left = at < 0.7 * running.speed_low + 0.3 * running.speed_high
+        offset, side = (8, "left") if left else (-8, "right")
+        axes[0].annotate(f"{rev(at):.0f} rev/min, {peak:.0f} N m", (rev(at), peak), (offset, 2),
+                         textcoords="offset points", ha=side, fontsize=9, bbox=_WHITE)  # fmt: skip
     axes[0].margins(y=0.1)
     _speed_axis(axes[0], study, mark=False)
     axes[0].set_xlabel("")

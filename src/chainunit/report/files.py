@@ -20,12 +20,17 @@ def _load_cycle(study: Study, file: Path) -> Path:
     with time, speed, torque of the load and inertia of the load, units in the head."""
     settled = study.settled
     steady = study.runs["start_up"].sel(time=slice(settled, None))
-    load = study.drive.loading
-    names = {"time": "time", "motor.w": "speed", f"{load}.tau": "torque", "machine.J": "inertia"}
+    names = {
+        "time": "time",
+        "motor.w": "speed",
+        f"{study.drive.loading}.tau": "torque",
+        "machine.J": "inertia",
+    }
     with whole(file) as part, part.open("w", newline="", encoding="utf-8") as out:
         writer = csv.writer(out)
         writer.writerow(f"{title} [{steady[name].attrs['units']}]" for name, title in names.items())
         columns = [steady[name].values - (settled if name == "time" else 0.0) for name in names]
+        columns[-1] = study.drive.load_inertia(steady)
         writer.writerows([f"{x:.9g}" for x in row] for row in zip(*columns, strict=True))
     return file
 

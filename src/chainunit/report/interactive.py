@@ -292,7 +292,7 @@ def _transient(study: Study, name: str) -> Plot:
     if drive.line is not None:
         series.append(("torque in shaft 2 [N m]", "%{y:.3g} N m", run["driveline.tau2"].values))
         rigid = run[RIGID].values if RIGID in run else None
-    kept = _thin(*(y for _, _, y in series), *([] if rigid is None else [rigid]))
+    kept = _thin(*(y for _, _, y in series), *([] if rigid is None else [np.nan_to_num(rigid)]))
     figure = make_subplots(rows=len(series), cols=1, shared_xaxes=True, vertical_spacing=0.05)
     x = _small(time[kept])
     for row, (label, hover, y) in enumerate(series, 1):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -40,9 +39,8 @@ def choose(
     """The drive of a study; FMUs that sizing needs are written to `folder`. Where no candidate fits, the first of the
     list stands for the machine's own numbers."""
     if config.sizing is None:
-        motor, tuning = tuned(config)
-        drive = Drive(DcMotor, motor, config.machine, feed_forward=config.feed_forward)
-        return Choice(with_line(config, drive), tuning)
+        drive = Drive(DcMotor, config.motor, config.machine, feed_forward=config.feed_forward)
+        return Choice(*tuned(config, with_line(config, drive)))
     sized = size(config, folder, report, backend)
     best = sized.chosen or (sized.candidates[0] if sized.candidates else None)
     drive = best.drive if best else Drive(DcMotor, config.motor, config.machine)
@@ -65,12 +63,10 @@ def with_line(config: Config, drive: Drive) -> Drive:
     return replace(drive, line=CardanDriveline.parameter_layout.from_names(values | {"ratio": gear}))
 
 
-def tuned(config: Config) -> tuple[Any, Tuning | None]:
-    """The motor with controller gains tuned to this machine, where the config does not give them."""
+def tuned(config: Config, drive: Drive) -> tuple[Drive, Tuning | None]:
+    """The drive with controller gains tuned to its inertia, where the config does not give them."""
     both = cycle(config.machine, config.run.crank_speed, config.feed.left, config.feed.right)
-    inertia = config.motor.rotor.J + float(np.mean(both.outputs.J))
-    if config.driveline is not None:
-        inertia += config.driveline.J4 / (config.machine.p.ratio**2 if config.place == "crank" else 1.0)
-    tuning = tune(config.motor.armature, inertia)
+    tuning = tune(config.motor.armature, drive.rotor_inertia + float(np.mean(both.outputs.J)))
     own = {name: gain for name, gain in tuning.parameters.items() if name not in config.motor_given}
-    return DcMotor.parameter_layout.from_names(own, config.motor), tuning if own else None
+    parameters = DcMotor.parameter_layout.from_names(own, config.motor)
+    return replace(drive, parameters=parameters), tuning if own else None

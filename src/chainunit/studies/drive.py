@@ -47,11 +47,22 @@ class Drive:
         """The machine as its FMU is: with the gear that is left behind the driveline."""
         return self.machine if self.line is None else self.machine.replace(ratio=self.ratio / self.line.ratio)
 
+    @property
+    def rotor_inertia(self) -> float:
+        """Inertia of the rotor, and of the driveline where there is one, at the motor [kg m2]."""
+        line = 0.0 if self.line is None else self.line.J4 / self.line.ratio**2
+        return float(self.parameters.rotor.J + line)
+
     def rigid(self) -> Drive:
         """The same without the elastic line, its inertia on the rotor."""
-        rotor = self.parameters.rotor
-        heavier = replace(rotor, J=rotor.J + self.line.J4 / self.line.ratio**2)
+        heavier = replace(self.parameters.rotor, J=self.rotor_inertia)
         return replace(self, line=None, parameters=replace(self.parameters, rotor=heavier))
+
+    def load_inertia(self, run: xr.Dataset) -> Any:
+        """Inertia at the motor's shaft beside the rotor [kg m2], shape (time,); with a driveline that of its even
+        ratio."""
+        J = run["machine.J"].values
+        return J if self.line is None else (J + self.line.J4) / self.line.ratio**2
 
     @property
     def loading(self) -> str:

@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, ConfigDict, Field, ValidationError, create_model
+from scipy.signal import find_peaks
 
 from .. import __version__
 from ..drives.cardan import Band, Cardan, check, frequency_band, frozen_frequency, sensitivity, two_joints
@@ -26,6 +27,7 @@ from ..drives.torsion import (
     rigid,
     settling_time,
     simulate,
+    simulation_steps,
     steady,
     with_damping_ratio,
 )
@@ -38,10 +40,18 @@ ORDERS = (2, 4)
 """Of the excitation: i23 varies twice a turn; four times a turn at large bends."""
 TONGUES = (1, 2, 3, 4)
 """n of the parametric resonances 2 speed = 2 k/n."""
+DENSER = (*TONGUES, 6)
+"""n of the speeds k/n about which the curves have more points; order 6 comes with large bends"""
+MOST_STEPS = 200_000
+"""of a time simulation"""
+LOST = 0.01
+"""share of the speed by which a time simulation may have left what was asked"""
 LEAST_DAMPING = 0.003
 """below which time simulation would take too long"""
 DRIFT = 0.01
 """growth of a deviation of the mean speed [1/s] from which on it is worth a word"""
+PEAK = 8
+"""points between a peak of the coarse resonance curve and its neighbours"""
 SIMULATED = 5
 """every so many points of the resonance curve are simulated"""
 
@@ -203,6 +213,12 @@ def _consistent(config: Config) -> None:
     ):
         if number != int(number):
             raise InputError(f"{name} = {number:g}: must be a whole number")
+    k = frozen_frequency(numpy_(), config.line, 1.0)
+    if not 0.01 <= k <= 1e6:
+        raise InputError(
+            f"natural frequency of the driveline = {k:.3g} rad/s: must be >= 0.01 and <= 1e+06 rad/s; check c2, c3, "
+            "J1, J4"
+        )
     slowest = frequency_band(config.line).largest / 50.0
     for name in ("speed", "speed_low"):
         given = getattr(running, name)
@@ -214,10 +230,10 @@ def _consistent(config: Config) -> None:
 
 
 def speeds(low: float, high: float, k: float, points: int) -> Any:
-    """Speeds [rad/s] from `low` to `high`, denser around k/1 to k/4, shape (points,)."""
+    """Speeds [rad/s] from `low` to `high`, denser around the resonances k/n, shape (points,)."""
     fine = np.linspace(low, high, 20001)
     density = np.ones_like(fine)
-    for n in TONGUES:
+    for n in DENSER:
         density += 6.0 / (1.0 + ((fine * n / k - 1.0) / 0.02) ** 2)
     reached = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))])
     return np.interp(np.linspace(0.0, reached[-1], points), reached, fine)
@@ -236,11 +252,6 @@ class StabilityMap:
     """[1/s], (ratios, bends, speeds); NaN where no steady motion was found"""
     unstable: Any
     """bool, of the same shape"""
-
-    def share(self) -> Any:
-        """Share of the range of speeds that is unstable, (ratios, bends)."""
-        step = np.gradient(self.speed)
-        return (self.unstable * step).sum(axis=2) / step.sum()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -278,6 +289,12 @@ class DrivelineStudy:
         """Largest torque of shaft 2 from the load alone, without inertia [N.m]."""
         return float(np.max(self.ratio)) * self.config.running.load
 
+    @property
+    def kept(self) -> Any:
+        """Which points of the time simulation kept the speed that was asked, bool."""
+        assert self.simulated is not None
+        return np.abs(self.simulated.speed / self.asked - 1.0) < LOST
+
     def crossings(self) -> dict[int, tuple[float, float]]:
         """Speeds at which an order meets the band of the natural frequency, or 2 speed = 2 k/n [rad/s], by n."""
         return {n: (self.band.least / n, self.band.largest / n) for n in TONGUES}
@@ -296,9 +313,31 @@ class DrivelineStudy:
 
     def resonances(self) -> list[tuple[float, float]]:
         """Speed [rad/s] and torque of shaft 2 [N.m] of each peak of the resonance curve, by speed."""
-        peak = self.steady.peak2  # NaN compares as false: beside a gap nothing counts as a peak
-        inner = np.flatnonzero((peak[1:-1] > 1.001 * peak[:-2]) & (peak[1:-1] >= peak[2:])) + 1
-        return [(float(self.speed[j]), float(peak[j])) for j in inner]
+        peak = self.steady.peak2
+        return [(float(self.speed[j]), float(peak[j])) for j in _peaks(peak)]
+
+
+def _peaks(curve: Any) -> Any:
+    """Places of the inner maxima that stand out by 2 %, above the ripple of torques that are sampled once a step."""
+    known = np.isfinite(curve)
+    if not known.any():
+        return []
+    height = np.log(np.maximum(np.where(known, curve, 1.0), 1e-9))
+    # a gap counts as higher than all: beside it nothing is known to be a peak
+    found, _ = find_peaks(np.where(known, height, height[known].max() + 1.0), prominence=0.02)
+    return [int(j) for j in found if known[j]]
+
+
+def _refined(line: Cardan, load: float, speed: Any, curve: Steady) -> tuple[Any, Steady]:
+    """The resonance curve with more points about each of its peaks, whose heights a coarse grid misses."""
+    near = [np.linspace(speed[j - 1], speed[j + 1], 2 * PEAK + 1)[1:-1] for j in _peaks(curve.peak2)]
+    if not near:
+        return speed, curve
+    more = np.setdiff1d(np.concatenate(near), speed)
+    added = steady(line, more, load)
+    order = np.argsort(np.concatenate([speed, more]))
+    whole = (np.concatenate([a, b], axis=-1)[..., order] for a, b in zip(curve, added, strict=True))
+    return np.concatenate([speed, more])[order], Steady(*whole)
 
 
 def _ranges(x: Any, inside: Any) -> list[tuple[float, float]]:
@@ -323,16 +362,18 @@ def run_driveline(config: Config, report: Report = lambda what, done, todo: None
     excitation = {n: float(2.0 * abs(np.mean(lead[:-1] * np.exp(-1j * n * angle[:-1])))) for n in ORDERS}
     speed = speeds(running.speed_low, running.speed_high, k, int(running.points))
     curve = steady(line, speed, running.load, lambda done: report("steady motion", done, 1.0))
+    speed, curve = _refined(line, running.load, speed, curve)
     operating = steady(line, running.speed, running.load)
     zeta = damping_ratio(line)
     asked = speed[::SIMULATED]
     simulated = None
-    if zeta >= LEAST_DAMPING:
+    settle = settling_time(line, 0.01)
+    if zeta >= LEAST_DAMPING and simulation_steps(line, asked, settle) <= MOST_STEPS:
         simulated = simulate(
             line,
             asked,
             running.load,
-            settling_time(line, 0.01),
+            settle,
             progress=lambda done: report("time simulation", done, 1.0),
         )
     map_ = stability_map(config, lambda done: report("map of stability", done, 1.0))
@@ -405,8 +446,14 @@ def _notes(study: DrivelineStudy) -> list[str]:
         )
     elif study.simulated is None:
         notes.append(
-            f"Damping ratio {study.damping_ratio:.2g} is below {LEAST_DAMPING:g}: transients take too long for a "
-            "time simulation; the resonance curve is that of the steady motion."
+            f"Transients take too long for a time simulation (damping ratio {study.damping_ratio:.2g}): the "
+            "resonance curve is that of the steady motion."
+        )
+    elif not np.all(study.kept):
+        lost = study.asked[~study.kept]
+        notes.append(
+            f"The slow control of the time simulation lost the speed at {len(lost)} of {len(study.asked)} speeds, "
+            f"{both_units(float(lost.min()), float(lost.max()))}; they are not drawn."
         )
     drifting = "; ".join(both_units(*ends) for ends in study.drifting_ranges())
     if drifting:
@@ -436,7 +483,8 @@ def _warnings(study: DrivelineStudy) -> list[str]:
     found = study.operating
     if not found.found[0]:
         warnings.append(
-            f"No steady motion found at {both_units(at)}: a strong resonance with little damping."
+            f"No steady motion found at {both_units(at)}: either none repeats itself each half turn, or the search "
+            "did not reach it; more damping or less bend helps both."
         )
     else:
         warnings += _at_operation(study)
@@ -447,7 +495,8 @@ def _warnings(study: DrivelineStudy) -> list[str]:
         )
     for low, high in study.missing_ranges():
         warnings.append(
-            f"No steady motion found from {both_units(low, high)}, a strong resonance: do not run there."
+            f"No steady motion found from {both_units(low, high)}: either none repeats itself each half turn, or the "
+            "search did not reach it."
         )
     return warnings
 

@@ -209,7 +209,7 @@ def _loops(study: Study) -> dict[str, Loop]:
     config, motor = study.config, study.motor
     J = cycle(study.drive.machine, config.run.crank_speed, config.feed.left, config.feed.right).outputs.J
     sizes = {"mean inertia": np.mean(J), "least inertia": np.min(J), "largest inertia": np.max(J)}
-    return {name: loop(motor, motor.rotor.J + float(size)) for name, size in sizes.items()}
+    return {name: loop(motor, study.drive.rotor_inertia + float(size)) for name, size in sizes.items()}
 
 
 def _torsion(study: Study) -> Torsion:
@@ -384,14 +384,20 @@ def _simulate(
             _close(study, "start_loaded", transient, 0.0, stop, bond, simulation, folder, backend)
     if drive.line is not None:
         report("the same with a rigid shaft", total, total)
-        _shaft(study, _rigid(study, files, stop))
+        try:
+            rigid = _rigid(study, files, stop)
+        except RunError as error:
+            # what it has is the rigid drive's, not this one's
+            error.partial = None
+            raise
+        _shaft(study, rigid)
     if config.monte_carlo.runs:
         study.monte_carlo = run_monte_carlo(Task(config, drive, files, stop), folder, report)
 
 
 def _rigid(study: Study, files: Mapping[str, Path], stop: float) -> dict[str, xr.Dataset]:
-    """Every run again without the line's elasticity and unevenness, at the same times; no coupling opens."""
-    config, drive = study.config, study.drive.rigid()
+    """Every run again without the line's elasticity and unevenness, at the same times and with the same coupling."""
+    config, drive, guards = study.config, study.drive.rigid(), _guards(study)
     step, reference = config.run.step, drive.reference(config.run.crank_speed, config.run.ramp)
     system = drive.system({name: files[name] for name in drive.models()})
     runs = {}
@@ -405,12 +411,13 @@ def _rigid(study: Study, files: Mapping[str, Path], stop: float) -> dict[str, xr
                     **scenario_signals(config, drive, name, event),
                     **drive.reference(config.run.crank_speed),
                 }
-                end = float(study.runs[name]["time"][-1])
-                runs[name] = _event(config, simulation, name, event, end)
+                runs[name] = _event(
+                    config, simulation, name, event, event + follow_time(config, name), guards=guards
+                )
     if "start_loaded" in study.event:
         loaded = scenario_signals(config, drive, "start_loaded", 0.0)
         with CoSimulation(system, {**loaded, **reference}) as simulation:
-            runs["start_loaded"] = simulation.run(float(study.runs["start_loaded"]["time"][-1]), step)
+            runs["start_loaded"] = simulation.run(stop, step, guards=guards)
     return runs
 
 
@@ -425,9 +432,9 @@ def _shaft(study: Study, rigid: Mapping[str, xr.Dataset]) -> None:
         if name == "steady":
             elastic = elastic.isel(time=_whole_turns(study, elastic))
         study.shaft[name], study.cycles_of[name], damage = shaft_answers(
-            study.drive, elastic, study.config.driveline.exponent, per_turn
+            study.drive, elastic, rigid[run].sel(time=since), study.config.driveline.exponent, per_turn
         )
-        per_turn = per_turn or damage
+        per_turn = damage if per_turn is None else per_turn
 
 
 def _guards(study: Study) -> dict[str, float]:
@@ -853,7 +860,7 @@ def as_dict(study: Study) -> dict[str, Any]:
         **({"sizing": study.sizing.as_dict()} if study.sizing else {}),
         **({"monte_carlo": study.monte_carlo.as_dict()} if study.monte_carlo else {}),
         "coupling": entries(config.coupling) if config.coupling else None,
-        **(_driveline(study) if study.drive.line is not None else {}),
+        **(_driveline(study) if study.torsion is not None else {}),
         "sides_over_speed": study.sides.as_dict() if study.sides else None,
     }
 
@@ -862,7 +869,13 @@ def _driveline(study: Study) -> dict[str, Any]:
     units = {"from": "N.m", "to": "N.m", "count": "1"}
     largest = max(answers.range_largest for answers in study.shaft.values()) if study.shaft else 0.0
     return {
-        "driveline": entries(study.config.driveline) | entries(study.drive.line) | entries(study.torsion),
+        "driveline": {
+            "place": study.config.place,
+            "damping_ratio": {"value": study.config.damping_ratio, "unit": "1"},
+            **entries(study.config.driveline),
+            **entries(study.drive.line),
+            **entries(study.torsion),
+        },
         "shaft": {name: entries(answers) for name, answers in study.shaft.items()},
         "torque_cycles": {
             name: [

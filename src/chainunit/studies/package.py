@@ -13,6 +13,7 @@ from ..drives.motor import Motor
 from ..errors import InputError
 from ..fmu.backends import Backend
 from ..fmu.ssp import ModelSystem, export
+from ..machines.api import ChainUnit
 from ..machines.chain_unit import ChamberForces, DirectChainUnit
 from ..model import Model
 from ..quantities import Layout
@@ -24,13 +25,13 @@ def study_system(config: Config, drive: Drive) -> ModelSystem:
     """Machine, driveline and motor of a study, from rest: the speed reference is the crank speed at the motor from
     the start on, feed and processing forces are those of normal running; with feed-forward, the machine that the
     control asks is in the system, too."""
-    machine = _machine(config, drive, ChamberForces)
+    machine = _machine(config, drive, ChamberForces, drive.driven)
     models = {name: model for name, (model, _) in drive.models().items()}
     start = {name: model.parameter_layout.named(p) for name, (model, p) in drive.models().items()}
-    start["motor"] |= {"w_ref": machine["w"]}
-    start["machine"] = machine | start["machine"] | {"w": machine["w"] / drive.ratio * drive.driven.p.ratio}
+    start["motor"] |= {"w_ref": config.run.crank_speed * drive.ratio}
+    start["machine"] = machine
     if drive.feed_forward:
-        models["model"], start["model"] = ChamberForces, machine
+        models["model"], start["model"] = ChamberForces, _machine(config, drive, ChamberForces, drive.machine)
     return ModelSystem(
         "ChainUnitDrive",
         models,
@@ -61,17 +62,21 @@ def start_of(
             raise InputError("the study has no [driveline]; add the table, or export without --config")
         return model.parameter_layout.named(drive.line)
     if not issubclass(model, Motor):
-        return _machine(config, drive, model)
+        return _machine(config, drive, model, drive.driven)
     if drive.motor is not model:
         raise InputError(f"the study's motor is {drive.motor.name}, not {model.name}")
     return model.parameter_layout.named(drive.parameters)
 
 
-def _machine(config: Config, drive: Drive, model: type[Model]) -> dict[str, float]:
-    """The machine with its feed, at the speed of the study."""
-    speed = config.run.crank_speed * drive.ratio
+def _machine(config: Config, drive: Drive, model: type[Model], machine: ChainUnit) -> dict[str, float]:
+    """The machine with its feed and the gear that it has, at the speed of the study."""
+    speed = config.run.crank_speed * machine.p.ratio
     turning = {"w_start": speed} if model is DirectChainUnit else {"phi": 0.0, "w": speed, "a": 0.0}
-    return drive.machine_parameters() | Layout(type(config.feed)).named(config.feed) | turning
+    return (
+        ChamberForces.parameter_layout.named(machine.p)
+        | Layout(type(config.feed)).named(config.feed)
+        | turning
+    )
 
 
 def _drive(config: Config, backend: Backend | None, report: Callable[[str], None]) -> Drive:

@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from ..drives.cardan import Cardan, frozen_frequency
+from ..drives.torsion import largest_frequency
 from ..engines import MATH
 from ..quantities import Value, declaration, quantity
 from .drive import Drive
@@ -80,28 +81,43 @@ def rainflow(torque: Any) -> Cycles:
     return Cycles(rows[:, 0], rows[:, 1], rows[:, 2])
 
 
+def from_peak(torque: Any) -> Any:
+    """A torque that repeats, turned so that it begins and ends at its largest value: then no cycle stays open,
+    whatever the phase of the window."""
+    first = int(np.argmax(torque))
+    return np.concatenate([torque[first:], torque[: first + 1]])
+
+
 def torsion(drive: Drive, inertia: Any) -> Torsion:
     """Natural frequencies of the drive's line with the machine's `inertia` at the motor [kg m2], an array over the
     turn."""
     line = drive.line
-    ends = []
+    ends, bounds = [], []
     for J in (float(np.min(inertia)), float(np.max(inertia))):
         two_masses = Cardan(
             c2=line.c2,
             c3=line.c3,
+            alpha1=line.alpha1,
+            alpha2=line.alpha2,
             J1=drive.parameters.rotor.J * line.ratio**2,
             J4=line.J4 + J * line.ratio**2,
         )
         ends.append(float(frozen_frequency(MATH, two_masses, 1.0)))
-    return Torsion(k_least=min(ends), k_largest=max(ends), step_longest=LONGEST_STEP / max(ends))
+        bounds.append(float(largest_frequency(two_masses)))
+    return Torsion(k_least=min(ends), k_largest=max(ends), step_longest=LONGEST_STEP / max(bounds))
+
+
+def rigid_torque(drive: Drive, rigid: xr.Dataset) -> Any:
+    """Torque in shaft 2 [N m], shape (time,), in a run of ``drive.rigid()``."""
+    line = drive.line
+    return line.ratio * rigid["machine.tau"].values + line.J4 / line.ratio * rigid["motor.a"].values
 
 
 def with_rigid(drive: Drive, run: xr.Dataset, rigid: xr.Dataset) -> xr.Dataset:
     """The `run` with the torque in shaft 2 of the same run of ``drive.rigid()`` beside it."""
-    line = drive.line
-    torque = line.ratio * rigid["machine.tau"].values + line.J4 / line.ratio * rigid["motor.a"].values
-    # a coupling that opened ends a run between two communication points
-    there = np.interp(run["time"].values, rigid["time"].values, torque)
+    torque = rigid_torque(drive, rigid)
+    # a coupling opens at its own time in each; behind that of the rigid drive there is nothing
+    there = np.interp(run["time"].values, rigid["time"].values, torque, right=np.nan)
     attributes = {"units": "N.m", "long_name": "torque in shaft 2 of the same drive with a rigid shaft"}
     return run.assign({RIGID: ("time", there, attributes)})
 
@@ -109,14 +125,17 @@ def with_rigid(drive: Drive, run: xr.Dataset, rigid: xr.Dataset) -> xr.Dataset:
 def shaft_answers(
     drive: Drive,
     run: xr.Dataset,
+    rigid: xr.Dataset,
     exponent: float,
     steady_damage_per_turn: float | None = None,
 ) -> tuple[ShaftAnswers, Cycles, float]:
-    """What a `run` from `with_rigid` asks of the line; its cycles, and their damage per turn of the crank, in the
-    unit (N m)^exponent."""
+    """What a `run` asks of the line, beside the same run of the rigid drive; its cycles, and their damage per turn of
+    the crank, in the unit (N m)^exponent. Without the damage of steady running it is steady running itself: then its
+    cycles close."""
     tau2 = run["driveline.tau2"].values
-    peak2, peak_rigid = float(np.max(np.abs(tau2))), float(np.max(np.abs(run[RIGID].values)))
-    cycles = rainflow(tau2)
+    peak2, peak_rigid = float(np.max(np.abs(tau2))), float(np.max(np.abs(rigid_torque(drive, rigid))))
+    steady = steady_damage_per_turn is None
+    cycles = rainflow(from_peak(tau2) if steady else tau2)
     angle, _ = drive.crank_motion(run)
     turns = max(float(angle[-1] - angle[0]) / (2.0 * np.pi), 1e-9)
     damage = cycles.damage(exponent)
@@ -130,7 +149,7 @@ def shaft_answers(
             twist_peak=float(np.max(np.abs(twist))),
             range_largest=float(np.max(cycles.range, initial=0.0)),
             cycles=float(np.sum(cycles.count)),
-            range_equivalent=None if steady_damage_per_turn else (damage / turns) ** (1.0 / exponent),
+            range_equivalent=(damage / turns) ** (1.0 / exponent) if steady else None,
             turns_of_steady=damage / steady_damage_per_turn if steady_damage_per_turn else None,
         ),
         cycles,
