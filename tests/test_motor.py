@@ -15,6 +15,7 @@ from chainunit.drives.speed_control import loop, tune
 from chainunit.errors import InputError
 from chainunit.integrate import rk4
 from chainunit.studies.choice import tuned as tuned_motor
+from chainunit.studies.drive import Drive
 
 LAYOUT = DcMotor.state_layout
 
@@ -100,7 +101,8 @@ def test_internal_integrator_against_an_error_controlled_solver():
 
 def test_declared_gains_are_the_tuned_ones_of_the_packaged_drive():
     config = load()
-    tuned, tuning = tuned_motor(config)
+    drive, tuning = tuned_motor(config, Drive(DcMotor, config.motor, config.machine))
+    tuned = drive.parameters
     declared = DcMotor.Parameters()
     for name in ("kp", "ki"):
         assert getattr(declared.speed_control, name) == pytest.approx(

@@ -241,14 +241,19 @@ def reproduce(
 @app.command()
 def export(
     name: Annotated[
-        str, typer.Argument(help="ChamberForces, ChainUnit, DcMotor, InductionMotor or CardanDriveline.")
+        str,
+        typer.Argument(
+            help="ChamberForces, ChainUnit, DcMotor, InductionMotor, CardanDriveline or KnifeDrive."
+        ),
     ],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="FMU file; NAME.fmu by default.")
     ] = None,
     config: Annotated[
         Path | None,
-        typer.Option("--config", help="Study file whose machine, feed or motor gives the start values."),
+        typer.Option(
+            "--config", help="Study file (or knife file) whose machine, feed or motor gives the start values."
+        ),
     ] = None,
     backend: Annotated[
         Backend | None, typer.Option("--backend", help="native where a C compiler is found, else python.")
@@ -276,7 +281,11 @@ def export(
     kind: Any = backend.value if backend else None
     with _console(stderr=True).status("exporting") as status:
         start = {}
-        if config:
+        if config and name == "KnifeDrive":
+            from .studies import knife as knives
+
+            start = knives.start_of(knives.load(config))
+        elif config:
             loaded = configuration.load(config)
             start = start_of(loaded, MODELS[name], backend=kind, report=status.update)
         made = write(

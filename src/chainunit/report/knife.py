@@ -111,10 +111,10 @@ _SHORT = tuple(
     for head, name in (
         ("flywheel", "flywheel"),
         ("start", "start_time"),
-        ("fluctuation", "fluctuation"),
+        ("ripple", "fluctuation"),
         ("by hand", "fluctuation_by_hand"),
-        ("torque peak", "motor_torque_peak"),
-        ("current/rated", "current_share"),
+        ("peak torque", "motor_torque_peak"),
+        ("current", "current_share"),
         ("lent", "stored_share_most"),
     )
 )
@@ -131,13 +131,18 @@ def show(study: KnifeStudy, console: Console) -> None:
         table.add_row(name, value)
     console.print(table)
     if study.wheels:
-        table = Table()
-        for head, _, _ in _SHORT:
-            table.add_column(head, justify="right")
+        table = Table(
+            title="Flywheels (ripple: fluctuation of the speed; current: RMS of rated; lent: of a cut's work)",
+            title_justify="left",
+        )
+        for head, _, unit in _SHORT:
+            table.add_column(f"{head}\n[{'%' if unit == '1' else unit.replace('.', ' ')}]", justify="right")
         table.add_column("")
         for what, wheel in columns(study):
             cells = [_value(getattr(wheel.answers, name), unit) for _, name, unit in _SHORT]
-            table.add_row(*cells, what + (" stalls" if wheel.stalled else ""))
+            # the unit is in the head
+            bare = [cell.partition(" ")[0] if cell[:1].isdigit() else cell for cell in cells]
+            table.add_row(*bare, what + (" stalls" if wheel.stalled else ""))
         console.print(table)
     for kind, lines in (("Warning", study.warnings), ("Note", study.notes)):
         for line in lines:

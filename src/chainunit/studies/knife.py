@@ -164,6 +164,12 @@ def load(file: Path | None = None) -> Config:
     return read(file, example, parse)
 
 
+def start_of(config: Config) -> dict[str, float]:
+    """Start values of `KnifeDrive`'s parameters and inputs, by name, as the file has them."""
+    turning = {"phi": 0.0, "w": config.motor_speed, "a": 0.0, "cut_force": config.cut.force}
+    return KnifeDrive.parameter_layout.named(config.machine) | turning
+
+
 def example() -> str:
     """The packaged knife file."""
     return packaged("knife.toml")
