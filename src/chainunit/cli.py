@@ -238,6 +238,27 @@ def reproduce(
     console.print("Written: " + ", ".join(str(path) for path in written), soft_wrap=True)
 
 
+@app.command("two-bar-error")
+def two_bar_error(
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path("two-bar"),
+) -> None:
+    """What two rigid bars get wrong about a hanging chain, over zeta, mu and psi, and where they are good enough.
+
+    Writes two_bar_error.json, two_bar_error.md and two_bar_error.png into the output folder.
+    """
+    from .report import two_bar as page
+    from .studies.two_bar import two_bar_error as compute
+
+    folder(output)
+    _clear(output, *page.NAMES)
+    console, errors = _console(), _console(stderr=True)
+    with _progress("bars and catenaries", errors) as report:
+        found = compute(report=lambda done: report("bars and catenaries", done, 1.0))
+    written = page.write(found, output)
+    page.show(found, console)
+    console.print("Written: " + ", ".join(str(path) for path in written), soft_wrap=True)
+
+
 @app.command()
 def export(
     name: Annotated[

@@ -13,8 +13,11 @@ from ..errors import GeometryError
 from ..ports import PortSlopes
 from . import chain_unit
 from .chain_unit import Chamber, ChamberForces, Inputs, Outputs, Parameters, SideLoads, State, Stop
+from .hanging import Hanging, Modes, modes, rods, split
 
 _XP = numpy_()
+CHAIN_RODS = 32
+"""Rods of an organ with which its lowest frequency is that of a chain to a thousandth."""
 EMPTY = SideLoads(material_mass=0.0, processing_force=0.0)
 FREE = Stop()
 
@@ -192,6 +195,49 @@ class ChainUnit:
         return chain_unit.chamber(
             _XP, self.p, Inputs(left=_arrays(left), right=_arrays(right)), _array(psi), _array(w), _array(a)
         )
+
+    def organ_rods(self, side: str, loads: SideLoads = EMPTY, number: int = CHAIN_RODS) -> tuple[Any, Any]:
+        """Lengths [m] and masses [kg] of an organ as `number` rods, shape (number,), wall first, with the material on
+        it: as many in wall and web as brings them nearest to equal length."""
+        p, own = self.p, getattr(self.p, side)
+        on_web = p.web_share * loads.material_mass
+        masses = own.wall_mass + loads.material_mass - on_web, own.web_mass + on_web
+        counts = split((p.l1, p.l2), number)
+        lengths, shares = ([x / n for x, n in zip(xs, counts, strict=True)] for xs in ((p.l1, p.l2), masses))
+        return np.repeat(lengths, counts), np.repeat(shares, counts)
+
+    def hanging(self, side: str, psi: float, loads: SideLoads = EMPTY, number: int = CHAIN_RODS) -> Hanging:
+        """An organ at rest as a chain of `number` rods, at the rocker angle `psi` [rad]; the right one is given
+        mirrored, as a left one at -psi.
+
+        Raises
+        ------
+        GeometryError
+            where it does not hang.
+        """
+        lengths, masses = self.organ_rods(side, loads, number)
+        return rods(lengths, masses * self.p.g, self._reach(side, psi))
+
+    def _reach(self, side: str, psi: float) -> Any:
+        """From A1 to A2 of a left organ, or of the mirrored right one [m]."""
+        hand = 1.0 if side == "left" else -1.0
+        return np.array([self.p.z + self.p.e * math.sin(hand * psi), -self.p.e * math.cos(psi)])
+
+    def chain_modes(
+        self, left: SideLoads = EMPTY, right: SideLoads = EMPTY, number: int = CHAIN_RODS
+    ) -> Modes | None:
+        """Small vibration of the organs as chains of `number` rods, the rocker held in the middle: of the loaded side
+        with the lowest frequency. None where no side is loaded, weighs anything or hangs."""
+        found = []
+        for side, loads in (("left", left), ("right", right)):
+            lengths, masses = self.organ_rods(side, loads, number)
+            if self.p.g > 0.0 and np.all(masses > 0.0):
+                try:
+                    rest = self.hanging(side, 0.0, loads, number)
+                except GeometryError:
+                    continue
+                found.append(modes(lengths, masses * self.p.g, rest, self.p.g))
+        return min(found, key=lambda each: float(each.frequency[0]), default=None)
 
     def rocker_extremes(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """(psi, phi_crank) [rad] at the right and at the left extreme of the rocker."""

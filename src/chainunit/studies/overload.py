@@ -99,7 +99,9 @@ class Limits:
 
     slack_speed: Value = quantity("rad/s", "crank speed at which a web first goes slack with this feed")
     slack_speed_empty: Value = quantity("rad/s", "crank speed at which a web first goes slack, empty")
-    chain_resonance: Value = quantity("rad/s", "crank speed of the lowest mode of a hanging chain, estimated")
+    chain_resonance: Value = quantity(
+        "rad/s", "crank speed at the lowest natural frequency of an organ as a chain"
+    )
     rocker_extreme_right: Value = quantity("rad", "right extreme of the rocker")
     rocker_extreme_left: Value = quantity("rad", "left extreme of the rocker")
     margin: Value = quantity("1", "least |sin| of the transmission angles over the turn")
@@ -243,12 +245,11 @@ def _statics(study: Study) -> None:
     study.factors = overload_factors(machine, w, feed.left, feed.right)
     study.sides = sides_over_speed(machine, feed.left, feed.right)
     (right, _), (left, _) = machine.rocker_extremes()
-    g = machine.p.g
+    modes = machine.chain_modes(feed.left, feed.right)
     study.limits = Limits(
         slack_speed=machine.slack_speed(feed.left, feed.right),
         slack_speed_empty=machine.slack_speed(),
-        # lowest mode of a hanging chain organ of this kind, from the chain model's prototype
-        chain_resonance=1.8 * math.sqrt(g / machine.p.l1),
+        chain_resonance=math.inf if modes is None else float(modes.frequency[0]),
         rocker_extreme_right=right,
         rocker_extreme_left=left,
         margin=float(np.min(study.cycles["both sides"].outputs.margin)),

@@ -1,0 +1,194 @@
+"""Statics of a hanging chain between two pins: N rods, and the catenary that they tend to.
+
+Frame x right, y up. `p` is the force on the chain at A1 from the support; going along the chain the force that a
+piece receives from what lies before it is p less the weight of that, and a rod lies along the mean of the forces at
+its ends: u = -m/|m|, m = p - (0, weight before its middle). So two unknowns are left. The length of the way from A1
+to A2 is the gradient of a convex function of p,
+
+    d/dp sum of l |m(p)| = -(A2 - A1),
+
+whose minimum is unique where the chain is longer than the distance: the hanging, stable position. A uniform piece
+has the integral of |p - (0, w s)| along it in place of l |m|: the catenary, piece by piece, in closed form.
+
+A trust-region method finds it, as near a crossing of m = 0, where a rod would turn over, plain steps of Newton's
+method fail; those polish what it found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.linalg import eigh, null_space
+from scipy.optimize import minimize
+
+from ..errors import GeometryError
+
+_POLISH = 30
+
+
+@dataclass(frozen=True)
+class Hanging:
+    """A chain at rest. Forces [N], shape (2,): `first` on it at A1 from the support, `last` at A2 from what holds it
+    there; `theta` the angles of the rods from the downward vertical, positive towards +x [rad], shape (N,), empty for
+    a catenary; `pull` the mean pull in each rod [N], the least one of a catenary."""
+
+    first: Any
+    last: Any
+    theta: Any
+    pull: Any
+
+
+def rods(lengths: Any, weights: Any, reach: Any) -> Hanging:
+    """Rods of the `lengths` [m] and `weights` [N] between A1 and A2 = A1 + `reach` [m].
+
+    Raises
+    ------
+    GeometryError
+        where the chain is not longer than the distance, or is folded up between pins nearer than a rod.
+    """
+    l, W = np.asarray(lengths, float), np.asarray(weights, float)
+    before = np.concatenate([[0.0], np.cumsum(W)[:-1]]) + 0.5 * W
+
+    def parts(p: Any) -> tuple[float, Any, Any]:
+        m = np.stack([np.full_like(before, p[0]), p[1] - before])
+        size = np.hypot(*m)
+        unit = m / size
+        hessian = np.einsum("k,ik,jk->ij", -l / size, unit, unit) + np.eye(2) * np.sum(l / size)
+        return float(l @ size), unit @ l, hessian
+
+    reach = np.asarray(reach, float)
+    for k in range(len(l)):
+        # without horizontal force all others would hang straight, and this one, without any, would close the rest
+        open_end = reach + np.array([0.0, float(l @ np.sign(before[k] - before))])
+        if np.hypot(*open_end) <= l[k] * (1.0 + 1e-9):
+            raise GeometryError(
+                f"horizontal distance of the pins = {abs(reach[0]):g} m: rod {k + 1} of {len(l)} ({l[k]:g} m) would "
+                "lie across between two parts that hang straight, without force; must be larger, or the rods shorter"
+            )
+    p = _least(parts, reach, float(np.sum(l)), float(np.sum(W)))
+    m = np.stack([np.full_like(before, p[0]), p[1] - before])
+    size = np.hypot(*m)
+    total = float(np.sum(W))
+    return Hanging(p, np.array([-p[0], total - p[1]]), np.arctan2(-m[0], m[1]), size)
+
+
+def catenary(lengths: Any, weights: Any, reach: Any) -> Hanging:
+    """Uniform pieces of the `lengths` [m] and `weights` [N], one behind the other, as chains of infinitely many rods.
+
+    Raises
+    ------
+    GeometryError
+        see `rods`.
+    """
+    l, W = np.asarray(lengths, float), np.asarray(weights, float)
+    ends = np.concatenate([[0.0], np.cumsum(W)])
+    w = W / l
+
+    def parts(p: Any) -> tuple[float, Any, Any]:
+        H = abs(p[0])
+        v = p[1] - ends
+        size = np.hypot(H, v)
+        # of |m| over a piece: (v |m| + H^2 asinh(v/H))/2 between its ends, divided by -w
+        curved = np.arcsinh(v / H)
+        area = 0.5 * (v * size + H * H * curved)
+        along_x = np.sum(p[0] * (curved[:-1] - curved[1:]) / w)
+        along_y = np.sum((size[:-1] - size[1:]) / w)
+        xx = np.sum(((curved - v / size)[:-1] - (curved - v / size)[1:]) / w)
+        xy = np.sum(((p[0] / size)[:-1] - (p[0] / size)[1:]) / w)
+        yy = np.sum(((v / size)[:-1] - (v / size)[1:]) / w)
+        return (
+            float(np.sum((area[:-1] - area[1:]) / w)),
+            np.array([along_x, along_y]),
+            np.array([[xx, xy], [xy, yy]]),
+        )
+
+    p = _least(parts, np.asarray(reach, float), float(np.sum(l)), float(np.sum(W)))
+    total = float(np.sum(W))
+    return Hanging(p, np.array([-p[0], total - p[1]]), np.empty(0), np.array(abs(p[0])))
+
+
+def _least(parts: Any, reach: Any, length: float, weight: float) -> Any:
+    """The p that makes the function with value, gradient and second derivatives of `parts`, and p . reach, least."""
+    distance = float(np.hypot(*reach))
+    if not length > distance:
+        raise GeometryError(
+            f"length of the chain = {length:g} m: must be > {distance:g} m, the distance of its ends"
+        )
+    # about the pull of a shallow parabola, which is of the right size also where the chain hangs deep
+    across = max(abs(reach[0]), 0.05 * length)
+    pull = across / np.sqrt(24.0 * max(length - distance, 1e-9 * length) * length)
+    start = np.array([-np.copysign(pull, reach[0] or 1.0), 0.5])
+
+    def value(x: Any) -> float:
+        return float(parts(weight * x)[0] / weight + x @ reach) / length
+
+    def gradient(x: Any) -> Any:
+        return (parts(weight * x)[1] + reach) / length
+
+    def curvature(x: Any) -> Any:
+        return parts(weight * x)[2] * weight / length
+
+    with np.errstate(invalid="ignore", divide="ignore"):
+        x = minimize(
+            value,
+            start,
+            jac=gradient,
+            hess=curvature,
+            method="trust-exact",
+            options={"gtol": 1e-7, "maxiter": 500},
+        ).x
+        # near the minimum values differ by less than rounding; the gradient still tells
+        wrong = gradient(x)
+        for _ in range(_POLISH):
+            tried = x - np.linalg.solve(curvature(x), wrong)
+            after = gradient(tried)
+            if not np.hypot(*after) < np.hypot(*wrong):
+                break
+            x, wrong = tried, after
+    if not np.hypot(*wrong) < 1e-11:
+        raise GeometryError(
+            f"a chain of {length:g} m between pins {distance:g} m apart: no hanging position was found; must be "
+            "neither stretched nor folded up"
+        )
+    return weight * x
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Small vibration of a hanging chain of N rods about its rest, both pins held: natural frequencies [rad/s],
+    rising, shape (N - 2,), and the angles of the rods in each, largest 1, shape (N - 2, N)."""
+
+    frequency: Any
+    shape: Any
+
+
+def modes(lengths: Any, weights: Any, rest: Hanging, g: float) -> Modes:
+    """Natural frequencies and shapes of the rods at `rest`, undamped; the rods are uniform.
+
+    A rod that turns out of its line stretches the way by l theta^2/2, so that the stiffness is diagonal: its length
+    times its pull. The inertia is that of the chain that hangs from A1; the pin A2 takes two directions away.
+    """
+    l, m = np.asarray(lengths, float), np.asarray(weights, float) / g
+    N = len(l)
+    after = np.concatenate([np.cumsum(m[::-1])[::-1][1:], [0.0]])  # mass behind each rod
+    outer = np.maximum.outer(np.arange(N), np.arange(N))  # of each two rods the one farther from A1
+    inertia = np.outer(l, l) * np.cos(np.subtract.outer(rest.theta, rest.theta)) * (0.5 * m + after)[outer]
+    inertia[np.diag_indices(N)] = l * l * (m / 3.0 + after)
+    along = np.stack([l * np.cos(rest.theta), l * np.sin(rest.theta)])
+    free = null_space(along)
+    k2, shapes = eigh(free.T @ (free * (l * rest.pull)[:, None]), free.T @ inertia @ free)
+    turned = (free @ shapes).T
+    return Modes(np.sqrt(np.maximum(k2, 0.0)), turned / np.max(np.abs(turned), axis=1, keepdims=True))
+
+
+def split(parts: Sequence[float], number: int) -> tuple[int, ...]:
+    """How many of `number` rods each of two parts of these lengths gets, so that the rods are nearest to equal
+    length."""
+    first, second = parts
+    most = number - 1
+    wanted = round(number * first / (first + second))
+    mine = min(max(1, wanted), most)
+    return mine, number - mine

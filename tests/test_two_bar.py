@@ -1,0 +1,72 @@
+"""What two bars get wrong at rest, and where they are good enough."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from chainunit import ChainUnit
+from chainunit.studies.two_bar import TwoBarError, loads, statement, two_bar_error
+
+
+@pytest.fixture(scope="module")
+def found():
+    return two_bar_error()
+
+
+def test_two_bars_are_the_papers_statics():
+    """Paper 000, Figs 17-22: left organ, divided by its weight, at psi = -12, 0, 12 deg."""
+    for degrees, tangential, normal in (
+        (-12.0, 0.0281, 0.3615),
+        (0.0, 0.1360, 0.3240),
+        (12.0, 0.2381, 0.2824),
+    ):
+        assert loads(0.6, 0.5, math.radians(degrees), (1, 1)) == pytest.approx((tangential, normal), abs=6e-5)
+
+
+def test_the_packaged_organ_has_these_errors(found):
+    """The same organ with its own lengths and masses (equal mass per length): 40 kg/m; two bars overstate R_t by a
+    third in the middle, as the reference of the chain shows (100.86 against 76.94 N)."""
+    machine = ChainUnit()
+    i, j = int(np.argmin(np.abs(found.mu - 0.6))), int(np.argmin(np.abs(found.zeta - 0.5)))
+    weight = (machine.p.left.wall_mass + machine.p.left.web_mass) * machine.p.g
+    bars = float(machine.chamber(0.0).left.tangential_load) / weight
+    k = int(np.argmin(np.abs(found.psi)))
+    assert found.load_t[i, j, k] + found.error_t[i, j, k] == pytest.approx(bars, rel=1e-5)
+    assert found.error_t[i, j, k] / found.load_t[i, j, k] == pytest.approx(100.86 / 76.94 - 1.0, abs=2e-3)
+
+
+def test_many_rods_have_none_of_it():
+    for psi in (-0.2, 0.1):
+        bars, chain = loads(0.6, 0.5, psi, (90, 36)), loads(0.6, 0.5, psi, None)
+        assert bars == pytest.approx(chain, abs=2e-5)
+
+
+def test_the_statement_is_that_of_the_table(found):
+    lines = statement(found)
+    for limit, line in zip((0.02, 0.05, 0.10), lines, strict=False):
+        good = found.largest < limit
+        assert f"good to {100 * limit:.0f} %" in line
+        assert f"in {100.0 * good.sum() / np.isfinite(found.largest).sum():.0f} % of the range" in line
+    hopeless = TwoBarError(found.mu, found.zeta, found.psi, found.error_t + 1.0, found.error_n, found.load_t)
+    assert statement(hopeless)[0].startswith("Nowhere in the range are two bars good to 2 %")
+
+
+def test_command(tmp_path):
+    command = [sys.executable, "-m", "chainunit.cli", "two-bar-error", "-o", "out"]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert {f.name for f in (tmp_path / "out").iterdir()} == {
+        "two_bar_error.json", "two_bar_error.md", "two_bar_error.png"
+    }  # fmt: skip
+    numbers = json.loads((tmp_path / "out" / "two_bar_error.json").read_text())
+    assert numbers["error_t"]["unit"] == "1" and numbers["psi"]["unit"] == "rad"
+    assert all(line in " ".join(done.stdout.split()) for line in numbers["statement"])
+    (tmp_path / "file").write_text("")
+    wrong = subprocess.run([*command[:-1], "file"], capture_output=True, text=True, cwd=tmp_path)
+    assert wrong.returncode == 2 and len(wrong.stderr.strip().splitlines()) == 1
