@@ -302,7 +302,7 @@ def test_same_model_same_file(native, tmp_path):
 def test_small_enough(native):
     for (name, _), (file, _) in native.items():
         # the knife's pose is followed around the crank at 20 angles, unrolled
-        assert file.stat().st_size < (500_000 if name == "KnifeDrive" else 300_000)
+        assert file.stat().st_size < (550_000 if name == "KnifeDrive" else 300_000)
 
 
 @pytest.mark.parametrize("fmi", [2, 3])

@@ -198,8 +198,11 @@ def test_the_scheme_of_paper_003_is_the_model_once_corrected():
 
 def test_paper_003_shows_what_each_slip_does():
     found = {r.quantity: r for r in ROWS if r.paper == "003"}
-    assert 0.03 < found["largest error of R_C, R_D, R_E in a turn, lengths in m"].computed < 1.7
-    assert 29.0 < found["largest error in a turn, lengths in mm"].computed < 1700.0
+    metres = found["largest error of R_C, R_D, R_E in a turn, lengths in m"].computed
+    assert metres == pytest.approx(0.4386, abs=1e-4)
+    assert found["largest error in a turn, lengths in mm"].computed == pytest.approx(
+        1000.0 * metres, rel=1e-9
+    )
     assert found["largest error in a turn without the constant"].computed < 1e-10
     arm = found["force across O4E at E, crank angle 0"]
     assert float(arm.printed) > 4.0 * arm.computed > 0.0

@@ -97,6 +97,46 @@ def test_many_triads_find_the_mode_they_were_built_in():
     assert {2, 4, 6} <= counts
 
 
+def searched(pins, lengths, arms, tries=600):
+    """All poses that Newton's method finds from as many random starts."""
+    rng, found = np.random.default_rng(31), []
+    for _ in range(tries):
+        try:
+            start = Pose(*rng.uniform(-2.0, 3.0, 2), rng.uniform(-math.pi, math.pi))
+            pose = corrected(MATH, pins, lengths, arms, start, 40)
+            triad = Triad(MATH, tuple(Motion(p) for p in pins), lengths, arms, pose)
+        except (ArithmeticError, ValueError):
+            continue
+        gaps = [math.sqrt((k.p - p).squared()) - l for k, p, l in zip(triad.pins, pins, lengths, strict=True)]
+        same = [
+            p for p in found
+            if abs(math.remainder(p.theta - pose.theta, 2.0 * math.pi)) + abs(p.x - pose.x) + abs(p.y - pose.y) < 1e-6
+        ]  # fmt: skip
+        if max(map(abs, gaps)) < 1e-9 and not same:
+            found.append(pose)
+    return found
+
+
+ARMS = (Vec2(-0.06, -0.14), Vec2(0.0, 0.0), Vec2(0.8, 0.0))
+SPECIAL = {
+    "parallel equal hangers": ((Vec2(0.43, -0.11), Vec2(0.86, 0.36), Vec2(1.66, 0.36)), (0.62, 0.39, 0.39), ARMS),
+    "nearly so": ((Vec2(0.43, -0.11), Vec2(0.86, 0.36), Vec2(1.66, 0.36 + 1e-7)), (0.62, 0.39, 0.39), ARMS),
+    "C in D": ((Vec2(0.4, 0.0), Vec2(0.86, 0.36), Vec2(1.6, 0.3)), (0.62, 0.39, 0.45), (ARMS[1], *ARMS[1:])),
+    "all on two lines": (
+        (Vec2(0.0, 0.0), Vec2(0.5, 0.0), Vec2(1.1, 0.0)), (0.5, 0.45, 0.6), (Vec2(-0.4, 0.0), ARMS[1], Vec2(0.5, 0.0))
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SPECIAL)
+def test_modes_of_special_triads(name):
+    """Where two of the three equations say the same of D, as of parallel hangers: against a search."""
+    modes, wanted = assembly_modes(*SPECIAL[name]), searched(*SPECIAL[name])
+    assert len(modes) == len(wanted) and len(modes) % 2 == 0
+    for mode in modes:
+        assert min(math.hypot(mode.x - p.x, mode.y - p.y) for p in wanted) < 1e-6
+
+
 def test_a_triad_that_cannot_close_has_no_mode():
     far = (Vec2(0.0, 0.0), Vec2(10.0, 0.0), Vec2(0.0, 10.0))
     assert assembly_modes(far, (1.0, 1.0, 1.0), (Vec2(0.1, 0.0), Vec2(0.0, 0.0), Vec2(0.0, 0.1))) == []

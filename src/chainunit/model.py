@@ -36,10 +36,9 @@ class Requirement:
         those = ", ".join(f"{name} = {given[name]:g}" for name in self.given)
         reason = self.why + (f" with {those}" if those else "")
         limits = [f"{sign} {limit:g}" for sign, limit in ((">", low), ("<", high)) if math.isfinite(limit)]
-        allowed = (
-            f"must be {' and '.join(limits)} {self.unit}" if low < high else f"no value fits; {self.remedy}"
-        )
-        return f"{self.subject} = {value:g} {self.unit}: {reason}; {allowed}"
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        allowed = f"must be {' and '.join(limits)}{unit}" if low < high else f"no value fits; {self.remedy}"
+        return f"{self.subject} = {value:g}{unit}: {reason}; {allowed}"
 
 
 @dataclass(frozen=True)
@@ -135,8 +134,9 @@ class Model:
         return ready
 
     @classmethod
-    def check(cls, p: Any) -> None:
-        """Refuse parameters out of bounds, or that make no machine.
+    def check(cls, p: Any, derived: list[Any] | None = None) -> Any:
+        """The parameters `prepared`, with those `derived` values if they are known; refuse what is out of bounds, or
+        makes no machine.
 
         Raises
         ------
@@ -149,13 +149,14 @@ class Model:
             raise InputError(line)
         given = cls.parameter_layout.named(p)
         try:
-            p = cls.prepared(MATH, p)
+            p = cls.prepared(MATH, p, derived)
         except (ArithmeticError, ValueError):
             # `math` raises where other engines give NaN, which no requirement admits
             p = cls.prepared(MATH, p, [math.nan] * cls.derived)
         for required, (value, low, high) in zip(cls.required, cls.requirements(MATH, p), strict=True):
             if not low < value < high:
                 raise GeometryError(required.refusal(value, low, high, given))
+        return p
 
     @staticmethod
     def excitation(t: float) -> dict[str, float]:

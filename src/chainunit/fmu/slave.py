@@ -93,6 +93,7 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         self._fresh = [False] * len(model.parts)
         self._shared: Any = None
         self._p: Any = None
+        self._derived: Any = None  # from fixed parameters, which stay as they are from initialization on
         self._u: Any = None
         self._x: list[float] = []
         self._initialized = False
@@ -231,8 +232,8 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
             self._refused = ""
             try:
                 p = self._p = self.model.parameter_layout.instance(self._set[: self._n_p])
-                self.model.check(p)
-                p = self._p = self.model.prepared(MATH, p)
+                p = self._p = self.model.check(p, self._derived if self._initialized else None)
+                self._derived = getattr(p, "derived", None)
                 if self.model.state_layout and not self._initialized:
                     self._x = self.model.state_layout.values(self.model.initial_states(MATH, p))
             except BaseException as reason:
@@ -320,7 +321,8 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
             return
         self._set, self._x = list(values), list(x)
         self._initialized = bool(state.get("initialized"))
-        self._p = self._u = None
+        # the state may be that of another geometry
+        self._p = self._u = self._derived = None
         self._touch()
 
     @staticmethod

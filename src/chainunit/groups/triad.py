@@ -17,6 +17,7 @@ and a mode is followed from one position to the next by `corrected`.
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 from ..planar import Link, Motion, Vec2
@@ -158,6 +159,8 @@ class Triad:
 def assembly_modes(pins: tuple[Vec2, ...], lengths: tuple[float, ...], arms: tuple[Vec2, ...]) -> list[Pose]:
     """All poses in which the triad closes, by rising angle in (-pi, pi]; at most six.
 
+    Two pins of the ternary link in one place make two dyads of it, which are not looked for here.
+
     With D the second pin, d = D - P2, u = (E - P3) - d and v = (C - P1) - d, the differences of the three equations
     of length are linear in d; put into the second, they leave a trigonometric polynomial of third order in theta. Its
     coefficients come from seven samples, its roots z = exp(i theta) are eigenvalues of a companion matrix, and each
@@ -178,7 +181,7 @@ def assembly_modes(pins: tuple[Vec2, ...], lengths: tuple[float, ...], arms: tup
         b = 0.5 * (l1 * l1 - l2 * l2 - v.squared())
         return u, v, a, b
 
-    size = max(l1, l2, l3, float(np.sqrt(c.squared() + e.squared())))
+    size = max(l1, l2, l3, math.sqrt(c.squared() + e.squared()))
     order, samples = 3, 7
     u, v, a, b = parts(2.0 * np.pi * np.arange(samples) / samples)
     det = u.cross(v)
@@ -188,29 +191,35 @@ def assembly_modes(pins: tuple[Vec2, ...], lengths: tuple[float, ...], arms: tup
     coefficients = [spectrum[k % samples] for k in range(-order, order + 1)]
     found: list[Pose] = []
     for z in np.roots(coefficients[::-1]):
-        if not abs(abs(z) - 1.0) < 1e-5:
+        if not abs(abs(z) - 1.0) < 1e-4:
             continue
         theta = float(np.angle(z))
         u, v, a, b = parts(theta)
-        det = float(u.cross(v))
-        if abs(det) < 1e-12 * size * size:
+        # D lies on the circle about P2 and on the line d . u = a, and on d . v = b, which is the same line where u
+        # and v are parallel, as of parallel hangers: both ends of the chord are tried
+        across, at = (u, a) if u.squared() > v.squared() else (v, b)
+        if not across.squared() > 0.0:
             continue
-        d = Vec2(float(a * v.y - b * u.y) / det, float(b * u.x - a * v.x) / det)
-        cos, sin = np.cos(theta), np.sin(theta)
-        arm = arms[1]
-        start = p2 + d - Vec2(float(cos * arm.x - sin * arm.y), float(sin * arm.x + cos * arm.y))
-        try:
-            pose = corrected(MATH, pins, lengths, arms, Pose(start.x, start.y, theta), 12)
-        except (ZeroDivisionError, OverflowError, ValueError):
-            continue
-        rows = _Rows(MATH, pins, arms, pose)
-        closes = all(
-            abs(r.squared() - l * l) < 1e-9 * size * size for r, l in zip(rows.r, lengths, strict=True)
-        )
-        turned = float(np.angle(np.exp(1j * pose.theta)))
-        if closes and not any(
-            abs(np.exp(1j * turned) - np.exp(1j * other.theta)) < 1e-7 and abs(pose.x - other.x) < 1e-7 * size
-            for other in found
-        ):
-            found.append(Pose(float(pose.x), float(pose.y), turned))
-    return sorted(found, key=lambda pose: pose.theta)
+        base = across * (at / across.squared())
+        chord = across.turned() * math.sqrt(max(l2 * l2 - base.squared(), 0.0) / across.squared())
+        cos, sin = math.cos(theta), math.sin(theta)
+        arm = Vec2(cos * arms[1].x - sin * arms[1].y, sin * arms[1].x + cos * arms[1].y)
+        for d in (base + chord, base - chord):
+            start = p2 + d - arm
+            try:
+                near = Pose(float(start.x), float(start.y), theta)
+                pose = corrected(MATH, pins, lengths, arms, near, 20)
+                rows = _Rows(MATH, pins, arms, pose)
+            except (ArithmeticError, ValueError):
+                continue
+            turned = math.remainder(pose.theta, 2.0 * math.pi)
+            closes = all(
+                abs(r.squared() - l * l) < 1e-9 * size * size for r, l in zip(rows.r, lengths, strict=True)
+            )
+            if closes and not any(
+                abs(math.remainder(turned - other.theta, 2.0 * math.pi)) < 1e-7
+                and math.hypot(pose.x - other.x, pose.y - other.y) < 1e-7 * size
+                for other in found
+            ):
+                found.append(Pose(pose.x, pose.y, turned))
+    return sorted(found, key=lambda pose: (pose.theta, pose.x, pose.y))

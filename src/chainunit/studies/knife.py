@@ -21,7 +21,7 @@ from .. import __version__
 from ..cosim import Bond, CoSimulation, System, energy_residual, port_connections
 from ..drives.catalogue import CatalogueMotor, catalogue
 from ..drives.induction_motor import InductionMotor
-from ..engines import MATH, numpy_
+from ..engines import numpy_
 from ..errors import InputError, RunError
 from ..fmu.backends import Backend, export
 from ..machines.knife_drive import KnifeDrive, Parameters
@@ -55,6 +55,8 @@ RESIDUAL = 0.01
 """Share of energy that may be missing in a run."""
 CLOSE = 0.03
 """Relative width to which the least flywheel's fluctuation is found, below the one permitted."""
+FAR = 0.15
+"""share by which a given gear ratio may differ from that of rated speed and crank speed"""
 _TURN = 2.0 * math.pi
 
 
@@ -198,10 +200,17 @@ def parse(text: str, source: str = "knife") -> Config:
     run = instance(Running, given_values(checked.run))
     _consistent(run)
     motor = _motor(checked.drive.motor)
-    ratio = train.ratio or motor.nameplate.speed / run.crank_speed
+    wanted = motor.nameplate.speed / run.crank_speed
+    ratio = train.ratio or wanted
+    if not abs(ratio / wanted - 1.0) < FAR:
+        raise InputError(
+            f"drive.ratio = {ratio:g}: with {motor.designation} the crank would turn at "
+            f"{motor.nameplate.speed / ratio:.3g} rad/s, run.crank_speed asks for {run.crank_speed:.3g} rad/s; must "
+            f"be > {wanted * (1.0 - FAR):.4g} and < {wanted * (1.0 + FAR):.4g}, or change run.crank_speed"
+        )
     machine = KnifeDrive.parameter_layout.from_names({**given, "ratio": ratio})
     try:
-        KnifeDrive.check(machine)
+        machine = KnifeDrive.check(machine)
     except InputError as error:
         raise InputError(f"machine: {error}") from error
     stack = machine.stack
@@ -211,7 +220,7 @@ def parse(text: str, source: str = "knife") -> Config:
         )
     return Config(
         title=checked.title,
-        machine=KnifeDrive.prepared(MATH, machine),
+        machine=machine,
         cut=instance(Cut, given_values(checked.cut)),
         motor=motor,
         train=train,

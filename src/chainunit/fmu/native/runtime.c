@@ -129,6 +129,7 @@ static Status check(Instance *c) {
         const Requirement *r = &model.required[i];
         const double value = limits[3 * i], low = limits[3 * i + 1], high = limits[3 * i + 2];
         if (value > low && value < high) continue;
+        const char *gap = r->unit[0] ? " " : "";
         char given[256] = "", range[160] = "";
         size_t at = 0;
         for (int k = 0; k < r->n_given && at < sizeof given; ++k)
@@ -137,12 +138,12 @@ static Status check(Instance *c) {
         if (!(low < high))
             snprintf(range, sizeof range, "no value fits; %s", r->remedy);
         else if (isfinite(low) && isfinite(high))
-            snprintf(range, sizeof range, "must be > %g and < %g %s", low, high, r->unit);
+            snprintf(range, sizeof range, "must be > %g and < %g%s%s", low, high, gap, r->unit);
         else
-            snprintf(range, sizeof range, "must be %s %g %s", isfinite(low) ? ">" : "<", isfinite(low) ? low : high,
-                     r->unit);
+            snprintf(range, sizeof range, "must be %s %g%s%s", isfinite(low) ? ">" : "<", isfinite(low) ? low : high,
+                     gap, r->unit);
         memset(c->k, 0, (size_t)model.n_k * sizeof(double)); /* nothing that is not finite stays behind */
-        return complain(c, ERROR, "%s = %g %s: %s%s; %s", r->subject, value, r->unit, r->why, given, range);
+        return complain(c, ERROR, "%s = %g%s%s: %s%s; %s", r->subject, value, gap, r->unit, r->why, given, range);
     }
     return OK;
 }
