@@ -346,9 +346,9 @@ def test_the_example_says_what_is_declared():
     ("text", "message"),
     [
         ("[machine]\nr = 0.3", "machine: r = 0.3 m: the crank cannot turn with ab = 0.37, bo2 = 0.3"),
-        ("[machine.knife.e]\nx = 0.1", "machine: largest misfit of a leg over the turn of the crank, in parts of its length = "),
-        ("[drive]\nratio = 100", "drive.ratio = 100: with IE3 4-pole 2.2 kW, 100L the crank would turn at 1.52 rad/s"),
-        ("[machine]\nratio = 30", "machine.ratio = 30: the gear belongs to the drive; must be left out"),
+        ("[machine.knife.e]\nx = 0.1", "machine: largest misfit of a leg over the turn of the crank"),
+        ("[drive]\nratio = 100", "drive.ratio = 100: with IE3 4-pole 2.2 kW, 100L the crank would turn"),
+        ("[machine]\nratio = 30", "machine.ratio = 30: the gear belongs to the drive"),
         ("[machine.stack]\ntop = -0.3", "machine.stack.top = -0.3 m: must be > -0.234 m, the height of the table"),
         ("[machine]\nmass = 3", "machine.mass: unknown key; known here: r, ab"),
         ("[cut]\nforce = 0", "cut.force = 0 N: must be > 0 N"),
