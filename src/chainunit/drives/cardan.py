@@ -46,6 +46,8 @@ LAYOUT = Layout(Cardan)
 
 
 BENDS = ("alpha1", "alpha2")
+ORDERS = (2, 4)
+"""Of the excitation: i23 varies twice a turn; four times a turn at large bends."""
 
 
 def check(p: Line) -> None:

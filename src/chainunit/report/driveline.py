@@ -16,10 +16,10 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from ..drives.cardan import Cardan
+from ..drives.cardan import ORDERS, Cardan
 from ..files import whole
 from ..quantities import DISPLAY_UNITS, Layout
-from ..studies.driveline import ORDERS, DrivelineStudy, as_dict, both_units, rev
+from ..studies.driveline import DrivelineStudy, as_dict, both_units, rev
 from .style import LINES, draw
 
 NUMBERS, TEXT = "driveline.json", "driveline.md"

@@ -17,7 +17,16 @@ from pydantic import BeforeValidator, ConfigDict, Field, ValidationError, create
 from scipy.signal import find_peaks
 
 from .. import __version__
-from ..drives.cardan import Band, Cardan, check, frequency_band, frozen_frequency, sensitivity, two_joints
+from ..drives.cardan import (
+    ORDERS,
+    Band,
+    Cardan,
+    check,
+    frequency_band,
+    frozen_frequency,
+    sensitivity,
+    two_joints,
+)
 from ..drives.line_table import SHAFTS, Damping, form, values
 from ..drives.torsion import (
     Rigid,
@@ -36,8 +45,6 @@ from ..errors import InputError
 from ..quantities import Layout, Value, declaration, quantity, variables
 from ..reading import first_line, given_values, instance, merged, packaged, read, schema, to_number, toml
 
-ORDERS = (2, 4)
-"""Of the excitation: i23 varies twice a turn; four times a turn at large bends."""
 TONGUES = (1, 2, 3, 4)
 """n of the parametric resonances 2 speed = 2 k/n."""
 DENSER = (*TONGUES, 6)

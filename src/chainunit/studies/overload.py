@@ -20,7 +20,7 @@ from .. import __version__
 from ..config import SCENARIOS as SCENARIOS
 from ..config import Config
 from ..cosim import Bond, CoSimulation, Profile, System, energy_residual, monolithic
-from ..drives.cardan import two_joints
+from ..drives.cardan import ORDERS, two_joints
 from ..drives.dc_motor import DcMotor
 from ..drives.speed_control import Loop, Tuning, loop
 from ..engines import numpy_
@@ -34,7 +34,7 @@ from .cycle import OverloadFactors, Sides, all_on_one, cycle, overload_factors, 
 from .drive import Drive
 from .monte_carlo import MonteCarloResult, Task
 from .monte_carlo import run as run_monte_carlo
-from .shaft import Cycles, ShaftAnswers, Torsion, shaft_answers, torsion, with_rigid
+from .shaft import AMPLIFIED, NEAR, Cycles, ShaftAnswers, Torsion, shaft_answers, torsion, with_rigid
 from .sizing import SizingResult
 
 PINS = {
@@ -799,14 +799,14 @@ def _note_shaft(study: Study) -> None:
     unevenness = float(np.ptp(i))
     if unevenness > 1e-6:
         note(f"The joints turn unevenly: i23 varies by {100 * unevenness:.2g} % twice a turn of the shaft.")
-        for order in (2, 4):
-            if 0.8 * found.k_least < order * speed < 1.2 * found.k_largest:
+        for order in ORDERS:
+            if (1.0 - NEAR) * found.k_least < order * speed < (1.0 + NEAR) * found.k_largest:
                 note(
                     f"The shaft turns at {speed:.3g} rad/s: order {order} of the joints, {order * speed:.3g} rad/s, "
                     f"lies near the line's natural frequency, {found.k_least:.3g} to {found.k_largest:.3g} rad/s."
                 )
     for name, shaft in study.shaft.items():
-        if shaft.amplification is not None and shaft.amplification > 1.2:
+        if shaft.amplification is not None and shaft.amplification > AMPLIFIED:
             note(
                 f"{SCENARIOS.get(name, 'steady running')}: the line's torque peaks at {shaft.amplification:.2f} "
                 "times that of a rigid drive."

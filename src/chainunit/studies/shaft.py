@@ -21,6 +21,10 @@ LONGEST_STEP = 0.3
 """Communication step times natural frequency: above it the coupling feeds the vibration more than it damps."""
 RIGID = "driveline.tau2_rigid"
 """Name in a run's Dataset of the torque in shaft 2 in the same run of the rigid drive."""
+NEAR = 0.2
+"""Share of a natural frequency within which an order of the joints is worth a word."""
+AMPLIFIED = 1.2
+"""Amplification that is worth a word."""
 CLASSES = 10
 """Classes of torque range that a table of cycles has."""
 
