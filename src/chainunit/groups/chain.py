@@ -135,7 +135,8 @@ class Sweep:
         return self._phi[-1].solve(end - self._beta[-1])
 
     def back(self, force: Vec2) -> tuple[list[Any], list[Vec2]]:
-        """Angular accelerations of the rods and the forces f_0 .. f_N at the pins, from the force at A2; f_0 is on the support."""
+        """Angular accelerations of the rods and the forces f_0 .. f_N at the pins, from the force at A2; f_0 is on
+        the support."""
         accelerations: list[Any] = []
         forces = [force]
         for k in reversed(range(len(self._rods))):
