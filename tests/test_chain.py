@@ -248,3 +248,34 @@ def test_dynamic_reference(case, hand):
         state = list(solved[:N, k]), list(solved[N:, k])
         f = Chain(MATH, rods, *state, G, speed, acceleration(psi, speed, rate)).forces
         np.testing.assert_allclose([f[-1].x, -f[-1].y], data["A2"][k], atol=1e-6 * peak)
+
+
+def test_two_rods_in_motion_are_the_two_bar_machine():
+    """The dyad's reactions on a rocker that moves anyhow, with material on the organ: the same forces, another
+    route."""
+    from chainunit.machines.chain_unit import Inputs, organs
+    from chainunit.planar import Link
+
+    machine, feed = ChainUnit(), SideLoads(material_mass=30.0, processing_force=0.0)
+    p = machine.p
+    lengths, masses = machine.organ_rods("left", feed, 2)
+    rods = Rods(lengths, masses, [0.0] * 3)
+    rng = np.random.default_rng(14)
+    for _ in range(50):
+        psi, speed, rate = rng.uniform(-0.15, 0.15), rng.uniform(-3.0, 3.0), rng.uniform(-20.0, 20.0)
+        link = Link(Motion(ZERO), Vec2(math.sin(psi), -math.cos(psi)), 1.0, 0.0)
+        dyad = organs(MATH, p, Inputs(left=feed, right=feed), link)[0].dyad
+        wall, web = dyad.first, dyad.second
+        theta = [math.atan2(wall.u.x, -wall.u.y), math.atan2(-web.u.x, web.u.y)]
+        omega = [wall.t1 * speed, web.t1 * speed]
+        s, c = math.sin(psi), math.cos(psi)
+        end = Vec2(c, s) * (p.e * rate) + Vec2(-s, c) * (p.e * speed * speed)
+        chain = Chain(MATH, rods, theta, omega, p.g, speed, end)
+        left = machine.chamber(psi, speed, rate, feed, feed).left
+        for force, expected, sign in (
+            (chain.forces[0], left.support, -1.0), (chain.forces[1], left.hinge, 1.0), (chain.forces[2],
+            left.rocker_joint, 1.0)
+        ):  # fmt: skip
+            wanted = [float(expected.fx), float(expected.fy)]
+            assert [sign * force.x, sign * force.y] == pytest.approx(wanted, rel=1e-9, abs=1e-8)
+        assert chain.rates[0] == pytest.approx(wall.t1 * rate + wall.t2 * speed * speed, rel=1e-9, abs=1e-9)
