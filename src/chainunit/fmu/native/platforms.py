@@ -15,11 +15,16 @@ import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 from ...errors import InputError, RunError
 
-_FLAGS = ("-std=c99", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-shared", "-s")
+_FLAGS = ("-std=c99", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off")
+_SHARED = ("-shared", "-s")
+
+
+KERNELS, KERNELS_OBJECT = "kernels.c", "kernels.o"
 
 
 @dataclass(frozen=True)
@@ -165,11 +170,27 @@ def _compile(
             (work / name).write_bytes(content)
         own = ("-target", target) if compiler.zig else ("-Wl,--build-id=none",)
         math = () if "windows" in target else ("-lm",)
-        command = [*compiler.command, *own, *_FLAGS, *compiled, "-o", library, *math]
-        built = subprocess.run(command, cwd=work, capture_output=True, text=True)
-        if built.returncode:
-            raise RunError(f"the C compiler {compiler.name} failed: {built.stderr.strip()}")
+        flags = (*own, *_FLAGS)
+        (work / KERNELS_OBJECT).write_bytes(_object(compiler, flags, sources[KERNELS]))
+        rest = [name for name in compiled if name != KERNELS]
+        _run(compiler, (*flags, *_SHARED, *rest, KERNELS_OBJECT, "-o", library, *math), work)
         return (work / library).read_bytes()
+
+
+@lru_cache(maxsize=32)
+def _object(compiler: Compiler, flags: tuple[str, ...], kernels: bytes) -> bytes:
+    """Object code of the kernels, which take almost all of the time and are the same for whatever start values."""
+    with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
+        work = Path(scratch)
+        (work / KERNELS).write_bytes(kernels)
+        _run(compiler, (*flags, "-c", KERNELS, "-o", KERNELS_OBJECT), work)
+        return (work / KERNELS_OBJECT).read_bytes()
+
+
+def _run(compiler: Compiler, arguments: tuple[str, ...], work: Path) -> None:
+    built = subprocess.run([*compiler.command, *arguments], cwd=work, capture_output=True, text=True)
+    if built.returncode:
+        raise RunError(f"the C compiler {compiler.name} failed: {built.stderr.strip()}")
 
 
 def fat(slices: Sequence[bytes]) -> bytes:
