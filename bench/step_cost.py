@@ -137,13 +137,13 @@ def main() -> None:
         )
     )
     motor, layout = DcMotor.Parameters(), DcMotor.state_layout
-    x, at = layout.values(DcMotor.initial_states(motor)), DcMotor.Inputs(w_ref=100.0)
+    x, at = layout.values(DcMotor.initial_states(engines.MATH, motor)), DcMotor.Inputs(w_ref=100.0)
     rows.append(
         (
             "motor, step of 1 ms (4 internal), math",
             cost(
                 lambda: rk4(
-                    lambda y: DcMotor.derivatives(engines.MATH, motor, at, layout.instance(y)),
+                    lambda _, y: DcMotor.derivatives(engines.MATH, motor, at, layout.instance(y)),
                     x, 1e-3, DcMotor.internal_step(engines.MATH, motor),
                 )
             ),
