@@ -77,7 +77,7 @@ def turned_by_exudyn(steps, fx, fy):
     """Every compared output over one turn from crank angle 0, at the start and after each step."""
     mbs = exudyn.SystemContainer().AddSystem()
     found = {"frame": mbs.AddObject(item.ObjectGround())}
-    start = Mechanism(MATH, KnifeDrive.prepared(MATH, P), 0.0)
+    start = Mechanism(MATH, KnifeDrive.prepared(MATH, P), None, 0.0)
     for name, body in zip(BODIES, start.bodies, strict=True):
         c, link, own = body.c, body.link, getattr(P, name)
         node = mbs.AddNode(

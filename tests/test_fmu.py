@@ -135,7 +135,7 @@ def test_two_versions_in_one_process_do_not_share_code(fmus, tmp_path, monkeypat
 
     def changed(model):
         for name, content in shipped(model):
-            if name == "machines/chain_unit.py":
+            if name == "machines/driven.py":
                 assert b"return self.J * a + self.bias.total" in content
                 content = content.replace(
                     b"return self.J * a + self.bias.total", b"return 2.0 * (self.J * a + self.bias.total)"

@@ -262,7 +262,7 @@ def test_the_series_is_a_start_and_newton_the_answer():
     assert len(series) == 3 * (2 * HARMONICS + 1) and misfit < 1e-14 and 0.3 < least < 0.6
     angles = np.linspace(0.0, 2.0 * math.pi, 257)
     near = _near(series, np.cos(angles), np.sin(angles))
-    link = Mechanism(numpy_(), DEFAULT, angles).triad.link
+    link = Mechanism(numpy_(), DEFAULT, None, angles).triad.link
     off = np.hypot(near.x - link.pin.p.x, near.y - link.pin.p.y)
     assert 1e-10 < np.max(off) < 1e-7
 
@@ -288,7 +288,7 @@ def test_accepted_machines_are_right_all_the_way_round():
         grows = slope(out.kinetic_energy) + slope(out.potential_energy)
         size = np.max(np.abs(out.power.v)) + np.max(np.abs(grows)) + np.max(np.abs(out.dissipated_power.v))
         assert np.max(np.abs(out.power.v - grows - out.dissipated_power.v)) < 1e-9 * size
-        triad = Mechanism(numpy_(), p, phi).triad
+        triad = Mechanism(numpy_(), p, None, phi).triad
         for pin, leg, length in zip(triad.pins, triad.legs, (p.bc, p.o3d, p.o4e), strict=True):
             r = pin.p - leg.pin.p
             np.testing.assert_allclose(np.hypot(r.x, r.y), length, rtol=1e-12)

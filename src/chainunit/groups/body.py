@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 from ..planar import Link, Motion, Vec2
@@ -48,6 +49,12 @@ class Body:
         force.y = force.y - self.m * g
         moment = (c.p - k.pin.p).cross(force) - self.I * (k.t1 * a + k.t2 * w2)
         return force, moment
+
+
+def reflected(bodies: Iterable[Body]) -> tuple[Any, Any]:
+    """Reflected inertia of several bodies J [kg m2] and its derivative dJ/dq."""
+    parts = [body.inertia() for body in bodies]
+    return sum(j for j, _ in parts), sum(j1 for _, j1 in parts)
 
 
 def point_load(at: Motion, pin: Motion, force: Vec2) -> tuple[Vec2, Any]:

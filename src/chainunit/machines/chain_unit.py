@@ -19,8 +19,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from ..engines import Dual, dual, slope
-from ..groups.body import Body, point_load, total
+from ..groups.body import Body, point_load, reflected, total
 from ..groups.driver import crank, driving_torque
 from ..groups.dyad import Dyad
 from ..groups.friction import pin_losses
@@ -29,7 +28,8 @@ from ..planar import ZERO, Link, Motion, Vec2
 from ..ports import PortSlopes, PortValues, flange, load_terminal
 from ..quantities import Value, declaration, group, quantity
 from .crank_rocker import TURNS, angle_at_pivot, longest_crank, pressure_angle
-from .parts import Force, Pin, Rod
+from .driven import DrivenState, slopes
+from .parts import Force, Pin, Rod, force
 
 
 @declaration
@@ -307,9 +307,9 @@ class Organ:
             # X cos s + Y sin s with s = +-psi: the force across the arm, along the arm
             tangential_load=rocker.u.turned().dot(at_a2) * psi_hand,
             normal_load=-rocker.u.dot(at_a2),
-            support=_force(at_a1),
-            hinge=_force(at_b),
-            rocker_joint=_force(at_a2),
+            support=force(at_a1),
+            hinge=force(at_b),
+            rocker_joint=force(at_a2),
             web_pull=xp.minimum(-web_axis.dot(at_a2), -web_axis.dot(at_b - processing)),
             wall_pull=xp.minimum(-wall_axis.dot(at_a1), wall_axis.dot(at_b)),
         )
@@ -365,8 +365,7 @@ class Mechanism:
 
     def inertia(self) -> tuple[Any, Any]:
         """Reflected inertia at the crank J [kg m2] and dJ/dq."""
-        parts = [body.inertia() for body in self.bodies]
-        return sum(j for j, _ in parts), sum(j1 for _, j1 in parts)
+        return reflected(self.bodies)
 
     def potential(self, g: Any) -> Any:
         """Potential energy [J], zero at the level of C."""
@@ -440,24 +439,14 @@ class Bias:
         self.total = self.conservative + self.processing + self.friction + self.stop_damping
 
 
-class State:
+class State(DrivenState):
     """The machine at one point: mechanism, inertia, and torque at constant speed."""
 
-    __slots__ = ("J", "bias", "dJ", "m", "w")
+    __slots__ = ()
 
-    def __init__(self, xp: Any, p: Any, u: Any, q: Any, w: Any) -> None:
-        self.w = w
-        self.m = Mechanism(xp, p, u, q)
-        self.J, self.dJ = self.m.inertia()
-        self.bias = Bias(xp, p, u, self.m, self.dJ, w)
-
-    def torque(self, a: Any) -> Any:
-        """The crank torque at crank acceleration `a` [N m]."""
-        return self.J * a + self.bias.total
-
-
-def _force(f: Vec2) -> Force:
-    return Force(fx=f.x, fy=f.y)
+    mechanism_of, bias_of = Mechanism, Bias
+    m: Mechanism
+    bias: Bias
 
 
 def _rocker_load(p: Any, left: Side, right: Side) -> dict[str, Any]:
@@ -512,10 +501,10 @@ def _loads(xp: Any, p: Any, s: State, a: Any) -> dict[str, Any]:
         ),
         left=on_left,
         right=on_right,
-        pivot=_force(f.at_c),
-        crank_bearing=_force(f.at_o1),
-        crank_pin=_force(f.at_a),
-        coupler_pin=_force(f.at_bd),
+        pivot=force(f.at_c),
+        crank_bearing=force(f.at_o1),
+        crank_pin=force(f.at_a),
+        coupler_pin=force(f.at_bd),
         pressure_angle=pressure_angle(xp, p.l, p.h, arm.squared()),
         frame=Frame(
             fx=-at_frame.x, fy=-at_frame.y, moment=torque - s.bias.friction - moment - s.bias.stop_moment
@@ -536,11 +525,7 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, s: State) -> Outputs:
     a = u.a / p.ratio
     return Outputs(
         tau=s.torque(a) / p.ratio,
-        tau_bias=s.bias.total / p.ratio,
-        J=s.J / (p.ratio * p.ratio),
-        dJ_dphi=s.dJ / (p.ratio * p.ratio * p.ratio),
-        phi0=u.phi,
-        w0=u.w,
+        **s.port(p, u),
         **_loads(xp, p, s, a),
     )
 
@@ -558,14 +543,6 @@ def _direct_outputs(xp: Any, p: Any, u: Any, x: Any, s: State) -> DirectOutputs:
         J=s.J / (p.ratio * p.ratio),
         **_loads(xp, p, s, a / p.ratio),
     )
-
-
-def _slopes(xp: Any, p: Any, u: Any, x: Any, s: State) -> PortSlopes:
-    # by the speed, only the force pass varies: the mechanism of the point is used again
-    by_w = Bias(dual(xp), p, u, s.m, s.dJ, Dual(s.w, 1.0)).total
-    by_q = State(dual(xp), p, u, Dual(u.phi / p.ratio, 1.0), s.w).bias.total
-    per_motor_turn = 1.0 / (p.ratio * p.ratio)
-    return PortSlopes(tau_bias_dphi=slope(by_q) * per_motor_turn, tau_bias_dw=slope(by_w) * per_motor_turn)
 
 
 def rocker_extremes(xp: Any, p: Any) -> tuple[Any, Any]:
@@ -602,6 +579,7 @@ class ChamberForces(Model):
         "machines/__init__.py",
         "machines/chain_unit.py",
         "machines/crank_rocker.py",
+        "machines/driven.py",
         "machines/parts.py",
         "groups",
     )
@@ -664,7 +642,7 @@ class ChamberForces(Model):
         ),
         Part(
             PortSlopes,
-            _slopes,
+            slopes,
             derivatives={"tau_bias_dphi": ("tau_bias", "phi"), "tau_bias_dw": ("tau_bias", "w")},
         ),
     )

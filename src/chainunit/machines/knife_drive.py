@@ -18,8 +18,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from ..engines import Dual, dual, slope
-from ..groups.body import Body, point_load, total
+from ..groups.body import Body, point_load, reflected, total
 from ..groups.driver import crank, driving_torque
 from ..groups.dyad import Dyad
 from ..groups.friction import pin_losses
@@ -29,7 +28,8 @@ from ..planar import Motion, Vec2
 from ..ports import PortSlopes, PortValues, flange, load_terminal
 from ..quantities import Value, declaration, group, quantity
 from .crank_rocker import TURNS, longest_crank
-from .parts import Force, Pin, Rod
+from .driven import DrivenState, slopes
+from .parts import Force, Pin, Rod, force
 
 SAMPLES = 20
 """Angles of the crank at which the triad is followed once around."""
@@ -230,7 +230,7 @@ class Mechanism:
 
     __slots__ = ("blade", "bodies", "drive", "triad")
 
-    def __init__(self, xp: Any, p: Any, q: Any) -> None:
+    def __init__(self, xp: Any, p: Any, u: Any, q: Any) -> None:
         self.drive = drive = Drive(xp, p, q)
         pins = drive.pins(p)
         pose = _pose(xp, p, pins, _near(p.derived, xp.cos(q), xp.sin(q)), _STEPS)
@@ -252,8 +252,7 @@ class Mechanism:
 
     def inertia(self) -> tuple[Any, Any]:
         """Reflected inertia at the crank J [kg m2] and dJ/dq."""
-        parts = [body.inertia() for body in self.bodies]
-        return sum(j for j, _ in parts), sum(j1 for _, j1 in parts)
+        return reflected(self.bodies)
 
 
 class Reactions:
@@ -307,24 +306,14 @@ class Bias:
         self.total = 0.5 * dJ * w2 + weights + self.cutting + self.further + self.losses
 
 
-class State:
+class State(DrivenState):
     """The machine at one point: mechanism, inertia, and torque at constant speed."""
 
-    __slots__ = ("J", "bias", "dJ", "m", "w")
+    __slots__ = ()
 
-    def __init__(self, xp: Any, p: Any, u: Any, q: Any, w: Any) -> None:
-        self.w = w
-        self.m = Mechanism(xp, p, q)
-        self.J, self.dJ = self.m.inertia()
-        self.bias = Bias(xp, p, u, self.m, self.dJ, w)
-
-    def torque(self, a: Any) -> Any:
-        """The crank torque at crank acceleration `a` [N m]."""
-        return self.J * a + self.bias.total
-
-
-def _force(f: Vec2) -> Force:
-    return Force(fx=f.x, fy=f.y)
+    mechanism_of, bias_of = Mechanism, Bias
+    m: Mechanism
+    bias: Bias
 
 
 def _outputs(xp: Any, p: Any, u: Any, x: Any, s: State) -> Outputs:
@@ -334,11 +323,7 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, s: State) -> Outputs:
     dyad, triad = m.drive.dyad, m.triad
     return Outputs(
         tau=torque / p.ratio,
-        tau_bias=s.bias.total / p.ratio,
-        J=s.J / (p.ratio * p.ratio),
-        dJ_dphi=s.dJ / (p.ratio * p.ratio * p.ratio),
-        phi0=u.phi,
-        w0=u.w,
+        **s.port(p, u),
         blade=Blade(
             x=k.p.x,
             y=k.p.y,
@@ -348,29 +333,22 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, s: State) -> Outputs:
             cut_fx=s.bias.cut.x,
             cut_fy=s.bias.cut.y,
         ),
-        crank_bearing=_force(f.at_o1),
-        crank_pin=_force(f.at_a),
-        coupler_pin=_force(f.at_b),
-        leg_pin=_force(f.outer[0]),
-        rocker_bearing=_force(f.at_o2),
-        c_pin=_force(f.inner[0]),
-        d_pin=_force(f.inner[1]),
-        e_pin=_force(f.inner[2]),
-        o3_bearing=_force(f.outer[1]),
-        o4_bearing=_force(f.outer[2]),
+        crank_bearing=force(f.at_o1),
+        crank_pin=force(f.at_a),
+        coupler_pin=force(f.at_b),
+        leg_pin=force(f.outer[0]),
+        rocker_bearing=force(f.at_o2),
+        c_pin=force(f.inner[0]),
+        d_pin=force(f.inner[1]),
+        e_pin=force(f.inner[2]),
+        o3_bearing=force(f.outer[1]),
+        o4_bearing=force(f.outer[2]),
         power=torque * w,
         kinetic_energy=0.5 * s.J * w * w,
         potential_energy=sum(body.potential(p.g) for body in m.bodies),
         dissipated_power=(s.bias.losses + s.bias.cutting + s.bias.further) * w,
         margin=xp.minimum(xp.abs(dyad.transmission), xp.abs(triad.margin)),
     )
-
-
-def _slopes(xp: Any, p: Any, u: Any, x: Any, s: State) -> PortSlopes:
-    by_w = Bias(dual(xp), p, u, s.m, s.dJ, Dual(s.w, 1.0)).total
-    by_q = State(dual(xp), p, u, Dual(u.phi / p.ratio, 1.0), s.w).bias.total
-    per_motor_turn = 1.0 / (p.ratio * p.ratio)
-    return PortSlopes(tau_bias_dphi=slope(by_q) * per_motor_turn, tau_bias_dw=slope(by_w) * per_motor_turn)
 
 
 class KnifeDrive(Model):
@@ -386,6 +364,7 @@ class KnifeDrive(Model):
     files = (
         "machines/__init__.py",
         "machines/knife_drive.py",
+        "machines/driven.py",
         "machines/parts.py",
         "machines/crank_rocker.py",
         "groups",
@@ -488,7 +467,7 @@ class KnifeDrive(Model):
         ),
         Part(
             PortSlopes,
-            _slopes,
+            slopes,
             derivatives={"tau_bias_dphi": ("tau_bias", "phi"), "tau_bias_dw": ("tau_bias", "w")},
         ),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..planar import Vec2
 from ..quantities import Value, declaration, quantity
 
 
@@ -33,3 +34,8 @@ class Force:
 
     fx: Value = quantity("N", "force along x", nominal=1000.0)
     fy: Value = quantity("N", "force along y", nominal=1000.0)
+
+
+def force(f: Vec2) -> Force:
+    """The vector as declared."""
+    return Force(fx=f.x, fy=f.y)

@@ -203,7 +203,7 @@ def markdown(study: KnifeStudy, plots: list[str]) -> str:
 def _joints(study: KnifeStudy, q: float) -> dict[str, tuple[float, float]]:
     """Pins and the ends of the edge at crank angle `q` [m]."""
     p = study.config.machine
-    m = Mechanism(numpy_(), p, q)
+    m = Mechanism(numpy_(), p, None, q)
     knife = m.triad.link
     at: dict[str, Any] = {
         "O1": p.o1,
