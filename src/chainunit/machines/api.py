@@ -148,7 +148,7 @@ class ChainUnit:
         u = self._inputs(phi, w, a, left, right, stop)
         s = self._state(u)
         w2, a = s.w * s.w, u.a / self.p.ratio
-        forces = chain_unit.Reactions(s.m, self.p, w2, a, *s.bias.processing_forces, s.bias.stop_moment)
+        forces = chain_unit.Reactions(s.m, self.p, w2, a, s.bias.processing_forces, s.bias.stop.moment)
         return forces.torque / self.p.ratio
 
     def friction_torque(

@@ -315,53 +315,29 @@ class Organ:
         )
 
 
-class Mechanism:
-    """The moving machine at crank angle q: links, bodies and dyads."""
+class CrankRocker:
+    """The drive at crank angle q: crank and dyad (coupler, rocker) as links and bodies."""
 
-    __slots__ = (
-        "a",
-        "bodies",
-        "coupler_body",
-        "crank",
-        "crank_body",
-        "drive",
-        "left",
-        "right",
-        "rocker",
-        "rocker_body",
-    )
+    __slots__ = ("a", "bodies", "coupler_body", "crank", "crank_body", "drive", "rocker", "rocker_body")
 
-    def __init__(self, xp: Any, p: Any, u: Any, q: Any) -> None:
+    def __init__(self, xp: Any, p: Any, q: Any) -> None:
         self.crank = crank(xp, Vec2(-p.c, -p.hy), q)
         self.a = self.crank.at(p.r)
         self.drive = Dyad(xp, self.a, Motion(ZERO), p.l, p.h, -1.0)
         self.rocker = self.drive.second
-        self.left, self.right = organs(xp, p, u, self.rocker)
         self.crank_body = Body(self.crank, p.crank.m, p.crank.s, p.crank.I)
         self.coupler_body = Body(self.drive.first, p.coupler.m, p.coupler.s, p.coupler.I)
         self.rocker_body = Body(self.rocker, p.rocker.m, p.rocker.s, p.rocker.I)
-        self.bodies = (
-            self.crank_body,
-            self.coupler_body,
-            self.rocker_body,
-            self.left.wall,
-            self.left.web,
-            self.right.wall,
-            self.right.web,
-        )
+        self.bodies: tuple[Body, ...] = (self.crank_body, self.coupler_body, self.rocker_body)
 
     def psi(self, xp: Any) -> Any:
         """Angle of the rocker [rad], which never reaches the horizontal."""
         return xp.asin(self.rocker.u.x)
 
     def pin_rates(self) -> tuple[Any, ...]:
-        """Relative rotation per crank rotation in the pins O1, A, Bd, C, then A2, B, A1 of each side."""
+        """Relative rotation per crank rotation in the pins O1, A, Bd, C."""
         k0, k1, k2 = self.crank.t1, self.drive.first.t1, self.rocker.t1
-        rates = [k0, k1 - k0, k1 - k2, k2]
-        for organ in (self.left, self.right):
-            wall, web = organ.dyad.first.t1, organ.dyad.second.t1
-            rates += [web - k2, web - wall, wall]
-        return tuple(rates)
+        return k0, k1 - k0, k1 - k2, k2
 
     def inertia(self) -> tuple[Any, Any]:
         """Reflected inertia at the crank J [kg m2] and dJ/dq."""
@@ -370,6 +346,25 @@ class Mechanism:
     def potential(self, g: Any) -> Any:
         """Potential energy [J], zero at the level of C."""
         return sum(body.potential(g) for body in self.bodies)
+
+
+class Mechanism(CrankRocker):
+    """The moving machine at crank angle q: the drive, and both organs as dyads."""
+
+    __slots__ = ("left", "right")
+
+    def __init__(self, xp: Any, p: Any, u: Any, q: Any) -> None:
+        super().__init__(xp, p, q)
+        self.left, self.right = organs(xp, p, u, self.rocker)
+        self.bodies += (self.left.wall, self.left.web, self.right.wall, self.right.web)
+
+    def pin_rates(self) -> tuple[Any, ...]:
+        """Those of the drive, then of A2, B, A1 of each side."""
+        k2, rates = self.rocker.t1, list(super().pin_rates())
+        for organ in (self.left, self.right):
+            wall, web = organ.dyad.first.t1, organ.dyad.second.t1
+            rates += [web - k2, web - wall, wall]
+        return tuple(rates)
 
 
 def organs(xp: Any, p: Any, u: Any, rocker: Link) -> tuple[Organ, Organ]:
@@ -381,8 +376,9 @@ def organs(xp: Any, p: Any, u: Any, rocker: Link) -> tuple[Organ, Organ]:
     )
 
 
-class Reactions:
-    """The force pass, last group first, at crank speed w (squared: `w2`) and acceleration `a`.
+class DriveReactions:
+    """The force pass of the drive, last group first, at crank speed w (squared: `w2`) and acceleration `a`, with the
+    forces of both organs and a moment on the rocker.
 
     Friction is left out of it: it is small, and with it the torque would no longer be linear in `a`.
     """
@@ -390,24 +386,63 @@ class Reactions:
     __slots__ = ("at_a", "at_bd", "at_c", "at_o1", "left", "right", "torque")
 
     def __init__(
-        self, m: Mechanism, p: Any, w2: Any, a: Any, left: Vec2, right: Vec2, stop_moment: Any
+        self,
+        m: CrankRocker,
+        p: Any,
+        w2: Any,
+        a: Any,
+        left: tuple[Vec2, Vec2, Vec2],
+        right: tuple[Vec2, Vec2, Vec2],
+        moment: Any,
     ) -> None:
+        """`left`, `right` are the forces at A1 and B on the wall and at A2 on the web."""
         g = p.g
-        self.left = m.left.reactions(w2, a, g, left)
-        self.right = m.right.reactions(w2, a, g, right)
-        a2, pivot = m.left.dyad.second.pin, m.rocker.pin
+        self.left, self.right = left, right
         rocker = total(
             m.rocker_body.applied(w2, a, g),
-            point_load(a2, pivot, -(self.left[2] + self.right[2])),
-            (ZERO, stop_moment),
+            point_load(m.rocker.at(p.e), m.rocker.pin, -(left[2] + right[2])),
+            (ZERO, moment),
         )
         self.at_a, self.at_bd, self.at_c = m.drive.reactions(m.coupler_body.applied(w2, a, g), rocker)
         self.torque, self.at_o1 = driving_torque(m.crank, m.a, m.crank_body.applied(w2, a, g), -self.at_a)
 
-    def pins(self, m: Mechanism) -> tuple[tuple[Vec2, Any], ...]:
+    def pins(self, m: CrankRocker) -> tuple[tuple[Vec2, Any], ...]:
+        """Reaction and relative rotation per crank rotation of the pins, as in `CrankRocker.pin_rates`."""
+        return tuple(zip((self.at_o1, self.at_a, self.at_bd, self.at_c), m.pin_rates(), strict=True))
+
+
+class Reactions(DriveReactions):
+    """The force pass of the whole machine, with the `processing` force of each side and the stop's moment."""
+
+    __slots__ = ()
+
+    def __init__(
+        self, m: Mechanism, p: Any, w2: Any, a: Any, processing: tuple[Vec2, Vec2], stop_moment: Any
+    ) -> None:
+        left, right = (
+            organ.reactions(w2, a, p.g, f) for organ, f in zip((m.left, m.right), processing, strict=True)
+        )
+        super().__init__(m, p, w2, a, left, right, stop_moment)
+
+    def pins(self, m: CrankRocker) -> tuple[tuple[Vec2, Any], ...]:
         """Reaction and relative rotation per crank rotation of the ten pins, as in `Mechanism.pin_rates`."""
         forces = (self.at_o1, self.at_a, self.at_bd, self.at_c, *self.left[::-1], *self.right[::-1])
         return tuple(zip(forces, m.pin_rates(), strict=True))
+
+
+class StopLoad:
+    """The stop on the rocker at crank speed `w`: moment on the rocker [N m], torque at the crank that overcomes it,
+    energy that it holds [J]."""
+
+    __slots__ = ("damping", "moment", "potential", "torque")
+
+    def __init__(self, xp: Any, u: Any, m: CrankRocker, w: Any) -> None:
+        k, turned = m.rocker.t1, m.psi(xp) - u.stop.psi
+        held = u.stop.stiffness * turned
+        self.potential = 0.5 * held * turned
+        self.damping = u.stop.damping * (k * k) * w
+        self.moment = -(held + u.stop.damping * k * w)
+        self.torque = held * k
 
 
 class Bias:
@@ -417,8 +452,7 @@ class Bias:
     """
 
     __slots__ = (
-        "conservative", "friction", "processing", "processing_forces", "reactions", "stop_damping", "stop_moment",
-        "stop_potential", "total",
+        "conservative", "friction", "processing", "processing_forces", "reactions", "stop", "total"
     )  # fmt: skip
 
     def __init__(self, xp: Any, p: Any, u: Any, m: Mechanism, dJ: Any, w: Any) -> None:
@@ -427,16 +461,13 @@ class Bias:
         force_r, torque_r = m.right.resistance(xp, p, u.right, w)
         self.processing_forces = (force_l, force_r)
         self.processing = torque_l + torque_r
-        k, turned = m.rocker.t1, m.psi(xp) - u.stop.psi
-        held = u.stop.stiffness * turned
-        self.stop_potential = 0.5 * held * turned
-        self.stop_damping = u.stop.damping * (k * k) * w
-        self.stop_moment = -(held + u.stop.damping * k * w)
-        self.reactions = Reactions(m, p, w2, 0.0, force_l, force_r, self.stop_moment)
+        self.stop = StopLoad(xp, u, m, w)
+        self.reactions = Reactions(m, p, w2, 0.0, self.processing_forces, self.stop.moment)
 
         self.friction = pin_losses(xp, p.pin, p.joint_damping, w, self.reactions.pins(m))
-        self.conservative = 0.5 * dJ * w2 + sum(body.weight_slope(p.g) for body in m.bodies) + held * k
-        self.total = self.conservative + self.processing + self.friction + self.stop_damping
+        weight = sum(body.weight_slope(p.g) for body in m.bodies)
+        self.conservative = 0.5 * dJ * w2 + weight + self.stop.torque
+        self.total = self.conservative + self.processing + self.friction + self.stop.damping
 
 
 class State(DrivenState):
@@ -449,11 +480,11 @@ class State(DrivenState):
     bias: Bias
 
 
-def _rocker_load(p: Any, left: Side, right: Side) -> dict[str, Any]:
+def _rocker_load(p: Any, left: Side, right: Side, at_a2: Any = 0.0) -> dict[str, Any]:
     """The fields of `RockerLoad`, which `Rocker` has, too."""
     tangential = left.tangential_load - right.tangential_load
     return {
-        "tau": p.e * tangential,
+        "tau": p.e * tangential + at_a2,
         "tangential_load": tangential,
         "normal_load": left.normal_load + right.normal_load,
     }
@@ -475,50 +506,69 @@ def chamber(xp: Any, p: Any, u: Any, psi: Any, psi_w: Any, psi_a: Any) -> Chambe
     return Chamber(rocker=load, left=on_left, right=on_right)
 
 
-def _loads(xp: Any, p: Any, s: State, a: Any) -> dict[str, Any]:
-    """The fields of `Loads` at crank acceleration `a`."""
+def drive_loads(
+    xp: Any,
+    p: Any,
+    s: Any,
+    a: Any,
+    f: DriveReactions,
+    left: Side,
+    right: Side,
+    at_a2: Any = 0.0,
+    at_a1: Any = 0.0,
+) -> dict[str, Any]:
+    """The fields of `Loads` but energies and margin, at crank acceleration `a`.
+
+    Parameters
+    ----------
+    s : state with crank speed `w`, drive `m`, `bias` and `torque`
+    f, left, right : the force pass at `a`, and what the organs carry in it
+    at_a2, at_a1 : moments on both organs in these pins, from the rocker and from the frame [N m]
+    """
     m, w = s.m, s.w
-    w2 = w * w
-    f = Reactions(m, p, w2, a, *s.bias.processing_forces, s.bias.stop_moment)
-    torque = s.torque(a)
-    rocker, drive = m.rocker, m.drive
-    force_l, force_r = s.bias.processing_forces
-    on_left = m.left.loads(xp, 1.0, rocker, f.left, force_l)
-    on_right = m.right.loads(xp, -1.0, rocker, f.right, force_r)
-    arm = drive.r1 - drive.r2
+    torque, rocker = s.torque(a), m.rocker
     at_frame = f.at_o1 + f.at_c + f.left[0] + f.right[0]
-    moment = (
-        m.crank.pin.p.cross(f.at_o1)
-        + m.left.dyad.first.pin.p.cross(f.left[0])
-        + m.right.dyad.first.pin.p.cross(f.right[0])
-    )
-    loads = Loads(
-        rocker=Rocker(
+    moment = m.crank.pin.p.cross(f.at_o1) + at_a1
+    for place, forces in ((-p.z, f.left), (p.z, f.right)):
+        moment = moment + Vec2(place, 0.0).cross(forces[0])
+    return {
+        "rocker": Rocker(
             psi=m.psi(xp),
             w=rocker.t1 * w,
-            a=rocker.t1 * a + rocker.t2 * w2,
-            **_rocker_load(p, on_left, on_right),
+            a=rocker.t1 * a + rocker.t2 * (w * w),
+            **_rocker_load(p, left, right, at_a2),
         ),
-        left=on_left,
-        right=on_right,
-        pivot=force(f.at_c),
-        crank_bearing=force(f.at_o1),
-        crank_pin=force(f.at_a),
-        coupler_pin=force(f.at_bd),
-        pressure_angle=pressure_angle(xp, p.l, p.h, arm.squared()),
-        frame=Frame(
-            fx=-at_frame.x, fy=-at_frame.y, moment=torque - s.bias.friction - moment - s.bias.stop_moment
+        "left": left,
+        "right": right,
+        "pivot": force(f.at_c),
+        "crank_bearing": force(f.at_o1),
+        "crank_pin": force(f.at_a),
+        "coupler_pin": force(f.at_bd),
+        "pressure_angle": pressure_angle(xp, p.l, p.h, (m.drive.r1 - m.drive.r2).squared()),
+        "frame": Frame(
+            fx=-at_frame.x, fy=-at_frame.y, moment=torque - s.bias.friction - moment - s.bias.stop.moment
         ),
-        power=torque * w,
-        kinetic_energy=0.5 * s.J * w2,
-        potential_energy=m.potential(p.g) + s.bias.stop_potential,
-        dissipated_power=(s.bias.friction + s.bias.processing + s.bias.stop_damping) * w,
-        margin=xp.minimum(
-            xp.abs(drive.transmission),
+        "power": torque * w,
+    }
+
+
+def _loads(xp: Any, p: Any, s: State, a: Any) -> dict[str, Any]:
+    """The fields of `Loads` at crank acceleration `a`."""
+    m, w, bias = s.m, s.w, s.bias
+    f = Reactions(m, p, w * w, a, bias.processing_forces, bias.stop.moment)
+    force_l, force_r = bias.processing_forces
+    on_left = m.left.loads(xp, 1.0, m.rocker, f.left, force_l)
+    on_right = m.right.loads(xp, -1.0, m.rocker, f.right, force_r)
+    return {
+        **drive_loads(xp, p, s, a, f, on_left, on_right),
+        "kinetic_energy": 0.5 * s.J * (w * w),
+        "potential_energy": m.potential(p.g) + bias.stop.potential,
+        "dissipated_power": (bias.friction + bias.processing + bias.stop.damping) * w,
+        "margin": xp.minimum(
+            xp.abs(m.drive.transmission),
             xp.minimum(xp.abs(m.left.dyad.transmission), xp.abs(m.right.dyad.transmission)),
         ),
-    )
-    return vars(loads)
+    }
 
 
 def _outputs(xp: Any, p: Any, u: Any, x: Any, s: State) -> Outputs:
