@@ -1,8 +1,11 @@
-"""The internal integrator of models with states in a co-simulation FMU.
+"""The internal integrators of models with states in a co-simulation FMU, as in its native code.
 
-The classical Runge-Kutta method with equal steps: its cost is known beforehand, it needs no error control
+`rk4`, the classical Runge-Kutta method with equal steps: its cost is known beforehand, it needs no error control
 that could give up in the middle of a step, and with steps well below the model's shortest time constant its
-error (fourth order) lies far below that of the coupling (second order). Standard library only.
+error (fourth order) lies far below that of the coupling (second order).
+
+`controlled`, the pair of Dormand and Prince of orders 5 and 4 with control of the error: for a model that is slow
+most of the time and now and then jerks. Standard library only.
 """
 
 from __future__ import annotations
@@ -32,3 +35,76 @@ def rk4(
             v + h / 6.0 * (a + 2.0 * (b + c) + d) for v, a, b, c, d in zip(now, k1, k2, k3, k4, strict=True)
         ]
     return now
+
+
+_NODES = (0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0)
+_STAGES = (
+    (),
+    (1 / 5,),
+    (3 / 40, 9 / 40),
+    (44 / 45, -56 / 15, 32 / 9),
+    (19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729),
+    (9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656),
+    (35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84),
+)
+_WRONG = (71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40)
+_SHORTEST = 1e-6
+"""of the longest step: one as short is taken as it is, as a snatch must not stop a run"""
+
+
+def controlled(
+    rates: Callable[[float, Sequence[float]], Sequence[float]],
+    close: Callable[[float, Sequence[float]], Sequence[float]],
+    x: Sequence[float],
+    step: float,
+    pace: float,
+    longest: float,
+    tolerance: float,
+    nominal: Sequence[float],
+) -> tuple[list[float], float]:
+    """The states `step` later, and the next substep that the error allows; see the native runtime, which does the
+    same.
+
+    Parameters
+    ----------
+    rates : derivatives of the states at a time since the start of the step, and the states there
+    close : the states, put where the model's constraints are met at that time; after each substep
+    pace : substep to begin with, and `longest` the longest [s]
+    tolerance, nominal : permitted error of a substep in parts of each state, or of its nominal size
+
+    Raises
+    ------
+    ArithmeticError
+        where the states leave all bounds.
+    """
+    now, since = list(x), 0.0
+    while since < step:
+        left = step - since
+        h = left if pace >= left else 0.5 * left if pace > 0.5 * left else pace
+        k: list[Sequence[float]] = []
+        at: list[float] = now
+        error = 0.0
+        try:
+            for node, weights in zip(_NODES, _STAGES, strict=True):
+                at = [
+                    v + h * sum(a * r[i] for a, r in zip(weights, k, strict=True)) for i, v in enumerate(now)
+                ]
+                k.append(rates(since + h * node, at))
+            usable = all(map(math.isfinite, (*at, *k[-1])))
+        except (ArithmeticError, ValueError):
+            usable = False
+        for i, (v, after, size) in enumerate(zip(now, at, nominal, strict=True) if usable else ()):
+            wrong = abs(h * sum(e * r[i] for e, r in zip(_WRONG, k, strict=True)))
+            error = max(error, wrong / (tolerance * max(abs(v), abs(after), size)))
+        last_resort = h <= _SHORTEST * longest
+        if not usable and last_resort:
+            raise ArithmeticError("the states left all bounds")
+        if usable and (error <= 1.0 or last_resort):
+            since = step if h >= left else since + h
+            now = list(close(since, at))
+        factor = 0.1 if not usable else 5.0 if error < 1e-4 else 0.9 * error**-0.2
+        following = h * min(max(factor, 0.2), 5.0)
+        if usable and error <= 1.0 and h < pace:
+            following = max(following, pace)
+        pace = min(max(following, _SHORTEST * longest), longest)
+    return now, pace

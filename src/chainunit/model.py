@@ -66,14 +66,17 @@ class Part:
         equations: Callable[..., Any],
         *,
         often: frozenset[str] = frozenset(),
+        by_differences: frozenset[str] = frozenset(),
         derivatives: Mapping[str, tuple[str, str]] | None = None,
     ) -> None:
         """`often` names the outputs that a driver asks for at every step: a native FMU evaluates them apart from the
-        rest. `derivatives` says which output by which input each of this part's is the derivative of, for an
-        engine that differentiates by itself."""
+        rest. `by_differences` names outputs that are derivatives themselves and whose own derivatives it takes by
+        central differences: exact ones would be the largest part of its code. `derivatives` says which output by
+        which input each of this part's is the derivative of, for an engine that differentiates by itself."""
         self.layout = Layout(declared)
         self.equations = equations
         self.often = often
+        self.by_differences = by_differences
         self.derivatives = dict(derivatives or {})
 
 
@@ -97,6 +100,15 @@ class Model:
     input_rates: ClassVar[Mapping[str, str]] = {}
     """Inputs of a co-simulation FMU that run along another one, their time derivative, inside a step (``phi`` along
     ``w`` along ``a``): else what turns would stand still in each step."""
+    start_unknowns: ClassVar[int] = 0
+    """How many numbers the states at the start are found from by iteration; see `start`."""
+    start_rounds: ClassVar[int] = 0
+    """Rounds of that iteration."""
+    controlled: ClassVar[bool] = False
+    """Whether a co-simulation FMU integrates with control of the error, to `tolerance`, and closes the states by
+    `closed` after each of its steps; else in equal steps."""
+    built_by: ClassVar[str] = ""
+    """The call that gives this class, for one that a function of its module makes."""
     icon: ClassVar[str]
     """Name of its icon in `data/icons`, an SVG and a PNG."""
 
@@ -166,8 +178,31 @@ class Model:
 
     @staticmethod
     def initial_states(xp: Any, p: Any) -> Any:
-        """States at the start (models with states)."""
+        """States at the start, where they follow from the parameters alone (models with states)."""
         raise NotImplementedError
+
+    @staticmethod
+    def start_guess(xp: Any, p: Any, u: Any) -> list[Any]:
+        """First guess of the unknowns of the start."""
+        return []
+
+    @staticmethod
+    def start_improved(xp: Any, p: Any, u: Any, z: list[Any]) -> list[Any]:
+        """The unknowns of the start after one more round."""
+        raise NotImplementedError
+
+    @classmethod
+    def started(cls, xp: Any, p: Any, u: Any, z: list[Any]) -> Any:
+        """States at the start with the inputs `u`, from the unknowns."""
+        return cls.initial_states(xp, p)
+
+    @classmethod
+    def start(cls, xp: Any, p: Any, u: Any, rounds: int | None = None) -> Any:
+        """States at the start with the inputs `u`; a few `rounds` show what they depend on."""
+        z = cls.start_guess(xp, p, u)
+        for _ in range(cls.start_rounds if rounds is None else rounds):
+            z = cls.start_improved(xp, p, u, z)
+        return cls.started(xp, p, u, z)
 
     @staticmethod
     def derivatives(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
@@ -177,6 +212,16 @@ class Model:
     @staticmethod
     def internal_step(xp: Any, p: Any) -> Any:
         """Longest step of the internal integrator [s] (models with states)."""
+        raise NotImplementedError
+
+    @staticmethod
+    def tolerance(xp: Any, p: Any) -> Any:
+        """Relative tolerance of the internal integrator, of states or of their nominal size (`controlled` models)."""
+        raise NotImplementedError
+
+    @staticmethod
+    def closed(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+        """The states near `x`, in declared order, that meet the model's constraints (`controlled` models)."""
         raise NotImplementedError
 
     @staticmethod

@@ -59,7 +59,7 @@ def monolithic(
     for name, (model, p) in models.items():
         if model.state_layout:
             offsets[name] = n
-            start += model.state_layout.values(model.initial_states(MATH, p))
+            start += model.state_layout.values(model.start(MATH, p, model.input_layout.from_names({})))
             sizes = [v.quantity.nominal or 1.0 for v in model.state_layout.variables]
             tolerances += [max(1e-12, rtol * 1e-3 * size) for size in sizes]
             n = len(start)
@@ -110,6 +110,16 @@ def monolithic(
                 dx += model.derivatives(MATH, p, inputs(name, model, t, values), states(name, model, flat))
         return dx
 
+    # where the start depends on an input that is another one's state, a pass for each on the way
+    for _ in models:
+        values = pass_through(MATH, 0.0, start, 1)
+        begun: list[float] = []
+        for name, (model, p) in models.items():
+            if model.state_layout:
+                begun += model.state_layout.values(model.start(MATH, p, inputs(name, model, 0.0, values)))
+        if begun == start:
+            break
+        start = begun
     times = np.asarray(times, float)
     inner = [c for c in sorted(set(corners)) if times[0] < c < times[-1]]
     stops = [times[0], *inner, times[-1]]

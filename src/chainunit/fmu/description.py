@@ -98,7 +98,7 @@ class Interface:
         rows_at_start = [*outputs, *derivatives]
         if model.state_layout:
             states = model.state_layout.values(x)
-            first = model.initial_states(casadi_(), p)
+            first = model.start(casadi_(), p, u, rounds=min(2, model.start_rounds))
             started = model.state_layout.values(first)
             rows_at_start = [*self._outputs(p, u, first), *model.derivatives(casadi_(), p, u, first)]
         in_run = self._influences(symbols, [*states, *outputs, *derivatives])

@@ -23,7 +23,7 @@ from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
 from ..engines import MATH
-from ..integrate import rk4
+from ..integrate import controlled, rk4
 from ..model import Model
 from ..quantities import complaint
 
@@ -96,6 +96,8 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         self._derived: Any = None  # from fixed parameters, which stay as they are from initialization on
         self._u: Any = None
         self._x: list[float] = []
+        self._pace = 0.0  # next substep of an integrator that controls its error
+        self._closed = False
         self._initialized = False
         self._refused = ""  # why the parameters make no model
         self._told = ""
@@ -138,7 +140,10 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         def rates(since: float, x: Any) -> list[float]:
             return model.derivatives(MATH, p, self._inputs(run, since), layout.instance(x))
 
-        x = rk4(rates, self._x, step, longest)
+        if model.controlled:
+            x = self._controlled(rates, run, step, longest)
+        else:
+            x = rk4(rates, self._x, step, longest)
         if not all(map(math.isfinite, x)):
             self._tell(f"the states left all bounds in the step from t = {time:g} s")
             return False
@@ -148,7 +153,23 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         if run:
             self._u = None
         self._touch()
+        self._closed = model.controlled
         return True
+
+    def _controlled(self, rates: Any, run: Any, step: float, longest: float) -> list[float]:
+        p, model, x = self._p, self.model, self._x
+        layout = model.state_layout
+        assert layout is not None
+
+        def close(since: float, x: Any) -> list[float]:
+            return model.closed(MATH, p, self._inputs(run, since), layout.instance(x))
+
+        for _ in range(0 if self._closed else 2):
+            x = close(0.0, x)
+        nominal = [v.quantity.nominal or 1.0 for v in layout.variables]
+        pace, tolerance = self._pace or 0.01 * longest, model.tolerance(MATH, p)
+        x, self._pace = controlled(rates, close, x, step, pace, longest, tolerance, nominal)
+        return x
 
     # -- values
 
@@ -162,6 +183,8 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
             elif vr >= self._n_p:
                 self._set[vr] = value
                 self._u = None
+                if not self._initialized and self.model.start_unknowns:
+                    self._p = None  # the start depends on the inputs, too
                 self._touch()
             elif not self._initialized:
                 self._set[vr] = value
@@ -224,6 +247,7 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
     def _touch(self) -> None:
         """Outputs are to be evaluated anew."""
         self._shared = None
+        self._closed = False
         self._fresh = [False] * len(self._fresh)
 
     def _prepare(self) -> str:
@@ -235,7 +259,8 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
                 p = self._p = self.model.check(p, self._derived if self._initialized else None)
                 self._derived = getattr(p, "derived", None)
                 if self.model.state_layout and not self._initialized:
-                    self._x = self.model.state_layout.values(self.model.initial_states(MATH, p))
+                    self._x = self.model.state_layout.values(self.model.start(MATH, p, self._inputs()))
+                    self._pace = 0.0
             except BaseException as reason:
                 self._refused = str(reason) or repr(reason)
                 self._tell(self._refused)
@@ -306,7 +331,13 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
     # -- states of the FMU, and its description
 
     def _get_fmu_state(self) -> dict[str, Any]:
-        return {"set": list(self._set), "x": list(self._x), "initialized": self._initialized}
+        return {
+            "set": list(self._set),
+            "x": list(self._x),
+            "initialized": self._initialized,
+            "pace": self._pace,
+            "closed": self._closed,
+        }
 
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
         values, x = state.get("set"), state.get("x")
@@ -324,6 +355,9 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         # the state may be that of another geometry
         self._p = self._u = self._derived = None
         self._touch()
+        pace = state.get("pace")
+        self._pace = pace if isinstance(pace, float) and pace >= 0.0 else 0.0
+        self._closed = state.get("closed") is True
 
     @staticmethod
     def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:

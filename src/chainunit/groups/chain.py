@@ -6,7 +6,8 @@ end to its A2 end. Pin k is the end of rod k, pin 0 is A1, pin N is A2; f_k is t
 follows.
 
 Damping moments act in the pins: on the outer of two rods -c_k (w_outer - w_inner), pin 0 against the frame, pin N
-against the rocker.
+against the rocker. Two rods that fold up against each other meet a stop: beyond the angle `fold_limit` between them
+it turns them back with fold_stiffness (angle - fold_limit)^2.
 """
 
 from __future__ import annotations
@@ -18,14 +19,25 @@ from ..planar import Motion, Vec2
 
 
 class Rods:
-    """Lengths [m] and masses [kg] of the rods, and damping c_0 .. c_N of the pins [N m s/rad]."""
+    """Lengths [m] and masses [kg] of the rods, and damping c_0 .. c_N of the pins [N m s/rad]; `inertia` is a factor
+    on m l^2/12, 1 for uniform rods. Stops of the inner pins: angle [rad] and stiffness [N m/rad2]."""
 
-    __slots__ = ("damping", "lengths", "masses")
+    __slots__ = ("damping", "fold_limit", "fold_stiffness", "inertia", "lengths", "masses")
 
-    def __init__(self, lengths: Sequence[Any], masses: Sequence[Any], damping: Sequence[Any]) -> None:
+    def __init__(
+        self,
+        lengths: Sequence[Any],
+        masses: Sequence[Any],
+        damping: Sequence[Any],
+        inertia: Any = 1.0,
+        fold_limit: Any = 3.0,
+        fold_stiffness: Any = 0.0,
+    ) -> None:
         self.lengths = tuple(lengths)
         self.masses = tuple(masses)
         self.damping = tuple(damping)
+        self.inertia = inertia
+        self.fold_limit, self.fold_stiffness = fold_limit, fold_stiffness
 
     def __len__(self) -> int:
         return len(self.lengths)
@@ -69,6 +81,7 @@ class Sweep:
         free: Sequence[Vec2],
         spin: Sequence[Any],
         moments: Sequence[Any],
+        at_start: Sequence[Vec2] | None = None,
     ) -> None:
         """
         Parameters
@@ -77,22 +90,30 @@ class Sweep:
         free : force on each rod at its middle [N]
         spin : squared angular speed of each rod [rad2/s2]
         moments : moment on each rod [N m]
+        at_start : force on each rod at its start [N]
         """
         self._rods = rods
+        # the inertia about an end is kappa m l^2
+        kappa = 0.25 + rods.inertia * (1.0 / 12.0)
+        half, quarter = 0.5 / kappa, 0.25 / kappa
         zero = 0.0 * theta[0]
         phi, beta = _Matrix(zero, zero, zero), Vec2(zero, zero)
         self._phi, self._beta, self._steps, self._u, self._n = [phi], [beta], [], [], []
         for k, (l, m) in enumerate(zip(rods.lengths, rods.masses, strict=True)):
             s, c = xp.sin(theta[k]), xp.cos(theta[k])
             u, n = Vec2(s, -c), Vec2(c, s)
-            # about the pin before: (m l^2/3) alpha + (m l/2) n . a = l n . f + (l/2) n . free + moment
-            j = m * l * l * (1.0 / 3.0)
+            # about the pin before: kappa m l^2 alpha + (m l/2) n . a = l n . f + (l/2) n . free + moment
+            j = kappa * m * l * l
             # what acts on the rod beside f and the acceleration of the pin before; `turn` is alpha's part of it
             turn = (free[k].dot(n) * (0.5 * l) + moments[k]) / j
             pull = free[k] + u * (0.5 * m * l * spin[k]) - n * (0.5 * m * l * turn)
-            # f_before = pull + f - (3/2) n (n . f) - B a_before, B = m (1 - (3/4) n n)
-            b = _Matrix(m * (1.0 - 0.75 * n.x * n.x), -0.75 * m * n.x * n.y, m * (1.0 - 0.75 * n.y * n.y))
-            # (1 + Phi B) a_before = Phi (pull + E f) + beta, E = 1 - (3/2) n n
+            if at_start is not None:
+                pull = pull + at_start[k]
+            # f_before = pull + E f - B a_before, B = m (1 - n n/(4 kappa)), E = 1 - n n/(2 kappa)
+            b = _Matrix(
+                m * (1.0 - quarter * n.x * n.x), -quarter * m * n.x * n.y, m * (1.0 - quarter * n.y * n.y)
+            )
+            # (1 + Phi B) a_before = Phi (pull + E f) + beta
             k11 = 1.0 + phi.xx * b.xx + phi.xy * b.xy
             k12 = phi.xx * b.xy + phi.xy * b.yy
             k21 = phi.xy * b.xx + phi.yy * b.xy
@@ -111,7 +132,7 @@ class Sweep:
             # a = a_before + l n alpha - l u spin, alpha = turn + (l/j) n . f - (m l/(2 j)) n . a_before
             #   = E^T a_before + (l^2/j) n (n . f) + l n turn - l u spin
             q = l * l / j
-            ex, exy, ey = 1.0 - 1.5 * n.x * n.x, -1.5 * n.x * n.y, 1.0 - 1.5 * n.y * n.y
+            ex, exy, ey = 1.0 - half * n.x * n.x, -half * n.x * n.y, 1.0 - half * n.y * n.y
             e = _Matrix(ex, exy, ey)
             # Phi_k = E S E + q n n
             ax, ay = ex * sxx + exy * sxy, ex * sxy + exy * syy
@@ -137,6 +158,7 @@ class Sweep:
     def back(self, force: Vec2) -> tuple[list[Any], list[Vec2]]:
         """Angular accelerations of the rods and the forces f_0 .. f_N at the pins, from the force at A2; f_0 is on
         the support."""
+        half = 0.5 / (0.25 + self._rods.inertia * (1.0 / 12.0))
         accelerations: list[Any] = []
         forces = [force]
         for k in reversed(range(len(self._rods))):
@@ -144,7 +166,7 @@ class Sweep:
             l, m = self._rods.lengths[k], self._rods.masses[k]
             n, f = self._n[k], forces[-1]
             across = n.dot(f)
-            moved = f - n * (1.5 * across)
+            moved = f - n * (half * across)
             before = held.times(moved) + rest
             accelerations.append(turn + l / j * across - 0.5 * m * l / j * n.dot(before))
             forces.append(pull + moved - b.times(before))
@@ -152,9 +174,10 @@ class Sweep:
 
 
 class Chain:
-    """A chain at one state, its A2 end moved."""
+    """A chain at one state, its A2 end moved. `moment_at_start` and `moment_at_end` act on it in the pins A1 and A2
+    [N m]; `folding` is the energy in the stops [J], `damped` what damping takes [W]."""
 
-    __slots__ = ("forces", "moment_at_end", "rates", "sweep")
+    __slots__ = ("damped", "folding", "forces", "moment_at_end", "moment_at_start", "rates", "sweep")
 
     def __init__(
         self,
@@ -165,6 +188,7 @@ class Chain:
         g: Any,
         end_spin: Any,
         end: Vec2,
+        at_start: Sequence[Vec2] | None = None,
     ) -> None:
         """
         Parameters
@@ -172,11 +196,22 @@ class Chain:
         theta, omega : angles [rad] and speeds [rad/s] of the rods
         end_spin : angular speed of the rocker [rad/s]
         end : acceleration of A2 [m/s2]
+        at_start : force on each rod at its start [N], beside its weight
         """
         N = len(rods)
         speeds = [0.0, *omega, end_spin]
-        moments = [c * (speeds[k + 1] - speeds[k]) for k, c in enumerate(rods.damping)]
-        self.moment_at_end = moments[-1]
+        slips = [speeds[k + 1] - speeds[k] for k in range(N + 1)]
+        moments = [c * slip for c, slip in zip(rods.damping, slips, strict=True)]
+        self.damped = sum(moment * slip for moment, slip in zip(moments, slips, strict=True))
+        self.folding = 0.0
+        # without a stop nothing is computed for it
+        if not (isinstance(rods.fold_stiffness, float) and rods.fold_stiffness == 0.0):
+            for k in range(1, N):
+                # what turns the inner rod towards the outer one, as damping does
+                moment, energy = self._stop(xp, rods, theta[k] - theta[k - 1])
+                moments[k] = moments[k] + moment
+                self.folding = self.folding + energy
+        self.moment_at_start, self.moment_at_end = -moments[0], moments[-1]
         self.sweep = Sweep(
             xp,
             rods,
@@ -184,8 +219,20 @@ class Chain:
             [Vec2(0.0, -m * g) for m in rods.masses],
             [w * w for w in omega],
             [moments[k + 1] - moments[k] for k in range(N)],
+            at_start,
         )
         self.rates, self.forces = self.sweep.back(self.sweep.force(end))
+
+    @staticmethod
+    def _stop(xp: Any, rods: Rods, fold: Any) -> tuple[Any, Any]:
+        """Moment of a stop at the angle `fold` between two rods, along it, and its energy."""
+        above = xp.maximum(fold - rods.fold_limit, 0.0)
+        below = xp.maximum(-fold - rods.fold_limit, 0.0)
+        k = rods.fold_stiffness
+        return (
+            k * (above * above - below * below),
+            k * (1.0 / 3.0) * (above * above * above + below * below * below),
+        )
 
 
 def end_motion(rods: Rods, theta: Sequence[Any], omega: Sequence[Any], xp: Any) -> Motion:
@@ -199,7 +246,7 @@ def end_motion(rods: Rods, theta: Sequence[Any], omega: Sequence[Any], xp: Any) 
 
 
 def closed(
-    xp: Any, rods: Rods, theta: Sequence[Any], omega: Sequence[Any], end: Motion, rounds: int = 2
+    xp: Any, rods: Rods, theta: Sequence[Any], omega: Sequence[Any], end: Motion, rounds: int = 3
 ) -> tuple[list[Any], list[Any]]:
     """Angles and speeds nearest to the given ones, in the metric of the masses, with which the chain ends at `end`
     and moves with it."""
@@ -208,9 +255,9 @@ def closed(
     for _ in range(rounds):
         at = end_motion(rods, theta, omega, xp)
         sweep = Sweep(xp, rods, theta, *nothing)
-        change, _ = sweep.back(sweep.force(end.p - at.p))
-        theta = [a + d for a, d in zip(theta, change, strict=True)]
-    at = end_motion(rods, theta, omega, xp)
-    sweep = Sweep(xp, rods, theta, *nothing)
-    change, _ = sweep.back(sweep.force(end.p1 - at.p1))
-    return list(theta), [w + d for w, d in zip(omega, change, strict=True)]
+        # the end's speed at the angles before they change, which is as near as they are
+        turned, _ = sweep.back(sweep.force(end.p - at.p))
+        faster, _ = sweep.back(sweep.force(end.p1 - at.p1))
+        theta = [a + d for a, d in zip(theta, turned, strict=True)]
+        omega = [w + d for w, d in zip(omega, faster, strict=True)]
+    return list(theta), list(omega)

@@ -304,15 +304,23 @@ class Organ:
         at_a1, at_b, at_a2 = forces
         wall_axis, web_axis = self.dyad.first.u, self.dyad.second.u
         return Side(
-            # X cos s + Y sin s with s = +-psi: the force across the arm, along the arm
-            tangential_load=rocker.u.turned().dot(at_a2) * psi_hand,
-            normal_load=-rocker.u.dot(at_a2),
-            support=force(at_a1),
-            hinge=force(at_b),
-            rocker_joint=force(at_a2),
+            **side(rocker, psi_hand, forces),
             web_pull=xp.minimum(-web_axis.dot(at_a2), -web_axis.dot(at_b - processing)),
             wall_pull=xp.minimum(-wall_axis.dot(at_a1), wall_axis.dot(at_b)),
         )
+
+
+def side(rocker: Link, psi_hand: float, forces: tuple[Vec2, Vec2, Vec2]) -> dict[str, Any]:
+    """The fields of `Side` but the pulls, from the forces at A1, B and A2; see `Organ.loads`."""
+    at_a1, at_b, at_a2 = forces
+    return {
+        # X cos s + Y sin s with s = +-psi: the force across the arm, along the arm
+        "tangential_load": rocker.u.turned().dot(at_a2) * psi_hand,
+        "normal_load": -rocker.u.dot(at_a2),
+        "support": force(at_a1),
+        "hinge": force(at_b),
+        "rocker_joint": force(at_a2),
+    }
 
 
 class CrankRocker:

@@ -24,10 +24,17 @@ def groups(interface: Interface) -> list[list[int]]:
     for part in interface.model.parts:
         places = {name: at + i for i, name in enumerate(part.layout.names)}
         at += len(places)
-        often = [i for name, i in places.items() if name in part.often]
-        rest = [i for name, i in places.items() if name not in part.often]
-        found += [group for group in (often, rest) if group]
+        often = [i for name, i in places.items() if name in part.often - part.by_differences]
+        apart = [i for name, i in places.items() if name in part.by_differences]
+        rest = [i for i in places.values() if i not in often and i not in apart]
+        found += [group for group in (often, rest, apart) if group]
     return found
+
+
+def differenced(interface: Interface) -> set[int]:
+    """Groups without code for their derivatives, see `Part`."""
+    names = {name for part in interface.model.parts for name in part.by_differences}
+    return {g for g, group in enumerate(groups(interface)) if interface.others[group[0]].name in names}
 
 
 def kernels(interface: Interface) -> str:
@@ -35,7 +42,7 @@ def kernels(interface: Interface) -> str:
     import casadi
 
     model = interface.model
-    (ps, us, xs, ks), p, _, _, outputs, derivatives = interface.traced
+    (ps, us, xs, ks), p, u, x, outputs, derivatives = interface.traced
     # what is derived from parameters comes last, and only where there is something
     more = [ks] if model.derived else []
     symbols = [ps, us, xs, *more]
@@ -60,14 +67,24 @@ def kernels(interface: Interface) -> str:
     for i, group in enumerate(groups(interface)):
         values = casadi.vertcat(*(outputs[k] for k in group))
         add(f"group_{i}", symbols, values)
-        add(f"group_{i}_forward", [ps, us, xs, du, dx, *more], forward(values))
+        if i not in differenced(interface):
+            add(f"group_{i}_forward", [ps, us, xs, du, dx, *more], forward(values))
     if interface.states:
         rates = casadi.vertcat(*derivatives)
         add("derivatives", symbols, rates)
         add("derivatives_forward", [ps, us, xs, du, dx, *more], forward(rates))
         assert model.state_layout is not None
-        add("initial", [ps], casadi.vertcat(*model.state_layout.values(model.initial_states(casadi_(), p))))
+        unknowns = casadi.SX.sym("z", model.start_unknowns)
+        z = casadi.vertsplit(unknowns) if model.start_unknowns else []
+        started = model.state_layout.values(model.started(casadi_(), p, u, z))
+        if z:
+            add("guess", [ps, us], casadi.vertcat(*model.start_guess(casadi_(), p, u)))
+            add("improved", [ps, us, unknowns], casadi.vertcat(*model.start_improved(casadi_(), p, u, z)))
+        add("initial", [ps, us, unknowns], casadi.vertcat(*started))
         add("internal_step", [ps], casadi.SX(model.internal_step(casadi_(), p)))
+        if model.controlled:
+            add("tolerance", [ps], casadi.SX(model.tolerance(casadi_(), p)))
+            add("closed", symbols, casadi.vertcat(*model.closed(casadi_(), p, u, x)))
     limits = [casadi.SX(v) for row in model.requirements(casadi_(), p) for v in row]
     if limits:
         add("requirements", [ps, *more], casadi.vertcat(*limits))
@@ -105,10 +122,13 @@ def _array(kind: str, name: str, items: list[str]) -> str:
 def tables(interface: Interface, guid: str, token: str) -> str:
     """``model.c``: what model.h asks for, with the FMI 2.0 GUID and the FMI 3.0 instantiation token given."""
     model = interface.model
-    groups_ = groups(interface)
-    functions = ["all", *(f"group_{i}{end}" for i in range(len(groups_)) for end in ("", "_forward"))]
+    groups_, apart = groups(interface), differenced(interface)
+    functions = ["all", *(f"group_{i}" for i in range(len(groups_)))]
+    functions += [f"group_{i}_forward" for i in range(len(groups_)) if i not in apart]
     if interface.states:
         functions += ["derivatives", "derivatives_forward", "initial", "internal_step"]
+        functions += ["guess", "improved"] if model.start_unknowns else []
+        functions += ["tolerance", "closed"] if model.controlled else []
     if model.required:
         functions.append("requirements")
     if model.derived:
@@ -128,7 +148,8 @@ def tables(interface: Interface, guid: str, token: str) -> str:
     first = 0
     group_rows = []
     for g, group in enumerate(groups_):
-        group_rows.append(f"{{{first}, {len(group)}, kernel_group_{g}, kernel_group_{g}_forward}}")
+        derivative = "NULL" if g in apart else f"kernel_group_{g}_forward"
+        group_rows.append(f"{{{first}, {len(group)}, kernel_group_{g}, {derivative}}}")
         for k, output in enumerate(group):
             place[output], group_of[output] = first + k, g
         first += len(group)
@@ -179,6 +200,7 @@ def tables(interface: Interface, guid: str, token: str) -> str:
         "n_x": len(interface.states),
         "n_y": n_y,
         "n_k": model.derived,
+        "n_z": model.start_unknowns,
         "n_groups": len(groups_),
         "n_required": len(model.required),
         "start": "starts",
@@ -192,10 +214,15 @@ def tables(interface: Interface, guid: str, token: str) -> str:
         "required": "required" if rows else "NULL",
         "requirements": "kernel_requirements" if rows else "NULL",
         "derive": "kernel_derive" if model.derived else "NULL",
+        "start_rounds": model.start_rounds,
+        "guess": "kernel_guess" if model.start_unknowns else "NULL",
+        "improved": "kernel_improved" if model.start_unknowns else "NULL",
         "initial": "kernel_initial" if states else "NULL",
         "derivatives": "kernel_derivatives" if states else "NULL",
         "derivatives_forward": "kernel_derivatives_forward" if states else "NULL",
         "internal_step": "kernel_internal_step" if states else "NULL",
+        "tolerance": "kernel_tolerance" if model.controlled else "NULL",
+        "closed": "kernel_closed" if model.controlled else "NULL",
     }
     lines.append("const Model model = {")
     lines += [f"    .{name} = {value}," for name, value in fields.items()]

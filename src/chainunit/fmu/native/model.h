@@ -28,7 +28,7 @@ typedef struct {
 typedef struct {
     int first, count; /* places among the outputs as they are stored */
     Kernel values;
-    Kernel forward; /* directional derivative by inputs and states */
+    Kernel forward; /* directional derivative by inputs and states; NULL: by central differences */
 } Group;
 
 /* What parameters must meet beyond their own bounds: value between two limits. */
@@ -42,7 +42,7 @@ typedef struct {
     const char *name;
     const char *guid; /* of the FMI 2.0 description */
     const char *token; /* of the FMI 3.0 description */
-    int n_p, n_u, n_x, n_y, n_k, n_groups, n_required;
+    int n_p, n_u, n_x, n_y, n_k, n_z, n_groups, n_required;
     const double *start;          /* parameters, inputs */
     const Quantity *declared;     /* parameters, inputs */
     const double *nominal;        /* of the states */
@@ -54,10 +54,15 @@ typedef struct {
     const Requirement *required;
     Kernel requirements;          /* (p, k) -> value, low, high of each */
     Kernel derive;                /* (p) -> what follows from fixed parameters and is computed once */
-    Kernel initial;               /* (p) -> states at the start */
+    int start_rounds;
+    Kernel guess;                 /* (p, u) -> first guess z of what the start is found from */
+    Kernel improved;              /* (p, u, z) -> z after one more round */
+    Kernel initial;               /* (p, u, z) -> states at the start */
     Kernel derivatives;           /* (p, u, x) */
     Kernel derivatives_forward;   /* (p, u, x, du, dx) */
     Kernel internal_step;         /* (p) -> longest step of the internal integrator [s] */
+    Kernel tolerance;             /* (p) -> its relative tolerance, where it controls its error */
+    Kernel closed;                /* (p, u, x, k) -> states that meet the constraints; after each of its steps */
 } Model;
 
 extern const Model model;

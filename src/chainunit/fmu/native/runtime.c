@@ -10,8 +10,8 @@
 enum { STARTED_BIT = 30, DERIVATIVES_BIT = 31 };
 
 typedef struct {
-    int mode, model_exchange;
-    double time;
+    int mode, model_exchange, closed;
+    double time, pace;
     unsigned guard; /* of the model: a state of another one is refused */
 } Saved;
 
@@ -23,7 +23,8 @@ static unsigned guard(void) {
 
 Instance *instance_new(const char *name, Report report) {
     const int n_in = model.n_u + model.n_x;
-    int work = 4 * model.n_x + 3 * n_in + model.n_y + model.n_x + 3 * model.n_required;
+    int work = 4 * model.n_x + 3 * n_in + 2 * model.n_y + model.n_x + 3 * model.n_required + 2 * model.n_z;
+    if (model.closed && work < 3 * model.n_u + 10 * model.n_x) work = 3 * model.n_u + 10 * model.n_x;
     const int saved = model.n_p + n_in + model.n_u + model.n_k;
     if (work < saved) work = saved;
     const size_t n = (size_t)(model.n_p + 2 * model.n_u + 2 * model.n_x + model.n_k + model.n_y + work + 1);
@@ -78,6 +79,8 @@ void instance_reset(Instance *c) {
     c->time = 0.0;
     c->fresh = 0;
     c->changed = 1;
+    c->closed = 0;
+    c->pace = 0.0;
 }
 
 Status complain(Instance *c, Status status, const char *format, ...) {
@@ -103,6 +106,16 @@ Status set_time(Instance *c, double time) {
     if (!isfinite(time)) return complain(c, ERROR, "time = %g s: must be a finite number", time);
     c->time = time;
     return OK;
+}
+
+static int all_finite(const double *v, int n) {
+    /* an infinite or undefined value makes its sum undefined; four sums, so that none waits for another */
+    double sum[4] = {0.0, 0.0, 0.0, 0.0};
+    int i = 0;
+    for (; i + 4 <= n; i += 4)
+        for (int k = 0; k < 4; ++k) sum[k] += v[i + k] * 0.0;
+    for (; i < n; ++i) sum[0] += v[i] * 0.0;
+    return sum[0] + sum[1] + sum[2] + sum[3] == 0.0;
 }
 
 /* -- start */
@@ -153,12 +166,26 @@ Status start(Instance *c) {
     Status status = check(c);
     if (status) return status;
     if (model.n_x) {
-        const double *arg[1] = {c->p};
-        double *res[1] = {c->x};
+        double *z = c->work, *next = z + model.n_z;
+        const double *arg[3] = {c->p, c->u, z};
+        double *res[1] = {z};
+        if (model.n_z) model.guess(arg, res, NULL, NULL, 0);
+        for (int round = 0; round < model.start_rounds; ++round) {
+            res[0] = next;
+            model.improved(arg, res, NULL, NULL, 0);
+            memcpy(z, next, (size_t)model.n_z * sizeof(double));
+        }
+        res[0] = c->x;
         model.initial(arg, res, NULL, NULL, 0);
+        if (!all_finite(c->x, model.n_x)) {
+            memset(c->x, 0, (size_t)model.n_x * sizeof(double));
+            return complain(c, ERROR, "a state at the start is not a finite number");
+        }
     }
     c->fresh = 0;
     c->changed = 0;
+    c->closed = 0;
+    c->pace = 0.0;
     return OK;
 }
 
@@ -166,16 +193,6 @@ Status start(Instance *c) {
 
 static Status unknown_reference(Instance *c, unsigned reference) {
     return complain(c, ERROR, "value reference %u does not exist", reference);
-}
-
-static int all_finite(const double *v, int n) {
-    /* an infinite or undefined value makes its sum undefined; four sums, so that none waits for another */
-    double sum[4] = {0.0, 0.0, 0.0, 0.0};
-    int i = 0;
-    for (; i + 4 <= n; i += 4)
-        for (int k = 0; k < 4; ++k) sum[k] += v[i + k] * 0.0;
-    for (; i < n; ++i) sum[0] += v[i] * 0.0;
-    return sum[0] + sum[1] + sum[2] + sum[3] == 0.0;
 }
 
 /* Evaluate the groups in the set `wanted`, a bit each, where they are not fresh. */
@@ -246,6 +263,7 @@ Status set(Instance *c, unsigned reference, double value) {
     if (c->p[i] != value) {
         c->p[i] = value;
         c->fresh = 0;
+        c->closed = 0;
         if (c->mode & (INSTANTIATED | INITIALIZATION)) c->changed = 1;
     }
     if (i >= model.n_p) c->du[i - model.n_p] = 0.0;
@@ -273,6 +291,7 @@ Status states_set(Instance *c, const double *x, size_t n, const char *call) {
     if (n && !all_finite(x, (int)n)) return complain(c, ERROR, "%s: a state is not a finite number", call);
     if (n) memcpy(c->x, x, n * sizeof *x);
     c->fresh = 0;
+    c->closed = 0;
     return OK;
 }
 
@@ -283,6 +302,28 @@ Status states_get(Instance *c, const double *from, double *to, size_t n, const c
 }
 
 /* -- derivatives of outputs */
+
+/* The directional derivative of a group without a kernel for it, of relative error 1e-9 or so: outputs on both sides
+ * at a distance that is small against inputs and states of the size of 1 and more. */
+static void differences(Instance *c, const Group *g, const double *du, const double *dx, double *dy) {
+    const int n_u = model.n_u, n_x = model.n_x;
+    double *u = dy + model.n_y + n_x, *x = u + n_u, *other = x + n_x, steepest = 0.0;
+    for (int i = 0; i < n_u + n_x; ++i) {
+        const double at = i < n_u ? c->u[i] : c->x[i - n_u], seed = i < n_u ? du[i] : dx[i - n_u];
+        const double share = fabs(seed) / (fabs(at) > 1.0 ? fabs(at) : 1.0);
+        if (share > steepest) steepest = share;
+    }
+    const double distance = steepest > 0.0 ? 1e-5 / steepest : 1.0;
+    const double *arg[4] = {c->p, u, x, c->k};
+    double *res[1];
+    for (int sense = 1; sense >= -1; sense -= 2) {
+        for (int i = 0; i < n_u; ++i) u[i] = c->u[i] + sense * distance * du[i];
+        for (int i = 0; i < n_x; ++i) x[i] = c->x[i] + sense * distance * dx[i];
+        res[0] = sense > 0 ? dy + g->first : other;
+        g->values(arg, res, NULL, NULL, 0);
+    }
+    for (int i = 0; i < g->count; ++i) dy[g->first + i] = (dy[g->first + i] - other[i]) / (2.0 * distance);
+}
 
 Status forward(Instance *c, const unsigned *unknown, size_t n_unknown, const unsigned *known, size_t n_known,
                const double *seed, double *sensitivity) {
@@ -309,7 +350,10 @@ Status forward(Instance *c, const unsigned *unknown, size_t n_unknown, const uns
             const int g = model.group_of[i];
             if (!(done & (1u << g))) {
                 double *res[1] = {dy + model.groups[g].first};
-                model.groups[g].forward(arg, res, NULL, NULL, 0);
+                if (model.groups[g].forward)
+                    model.groups[g].forward(arg, res, NULL, NULL, 0);
+                else
+                    differences(c, &model.groups[g], du, dx, dy);
                 done |= 1u << g;
             }
             sensitivity[k] = dy[model.place[i]];
@@ -358,21 +402,143 @@ Status output_derivative(Instance *c, unsigned reference, double *value) {
     return status;
 }
 
-/* -- co-simulation: the classical Runge-Kutta method with equal steps, its cost known beforehand; inputs run
- * along their derivatives, to the end of the step */
+/* -- co-simulation; inputs run along their derivatives, to the end of the step */
 
-static int slope(Instance *c, double *u, const double *x, double *dx) {
-    const double *arg[4] = {c->p, u, x, c->k};
+/* Inputs on their way through a step: `at` are those of the moment. */
+typedef struct {
+    double *at;
+    const double *rate, *half; /* first derivative, and half of the second */
+} Course;
+
+static void run_to(const Instance *c, const Course *u, double since) {
+    for (int i = 0; i < model.n_u; ++i) u->at[i] = c->u[i] + since * (u->rate[i] + since * u->half[i]);
+}
+
+static int slope(Instance *c, const Course *u, double since, const double *x, double *dx) {
+    run_to(c, u, since);
+    const double *arg[4] = {c->p, u->at, x, c->k};
     double *res[1] = {dx};
     model.derivatives(arg, res, NULL, NULL, 0);
     return all_finite(dx, model.n_x);
+}
+
+static double number(Kernel kernel, const Instance *c) {
+    double value = 0.0;
+    const double *arg[1] = {c->p};
+    double *res[1] = {&value};
+    kernel(arg, res, NULL, NULL, 0);
+    return value;
+}
+
+static Status astray(Instance *c, double time) {
+    return complain(c, DISCARD, "the states left all bounds in the step from t = %g s", time);
+}
+
+/* The classical Runge-Kutta method with equal steps, its cost known beforehand. */
+static Status even_steps(Instance *c, double time, double size, const Course *u, double *work) {
+    const int n_x = model.n_x;
+    double *x = work, *k = x + n_x, *sum = k + n_x, *at = sum + n_x;
+    const double longest = number(model.internal_step, c);
+    const double wanted = ceil(size / longest - 1e-9);
+    if (!(wanted < 1e6)) return complain(c, DISCARD, "step of %g s: must be < %g s", size, 1e6 * longest);
+    const long n = wanted < 1.0 ? 1 : (long)wanted;
+    const double h = size / (double)n;
+    static const double node[4] = {0.0, 0.5, 0.5, 1.0}, weight[4] = {1.0, 2.0, 2.0, 1.0};
+    memcpy(x, c->x, (size_t)n_x * sizeof(double));
+    for (long s = 0; s < n; ++s) {
+        for (int i = 0; i < n_x; ++i) sum[i] = 0.0;
+        for (int stage = 0; stage < 4; ++stage) {
+            for (int i = 0; i < n_x; ++i) at[i] = stage ? x[i] + node[stage] * h * k[i] : x[i];
+            if (!slope(c, u, h * ((double)s + node[stage]), at, k)) return astray(c, time);
+            for (int i = 0; i < n_x; ++i) sum[i] += weight[stage] * k[i];
+        }
+        for (int i = 0; i < n_x; ++i) x[i] += h / 6.0 * sum[i];
+    }
+    memcpy(c->x, x, (size_t)n_x * sizeof(double));
+    return OK;
+}
+
+/* Put the states, in `x`, where the constraints are met at `since`. */
+static int close_states(Instance *c, const Course *u, double since, double *x, double *spare) {
+    run_to(c, u, since);
+    const double *arg[4] = {c->p, u->at, x, c->k};
+    double *res[1] = {spare};
+    model.closed(arg, res, NULL, NULL, 0);
+    if (!all_finite(spare, model.n_x)) return 0;
+    memcpy(x, spare, (size_t)model.n_x * sizeof(double));
+    return 1;
+}
+
+/* The pair of Dormand and Prince of orders 5 and 4, its error controlled to the model's tolerance, the constraints
+ * closed after each step. A step that is as short as SHORTEST of the longest is taken as it is: a snatch must not
+ * stop a run. Coefficients: J. Comp. Appl. Math. 6 (1980) 19. */
+#define SHORTEST 1e-6
+
+static Status controlled_steps(Instance *c, double time, double size, const Course *u, double *work) {
+    static const double node[6] = {0.0, 1.0 / 5.0, 3.0 / 10.0, 4.0 / 5.0, 8.0 / 9.0, 1.0};
+    static const double a[6][6] = {
+        {0.0},
+        {1.0 / 5.0},
+        {3.0 / 40.0, 9.0 / 40.0},
+        {44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0},
+        {19372.0 / 6561.0, -25360.0 / 2187.0, 64448.0 / 6561.0, -212.0 / 729.0},
+        {9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0},
+    };
+    static const double fifth[6] = {35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0};
+    static const double wrong[7] = {71.0 / 57600.0,      0.0,          -71.0 / 16695.0, 71.0 / 1920.0,
+                                    -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0};
+    const int n_x = model.n_x;
+    double *x = work, *at = x + n_x, *k = at + n_x;
+    const double longest = number(model.internal_step, c), tolerance = number(model.tolerance, c);
+    memcpy(x, c->x, (size_t)n_x * sizeof(double));
+    for (int round = 0; !c->closed && round < 2; ++round)
+        if (!close_states(c, u, 0.0, x, at)) return astray(c, time);
+    double since = 0.0, pace = c->pace > 0.0 ? c->pace : 0.01 * longest;
+    while (since < size) {
+        const double left = size - since;
+        /* no tiny rest: what is left is taken in one step or in two alike */
+        const double h = pace >= left ? left : pace > 0.5 * left ? 0.5 * left : pace;
+        int usable = 1;
+        for (int s = 0; s < 7 && usable; ++s) {
+            for (int i = 0; i < n_x; ++i) {
+                double sum = 0.0;
+                for (int j = 0; j < s && j < 6; ++j) sum += (s < 6 ? a[s][j] : fifth[j]) * k[j * n_x + i];
+                at[i] = x[i] + h * sum;
+            }
+            usable = slope(c, u, since + h * (s < 6 ? node[s] : 1.0), at, k + s * n_x);
+        }
+        double error = 0.0;
+        for (int i = 0; i < n_x && usable; ++i) {
+            double sum = 0.0;
+            for (int s = 0; s < 7; ++s) sum += wrong[s] * k[s * n_x + i];
+            const double big = fabs(x[i]) > fabs(at[i]) ? fabs(x[i]) : fabs(at[i]);
+            const double scale = tolerance * (big > model.nominal[i] ? big : model.nominal[i]);
+            if (fabs(h * sum) > error * scale) error = fabs(h * sum) / scale;
+        }
+        const int last_resort = h <= SHORTEST * longest;
+        if (!usable && last_resort) return astray(c, time);
+        if (usable && (error <= 1.0 || last_resort)) {
+            since = h >= left ? size : since + h;
+            memcpy(x, at, (size_t)n_x * sizeof(double));
+            if (!close_states(c, u, since, x, at)) return astray(c, time);
+        }
+        const double factor = !usable ? 0.1 : error < 1e-4 ? 5.0 : 0.9 * pow(error, -0.2);
+        double next = h * (factor < 0.2 ? 0.2 : factor > 5.0 ? 5.0 : factor);
+        /* a step that was cut short by the end says nothing against a longer one */
+        if (usable && error <= 1.0 && h < pace && next < pace) next = pace;
+        pace = next > longest ? longest : next < SHORTEST * longest ? SHORTEST * longest : next;
+    }
+    memcpy(c->x, x, (size_t)n_x * sizeof(double));
+    c->pace = pace;
+    c->closed = 1;
+    return OK;
 }
 
 Status step(Instance *c, double time, double size) {
     if (!isfinite(time) || !isfinite(size) || size < 0.0)
         return complain(c, ERROR, "step of %g s from t = %g s: must be finite and not negative", size, time);
     const int n_x = model.n_x, n_u = model.n_u;
-    double *u = c->work, *rate = u + n_u, *half = rate + n_u, *x = half + n_u;
+    double *u = c->work, *rate = u + n_u, *half = rate + n_u;
     for (int i = 0; i < n_u; ++i) {
         rate[i] = input_rate(c, i);
         half[i] = 0.5 * input_curvature(c, i);
@@ -382,30 +548,9 @@ Status step(Instance *c, double time, double size) {
                             model.declared[model.n_p + i].name, time);
     }
     if (n_x && size > 0.0) {
-        double *k = x + n_x, *sum = k + n_x, *at = sum + n_x;
-        double longest = 0.0;
-        const double *of[1] = {c->p};
-        double *into[1] = {&longest};
-        model.internal_step(of, into, NULL, NULL, 0);
-        const double wanted = ceil(size / longest - 1e-9);
-        if (!(wanted < 1e6)) return complain(c, DISCARD, "step of %g s: must be < %g s", size, 1e6 * longest);
-        const long n = wanted < 1.0 ? 1 : (long)wanted;
-        const double h = size / (double)n;
-        static const double node[4] = {0.0, 0.5, 0.5, 1.0}, weight[4] = {1.0, 2.0, 2.0, 1.0};
-        memcpy(x, c->x, (size_t)n_x * sizeof(double));
-        for (long s = 0; s < n; ++s) {
-            for (int i = 0; i < n_x; ++i) sum[i] = 0.0;
-            for (int stage = 0; stage < 4; ++stage) {
-                const double since = h * ((double)s + node[stage]);
-                for (int i = 0; i < n_u; ++i) u[i] = c->u[i] + since * (rate[i] + since * half[i]);
-                for (int i = 0; i < n_x; ++i) at[i] = stage ? x[i] + node[stage] * h * k[i] : x[i];
-                if (!slope(c, u, at, k))
-                    return complain(c, DISCARD, "the states left all bounds in the step from t = %g s", time);
-                for (int i = 0; i < n_x; ++i) sum[i] += weight[stage] * k[i];
-            }
-            for (int i = 0; i < n_x; ++i) x[i] += h / 6.0 * sum[i];
-        }
-        memcpy(c->x, x, (size_t)n_x * sizeof(double));
+        const Course course = {u, rate, half};
+        Status status = (model.closed ? controlled_steps : even_steps)(c, time, size, &course, half + n_u);
+        if (status) return status;
         c->fresh = 0;
     }
     for (int i = 0; i < n_u; ++i)
@@ -426,7 +571,9 @@ void state_write(const Instance *c, void *memory) {
     memset(&saved, 0, sizeof saved);
     saved.mode = (int)c->mode;
     saved.model_exchange = c->model_exchange;
+    saved.closed = c->closed;
     saved.time = c->time;
+    saved.pace = c->pace;
     saved.guard = guard();
     memcpy(memory, &saved, sizeof saved);
     memcpy((char *)memory + sizeof saved, c->block, c->block_size);
@@ -443,11 +590,13 @@ Status state_read(Instance *c, const void *memory, size_t size) {
     const size_t first = (size_t)(c->dx - c->block) * sizeof(double);
     double *values = c->work;
     memcpy(values, (const char *)memory + sizeof saved, first);
-    if (!(mode & known) || (mode & (mode - 1)) || !isfinite(saved.time) || !all_finite(values, (int)(c->dx - c->block)))
+    if (!(mode & known) || (mode & (mode - 1)) || !isfinite(saved.time) || !(saved.pace >= 0.0) || !all_finite(values, (int)(c->dx - c->block)))
         return complain(c, ERROR, "saved state: it is damaged");
     memcpy(c->block, values, first);
     c->mode = (Mode)saved.mode;
     c->time = saved.time;
+    c->pace = saved.pace;
+    c->closed = saved.closed;
     c->fresh = 0;
     c->changed = c->mode == INSTANTIATED || c->mode == INITIALIZATION;
     return OK;

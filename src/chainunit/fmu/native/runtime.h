@@ -35,6 +35,8 @@ struct Instance {
     unsigned *slot, *needs; /* of each value reference: place in the block, and what must be evaluated for it */
     unsigned fresh;         /* a bit per group of outputs; the highest for the derivatives */
     int changed;    /* parameters or inputs set since the states were started */
+    int closed;     /* the states meet the constraints at the present inputs, as the last step left them */
+    double pace;    /* what the integrator that controls its error would step next [s]; 0 not known */
     char *name;
     Report report;
     void *host[3]; /* the FMI layer's own */
