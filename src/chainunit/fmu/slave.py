@@ -23,7 +23,7 @@ from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
 from ..engines import MATH
-from ..integrate import controlled, rk4
+from ..integrate import MOST_STEPS, controlled, rk4
 from ..model import Model
 from ..quantities import complaint
 
@@ -60,10 +60,6 @@ def _release_at_exit(library: Path) -> None:
             ctypes.CDLL(str(library), mode=os.RTLD_NOW | os.RTLD_NOLOAD).finalizePythonInterpreter()
 
     atexit.register(release)
-
-
-_LONGEST_STEP = 1_000_000
-"""Internal steps that one communication step may take."""
 
 
 class ModelSlave(Fmi2Slave):  # type: ignore[misc]
@@ -133,8 +129,8 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         layout = model.state_layout
         assert layout is not None
         longest = model.internal_step(MATH, p)
-        if step > _LONGEST_STEP * longest:
-            self._tell(f"step of {step:g} s: must be < {_LONGEST_STEP * longest:g} s")
+        if step > MOST_STEPS * longest:
+            self._tell(f"step of {step:g} s: must be < {MOST_STEPS * longest:g} s")
             return False
 
         def rates(since: float, x: Any) -> list[float]:

@@ -434,13 +434,16 @@ static Status astray(Instance *c, double time) {
     return complain(c, DISCARD, "the states left all bounds in the step from t = %g s", time);
 }
 
+#define MOST_STEPS 1e6 /* that a step may take of its own */
+
 /* The classical Runge-Kutta method with equal steps, its cost known beforehand. */
 static Status even_steps(Instance *c, double time, double size, const Course *u, double *work) {
     const int n_x = model.n_x;
     double *x = work, *k = x + n_x, *sum = k + n_x, *at = sum + n_x;
     const double longest = number(model.internal_step, c);
     const double wanted = ceil(size / longest - 1e-9);
-    if (!(wanted < 1e6)) return complain(c, DISCARD, "step of %g s: must be < %g s", size, 1e6 * longest);
+    if (!(wanted < MOST_STEPS))
+        return complain(c, DISCARD, "step of %g s: must be < %g s", size, MOST_STEPS * longest);
     const long n = wanted < 1.0 ? 1 : (long)wanted;
     const double h = size / (double)n;
     static const double node[4] = {0.0, 0.5, 0.5, 1.0}, weight[4] = {1.0, 2.0, 2.0, 1.0};
@@ -493,8 +496,14 @@ static Status controlled_steps(Instance *c, double time, double size, const Cour
     memcpy(x, c->x, (size_t)n_x * sizeof(double));
     for (int round = 0; !c->closed && round < 2; ++round)
         if (!close_states(c, u, 0.0, x, at)) return astray(c, time);
+    if (!(size < MOST_STEPS * longest))
+        return complain(c, DISCARD, "step of %g s: must be < %g s", size, MOST_STEPS * longest);
+    long taken = 0;
     double since = 0.0, pace = c->pace > 0.0 ? c->pace : 0.01 * longest;
     while (since < size) {
+        if (++taken > MOST_STEPS)
+            return complain(c, DISCARD, "step of %g s from t = %g s takes more than %g of its own; shorten it", size,
+                            time, MOST_STEPS);
         const double left = size - since;
         /* no tiny rest: what is left is taken in one step or in two alike */
         const double h = pace >= left ? left : pace > 0.5 * left ? 0.5 * left : pace;
