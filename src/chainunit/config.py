@@ -19,6 +19,7 @@ from .drives.line_table import form, given_line
 from .errors import InputError
 from .machines.api import ChainUnit, ratios
 from .machines.chain_unit import ChamberForces, SideLoads
+from .machines.flexible import LEAST, MOST, OrganLaw
 from .quantities import Layout, Value, declaration, group, quantity
 from .reading import filled, first_line, given_values, instance, merged, packaged, read, schema, toml
 
@@ -197,6 +198,35 @@ class Driveline(Mounted):
     )
 
 
+@declaration
+class Chain(OrganLaw):
+    """The organs as chains, where `organ` is "chain", and the sweep over crank speeds with them."""
+
+    rods: Value = quantity("1", "number of rods of an organ", default=8.0, min=float(LEAST), max=float(MOST))
+    sweep_lowest: Value = quantity(
+        "rad/s", "lowest crank speed of the sweep", default=1.0, above=0.0, max=1000.0
+    )
+    sweep_highest: Value = quantity(
+        "rad/s", "highest crank speed of the sweep", default=15.0, above=0.0, max=1000.0
+    )
+    sweep_points: Value = quantity(
+        "1",
+        "number of speeds of the sweep; 0 leaves all but the study's own out",
+        default=15.0,
+        min=0.0,
+        max=200.0,
+    )
+    starts: Value = quantity(
+        "1", "starts at each speed, evenly over the turn: at least 10", default=10.0, min=10.0, max=1000.0
+    )
+    turns: Value = quantity(
+        "1", "crank turns that are evaluated of each start: at least 30", default=30.0, min=30.0, max=1e4
+    )
+
+
+ORGANS = ("two-bar", "chain")
+"""How the organs are modelled."""
+
 PLACES = ("crank", "motor")
 """Where a driveline is: on the crank's shaft, behind the gear, or on the motor's, before it."""
 
@@ -214,6 +244,7 @@ _SECTIONS = {
     "sizing": Sizing,
     "gear": Transmission,
     "starter": Starter,
+    "chain": Chain,
 }
 _Driveline = form(Driveline, "driveline", "driveline.", place=(Literal[PLACES], "crank"))
 _File = create_model(
@@ -227,6 +258,7 @@ _File = create_model(
     driveline=(_Driveline, Field(default_factory=_Driveline)),
     feed_forward=(bool, False),
     start=(Literal[STARTS], "direct"),
+    organ=(Literal[ORGANS], "two-bar"),
     catalogue=(str, ""),
     events=(list[Literal[*SCENARIOS]], ["right_empties", "feed_left", "jam_left"]),  # type: ignore[valid-type]
 )  # type: ignore[call-overload]
@@ -258,6 +290,8 @@ class Config:
     """of the driveline, one of `PLACES`"""
     damping_ratio: float | None
     """of the driveline's torsion, in place of d2 and d3"""
+    chain: Chain | None
+    """the organs as chains, or None for two bars"""
     source: str
 
 
@@ -337,6 +371,7 @@ def parse(text: str, source: str = "config") -> Config:
         driveline=_driveline(checked.driveline) if "driveline" in data else None,
         place=checked.driveline.place,
         damping_ratio=checked.driveline.damping_ratio,
+        chain=instance(Chain, given_values(checked.chain)) if checked.organ == "chain" else None,
         source=source,
     )
     run, turn, o = config.run, 2.0 * math.pi / config.run.crank_speed, config.overload
@@ -388,13 +423,25 @@ def _consistent(data: Mapping[str, Any], checked: Any) -> None:
     ):
         if high < low:
             raise InputError(f"{what} = {high:g}: must be >= {low:g}, the least")
+    if "chain" in data and checked.organ != "chain":
+        raise InputError('chain: is of organs that are chains; add organ = "chain", or leave it out')
+    chain = instance(Chain, given_values(checked.chain))
+    if chain.sweep_highest <= chain.sweep_lowest:
+        raise InputError(
+            f"chain.sweep_highest = {chain.sweep_highest:g} rad/s: must be > chain.sweep_lowest, "
+            f"{chain.sweep_lowest:g} rad/s"
+        )
     if not sizing.temperature > sizing.ambient:
         raise InputError(
             f"sizing.temperature = {sizing.temperature:g} K: must be > sizing.ambient, {sizing.ambient:g} K"
         )
-    for name, number in (("runs", random.runs), ("seed", random.seed)):
+    for name, number in (
+        ("monte_carlo.runs", random.runs),
+        ("monte_carlo.seed", random.seed),
+        *((f"chain.{n}", getattr(chain, n)) for n in ("rods", "sweep_points", "starts", "turns")),
+    ):
         if number != int(number):
-            raise InputError(f"monte_carlo.{name} = {number:g}: must be a whole number")
+            raise InputError(f"{name} = {number:g}: must be a whole number")
 
 
 def _beside(name: str, source: str) -> Path | None:

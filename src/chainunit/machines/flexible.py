@@ -21,7 +21,8 @@ which is the plain derivative by the angle for two rods, and
 as the rods follow a change of the speed.
 
 A chain that does not quite end at A2, through errors of integration, is drawn there: the wanted acceleration of its
-end has the addition 2 CLOSING (speed that is missing) + CLOSING^2 (way that is missing).
+end has the addition 2 CLOSING (speed that is missing) + CLOSING^2 (way that is missing). Outputs are without it: at a
+communication point the drive has just corrected its speed, and the chain follows in the next step only.
 
 Pin friction acts in the four pins of the drive alone; in those of the chains it is the viscous damping of `organ`.
 """
@@ -141,6 +142,7 @@ class Hung:
         state: tuple[Sequence[Any], Sequence[Any]],
         loads: Any,
         a: Any = 0.0,
+        closing: float = 0.0,
     ) -> None:
         """
         Parameters
@@ -150,6 +152,7 @@ class Hung:
         w, a : speed of the crank [rad/s], and the acceleration for which `chain` is solved [rad/s2]
         state : angles and speeds of the rods
         loads : `SideLoads`
+        closing : rate at which the chain is drawn to A2 [1/s]
         """
         self.rods, self.walls, self.state = rods, walls, state
         self.a2, self.turn = rocker.at(p.e), rocker.t1
@@ -162,7 +165,7 @@ class Hung:
         end = chain.end_motion(rods, theta, omega, xp)
         self.missing = self.a2.p - a1 - end.p
         late = self.a2.p1 * w - end.p1
-        self.wanted = self.a2.p2 * (w * w) + late * (2.0 * CLOSING) + self.missing * (CLOSING * CLOSING)
+        self.wanted = self.a2.p2 * (w * w) + late * (2.0 * closing) + self.missing * (closing * closing)
         self.at_start = [ZERO] * len(rods)
         self.at_start[walls] = self.processing
         self.chain = chain.Chain(
@@ -230,10 +233,11 @@ def _organs(
     m: CrankRocker,
     w: Any,
     a: Any = 0.0,
+    closing: float = 0.0,
 ) -> tuple[Hung, ...]:
     """Both chains on the rocker of `m`."""
     return tuple(
-        Hung(xp, p, each, walls, a1, m.rocker, w, state, loads, a)
+        Hung(xp, p, each, walls, a1, m.rocker, w, state, loads, a, closing)
         for each, a1, state, loads in zip(rods, _supports(p), states, (u.left, u.right), strict=True)
     )
 
@@ -636,7 +640,7 @@ def _flexible(walls: int, webs: int) -> type[Model]:
             w, a = u.w / p.ratio, u.a / p.ratio
             m = CrankRocker(xp, p, u.phi / p.ratio)
             rates: list[Any] = []
-            for h in _organs(xp, p, u, rods(p, u), walls, split(x), m, w, a):
+            for h in _organs(xp, p, u, rods(p, u), walls, split(x), m, w, a, CLOSING):
                 rates += [*h.state[1], *h.chain.rates, h.torque() * w - h.lost()]
             return rates
 

@@ -39,11 +39,13 @@ def choose(
     """The drive of a study; FMUs that sizing needs are written to `folder`. Where no candidate fits, the first of the
     list stands for the machine's own numbers."""
     if config.sizing is None:
-        drive = Drive(DcMotor, config.motor, config.machine, feed_forward=config.feed_forward)
+        drive = Drive(
+            DcMotor, config.motor, config.machine, feed_forward=config.feed_forward, chain=config.chain
+        )
         return Choice(*tuned(config, with_line(config, drive)))
     sized = size(config, folder, report, backend)
     best = sized.chosen or (sized.candidates[0] if sized.candidates else None)
-    drive = best.drive if best else Drive(DcMotor, config.motor, config.machine)
+    drive = best.drive if best else Drive(DcMotor, config.motor, config.machine, chain=config.chain)
     return Choice(with_line(config, drive), sizing=sized)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..machines.api import EMPTY, ChainUnit
-from ..machines.chain_unit import Outputs, SideLoads
+from ..machines.chain_unit import SideLoads
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,8 @@ class Cycle:
     angle: Any
     crank_torque: Any
     """[N m]"""
-    outputs: Outputs
+    outputs: Any
+    """as `Outputs`; of chains the `tau` and `J` alone"""
 
 
 def cycle(

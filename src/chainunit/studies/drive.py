@@ -16,6 +16,8 @@ from ..drives.motor import Motor
 from ..fmu.backends import Backend, export
 from ..machines.api import ChainUnit
 from ..machines.chain_unit import ChamberForces, DirectChainUnit
+from ..machines.flexible import OrganLaw, flexible
+from ..machines.hanging import split
 from ..model import Model
 from ..quantities import Layout
 
@@ -33,6 +35,9 @@ class Drive:
     feed_forward: bool = False
     """whether the speed control is told the torque of the machine with its normal feed, from a second machine FMU at
     the motor's angle and speed and the acceleration that is asked for"""
+
+    chain: Any = None
+    """the organs as chains, a `config.Chain`; None for two bars"""
 
     line: Any = None
     """parameters of the driveline between motor and machine, if there is one; its `ratio` is the gear before it"""
@@ -69,11 +74,33 @@ class Drive:
         """Name of the instance that loads the motor."""
         return "machine" if self.line is None else "driveline"
 
+    @property
+    def rods(self) -> tuple[int, int]:
+        """How many rods the wall and the web have, where the organs are chains."""
+        walls, webs = split((self.machine.p.l1, self.machine.p.l2), int(self.chain.rods))
+        return walls, webs
+
+    def load_model(self) -> tuple[type[Model], Any]:
+        """Model of the machine, with two bars or chains, and its parameters."""
+        if self.chain is None:
+            return ChamberForces, self.driven.p
+        model = flexible(*self.rods)
+        return model, model.parameter_layout.from_names(
+            ChamberForces.parameter_layout.named(self.driven.p) | self.organ()
+        )
+
+    def organ(self) -> dict[str, float]:
+        """What the model with chains has beside the parameters of the one with two bars."""
+        if self.chain is None:
+            return {}
+        given = Layout(type(self.chain)).named(self.chain)
+        return {f"organ.{name}": given[name] for name in Layout(OrganLaw).names}
+
     def models(self) -> dict[str, tuple[type[Model], Any]]:
         """Models and parameters by instance name, each before what drives it."""
         line = {} if self.line is None else {"driveline": (CardanDriveline, self.line)}
         return {
-            "machine": (ChamberForces, self.driven.p),
+            "machine": self.load_model(),
             **line,
             "motor": (self.motor, self.parameters),
         }
@@ -101,16 +128,24 @@ class Drive:
         """Write the FMUs, with these start values; returns files by instance name, and how they were made."""
         files, made = {}, {}
         for name, (model, p) in self.models().items():
-            files[name] = folder / f"{model.name}.fmu"
-            made[name] = export(model, files[name], model.parameter_layout.named(p), backend=backend)
+            files[name], made[name] = _exported(model, p, folder, backend)
+        if self.feed_forward and self.chain is not None:
+            # a control is told what it can know: the machine with two bars
+            files["model"] = folder / f"{ChamberForces.name}.fmu"
+            export(ChamberForces, files["model"], self.machine_parameters(), backend=backend)
         return files, made
+
+    def export_machine(self, folder: Path, backend: Backend | None = None) -> tuple[Path, str]:
+        """Write the machine's FMU alone; the same as `export` writes."""
+        return _exported(*self.load_model(), folder, backend)
 
     def system(self, files: Mapping[str, Path]) -> System:
         """The system of FMUs that were made of these models, whatever start values they carry."""
         if not self.feed_forward:
+            files = {name: file for name, file in files.items() if name != "model"}
             return System(files, self.connections(), self.start())
         told = {f"model.{name}": value for name, value in self.machine_parameters().items()}
-        return System({**files, "model": files["machine"]}, self.connections(), self.start() | told)
+        return System({"model": files["machine"], **files}, self.connections(), self.start() | told)
 
     def connections(self, *, slopes: bool = True) -> list[tuple[str, str]]:
         """The load port and the shaft, see `port_connections`; and what the control is told."""
@@ -154,3 +189,8 @@ class Drive:
         """Its parameters by name."""
         added = {} if self.line is None else {"J_added": self.line.J4}
         return ChamberForces.parameter_layout.named(self.driven.p) | added
+
+
+def _exported(model: type[Model], p: Any, folder: Path, backend: Backend | None) -> tuple[Path, str]:
+    file = folder / f"{model.name}.fmu"
+    return file, export(model, file, model.parameter_layout.named(p), backend=backend)

@@ -26,9 +26,10 @@ from ..drives.speed_control import Loop, Tuning, loop
 from ..engines import numpy_
 from ..errors import InputError, RunError
 from ..fmu.backends import Backend
-from ..machines.api import EMPTY, ChainUnit
+from ..machines.api import EMPTY
 from ..quantities import Layout, Value, declaration, quantity
 from . import protection
+from .chain import ChainResult, study_chain
 from .choice import choose
 from .cycle import OverloadFactors, Sides, all_on_one, cycle, overload_factors, sides_over_speed
 from .drive import Drive
@@ -81,6 +82,8 @@ class Answers:
     recovery_time: Value = quantity("s", "recovery")
     web_pull_least: Value = quantity("N", "least pull in a web")
     wall_pull_least: Value = quantity("N", "least pull in a wall")
+    slack_time: Value = quantity("1", "share of the time with a slack rod")
+    fold_largest: Value = quantity("rad", "largest angle between two rods")
     shaft_share: Value = quantity("1", "shaft over motor torque")
     shaking_force: Value = quantity("N", "shaking force")
     shaking_moment: Value = quantity("N.m", "shaking moment")
@@ -154,6 +157,8 @@ class Study:
     """what each run asks of the driveline, where there is one"""
     cycles_of: dict[str, Cycles] = field(default_factory=dict)
     """rainflow cycles of the torque in shaft 2 by run"""
+    chain: ChainResult | None = None
+    """the organs as chains at constant speed, where the study has them"""
     coasting: Path | None = None
     """the FMU of the machine behind an open coupling, where one tripped"""
     failure: RunError | None = None
@@ -197,6 +202,8 @@ def run_study(
         study.torsion = _torsion(study)
     files, study.made = study.drive.export(folder / "fmu", backend)
     try:
+        if study.drive.chain is not None:
+            study.chain = study_chain(config, study.drive, files["machine"], report)
         _simulate(study, files, folder, report, check, backend)
     except RunError as error:
         if error.partial is not None:
@@ -330,7 +337,7 @@ def _simulate(
     bond = Bond(
         "motor" if drive.line is None else "driveline",
         "machine",
-        {f"{s}.material_mass": partial(_energy_per_kg, drive.driven, s) for s in ("left", "right")},
+        {f"{s}.material_mass": partial(_energy_per_kg, drive, s) for s in ("left", "right")},
     )
     guards = _guards(study)
     with CoSimulation(drive.system(files), signals) as simulation:
@@ -400,7 +407,7 @@ def _rigid(study: Study, files: Mapping[str, Path], stop: float) -> dict[str, xr
     """Every run again without the line's elasticity and unevenness, at the same times and with the same coupling."""
     config, drive, guards = study.config, study.drive.rigid(), _guards(study)
     step, reference = config.run.step, drive.reference(config.run.crank_speed, config.run.ramp)
-    system = drive.system({name: files[name] for name in drive.models()})
+    system = drive.system({name: file for name, file in files.items() if name != "driveline"})
     runs = {}
     with CoSimulation(system, {**drive.loads(config.feed), **reference}) as simulation:
         runs["start_up"] = simulation.run(stop, step)
@@ -545,8 +552,10 @@ def _lead(config: Config, angle: float, speed: float) -> float:
     return ahead / max(speed, 0.5 * config.run.crank_speed)
 
 
-def _energy_per_kg(machine: ChainUnit, side: str, run: xr.Dataset) -> Any:
-    return machine.energy_per_kg(side, run["machine.phi0"].values, run["machine.w0"].values)
+def _energy_per_kg(drive: Drive, side: str, run: xr.Dataset) -> Any:
+    if drive.chain is not None:
+        return run[f"machine.{side}.energy_per_kg"].values
+    return drive.driven.energy_per_kg(side, run["machine.phi0"].values, run["machine.w0"].values)
 
 
 def _progress(report: Report, what: str, before: float, todo: float, time: float) -> None:
@@ -646,6 +655,12 @@ def _answers(study: Study, run: xr.Dataset, event: float | None, steady: xr.Data
         recovery_time=recovery,
         web_pull_least=least("web"),
         wall_pull_least=least("wall"),
+        slack_time=mean(_any_slack(run, sides)) if drive.chain is not None else None,
+        fold_largest=max(
+            (float(np.max(value(f"machine.{side}.fold_largest"))) for side in sides), default=0.0
+        )
+        if drive.chain is not None
+        else None,
         shaft_share=peak(value("motor.tau")) / peak(motor_torque),
         shaking_force=swing("fx", "fy"),
         shaking_moment=swing("moment"),
@@ -657,6 +672,12 @@ def _answers(study: Study, run: xr.Dataset, event: float | None, steady: xr.Data
         energy_behind=None,
         standstill_time=None,
     )
+
+
+def _any_slack(run: xr.Dataset, sides: list[str]) -> Any:
+    """Whether some rod is slack, shape (time,)."""
+    shares = [run[f"machine.{side}.slack_share"].values for side in sides]
+    return (np.max(shares, axis=0) > 0.0).astype(float) if shares else np.zeros(run.sizes["time"])
 
 
 def _relay(study: Study, since: Any, current: Any) -> float | None:
@@ -689,6 +710,8 @@ def _pins(study: Study, run: xr.Dataset) -> dict[str, dict[str, float]]:
     """Peak, RMS and equivalent load (mean of ISO 281 over what the pin turns) of the reaction of every pin [N]."""
     table, whole = {}, _whole_turns(study, run)
     turned = study.drive.driven.pin_turns(run["machine.phi0"].values[whole])
+    if study.drive.chain is not None:
+        turned[4:] = _chain_turns(study.drive, run.isel(time=whole))
     for (title, name), angle in zip(PINS.items(), turned, strict=True):
         size = np.hypot(run[f"machine.{name}.fx"].values, run[f"machine.{name}.fy"].values)
         table[title] = {
@@ -697,6 +720,18 @@ def _pins(study: Study, run: xr.Dataset) -> dict[str, dict[str, float]]:
             "equivalent": protection.mean_load(size[whole], angle),
         }
     return table
+
+
+def _chain_turns(drive: Drive, run: xr.Dataset) -> list[Any]:
+    """Relative angle in A2, B and A1 of each side [rad], shape (time,), of chains."""
+    walls, webs = drive.rods
+    found = []
+    for side in ("left", "right"):
+        first, last, other, end = (
+            run[f"machine.{side}.theta_{k}"].values for k in (1, walls, walls + 1, walls + webs)
+        )
+        found += [end - run["machine.rocker.psi"].values, other - last, first]
+    return found
 
 
 def _note(study: Study) -> None:
@@ -715,7 +750,9 @@ def _note(study: Study) -> None:
     )
     # two bars against a chain of many rods, on this organ: docs/physics.md
     speed, mode = config.run.crank_speed, limits.chain_resonance
-    if speed > 0.31 * mode:
+    if study.chain is not None:
+        _note_chain(study, study.chain)
+    elif speed > 0.31 * mode:
         note(
             "A chain has a mode that two bars lack: the rocker torque of two bars is good to 10 % only up "
             f"to about {0.31 * mode:.1f} rad/s of the crank"
@@ -746,7 +783,13 @@ def _note(study: Study) -> None:
             )
     for name, answers in study.answers.items():
         title = SCENARIOS.get(name, "steady running")
-        if answers.web_pull_least < 0.0:
+        if answers.slack_time is not None:
+            if answers.slack_time > 0.0:
+                note(
+                    f"{title}: a rod is slack for {100 * answers.slack_time:.2g} % of the time; what snatches has no "
+                    "single peak that is a prediction."
+                )
+        elif answers.web_pull_least < 0.0:
             note(
                 f"{title}: web pull down to {answers.web_pull_least:.0f} N; a chain cannot push, it would go slack "
                 "and snatch."
@@ -778,6 +821,34 @@ def _note(study: Study) -> None:
                 f"{SCENARIOS.get(name, 'start-up and steady running')}: the energy residual is {share:.1e} of "
                 "the energy moved; the step is too long for this run, lessen run.step."
             )
+
+
+def _note_chain(study: Study, found: ChainResult) -> None:
+    """What the reader has to know of the chains."""
+    note, own, chain = study.notes.append, found.own, study.config.chain
+    assert chain is not None
+    note(
+        f"The organs are chains of {found.rods[0]} + {found.rods[1]} rods; their damping (eta {chain.eta:g} "
+        f"N m2 s, ends {chain.end_damping:g} N m s) and folding are assumed."
+    )
+    resonance = study.limits.chain_resonance if study.limits else math.inf
+    if math.isfinite(resonance):
+        note(
+            f"The crank turns at {own.speed / resonance:.2f} times the speed at which it meets the lowest natural "
+            f"frequency of an organ, {resonance:.2f} rad/s."
+        )
+    for band in found.avoid:
+        if band.low <= own.speed <= band.high:
+            note(
+                f"The crank speed lies among those to avoid, {band.low:.3g} to {band.high:.3g} rad/s: {band.why}."
+            )
+    if own.fold_largest > math.pi:
+        note(
+            f"Rods fold up to {math.degrees(own.fold_largest):.0f} deg against each other, through their stop; "
+            "raise chain.fold_stiffness, or take the result for a machine that breaks."
+        )
+    if study.coasting is not None:
+        note("Behind the open coupling the machine is followed with two bars.")
 
 
 def _note_shaft(study: Study) -> None:
@@ -862,6 +933,7 @@ def as_dict(study: Study) -> dict[str, Any]:
         **({"monte_carlo": study.monte_carlo.as_dict()} if study.monte_carlo else {}),
         "coupling": entries(config.coupling) if config.coupling else None,
         **(_driveline(study) if study.torsion is not None else {}),
+        **({"chain": entries(config.chain) | study.chain.as_dict()} if study.chain else {}),
         "sides_over_speed": study.sides.as_dict() if study.sides else None,
     }
 

@@ -25,7 +25,7 @@ def study_system(config: Config, drive: Drive) -> ModelSystem:
     """Machine, driveline and motor of a study, from rest: the speed reference is the crank speed at the motor from
     the start on, feed and processing forces are those of normal running; with feed-forward, the machine that the
     control asks is in the system, too."""
-    machine = _machine(config, drive, ChamberForces, drive.driven)
+    machine = _machine(config, drive, ChamberForces, drive.driven) | drive.organ()
     models = {name: model for name, (model, _) in drive.models().items()}
     start = {name: model.parameter_layout.named(p) for name, (model, p) in drive.models().items()}
     start["motor"] |= {"w_ref": config.run.crank_speed * drive.ratio}
@@ -62,7 +62,8 @@ def start_of(
             raise InputError("the study has no [driveline]; add the table, or export without --config")
         return model.parameter_layout.named(drive.line)
     if not issubclass(model, Motor):
-        return _machine(config, drive, model, drive.driven)
+        given = _machine(config, drive, model, drive.driven)
+        return given | (drive.organ() if model.name == "ChainUnitFlexible" else {})
     if drive.motor is not model:
         raise InputError(f"the study's motor is {drive.motor.name}, not {model.name}")
     return model.parameter_layout.named(drive.parameters)

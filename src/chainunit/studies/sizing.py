@@ -19,6 +19,7 @@ import xarray as xr
 
 from ..config import Config
 from ..cosim import CoSimulation, Profile
+from ..cosim.instance import Fmu
 from ..drives.catalogue import CatalogueMotor, catalogue
 from ..drives.gearing import motor_side
 from ..drives.induction_motor import InductionMotor, breakdown, volts_per_hertz
@@ -26,8 +27,9 @@ from ..drives.motor import T_RATED
 from ..engines import MATH, numpy_
 from ..errors import InterruptedRunError, RunError
 from ..fmu.backends import Backend
-from ..machines.api import EMPTY, ChainUnit
+from ..machines.api import EMPTY
 from ..quantities import Layout, Value, declaration, quantity
+from .chain import duty
 from .cycle import Cycle, all_on_one, cycle
 from .drive import Drive
 
@@ -38,15 +40,16 @@ def rms(*parts: tuple[float, Any]) -> float:
     return math.sqrt(sum(share * float(np.mean(np.square(x))) for share, x in parts) / whole)
 
 
-def flywheel(torque: Any, speed: float, fluctuation: float) -> float:
+def flywheel(torque: Any, speed: float, fluctuation: float, turned: float = 2.0 * math.pi) -> float:
     """Inertia [kg m2] on the shaft that keeps (largest - least)/mean of its speed at `fluctuation`.
 
-    `torque` [N m] is what the shaft needs over a turn at constant `speed` [rad/s], evenly spaced in angle, shape
-    (n,), against a drive that gives its mean: J = (E_max - E_min)/(fluctuation w^2), with E the energy that runs
-    ahead of the mean (Wittenbauer's method with the torque at constant speed).
+    `torque` [N m] is what the shaft needs over a turn, or over an angle `turned` [rad] of several, at constant
+    `speed` [rad/s], evenly spaced in angle, shape (n,), against a drive that gives its mean: J = (E_max -
+    E_min)/(fluctuation w^2), with E the energy that runs ahead of the mean (Wittenbauer's method with the torque at
+    constant speed).
     """
     torque = np.asarray(torque, dtype=float)
-    excess = np.cumsum(torque - np.mean(torque)) * (2.0 * math.pi / len(torque))
+    excess = np.cumsum(torque - np.mean(torque)) * (turned / len(torque))
     return float(np.ptp(excess)) / (fluctuation * speed * speed)
 
 
@@ -198,17 +201,28 @@ def _entries(declared: Any) -> dict[str, Any]:
     }
 
 
-def duty_cycles(machine: ChainUnit, config: Config) -> tuple[Cycle, Cycle]:
-    """The turn with both sides loaded, and with all feed on the left."""
+def duty_cycles(config: Config, folder: Path, backend: Backend | None) -> tuple[Cycle, Cycle]:
+    """The turn with both sides loaded, and with all feed on the left; with chains many turns, by their FMU, which is
+    written to `folder`."""
     feed, w = config.feed, config.run.crank_speed
-    together = all_on_one(feed.left, feed.right)
-    return cycle(machine, w, feed.left, feed.right), cycle(machine, w, together, EMPTY)
+    cases = (feed.left, feed.right), (all_on_one(feed.left, feed.right), EMPTY)
+    if config.chain is None:
+        both, one_sided = (cycle(config.machine, w, *case) for case in cases)
+        return both, one_sided
+    drive = Drive(InductionMotor, None, config.machine, chain=config.chain)
+    fmu = Fmu(drive.export_machine(folder, backend)[0])
+    try:
+        both, one_sided = (duty(fmu, drive, w, *case) for case in cases)
+    finally:
+        fmu.close()
+    return both, one_sided
 
 
-def cycle_numbers(machine: ChainUnit, config: Config) -> CycleNumbers:
-    """What the machine asks of any drive, by inverse dynamics."""
+def cycle_numbers(config: Config, both: Cycle, one_sided: Cycle) -> CycleNumbers:
+    """What the machine asks of any drive, at constant speed of the crank."""
     assert config.sizing is not None
-    both, one_sided = duty_cycles(machine, config)
+    machine = config.machine
+    turned = float(len(both.angle) * (both.angle[1] - both.angle[0]))
     w, share = config.run.crank_speed, config.sizing.one_sided_share
     inertia = both.outputs.J * machine.p.ratio**2
     mean = float(np.mean(both.crank_torque))
@@ -221,7 +235,7 @@ def cycle_numbers(machine: ChainUnit, config: Config) -> CycleNumbers:
         inertia_least=float(np.min(inertia)),
         inertia_mean=float(np.mean(inertia)),
         inertia_largest=float(np.max(inertia)),
-        inertia_wanted=flywheel(both.crank_torque, w, config.sizing.fluctuation),
+        inertia_wanted=flywheel(both.crank_torque, w, config.sizing.fluctuation, turned),
     )
 
 
@@ -246,7 +260,9 @@ def size(
     """
     asked = config.sizing
     assert asked is not None
-    numbers = cycle_numbers(config.machine, config)
+    report("the machine at constant speed", 0.0, 1.0)
+    both, one_sided = duty_cycles(config, folder, backend)
+    numbers = cycle_numbers(config, both, one_sided)
     notes = [
         "Catalogue data are typical; iron losses are not in the motor model.",
         "The gear's losses act as viscous drag on the motor shaft, of the mean power that its efficiency takes.",
@@ -265,7 +281,7 @@ def size(
     files: Mapping[str, Path] = {}
     for k, motor in enumerate(shortlist):
         report(f"co-simulating {motor.designation}", float(k), float(len(shortlist)))
-        candidate = proposed(config, motor, numbers)
+        candidate = proposed(config, motor, numbers, both)
         if not files:
             files, _ = candidate.drive.export(folder, backend)
         found.append(with_flywheel(config, candidate, numbers, files))
@@ -316,8 +332,9 @@ def with_flywheel(
     return best
 
 
-def proposed(config: Config, motor: CatalogueMotor, numbers: CycleNumbers) -> Candidate:
-    """A motor with the gear ratio at which the crank has its speed, without a flywheel."""
+def proposed(config: Config, motor: CatalogueMotor, numbers: CycleNumbers, both: Cycle) -> Candidate:
+    """A motor with the gear ratio at which the crank has its speed, without a flywheel; `both` is the turn with both
+    sides loaded."""
     asked, gear = config.sizing, config.gear
     assert asked is not None
     plate = motor.nameplate
@@ -325,7 +342,6 @@ def proposed(config: Config, motor: CatalogueMotor, numbers: CycleNumbers) -> Ca
     synchronous, rated_speed, rated_torque = plate.synchronous, plate.speed, plate.torque
     w = config.run.crank_speed
     follows = config.start == "inverter"
-    both, _ = duty_cycles(config.machine, config)
     ratio = gear.ratio if "ratio" in config.gear_given else rated_speed / w
     speed, drag = rated_speed, gear.d
     for _ in range(3):
@@ -350,7 +366,7 @@ def proposed(config: Config, motor: CatalogueMotor, numbers: CycleNumbers) -> Ca
         ambient=dataclasses.replace(p.ambient, T=asked.ambient),
     )
     machine = config.machine.replace({"ratio": ratio})
-    drive = Drive(InductionMotor, p, machine, follows, rated_current=plate.rated_current)
+    drive = Drive(InductionMotor, p, machine, follows, rated_current=plate.rated_current, chain=config.chain)
     return Candidate(motor, drive, 0.0, {}, math.nan, math.nan, math.nan)
 
 

@@ -1,0 +1,351 @@
+"""The organs as chains at constant crank speed: what they ask beside two bars, and which speeds to avoid.
+
+Above a certain speed the motion is chaotic: no single peak is a prediction. At each speed several starts, the crank
+at other angles, are followed over many turns; of the peak of each turn medians and quantiles over all turns of all
+starts are given. A rod is slack while its mean axial pull is below zero.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from ..config import Config
+from ..cosim.instance import Fmu, Instance
+from ..machines.api import ChainUnit
+from ..machines.chain_unit import SideLoads
+from ..quantities import Layout, Value, declaration, quantity
+from .cycle import Cycle, cycle
+from .drive import Drive
+
+SETTLE = 5
+"""Turns of each start that are left out."""
+POINTS = 256
+"""Points of a turn at which outputs are read."""
+HIGH = 0.95
+"""The quantile that is given beside the median."""
+AVOID_RATIO = 1.25
+"""Where the rocker torque of chains is that many times the one of two bars, a speed is to be avoided."""
+AVOID_SLACK = 0.01
+"""Where a rod is slack for that share of the time, too."""
+_SIDES = ("left", "right")
+
+
+@declaration
+class SpeedNumbers:
+    """Chains and two bars at one crank speed. Peaks are those of single turns, over all turns of all starts."""
+
+    speed: Value = quantity("rad/s", "crank speed")
+    crank_torque_median: Value = quantity("N.m", "crank torque, peak of a turn, median")
+    crank_torque_high: Value = quantity("N.m", f"crank torque, peak of a turn, {100 * HIGH:g} % quantile")
+    crank_torque_rms: Value = quantity("N.m", "crank torque, RMS")
+    rocker_torque_median: Value = quantity("N.m", "rocker torque, peak of a turn, median")
+    rocker_torque_high: Value = quantity("N.m", f"rocker torque, peak of a turn, {100 * HIGH:g} % quantile")
+    snatch_median: Value = quantity("1", "force at A2, peak of a turn over that at rest, median")
+    snatch_high: Value = quantity(
+        "1", f"force at A2, peak of a turn over that at rest, {100 * HIGH:g} % quantile"
+    )
+    snatch_spread: Value = quantity("1", "largest over least of the starts' medians of it")
+    slack_time: Value = quantity("1", "share of the time in which a rod is slack")
+    slack_rods: Value = quantity("1", "share of the rods that are slack, mean over time")
+    fold_largest: Value = quantity("rad", "largest angle between neighbouring rods")
+    two_bar_crank_torque: Value = quantity("N.m", "crank torque of two bars, peak")
+    two_bar_crank_torque_rms: Value = quantity("N.m", "crank torque of two bars, RMS")
+    two_bar_rocker_torque: Value = quantity("N.m", "rocker torque of two bars, peak")
+
+
+@dataclass(frozen=True)
+class Turns:
+    """Steady running of the machine with chains, sampled: arrays of shape (starts, turns, points)."""
+
+    angle: Any
+    """of the crank in a turn [rad], shape (points,); that of start k is ahead by k/starts of a turn"""
+    values: Mapping[str, Any]
+    """outputs by name"""
+    pulls: Mapping[str, Any]
+    """by side, mean axial pull in each rod [N], shape (starts, turns, points, rods)"""
+
+
+@dataclass(frozen=True)
+class Band:
+    """Speeds to avoid [rad/s], and why."""
+
+    low: float
+    high: float
+    why: str
+
+
+@dataclass(frozen=True)
+class ChainResult:
+    """The study's own speed, the sweep in rising order, and what follows from it."""
+
+    own: SpeedNumbers
+    sweep: tuple[SpeedNumbers, ...]
+    avoid: tuple[Band, ...]
+    critical: tuple[tuple[int, int, float], ...]
+    """(mode, order, crank speed [rad/s]) at which a multiple of the crank speed meets a natural frequency"""
+    slack_by_rod: Mapping[str, Any]
+    """by side: share of the time in which each rod is slack, at the study's own speed"""
+    starts: int
+    turns: int
+    rods: tuple[int, int]
+
+    @property
+    def distance(self) -> float:
+        """Relative distance of the study's speed from the nearest speed at which the first mode meets order 1."""
+        first = next(speed for mode, order, speed in self.critical if mode == 1 and order == 1)
+        return float(self.own.speed / first - 1.0)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Ready for JSON, each number with its unit."""
+
+        def row(numbers: SpeedNumbers) -> dict[str, Any]:
+            layout = Layout(SpeedNumbers)
+            return {
+                v.name: {"value": float(x), "unit": v.unit}
+                for v, x in zip(layout.variables, layout.values(numbers), strict=True)
+            }
+
+        return {
+            "rods": {"wall": self.rods[0], "web": self.rods[1]},
+            "starts": self.starts,
+            "turns": self.turns,
+            "own_speed": row(self.own),
+            "distance_to_resonance": {"value": self.distance, "unit": "1"},
+            "sweep": [row(numbers) for numbers in self.sweep],
+            "avoid": [
+                {
+                    "from": {"value": b.low, "unit": "rad/s"},
+                    "to": {"value": b.high, "unit": "rad/s"},
+                    "why": b.why,
+                }
+                for b in self.avoid
+            ],
+            "critical_speeds": [
+                {"mode": mode, "order": order, "speed": {"value": speed, "unit": "rad/s"}}
+                for mode, order, speed in self.critical
+            ],
+            "slack_by_rod": {
+                side: {"value": [float(x) for x in shares], "unit": "1"}
+                for side, shares in self.slack_by_rod.items()
+            },
+        }
+
+
+def run_turns(
+    fmu: Fmu,
+    drive: Drive,
+    crank_speed: float,
+    left: SideLoads,
+    right: SideLoads,
+    outputs: Sequence[str],
+    *,
+    starts: int,
+    turns: int,
+    settle: int = SETTLE,
+    points: int = POINTS,
+    progress: Callable[[float], None] = lambda share: None,
+) -> Turns:
+    """Steady running at a prescribed constant speed of the crank, from the hanging position at several angles.
+
+    Parameters
+    ----------
+    fmu : the machine with chains
+    drive : whose machine it is
+    outputs : names of the wanted outputs
+    starts, turns, settle, points : see `Turns`, `SETTLE`, `POINTS`
+    progress : is told the share done
+    """
+    model, p = drive.load_model()
+    rods = [f"{side}.pull_{k + 1}" for side in _SIDES for k in range(sum(drive.rods))]
+    names = [*outputs, *rods]
+    ratio = drive.driven.p.ratio
+    step = 2.0 * math.pi / crank_speed / points
+    given = model.parameter_layout.named(p) | {
+        f"{side}.{name}": value
+        for side, loads in zip(_SIDES, (left, right), strict=True)
+        for name, value in Layout(SideLoads).named(loads).items()
+    }
+    done = [0]
+
+    def one(start: int) -> Any:
+        unit = Instance(fmu, f"start {start}")
+        try:
+            # inside the FMU the angle runs on along the speed: nothing is set any more
+            phi = 2.0 * math.pi * start / starts
+            unit.initialize(given | {"phi": phi * ratio, "w": crank_speed * ratio, "a": 0.0}, 0.0)
+            unit.finish_initialization()
+            handle = unit.handle(names)
+            rows = np.empty((turns * points, len(names)))
+            for k in range(settle):
+                unit.step(k * points * step, points * step)
+            for k in range(turns * points):
+                unit.step((settle * points + k) * step, step)
+                rows[k] = unit.read(handle)
+            return rows
+        finally:
+            unit.close()
+            done[0] += 1
+            progress(done[0] / starts)
+
+    with ThreadPoolExecutor(min(starts, os.cpu_count() or 1)) as pool:
+        found = np.array(list(pool.map(one, range(starts)))).reshape(starts, turns, points, len(names))
+    first = len(outputs)
+    each = len(rods) // 2
+    return Turns(
+        2.0 * math.pi * np.arange(1, points + 1) / points,
+        {name: found[..., k] for k, name in enumerate(outputs)},
+        {side: found[..., first + each * k : first + each * (k + 1)] for k, side in enumerate(_SIDES)},
+    )
+
+
+def duty(fmu: Fmu, drive: Drive, crank_speed: float, left: SideLoads, right: SideLoads) -> Cycle:
+    """The machine with chains over 20 turns in a row, as `cycle` gives it of two bars over one: what sizing begins
+    with."""
+    turns = run_turns(fmu, drive, crank_speed, left, right, ("tau", "J"), starts=1, turns=20)
+    tau, J = (turns.values[name].ravel() for name in ("tau", "J"))
+    ratio = drive.driven.p.ratio
+    angle = np.linspace(0.0, 40.0 * math.pi, len(tau), endpoint=False)
+    return Cycle(angle, tau * ratio, SimpleNamespace(J=J, tau=tau))
+
+
+def numbers_at(
+    fmu: Fmu,
+    drive: Drive,
+    config: Config,
+    crank_speed: float,
+    progress: Callable[[float], None] = lambda share: None,
+) -> tuple[SpeedNumbers, dict[str, Any]]:
+    """The numbers at one speed with the study's feed, and by side the share of time in which each rod is slack."""
+    chain, feed = config.chain, config.feed
+    assert chain is not None
+    forces = [f"{side}.rocker_joint.{x}" for side in _SIDES for x in ("fx", "fy")]
+    outputs = ("tau", "rocker.tau", "left.fold_largest", "right.fold_largest", *forces)
+    starts, turns = int(chain.starts), int(chain.turns)
+    found = run_turns(
+        fmu, drive, crank_speed, feed.left, feed.right, outputs, starts=starts, turns=turns, progress=progress
+    )
+    values, ratio = found.values, drive.driven.p.ratio
+
+    def peaks(x: Any) -> Any:
+        return np.max(np.abs(x), axis=2)
+
+    at_rest, snatch = drive.machine.chamber(0.0, left=feed.left, right=feed.right), []
+    for side in _SIDES:
+        joint = getattr(at_rest, side).rocker_joint
+        size = np.hypot(*(values[f"{side}.rocker_joint.{x}"] for x in ("fx", "fy")))
+        rest = _rest_force(drive.machine, side, getattr(feed, side), sum(drive.rods))
+        snatch.append(peaks(size) / max(rest or float(np.hypot(joint.fx, joint.fy)), 1e-9))
+    snatched = np.maximum(*snatch)
+    slack = {side: found.pulls[side] < 0.0 for side in _SIDES}
+    all_rods = np.concatenate([slack[side] for side in _SIDES], axis=-1)
+    crank, rocker = values["tau"] * ratio, values["rocker.tau"]
+    two = cycle(drive.machine, crank_speed, feed.left, feed.right)
+    medians = np.median(snatched, axis=1)
+    return (
+        SpeedNumbers(
+            speed=crank_speed,
+            crank_torque_median=float(np.median(peaks(crank))),
+            crank_torque_high=float(np.quantile(peaks(crank), HIGH)),
+            crank_torque_rms=float(np.sqrt(np.mean(crank**2))),
+            rocker_torque_median=float(np.median(peaks(rocker))),
+            rocker_torque_high=float(np.quantile(peaks(rocker), HIGH)),
+            snatch_median=float(np.median(snatched)),
+            snatch_high=float(np.quantile(snatched, HIGH)),
+            snatch_spread=float(np.max(medians) / np.min(medians)),
+            slack_time=float(np.mean(np.any(all_rods, axis=-1))),
+            slack_rods=float(np.mean(all_rods)),
+            fold_largest=float(max(np.max(values[f"{side}.fold_largest"]) for side in _SIDES)),
+            two_bar_crank_torque=float(np.max(np.abs(two.crank_torque))),
+            two_bar_crank_torque_rms=float(np.sqrt(np.mean(two.crank_torque**2))),
+            two_bar_rocker_torque=float(np.max(np.abs(two.outputs.rocker.tau))),
+        ),
+        {side: np.mean(slack[side], axis=(0, 1, 2)) for side in _SIDES},
+    )
+
+
+def _rest_force(machine: ChainUnit, side: str, loads: SideLoads, rods: int) -> float:
+    """Force at A2 with the chain at rest, the rocker in the middle [N]; 0 without weight."""
+    if machine.p.g == 0.0:
+        return 0.0
+    return float(np.hypot(*machine.hanging(side, 0.0, loads, rods).last))
+
+
+def study_chain(
+    config: Config,
+    drive: Drive,
+    file: Path,
+    report: Callable[[str, float, float], None],
+) -> ChainResult:
+    """The study's own speed and the sweep of a study whose organs are chains, by the FMU `file` of the machine."""
+    chain, own = config.chain, config.run.crank_speed
+    assert chain is not None
+    speeds = np.linspace(chain.sweep_lowest, chain.sweep_highest, int(chain.sweep_points)).tolist()
+    speeds = sorted({round(w, 9) for w in (*speeds, own)})
+    rows: list[SpeedNumbers] = []
+    by_rod: dict[str, Any] = {}
+    fmu = Fmu(file)
+    try:
+        for k, w in enumerate(speeds):
+            what = f"chains at {w:.3g} rad/s"
+
+            def told(share: float, k: int = k, what: str = what) -> None:
+                report(what, k + share, float(len(speeds)))
+
+            told(0.0)
+            numbers, slack = numbers_at(fmu, drive, config, w, told)
+            rows.append(numbers)
+            if abs(w - own) < 1e-8:
+                by_rod = slack
+    finally:
+        fmu.close()
+    modes = drive.machine.chain_modes(config.feed.left, config.feed.right)
+    critical = []
+    if modes is not None:
+        for mode, frequency in enumerate(modes.frequency[:4], 1):
+            critical += [(mode, order, float(frequency) / order) for order in (1, 2)]
+    return ChainResult(
+        own=next(n for n in rows if abs(n.speed - own) < 1e-8),
+        sweep=tuple(rows),
+        avoid=tuple(bands(rows)),
+        critical=tuple(critical),
+        slack_by_rod=by_rod,
+        starts=int(chain.starts),
+        turns=int(chain.turns),
+        rods=drive.rods,
+    )
+
+
+def bands(rows: Sequence[SpeedNumbers]) -> list[Band]:
+    """Speeds to avoid, from the rows of a sweep in rising order: neighbours with the same reason are one band, from
+    halfway to the last good speed to halfway to the next."""
+
+    def why(n: SpeedNumbers) -> str:
+        reasons = []
+        if n.slack_time > AVOID_SLACK:
+            reasons.append("rods go slack and snatch")
+        if n.rocker_torque_high > AVOID_RATIO * n.two_bar_rocker_torque:
+            reasons.append("the rocker carries more than with two bars")
+        return " and ".join(reasons)
+
+    speeds = [n.speed for n in rows]
+    found: list[Band] = []
+    begun: int | None = None
+    for k in range(len(rows) + 1):
+        now = why(rows[k]) if k < len(rows) else ""
+        if begun is not None and now != why(rows[begun]):
+            low = speeds[0] if begun == 0 else 0.5 * (speeds[begun - 1] + speeds[begun])
+            high = speeds[-1] if k == len(rows) else 0.5 * (speeds[k - 1] + speeds[k])
+            found.append(Band(low, high, why(rows[begun])))
+            begun = None
+        if begun is None and now:
+            begun = k
+    return found
