@@ -264,7 +264,8 @@ def export(
     name: Annotated[
         str,
         typer.Argument(
-            help="ChamberForces, ChainUnit, DcMotor, InductionMotor, CardanDriveline or KnifeDrive."
+            help="ChamberForces, ChainUnitFlexible (organs as chains), ChainUnit, DcMotor, InductionMotor, "
+            "CardanDriveline or KnifeDrive."
         ),
     ],
     output: Annotated[
@@ -287,30 +288,42 @@ def export(
             help="Comma-separated, of linux64, win64, darwin64, aarch64-linux, or all; this machine's by default.",
         ),
     ] = None,
+    rods: Annotated[
+        int | None,
+        typer.Option(
+            "--rods", help="Rods of an organ of ChainUnitFlexible, 2 to 24; 8, or the study's, by default."
+        ),
+    ] = None,
 ) -> None:
     """Write a model as an FMU."""
     from . import config as configuration
     from .fmu.backends import export as write
     from .models import MODELS
-    from .studies.package import start_of
+    from .studies.package import start_of, with_rods
 
     if name not in MODELS:
         raise InputError(f"{name}: no such model; there are {', '.join(MODELS)}")
     file = output or Path(f"{name}.fmu")
     if file.suffix != ".fmu":
         raise InputError(f"-o {file}: must be a file name that ends in .fmu")
+    if rods is not None and name != "ChainUnitFlexible":
+        raise InputError(f"--rods {rods}: is of ChainUnitFlexible; leave it out for {name}")
     kind: Any = backend.value if backend else None
     with _console(stderr=True).status("exporting") as status:
         start = {}
+        model = MODELS[name]
         if config and name == "KnifeDrive":
             from .studies import knife as knives
 
             start = knives.start_of(knives.load(config))
         elif config:
             loaded = configuration.load(config)
-            start = start_of(loaded, MODELS[name], backend=kind, report=status.update)
+            start = start_of(loaded, model, backend=kind, report=status.update)
+            rods = rods or (int(loaded.chain.rods) if loaded.chain else None)
+        if name == "ChainUnitFlexible":
+            model = with_rods(rods or 8, start)
         made = write(
-            MODELS[name],
+            model,
             file,
             start,
             backend=kind,

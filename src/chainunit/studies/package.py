@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from ..config import Config
@@ -15,6 +15,8 @@ from ..fmu.backends import Backend
 from ..fmu.ssp import ModelSystem, export
 from ..machines.api import ChainUnit
 from ..machines.chain_unit import ChamberForces, DirectChainUnit
+from ..machines.flexible import LEAST, MOST, flexible
+from ..machines.hanging import split
 from ..model import Model
 from ..quantities import Layout
 from .choice import choose
@@ -67,6 +69,21 @@ def start_of(
     if drive.motor is not model:
         raise InputError(f"the study's motor is {drive.motor.name}, not {model.name}")
     return model.parameter_layout.named(drive.parameters)
+
+
+def with_rods(number: int, start: Mapping[str, float]) -> type[Model]:
+    """ChainUnitFlexible with `number` rods an organ, as many in wall and web as brings them nearest to equal length
+    with the lengths among the `start` values.
+
+    Raises
+    ------
+    InputError
+        for a number that it cannot have.
+    """
+    if not LEAST <= number <= MOST:
+        raise InputError(f"{number} rods an organ: must be >= {LEAST} and <= {MOST}")
+    lengths = ChamberForces.Parameters()
+    return flexible(*split((start.get("l1", lengths.l1), start.get("l2", lengths.l2)), number))
 
 
 def _machine(config: Config, drive: Drive, model: type[Model], machine: ChainUnit) -> dict[str, float]:
