@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 from scipy.integrate import solve_ivp
 
-from ..engines import MATH, numpy_
+from ..engines import MATH, casadi_, numpy_
 from ..errors import RunError
 from ..model import Model
 
@@ -51,7 +51,8 @@ def monolithic(
     RunError
         where the solver gives up.
     """
-    xp = numpy_()
+    import casadi
+
     models = {name: (model, model.prepared(MATH, p)) for name, (model, p) in models.items()}
     offsets, n = {}, 0
     start: list[float] = []
@@ -64,9 +65,9 @@ def monolithic(
             tolerances += [max(1e-12, rtol * 1e-3 * size) for size in sizes]
             n = len(start)
 
-    def pass_through(engine: Any, t: Any, x: Any, rounds: int) -> dict[str, Any]:
+    def pass_through(engine: Any, given: Mapping[str, Any], x: Any, rounds: int) -> dict[str, Any]:
         """Every value by full name: states, then outputs in the models' order; `rounds` passes carry a
-        value through as many models."""
+        value through as many models. `given` are the inputs from outside."""
         values: dict[str, Any] = {}
         for name, (model, _) in models.items():
             if model.state_layout:
@@ -75,7 +76,7 @@ def monolithic(
                     values[f"{name}.{variable}"] = x[at + i]
         for _ in range(rounds):
             for name, (model, p) in models.items():
-                u, state = inputs(name, model, t, values), states(name, model, x)
+                u, state = inputs(name, model, given, values), states(name, model, x)
                 shared = model.shared(engine, p, u, state)
                 part = model.parts[0]
                 out = part.layout.values(part.equations(engine, p, u, state, shared))
@@ -84,16 +85,21 @@ def monolithic(
 
     sources: dict[str, str] = {target: source for source, target in connections}
 
-    def inputs(name: str, model: type[Model], t: Any, values: Mapping[str, Any]) -> Any:
-        given = []
-        for variable in model.input_layout.variables:
-            full = f"{name}.{variable.name}"
-            if full in sources:
-                given.append(values.get(sources[full], 0.0))
-            else:
-                signal = signals.get(full, variable.quantity.start)
-                given.append(signal(t) if callable(signal) else signal)
-        return model.input_layout.instance(given)
+    outside = {
+        f"{name}.{v.name}": signals.get(f"{name}.{v.name}", v.quantity.start)
+        for name, (model, _) in models.items()
+        for v in model.input_layout.variables
+        if f"{name}.{v.name}" not in sources
+    }
+
+    def at(t: Any) -> dict[str, Any]:
+        return {full: signal(t) if callable(signal) else signal for full, signal in outside.items()}
+
+    def inputs(name: str, model: type[Model], given: Mapping[str, Any], values: Mapping[str, Any]) -> Any:
+        full = [f"{name}.{variable}" for variable in model.input_layout.names]
+        return model.input_layout.instance(
+            [values.get(sources[f], 0.0) if f in sources else given[f] for f in full]
+        )
 
     def states(name: str, model: type[Model], x: Any) -> Any:
         if model.state_layout is None:
@@ -101,22 +107,30 @@ def monolithic(
         at = offsets[name]
         return model.state_layout.instance(x[at : at + len(model.state_layout.names)])
 
-    def rates(t: float, x: Any) -> list[float]:
-        flat = [float(v) for v in x]
-        values = pass_through(MATH, t, flat, 1)
-        dx: list[float] = []
+    def traced() -> Any:
+        """The derivatives of all states, traced once: several times as fast as the kernels themselves."""
+        engine = casadi_()
+        symbols = casadi.SX.sym("u", len(outside)), casadi.SX.sym("x", n)
+        given, x = dict(zip(outside, casadi.vertsplit(symbols[0]), strict=True)), casadi.vertsplit(symbols[1])
+        values = pass_through(engine, given, x, 1)
+        dx: list[Any] = []
         for name, (model, p) in models.items():
             if model.state_layout:
-                dx += model.derivatives(MATH, p, inputs(name, model, t, values), states(name, model, flat))
-        return dx
+                dx += model.derivatives(engine, p, inputs(name, model, given, values), states(name, model, x))
+        return casadi.Function("rates", list(symbols), [casadi.cse(casadi.vertcat(*dx))])
+
+    derivatives = traced()
+
+    def rates(t: float, x: Any) -> Any:
+        return derivatives(list(at(t).values()), x).full().ravel()
 
     # where the start depends on an input that is another one's state, a pass for each on the way
     for _ in models:
-        values = pass_through(MATH, 0.0, start, 1)
+        values = pass_through(MATH, at(0.0), start, 1)
         begun: list[float] = []
         for name, (model, p) in models.items():
             if model.state_layout:
-                begun += model.state_layout.values(model.start(MATH, p, inputs(name, model, 0.0, values)))
+                begun += model.state_layout.values(model.start(MATH, p, inputs(name, model, at(0.0), values)))
         if begun == start:
             break
         start = begun
@@ -140,7 +154,7 @@ def monolithic(
             raise RunError(f"monolithic reference: {solution.message}")
         found[:, chosen] = solution.sol(times[chosen])
         x = solution.y[:, -1]
-    values = pass_through(xp, times, found, len(models) + 1)
+    values = pass_through(numpy_(), at(times), found, len(models) + 1)
     described = {
         f"{name}.{v.name}": v
         for name, (model, _) in models.items()
