@@ -9,6 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ..quantities import Layout, Variable
+from ..studies.chain import HIGH, ChainResult
 from ..studies.monte_carlo import QUANTILES, MonteCarloResult, Sample
 from ..studies.overload import SCENARIOS, Answers, Study
 from ..studies.shaft import ShaftAnswers
@@ -34,6 +35,8 @@ _HIDDEN = {
     "crank_torque_mean",
 }
 _IF_ANY = {
+    "slack_time",
+    "fold_largest",
     "stall_time",
     "thermal_trip_time",
     "coupling_trip_time",
@@ -58,6 +61,8 @@ def _cell(study: Study, run: str, v: Variable) -> str:
         return "-"
     if v.name == "recovery_time" and run == "steady":
         return ""
+    if v.unit == "rad":
+        return f"{math.degrees(value):.3g} deg"
     return _number(value, v.unit)
 
 
@@ -77,6 +82,8 @@ def show(study: Study, console: Console) -> None:
             if v.name not in _HIDDEN and (known or v.name not in _IF_ANY):
                 table.add_row(v.description, *(_cell(study, run, v) for run in runs))
         console.print(table)
+    if study.chain is not None:
+        _show_chain(study.chain, console)
     if study.monte_carlo is not None:
         _show_monte_carlo(study.monte_carlo, console)
     if study.factors:
@@ -109,8 +116,9 @@ def show(study: Study, console: Console) -> None:
     if limits is not None:
         swing = (math.degrees(limits.rocker_extreme_left), math.degrees(limits.rocker_extreme_right))
         console.print(f"Rocker swings from {swing[0]:.3f} to {swing[1]:.3f} deg; margin {limits.margin:.2f}.")
+        first = "A web" if study.chain is None else "With two bars a web"
         console.print(
-            f"A web first goes slack at {limits.slack_speed:.2f} rad/s of the crank with this feed "
+            f"{first} first goes slack at {limits.slack_speed:.2f} rad/s of the crank with this feed "
             f"({limits.slack_speed_empty:.2f} rad/s empty); lowest chain mode near "
             f"{limits.chain_resonance:.1f} rad/s."
         )
@@ -135,6 +143,61 @@ def show(study: Study, console: Console) -> None:
             console.print(f"Difference of {quantity} to the monolithic solution: {value:.1e} of its peak.")
     for note in study.notes:
         console.print(f"Note: {note}")
+
+
+def _show_chain(found: ChainResult, console: Console) -> None:
+    """Chains beside two bars at the study's speed, and which speeds to avoid."""
+    own, high = found.own, f"{100 * HIGH:g} %"
+    table = Table(
+        title=f"Chains and two bars at constant {own.speed:g} rad/s, {found.starts} starts of {found.turns} turns",
+        title_justify="left",
+    )
+    table.add_column("peaks are of single turns")
+    for column in ("chains, median", f"chains, {high}", "two bars"):
+        table.add_column(column, justify="right")
+    for title, name in (("crank torque, peak", "crank_torque"), ("rocker torque, peak", "rocker_torque")):
+        sizes = (f"{name}_median", f"{name}_high", f"two_bar_{name}")
+        table.add_row(title, *(_number(getattr(own, size), "N.m") for size in sizes))
+    one, two = _number(own.crank_torque_rms, "N.m"), _number(own.two_bar_crank_torque_rms, "N.m")
+    table.add_row("crank torque, RMS", one, "", two)
+    snatches = (own.snatch_median, own.snatch_high, own.two_bar_snatch)
+    table.add_row("snatch: force at A2 over that at rest", *(f"{x:.2f}" for x in snatches))
+    table.add_row("snatch, largest over least median of a start", f"{own.snatch_spread:.3f}", "", "")
+    table.add_row(
+        "time with a slack rod; two bars: with one that pushes",
+        _number(own.slack_time, "1"),
+        "",
+        _number(own.two_bar_slack_time, "1"),
+    )
+    table.add_row("rods that are slack, mean", _number(own.slack_rods, "1"), "", "")
+    table.add_row("largest angle between two rods", f"{math.degrees(own.fold_largest):.0f} deg", "", "")
+    console.print(table)
+    if found.distance is not None:
+        console.print(
+            f"The crank turns {100 * abs(found.distance):.0f} % {'above' if found.distance > 0.0 else 'below'} the "
+            f"resonance of an organ, {found.resonance:.2f} rad/s.",
+            soft_wrap=True,
+        )
+    for side, shares in found.slack_by_rod.items():
+        slack = [f"{found.rod_name(k)} {100 * share:.2g} %" for k, share in enumerate(shares) if share > 0.0]
+        if slack:
+            console.print(f"Slack on the {side}, share of the time: {', '.join(slack)}.", soft_wrap=True)
+    if len(found.sweep) > 1:
+        low, high_speed = found.sweep[0].speed, found.sweep[-1].speed
+        for band in found.avoid:
+            end = f"{band.high:.3g} rad/s" + (", where the sweep ends" if band.high == high_speed else "")
+            console.print(f"Avoid {band.low:.3g} to {end}: {band.why}.", soft_wrap=True)
+        if not found.avoid:
+            console.print(f"No speed to avoid from {low:.3g} to {high_speed:.3g} rad/s.")
+    inside = [
+        f"{speed:.2f} (mode {mode}, order {order})"
+        for mode, order, speed in sorted(found.critical, key=lambda each: each[2])
+        if found.sweep[0].speed <= speed <= found.sweep[-1].speed
+    ]
+    if inside:
+        console.print(
+            f"Critical speeds within the sweep [rad/s]: {', '.join(inside)}.", soft_wrap=True, markup=False
+        )
 
 
 def _show_shaft(study: Study, console: Console) -> None:

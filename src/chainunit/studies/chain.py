@@ -33,7 +33,9 @@ POINTS = 256
 HIGH = 0.95
 """The quantile that is given beside the median."""
 AVOID_RATIO = 1.25
-"""Where the rocker torque of chains is that many times the one of two bars, a speed is to be avoided."""
+"""Where the rocker torque of chains is that many times the one of two bars, at this speed and at rest, a speed is to
+be avoided. At rest, too: the torque of two bars passes a minimum where weight and inertia cancel; chains that do not
+follow it there ask no more of the machine than at lower speeds."""
 AVOID_SLACK = 0.01
 """Where a rod is slack for that share of the time, too."""
 _SIDES = ("left", "right")
@@ -60,6 +62,8 @@ class SpeedNumbers:
     two_bar_crank_torque: Value = quantity("N.m", "crank torque of two bars, peak")
     two_bar_crank_torque_rms: Value = quantity("N.m", "crank torque of two bars, RMS")
     two_bar_rocker_torque: Value = quantity("N.m", "rocker torque of two bars, peak")
+    two_bar_snatch: Value = quantity("1", "force at A2 of two bars, peak, over that at rest")
+    two_bar_slack_time: Value = quantity("1", "share of the time in which a bar would have to push")
 
 
 @dataclass(frozen=True)
@@ -93,16 +97,25 @@ class ChainResult:
     critical: tuple[tuple[int, int, float], ...]
     """(mode, order, crank speed [rad/s]) at which a multiple of the crank speed meets a natural frequency"""
     slack_by_rod: Mapping[str, Any]
-    """by side: share of the time in which each rod is slack, at the study's own speed"""
+    """by side: share of the time in which each rod is slack, from A1 on, at the study's own speed"""
     starts: int
     turns: int
     rods: tuple[int, int]
 
     @property
-    def distance(self) -> float:
-        """Relative distance of the study's speed from the nearest speed at which the first mode meets order 1."""
-        first = next(speed for mode, order, speed in self.critical if mode == 1 and order == 1)
-        return float(self.own.speed / first - 1.0)
+    def resonance(self) -> float | None:
+        """Crank speed that is the lowest natural frequency of an organ [rad/s]; None without weight."""
+        return next((speed for mode, order, speed in self.critical if mode == order == 1), None)
+
+    @property
+    def distance(self) -> float | None:
+        """Distance of the study's speed from the resonance, relative to it: negative below."""
+        return None if self.resonance is None else float(self.own.speed / self.resonance - 1.0)
+
+    def rod_name(self, k: int) -> str:
+        """What rod `k`, counted from 0 at A1, is called."""
+        wall, _ = self.rods
+        return f"wall {k + 1}" if k < wall else f"web {k - wall + 1}"
 
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON, each number with its unit."""
@@ -114,11 +127,17 @@ class ChainResult:
                 for v, x in zip(layout.variables, layout.values(numbers), strict=True)
             }
 
+        def pure(value: float) -> dict[str, Any]:
+            return {"value": value, "unit": "1"}
+
         return {
-            "rods": {"wall": self.rods[0], "web": self.rods[1]},
-            "starts": self.starts,
-            "turns": self.turns,
+            "rods_of_wall": pure(self.rods[0]),
+            "rods_of_web": pure(self.rods[1]),
+            "starts": pure(self.starts),
+            "turns": pure(self.turns),
+            "quantile": pure(HIGH),
             "own_speed": row(self.own),
+            "resonance": {"value": self.resonance, "unit": "rad/s"},
             "distance_to_resonance": {"value": self.distance, "unit": "1"},
             "sweep": [row(numbers) for numbers in self.sweep],
             "avoid": [
@@ -130,11 +149,11 @@ class ChainResult:
                 for b in self.avoid
             ],
             "critical_speeds": [
-                {"mode": mode, "order": order, "speed": {"value": speed, "unit": "rad/s"}}
+                {"mode": pure(mode), "order": pure(order), "speed": {"value": speed, "unit": "rad/s"}}
                 for mode, order, speed in self.critical
             ],
             "slack_by_rod": {
-                side: {"value": [float(x) for x in shares], "unit": "1"}
+                side: [{"rod": self.rod_name(k), **pure(float(share))} for k, share in enumerate(shares)]
                 for side, shares in self.slack_by_rod.items()
             },
         }
@@ -238,17 +257,21 @@ def numbers_at(
     def peaks(x: Any) -> Any:
         return np.max(np.abs(x), axis=2)
 
-    at_rest, snatch = drive.machine.chamber(0.0, left=feed.left, right=feed.right), []
+    two = cycle(drive.machine, crank_speed, feed.left, feed.right)
+    at_rest = drive.machine.chamber(0.0, left=feed.left, right=feed.right)
+    snatch, two_bar_snatch, pushes = [], [], []
     for side in _SIDES:
-        joint = getattr(at_rest, side).rocker_joint
+        joint, bars = getattr(at_rest, side).rocker_joint, getattr(two.outputs, side)
         size = np.hypot(*(values[f"{side}.rocker_joint.{x}"] for x in ("fx", "fy")))
         rest = _rest_force(drive.machine, side, getattr(feed, side), sum(drive.rods))
-        snatch.append(peaks(size) / max(rest or float(np.hypot(joint.fx, joint.fy)), 1e-9))
+        rest = max(rest or float(np.hypot(joint.fx, joint.fy)), 1e-9)
+        snatch.append(peaks(size) / rest)
+        two_bar_snatch.append(np.max(np.hypot(bars.rocker_joint.fx, bars.rocker_joint.fy)) / rest)
+        pushes.append(np.minimum(bars.wall_pull, bars.web_pull) < 0.0)
     snatched = np.maximum(*snatch)
     slack = {side: found.pulls[side] < 0.0 for side in _SIDES}
     all_rods = np.concatenate([slack[side] for side in _SIDES], axis=-1)
     crank, rocker = values["tau"] * ratio, values["rocker.tau"]
-    two = cycle(drive.machine, crank_speed, feed.left, feed.right)
     medians = np.median(snatched, axis=1)
     return (
         SpeedNumbers(
@@ -267,6 +290,8 @@ def numbers_at(
             two_bar_crank_torque=float(np.max(np.abs(two.crank_torque))),
             two_bar_crank_torque_rms=float(np.sqrt(np.mean(two.crank_torque**2))),
             two_bar_rocker_torque=float(np.max(np.abs(two.outputs.rocker.tau))),
+            two_bar_snatch=float(max(two_bar_snatch)),
+            two_bar_slack_time=float(np.mean(np.logical_or(*pushes))),
         ),
         {side: np.mean(slack[side], axis=(0, 1, 2)) for side in _SIDES},
     )
@@ -315,7 +340,7 @@ def study_chain(
     return ChainResult(
         own=next(n for n in rows if abs(n.speed - own) < 1e-8),
         sweep=tuple(rows),
-        avoid=tuple(bands(rows)),
+        avoid=tuple(bands(rows, _rocker_at_rest(config, drive))),
         critical=tuple(critical),
         slack_by_rod=by_rod,
         starts=int(chain.starts),
@@ -324,17 +349,23 @@ def study_chain(
     )
 
 
-def bands(rows: Sequence[SpeedNumbers]) -> list[Band]:
+def _rocker_at_rest(config: Config, drive: Drive) -> float:
+    """The rocker torque of two bars, largest of a turn that takes for ever [N.m]."""
+    slowly = cycle(drive.machine, 1e-6, config.feed.left, config.feed.right)
+    return float(np.max(np.abs(slowly.outputs.rocker.tau)))
+
+
+def bands(rows: Sequence[SpeedNumbers], at_rest: float) -> list[Band]:
     """Speeds to avoid, from the rows of a sweep in rising order: neighbours with the same reason are one band, from
-    halfway to the last good speed to halfway to the next."""
+    halfway to the last good speed to halfway to the next. `at_rest`: the rocker torque of two bars at rest [N.m]."""
 
     def why(n: SpeedNumbers) -> str:
         reasons = []
         if n.slack_time > AVOID_SLACK:
             reasons.append("rods go slack and snatch")
-        if n.rocker_torque_high > AVOID_RATIO * n.two_bar_rocker_torque:
+        if n.rocker_torque_high > AVOID_RATIO * max(n.two_bar_rocker_torque, at_rest):
             reasons.append("the rocker carries more than with two bars")
-        return " and ".join(reasons)
+        return ", and ".join(reasons)
 
     speeds = [n.speed for n in rows]
     found: list[Band] = []

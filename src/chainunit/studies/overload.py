@@ -27,6 +27,7 @@ from ..engines import numpy_
 from ..errors import InputError, RunError
 from ..fmu.backends import Backend
 from ..machines.api import EMPTY
+from ..machines.chain_unit import ChamberForces
 from ..quantities import Layout, Value, declaration, quantity
 from . import protection
 from .chain import ChainResult, study_chain
@@ -577,7 +578,7 @@ def _compare(study: Study, run: xr.Dataset, signals: Mapping[str, Any]) -> None:
     corners = [c for signal in signals.values() if isinstance(signal, Profile) for c in signal.corners]
     models = study.drive.models()
     if study.drive.feed_forward:
-        models = {"model": models["machine"], **models}
+        models = {"model": (ChamberForces, study.drive.machine.p), **models}
     reference = monolithic(
         models,
         study.drive.connections(slopes=False),
@@ -840,12 +841,13 @@ def _note_chain(study: Study, found: ChainResult) -> None:
     for band in found.avoid:
         if band.low <= own.speed <= band.high:
             note(
-                f"The crank speed lies among those to avoid, {band.low:.3g} to {band.high:.3g} rad/s: {band.why}."
+                f"chains: the crank speed lies among those to avoid, {band.low:.3g} to {band.high:.3g} rad/s: "
+                f"{band.why}."
             )
     if own.fold_largest > math.pi:
         note(
-            f"Rods fold up to {math.degrees(own.fold_largest):.0f} deg against each other, through their stop; "
-            "raise chain.fold_stiffness, or take the result for a machine that breaks."
+            f"chains: rods fold up to {math.degrees(own.fold_largest):.0f} deg against each other, through their "
+            "stop; raise chain.fold_stiffness, or take the result for a machine that breaks."
         )
     if study.coasting is not None:
         note("Behind the open coupling the machine is followed with two bars.")
