@@ -1,0 +1,56 @@
+# %% [markdown]
+# # The organ as a chain
+#
+# Export `ChainUnitFlexible`, here with 4 rods a side, drive it with fmpy at a speed at which the chains snatch, and set
+# the machine with two bars beside it.
+
+# %%
+import tempfile
+from pathlib import Path
+
+import fmpy
+import numpy as np
+
+from chainunit import ChainUnit, SideLoads
+from chainunit.fmu.backends import export
+from chainunit.machines.flexible import flexible
+
+speed, turns = 10.0, 6
+folder = tempfile.TemporaryDirectory()
+file = Path(folder.name) / "ChainUnitFlexible.fmu"
+print(export(flexible(walls=3, webs=1), file))
+
+# %%
+# in co-simulation phi runs along w inside each step
+step = 2.0 * np.pi / speed / 100
+time = step * np.arange(100 * turns + 1)
+motion = np.array(
+    list(zip(time, speed * time, np.full_like(time, speed), strict=True)),
+    dtype=[("time", float), ("phi", float), ("w", float)],
+)
+sides = ("left", "right")
+result = fmpy.simulate_fmu(
+    str(file),
+    stop_time=time[-1],
+    step_size=step,
+    output_interval=step,
+    input=motion,
+    start_values={"a": 0.0} | {f"{side}.material_mass": 30.0 for side in sides},
+    output=[
+        "rocker.tau",
+        *(f"{side}.{name}" for side in sides for name in ("slack_share", "energy_residual")),
+    ],
+)
+steady = result[200:]
+
+# %%
+feed = SideLoads(material_mass=30.0, processing_force=0.0)
+two_bars = ChainUnit().forces(np.linspace(0.0, 2.0 * np.pi, 361), speed, 0.0, feed, feed)
+peaks = np.abs(steady["rocker.tau"][: 100 * (turns - 2)]).reshape(turns - 2, 100).max(axis=1)
+print("peak of the rocker torque in each turn:", " ".join(f"{peak:.0f}" for peak in peaks), "N m")
+print(f"two bars: {np.abs(two_bars.rocker.tau).max():.0f} N m")
+slack = np.mean(np.maximum(*(steady[f"{side}.slack_share"] for side in sides)) > 0.0)
+print(f"a rod is slack for {100 * slack:.0f} % of the time")
+residual = max(np.abs(result[f"{side}.energy_residual"]).max() for side in sides)
+print(f"energy residual of the chains: at most {residual:.1e} J")
+folder.cleanup()
