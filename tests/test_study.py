@@ -54,7 +54,8 @@ def test_study_writes_numbers_series_plots_and_fmus(done):
     result, folder = done
     names = {p.name for p in folder.iterdir()}
     assert names == {"report.html", "result.json", "result.nc", "load_cycle.csv", "fmu", *plots.NAMES} - {
-        "driveline.png"
+        "driveline.png",
+        "chain_sweep.png",
     }
     for name in ("ChamberForces", "DcMotor"):
         assert validate_fmu(str(folder / "fmu" / f"{name}.fmu")) == []

@@ -14,9 +14,10 @@ from plotly.subplots import make_subplots  # type: ignore[import-untyped]
 from ..drives.dc_motor import DcMotor
 from ..engines import numpy_
 from ..machines.chain_unit import ChamberForces
+from ..studies.chain import HIGH
 from ..studies.overload import PINS, SCENARIOS, Study
 from ..studies.shaft import RIGID
-from .style import LINES
+from .style import LINES, WIDE
 
 COASTING = "_coasting"
 """Ends the name of a run of the machine alone, behind the safety coupling that opened in the run named before it."""
@@ -124,6 +125,8 @@ def plots(study: Study) -> Iterator[Plot]:
         yield _turn(study)
     if study.sides is not None:
         yield _sides(study)
+    if study.chain is not None and len(study.chain.sweep) > 1:
+        yield _chains(study)
     for name in driven:
         yield _transient(study, name)
     if study.pins:
@@ -274,6 +277,98 @@ def _sides(study: Study) -> Plot:
         "One side against both, over the speed",
         "Largest crank torque and rocker torque in a turn over the crank speed, with both sides and with the left "
         "side alone; the speed of normal running is marked.",
+        figure,
+    )
+
+
+def _chains(study: Study) -> Plot:
+    found = study.chain
+    assert found is not None
+    rows = found.sweep
+    speed = _small([n.speed for n in rows])
+    figure = make_subplots(
+        rows=3, cols=1, shared_xaxes=True, vertical_spacing=0.05, row_heights=(0.39, 0.39, 0.22)
+    )
+    panels: list[tuple[str, str, list[Any]]] = [
+        (
+            f"{name} torque, peak [N m]",
+            "%{y:.3g} N m",
+            [
+                [getattr(n, size) for n in rows]
+                for size in (f"{name}_torque_median", f"{name}_torque_high", f"two_bar_{name}_torque")
+            ],
+        )
+        for name in ("rocker", "crank")
+    ]
+    slack = [[100.0 * getattr(n, size) for n in rows] for size in ("slack_time", "two_bar_slack_time")]
+    panels.append(("time slack [%]", "%{y:.3g} %", [slack[0], None, slack[1]]))
+    for row, (label, hover, (median, high, two_bars)) in enumerate(panels, 1):
+        for words, y, look in (
+            ("chains, median", median, {"line": _style(0), "mode": "lines+markers"}),
+            (
+                f"chains, {100 * HIGH:g} % quantile",
+                high,
+                {
+                    "line": {"color": _INK, "width": 0.8, "dash": "dot"},
+                    "mode": "lines",
+                    "fill": "tonexty",
+                    "fillcolor": "rgba(90, 90, 90, 0.5)",
+                },
+            ),
+            (
+                "two bars",
+                two_bars,
+                {"line": _style(1), "mode": "lines+markers", "marker": {"symbol": "square"}},
+            ),
+        ):
+            if y is not None:
+                figure.add_scatter(
+                    x=speed,
+                    y=_small(y),
+                    name=words,
+                    legendgroup=words,
+                    showlegend=row == 1,
+                    hovertemplate=hover,
+                    row=row,
+                    col=1,
+                    **look,
+                )
+        sizes = [*median, *(high or []), *two_bars]
+        wide = row < 3 and max(sizes) > WIDE * max(min(sizes), 1e-9)
+        figure.update_yaxes(
+            title_text=label,
+            **({"type": "log", "dtick": 1} if wide else {"rangemode": "tozero"}),
+            row=row,
+        )
+    for band in found.avoid:
+        figure.add_vrect(
+            x0=band.low, x1=band.high, fillcolor="#000000", opacity=0.07, line_width=0, row="all", col=1
+        )
+    # on a narrow screen, too, no label covers another
+    labelled = found.within_sweep(0.05)
+    for mode, order, at in found.within_sweep():
+        figure.add_vline(x=at, line={"color": "#777777", "width": 0.8}, row="all", col=1)
+        if (mode, order, at) in labelled:
+            figure.add_annotation(
+                x=at,
+                xref="x",
+                y=1.0,
+                yref="paper",
+                yanchor="bottom",
+                text=f"mode {mode}" + (f", order {order}" if order > 1 else ""),
+                textangle=-90,
+                showarrow=False,
+                font={"size": 11},
+            )
+    figure.add_vline(x=found.own.speed, line=_style(2), row="all", col=1)
+    figure.update_layout(template=_TEMPLATE, height=790, hovermode="x unified", margin={"t": 116})
+    figure.update_xaxes(range=[float(speed[0]), float(speed[-1])])
+    figure.update_xaxes(title_text="crank speed [rad/s]", row=3)
+    return Plot(
+        "chains",
+        "Chains and two bars, over the speed",
+        "Peaks of rocker torque and crank torque in a turn over the crank speed, chains and two bars, and below the "
+        "share of the time in which a rod is slack; speeds to avoid are shaded, critical speeds are lines.",
         figure,
     )
 

@@ -64,6 +64,7 @@ def render(study: Study, result: Mapping[str, Any]) -> str:
         ("answer", "The answer", _answer(t, study)),
         ("sizing", "The drive", _sizing(t) if "sizing" in result else ""),
         ("runs", "Every run in numbers", _runs(t)),
+        ("chains", "Chains and two bars", _chains(t) if "chain" in result else ""),
         ("plots", "Plots", _figures(t, drawn)),
         ("motion", "The machine in motion", _motion() if moving else ""),
         ("basis", "What this rests on", _basis(t, study)),
@@ -217,6 +218,7 @@ def _all_given(t: Traced, study: Study) -> str:
             ("overload", config.overload, "Overloads"),
             ("coupling", config.coupling, "Safety coupling"),
             ("machine", study.drive.machine.p, "Machine"),
+            ("chain", config.chain, "Chains"),
             ("driveline", config.driveline, "Driveline"),
             ("motor", study.drive.parameters, "Motor"),
         )
@@ -329,6 +331,133 @@ def _runs(t: Traced) -> str:
     return "\n".join(parts)
 
 
+def _chains(t: Traced) -> str:
+    """Chains beside two bars at the study's speed, and over the speeds of the sweep."""
+    chain = t.result["chain"]
+    quantile = f"{t.number('chain.quantile', form='percent', given=True)} quantile"
+    parts = [
+        f'<p class="lead">The organs are chains of {t.number("chain.rods_of_wall", given=True)} rods in the wall and '
+        f"{t.number('chain.rods_of_web', given=True)} in the web, the crank is held at constant speed, "
+        f"{t.number('chain.starts', given=True)} starts at other crank angles are followed over "
+        f"{t.number('chain.turns', given=True)} turns each. Where rods go slack the motion may be chaotic: no single "
+        "peak is a prediction. Median and quantile are of the peaks of single turns, all turns of all starts.</p>"
+    ]
+    if chain["avoid"]:
+        parts.append(
+            '<ul class="verdicts">'
+            + "".join(
+                '<li><span class="sign" aria-hidden="true">!</span> <span class="inline">Avoid '
+                f"{t.number(f'chain.avoid.{i}.from')} to {t.number(f'chain.avoid.{i}.to')}"
+                f"{', where the sweep ends' if band['to'] == chain['sweep'][-1]['speed'] else ''}: "
+                f"{t.text(f'chain.avoid.{i}.why')}.</span></li>"
+                for i, band in enumerate(chain["avoid"])
+            )
+            + "</ul>"
+        )
+    elif len(chain["sweep"]) > 1:
+        ends = (t.number(f"chain.sweep.{i}.speed") for i in (0, len(chain["sweep"]) - 1))
+        parts.append(f'<p class="fine">No speed to avoid from {" to ".join(ends)}.</p>')
+
+    def own(name: str, form: str = "") -> str:
+        return t.number(f"chain.own_speed.{name}", form=form) if name else ""
+
+    rows = [
+        (title, *(own(name, form) for name in names))
+        for title, form, names in (
+            (
+                "Crank torque, peak",
+                "",
+                ("crank_torque_median", "crank_torque_high", "two_bar_crank_torque"),
+            ),
+            ("Crank torque, RMS", "", ("crank_torque_rms", "", "two_bar_crank_torque_rms")),
+            (
+                "Rocker torque, peak",
+                "",
+                ("rocker_torque_median", "rocker_torque_high", "two_bar_rocker_torque"),
+            ),
+            ("Snatch: force at A2 over that at rest", "", ("snatch_median", "snatch_high", "two_bar_snatch")),
+            ("Snatch, largest over least median of a start", "", ("snatch_spread", "", "")),
+            (
+                "Time with a slack rod; two bars: with one that pushes",
+                "percent",
+                ("slack_time", "", "two_bar_slack_time"),
+            ),
+            ("Rods that are slack, mean over time", "percent", ("slack_rods", "", "")),
+            ("Largest angle between neighbouring rods", "display", ("fold_largest", "", "")),
+        )
+    ]
+    if chain["resonance"]["value"] is not None:
+        rows.append(("Resonance of an organ, crank speed", t.number("chain.resonance"), "", ""))
+        distance = t.number("chain.distance_to_resonance", form="percent")
+        rows.append(("Distance to it, relative; negative below", distance, "", ""))
+    parts.append(
+        _table(
+            ("", "Chains, median", f"Chains, {quantile}", "Two bars"),
+            rows,
+            caption=f"At {t.number('chain.own_speed.speed', given=True)} of the crank",
+        )
+    )
+    slack = [
+        (
+            escape(_capital(side)),
+            ", ".join(
+                f"{t.text(f'chain.slack_by_rod.{side}.{k}.rod')}: "
+                f"{t.number(f'chain.slack_by_rod.{side}.{k}', form='percent')}"
+                for k, rod in enumerate(rods)
+                if rod["value"] > 0.0
+            )
+            or "none",
+        )
+        for side, rods in chain["slack_by_rod"].items()
+    ]
+    if any(rod["value"] > 0.0 for rods in chain["slack_by_rod"].values() for rod in rods):
+        parts.append(_table((), slack, caption="Rods that go slack, share of the time", numeric=False))
+    if len(chain["sweep"]) > 1:
+        columns = {
+            "crank_torque_median": "Crank torque: median",
+            "crank_torque_high": f"Crank torque: {quantile}",
+            "two_bar_crank_torque": "Crank torque: two bars",
+            "rocker_torque_median": "Rocker torque: median",
+            "rocker_torque_high": f"Rocker torque: {quantile}",
+            "two_bar_rocker_torque": "Rocker torque: two bars",
+            "snatch_median": "Snatch: median",
+            "snatch_high": f"Snatch: {quantile}",
+            "slack_time": "Time with a slack rod",
+        }
+        sweep = [
+            (
+                t.number(f"chain.sweep.{i}.speed"),
+                *(
+                    t.number(f"chain.sweep.{i}.{name}", form="percent" if name == "slack_time" else "")
+                    for name in columns
+                ),
+            )
+            for i in range(len(chain["sweep"]))
+        ]
+        parts.append(_table(("Crank speed", *columns.values()), sweep, caption="Over the crank speed"))
+    if chain["critical_speeds"]:
+        found: dict[float, dict[float, int]] = {}
+        for i, each in enumerate(chain["critical_speeds"]):
+            found.setdefault(each["mode"]["value"], {})[each["order"]["value"]] = i
+        orders = next(iter(found.values()))
+        critical = [
+            (
+                f"Mode {t.number(f'chain.critical_speeds.{next(iter(at_order.values()))}.mode', given=True)}",
+                *(t.number(f"chain.critical_speeds.{i}.speed") for i in at_order.values()),
+            )
+            for at_order in found.values()
+        ]
+        heads = (f"Order {t.number(f'chain.critical_speeds.{i}.order', given=True)}" for i in orders.values())
+        parts.append(
+            _table(
+                ("", *heads),
+                critical,
+                caption="Critical crank speeds, at which a multiple of the speed is a natural frequency of an organ",
+            )
+        )
+    return "\n".join(parts)
+
+
 def _random(t: Traced) -> str:
     """The quantiles of overloads at random."""
     found = t.result["monte_carlo"]["quantiles"]
@@ -420,7 +549,7 @@ def _card(t: Traced, family: str, members: list[tuple[str, Variable]], run: str)
 
 def _answer_number(t: Traced, run: str, v: Variable) -> str:
     none = "not reached" if v.name == "recovery_time" and run != "steady" else "–"
-    form = "percent" if v.name in ("speed_dip", "speed_ripple") else _angle(v.unit)
+    form = "percent" if v.name in ("speed_dip", "speed_ripple", "slack_time") else _angle(v.unit)
     return t.number(f"answers.{run}.{v.name}", form=form, none=none)
 
 
@@ -438,7 +567,7 @@ def _factor_card(t: Traced) -> str:
 
 def _notes(t: Traced) -> Iterator[tuple[str, bool]]:
     """Path of each note, and whether it is a verdict on a run (it begins with the run's name)."""
-    starts = tuple(f"{called(run)}:" for run in ("start_up", "steady", *SCENARIOS))
+    starts = tuple(f"{called(run)}:" for run in ("start_up", "steady", *SCENARIOS, "chains"))
     for i, note in enumerate(t.result["notes"]):
         yield f"notes.{i}", note.startswith(starts)
 
@@ -611,6 +740,8 @@ def _figures(t: Traced, drawn: list[Plot]) -> str:
         "turn": f"Inverse dynamics at {t.number('run.crank_speed', given=True)} of the crank, without a motor.",
         "sides": "Largest torques of a turn by inverse dynamics. Where the lines cross, one side alone asks as much "
         "as both.",
+        "chains": "The crank held at constant speed. Shaded: speeds to avoid; dash-dotted: the speed of normal "
+        "running; thin: critical speeds. Two bars do not go slack: of them, the time in which one pushes.",
         "reactions": "Peak and RMS of the force in each pin, frame x right, y up; means over whole crank turns.",
     }
     html = []

@@ -11,9 +11,10 @@ import numpy as np
 
 from ..drives.dc_motor import DcMotor
 from ..engines import numpy_
+from ..studies.chain import HIGH
 from ..studies.overload import PINS, SCENARIOS, Study
 from ..studies.shaft import RIGID
-from .style import LINES, draw
+from .style import LINES, WIDE, draw
 
 NAMES = (
     "torque_angle.png",
@@ -24,6 +25,7 @@ NAMES = (
     "reactions.png",
     "start_up.png",
     "driveline.png",
+    "chain_sweep.png",
 )
 
 
@@ -42,6 +44,8 @@ def write(study: Study, folder: Path) -> list[Path]:
         plots["start_up.png"] = _start_up
     if study.shaft:
         plots["driveline.png"] = _driveline
+    if study.chain is not None and len(study.chain.sweep) > 1:
+        plots["chain_sweep.png"] = _chain_sweep
     return draw({name: partial(make, study) for name, make in plots.items()}, folder)
 
 
@@ -196,6 +200,76 @@ def _driveline(study: Study) -> Any:
     axes[0, 0].set_ylabel("torque in shaft 2 [N m]")
     axes[1, 0].set_ylabel("range of torque [N m]")
     axes[0, 0].legend(loc="best", fontsize=9)
+    return figure
+
+
+def _chain_sweep(study: Study) -> Any:
+    found = study.chain
+    assert found is not None
+    rows = found.sweep
+    speed = [n.speed for n in rows]
+    figure, axes = plt.subplots(3, 1, figsize=(8, 8.6), sharex=True, height_ratios=(1.0, 1.0, 0.62))
+    for axis, name in zip(axes, ("rocker", "crank"), strict=False):
+        median, high, two = (
+            np.array([getattr(n, size) for n in rows])
+            for size in (f"{name}_torque_median", f"{name}_torque_high", f"two_bar_{name}_torque")
+        )
+        axis.fill_between(
+            speed,
+            median,
+            high,
+            facecolor="#a9a9a9",
+            edgecolor="#1b1b1b",
+            linewidth=0.5,
+            label=f"chains, up to the {100 * HIGH:g} % quantile",
+        )
+        axis.plot(speed, median, marker="o", markersize=4, label="chains, median", **LINES[0])
+        axis.plot(speed, two, marker="s", markersize=3.5, label="two bars", **LINES[1])
+        axis.set_ylabel(f"{name} torque, peak [N m]")
+        least = min(median.min(), two.min())
+        if max(high.max(), two.max()) > WIDE * max(least, 1e-9):
+            axis.set_yscale("log")
+        else:
+            axis.set_ylim(bottom=0.0)
+    axes[2].plot(
+        speed, [100.0 * n.slack_time for n in rows], marker="o", markersize=4, label="chains", **LINES[0]
+    )
+    axes[2].plot(
+        speed,
+        [100.0 * n.two_bar_slack_time for n in rows],
+        marker="s",
+        markersize=3.5,
+        label="two bars",
+        **LINES[1],
+    )
+    axes[2].set_ylabel("time slack [%]")
+    axes[2].set_ylim(-4.0, 104.0)
+    axes[2].set_xlabel("crank speed [rad/s]")
+    axes[2].set_xlim(speed[0], speed[-1])
+    for axis in axes:
+        for i, band in enumerate(found.avoid):
+            axis.axvspan(
+                band.low, band.high, color="#ececec", linewidth=0.0, zorder=0, label="" if i else "to avoid"
+            )
+        axis.axvline(found.own.speed, label="the study's speed", **LINES[2])
+    labelled = found.within_sweep(0.018)
+    for mode, order, at in found.within_sweep():
+        for axis in axes:
+            axis.axvline(at, color="#777777", linewidth=0.8)
+        if (mode, order, at) in labelled:
+            axes[0].annotate(
+                f"mode {mode}" + (f", order {order}" if order > 1 else ""),
+                (at, 1.0),
+                (0.0, 3.0),
+                xycoords=("data", "axes fraction"),
+                textcoords="offset points",
+                rotation=90,
+                fontsize=8,
+                ha="center",
+                va="bottom",
+            )
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=9)
+    figure.suptitle(f"Chains and two bars over the crank speed: {found.starts} starts of {found.turns} turns")
     return figure
 
 

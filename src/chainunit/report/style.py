@@ -27,6 +27,8 @@ LINES = [
     {"color": "#0b6fa4", "linestyle": "-.", "linewidth": 1.6},
     {"color": "#6a994e", "linestyle": ":", "linewidth": 2.0},
 ]
+WIDE = 30.0
+"""From that ratio of largest to least on an axis is logarithmic."""
 
 
 def draw(plots: Mapping[str, Callable[[], Any]], folder: Path) -> list[Path]:

@@ -191,8 +191,7 @@ def _show_chain(found: ChainResult, console: Console) -> None:
             console.print(f"No speed to avoid from {low:.3g} to {high_speed:.3g} rad/s.")
     inside = [
         f"{speed:.2f} (mode {mode}, order {order})"
-        for mode, order, speed in sorted(found.critical, key=lambda each: each[2])
-        if found.sweep[0].speed <= speed <= found.sweep[-1].speed
+        for mode, order, speed in sorted(found.within_sweep(), key=lambda each: each[2])
     ]
     if inside:
         console.print(

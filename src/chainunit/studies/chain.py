@@ -112,6 +112,17 @@ class ChainResult:
         """Distance of the study's speed from the resonance, relative to it: negative below."""
         return None if self.resonance is None else float(self.own.speed / self.resonance - 1.0)
 
+    def within_sweep(self, apart: float = 0.0) -> list[tuple[int, int, float]]:
+        """The critical speeds within the sweep, low orders first, without those that are nearer than `apart` of the
+        sweep's width to one before them."""
+        low, high = self.sweep[0].speed, self.sweep[-1].speed
+        kept: list[tuple[int, int, float]] = []
+        for each in sorted(self.critical, key=lambda found: (found[1], found[0])):
+            clear = all(abs(each[2] - other[2]) >= apart * (high - low) for other in kept)
+            if low <= each[2] <= high and clear:
+                kept.append(each)
+        return kept
+
     def rod_name(self, k: int) -> str:
         """What rod `k`, counted from 0 at A1, is called."""
         wall, _ = self.rods
