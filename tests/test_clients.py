@@ -31,6 +31,11 @@ pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 # what runs alone: its start values and what is read. From rest at 0.4 rad the chain unit falls and swings
 ALONE = {
     "ChainUnit": ({"phi_start": 0.4}, ["phi", "w", "a", "left.support.fy", "margin"]),
+    # the crank turns by itself: inside a step phi runs along w
+    "ChainUnitFlexible": (
+        {"phi": 1.0, "w": 8.0},
+        ["phi0", "tau", "J", "left.theta_1", "right.pull_8", "rocker.tau"],
+    ),
     "KnifeDrive": ({"phi": 1.0, "a": 2.0}, ["tau", "J", "blade.y", "blade.tilt", "d_pin.fx", "margin"]),
 }
 
