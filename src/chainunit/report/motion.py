@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from ..engines import numpy_
 from ..machines.chain_unit import ChamberForces, Inputs, SideLoads
+from ..planar import ZERO, Vec2
 from ..studies.overload import PINS, Study
 from .interactive import called, event_of, in_order, settled
 
@@ -33,7 +35,7 @@ _AT = {
 
 def motion(study: Study) -> dict[str, Any]:
     """Joints [m], forces [N] and readings of every run, at about 60 pictures a second of machine time, more where
-    the crank is fast.
+    the crank is fast. The rods of chains have joints of their own between the named ones.
 
     The positions are those of the kernels that the forces come from. A joint or force that does not move has
     one entry.
@@ -50,9 +52,15 @@ def motion(study: Study) -> dict[str, Any]:
         ("coupler", "A", "Bd", p.l),
         ("rocker", "C", "Bd", p.h),
         ("rocker", "C", "A2", p.e),
-        *(("wall", f"A1 {side}", f"B {side}", p.l1) for side in ("left", "right")),
-        *(("web", f"B {side}", "A2", p.l2) for side in ("left", "right")),
     ]
+    walls, webs = _rods(study)
+    for kind, length, span in (
+        ("wall", p.l1 / walls, slice(walls + 1)),
+        ("web", p.l2 / webs, slice(walls, None)),
+    ):
+        for side in ("left", "right"):
+            ends = pairwise(_organ_joints(side, (walls, webs))[span])
+            links += [(kind, start, end, length) for start, end in ends]
     return {
         "links": [
             {"kind": kind, "from": start, "to": end, "length": length} for kind, start, end, length in links
@@ -62,6 +70,34 @@ def motion(study: Study) -> dict[str, Any]:
         "turn": turn,
         "runs": runs,
     }
+
+
+def _rods(study: Study) -> tuple[int, int]:
+    """How many rods wall and web have."""
+    return (1, 1) if study.drive.chain is None else study.drive.rods
+
+
+def _organ_joints(side: str, rods: tuple[int, int]) -> list[str]:
+    """The joints of an organ from A1 to A2."""
+    walls, webs = rods
+    names = [f"rod {k} {side}" for k in range(1, walls + webs)]
+    names[walls - 1] = f"B {side}"
+    return [f"A1 {side}", *names, "A2"]
+
+
+def _chain(p: Any, part: Any, side: str, a1: Vec2, rods: tuple[int, int]) -> tuple[list[Vec2], Vec2]:
+    """The joints between the rods of a simulated chain, from A1 on, and the velocity of B."""
+    walls, webs = rods
+    lengths = [p.l1 / walls] * walls + [p.l2 / webs] * webs
+    at, v, found, of_b = a1, ZERO, [], ZERO
+    for k, length in enumerate(lengths[:-1], 1):
+        angle, turning = (part[f"machine.{side}.{x}_{k}"].values for x in ("theta", "omega"))
+        across = Vec2(np.cos(angle), np.sin(angle)) * length
+        at, v = at + Vec2(across.y, -across.x), v + across * turning
+        found.append(at)
+        if k == walls:
+            of_b = v
+    return found, of_b
 
 
 def _run(study: Study, name: str, interval: float) -> dict[str, Any]:
@@ -96,6 +132,21 @@ def _run(study: Study, name: str, interval: float) -> dict[str, Any]:
         "B left": m.left.dyad.b.p,
         "B right": m.right.dyad.b.p,
     }
+    processing = dict(zip(("left", "right"), state.bias.processing_forces, strict=True))
+    walls, webs = rods = _rods(study)
+    for side in ("left", "right") if study.drive.chain is not None else ():
+        names = _organ_joints(side, rods)[1:-1]
+        a1, b, a2 = (joints[name] for name in (f"A1 {side}", f"B {side}", "A2"))
+        if f"machine.{side}.theta_1" in part:
+            between, v = _chain(p, part, side, a1, rods)
+            smooth = p.processing.v_smooth
+            size = loads[side].processing_force / np.sqrt(v.squared() + smooth * smooth)
+            processing[side] = v * -size
+        else:
+            # behind an open coupling the machine is followed with two bars
+            between = [a1 + (b - a1) * (k / walls) for k in range(1, walls)]
+            between += [b + (a2 - b) * (k / webs) for k in range(webs)]
+        joints |= dict(zip(names, between, strict=True))
     reach = max(p.r, p.l, p.h, p.l1, p.z, p.c)
     forces = []
     for words, pin in PINS.items():
@@ -103,7 +154,7 @@ def _run(study: Study, name: str, interval: float) -> dict[str, Any]:
             joint, short, side = _AT[pin]
             xy = value(f"machine.{pin}.fx"), value(f"machine.{pin}.fy")
             forces.append((words, joint, short, side, "reaction", xy))
-    for side, force in zip(("left", "right"), state.bias.processing_forces, strict=True):
+    for side, force in processing.items():
         forces.append((f"processing force {side}", f"B {side}", "P", side, "load", (force.x, force.y)))
     largest = max(float(np.max(np.hypot(*xy))) for *_, xy in forces)
     event = event_of(study, name)

@@ -102,15 +102,16 @@
     parts.material = {};
     for (const side of ["left", "right"]) parts.material[side] = add(stage, "g", { class: side });
     for (const side of ["left", "right"]) {
-      parts.material[side].web = add(parts.material[side], "line", { class: "material" });
-      parts.material[side].wall = add(parts.material[side], "line", { class: "material" });
+      const loaded = motion.links.filter((l) => /^(web|wall)$/.test(l.kind) && (l.from + l.to).includes(side));
+      const group = parts.material[side];
+      parts.material[side] = loaded.map((link) => [link, add(group, "line", { class: "material" })]);
     }
     parts.links = motion.links.map((link) => add(stage, "line", { class: "link " + link.kind }));
     parts.joints = {};
     for (const name of Object.keys(run.joints)) {
       parts.joints[name] = [
-        add(stage, "circle", { class: "joint", r: 5 }),
-        add(stage, "text", { "text-anchor": "middle" }, name.split(" ")[0]),
+        add(stage, "circle", { class: "joint", r: name.startsWith("rod") ? 3 : 5 }),
+        add(stage, "text", { "text-anchor": "middle" }, name.startsWith("rod") ? "" : name.split(" ")[0]),
       ];
     }
     parts.forces = run.forces.map((force) => {
@@ -176,9 +177,9 @@
     const heaviest = Math.max(1e-9, ...motion.runs.flatMap((r) => Object.values(r.material).flat()));
     for (const side of ["left", "right"]) {
       const mass = of(run.material[side], frame);
-      for (const [kind, share] of [["web", motion.web_share], ["wall", 1 - motion.web_share]]) {
-        const link = motion.links.find((l) => l.kind === kind && (l.from + l.to).includes(side));
-        const [x1, y1] = at(link.from), [x2, y2] = at(link.to), band = parts.material[side][kind];
+      for (const [link, band] of parts.material[side]) {
+        const share = link.kind === "web" ? motion.web_share : 1 - motion.web_share;
+        const [x1, y1] = at(link.from), [x2, y2] = at(link.to);
         for (const [name, value] of Object.entries({ x1, y1, x2, y2 })) band.setAttribute(name, value);
         band.setAttribute("stroke-width", (34 * mass * share) / heaviest);
       }
