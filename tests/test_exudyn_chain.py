@@ -135,7 +135,7 @@ def by_us(case, times):
     return found
 
 
-def by_exudyn(case, steps):
+def by_exudyn(case, steps, newton=(1e-12, 1e-14)):
     mbs = exudyn.SystemContainer().AddSystem()
     ground = mbs.AddObject(item.ObjectGround())
     fixed = mbs.AddMarker(
@@ -195,7 +195,7 @@ def by_exudyn(case, steps):
     settings.solution.sensors.writePeriod = 0.0
     time = settings.timeIntegration
     time.startTime, time.adaptiveStep = case.begin, False
-    time.newton.relativeTolerance, time.newton.absoluteTolerance = 1e-12, 1e-14
+    time.newton.relativeTolerance, time.newton.absoluteTolerance = newton
 
     def solve(end, steps):
         time.endTime, time.numberOfSteps = end, steps
