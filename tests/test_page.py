@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import io
 import json
 import re
 import shutil
@@ -11,10 +12,11 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from chainunit import RunError, config
 from chainunit.quantities import DISPLAY_UNITS
-from chainunit.report import motion, page
+from chainunit.report import motion, page, plots, table
 from chainunit.report.trace import at, digits_text, unit_text
 from chainunit.studies.overload import as_dict, run_study
 
@@ -42,6 +44,14 @@ def study(tmp_path_factory):
 @pytest.fixture(scope="module")
 def written(study, tmp_path_factory):
     return page.write(study, tmp_path_factory.mktemp("a page"))
+
+
+@pytest.fixture(scope="module")
+def chains(tmp_path_factory):
+    """Rods go slack at the study's own speed and at the higher end of the sweep."""
+    text = 'organ = "chain"\n' + SHORT.replace('"feed_left", "jam_left"', '"jam_left"').replace("= 6", "= 10")
+    few = "[chain]\nsweep_points = 2\nsweep_lowest = 2\nsweep_highest = 12\n"
+    return run_study(config.parse(text + few), tmp_path_factory.mktemp("chains"))
 
 
 def number(value, unit, **more):
@@ -341,6 +351,78 @@ def test_paths_numbers_and_units():
         "degC": "°C",
     }
     assert {unit: unit_text(unit) for unit in units} == units
+
+
+def test_chains_stand_beside_two_bars(chains, tmp_path):
+    result = json.loads(json.dumps(as_dict(chains)))
+    found = result["chain"]
+    assert result["status"] == "complete" and [n["speed"]["value"] for n in found["sweep"]] == [
+        2.0,
+        10.0,
+        12.0,
+    ]
+    own = found["own_speed"]
+    assert (
+        own == found["sweep"][1] and own["crank_torque_high"]["value"] >= own["crank_torque_median"]["value"]
+    )
+    assert own["two_bar_rocker_torque"]["value"] > 0.0 and own["slack_time"]["value"] > 0.01
+    # from halfway to the last good speed
+    assert found["avoid"][0]["from"] == {"value": 6.0, "unit": "rad/s"}
+    slack = [rod for side in found["slack_by_rod"].values() for rod in side if rod["value"] > 0.0]
+    assert slack and {rod["rod"] for rod in slack} <= {
+        f"{bar} {k}" for bar in ("wall", "web") for k in range(9)
+    }
+    assert any(
+        note.startswith("chains: the crank speed lies among those to avoid") for note in result["notes"]
+    )
+
+    text = page.render(chains, result)
+    reader = Reader(text)
+    check_traced(reader, result)
+    paths = {n["data-path"] for n in reader.numbers}
+    assert {f"chain.own_speed.{name}" for name in own} <= paths
+    assert {"chain.distance_to_resonance", "chain.avoid.0.from", "chain.eta", "chain.starts"} <= paths
+    assert {f"chain.avoid.{i}.why" for i in range(len(found["avoid"]))} <= {
+        w["data-path"] for w in reader.words
+    }
+    assert not re.search(r"\d", re.sub(r"\bA2\b", "", reader.rest["chains"]))
+    assert "chains" in json.loads(reader.scripts["figures"])
+
+    names = {file.name for file in plots.write(chains, tmp_path)}
+    assert "chain_sweep.png" in names
+    told = io.StringIO()
+    table.show(chains, Console(file=told, width=140))
+    for words in (
+        "chains, 95 %",
+        "10 starts of 30 turns",
+        "Slack on the left",
+        "Avoid 6 to",
+        "(mode 1, order 1)",
+    ):
+        assert words in told.getvalue(), words
+
+
+def test_the_rods_of_chains_move_as_simulated(chains):
+    moving = motion.motion(chains)
+    kinds = [link["kind"] for link in moving["links"]]
+    assert (kinds.count("wall"), kinds.count("web")) == tuple(2 * n for n in chains.drive.rods)
+    for run in moving["runs"]:
+        for link in moving["links"]:
+            ends = [
+                [np.broadcast_to(run["joints"][link[end]][axis], len(run["time"])) for axis in "xy"]
+                for end in ("from", "to")
+            ]
+            length = np.hypot(*(np.subtract(*ends)))
+            # the chain ends at the rocker's pin to a tenth of a millimetre
+            assert np.max(np.abs(length - link["length"])) < 3e-4, link
+
+
+def test_two_bars_have_no_row_of_chains(study, written):
+    told = io.StringIO()
+    table.show(study, Console(file=told, width=140))
+    for text in (told.getvalue(), written.read_text("utf-8")):
+        for words in ("are of the time with a slack rod", "argest angle between", "Chains and two bars"):
+            assert words not in text
 
 
 @pytest.mark.slow

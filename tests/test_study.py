@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import subprocess
 import sys
 
@@ -129,6 +130,25 @@ def test_bad_input_ends_with_2_in_one_line_and_writes_nothing(tmp_path):
         assert "Traceback" not in result.stderr
     assert {p.name for p in tmp_path.iterdir()} == {"bad.toml", "dangling"}
     assert "machine.crank.m = -3 kg: must be >= 0 kg" in chainunit("study", "bad.toml", cwd=tmp_path).stderr
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("[chain]\nrods = 8", 'chain: is of organs that are chains; add organ = "chain"'),
+        ('organ = "chain"\n[chain]\nstarts = 5', "chain.starts = 5"),
+        ('organ = "chain"\n[chain]\nturns = 20', "chain.turns = 20"),
+        ('organ = "chain"\n[chain]\nrods = 7.5', "chain.rods = 7.5"),
+        ('organ = "chain"\n[chain]\nsweep_lowest = 5\nsweep_highest = 5', "must be > chain.sweep_lowest"),
+        ('organ = "rope"', "organ"),
+    ],
+)
+def test_what_chains_are_refused(text, told):
+    from chainunit import config
+    from chainunit.errors import InputError
+
+    with pytest.raises(InputError, match=re.escape(told)):
+        config.parse(text)
 
 
 def test_a_run_that_fails_keeps_what_it_computed(tmp_path, monkeypatch):

@@ -832,12 +832,6 @@ def _note_chain(study: Study, found: ChainResult) -> None:
         f"The organs are chains of {found.rods[0]} + {found.rods[1]} rods; their damping (eta {chain.eta:g} "
         f"N m2 s, ends {chain.end_damping:g} N m s) and folding are assumed."
     )
-    resonance = study.limits.chain_resonance if study.limits else math.inf
-    if math.isfinite(resonance):
-        note(
-            f"The crank turns at {own.speed / resonance:.2f} times the speed at which it meets the lowest natural "
-            f"frequency of an organ, {resonance:.2f} rad/s."
-        )
     for band in found.avoid:
         if band.low <= own.speed <= band.high:
             note(
