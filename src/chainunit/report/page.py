@@ -342,13 +342,19 @@ def _chains(t: Traced) -> str:
         f"{t.number('chain.turns', given=True)} turns each. Where rods go slack the motion may be chaotic: no single "
         "peak is a prediction. Median and quantile are of the peaks of single turns, all turns of all starts.</p>"
     ]
+
+    def end(i: int, band: Mapping[str, Any]) -> str:
+        if band["to"] == band["from"]:
+            return ""
+        last = band["to"] == chain["sweep"][-1]["speed"]
+        return f" to {t.number(f'chain.avoid.{i}.to')}{', where the sweep ends' if last else ''}"
+
     if chain["avoid"]:
         parts.append(
             '<ul class="verdicts">'
             + "".join(
                 '<li><span class="sign" aria-hidden="true">!</span> <span class="inline">Avoid '
-                f"{t.number(f'chain.avoid.{i}.from')} to {t.number(f'chain.avoid.{i}.to')}"
-                f"{', where the sweep ends' if band['to'] == chain['sweep'][-1]['speed'] else ''}: "
+                f"{t.number(f'chain.avoid.{i}.from')}{end(i, band)}: "
                 f"{t.text(f'chain.avoid.{i}.why')}.</span></li>"
                 for i, band in enumerate(chain["avoid"])
             )

@@ -179,14 +179,14 @@ def _show_chain(found: ChainResult, console: Console) -> None:
             soft_wrap=True,
         )
     for side, shares in found.slack_by_rod.items():
-        slack = [f"{found.rod_name(k)} {100 * share:.2g} %" for k, share in enumerate(shares) if share > 0.0]
+        slack = [f"{found.rod_name(k)} {100 * share:.3g} %" for k, share in enumerate(shares) if share > 0.0]
         if slack:
             console.print(f"Slack on the {side}, share of the time: {', '.join(slack)}.", soft_wrap=True)
     if len(found.sweep) > 1:
         low, high_speed = found.sweep[0].speed, found.sweep[-1].speed
         for band in found.avoid:
-            end = f"{band.high:.3g} rad/s" + (", where the sweep ends" if band.high == high_speed else "")
-            console.print(f"Avoid {band.low:.3g} to {end}: {band.why}.", soft_wrap=True)
+            ends = ", where the sweep ends" if band.high == high_speed else ""
+            console.print(f"Avoid {band}{ends}: {band.why}.", soft_wrap=True)
         if not found.avoid:
             console.print(f"No speed to avoid from {low:.3g} to {high_speed:.3g} rad/s.")
     inside = [

@@ -86,6 +86,10 @@ class Band:
     high: float
     why: str
 
+    def __str__(self) -> str:
+        """From where to where, in words; a study without a sweep has but one speed."""
+        return f"{self.low:.3g}" + (f" to {self.high:.3g}" if self.high > self.low else "") + " rad/s"
+
 
 @dataclass(frozen=True)
 class ChainResult:

@@ -787,7 +787,7 @@ def _note(study: Study) -> None:
         if answers.slack_time is not None:
             if answers.slack_time > 0.0:
                 note(
-                    f"{title}: a rod is slack for {100 * answers.slack_time:.2g} % of the time; what snatches has no "
+                    f"{title}: a rod is slack for {100 * answers.slack_time:.3g} % of the time; what snatches has no "
                     "single peak that is a prediction."
                 )
         elif answers.web_pull_least < 0.0:
@@ -834,10 +834,7 @@ def _note_chain(study: Study, found: ChainResult) -> None:
     )
     for band in found.avoid:
         if band.low <= own.speed <= band.high:
-            note(
-                f"chains: the crank speed lies among those to avoid, {band.low:.3g} to {band.high:.3g} rad/s: "
-                f"{band.why}."
-            )
+            note(f"chains: the crank speed lies among those to avoid, {band}: {band.why}.")
     if own.fold_largest > math.pi:
         note(
             f"chains: rods fold up to {math.degrees(own.fold_largest):.0f} deg against each other, through their "
