@@ -250,14 +250,24 @@ def closed(
 ) -> tuple[list[Any], list[Any]]:
     """Angles and speeds nearest to the given ones, in the metric of the masses, with which the chain ends at `end`
     and moves with it."""
-    N = len(rods)
+    found, speeds, _ = jolted(xp, rods, theta, omega, end, rounds)
+    return found, speeds
+
+
+def jolted(
+    xp: Any, rods: Rods, theta: Sequence[Any], omega: Sequence[Any], end: Motion, rounds: int
+) -> tuple[list[Any], list[Any], Any]:
+    """As `closed`, and the work [J] of the jolts at A2 that change the speeds."""
+    N, work = len(rods), 0.0
     nothing = [Vec2(0.0, 0.0)] * N, [0.0] * N, [0.0] * N
     for _ in range(rounds):
         at = end_motion(rods, theta, omega, xp)
         sweep = Sweep(xp, rods, theta, *nothing)
         # the end's speed at the angles before they change, which is as near as they are
         turned, _ = sweep.back(sweep.force(end.p - at.p))
-        faster, _ = sweep.back(sweep.force(end.p1 - at.p1))
+        jolt = sweep.force(end.p1 - at.p1)
+        faster, _ = sweep.back(jolt)
+        work = work + 0.5 * jolt.dot(end.p1 + at.p1)
         theta = [a + d for a, d in zip(theta, turned, strict=True)]
         omega = [w + d for w, d in zip(omega, faster, strict=True)]
-    return list(theta), list(omega)
+    return list(theta), list(omega), work

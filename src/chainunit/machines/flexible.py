@@ -609,7 +609,8 @@ def _flexible(walls: int, webs: int) -> type[Model]:
             for k, (hand, each) in enumerate(zip((1.0, -1.0), rods(p, u), strict=True)):
                 H, v = z[3 * k : 3 * k + 2]
                 theta = [xp.atan2(hand * H, v - b) for b in _shape(each)[1]]
-                found.append(_closed(xp, p, each, _supports(p)[k], m.rocker, w, (theta, [0.0 * H] * N), 2))
+                hanging = theta, [0.0 * H] * N
+                found.append(_closed(xp, p, each, _supports(p)[k], m.rocker, w, hanging, 2)[:2])
             organs = _organs(xp, p, u, rods(p, u), walls, found, m, w)
             sides = []
             for (theta, omega), h, a1 in zip(found, organs, _supports(p), strict=True):
@@ -619,14 +620,15 @@ def _flexible(walls: int, webs: int) -> type[Model]:
 
         @staticmethod
         def closed(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
-            """Both chains end at A2 and move with it, by the smallest change in the metric of the masses."""
+            """Both chains end at A2 and move with it, by the smallest change in the metric of the masses. Where the
+            drive has corrected its speed this is a jolt from the rocker, whose work counts."""
             m, w = CrankRocker(xp, p, u.phi / p.ratio), u.w / p.ratio
             found: list[Any] = []
             for each, a1, state, due in zip(
                 rods(p, u), _supports(p), split(x), (x.left.energy_due, x.right.energy_due), strict=True
             ):
-                theta, omega = _closed(xp, p, each, a1, m.rocker, w, state, 1)
-                found += [*theta, *omega, due]
+                theta, omega, work = _closed(xp, p, each, a1, m.rocker, w, state, 1)
+                found += [*theta, *omega, due + work]
             return found
 
         @staticmethod
@@ -656,9 +658,9 @@ def _flexible(walls: int, webs: int) -> type[Model]:
 
 def _closed(
     xp: Any, p: Any, rods: chain.Rods, a1: Vec2, rocker: Link, w: Any, state: tuple[Any, Any], rounds: int
-) -> tuple[list[Any], list[Any]]:
+) -> tuple[list[Any], list[Any], Any]:
     a2 = rocker.at(p.e)
-    return chain.closed(xp, rods, *state, Motion(a2.p - a1, a2.p1 * w), rounds)
+    return chain.jolted(xp, rods, *state, Motion(a2.p - a1, a2.p1 * w), rounds)
 
 
 ChainUnitFlexible = flexible(6, 2)
