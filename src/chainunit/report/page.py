@@ -64,7 +64,7 @@ def render(study: Study, result: Mapping[str, Any]) -> str:
         ("answer", "The answer", _answer(t, study)),
         ("sizing", "The drive", _sizing(t) if "sizing" in result else ""),
         ("runs", "Every run in numbers", _runs(t)),
-        ("chains", "Chains and two bars", _chains(t) if "chain" in result else ""),
+        ("chains", "Chains and two bars", _chains(t) if study.chain is not None else ""),
         ("plots", "Plots", _figures(t, drawn)),
         ("motion", "The machine in motion", _motion() if moving else ""),
         ("basis", "What this rests on", _basis(t, study)),

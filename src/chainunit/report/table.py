@@ -116,7 +116,7 @@ def show(study: Study, console: Console) -> None:
     if limits is not None:
         swing = (math.degrees(limits.rocker_extreme_left), math.degrees(limits.rocker_extreme_right))
         console.print(f"Rocker swings from {swing[0]:.3f} to {swing[1]:.3f} deg; margin {limits.margin:.2f}.")
-        first = "A web" if study.chain is None else "With two bars a web"
+        first = "A web" if study.drive.chain is None else "With two bars a web"
         console.print(
             f"{first} first goes slack at {limits.slack_speed:.2f} rad/s of the crank with this feed "
             f"({limits.slack_speed_empty:.2f} rad/s empty); lowest chain mode near "

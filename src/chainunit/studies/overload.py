@@ -18,7 +18,7 @@ import xarray as xr
 
 from .. import __version__
 from ..config import SCENARIOS as SCENARIOS
-from ..config import Config
+from ..config import Chain, Config
 from ..cosim import Bond, CoSimulation, Profile, System, energy_residual, monolithic
 from ..drives.cardan import ORDERS, two_joints
 from ..drives.dc_motor import DcMotor
@@ -204,7 +204,7 @@ def run_study(
     files, study.made = study.drive.export(folder / "fmu", backend)
     try:
         if study.drive.chain is not None:
-            study.chain = study_chain(config, study.drive, files["machine"], report)
+            study.chain = _chains(study, files["machine"], report)
         _simulate(study, files, folder, report, check, backend)
     except RunError as error:
         if error.partial is not None:
@@ -212,6 +212,16 @@ def run_study(
         study.failure = error
     _note(study)
     return study
+
+
+def _chains(study: Study, file: Path, report: Report) -> ChainResult | None:
+    """Chains at constant speed; left out where an FMU in Python would take hours for their many turns."""
+    if "native" in study.made["machine"]:
+        return study_chain(study.config, study.drive, file, report)
+    study.notes.append(
+        "chains at constant speed and the sweep are left out: they need native code, that is a C compiler."
+    )
+    return None
 
 
 def _loops(study: Study) -> dict[str, Loop]:
@@ -751,8 +761,8 @@ def _note(study: Study) -> None:
     )
     # two bars against a chain of many rods, on this organ: docs/physics.md
     speed, mode = config.run.crank_speed, limits.chain_resonance
-    if study.chain is not None:
-        _note_chain(study, study.chain)
+    if config.chain is not None:
+        _note_chain(study, config.chain)
     elif speed > 0.31 * mode:
         note(
             "A chain has a mode that two bars lack: the rocker torque of two bars is good to 10 % only up "
@@ -824,21 +834,20 @@ def _note(study: Study) -> None:
             )
 
 
-def _note_chain(study: Study, found: ChainResult) -> None:
+def _note_chain(study: Study, chain: Chain) -> None:
     """What the reader has to know of the chains."""
-    note, own, chain = study.notes.append, found.own, study.config.chain
-    assert chain is not None
+    note, (walls, webs), found = study.notes.append, study.drive.rods, study.chain
     note(
-        f"The organs are chains of {found.rods[0]} + {found.rods[1]} rods; their damping (eta {chain.eta:g} "
-        f"N m2 s, ends {chain.end_damping:g} N m s) and folding are assumed."
+        f"The organs are chains of {walls} + {webs} rods; their damping (eta {chain.eta:g} N m2 s, ends "
+        f"{chain.end_damping:g} N m s), which a heavier organ wants larger, and folding are assumed."
     )
-    for band in found.avoid:
-        if band.low <= own.speed <= band.high:
+    for band in found.avoid if found else ():
+        if found and band.low <= found.own.speed <= band.high:
             note(f"chains: the crank speed lies among those to avoid, {band}: {band.why}.")
-    if own.fold_largest > math.pi:
+    if found and found.own.fold_largest > math.pi:
         note(
-            f"chains: rods fold up to {math.degrees(own.fold_largest):.0f} deg against each other, through their "
-            "stop; raise chain.fold_stiffness, or take the result for a machine that breaks."
+            f"chains: rods fold up to {math.degrees(found.own.fold_largest):.0f} deg against each other, through "
+            "their stop; raise chain.fold_stiffness, or take the result for a machine that breaks."
         )
     if study.coasting is not None:
         note("Behind the open coupling the machine is followed with two bars.")
@@ -926,7 +935,11 @@ def as_dict(study: Study) -> dict[str, Any]:
         **({"monte_carlo": study.monte_carlo.as_dict()} if study.monte_carlo else {}),
         "coupling": entries(config.coupling) if config.coupling else None,
         **(_driveline(study) if study.torsion is not None else {}),
-        **({"chain": entries(config.chain) | study.chain.as_dict()} if study.chain else {}),
+        **(
+            {"chain": entries(config.chain) | (study.chain.as_dict() if study.chain else {})}
+            if config.chain
+            else {}
+        ),
         "sides_over_speed": study.sides.as_dict() if study.sides else None,
     }
 
