@@ -12,8 +12,8 @@
 # Python function of the rocker's motion is subtracted. Ours has the drive and both chains, and is stepped and read
 # through fmpy. Demanded: 20 times as fast.
 #
-# Measured: 137, 643 and 714 times real time, 0.85 of the limit, which at 1 ms is 161 itself: a step of the integrator
-# is seven right-hand sides, however short. 149 times as fast as exudyn.
+# Measured: 130, 620 and 690 times real time, 0.85 of the limit, which at 1 ms is 155 itself: a step of the integrator
+# is seven right-hand sides, however short. 147 times as fast as exudyn.
 
 # %%
 from __future__ import annotations
