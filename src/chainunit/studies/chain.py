@@ -328,7 +328,15 @@ def study_chain(
     """The study's own speed and the sweep of a study whose organs are chains, by the FMU `file` of the machine."""
     chain, own = config.chain, config.run.crank_speed
     assert chain is not None
+    modes = drive.machine.chain_modes(config.feed.left, config.feed.right)
+    critical = []
+    if modes is not None:
+        for mode, frequency in enumerate(modes.frequency[:4], 1):
+            critical += [(mode, order, float(frequency) / order) for order in (1, 2)]
     speeds = np.linspace(chain.sweep_lowest, chain.sweep_highest, int(chain.sweep_points)).tolist()
+    if speeds:
+        # the resonance itself, whatever the grid
+        speeds += [w for _, _, w in critical[:1] if chain.sweep_lowest < w < chain.sweep_highest]
     speeds = sorted({round(w, 9) for w in (*speeds, own)})
     rows: list[SpeedNumbers] = []
     by_rod: dict[str, Any] = {}
@@ -347,11 +355,6 @@ def study_chain(
                 by_rod = slack
     finally:
         fmu.close()
-    modes = drive.machine.chain_modes(config.feed.left, config.feed.right)
-    critical = []
-    if modes is not None:
-        for mode, frequency in enumerate(modes.frequency[:4], 1):
-            critical += [(mode, order, float(frequency) / order) for order in (1, 2)]
     return ChainResult(
         own=next(n for n in rows if abs(n.speed - own) < 1e-8),
         sweep=tuple(rows),
