@@ -83,3 +83,13 @@ def test_a_lump_swings_the_cardan_shaft(result):
     jam = numbers["shaft"]["jam_left"]
     assert jam["amplification"]["value"] == pytest.approx(1.5, abs=0.1)
     assert "the line's torque peaks at" in said and (folder / "driveline.png").exists()
+
+
+def test_chains_run_near_their_resonance():
+    """As its title says, and the sweep passes through it. The run itself, of a minute, is that of tests/test_study.py."""
+    from chainunit import config
+
+    loaded = config.load(EXAMPLES / "chains_near_resonance.toml")
+    resonance = float(loaded.machine.chain_modes(loaded.feed.left, loaded.feed.right).frequency[0])
+    assert 0.7 * resonance < loaded.run.crank_speed < 0.9 * resonance
+    assert loaded.chain.sweep_lowest < 0.5 * resonance and loaded.chain.sweep_highest > 2.0 * resonance
