@@ -86,7 +86,8 @@ def test_a_lump_swings_the_cardan_shaft(result):
 
 
 def test_chains_run_near_their_resonance():
-    """As its title says, and the sweep passes through it. The run itself, of a minute, is that of tests/test_study.py."""
+    """As its title says, and the sweep passes through it. The run itself, of a minute, is that of
+    tests/test_study.py."""
     from chainunit import config
 
     loaded = config.load(EXAMPLES / "chains_near_resonance.toml")
