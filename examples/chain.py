@@ -1,8 +1,8 @@
 # %% [markdown]
 # # The organ as a chain
 #
-# Export `ChainUnitFlexible`, here with 4 rods a side, drive it with fmpy at a speed at which the chains snatch, and set
-# the machine with two bars beside it.
+# Export `ChainUnitFlexible`, here with 4 rods a side, drive it with fmpy at a speed at which the chains snatch, and
+# set the machine with two bars beside it.
 
 # %%
 import tempfile
