@@ -351,6 +351,67 @@ def dense(model, p, u, x, side, a2):
     return np.linalg.solve(system, [*right, *(a2 + (along_rod * l) @ omega**2)])[N:], moments[-1]
 
 
+def momentum(p, u, x, counts):
+    """Momentum, its moment about C, and weights and processing forces with their moment, link by link."""
+    drive = CrankRocker(MATH, p, u.phi)
+    parts = [
+        (b.m, b.I, (b.c.p.x, b.c.p.y), (b.c.p1.x * u.w, b.c.p1.y * u.w), b.link.t1 * u.w)
+        for b in drive.bodies
+    ]
+    outside, moment = np.zeros(2), 0.0
+    for side, loads, masses, a1 in ((x.left, u.left, p.left, -p.z), (x.right, u.right, p.right, p.z)):
+        place, speed = np.array([a1, 0.0]), np.zeros(2)
+        material = (1.0 - p.web_share) * loads.material_mass, p.web_share * loads.material_mass
+        rods = [(p.l1, masses.wall_mass + material[0])] * counts[0]
+        rods += [(p.l2, masses.web_mass + material[1])] * counts[1]
+        for k, (length, mass) in enumerate(rods, 1):
+            number = counts[0] if k <= counts[0] else counts[1]
+            l, m = length / number, mass / number
+            theta, omega = getattr(side, f"theta_{k}"), getattr(side, f"omega_{k}")
+            along = 0.5 * l * np.array([math.sin(theta), -math.cos(theta)])
+            across = 0.5 * l * omega * np.array([math.cos(theta), math.sin(theta)])
+            parts.append((m, m * l * l / 12.0, place + along, speed + across, omega))
+            place, speed = place + 2.0 * along, speed + 2.0 * across
+            if k == counts[0]:
+                force = -loads.processing_force * speed / math.hypot(*speed, p.processing.v_smooth)
+                outside, moment = outside + force, moment + place[0] * force[1] - place[1] * force[0]
+    linear = sum(m * np.array(v) for m, _, _, v, _ in parts)
+    angular = sum(m * (c[0] * v[1] - c[1] * v[0]) + I * turn for m, I, c, v, turn in parts)
+    outside = outside - np.array([0.0, p.g * sum(m for m, *_ in parts)])
+    moment -= p.g * sum(m * c[0] for m, _, c, *_ in parts)
+    return np.array([*linear, angular]), np.array([*outside, moment])
+
+
+def test_the_frame_carries_what_changes_the_momentum():
+    """A third route, which sees the damping moments of the pins at frame and rocker: dP/dt of all links, less weights
+    and processing."""
+    counts = 3, 2
+    model = flexible(*counts)
+    given = {"pin.friction": 0.0, "organ.end_damping": 7.0, "organ.eta": 2.0, "web_share": 0.7}
+    p = model.check(model.parameter_layout.from_names(given))
+    loads = {"left.material_mass": 20.0, "left.processing_force": 50.0, "right.material_mass": 40.0}
+
+    def inputs(t):
+        motion = {"phi": 1.0 + 7.0 * t + 5.5 * t * t, "w": 7.0 + 11.0 * t, "a": 11.0}
+        return model.input_layout.from_names(motion | loads)
+
+    def at(y):
+        return model.state_layout.instance(list(y))
+
+    start = model.state_layout.values(model.start(MATH, p, inputs(0.0)))
+    run = solve_ivp(
+        lambda t, y: model.derivatives(MATH, p, inputs(t), at(y)), (0.0, 0.5), start, method="DOP853",
+        rtol=1e-11, atol=1e-11, dense_output=True,
+    ).sol  # fmt: skip
+    h = 1e-4
+    for t in (0.1, 0.3, 0.45):
+        moved = [momentum(p, inputs(s), at(run(s)), counts)[0] for s in (t - 2 * h, t - h, t + h, t + 2 * h)]
+        rate = (moved[0] - 8.0 * moved[1] + 8.0 * moved[2] - moved[3]) / (12.0 * h)
+        wanted = momentum(p, inputs(t), at(run(t)), counts)[1] - rate
+        frame = model.evaluate(MATH, p, inputs(t), at(run(t)))[0].frame
+        np.testing.assert_allclose([frame.fx, frame.fy, frame.moment], wanted, rtol=1e-8)
+
+
 def test_port_is_that_of_dense_equations():
     """J, tau_bias and the force at A2 against the drive without organs, of the two-bar machine, and both chains by
     mass matrix and multipliers."""
