@@ -362,11 +362,11 @@ def test_chains_stand_beside_two_bars(chains, tmp_path):
     assert [n["speed"]["value"] for n in found["sweep"]] == pytest.approx(speeds, rel=1e-9)
     own = found["own_speed"]
     assert (
-        own == found["sweep"][1] and own["crank_torque_high"]["value"] >= own["crank_torque_median"]["value"]
+        own == found["sweep"][2] and own["crank_torque_high"]["value"] >= own["crank_torque_median"]["value"]
     )
     assert own["two_bar_rocker_torque"]["value"] > 0.0 and own["slack_time"]["value"] > 0.01
     # from halfway to the last good speed
-    assert found["avoid"][0]["from"] == {"value": 6.0, "unit": "rad/s"}
+    assert found["avoid"][0]["from"]["value"] == pytest.approx(0.5 * (speeds[0] + speeds[1]))
     slack = [rod for side in found["slack_by_rod"].values() for rod in side if rod["value"] > 0.0]
     assert slack and {rod["rod"] for rod in slack} <= {
         f"{bar} {k}" for bar in ("wall", "web") for k in range(9)
@@ -395,7 +395,7 @@ def test_chains_stand_beside_two_bars(chains, tmp_path):
         "chains, 95 %",
         "10 starts of 30 turns",
         "Slack on the left",
-        "Avoid 6 to",
+        "Avoid 3.54 to",
         "(mode 1, order 1)",
     ):
         assert words in told.getvalue(), words
