@@ -734,6 +734,75 @@ def test_numbers_of_rods_that_make_no_model():
     assert flexible(3, 1) is flexible(3, 1) and flexible(3, 1).built_by == "flexible(3, 1)"
 
 
+def test_two_rods_stand_where_a_hanging_chain_would_not():
+    """Bars that push at rest: two rods are the dyad all the same, on its branch; a chain of more rods whose hanging
+    position is not found, or whose rods rest in their stop, is refused in words."""
+    lengths = {
+        "r": 0.1635, "l": 0.56, "h": 0.204, "e": 0.1884, "l1": 0.5069, "l2": 0.3186, "z": 0.3699, "c": 0.5451,
+        "hy": 0.2065,
+    }  # fmt: skip
+    machine = ChainUnit(lengths)
+    with pytest.raises(GeometryError, match="would lie across"):
+        machine.hanging("right", float(machine.rocker_extremes()[0][0]), number=2)
+    model, free = flexible(1, 1), {"organ.eta": 0.0, "organ.end_damping": 0.0, "pin.friction": 0.0}
+    p = model.check(model.parameter_layout.from_names(lengths | free))
+    for phi in np.linspace(0.0, 6.0, 13):
+        empty = {f"{side}.material_mass": 0.0 for side in SIDES}
+        u = model.input_layout.from_names({"phi": float(phi), "w": 2.0} | empty)
+        found = model.evaluate(MATH, p, u, model.begin(p, u))[0]
+        wanted = machine.replace({"pin.friction": 0.0}).forces(float(phi), 2.0)
+        assert found.rocker.tau == pytest.approx(float(wanted.rocker.tau), rel=1e-9, abs=1e-9)
+        assert found.right.drift < 1e-12 and found.margin == pytest.approx(float(wanted.margin), rel=1e-9)
+    model = flexible(2, 1)
+    p = model.check(model.parameter_layout.from_names({"organ.fold_limit": 1.0}))
+    with pytest.raises(
+        GeometryError, match=r"^largest angle between rods of the left organ at the start = 1\.\d+ rad: "
+    ):
+        model.begin(p, model.Inputs())
+    # an unknown that was not found leaves a gap, which is told
+    p = model.check(model.Parameters())
+    u = model.Inputs()
+    limits = list(model.start_limits(MATH, p, u, model.started(MATH, p, u, [0.02, 0.9, 1.0, 0.5, 0.5, 1.0])))
+    assert limits[0][0] > limits[0][2]
+
+
+@native
+def test_the_fmu_refuses_rods_in_their_stop(files):
+    with pytest.raises(
+        RunError, match=r"largest angle between rods of the left organ at the start = 1\.\d+ rad"
+    ):
+        Run(files(3, 1), {"organ.fold_limit": 1.0})
+
+
+@native
+def test_model_exchange_starts_where_the_inputs_say(files):
+    """In initialization an input that is set anew moves the states at the start, however they are read."""
+    from fmpy.fmi2 import FMU2Model
+
+    fmu = files(3, 1)
+    unit = FMU2Model(
+        guid=fmu.description.guid,
+        unzipDirectory=fmu.folder,
+        modelIdentifier="ChainUnitFlexible",
+        instanceName="x",
+    )
+    unit.instantiate()
+    unit.setupExperiment()
+    unit.enterInitializationMode()
+    n, phi = len(flexible(3, 1).state_layout.names), fmu.variables["phi"].valueReference
+    first = [v.valueReference for v in fmu.description.modelVariables if v.name.endswith("theta_1")]
+    places = [flexible(3, 1).state_layout.names.index(f"{side}.theta_1") for side in SIDES]
+    seen = []
+    for angle in (1.0, 2.0):
+        unit.setReal([phi], [angle])
+        x = (ctypes.c_double * n)()
+        unit.getContinuousStates(x, n)
+        assert [x[k] for k in places] == unit.getReal(first)
+        seen.append(x[0])
+    assert seen[0] != seen[1]
+    unit.freeInstance()
+
+
 def test_a_chain_without_mass_is_refused():
     model = flexible(3, 1)
     for side in SIDES:

@@ -319,9 +319,10 @@ def export(
         elif config:
             loaded = configuration.load(config)
             start = start_of(loaded, model, backend=kind, report=status.update)
-            rods = rods or (int(loaded.chain.rods) if loaded.chain else None)
+            if rods is None and loaded.chain:
+                rods = int(loaded.chain.rods)
         if name == "ChainUnitFlexible":
-            model = with_rods(rods or 8, start)
+            model = with_rods(int(configuration.Chain().rods) if rods is None else rods, start)
         made = write(
             model,
             file,

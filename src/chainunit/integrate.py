@@ -83,7 +83,7 @@ def controlled(
     while since < step:
         taken += 1
         if taken > MOST_STEPS:
-            raise ArithmeticError(f"more than {MOST_STEPS} steps of its own; shorten it")
+            raise ArithmeticError(f"it takes more than {MOST_STEPS:g} of its own; shorten it")
         left = step - since
         h = left if pace >= left else 0.5 * left if pace > 0.5 * left else pace
         k: list[Sequence[float]] = []

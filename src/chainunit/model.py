@@ -104,6 +104,8 @@ class Model:
     """How many numbers the states at the start are found from by iteration; see `start`."""
     start_rounds: ClassVar[int] = 0
     """Rounds of that iteration."""
+    start_required: ClassVar[tuple[Requirement, ...]] = ()
+    """What the states at the start must meet; see `start_limits`."""
     controlled: ClassVar[bool] = False
     """Whether a co-simulation FMU integrates with control of the error, to `tolerance`, and closes the states by
     `closed` after each of its steps; else in equal steps."""
@@ -195,6 +197,29 @@ class Model:
     def started(cls, xp: Any, p: Any, u: Any, z: list[Any]) -> Any:
         """States at the start with the inputs `u`, from the unknowns."""
         return cls.initial_states(xp, p)
+
+    @staticmethod
+    def start_limits(xp: Any, p: Any, u: Any, x: Any) -> Iterator[tuple[Any, Any, Any]]:
+        """Value, lower and upper limit of each of `start_required`, in order, of the states `x` at the start."""
+        return iter(())
+
+    @classmethod
+    def begin(cls, p: Any, u: Any) -> Any:
+        """The states at the start, checked.
+
+        Raises
+        ------
+        GeometryError
+            where they do not meet what is required, in one line.
+        """
+        x = cls.start(MATH, p, u)
+        given = cls.parameter_layout.named(p) if cls.start_required else {}
+        for required, (value, low, high) in zip(
+            cls.start_required, cls.start_limits(MATH, p, u, x), strict=True
+        ):
+            if not low < value < high:
+                raise GeometryError(required.refusal(value, low, high, given))
+        return x
 
     @classmethod
     def start(cls, xp: Any, p: Any, u: Any, rounds: int | None = None) -> Any:

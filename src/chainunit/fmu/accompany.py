@@ -61,7 +61,7 @@ def _reference(interface: Interface) -> dict[str, bytes]:
 
     states: list[Any] = [None] * _ROWS
     if layout := model.state_layout:
-        first = layout.values(model.start(MATH, p, inputs(0.0)))
+        first = layout.values(model.begin(p, inputs(0.0)))
         solved = solve_ivp(
             lambda t, x: model.derivatives(MATH, p, inputs(t), layout.instance(x.tolist())),
             (0.0, _STOP),

@@ -119,7 +119,10 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
                 self._touch()
                 self._tell(bad)
                 return False
-            return not self._n_x or self._integrate(current_time, step_size)
+            return not self._n_x or not step_size or self._integrate(current_time, step_size)
+        except ArithmeticError as reason:
+            self._tell(f"step from t = {current_time:g} s: {reason}")
+            return False
         except BaseException as reason:
             self._tell(f"step from t = {current_time:g} s failed: {reason!r}")
             return False
@@ -255,7 +258,7 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
                 p = self._p = self.model.check(p, self._derived if self._initialized else None)
                 self._derived = getattr(p, "derived", None)
                 if self.model.state_layout and not self._initialized:
-                    self._x = self.model.state_layout.values(self.model.start(MATH, p, self._inputs()))
+                    self._x = self.model.state_layout.values(self.model.begin(p, self._inputs()))
                     self._pace = 0.0
             except BaseException as reason:
                 self._refused = str(reason) or repr(reason)

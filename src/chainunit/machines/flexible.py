@@ -40,6 +40,7 @@ from typing import Any
 from ..engines import Dual, dual, slope
 from ..errors import InputError
 from ..groups import chain
+from ..groups.dyad import Dyad
 from ..groups.friction import pin_losses
 from ..model import Model, Part, Requirement
 from ..planar import ZERO, Link, Motion, Vec2
@@ -52,6 +53,8 @@ W_SMALL = 0.01
 """Speed of the crank [rad/s] below which the slopes by the angle tend to zero."""
 CLOSING = 20.0
 """Rate at which a chain that has drifted off A2 is drawn back [1/s]."""
+_CLOSED = 1e-6
+"""Gap at the start above which a chain does not hang [m]."""
 _NO_PULL = 1e-6  # N, over which a rod turns from pulled to slack
 LEAST, MOST = 2, 24
 """Rods of an organ."""
@@ -66,10 +69,16 @@ class OrganLaw:
         "damping of the inner pins times the mean length of the rods beside each; assumed",
         default=0.24,
         min=0.0,
+        max=1e4,
         tunable=True,
     )
     end_damping: Value = quantity(
-        "N.m.s/rad", "damping of each of the pins A1 and A2; assumed", default=1.0, min=0.0, tunable=True
+        "N.m.s/rad",
+        "damping of each of the pins A1 and A2; assumed",
+        default=1.0,
+        min=0.0,
+        max=1e5,
+        tunable=True,
     )
     fold_limit: Value = quantity(
         "rad",
@@ -83,6 +92,7 @@ class OrganLaw:
         "stiffness of the stop behind it, whose moment grows with the square of the angle; assumed",
         default=5e4,
         min=0.0,
+        max=1e7,
         tunable=True,
     )
 
@@ -108,7 +118,10 @@ class ChainSide(chain_unit.Side):
 
     slack_share: Value = quantity("1", "share of the rods whose mean axial pull is below zero")
     fold_largest: Value = quantity("rad", "largest angle between neighbouring rods")
-    drift: Value = quantity("m", "distance between the end of the chain and A2")
+    drift: Value = quantity(
+        "m",
+        "distance between the end of the chain and A2, in Co-Simulation behind the projection of each step",
+    )
     kinetic_energy: Value = quantity("J", "kinetic energy")
     potential_energy: Value = quantity(
         "J", "potential energy, of weights zero at the level of C, and of folded rods", nominal=100.0
@@ -351,8 +364,8 @@ def _side(
         "web_pull": functools.reduce(xp.minimum, least[walls:]),
         "wall_pull": functools.reduce(xp.minimum, least[:walls]),
         "slack_share": sum(slack) * (1.0 / N),
-        "fold_largest": functools.reduce(xp.maximum, [xp.abs(fold) for fold in folds]),
-        "drift": xp.sqrt(h.missing.squared() + 1e-60),
+        "fold_largest": _largest_fold(xp, theta),
+        "drift": _size(xp, h.missing),
         "kinetic_energy": kinetic,
         "potential_energy": potential,
         "energy_residual": kinetic + potential - given,
@@ -360,6 +373,22 @@ def _side(
         **{f"pull_{k + 1}": pull for k, pull in enumerate(pulls)},
         **{f"fold_{k + 1}": fold for k, fold in enumerate(folds)},
     }
+
+
+def _size(xp: Any, v: Vec2) -> Any:
+    # 0 has no slope without the small term
+    return xp.sqrt(v.squared() + 1e-60)
+
+
+def _largest_fold(xp: Any, theta: Sequence[Any]) -> Any:
+    return functools.reduce(xp.maximum, [xp.abs(outer - inner) for inner, outer in pairwise(theta)])
+
+
+def _bars(xp: Any, dyad: Dyad) -> list[Any]:
+    """Angles of wall and web as two rods."""
+    wall, web = dyad.first.u, -dyad.second.u
+    first = xp.atan2(wall.x, -wall.y)
+    return [first, first + xp.atan2(wall.cross(web), wall.dot(web))]
 
 
 def _gradient(b: Sequence[Any], l: Sequence[Any], H: Any, v: Any, reach: tuple[Any, Any], xp: Any) -> Any:
@@ -545,7 +574,26 @@ def _flexible(walls: int, webs: int) -> type[Model]:
         icon = ChamberForces.icon
         input_rates = MappingProxyType({"phi": "w", "w": "a"})
         controlled = True
-        start_unknowns, start_rounds = 6, 100
+        # two rods stand where the dyad does
+        start_unknowns, start_rounds = (0, 0) if N == LEAST else (6, 100)
+        start_required = tuple(
+            requirement
+            for one in ("left", "right")
+            for requirement in (
+                Requirement(
+                    f"distance of the {one} chain's end from A2 at the start",
+                    "m",
+                    "it does not hang, as a rod would have to push (widen z or shorten the rods)",
+                    ("z", "l1", "l2", "e"),
+                ),
+                Requirement(
+                    f"largest angle between rods of the {one} organ at the start",
+                    "rad",
+                    "they rest against each other (raise organ.fold_limit, widen z, or take more rods)",
+                    ("z", "l1", "l2", "e"),
+                ),
+            )
+        )
         required = (
             *ChamberForces.required,
             *(
@@ -573,6 +621,14 @@ def _flexible(walls: int, webs: int) -> type[Model]:
                 yield masses.web_mass, 0.0, math.inf
 
         @staticmethod
+        def start_limits(xp: Any, p: Any, u: Any, x: Any) -> Iterator[tuple[Any, Any, Any]]:
+            """Of each side: the chain ends at A2, and no stop between rods is met."""
+            m = CrankRocker(xp, p, u.phi / p.ratio)
+            for h in _organs(xp, p, u, rods(p, u), walls, split(x), m, 0.0):
+                yield _size(xp, h.missing), -math.inf, _CLOSED
+                yield _largest_fold(xp, h.state[0]), -math.inf, p.organ.fold_limit
+
+        @staticmethod
         def internal_step(xp: Any, p: Any) -> Any:
             """20 ms: a quarter of a radian of the crank at 12 rad/s."""
             return 0.02
@@ -586,6 +642,8 @@ def _flexible(walls: int, webs: int) -> type[Model]:
         def start_guess(xp: Any, p: Any, u: Any) -> list[Any]:
             """Of each side H, the pull of a shallow parabola, v = 1/2, and what holds Newton's method back."""
             found: list[Any] = []
+            if N == LEAST:
+                return found
             for x, y in reaches(xp, p, CrankRocker(xp, p, u.phi / p.ratio).rocker):
                 spare = xp.maximum(1e-9, 1.0 - xp.sqrt(x * x + y * y))
                 found += [xp.maximum(x, 0.05) / xp.sqrt(24.0 * spare), 0.5, 1.0]
@@ -606,11 +664,16 @@ def _flexible(walls: int, webs: int) -> type[Model]:
             """Hanging at rest, and taken along by A2 where the crank turns."""
             m, w = CrankRocker(xp, p, u.phi / p.ratio), u.w / p.ratio
             found = []
+            bars = chain_unit.organs(xp, p, u, m.rocker)
             for k, (hand, each) in enumerate(zip((1.0, -1.0), rods(p, u), strict=True)):
-                H, v = z[3 * k : 3 * k + 2]
-                theta = [xp.atan2(hand * H, v - b) for b in _shape(each)[1]]
-                hanging = theta, [0.0 * H] * N
-                found.append(_closed(xp, p, each, _supports(p)[k], m.rocker, w, hanging, 2)[:2])
+                if N == LEAST:
+                    theta = _bars(xp, bars[k].dyad)
+                else:
+                    H, v = z[3 * k : 3 * k + 2]
+                    theta = [xp.atan2(hand * H, v - b) for b in _shape(each)[1]]
+                hanging = theta, [0.0 * theta[0]] * N
+                # once: of a chain that was not found to hang it leaves a gap, see `start_limits`
+                found.append(_closed(xp, p, each, _supports(p)[k], m.rocker, w, hanging, 1)[:2])
             organs = _organs(xp, p, u, rods(p, u), walls, found, m, w)
             sides = []
             for (theta, omega), h, a1 in zip(found, organs, _supports(p), strict=True):

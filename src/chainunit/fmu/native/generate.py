@@ -81,6 +81,9 @@ def kernels(interface: Interface) -> str:
             add("guess", [ps, us], casadi.vertcat(*model.start_guess(casadi_(), p, u)))
             add("improved", [ps, us, unknowns], casadi.vertcat(*model.start_improved(casadi_(), p, u, z)))
         add("initial", [ps, us, unknowns], casadi.vertcat(*started))
+        if model.start_required:
+            rows = [casadi.SX(v) for row in model.start_limits(casadi_(), p, u, x) for v in row]
+            add("start_limits", symbols, casadi.vertcat(*rows))
         add("internal_step", [ps], casadi.SX(model.internal_step(casadi_(), p)))
         if model.controlled:
             add("tolerance", [ps], casadi.SX(model.tolerance(casadi_(), p)))
@@ -128,6 +131,7 @@ def tables(interface: Interface, guid: str, token: str) -> str:
     if interface.states:
         functions += ["derivatives", "derivatives_forward", "initial", "internal_step"]
         functions += ["guess", "improved"] if model.start_unknowns else []
+        functions += ["start_limits"] if model.start_required else []
         functions += ["tolerance", "closed"] if model.controlled else []
     if model.required:
         functions.append("requirements")
@@ -182,11 +186,12 @@ def tables(interface: Interface, guid: str, token: str) -> str:
         _array("int", "group_of", [str(group_of[i]) for i in range(n_y)]),
         _array("Group", "group", group_rows),
     ]
-    for i, r in enumerate(model.required):
+    wanted = (*model.required, *model.start_required)
+    for i, r in enumerate(wanted):
         lines.append(_array("int", f"given_{i}", [str(parameter_names.index(n)) for n in r.given]))
     rows = [
         f"{{{_text(r.subject)}, {_unit(r.unit)}, {_text(r.why)}, {_text(r.remedy)}, {len(r.given)}, given_{i}}}"
-        for i, r in enumerate(model.required)
+        for i, r in enumerate(wanted)
     ]
     if rows:
         lines.append(_array("Requirement", "required", rows))
@@ -203,6 +208,7 @@ def tables(interface: Interface, guid: str, token: str) -> str:
         "n_z": model.start_unknowns,
         "n_groups": len(groups_),
         "n_required": len(model.required),
+        "n_start_required": len(model.start_required),
         "start": "starts",
         "declared": "declared",
         "nominal": "nominal",
@@ -212,7 +218,8 @@ def tables(interface: Interface, guid: str, token: str) -> str:
         "groups": "group",
         "all": "kernel_all",
         "required": "required" if rows else "NULL",
-        "requirements": "kernel_requirements" if rows else "NULL",
+        "requirements": "kernel_requirements" if model.required else "NULL",
+        "start_limits": "kernel_start_limits" if model.start_required else "NULL",
         "derive": "kernel_derive" if model.derived else "NULL",
         "start_rounds": model.start_rounds,
         "guess": "kernel_guess" if model.start_unknowns else "NULL",

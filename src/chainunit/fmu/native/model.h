@@ -42,7 +42,7 @@ typedef struct {
     const char *name;
     const char *guid; /* of the FMI 2.0 description */
     const char *token; /* of the FMI 3.0 description */
-    int n_p, n_u, n_x, n_y, n_k, n_z, n_groups, n_required;
+    int n_p, n_u, n_x, n_y, n_k, n_z, n_groups, n_required, n_start_required;
     const double *start;          /* parameters, inputs */
     const Quantity *declared;     /* parameters, inputs */
     const double *nominal;        /* of the states */
@@ -51,8 +51,9 @@ typedef struct {
     const int *group_of;          /* of each output, by value reference */
     const Group *groups;
     Kernel all;                   /* (p, u, x) -> outputs of all groups; cheaper than one after the other */
-    const Requirement *required;
+    const Requirement *required;  /* of the parameters, then of the states at the start */
     Kernel requirements;          /* (p, k) -> value, low, high of each */
+    Kernel start_limits;          /* (p, u, x, k) -> value, low, high of each, at the start */
     Kernel derive;                /* (p) -> what follows from fixed parameters and is computed once */
     int start_rounds;
     Kernel guess;                 /* (p, u) -> first guess z of what the start is found from */

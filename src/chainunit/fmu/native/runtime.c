@@ -23,7 +23,7 @@ static unsigned guard(void) {
 
 Instance *instance_new(const char *name, Report report) {
     const int n_in = model.n_u + model.n_x;
-    int work = 4 * model.n_x + 3 * n_in + 2 * model.n_y + model.n_x + 3 * model.n_required + 2 * model.n_z;
+    int work = 4 * model.n_x + 3 * n_in + 2 * model.n_y + model.n_x + 3 * (model.n_required + model.n_start_required) + 2 * model.n_z;
     if (model.closed && work < 3 * model.n_u + 10 * model.n_x) work = 3 * model.n_u + 10 * model.n_x;
     const int saved = model.n_p + n_in + model.n_u + model.n_k;
     if (work < saved) work = saved;
@@ -120,26 +120,10 @@ static int all_finite(const double *v, int n) {
 
 /* -- start */
 
-static Status check(Instance *c) {
-    for (int i = 0; i < model.n_p + model.n_u; ++i) {
-        const Quantity *q = &model.declared[i];
-        const double v = c->p[i];
-        const int above = q->open_low ? v > q->low : v >= q->low;
-        if (!isfinite(v) || (i < model.n_p && !(above && v <= q->high)))
-            return complain(c, ERROR, "%s = %g %s: must be %s%s", q->name, v, q->unit, isfinite(v) ? "" : "finite, ",
-                            q->allowed);
-    }
-    const double *arg[2] = {c->p, c->k};
-    if (model.n_k) {
-        double *into[1] = {c->k};
-        model.derive(arg, into, NULL, NULL, 0);
-    }
-    if (!model.n_required) return OK;
-    double *limits = c->work;
-    double *res[1] = {limits};
-    model.requirements(arg, res, NULL, NULL, 0);
-    for (int i = 0; i < model.n_required; ++i) {
-        const Requirement *r = &model.required[i];
+/* Whether each value lies between its limits; refuses the first that does not, in one line. */
+static Status meets(Instance *c, const Requirement *required, int n, const double *limits) {
+    for (int i = 0; i < n; ++i) {
+        const Requirement *r = &required[i];
         const double value = limits[3 * i], low = limits[3 * i + 1], high = limits[3 * i + 2];
         if (value > low && value < high) continue;
         const char *gap = r->unit[0] ? " " : "";
@@ -155,10 +139,31 @@ static Status check(Instance *c) {
         else
             snprintf(range, sizeof range, "must be %s %g%s%s", isfinite(low) ? ">" : "<", isfinite(low) ? low : high,
                      gap, r->unit);
-        memset(c->k, 0, (size_t)model.n_k * sizeof(double)); /* nothing that is not finite stays behind */
         return complain(c, ERROR, "%s = %g%s%s: %s%s; %s", r->subject, value, gap, r->unit, r->why, given, range);
     }
     return OK;
+}
+
+static Status check(Instance *c) {
+    for (int i = 0; i < model.n_p + model.n_u; ++i) {
+        const Quantity *q = &model.declared[i];
+        const double v = c->p[i];
+        const int above = q->open_low ? v > q->low : v >= q->low;
+        if (!isfinite(v) || (i < model.n_p && !(above && v <= q->high)))
+            return complain(c, ERROR, "%s = %g %s: must be %s%s", q->name, v, q->unit, isfinite(v) ? "" : "finite, ",
+                            q->allowed);
+    }
+    const double *arg[2] = {c->p, c->k};
+    if (model.n_k) {
+        double *into[1] = {c->k};
+        model.derive(arg, into, NULL, NULL, 0);
+    }
+    if (!model.n_required) return OK;
+    double *res[1] = {c->work};
+    model.requirements(arg, res, NULL, NULL, 0);
+    Status status = meets(c, model.required, model.n_required, c->work);
+    if (status) memset(c->k, 0, (size_t)model.n_k * sizeof(double)); /* nothing that is not finite stays behind */
+    return status;
 }
 
 Status start(Instance *c) {
@@ -180,6 +185,13 @@ Status start(Instance *c) {
         if (!all_finite(c->x, model.n_x)) {
             memset(c->x, 0, (size_t)model.n_x * sizeof(double));
             return complain(c, ERROR, "a state at the start is not a finite number");
+        }
+        if (model.n_start_required) {
+            const double *of[4] = {c->p, c->u, c->x, c->k};
+            res[0] = c->work;
+            model.start_limits(of, res, NULL, NULL, 0);
+            status = meets(c, model.required + model.n_required, model.n_start_required, c->work);
+            if (status) return status;
         }
     }
     c->fresh = 0;
@@ -219,7 +231,9 @@ static Status evaluate(Instance *c, unsigned wanted) {
 }
 
 Status derivatives(Instance *c) {
-    if (!model.n_x || (c->fresh >> DERIVATIVES_BIT)) return OK;
+    /* what was set since decides where the states start */
+    Status status = c->mode == INITIALIZATION ? start(c) : OK;
+    if (status || !model.n_x || (c->fresh >> DERIVATIVES_BIT)) return status;
     const double *arg[4] = {c->p, c->u, c->x, c->k};
     double *res[1] = {c->dx};
     model.derivatives(arg, res, NULL, NULL, 0);
@@ -297,6 +311,7 @@ Status states_set(Instance *c, const double *x, size_t n, const char *call) {
 
 Status states_get(Instance *c, const double *from, double *to, size_t n, const char *call) {
     Status status = count_states(c, n, to, call);
+    if (!status && c->mode == INITIALIZATION) status = start(c);
     if (!status && n) memcpy(to, from, n * sizeof *to);
     return status;
 }
