@@ -204,7 +204,7 @@ class Chain(OrganLaw):
 
     rods: Value = quantity("1", "number of rods of an organ", default=8.0, min=float(LEAST), max=float(MOST))
     sweep_lowest: Value = quantity(
-        "rad/s", "lowest crank speed of the sweep", default=1.0, above=0.0, max=1000.0
+        "rad/s", "lowest crank speed of the sweep", default=1.0, min=0.01, max=1000.0
     )
     sweep_highest: Value = quantity(
         "rad/s", "highest crank speed of the sweep", default=15.0, above=0.0, max=1000.0

@@ -30,7 +30,7 @@ Progress = Callable[[float], None]
 
 
 @contextmanager
-def _stoppable() -> Iterator[Callable[[], bool]]:
+def stoppable() -> Iterator[Callable[[], bool]]:
     """Whether Ctrl-C was pressed, asked between steps: a KeyboardInterrupt inside an FMU would be a fatal error."""
     pressed: list[int] = []
     if threading.current_thread() is not threading.main_thread():
@@ -271,7 +271,7 @@ class CoSimulation:
         moves_inside, moves_over = inside.tolist(), (inside | over).tolist()
         every = max(1, n // 200)
         done = said = before = 0
-        with _stoppable() as stopped:
+        with stoppable() as stopped:
             try:
                 apply(points, 0)
                 self._transfer()

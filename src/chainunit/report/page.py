@@ -390,6 +390,7 @@ def _chains(t: Traced) -> str:
             ),
             ("Rods that are slack, mean over time", "percent", ("slack_rods", "", "")),
             ("Largest angle between neighbouring rods", "display", ("fold_largest", "", "")),
+            ("Energy residual of an organ over the energy moved", "", ("energy_residual", "", "")),
         )
     ]
     if chain["resonance"]["value"] is not None:

@@ -161,8 +161,11 @@ def _show_chain(found: ChainResult, console: Console) -> None:
     one, two = _number(own.crank_torque_rms, "N.m"), _number(own.two_bar_crank_torque_rms, "N.m")
     table.add_row("crank torque, RMS", one, "", two)
     snatches = (own.snatch_median, own.snatch_high, own.two_bar_snatch)
-    table.add_row("snatch: force at A2 over that at rest", *(f"{x:.2f}" for x in snatches))
-    table.add_row("snatch, largest over least median of a start", f"{own.snatch_spread:.3f}", "", "")
+    table.add_row(
+        "snatch: force at A2 over that at rest", *(f"{x:.2f}" if math.isfinite(x) else "-" for x in snatches)
+    )
+    spread = f"{own.snatch_spread:.3f}" if math.isfinite(own.snatch_spread) else "-"
+    table.add_row("snatch, largest over least median of a start", spread, "", "")
     table.add_row(
         "time with a slack rod; two bars: with one that pushes",
         _number(own.slack_time, "1"),
@@ -171,6 +174,7 @@ def _show_chain(found: ChainResult, console: Console) -> None:
     )
     table.add_row("rods that are slack, mean", _number(own.slack_rods, "1"), "", "")
     table.add_row("largest angle between two rods", f"{math.degrees(own.fold_largest):.0f} deg", "", "")
+    table.add_row("energy residual over the energy moved", f"{own.energy_residual:.1e}", "", "")
     console.print(table)
     if found.distance is not None:
         console.print(

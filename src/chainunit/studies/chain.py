@@ -20,8 +20,12 @@ import numpy as np
 
 from ..config import Config
 from ..cosim.instance import Fmu, Instance
+from ..cosim.master import stoppable
+from ..engines import numpy_
+from ..errors import InterruptedRunError, RunError
 from ..machines.api import ChainUnit
-from ..machines.chain_unit import SideLoads
+from ..machines.chain_unit import ChamberForces, SideLoads
+from ..machines.flexible import flexible
 from ..quantities import Layout, Value, declaration, quantity
 from .cycle import Cycle, cycle
 from .drive import Drive
@@ -63,7 +67,10 @@ class SpeedNumbers:
     two_bar_crank_torque_rms: Value = quantity("N.m", "crank torque of two bars, RMS")
     two_bar_rocker_torque: Value = quantity("N.m", "rocker torque of two bars, peak")
     two_bar_snatch: Value = quantity("1", "force at A2 of two bars, peak, over that at rest")
-    two_bar_slack_time: Value = quantity("1", "share of the time in which a bar would have to push")
+    two_bar_slack_time: Value = quantity(
+        "1", "share of the time in which a bar is pushed, by its mean axial pull as a rod's"
+    )
+    energy_residual: Value = quantity("1", "largest energy residual of an organ over the energy moved")
 
 
 @dataclass(frozen=True)
@@ -105,6 +112,8 @@ class ChainResult:
     starts: int
     turns: int
     rods: tuple[int, int]
+    failed: Mapping[float, str]
+    """by crank speed [rad/s], why it is missing in the sweep"""
 
     @property
     def resonance(self) -> float | None:
@@ -138,7 +147,7 @@ class ChainResult:
         def row(numbers: SpeedNumbers) -> dict[str, Any]:
             layout = Layout(SpeedNumbers)
             return {
-                v.name: {"value": float(x), "unit": v.unit}
+                v.name: {"value": float(x) if math.isfinite(x) else None, "unit": v.unit}
                 for v, x in zip(layout.variables, layout.values(numbers), strict=True)
             }
 
@@ -210,7 +219,7 @@ def run_turns(
     }
     done = [0]
 
-    def one(start: int) -> Any:
+    def one(start: int, stopped: Callable[[], bool]) -> Any:
         unit = Instance(fmu, f"start {start}")
         try:
             # inside the FMU the angle runs on along the speed: nothing is set any more
@@ -222,6 +231,8 @@ def run_turns(
             for k in range(settle):
                 unit.step(k * points * step, points * step)
             for k in range(turns * points):
+                if stopped():
+                    raise InterruptedRunError(f"interrupted at {crank_speed:g} rad/s")
                 unit.step((settle * points + k) * step, step)
                 rows[k] = unit.read(handle)
             return rows
@@ -230,8 +241,9 @@ def run_turns(
             done[0] += 1
             progress(done[0] / starts)
 
-    with ThreadPoolExecutor(min(starts, os.cpu_count() or 1)) as pool:
-        found = np.array(list(pool.map(one, range(starts)))).reshape(starts, turns, points, len(names))
+    with stoppable() as stopped, ThreadPoolExecutor(min(starts, os.cpu_count() or 1)) as pool:
+        rows = list(pool.map(one, range(starts), [stopped] * starts))
+    found = np.array(rows).reshape(starts, turns, points, len(names))
     first = len(outputs)
     each = len(rods) // 2
     return Turns(
@@ -242,13 +254,31 @@ def run_turns(
 
 
 def duty(fmu: Fmu, drive: Drive, crank_speed: float, left: SideLoads, right: SideLoads) -> Cycle:
-    """The machine with chains over 20 turns in a row, as `cycle` gives it of two bars over one: what sizing begins
-    with."""
-    turns = run_turns(fmu, drive, crank_speed, left, right, ("tau", "J"), starts=1, turns=20)
-    tau, J = (turns.values[name].ravel() for name in ("tau", "J"))
-    ratio = drive.driven.p.ratio
-    angle = np.linspace(0.0, 40.0 * math.pi, len(tau), endpoint=False)
-    return Cycle(angle, tau * ratio, SimpleNamespace(J=J, tau=tau))
+    """The machine with chains over all turns of all starts, of shape (turns, points), where `cycle` gives the one
+    turn of two bars: what sizing begins with."""
+    chain = drive.chain
+    found = run_turns(
+        fmu, drive, crank_speed, left, right, ("tau", "J"), starts=int(chain.starts), turns=int(chain.turns)
+    )
+    tau, J = (found.values[name].reshape(-1, POINTS) for name in ("tau", "J"))
+    return Cycle(found.angle, tau * drive.driven.p.ratio, SimpleNamespace(J=J, tau=tau))
+
+
+def two_bar_pulls(
+    machine: ChainUnit, angle: Any, crank_speed: float, left: SideLoads, right: SideLoads
+) -> Any:
+    """Mean axial pull [N] in wall and web of both sides of two bars at crank angles `angle` [rad], shape (4, n): as
+    two rods without damping, so that slack means the same of both."""
+    model, xp = flexible(1, 1), numpy_()
+    named = ChamberForces.parameter_layout.named(machine.p) | {
+        f"organ.{name}": 0.0 for name in ("eta", "end_damping", "fold_stiffness")
+    }
+    p = model.parameter_layout.from_names(named)
+    ratio = machine.p.ratio
+    u = model.Inputs(phi=angle * ratio, w=crank_speed * ratio, a=0.0, left=left, right=right)
+    sides = model.evaluate(xp, p, u, model.start(xp, p, u))[0]
+    pulls = [getattr(getattr(sides, side), f"pull_{k}") for side in _SIDES for k in (1, 2)]
+    return np.array([np.broadcast_to(pull, np.shape(angle)) for pull in pulls])
 
 
 def numbers_at(
@@ -262,7 +292,8 @@ def numbers_at(
     chain, feed = config.chain, config.feed
     assert chain is not None
     forces = [f"{side}.rocker_joint.{x}" for side in _SIDES for x in ("fx", "fy")]
-    outputs = ("tau", "rocker.tau", "left.fold_largest", "right.fold_largest", *forces)
+    others = [f"{side}.{name}" for side in _SIDES for name in ("fold_largest", "energy_residual")]
+    outputs = ("tau", "power", "rocker.tau", *others, *forces)
     starts, turns = int(chain.starts), int(chain.turns)
     found = run_turns(
         fmu, drive, crank_speed, feed.left, feed.right, outputs, starts=starts, turns=turns, progress=progress
@@ -274,16 +305,20 @@ def numbers_at(
 
     two = cycle(drive.machine, crank_speed, feed.left, feed.right)
     at_rest = drive.machine.chamber(0.0, left=feed.left, right=feed.right)
-    snatch, two_bar_snatch, pushes = [], [], []
+    snatch, two_bar_snatch = [], []
     for side in _SIDES:
         joint, bars = getattr(at_rest, side).rocker_joint, getattr(two.outputs, side)
         size = np.hypot(*(values[f"{side}.rocker_joint.{x}"] for x in ("fx", "fy")))
         rest = _rest_force(drive.machine, side, getattr(feed, side), sum(drive.rods))
-        rest = max(rest or float(np.hypot(joint.fx, joint.fy)), 1e-9)
+        # without weight nothing is pulled at rest
+        rest = rest or float(np.hypot(joint.fx, joint.fy)) or math.nan
         snatch.append(peaks(size) / rest)
         two_bar_snatch.append(np.max(np.hypot(bars.rocker_joint.fx, bars.rocker_joint.fy)) / rest)
-        pushes.append(np.minimum(bars.wall_pull, bars.web_pull) < 0.0)
     snatched = np.maximum(*snatch)
+    pushed = two_bar_pulls(drive.machine, two.angle, crank_speed, feed.left, feed.right) < 0.0
+    duration = 2.0 * math.pi / crank_speed * turns
+    moved = float(np.min(np.mean(np.abs(values["power"]), axis=(1, 2)))) * duration
+    missing = max(float(np.max(np.ptp(values[f"{side}.energy_residual"], axis=(1, 2)))) for side in _SIDES)
     slack = {side: found.pulls[side] < 0.0 for side in _SIDES}
     all_rods = np.concatenate([slack[side] for side in _SIDES], axis=-1)
     crank, rocker = values["tau"] * ratio, values["rocker.tau"]
@@ -306,7 +341,8 @@ def numbers_at(
             two_bar_crank_torque_rms=float(np.sqrt(np.mean(two.crank_torque**2))),
             two_bar_rocker_torque=float(np.max(np.abs(two.outputs.rocker.tau))),
             two_bar_snatch=float(max(two_bar_snatch)),
-            two_bar_slack_time=float(np.mean(np.logical_or(*pushes))),
+            two_bar_slack_time=float(np.mean(np.any(pushed, axis=0))),
+            energy_residual=missing / max(moved, 1e-300),
         ),
         {side: np.mean(slack[side], axis=(0, 1, 2)) for side in _SIDES},
     )
@@ -324,8 +360,15 @@ def study_chain(
     drive: Drive,
     file: Path,
     report: Callable[[str, float, float], None],
-) -> ChainResult:
-    """The study's own speed and the sweep of a study whose organs are chains, by the FMU `file` of the machine."""
+) -> tuple[ChainResult, RunError | None]:
+    """The study's own speed and the sweep of a study whose organs are chains, by the FMU `file` of the machine; and
+    why the sweep ended early, if it did. A speed of the sweep whose run fails is left out and named in `failed`.
+
+    Raises
+    ------
+    RunError
+        where the study's own speed fails or is interrupted.
+    """
     chain, own = config.chain, config.run.crank_speed
     assert chain is not None
     modes = drive.machine.chain_modes(config.feed.left, config.feed.right)
@@ -337,26 +380,35 @@ def study_chain(
     if speeds:
         # the resonance itself, whatever the grid
         speeds += [w for _, _, w in critical[:1] if chain.sweep_lowest < w < chain.sweep_highest]
-    speeds = sorted({round(w, 9) for w in (*speeds, own)})
-    rows: list[SpeedNumbers] = []
-    by_rod: dict[str, Any] = {}
+    others = sorted({w for w in speeds if abs(w - own) > 1e-9 * own})
+    failed: dict[float, str] = {}
+    interrupted: RunError | None = None
     fmu = Fmu(file)
     try:
-        for k, w in enumerate(speeds):
-            what = f"chains at {w:.3g} rad/s"
 
-            def told(share: float, k: int = k, what: str = what) -> None:
-                report(what, k + share, float(len(speeds)))
+        def at(k: int, w: float) -> tuple[SpeedNumbers, dict[str, Any]]:
+            def told(share: float) -> None:
+                report(f"chains at {w:.3g} rad/s", k + share, float(len(others) + 1))
 
             told(0.0)
-            numbers, slack = numbers_at(fmu, drive, config, w, told)
-            rows.append(numbers)
-            if abs(w - own) < 1e-8:
-                by_rod = slack
+            return numbers_at(fmu, drive, config, w, told)
+
+        # first what the study asks, so that an early end costs the sweep alone
+        mine, by_rod = at(0, own)
+        rows = [mine]
+        for k, w in enumerate(others, 1):
+            try:
+                rows.append(at(k, w)[0])
+            except InterruptedRunError as error:
+                interrupted = error
+                break
+            except RunError as error:
+                failed[w] = str(error)
     finally:
         fmu.close()
-    return ChainResult(
-        own=next(n for n in rows if abs(n.speed - own) < 1e-8),
+    rows.sort(key=lambda n: float(n.speed))
+    result = ChainResult(
+        own=mine,
         sweep=tuple(rows),
         avoid=tuple(bands(rows, _rocker_at_rest(config, drive))),
         critical=tuple(critical),
@@ -364,7 +416,9 @@ def study_chain(
         starts=int(chain.starts),
         turns=int(chain.turns),
         rods=drive.rods,
+        failed=failed,
     )
+    return result, interrupted
 
 
 def _rocker_at_rest(config: Config, drive: Drive) -> float:
@@ -382,7 +436,9 @@ def bands(rows: Sequence[SpeedNumbers], at_rest: float) -> list[Band]:
         if n.slack_time > AVOID_SLACK:
             reasons.append("rods go slack and snatch")
         if n.rocker_torque_high > AVOID_RATIO * max(n.two_bar_rocker_torque, at_rest):
-            reasons.append("the rocker carries more than with two bars")
+            reasons.append(
+                f"the rocker carries over {AVOID_RATIO:g} times what two bars ask, here and at rest"
+            )
         return ", and ".join(reasons)
 
     speeds = [n.speed for n in rows]

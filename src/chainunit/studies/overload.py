@@ -24,7 +24,7 @@ from ..drives.cardan import ORDERS, two_joints
 from ..drives.dc_motor import DcMotor
 from ..drives.speed_control import Loop, Tuning, loop
 from ..engines import numpy_
-from ..errors import InputError, RunError
+from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
 from ..machines.api import EMPTY
 from ..machines.chain_unit import ChamberForces
@@ -203,25 +203,29 @@ def run_study(
         study.torsion = _torsion(study)
     files, study.made = study.drive.export(folder / "fmu", backend)
     try:
-        if study.drive.chain is not None:
-            study.chain = _chains(study, files["machine"], report)
         _simulate(study, files, folder, report, check, backend)
     except RunError as error:
         if error.partial is not None:
             study.runs["unfinished"] = error.partial
         study.failure = error
+    if study.drive.chain is not None and not isinstance(study.failure, InterruptedRunError):
+        _chains(study, files["machine"], report)
     _note(study)
     return study
 
 
-def _chains(study: Study, file: Path, report: Report) -> ChainResult | None:
+def _chains(study: Study, file: Path, report: Report) -> None:
     """Chains at constant speed; left out where an FMU in Python would take hours for their many turns."""
-    if "native" in study.made["machine"]:
-        return study_chain(study.config, study.drive, file, report)
-    study.notes.append(
-        "chains at constant speed and the sweep are left out: they need native code, that is a C compiler."
-    )
-    return None
+    if "native" not in study.made["machine"]:
+        study.notes.append(
+            "chains at constant speed and the sweep are left out: they need native code, that is a C compiler."
+        )
+        return
+    try:
+        study.chain, ended = study_chain(study.config, study.drive, file, report)
+    except RunError as error:
+        ended = error
+    study.failure = study.failure or ended
 
 
 def _loops(study: Study) -> dict[str, Loop]:
@@ -800,6 +804,11 @@ def _note(study: Study) -> None:
                     f"{title}: a rod is slack for {100 * answers.slack_time:.3g} % of the time; what snatches has no "
                     "single peak that is a prediction."
                 )
+            elif answers.web_pull_least < 0.0 or answers.wall_pull_least < 0.0:
+                note(
+                    f"{title}: an end of a rod is pushed, though the rod is pulled in the mean; more rods are nearer "
+                    "to a chain."
+                )
         elif answers.web_pull_least < 0.0:
             note(
                 f"{title}: web pull down to {answers.web_pull_least:.0f} N; a chain cannot push, it would go slack "
@@ -844,11 +853,31 @@ def _note_chain(study: Study, chain: Chain) -> None:
     for band in found.avoid if found else ():
         if found and band.low <= found.own.speed <= band.high:
             note(f"chains: the crank speed lies among those to avoid, {band}: {band.why}.")
-    if found and found.own.fold_largest > math.pi:
+    folds = [answers.fold_largest for answers in study.answers.values()]
+    folded = max([found.own.fold_largest] * bool(found) + folds if found else folds, default=0.0)
+    if folded > math.pi:
         note(
-            f"chains: rods fold up to {math.degrees(found.own.fold_largest):.0f} deg against each other, through "
-            "their stop; raise chain.fold_stiffness, or take the result for a machine that breaks."
+            f"chains: rods fold up to {math.degrees(folded):.0f} deg against each other, through their stop; raise "
+            "chain.fold_stiffness, or take the result for a machine that breaks."
         )
+    elif folded > chain.fold_limit:
+        note(
+            f"chains: rods fold up to {math.degrees(folded):.0f} deg and meet the stop between them, at "
+            f"{math.degrees(chain.fold_limit):.0f} deg, whose stiffness is assumed."
+        )
+    if walls + webs < 4:
+        note(
+            f"chains: {walls + webs} rods have {walls + webs - 2} natural frequencies; 8 rods show what a chain does."
+        )
+    if found:
+        for speed, why in found.failed.items():
+            note(f"chains: {speed:.4g} rad/s is missing in the sweep: {why}")
+        residual = max(n.energy_residual for n in found.sweep)
+        if not residual < 1e-3:
+            note(
+                f"chains: the energy residual reaches {residual:.1e} of the energy moved; lessen "
+                "chain.fold_stiffness."
+            )
     if study.coasting is not None:
         note("Behind the open coupling the machine is followed with two bars.")
 

@@ -29,7 +29,7 @@ from ..errors import InterruptedRunError, RunError
 from ..fmu.backends import Backend
 from ..machines.api import EMPTY
 from ..quantities import Layout, Value, declaration, quantity
-from .chain import duty
+from .chain import HIGH, duty
 from .cycle import Cycle, all_on_one, cycle
 from .drive import Drive
 
@@ -40,16 +40,16 @@ def rms(*parts: tuple[float, Any]) -> float:
     return math.sqrt(sum(share * float(np.mean(np.square(x))) for share, x in parts) / whole)
 
 
-def flywheel(torque: Any, speed: float, fluctuation: float, turned: float = 2.0 * math.pi) -> float:
+def flywheel(torque: Any, speed: float, fluctuation: float) -> float:
     """Inertia [kg m2] on the shaft that keeps (largest - least)/mean of its speed at `fluctuation`.
 
-    `torque` [N m] is what the shaft needs over a turn, or over an angle `turned` [rad] of several, at constant
-    `speed` [rad/s], evenly spaced in angle, shape (n,), against a drive that gives its mean: J = (E_max -
+    `torque` [N m] is what the shaft needs over a turn at constant `speed` [rad/s], evenly spaced in angle, shape
+    (n,), against a drive that gives its mean: J = (E_max -
     E_min)/(fluctuation w^2), with E the energy that runs ahead of the mean (Wittenbauer's method with the torque at
     constant speed).
     """
     torque = np.asarray(torque, dtype=float)
-    excess = np.cumsum(torque - np.mean(torque)) * (turned / len(torque))
+    excess = np.cumsum(torque - np.mean(torque)) * (2.0 * math.pi / len(torque))
     return float(np.ptp(excess)) / (fluctuation * speed * speed)
 
 
@@ -222,20 +222,30 @@ def cycle_numbers(config: Config, both: Cycle, one_sided: Cycle) -> CycleNumbers
     """What the machine asks of any drive, at constant speed of the crank."""
     assert config.sizing is not None
     machine = config.machine
-    turned = float(len(both.angle) * (both.angle[1] - both.angle[0]))
+
+    def peak(cycle: Cycle) -> float:
+        # of many turns of chains the quantile of their peaks, as no single one is a prediction
+        peaks = np.max(np.abs(np.atleast_2d(cycle.crank_torque)), axis=1)
+        return float(np.quantile(peaks, HIGH))
+
     w, share = config.run.crank_speed, config.sizing.one_sided_share
     inertia = both.outputs.J * machine.p.ratio**2
     mean = float(np.mean(both.crank_torque))
     return CycleNumbers(
         power_mean=mean * w,
         torque_mean=mean,
-        torque_peak=float(np.max(np.abs(both.crank_torque))),
-        torque_peak_one_sided=float(np.max(np.abs(one_sided.crank_torque))),
+        torque_peak=peak(both),
+        torque_peak_one_sided=peak(one_sided),
         torque_rms=rms((1.0 - share, both.crank_torque), (share, one_sided.crank_torque)),
         inertia_least=float(np.min(inertia)),
         inertia_mean=float(np.mean(inertia)),
         inertia_largest=float(np.max(inertia)),
-        inertia_wanted=flywheel(both.crank_torque, w, config.sizing.fluctuation, turned),
+        inertia_wanted=float(
+            np.quantile(
+                [flywheel(turn, w, config.sizing.fluctuation) for turn in np.atleast_2d(both.crank_torque)],
+                HIGH,
+            )
+        ),
     )
 
 
@@ -267,6 +277,11 @@ def size(
         "Catalogue data are typical; iron losses are not in the motor model.",
         "The gear's losses act as viscous drag on the motor shaft, of the mean power that its efficiency takes.",
     ]
+    if config.chain is not None:
+        notes.append(
+            f"Peaks of the cycle and the flywheel are those of single turns, {100 * HIGH:g} % quantile over all "
+            "turns of all starts of the chains."
+        )
     motors = [
         m for m in catalogue(config.catalogue) if asked.poles_least <= m.nameplate.poles <= asked.poles_most
     ]
