@@ -6,6 +6,7 @@ from __future__ import annotations
 import ctypes
 import dataclasses
 import math
+import signal
 
 import numpy as np
 import pytest
@@ -13,11 +14,12 @@ from machines import random_loads, random_machine
 from scipy.integrate import cumulative_simpson, solve_ivp
 from test_chain import DATA, M
 
-from chainunit import ChainUnit, GeometryError, InputError, RunError
+from chainunit import ChainUnit, GeometryError, InputError, RunError, config
 from chainunit.cosim import CoSimulation, System, monolithic, port_connections
 from chainunit.cosim.instance import Fmu, Instance
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.engines import MATH
+from chainunit.errors import InterruptedRunError
 from chainunit.fmu.export import export as export_python
 from chainunit.fmu.native.export import export as export_native
 from chainunit.fmu.native.platforms import compiler
@@ -33,6 +35,8 @@ from chainunit.machines.chain_unit import (
 )
 from chainunit.machines.flexible import OrganLaw, flexible
 from chainunit.machines.parts import Pin
+from chainunit.studies.chain import numbers_at, study_chain
+from chainunit.studies.drive import Drive
 
 FREE = OrganLaw(eta=0.0, end_damping=0.0, fold_stiffness=0.0)
 LOOSE = {"organ.eta": 0.048, "organ.end_damping": 0.2}
@@ -819,3 +823,43 @@ def test_the_fmu_refuses_a_chain_without_mass(files):
         RunError, match=r"left.web_mass = 0 kg: a chain without mass has no motion of its own"
     ):
         Run(files(3, 1), {"left.web_mass": 0.0})
+
+
+@pytest.fixture(scope="module")
+def undamped(files):
+    """FMU, study and drive of two rods a side without damping."""
+    study = config.parse(
+        'organ = "chain"\n[run]\ncrank_speed = 8\n[chain]\nrods = 2\neta = 0\nend_damping = 0\nsweep_points = 4\n'
+    )
+    return files(1, 1), study, Drive(DcMotor, DcMotor.Parameters(), study.machine, chain=study.chain)
+
+
+@native
+def test_numbers_of_two_rods_are_those_of_two_bars(undamped):
+    """Slack, snatch and torques mean the same of chains and of two bars."""
+    fmu, study, drive = undamped
+    found, by_rod = numbers_at(fmu, drive, study, 8.0)
+    assert 0.05 < found.slack_time == pytest.approx(found.two_bar_slack_time, abs=0.005)
+    assert found.snatch_median == pytest.approx(found.two_bar_snatch, rel=1e-3)
+    assert found.rocker_torque_median == pytest.approx(found.two_bar_rocker_torque, rel=1e-3)
+    assert found.crank_torque_rms == pytest.approx(
+        found.two_bar_crank_torque_rms, rel=0.05
+    )  # its pins' friction
+    assert found.energy_residual < 1e-6 and found.snatch_spread == pytest.approx(1.0, abs=1e-3)
+    assert all(share.shape == (2,) for share in by_rod.values())
+
+
+@native
+def test_an_interrupted_sweep_keeps_what_it_has(undamped):
+    """Ctrl-C at the third speed: the study's own and the first of the sweep stay."""
+    fmu, study, drive = undamped
+    told = []
+
+    def report(what, done, todo):
+        told.append(what)
+        if len(set(told)) == 3:
+            signal.raise_signal(signal.SIGINT)
+
+    result, ended = study_chain(study, drive, fmu.archive, report)
+    assert isinstance(ended, InterruptedRunError) and "interrupted at" in str(ended)
+    assert [round(n.speed, 3) for n in result.sweep] == [1.0, 8.0] and result.own.speed == 8.0

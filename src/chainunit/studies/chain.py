@@ -11,6 +11,7 @@ import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
@@ -196,6 +197,7 @@ def run_turns(
     settle: int = SETTLE,
     points: int = POINTS,
     progress: Callable[[float], None] = lambda share: None,
+    stopped: Callable[[], bool] | None = None,
 ) -> Turns:
     """Steady running at a prescribed constant speed of the crank, from the hanging position at several angles.
 
@@ -206,6 +208,12 @@ def run_turns(
     outputs : names of the wanted outputs
     starts, turns, settle, points : see `Turns`, `SETTLE`, `POINTS`
     progress : is told the share done
+    stopped : whether to stop, see `stoppable`; by default Ctrl-C stops it
+
+    Raises
+    ------
+    InterruptedRunError, RunError
+        where it was stopped, or a run fails.
     """
     model, p = drive.load_model()
     rods = [f"{side}.pull_{k + 1}" for side in _SIDES for k in range(sum(drive.rods))]
@@ -219,7 +227,7 @@ def run_turns(
     }
     done = [0]
 
-    def one(start: int, stopped: Callable[[], bool]) -> Any:
+    def one(start: int, stop: Callable[[], bool]) -> Any:
         unit = Instance(fmu, f"start {start}")
         try:
             # inside the FMU the angle runs on along the speed: nothing is set any more
@@ -231,7 +239,7 @@ def run_turns(
             for k in range(settle):
                 unit.step(k * points * step, points * step)
             for k in range(turns * points):
-                if stopped():
+                if stop():
                     raise InterruptedRunError(f"interrupted at {crank_speed:g} rad/s")
                 unit.step((settle * points + k) * step, step)
                 rows[k] = unit.read(handle)
@@ -241,8 +249,9 @@ def run_turns(
             done[0] += 1
             progress(done[0] / starts)
 
-    with stoppable() as stopped, ThreadPoolExecutor(min(starts, os.cpu_count() or 1)) as pool:
-        rows = list(pool.map(one, range(starts), [stopped] * starts))
+    asked = nullcontext(stopped) if stopped else stoppable()
+    with asked as stop, ThreadPoolExecutor(min(starts, os.cpu_count() or 1)) as pool:
+        rows = list(pool.map(one, range(starts), [stop] * starts))
     found = np.array(rows).reshape(starts, turns, points, len(names))
     first = len(outputs)
     each = len(rods) // 2
@@ -287,6 +296,7 @@ def numbers_at(
     config: Config,
     crank_speed: float,
     progress: Callable[[float], None] = lambda share: None,
+    stopped: Callable[[], bool] | None = None,
 ) -> tuple[SpeedNumbers, dict[str, Any]]:
     """The numbers at one speed with the study's feed, and by side the share of time in which each rod is slack."""
     chain, feed = config.chain, config.feed
@@ -296,7 +306,16 @@ def numbers_at(
     outputs = ("tau", "power", "rocker.tau", *others, *forces)
     starts, turns = int(chain.starts), int(chain.turns)
     found = run_turns(
-        fmu, drive, crank_speed, feed.left, feed.right, outputs, starts=starts, turns=turns, progress=progress
+        fmu,
+        drive,
+        crank_speed,
+        feed.left,
+        feed.right,
+        outputs,
+        starts=starts,
+        turns=turns,
+        progress=progress,
+        stopped=stopped,
     )
     values, ratio = found.values, drive.driven.p.ratio
 
@@ -383,15 +402,14 @@ def study_chain(
     others = sorted({w for w in speeds if abs(w - own) > 1e-9 * own})
     failed: dict[float, str] = {}
     interrupted: RunError | None = None
-    fmu = Fmu(file)
-    try:
+    with stoppable() as stopped, closing(Fmu(file)) as fmu:
 
         def at(k: int, w: float) -> tuple[SpeedNumbers, dict[str, Any]]:
             def told(share: float) -> None:
                 report(f"chains at {w:.3g} rad/s", k + share, float(len(others) + 1))
 
             told(0.0)
-            return numbers_at(fmu, drive, config, w, told)
+            return numbers_at(fmu, drive, config, w, told, stopped)
 
         # first what the study asks, so that an early end costs the sweep alone
         mine, by_rod = at(0, own)
@@ -404,8 +422,6 @@ def study_chain(
                 break
             except RunError as error:
                 failed[w] = str(error)
-    finally:
-        fmu.close()
     rows.sort(key=lambda n: float(n.speed))
     result = ChainResult(
         own=mine,
