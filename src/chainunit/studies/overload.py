@@ -124,6 +124,10 @@ def _number(value: Any) -> float | None:
     return None if value is None or not math.isfinite(value) else float(value)
 
 
+_ROCKER_GOOD, _CRANK_GOOD = (0.2, 0.4), 0.6
+"""Crank speeds, in parts of the organ's lowest natural frequency, up to which two bars give the rocker torque (empty,
+loaded) and the crank torque to a tenth of the peak of chains: on the packaged machine, docs/physics.md."""
+
 Report = Callable[[str, float, float], None]
 """Called with what is running, the time done and the time to do [s]."""
 
@@ -763,15 +767,20 @@ def _note(study: Study) -> None:
         "Friction is smoothed: at rest nothing sticks, so that the torque to break away from a loaded "
         "stop is not in the start-up."
     )
-    # two bars against a chain of many rods, on this organ: docs/physics.md
     speed, mode = config.run.crank_speed, limits.chain_resonance
     if config.chain is not None:
         _note_chain(study, config.chain)
-    elif speed > 0.31 * mode:
+    elif speed > _ROCKER_GOOD[0] * mode:
+        empty, loaded = (share * mode for share in _ROCKER_GOOD)
         note(
-            "A chain has a mode that two bars lack: the rocker torque of two bars is good to 10 % only up "
-            f"to about {0.31 * mode:.1f} rad/s of the crank"
-            + (", the crank torque up to about twice that." if speed > 0.65 * mode else ".")
+            "A chain has a mode that two bars lack: the rocker torque of two bars is good to 10 % only up to about "
+            f"{empty:.1f} rad/s (empty) or {loaded:.1f} rad/s (loaded) of the crank"
+            + (
+                f", the crank torque up to {_CRANK_GOOD * mode:.1f} rad/s"
+                if speed > _CRANK_GOOD * mode
+                else ""
+            )
+            + '; organ = "chain" has chains.'
         )
     steady = study.answers.get("steady")
     if steady is not None and not _settled(steady, speed):
