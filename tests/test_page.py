@@ -395,7 +395,7 @@ def test_chains_stand_beside_two_bars(chains, tmp_path):
         "chains, 95 %",
         "10 starts of 30 turns",
         "Slack on the left",
-        "Avoid 3.54 to",
+        "Avoid 3.542 to",
         "(mode 1, order 1)",
     ):
         assert words in told.getvalue(), words

@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from ..planar import Motion, Vec2
+from ..planar import ZERO, Motion, Vec2
 
 
 class Rods:
@@ -235,14 +235,18 @@ class Chain:
         )
 
 
+def pins(lengths: Sequence[Any], theta: Sequence[Any], omega: Sequence[Any], xp: Any) -> list[Motion]:
+    """Place and velocity of each pin from A1, of pin 0 too."""
+    found = [Motion(ZERO, ZERO)]
+    for l, angle, w in zip(lengths, theta, omega, strict=True):
+        s, c = xp.sin(angle), xp.cos(angle)
+        found.append(Motion(found[-1].p + Vec2(s, -c) * l, found[-1].p1 + Vec2(c, s) * (l * w)))
+    return found
+
+
 def end_motion(rods: Rods, theta: Sequence[Any], omega: Sequence[Any], xp: Any) -> Motion:
     """Place and velocity of the last pin from A1."""
-    p, v = Vec2(0.0, 0.0), Vec2(0.0, 0.0)
-    for l, angle, w in zip(rods.lengths, theta, omega, strict=True):
-        s, c = xp.sin(angle), xp.cos(angle)
-        p = p + Vec2(s, -c) * l
-        v = v + Vec2(c, s) * (l * w)
-    return Motion(p, v)
+    return pins(rods.lengths, theta, omega, xp)[-1]
 
 
 def closed(

@@ -266,6 +266,11 @@ class DirectOutputs(Loads):
     J: Value = quantity("kg.m2", "inertia reflected to the shaft")
 
 
+def processing_by_speed(xp: Any, p: Any, loads: Any, v2: Any) -> Any:
+    """The processing force by the speed of B, where that is `v2` squared [N s/m]."""
+    return loads.processing_force / xp.sqrt(v2 + p.processing.v_smooth * p.processing.v_smooth)
+
+
 class Organ:
     """A working organ: the dyad wall (A1-B) and web (A2-B) with the material on it."""
 
@@ -284,11 +289,7 @@ class Organ:
     def resistance(self, xp: Any, p: Any, loads: Any, w: Any) -> tuple[Vec2, Any]:
         """The processing force on the web at B, and the torque that overcomes it (its power over w)."""
         v1 = self.dyad.b.p1
-        v = (
-            loads.processing_force
-            * w
-            / xp.sqrt(v1.squared() * (w * w) + p.processing.v_smooth * p.processing.v_smooth)
-        )
+        v = processing_by_speed(xp, p, loads, v1.squared() * (w * w)) * w
         return v1 * (-v), v1.squared() * v
 
     def reactions(self, w2: Any, a: Any, g: Any, processing: Vec2) -> tuple[Vec2, Vec2, Vec2]:

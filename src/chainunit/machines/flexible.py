@@ -170,12 +170,10 @@ class Hung:
         self.rods, self.walls, self.state = rods, walls, state
         self.a2, self.turn = rocker.at(p.e), rocker.t1
         theta, omega = state
-        wall = chain.Rods(rods.lengths[:walls], rods.masses[:walls], ())
-        v = chain.end_motion(wall, theta[:walls], omega[:walls], xp).p1
-        v2 = v.squared()
-        per_speed = loads.processing_force / xp.sqrt(v2 + p.processing.v_smooth * p.processing.v_smooth)
-        self.processing, self.resisted = v * (-per_speed), v2 * per_speed
-        end = chain.end_motion(rods, theta, omega, xp)
+        pins = chain.pins(rods.lengths, theta, omega, xp)
+        v, end = pins[walls].p1, pins[-1]
+        per_speed = chain_unit.processing_by_speed(xp, p, loads, v.squared())
+        self.processing, self.resisted = v * (-per_speed), v.squared() * per_speed
         self.missing = self.a2.p - a1 - end.p
         late = self.a2.p1 * w - end.p1
         self.wanted = self.a2.p2 * (w * w) + late * (2.0 * closing) + self.missing * (closing * closing)

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..engines import numpy_
-from ..machines.chain_unit import ChamberForces, Inputs, SideLoads
-from ..planar import ZERO, Vec2
+from ..groups.chain import pins
+from ..machines.chain_unit import ChamberForces, Inputs, SideLoads, processing_by_speed
+from ..planar import Motion
 from ..studies.overload import PINS, Study
 from .interactive import called, event_of, in_order, settled
 
@@ -85,19 +86,14 @@ def _organ_joints(side: str, rods: tuple[int, int]) -> list[str]:
     return [f"A1 {side}", *names, "A2"]
 
 
-def _chain(p: Any, part: Any, side: str, a1: Vec2, rods: tuple[int, int]) -> tuple[list[Vec2], Vec2]:
-    """The joints between the rods of a simulated chain, from A1 on, and the velocity of B."""
+def _chain(p: Any, part: Any, side: str, rods: tuple[int, int]) -> list[Motion]:
+    """Places, from A1, and velocities of the joints of a simulated chain."""
     walls, webs = rods
-    lengths = [p.l1 / walls] * walls + [p.l2 / webs] * webs
-    at, v, found, of_b = a1, ZERO, [], ZERO
-    for k, length in enumerate(lengths[:-1], 1):
-        angle, turning = (part[f"machine.{side}.{x}_{k}"].values for x in ("theta", "omega"))
-        across = Vec2(np.cos(angle), np.sin(angle)) * length
-        at, v = at + Vec2(across.y, -across.x), v + across * turning
-        found.append(at)
-        if k == walls:
-            of_b = v
-    return found, of_b
+    theta, omega = (
+        [part[f"machine.{side}.{x}_{k}"].values for k in range(1, walls + webs + 1)]
+        for x in ("theta", "omega")
+    )
+    return pins([p.l1 / walls] * walls + [p.l2 / webs] * webs, theta, omega, numpy_())
 
 
 def _run(study: Study, name: str, interval: float) -> dict[str, Any]:
@@ -138,10 +134,9 @@ def _run(study: Study, name: str, interval: float) -> dict[str, Any]:
         names = _organ_joints(side, rods)[1:-1]
         a1, b, a2 = (joints[name] for name in (f"A1 {side}", f"B {side}", "A2"))
         if f"machine.{side}.theta_1" in part:
-            between, v = _chain(p, part, side, a1, rods)
-            smooth = p.processing.v_smooth
-            size = loads[side].processing_force / np.sqrt(v.squared() + smooth * smooth)
-            processing[side] = v * -size
+            moving = _chain(p, part, side, rods)
+            between, v = [a1 + pin.p for pin in moving[1:-1]], moving[walls].p1
+            processing[side] = v * -processing_by_speed(numpy_(), p, loads[side], v.squared())
         else:
             # behind an open coupling the machine is followed with two bars
             between = [a1 + (b - a1) * (k / walls) for k in range(1, walls)]

@@ -189,7 +189,8 @@ def _show_chain(found: ChainResult, console: Console) -> None:
     if len(found.sweep) > 1:
         low, high_speed = found.sweep[0].speed, found.sweep[-1].speed
         for band in found.avoid:
-            ends = ", where the sweep ends" if band.high == high_speed else ""
+            ends = ", where the sweep begins" if band.low == low else ""
+            ends += ", where the sweep ends" if band.high == high_speed else ""
             console.print(f"Avoid {band}{ends}: {band.why}.", soft_wrap=True)
         if not found.avoid:
             console.print(f"No speed to avoid from {low:.3g} to {high_speed:.3g} rad/s.")

@@ -96,7 +96,7 @@ class Band:
 
     def __str__(self) -> str:
         """From where to where, in words; a study without a sweep has but one speed."""
-        return f"{self.low:.3g}" + (f" to {self.high:.3g}" if self.high > self.low else "") + " rad/s"
+        return f"{self.low:.4g}" + (f" to {self.high:.4g}" if self.high > self.low else "") + " rad/s"
 
 
 @dataclass(frozen=True)
@@ -399,6 +399,7 @@ def study_chain(
     if speeds:
         # the resonance itself, whatever the grid
         speeds += [w for _, _, w in critical[:1] if chain.sweep_lowest < w < chain.sweep_highest]
+    spacing = (chain.sweep_highest - chain.sweep_lowest) / max(1, len(speeds) - 2)
     others = sorted({w for w in speeds if abs(w - own) > 1e-9 * own})
     failed: dict[float, str] = {}
     interrupted: RunError | None = None
@@ -426,7 +427,7 @@ def study_chain(
     result = ChainResult(
         own=mine,
         sweep=tuple(rows),
-        avoid=tuple(bands(rows, _rocker_at_rest(config, drive))),
+        avoid=tuple(bands(rows, _rocker_at_rest(config, drive), 0.5 * spacing)),
         critical=tuple(critical),
         slack_by_rod=by_rod,
         starts=int(chain.starts),
@@ -443,9 +444,10 @@ def _rocker_at_rest(config: Config, drive: Drive) -> float:
     return float(np.max(np.abs(slowly.outputs.rocker.tau)))
 
 
-def bands(rows: Sequence[SpeedNumbers], at_rest: float) -> list[Band]:
+def bands(rows: Sequence[SpeedNumbers], at_rest: float, reach: float = math.inf) -> list[Band]:
     """Speeds to avoid, from the rows of a sweep in rising order: neighbours with the same reason are one band, from
-    halfway to the last good speed to halfway to the next. `at_rest`: the rocker torque of two bars at rest [N.m]."""
+    halfway to the last good speed to halfway to the next, but no farther than `reach` [rad/s] from one that was run.
+    `at_rest`: the rocker torque of two bars at rest [N.m]."""
 
     def why(n: SpeedNumbers) -> str:
         reasons = []
@@ -463,8 +465,10 @@ def bands(rows: Sequence[SpeedNumbers], at_rest: float) -> list[Band]:
     for k in range(len(rows) + 1):
         now = why(rows[k]) if k < len(rows) else ""
         if begun is not None and now != why(rows[begun]):
-            low = speeds[0] if begun == 0 else 0.5 * (speeds[begun - 1] + speeds[begun])
-            high = speeds[-1] if k == len(rows) else 0.5 * (speeds[k - 1] + speeds[k])
+            low = speeds[begun] - (
+                0.0 if begun == 0 else min(reach, 0.5 * (speeds[begun] - speeds[begun - 1]))
+            )
+            high = speeds[k - 1] + (0.0 if k == len(rows) else min(reach, 0.5 * (speeds[k] - speeds[k - 1])))
             found.append(Band(low, high, why(rows[begun])))
             begun = None
         if begun is None and now:
