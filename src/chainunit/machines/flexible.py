@@ -556,7 +556,13 @@ def _flexible(walls: int, webs: int) -> type[Model]:
             yield (a2 - a1).x * hand / whole, (a2 - a1).y / whole
 
     class ChainUnitFlexible(Model):
-        """The chain unit with its organs as chains; rods on each side as its function `flexible` was told."""
+        """The chain unit with its organs as chains of rods, as many as `flexible` was told.
+
+        Inputs, outputs and load port are those of ChamberForces, and connect alike. In a co-simulation the inputs phi
+        and w run along w and a inside a step, and its own integrator controls its error to `tolerance`. In Model
+        Exchange phi, w and a must be set whenever derivatives are evaluated. Rods are counted from A1; a rod is slack
+        where its mean axial pull is below zero.
+        """
 
         name = "ChainUnitFlexible"
         built_by = f"flexible({walls}, {webs})"
