@@ -1,4 +1,4 @@
-"""The chain unit with its organs as true chains: rods of number between wall hinge A1 and web hinge A2, with states.
+"""The chain unit with its organs as true chains: N rods a side between wall hinge A1 and web hinge A2, with states.
 
 Symbols as in `chainunit.machines.chain_unit`, of the chain as in `chainunit.groups.chain`: rods are numbered from A1,
 the first `walls` of them are the wall, the others the web; theta is the angle of a rod from the downward vertical,
