@@ -161,16 +161,21 @@ class Model:
         """
         for line in violations(cls.parameter_layout, p):
             raise InputError(line)
-        given = cls.parameter_layout.named(p)
         try:
             p = cls.prepared(MATH, p, derived)
         except (ArithmeticError, ValueError):
             # `math` raises where other engines give NaN, which no requirement admits
             p = cls.prepared(MATH, p, [math.nan] * cls.derived)
-        for required, (value, low, high) in zip(cls.required, cls.requirements(MATH, p), strict=True):
-            if not low < value < high:
-                raise GeometryError(required.refusal(value, low, high, given))
+        cls._meets(p, cls.required, cls.requirements(MATH, p))
         return p
+
+    @classmethod
+    def _meets(
+        cls, p: Any, required: tuple[Requirement, ...], limits: Iterator[tuple[Any, Any, Any]]
+    ) -> None:
+        for each, (value, low, high) in zip(required, limits, strict=True):
+            if not low < value < high:
+                raise GeometryError(each.refusal(value, low, high, cls.parameter_layout.named(p)))
 
     @staticmethod
     def excitation(t: float) -> dict[str, float]:
@@ -213,12 +218,7 @@ class Model:
             where they do not meet what is required, in one line.
         """
         x = cls.start(MATH, p, u)
-        given = cls.parameter_layout.named(p) if cls.start_required else {}
-        for required, (value, low, high) in zip(
-            cls.start_required, cls.start_limits(MATH, p, u, x), strict=True
-        ):
-            if not low < value < high:
-                raise GeometryError(required.refusal(value, low, high, given))
+        cls._meets(p, cls.start_required, cls.start_limits(MATH, p, u, x))
         return x
 
     @classmethod

@@ -376,12 +376,17 @@ class Mechanism(CrankRocker):
         return tuple(rates)
 
 
+def supports(p: Any) -> tuple[Vec2, Vec2]:
+    """A1 of the left and of the right organ."""
+    return Vec2(-p.z, 0.0), Vec2(p.z, 0.0)
+
+
 def organs(xp: Any, p: Any, u: Any, rocker: Link) -> tuple[Organ, Organ]:
     """Both working organs on a rocker that moves in a known way."""
-    a2 = rocker.at(p.e)
+    a2, (left, right) = rocker.at(p.e), supports(p)
     return (
-        Organ(xp, p, Vec2(-p.z, 0.0), a2, p.left, u.left, -1.0),
-        Organ(xp, p, Vec2(p.z, 0.0), a2, p.right, u.right, 1.0),
+        Organ(xp, p, left, a2, p.left, u.left, -1.0),
+        Organ(xp, p, right, a2, p.right, u.right, 1.0),
     )
 
 
@@ -538,8 +543,8 @@ def drive_loads(
     torque, rocker = s.torque(a), m.rocker
     at_frame = f.at_o1 + f.at_c + f.left[0] + f.right[0]
     moment = m.crank.pin.p.cross(f.at_o1) + at_a1
-    for place, forces in ((-p.z, f.left), (p.z, f.right)):
-        moment = moment + Vec2(place, 0.0).cross(forces[0])
+    for a1, forces in zip(supports(p), (f.left, f.right), strict=True):
+        moment = moment + a1.cross(forces[0])
     return {
         "rocker": Rocker(
             psi=m.psi(xp),

@@ -47,7 +47,16 @@ from ..planar import ZERO, Link, Motion, Vec2
 from ..ports import PortSlopes
 from ..quantities import Layout, Value, declaration, group, quantity
 from . import chain_unit
-from .chain_unit import ChamberForces, CrankRocker, DriveReactions, Inputs, Outputs, StopLoad, drive_loads
+from .chain_unit import (
+    ChamberForces,
+    CrankRocker,
+    DriveReactions,
+    Inputs,
+    Outputs,
+    StopLoad,
+    drive_loads,
+    supports,
+)
 
 W_SMALL = 0.01
 """Speed of the crank [rad/s] below which the slopes by the angle tend to zero."""
@@ -249,7 +258,7 @@ def _organs(
     """Both chains on the rocker of `m`."""
     return tuple(
         Hung(xp, p, each, walls, a1, m.rocker, w, state, loads, a, closing)
-        for each, a1, state, loads in zip(rods, _supports(p), states, (u.left, u.right), strict=True)
+        for each, a1, state, loads in zip(rods, supports(p), states, (u.left, u.right), strict=True)
     )
 
 
@@ -337,11 +346,6 @@ class State:
                 slope(along.J) * share,
             )
         return self._slopes
-
-
-def _supports(p: Any) -> tuple[Vec2, Vec2]:
-    """A1 of the left and of the right organ."""
-    return Vec2(-p.z, 0.0), Vec2(p.z, 0.0)
 
 
 def _side(
@@ -509,7 +513,7 @@ def _flexible(walls: int, webs: int) -> type[Model]:
         left, right = (
             side_loads(**_side(xp, p, h, a1, hand, s.m, each, state.energy_due))
             for h, a1, hand, each, state in zip(
-                s.organs, _supports(p), (1.0, -1.0), forces, (x.left, x.right), strict=True
+                s.organs, supports(p), (1.0, -1.0), forces, (x.left, x.right), strict=True
             )
         )
         margin = xp.abs(s.m.drive.transmission)
@@ -552,7 +556,7 @@ def _flexible(walls: int, webs: int) -> type[Model]:
     def reaches(xp: Any, p: Any, rocker: Link) -> Iterator[tuple[Any, Any]]:
         """From A1 to A2 in parts of the length, the right organ mirrored."""
         a2, whole = rocker.at(p.e).p, p.l1 + p.l2
-        for hand, a1 in zip((1.0, -1.0), _supports(p), strict=True):
+        for hand, a1 in zip((1.0, -1.0), supports(p), strict=True):
             yield (a2 - a1).x * hand / whole, (a2 - a1).y / whole
 
     class ChainUnitFlexible(Model):
@@ -668,7 +672,7 @@ def _flexible(walls: int, webs: int) -> type[Model]:
             """Hanging at rest, and taken along by A2 where the crank turns."""
             m, w = CrankRocker(xp, p, u.phi / p.ratio), u.w / p.ratio
             found = []
-            bars = chain_unit.organs(xp, p, u, m.rocker)
+            bars = chain_unit.organs(xp, p, u, m.rocker) if N == LEAST else ()
             for k, (hand, each) in enumerate(zip((1.0, -1.0), rods(p, u), strict=True)):
                 if N == LEAST:
                     theta = _bars(xp, bars[k].dyad)
@@ -677,10 +681,10 @@ def _flexible(walls: int, webs: int) -> type[Model]:
                     theta = [xp.atan2(hand * H, v - b) for b in _shape(each)[1]]
                 hanging = theta, [0.0 * theta[0]] * N
                 # once: of a chain that was not found to hang it leaves a gap, see `start_limits`
-                found.append(_closed(xp, p, each, _supports(p)[k], m.rocker, w, hanging, 1)[:2])
+                found.append(_closed(xp, p, each, supports(p)[k], m.rocker, w, hanging, 1)[:2])
             organs = _organs(xp, p, u, rods(p, u), walls, found, m, w)
             sides = []
-            for (theta, omega), h, a1 in zip(found, organs, _supports(p), strict=True):
+            for (theta, omega), h, a1 in zip(found, organs, supports(p), strict=True):
                 kinetic, potential, _ = _energies(xp, p, h, a1)
                 sides.append(of_side.instance([*theta, *omega, kinetic + potential]))
             return states(left=sides[0], right=sides[1])
@@ -692,7 +696,7 @@ def _flexible(walls: int, webs: int) -> type[Model]:
             m, w = CrankRocker(xp, p, u.phi / p.ratio), u.w / p.ratio
             found: list[Any] = []
             for each, a1, state, due in zip(
-                rods(p, u), _supports(p), split(x), (x.left.energy_due, x.right.energy_due), strict=True
+                rods(p, u), supports(p), split(x), (x.left.energy_due, x.right.energy_due), strict=True
             ):
                 theta, omega, work = _closed(xp, p, each, a1, m.rocker, w, state, 1)
                 found += [*theta, *omega, due + work]

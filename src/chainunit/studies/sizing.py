@@ -44,9 +44,8 @@ def flywheel(torque: Any, speed: float, fluctuation: float) -> float:
     """Inertia [kg m2] on the shaft that keeps (largest - least)/mean of its speed at `fluctuation`.
 
     `torque` [N m] is what the shaft needs over a turn at constant `speed` [rad/s], evenly spaced in angle, shape
-    (n,), against a drive that gives its mean: J = (E_max -
-    E_min)/(fluctuation w^2), with E the energy that runs ahead of the mean (Wittenbauer's method with the torque at
-    constant speed).
+    (n,), against a drive that gives its mean: J = (E_max - E_min)/(fluctuation w^2), with E the energy that runs
+    ahead of the mean (Wittenbauer's method with the torque at constant speed).
     """
     torque = np.asarray(torque, dtype=float)
     excess = np.cumsum(torque - np.mean(torque)) * (2.0 * math.pi / len(torque))

@@ -64,10 +64,11 @@ def kernels(interface: Interface) -> str:
         return casadi.jtimes(result, casadi.vertcat(us, xs), casadi.vertcat(du, dx))
 
     add("all", symbols, casadi.vertcat(*(outputs[k] for group in groups(interface) for k in group)))
+    apart = differenced(interface)
     for i, group in enumerate(groups(interface)):
         values = casadi.vertcat(*(outputs[k] for k in group))
         add(f"group_{i}", symbols, values)
-        if i not in differenced(interface):
+        if i not in apart:
             add(f"group_{i}_forward", [ps, us, xs, du, dx, *more], forward(values))
     if interface.states:
         rates = casadi.vertcat(*derivatives)

@@ -22,8 +22,6 @@ from ...errors import InputError, RunError
 
 _FLAGS = ("-std=c99", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off")
 _SHARED = ("-shared", "-s")
-
-
 KERNELS, KERNELS_OBJECT = "kernels.c", "kernels.o"
 
 
