@@ -21,7 +21,6 @@ from ..pack import checked, pack, written
 from .generate import kernels, tables
 from .platforms import build, chosen
 
-_HERE = Path(__file__).parent
 _LAYER = ("model.h", "runtime.h", "runtime.c")
 
 
@@ -103,7 +102,7 @@ def export(
 
     report("generating C")
     functions = kernels(interface)
-    layer_texts = {name: (_HERE / name).read_bytes() for name in layer}
+    layer_texts = {name: (_c_layer() / name).read_bytes() for name in layer}
     digest = hashlib.sha256(description(""))
     for text in (functions.encode(), tables(interface, "", "").encode(), *layer_texts.values()):
         digest.update(text + b"\0")
@@ -135,6 +134,12 @@ def _build_description(identifier: str, names: Sequence[str]) -> bytes:
     for name in names:
         SubElement(files, "SourceFile", name=name)
     return written(root)
+
+
+def _c_layer() -> Path:
+    """The folder of the C layer: in an installed package beside this file, in a checkout `fmu/native`."""
+    here = Path(__file__).parent
+    return here if (here / "runtime.c").exists() else here.parents[3] / "fmu" / "native"
 
 
 def _headers() -> Path:
