@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from chainunit.errors import InputError
+from chainunit.fmu.description import Interface, model_description
 from chainunit.models import MODELS
-from chainunit.quantities import Layout, base_units, variables
+from chainunit.quantities import Layout, Quantity, base_units, bounded, variables
+from chainunit.reading import to_number
 
 
 def test_units_are_parsed():
@@ -14,7 +17,9 @@ def test_units_are_parsed():
     assert base_units("kg.m2/rad") == {"kg": 1, "m": 2, "rad": -1}
     assert base_units("V") == {"kg": 1, "m": 2, "s": -3, "A": -1}
     assert base_units("Ohm") == base_units("V/A") and base_units("H") == base_units("V.s/A")
-    for wrong in ("Nm", "kg m", "rpm", ""):
+    assert base_units("Hz/(N.m)") == {"kg": -1, "m": -2, "s": 1}
+    assert base_units("kg.m2/(s3.A)") == base_units("V")
+    for wrong in ("Nm", "(N.m", "kg m", "rpm", ""):
         with pytest.raises(ValueError, match="unknown unit"):
             base_units(wrong)
 
@@ -49,3 +54,31 @@ def test_layout_goes_there_and_back(model):
 @pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 def test_start_values_make_a_model(model):
     model.check(model.Parameters())
+
+
+@pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
+def test_no_unit_of_an_fmu_can_be_read_in_two_ways(model):
+    """`kg.m2/s4.A` is kg m2 A/s4 to one reader, kg m2/(s4 A) to another."""
+    root = model_description(Interface(model, {}), "", {"ModelExchange": {}}, "0")
+    units = {node.get("name") for node in root.iter("Unit")}
+    assert units and not [u for u in units if "." in u.partition("/")[2] and not u.endswith(")")]
+
+
+def test_a_text_takes_brackets_below_a_stroke():
+    (slip,) = (v for v in MODELS["InductionMotor"].parameter_layout.variables if v.unit == "Hz/(N.m)")
+    assert to_number(slip, "0.02 Hz/(N.m)") == to_number(slip, "0.02 Hz/N.m") == pytest.approx(0.02)
+
+
+def test_what_is_off_its_bound_by_rounding_counts_as_the_bound():
+    share = Quantity("1", "", low=0.0, high=1.0)
+    heavy = Quantity("kg", "", low=0.0, open_low=True, nominal=1e3)
+    for x in (-1e-9, 0.0, 1.0, 1.0 + 1e-9):
+        assert share.admits(x) and share.bounded(x) == round(x)
+    assert not share.admits(-1.1e-9) and not share.admits(1.0 + 1.1e-9)
+    assert not heavy.admits(-1e-9) and not heavy.admits(0.0), "a bound that is itself forbidden"
+    model = MODELS["ChamberForces"]
+    p = model.parameter_layout.from_names({"web_share": 1.0 + 1e-12, "crank.m": -1e-12})
+    assert (model.check(p).web_share, model.check(p).crank.m) == (1.0, 0.0)
+    assert bounded(model.parameter_layout, model.Parameters()) == model.Parameters()
+    with pytest.raises(InputError, match=r"web_share = 1\.1: must be >= 0 and <= 1"):
+        model.check(model.parameter_layout.from_names({"web_share": 1.1}))

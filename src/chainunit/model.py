@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 
 from .engines import MATH
 from .errors import GeometryError, InputError
-from .quantities import Layout, violations
+from .quantities import Layout, bounded, violations
 
 
 @dataclass(frozen=True)
@@ -161,6 +161,7 @@ class Model:
         """
         for line in violations(cls.parameter_layout, p):
             raise InputError(line)
+        p = bounded(cls.parameter_layout, p)
         try:
             p = cls.prepared(MATH, p, derived)
         except (ArithmeticError, ValueError):

@@ -5,8 +5,8 @@ scalar) or `group` (a nested dataclass, whose fields appear under a prefix: ``cr
 Everything else - modelDescription.xml, config validation, tables, netCDF attributes - is
 generated from these declarations. Standard library only: FMUs carry this file.
 
-Units are written as in FMI: ``.`` multiplies, ``/`` divides (everything behind it), an integer
-behind a name is its power: ``kg.m2``, ``N.m.s/rad``, ``1`` for a pure number.
+Units are written as in FMI: ``.`` multiplies, ``/`` divides, an integer behind a name is its power:
+``kg.m2``, ``N.m.s/rad``, ``1`` for a pure number. Several factors below stand in brackets: ``Hz/(N.m)``.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ TYPES: dict[str, str] = {
     "1/Wb": "SaturationCoefficient",
     "Hz": "Frequency",
     "Hz/s": "FrequencyRate",
-    "Hz/N.m": "SlipCompensation",
+    "Hz/(N.m)": "SlipCompensation",
 }
 """Name of the kind of quantity of a unit, as the declared type of an FMU's variables."""
 
@@ -96,7 +96,7 @@ def base_units(unit: str) -> dict[str, int]:
     """
     exponents: dict[str, int] = {}
     for sign, part in zip((1, -1), unit.split("/"), strict=False):
-        for factor in part.split("."):
+        for factor in (part[1:-1] if part[:1] + part[-1:] == "()" else part).split("."):
             match = re.fullmatch(r"([A-Za-z]+|1)(-?\d+)?", factor)
             if match is None or match[1] not in _NAMED:
                 raise ValueError(f"unknown unit {factor!r} in {unit!r}")
@@ -104,6 +104,10 @@ def base_units(unit: str) -> dict[str, int]:
             for base, exponent in _NAMED[match[1]].items():
                 exponents[base] = exponents.get(base, 0) + exponent * power
     return {base: exponents[base] for base in SI if exponents.get(base)}
+
+
+ROUNDING = 1e-9
+"""in parts of a quantity's nominal size: what is beyond a bound by no more counts as the bound"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,10 +132,19 @@ class Quantity:
         high = f"<= {self.high:g}{unit}" if math.isfinite(self.high) else ""
         return " and ".join(x for x in (low, high) if x) or "any number"
 
+    @property
+    def slack(self) -> float:
+        """How far beyond a bound a value counts as the bound: what rounding makes of the typical size."""
+        return ROUNDING * (self.nominal or 1.0)
+
     def admits(self, x: float) -> bool:
-        """Whether the number `x` is finite and inside the bounds."""
-        above = x > self.low if self.open_low else x >= self.low
-        return math.isfinite(x) and above and x <= self.high
+        """Whether the number `x` is finite and inside the bounds, or beyond one by rounding only."""
+        above = x > self.low if self.open_low else x >= self.low - self.slack
+        return math.isfinite(x) and above and x <= self.high + self.slack
+
+    def bounded(self, x: float) -> float:
+        """An admitted number `x`, on its bound where it is beyond it by rounding."""
+        return self.low if x < self.low else self.high if x > self.high else x
 
 
 Value: TypeAlias = Any
@@ -277,6 +290,13 @@ def violations(layout: Layout, instance: Any) -> Iterator[str]:
     for variable, x in zip(layout.variables, layout.values(instance), strict=True):
         if not variable.quantity.admits(x):
             yield complaint(variable, x)
+
+
+def bounded(layout: Layout, instance: Any) -> Any:
+    """An admitted `instance` with each value that is beyond a bound by rounding on that bound."""
+    values = layout.values(instance)
+    inside = [v.quantity.bounded(x) for v, x in zip(layout.variables, values, strict=True)]
+    return instance if inside == values else layout.instance(inside)
 
 
 def complaint(variable: Variable, x: Any) -> str:

@@ -24,7 +24,10 @@ from .quantities import Layout, Variable, base_units, complaint, variables
 T = TypeVar("T")
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*")
-_UNIT = re.compile(r"1|(?:1/)?[A-Za-zµΩ°]+(?:\^|\*\*)?-?\d?(?:\s*[.*/·]\s*[A-Za-zµΩ°]+(?:\^|\*\*)?-?\d?)*")
+_POWER = r"[A-Za-zµΩ°]+(?:\^|\*\*)?-?\d?"
+_UNIT = re.compile(
+    rf"1|(?:1/)?{_POWER}(?:\s*[.*/·]\s*{_POWER})*(?:\s*/\s*\(\s*{_POWER}(?:\s*[.*·]\s*{_POWER})*\s*\))?"
+)
 _ANGLES = frozenset(
     "rad mrad radian radians deg degree degrees ° rev revolution revolutions turn turns rpm".split()
 )
@@ -67,7 +70,7 @@ def to_number(variable: Variable, given: Any) -> float:
         raise ValueError(f"{variable.name}: the number is too large; must be {_kind(variable)}") from None
     if not variable.quantity.admits(value):
         raise ValueError(complaint(variable, value))
-    return value
+    return variable.quantity.bounded(value)
 
 
 def _converted(variable: Variable, text: str) -> float:

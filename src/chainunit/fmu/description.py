@@ -297,8 +297,8 @@ def _per_second(unit: str) -> str:
     powers = base_units(unit)
     powers["s"] = powers.get("s", 0) - 1
     top = ".".join(f"{b}{'' if n == 1 else n}" for b, n in powers.items() if n > 0)
-    below = ".".join(f"{b}{'' if n == -1 else -n}" for b, n in powers.items() if n < 0)
-    return (top or "1") + (f"/{below}" if below else "")
+    below = [f"{b}{'' if n == -1 else -n}" for b, n in powers.items() if n < 0]
+    return (top or "1") + (f"/({'.'.join(below)})" if len(below) > 1 else "".join(f"/{b}" for b in below))
 
 
 def _log_categories(root: Element) -> None:
