@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 import io
 import json
+import math
 import re
 import shutil
 import subprocess
@@ -15,8 +17,10 @@ import pytest
 from rich.console import Console
 
 from chainunit import RunError, config
+from chainunit.config import Starter
+from chainunit.drives.induction_motor import SoftStart
 from chainunit.quantities import DISPLAY_UNITS
-from chainunit.report import motion, page, plots, table
+from chainunit.report import interactive, motion, page, plots, table
 from chainunit.report.trace import at, digits_text, unit_text
 from chainunit.studies.overload import as_dict, run_study
 
@@ -259,6 +263,19 @@ def test_the_moving_machine_is_the_simulated_one(study, written):
         assert np.max(np.abs(full(run["torque"]) - torque)) < 1e-3 * np.max(np.abs(torque))
     loads = moving["runs"][1]["material"]
     assert loads["right"][-1] == 0 and loads["left"][-1] == 60
+
+
+def test_steady_running_begins_where_the_study_takes_it(study):
+    """A soft starter that ramps for longer than the reference moves the mark and the still picture, too."""
+    soft = SoftStart(voltage=0.5, time=0.7)
+    slow = dataclasses.replace(
+        study, config=dataclasses.replace(study.config, start="soft", starter=Starter(soft_start=soft))
+    )
+    start_up = next(plot for plot in interactive.plots(slow) if plot.run == "start_up")
+    (mark,) = start_up.figure.layout.annotations
+    assert mark.text == "steady from here" and mark.x == slow.settled == pytest.approx(0.7 + math.pi / 3.0)
+    first = motion.motion(slow)["runs"][0]
+    assert first["time"][first["still"] - 1] < slow.settled <= first["time"][first["still"]]
 
 
 def test_a_long_study_is_thinned_out(study, monkeypatch):

@@ -294,6 +294,13 @@ class Config:
     """the organs as chains, or None for two bars"""
     source: str
 
+    @property
+    def settled(self) -> float:
+        """Time from which running counts as steady [s]: `run.settle_turns` after the ramp of the reference or of the
+        soft starter."""
+        soft = self.starter.soft_start.time if self.start == "soft" else 0.0
+        return float(max(self.run.ramp, soft) + self.run.settle_turns * 2.0 * math.pi / self.run.crank_speed)
+
 
 def load(file: Path | None = None) -> Config:
     """Read and check a study file; without one, the packaged example.
@@ -376,7 +383,7 @@ def parse(text: str, source: str = "config") -> Config:
     )
     run, turn, o = config.run, 2.0 * math.pi / config.run.crank_speed, config.overload
     lumps = o.lumps * (2.0 * o.jam_rise + o.jam_duration + o.lump_pause) if "lumps" in config.events else 0.0
-    seconds = run.ramp + (run.settle_turns + run.turns + len(config.events) * (o.turns + 2.0)) * turn + lumps
+    seconds = config.settled + (run.turns + len(config.events) * (o.turns + 2.0)) * turn + lumps
     steps = max(seconds, config.monte_carlo.duration) / run.step
     if not steps <= MOST_STEPS:
         raise InputError(

@@ -133,12 +133,6 @@ def plots(study: Study) -> Iterator[Plot]:
         yield _reactions(study)
 
 
-def settled(study: Study) -> float:
-    """When running counts as steady [s]."""
-    run = study.config.run
-    return run.ramp + run.settle_turns * 2.0 * math.pi / run.crank_speed
-
-
 def _style(i: int) -> dict[str, Any]:
     return _STYLES[i % len(_STYLES)]
 
@@ -466,7 +460,7 @@ def _transient(study: Study, name: str) -> Plot:
             )
         _mark(figure, 0.0, "event")
     elif name == "start_up" and study.answers:
-        _mark(figure, settled(study), "steady from here")
+        _mark(figure, study.settled, "steady from here")
     figure.update_layout(
         template=_TEMPLATE, height=190 * len(series) + 75, hovermode="x unified", margin={"t": 52}
     )

@@ -13,7 +13,7 @@ from ..groups.chain import pins
 from ..machines.chain_unit import ChamberForces, Inputs, SideLoads, processing_by_speed
 from ..planar import Motion
 from ..studies.overload import PINS, Study
-from .interactive import called, event_of, in_order, settled
+from .interactive import called, event_of, in_order
 
 _XP = numpy_()
 _PER_SECOND = 60
@@ -159,7 +159,7 @@ def _run(study: Study, name: str, interval: float) -> dict[str, Any]:
         "title": called(name),
         "event": event is not None,
         # the picture that stands still until it is played
-        "still": int(np.searchsorted(since, 0.0 if event is not None else settled(study))),
+        "still": int(np.searchsorted(since, 0.0 if event is not None else study.settled)),
         "time": _list(since, max(since[-1] - since[0], 1e-9), 5),
         "angle": _list(np.degrees(angle) % 360.0, 360.0, 4),
         "speed": _list(speed, study.config.run.crank_speed, 4),

@@ -170,10 +170,8 @@ class Study:
 
     @property
     def settled(self) -> float:
-        """Time from which running counts as steady [s]: after the ramp of the reference or of the soft starter."""
-        run, config = self.config.run, self.config
-        soft = config.starter.soft_start.time if config.start == "soft" else 0.0
-        return float(max(run.ramp, soft) + run.settle_turns * 2.0 * math.pi / run.crank_speed)
+        """Time from which running counts as steady [s]."""
+        return self.config.settled
 
     @property
     def motor(self) -> Any:

@@ -123,5 +123,5 @@ def export_study(
     """
     drive = _drive(config, backend, report)
     run = config.run
-    stop = run.ramp + (run.settle_turns + run.turns) * 2.0 * math.pi / run.crank_speed
+    stop = config.settled + run.turns * 2.0 * math.pi / run.crank_speed
     return export(study_system(config, drive), file, stop=stop, step=run.step, backend=backend, report=report)
