@@ -186,8 +186,8 @@ class Twist:
     The cardan has no mass: phi2 follows from the balance of the two springs, and w2 from its change. Damping is that
     of the twist speeds, v2 = w1 - w2 and v3 = i23 w2 - w4; from its dissipation function (d2 v2^2 + d3 v3^2)/2 come
     the torques at both ends, so that tau1 w1 - tau4 w4 is the growth of `energy` plus `dissipated`, exactly. What is
-    left out is that damping moves the balance of the cardan: nothing where d2/c2 = d3/c3, else a share of the order
-    of (k d/c)^2.
+    left out is that damping moves the balance of the cardan: nothing where d2/c2 = d3/c3 and i23 is constant, else a
+    share of second order in d/c, (k d/c)^2 where the two ratios differ.
     """
 
     __slots__ = ("dissipated", "energy", "i", "phi2", "phi3", "tau1", "tau4", "twist2", "twist3")
