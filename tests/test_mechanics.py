@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
@@ -10,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from machines import random_loads, random_machine, random_state
 
-from chainunit import EMPTY, ChainUnit, SideLoads, engines
+from chainunit import EMPTY, ChainUnit, GeometryError, SideLoads, engines
 from chainunit.machines.api import FREE
-from chainunit.machines.chain_unit import ChamberForces, Stop
+from chainunit.machines.chain_unit import ChamberForces, Stop, half_width_range
 
 
 def draw(seed: int, lossless: bool = False):
@@ -214,6 +215,48 @@ def test_outputs_have_the_common_shape():
     part = ChamberForces.parts[0]
     assert {np.shape(v) for v in part.layout.values(out)} == {(4, 3)}
     assert {np.shape(v) for v in ChainUnit().evaluate({"phi": phi, "w": w}).values()} == {(4, 3)}
+
+
+def test_half_widths_that_close_are_those_of_brute_force():
+    """The distance of A2 from A1 over the swing, walked through, against the range; also where |l1 - l2| < e."""
+    rng, kinds = np.random.default_rng(7), set()
+    for _ in range(4000):
+        e, l1, l2 = rng.uniform(0.05, 1.5, 3)
+        swing, z = rng.uniform(0.05, 1.2), rng.uniform(0.0, 2.5)
+        psi = np.linspace(-swing, swing, 201)
+        distance = np.hypot(z + e * np.sin(psi), e * np.cos(psi))
+        spare = min(float(np.min(distance)) - abs(l1 - l2), l1 + l2 - float(np.max(distance)))
+        low, high = half_width_range(engines.MATH, e, l1, l2, swing, z)
+        if abs(spare) > 1e-9:
+            assert (low < z < high) == (spare > 0.0), (e, l1, l2, swing, z)
+        for end, sign in ((low, 1.0), (high, -1.0)):
+            if 0.0 < end and low < high:
+                at = np.hypot(end + e * np.sin(psi), e * np.cos(psi))
+                assert min(abs(np.min(at) - abs(l1 - l2)), abs(np.max(at) - l1 - l2)) < 1e-9
+                assert low < end + sign * 1e-6 * (high - low) < high
+        kinds.add((spare > 0.0, low == 0.0, abs(l1 - l2) < e * np.cos(swing), z < e * np.sin(swing)))
+    # narrower than the swing of A2, too, with and without a gap in the range
+    assert {(True, True, True, True), (True, True, False, True), (True, False, False, False)} <= kinds
+
+
+@pytest.mark.parametrize(("l1", "l2", "z"), [(1.0, 0.9, 0.1), (1.35, 0.545, 0.02)])
+def test_a_machine_that_is_narrower_than_its_swing_turns(l1, l2, z):
+    machine = ChainUnit(l1=l1, l2=l2, z=z)
+    (psi, _), _ = machine.rocker_extremes()
+    assert z < machine.p.e * np.sin(psi)
+    phi = np.linspace(0.0, 2.0 * np.pi, 721)
+    out = machine.forces(phi, 2.0, 0.0, SideLoads(material_mass=30.0, processing_force=0.0), EMPTY)
+    assert np.all(np.isfinite(out.tau)) and float(np.min(out.margin)) > 0.01
+    assert np.allclose(machine.torque_by_reactions(phi, 0.0), machine.forces(phi).tau, atol=1e-9)
+
+
+def test_a_gap_of_half_widths_is_refused_with_its_limits():
+    with pytest.raises(GeometryError, match=r"z = 0\.1 m: .* must be > 0 and < (\S+) m") as refused:
+        ChainUnit(l1=1.35, l2=0.545, z=0.1)
+    limit = float(re.search(r"< (\S+) m$", str(refused.value))[1])
+    assert ChainUnit(l1=1.35, l2=0.545, z=limit - 1e-5).p.z > 0.0
+    with pytest.raises(GeometryError, match=r"z = 0\.2 m: .* must be > (\S+) and < (\S+) m"):
+        ChainUnit(l1=1.35, l2=0.545, z=0.2)
 
 
 def test_a_side_that_is_not_there_cannot_go_slack():

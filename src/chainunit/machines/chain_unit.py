@@ -619,14 +619,26 @@ def rocker_extremes(xp: Any, p: Any) -> tuple[Any, Any]:
     return right, left
 
 
-def half_width_range(xp: Any, e: Any, l1: Any, l2: Any, swing: Any) -> tuple[Any, Any]:
-    """Least and largest half width z [m] at which both organs close wherever the rocker stands within
-    +-`swing` [rad]; both ends are singular. With l2 = l1 - e the least is 2 e sin(swing). Empty where the
-    least is not below the largest."""
+_FAR = 1e300  # more than any length; times a length of either sign it picks one of two limits
+
+
+def half_width_range(xp: Any, e: Any, l1: Any, l2: Any, swing: Any, z: Any = math.inf) -> tuple[Any, Any]:
+    """Least and largest half width [m] at which both organs close wherever the rocker stands within +-`swing` [rad];
+    both ends are singular, but for 0. Empty where the least is not below the largest.
+
+    The distance of A2 from A1 must stay above |l1 - l2| and below l1 + l2; over the swing its square is within
+    (z -+ e sin(swing))^2 + (e cos(swing))^2. Above e cos(swing), |l1 - l2| leaves out half widths about e sin(swing):
+    then it is the range on the side of these on which `z` lies. With l2 = l1 - e the range begins at 2 e sin(swing).
+    """
     reach = e * xp.sin(swing)
     drop2 = e * e - reach * reach
-    low = xp.sqrt(xp.maximum((l1 - l2) * (l1 - l2) - drop2, 0.0)) + reach
-    return low, xp.sqrt(xp.maximum((l1 + l2) * (l1 + l2) - drop2, 0.0)) - reach
+    short2 = (l1 - l2) * (l1 - l2) - drop2
+    left_out = xp.sqrt(xp.maximum(short2, 0.0))
+    whole = _FAR * xp.maximum(-short2, 0.0)
+    low = reach + left_out - whole - _FAR * xp.maximum(reach - z, 0.0)
+    high = reach - left_out + whole + _FAR * xp.maximum(z - reach, 0.0)
+    longest = xp.sqrt(xp.maximum((l1 + l2) * (l1 + l2) - drop2, 0.0)) - reach
+    return xp.maximum(low, 0.0), xp.minimum(high, longest)
 
 
 class ChamberForces(Model):
@@ -687,7 +699,7 @@ class ChamberForces(Model):
         right, left = rocker_extremes(xp, p)
         swing = xp.maximum(xp.abs(right), xp.abs(left))
         yield swing, -math.inf, 0.5 * math.pi
-        low, high = half_width_range(xp, p.e, p.l1, p.l2, swing)
+        low, high = half_width_range(xp, p.e, p.l1, p.l2, swing, p.z)
         yield p.z, low, high
 
     @staticmethod
