@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,8 +16,8 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from . import __version__
-from .errors import InputError, InterruptedRunError, RunError
-from .files import folder
+from .errors import InputError, InterruptedRunError, RunError, WriteError
+from .files import claimed, full, leftovers
 
 
 class Backend(StrEnum):
@@ -86,20 +87,33 @@ def study(
 
         # before anything of an earlier run is taken away
         check_own(loaded.catalogue)
-    folder(output)
+    with claimed(output):
+        from .report import files, page, plots, table
+        from .studies.overload import run_study
 
-    from .report import files, page, plots, table
-    from .studies.overload import run_study
-
-    _clear(output, "result.json", "result.nc", files.LOAD_CYCLE, page.NAME, *plots.NAMES)
-    console, errors = _console(), _console(stderr=True)
-    with _progress("exporting FMUs", errors) as report:
-        result = run_study(loaded, output, report, check=check, backend=backend.value if backend else None)
-    written = [*files.write(result, output), *plots.write(result, output), page.write(result, output)]
-    table.show(result, console)
-    console.print("Written: " + ", ".join(str(path) for path in written), soft_wrap=True)
+        _clear(output, "result.json", "result.nc", files.LOAD_CYCLE, page.NAME, *plots.NAMES)
+        console, errors = _console(), _console(stderr=True)
+        with _progress("exporting FMUs", errors) as report:
+            result = run_study(
+                loaded, output, report, check=check, backend=backend.value if backend else None
+            )
+        # what one file has no room for must not cost the others, nor the answer on the terminal
+        written, unwritten = [], None
+        for write in (files.write, plots.write, lambda *which: [page.write(*which)]):
+            try:
+                written += write(result, output)
+            except WriteError as error:
+                unwritten = unwritten or error
+        table.show(result, console)
+        _show_written(written, console)
     if result.failure is not None:
         _stopped_early(result.failure, output, errors)
+    if unwritten is not None:
+        raise unwritten
+
+
+def _show_written(written: list[Path], console: Console) -> None:
+    console.print("Written: " + ", ".join(str(path) for path in written), soft_wrap=True)
 
 
 @contextmanager
@@ -127,6 +141,8 @@ def _clear(folder: Path, *names: str) -> None:
         if stale.exists() and not stale.is_file():
             raise InputError(f"{stale}: is not a regular file; name another folder")
         stale.unlink(missing_ok=True)
+        for part in leftovers(stale):
+            part.unlink(missing_ok=True)
 
 
 @app.command()
@@ -150,20 +166,19 @@ def driveline(
         print(lines.example(), end="")
         return
     loaded = lines.load(config)
-    folder(output)
+    with claimed(output):
+        from .report import driveline as page
 
-    from .report import driveline as page
-
-    _clear(output, *page.NAMES)
-    console, errors = _console(), _console(stderr=True)
-    try:
-        with _progress("steady motion", errors) as report:
-            result = lines.run_driveline(loaded, report)
-    except KeyboardInterrupt:
-        raise InterruptedRunError("interrupted before anything was written") from None
-    written = page.write(result, output)
-    page.show(result, console)
-    console.print("Written: " + ", ".join(str(path) for path in written), soft_wrap=True)
+        _clear(output, *page.NAMES)
+        console, errors = _console(), _console(stderr=True)
+        try:
+            with _progress("steady motion", errors) as report:
+                result = lines.run_driveline(loaded, report)
+        except KeyboardInterrupt:
+            raise InterruptedRunError("interrupted before anything was written") from None
+        written = page.write(result, output)
+        page.show(result, console)
+        _show_written(written, console)
 
 
 @app.command()
@@ -190,20 +205,19 @@ def knife(
         print(knives.example(), end="")
         return
     loaded = knives.load(config)
-    folder(output)
+    with claimed(output):
+        from .report import knife as page
 
-    from .report import knife as page
-
-    _clear(output, *page.NAMES)
-    console, errors = _console(), _console(stderr=True)
-    try:
-        with _progress("the turn at constant speed", errors) as report:
-            result = knives.run_knife(loaded, output, report, backend.value if backend else None)
-    except KeyboardInterrupt:
-        raise InterruptedRunError("interrupted before anything was written") from None
-    written = page.write(result, output)
-    page.show(result, console)
-    console.print("Written: " + ", ".join(str(path) for path in written), soft_wrap=True)
+        _clear(output, *page.NAMES)
+        console, errors = _console(), _console(stderr=True)
+        try:
+            with _progress("the turn at constant speed", errors) as report:
+                result = knives.run_knife(loaded, output, report, backend.value if backend else None)
+        except KeyboardInterrupt:
+            raise InterruptedRunError("interrupted before anything was written") from None
+        written = page.write(result, output)
+        page.show(result, console)
+        _show_written(written, console)
     if result.failure is not None:
         _stopped_early(result.failure, output, errors)
 
@@ -212,7 +226,7 @@ def _stopped_early(failure: RunError, output: Path, errors: Console) -> None:
     errors.print(
         f"The run stopped early: {failure}. What was computed before is in {output}.", soft_wrap=True
     )
-    raise typer.Exit(130 if isinstance(failure, InterruptedRunError) else 1)
+    raise typer.Exit(_status(failure))
 
 
 @app.command()
@@ -225,17 +239,16 @@ def reproduce(
 
     Writes reproduction.json, reproduction.md and the figures into the output folder.
     """
-    folder(output)
+    with claimed(output):
+        from .report import reproduction
+        from .studies.reproduction import reproduce as compute
 
-    from .report import reproduction
-    from .studies.reproduction import reproduce as compute
-
-    console = _console()
-    with _console(stderr=True).status("computing"):
-        rows = compute()
-        written = reproduction.write(rows, output)
-    reproduction.show(rows, console)
-    console.print("Written: " + ", ".join(str(path) for path in written), soft_wrap=True)
+        console = _console()
+        with _console(stderr=True).status("computing"):
+            rows = compute()
+            written = reproduction.write(rows, output)
+        reproduction.show(rows, console)
+        _show_written(written, console)
 
 
 @app.command("two-bar-error")
@@ -249,14 +262,14 @@ def two_bar_error(
     from .report import two_bar as page
     from .studies.two_bar import two_bar_error as compute
 
-    folder(output)
-    _clear(output, *page.NAMES)
-    console, errors = _console(), _console(stderr=True)
-    with _progress("bars and catenaries", errors) as report:
-        found = compute(report=lambda done: report("bars and catenaries", done, 1.0))
-    written = page.write(found, output)
-    page.show(found, console)
-    console.print("Written: " + ", ".join(str(path) for path in written), soft_wrap=True)
+    with claimed(output):
+        _clear(output, *page.NAMES)
+        console, errors = _console(), _console(stderr=True)
+        with _progress("bars and catenaries", errors) as report:
+            found = compute(report=lambda done: report("bars and catenaries", done, 1.0))
+        written = page.write(found, output)
+        page.show(found, console)
+        _show_written(written, console)
 
 
 @app.command()
@@ -370,23 +383,41 @@ def _platforms(wanted: str | None, fmi: int) -> list[str]:
     return names
 
 
+_told_to_end: list[int] = []
+"""Signals that told this process to end, apart from Ctrl-C."""
+
+
+def _end_in_order(number: int, frame: Any) -> None:
+    """Take a signal to end as Ctrl-C is taken: what was computed is written, temporary folders are taken away."""
+    _told_to_end.append(number)
+    raise KeyboardInterrupt
+
+
+def _status(error: BaseException) -> int:
+    """Exit status of a run that failed with `error`."""
+    if _told_to_end:
+        return 128 + _told_to_end[0]
+    if isinstance(error, InterruptedRunError | KeyboardInterrupt | typer.Abort):
+        return 130
+    return 2 if isinstance(error, InputError) else 1
+
+
 def main() -> None:
-    """Run the command line: exit status 2 for bad input, in one line; 1 for a run that failed, 130 for Ctrl-C."""
+    """Run the command line: exit status 2 for bad input, in one line; 1 for a run that failed or a file that could
+    not be written, 130 for Ctrl-C, 143 for SIGTERM."""
+    signal.signal(signal.SIGTERM, _end_in_order)
     try:
         sys.exit(app(sys.argv[1:] or ["--help"], standalone_mode=False))
-    except InputError as error:
-        _end(str(error), 2)
-    except InterruptedRunError as error:
-        _end(str(error), 130)
-    except RunError as error:
-        _end(str(error), 1)
-    except (typer.Abort, KeyboardInterrupt):
-        _end("interrupted", 130)
+    except (InputError, RunError) as error:
+        _end(str(error), _status(error))
+    except (typer.Abort, KeyboardInterrupt) as error:
+        _end("interrupted", _status(error))
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
     except OSError as error:
-        _end(f"{error.filename or ''}: {error.strerror or error}", 2)
+        where = error.filename or ("the output or the folder for temporary files" if full(error) else "")
+        _end(f"{where}: {error.strerror or error}", 1 if full(error) else 2)
     except Exception as error:
         # wrong usage: an unknown command or option, a missing argument
         if not hasattr(error, "format_message"):

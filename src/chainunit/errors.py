@@ -20,4 +20,8 @@ class RunError(RuntimeError):
 
 
 class InterruptedRunError(RunError):
-    """The user stopped the run (Ctrl-C)."""
+    """The run was stopped from outside (Ctrl-C, SIGTERM)."""
+
+
+class WriteError(RunError):
+    """A file could not be written, such as on a full disk; the message names it."""

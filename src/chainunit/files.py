@@ -1,31 +1,72 @@
-"""Files that appear whole or not at all."""
+"""Files that appear whole or not at all, and folders that one process at a time writes to."""
 
 from __future__ import annotations
 
+import contextlib
+import errno
+import os
+import re
+import secrets
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from .errors import InputError
+from .errors import InputError, WriteError
+
+LOCK = ".chainunit-lock"
+"""Name of the file that stands in a folder while a process writes there."""
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
 
 
 @contextmanager
 def whole(file: Path) -> Iterator[Path]:
     """A path to write to in place of `file`; it becomes `file` at the end, and vanishes on an error.
 
+    Its name is a new one each time: several processes may write the same file, and the last one's stays.
+
     Raises
     ------
     InputError
         where `file` is something else than a regular file.
+    WriteError
+        where it cannot be written, such as on a full disk; a `file` that was there before is as it was.
     """
     if file.exists() and not file.is_file():
         raise InputError(f"{file}: is not a regular file; name another")
-    part = file.with_name(file.name + ".part")
+    part = file.with_name(f"{file.name}.{secrets.token_hex(8)}.part")
     try:
-        yield part
-        part.replace(file)
+        with writing(file):
+            yield part
+            part.replace(file)
     finally:
         part.unlink(missing_ok=True)
+
+
+@contextmanager
+def writing(file: Path) -> Iterator[None]:
+    """Names `file` in the error of an operating system that does not take what is written.
+
+    Raises
+    ------
+    WriteError
+        in place of an OSError.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise WriteError(f"{file}: cannot be written ({error.strerror or error})") from error
+
+
+def full(error: OSError) -> bool:
+    """Whether the place for what was to be written is at fault, and not the name that was given."""
+    return error.errno in _FULL
+
+
+def leftovers(file: Path) -> list[Path]:
+    """What processes that were killed while they wrote `file` left beside it."""
+    name = re.compile(re.escape(file.name) + r"\.[0-9a-f]{16}\.part")
+    return [path for path in file.parent.iterdir() if name.fullmatch(path.name)]
 
 
 def folder(path: Path) -> Path:
@@ -38,9 +79,68 @@ def folder(path: Path) -> Path:
     """
     try:
         path.mkdir(parents=True, exist_ok=True)
-        probe = path / ".chainunit"
-        probe.touch()
+        probe = path / f".{secrets.token_hex(8)}.part"
+        probe.touch(exist_ok=False)
         probe.unlink()
     except OSError as error:
-        raise InputError(f"{path}: cannot be written to ({error.strerror or error})") from error
+        kind = WriteError if full(error) else InputError
+        raise kind(f"{path}: cannot be written to ({error.strerror or error})") from error
     return path
+
+
+@contextmanager
+def claimed(path: Path) -> Iterator[Path]:
+    """The `folder` at `path`, for this process alone as long as the context lasts.
+
+    A lock of the operating system guards it, on a file that vanishes at the end; the lock ends with the process,
+    however that ends. Where the file system has no locks, there is none.
+
+    Raises
+    ------
+    InputError
+        where another process writes there; see `folder`, too.
+    """
+    lock = folder(path) / LOCK
+    while True:
+        handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            if not _locked(handle):
+                raise InputError(
+                    f"{path}: another chainunit writes to this folder; wait until it ends, or name another folder "
+                    "with -o"
+                )
+            # the one before may have taken its file away between the opening and the locking
+            with contextlib.suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(handle), lock.stat()):
+                    break
+        except BaseException:
+            os.close(handle)
+            raise
+        os.close(handle)
+    try:
+        yield path
+    finally:
+        if sys.platform == "win32":  # an open file cannot be taken away there
+            os.close(handle)
+        # one that holds something is not ours
+        with contextlib.suppress(OSError):
+            if not lock.stat().st_size:
+                lock.unlink()
+        if sys.platform != "win32":
+            os.close(handle)
+
+
+def _locked(handle: int) -> bool:
+    """Take the lock of an open file; False where another process has it."""
+    try:
+        if sys.platform == "win32":
+            import msvcrt
+
+            msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        return error.errno not in (errno.EWOULDBLOCK, errno.EACCES, errno.EDEADLK)
+    return True

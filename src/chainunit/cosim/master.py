@@ -31,16 +31,28 @@ Progress = Callable[[float], None]
 
 @contextmanager
 def stoppable() -> Iterator[Callable[[], bool]]:
-    """Whether Ctrl-C was pressed, asked between steps: a KeyboardInterrupt inside an FMU would be a fatal error."""
-    pressed: list[int] = []
+    """Whether Ctrl-C was pressed, asked between steps: a KeyboardInterrupt inside an FMU would be a fatal error. So
+    it is with SIGTERM, where somebody handles it by a KeyboardInterrupt."""
+    caught: list[KeyboardInterrupt] = []
     if threading.current_thread() is not threading.main_thread():
         yield lambda: False
         return
-    previous = signal.signal(signal.SIGINT, lambda number, frame: pressed.append(number))
+
+    def later(number: int, frame: Any) -> None:
+        try:
+            previous[number](number, frame)
+        except KeyboardInterrupt as error:
+            caught.append(error)
+
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    previous: dict[int, Any] = {number: handler for number, handler in handlers.items() if callable(handler)}
+    for number in previous:
+        signal.signal(number, later)
     try:
-        yield lambda: bool(pressed)
+        yield lambda: bool(caught)
     finally:
-        signal.signal(signal.SIGINT, previous)
+        for number, handler in previous.items():
+            signal.signal(number, handler)
 
 
 class CoSimulation:

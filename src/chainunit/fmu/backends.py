@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Literal
 
-from ..errors import InputError, RunError
+from ..errors import InputError, RunError, WriteError
 from ..model import Model
 from . import export as python
 from .native import export as native
@@ -50,6 +50,8 @@ def export(
     names, compiler = targets.chosen(platforms, fmi)
     try:
         native.export(model, file, start, fmi=fmi, platforms=platforms, report=report)
+    except WriteError:
+        raise
     except RunError:
         if backend or fmi != 2 or platforms:
             raise

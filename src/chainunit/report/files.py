@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import errno
 import json
 from pathlib import Path
 
@@ -57,6 +58,10 @@ def write(study: Study, folder: Path) -> list[Path]:
         )
         tree.attrs.update(title=study.config.title, source=f"chainunit {__version__}")
         with whole(series) as part:
-            tree.to_netcdf(part, engine="netcdf4")
+            try:
+                tree.to_netcdf(part, engine="netcdf4")
+            except RuntimeError as error:
+                # the library says no more of a disk that is full
+                raise OSError(errno.EIO, f"{error}; is the disk full?") from error
         written.append(series)
     return written

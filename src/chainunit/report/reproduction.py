@@ -19,6 +19,7 @@ from rich.table import Table
 
 from .. import __version__
 from ..engines import numpy_
+from ..files import whole
 from ..machines.api import EMPTY, ChainUnit
 from ..machines.crank_rocker import longest_crank, parallel_frame, pressure_angle_extremes, swing
 from ..studies.cycle import overload_factors
@@ -57,14 +58,16 @@ def write(rows: Sequence[Row], folder: Path) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     numbers = folder / "reproduction.json"
     content = {"chainunit": __version__, "rows": [row.as_dict() for row in rows]}
-    numbers.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", "utf-8")
+    with whole(numbers) as part:
+        part.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", "utf-8")
     table = folder / "reproduction.md"
-    table.write_text(
-        "\n".join(
-            f"## Paper {paper}\n\n{markdown([r for r in rows if r.paper == paper])}" for paper in PAPERS
-        ),
-        "utf-8",
-    )
+    with whole(table) as part:
+        part.write_text(
+            "\n".join(
+                f"## Paper {paper}\n\n{markdown([r for r in rows if r.paper == paper])}" for paper in PAPERS
+            ),
+            "utf-8",
+        )
     return [numbers, table, *draw(FIGURES, folder)]
 
 

@@ -11,6 +11,8 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
+from ..files import whole
+
 STYLE: dict[str, Any] = {
     "font.size": 10,
     "axes.grid": True,
@@ -32,13 +34,16 @@ WIDE = 30.0
 
 
 def draw(plots: Mapping[str, Callable[[], Any]], folder: Path) -> list[Path]:
-    """Draw each figure into its file in `folder`; returns the files."""
+    """Draw each figure into its file in `folder`, a PNG; returns the files."""
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     with plt.rc_context(STYLE):
         for name, make in plots.items():
             figure = make()
-            figure.savefig(folder / name)
-            plt.close(figure)
+            try:
+                with whole(folder / name) as part:
+                    figure.savefig(part, format="png")
+            finally:
+                plt.close(figure)
             written.append(folder / name)
     return written

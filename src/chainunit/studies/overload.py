@@ -210,6 +210,9 @@ def run_study(
         if error.partial is not None:
             study.runs["unfinished"] = error.partial
         study.failure = error
+    except KeyboardInterrupt:
+        # between two runs, or in one that is not a co-simulation
+        study.failure = InterruptedRunError("interrupted")
     if study.drive.chain is not None and not isinstance(study.failure, InterruptedRunError):
         _chains(study, files["machine"], report)
     _note(study)

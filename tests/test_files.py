@@ -1,0 +1,216 @@
+"""Files appear whole or not at all; one process writes to a folder at a time; nothing stays behind."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+
+import pytest
+
+from chainunit.errors import InputError, WriteError
+from chainunit.files import LOCK, claimed, folder, whole
+
+SHORT = """
+events = []
+[run]
+ramp = 0.3
+turns = 1
+step = 0.004
+crank_speed = 6
+[overload]
+turns = 1
+[machine]
+ratio = 25
+"""
+
+posix = pytest.mark.skipif(sys.platform == "win32", reason="signals and limits of POSIX")
+
+
+def python(script, cwd, **more):
+    return subprocess.Popen(
+        [sys.executable, "-c", textwrap.dedent(script)],
+        cwd=cwd,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        **more,
+    )
+
+
+def names(folder):
+    return sorted(p.name for p in folder.iterdir())
+
+
+def test_two_writers_of_one_file_do_not_disturb_each_other(tmp_path):
+    file = tmp_path / "a.txt"
+    with whole(file) as first:
+        first.write_text("first")
+        with whole(file) as second:
+            second.write_text("second")
+        assert file.read_text() == "second"
+    assert file.read_text() == "first"
+    assert names(tmp_path) == ["a.txt"]
+
+
+def test_a_user_s_files_in_the_folder_are_left_alone(tmp_path):
+    for name in (".chainunit", LOCK, "result.json.part"):
+        (tmp_path / name).write_text("mine")
+    folder(tmp_path)
+    with claimed(tmp_path):
+        pass
+    assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {
+        ".chainunit": "mine",
+        LOCK: "mine",
+        "result.json.part": "mine",
+    }
+
+
+def test_one_process_at_a_time_and_the_lock_goes_with_it(tmp_path):
+    holder = python(
+        """
+        import time
+        from pathlib import Path
+        from chainunit.files import claimed
+        with claimed(Path("out")):
+            print("has it", flush=True)
+            time.sleep(600)
+        """,
+        tmp_path,
+    )
+    assert holder.stdout.readline() == "has it\n"
+    with pytest.raises(InputError, match="another chainunit writes to this folder"):
+        with claimed(tmp_path / "out"):
+            pass
+    holder.kill()
+    holder.communicate()
+    with claimed(tmp_path / "out"):
+        assert (tmp_path / "out" / LOCK).exists()
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_a_second_study_in_a_folder_is_refused_and_takes_nothing_away(tmp_path):
+    out = tmp_path / "out"
+    with claimed(out):
+        (out / "result.json").write_text("of the first")
+        second = subprocess.run(
+            [sys.executable, "-m", "chainunit.cli", "study", "-o", "out"],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+        )
+        assert second.returncode == 2
+        assert second.stderr.startswith("chainunit: out: another chainunit writes to this folder")
+        assert (out / "result.json").read_text() == "of the first"
+
+
+def test_pngs_appear_whole(tmp_path):
+    """A figure that fails to be drawn, or written, leaves what was there."""
+    import matplotlib.pyplot as plt
+
+    from chainunit.report.style import draw
+
+    (tmp_path / "a.png").write_bytes(b"before")
+
+    def broken():
+        figure = plt.figure()
+
+        def fails(out, **options):
+            out.write_bytes(b"\x89PNG")
+            raise OSError(28, "No space left on device")
+
+        figure.savefig = fails
+        return figure
+
+    with pytest.raises(WriteError, match=r"a\.png: cannot be written \(No space left"):
+        draw({"a.png": broken}, tmp_path)
+    assert names(tmp_path) == ["a.png"] and (tmp_path / "a.png").read_bytes() == b"before"
+    draw({"a.png": plt.figure}, tmp_path)
+    assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
+
+
+@posix
+def test_a_full_disk_is_named_and_costs_no_more_than_the_file(tmp_path):
+    """No file may grow beyond 300 kB: the series and the page have no room, numbers and plots have."""
+    (tmp_path / "short.toml").write_text(SHORT)
+    command = python(
+        """
+        import resource, sys
+        from chainunit.cli import main
+        from chainunit.studies import overload
+
+        study = overload.run_study
+
+        def then_full(*args, **options):
+            done = study(*args, **options)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, resource.RLIM_INFINITY))
+            return done
+
+        overload.run_study = then_full
+        sys.argv = ["chainunit", "study", "short.toml", "-o", "out"]
+        main()
+        """,
+        tmp_path,
+    )
+    said, errors = command.communicate()
+    assert command.returncode == 1, errors
+    assert "out/result.nc: cannot be written" in errors and "Traceback" not in errors
+    there = names(tmp_path / "out")
+    assert {"result.json", "load_cycle.csv", "start_up.png", "fmu"} <= set(there)
+    assert not {n for n in there if "part" in n or n in ("result.nc", "report.html", LOCK)}
+    assert "crank torque, peak" in said
+
+
+@posix
+def test_a_disk_that_is_full_from_the_start_is_named(tmp_path):
+    command = python(
+        """
+        import resource, sys
+        from chainunit.cli import main
+        from chainunit.fmu import pack
+        from chainunit.fmu.native import export
+        written = export.pack
+
+        def full(*args):
+            resource.setrlimit(resource.RLIMIT_FSIZE, (1000, resource.RLIM_INFINITY))
+            written(*args)
+
+        export.pack = full
+        sys.argv = ["chainunit", "export", "DcMotor", "-o", "out/x.fmu", "--backend", "native"]
+        main()
+        """,
+        tmp_path,
+    )
+    _, errors = command.communicate()
+    assert command.returncode == 1
+    assert errors.splitlines()[-1].startswith("chainunit: out/x.fmu: cannot be written (File too large")
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+@posix
+def test_sigterm_ends_in_order(tmp_path):
+    """What was computed is written, and no folder for temporary files stays behind."""
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    (tmp_path / "long.toml").write_text(SHORT.replace("turns = 1", "turns = 300"))
+    running = subprocess.Popen(
+        [sys.executable, "-m", "chainunit.cli", "study", "long.toml", "-o", "out"],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"TMPDIR": str(scratch)},
+    )
+    while len(list(scratch.glob("chainunit_fmu_*/binaries"))) < 2:
+        assert running.poll() is None, running.communicate()
+        time.sleep(0.05)
+    time.sleep(0.5)
+    running.send_signal(signal.SIGTERM)
+    _, err = running.communicate(timeout=60)
+    assert running.returncode == 143, err
+    assert "Traceback" not in err
+    assert list(scratch.glob("chainunit*")) == []
+    assert (tmp_path / "out" / "result.json").exists() and not (tmp_path / "out" / LOCK).exists()
