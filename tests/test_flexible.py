@@ -8,8 +8,12 @@ import dataclasses
 import math
 import signal
 
+import fmpy
 import numpy as np
 import pytest
+from fmpy.fmi2 import FMU2Model
+from fmpy.fmi3 import FMU3Model
+from fmpy.sundials import CVodeSolver
 from machines import random_loads, random_machine
 from scipy.integrate import cumulative_simpson, solve_ivp
 from test_chain import DATA, M
@@ -53,12 +57,13 @@ def files(tmp_path_factory):
     """By rods of wall and web, a native FMU, compiled once and unpacked; `archive` is its file."""
     folder, found = tmp_path_factory.mktemp("chains"), {}
 
-    def made(walls, webs):
-        if (walls, webs) not in found:
-            file = export_native(flexible(walls, webs), folder / f"{walls}{webs}.fmu")
-            found[walls, webs] = Fmu(file)
-            found[walls, webs].archive = file
-        return found[walls, webs]
+    def made(walls, webs, fmi=2):
+        key = walls, webs, fmi
+        if key not in found:
+            file = export_native(flexible(walls, webs), folder / f"{walls}{webs}{fmi}.fmu", fmi=fmi)
+            found[key] = Fmu(file)
+            found[key].archive = file
+        return found[key]
 
     yield made
     for fmu in found.values():
@@ -660,8 +665,6 @@ def test_steps_far_too_long_and_senseless_ones(files):
 def test_model_exchange(files):
     """Derivatives are those of Python; two turns by DOP853 without projection stay closed by the drawing-back, from
     a chain that was a hundredth of a radian off, too, and are those of co-simulation."""
-    from fmpy.fmi2 import FMU2Model
-
     fmu, model = files(6, 2), flexible(6, 2)
     unit = FMU2Model(
         guid=fmu.description.guid, unzipDirectory=fmu.folder, modelIdentifier=model.name, instanceName="unit"
@@ -708,6 +711,77 @@ def test_model_exchange(files):
     assert drift(0.0, off) > 1e-3
     found = solve_ivp(rates, whole, off, method="DOP853", rtol=1e-8, atol=1e-8).y.T
     assert drift(times[-1], found[-1]) < 1e-7
+    unit.terminate()
+    unit.freeInstance()
+
+
+@native
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_events_of_model_exchange_put_the_chain_back_to_its_end(files, fmi):
+    """fmpy holds its inputs for a step of CVode: A2 runs ahead of the chain by 7 mm a step, and each event closes
+    the gap. An importer that sets them whenever it asks for derivatives drifts by its tolerance alone, and no event
+    disturbs its integrator."""
+    fmu = files(2, 1, fmi)
+    t = np.linspace(0.0, 1.0, 1001)
+    given = np.rec.fromarrays([t, W * t, W + 0.0 * t, 0.0 * t], names="time,phi,w,a")
+    got = fmpy.simulate_fmu(
+        fmu.folder,
+        fmi_type="ModelExchange",
+        input=given,
+        stop_time=1.0,
+        output_interval=0.01,
+        output=[f"{side}.drift" for side in SIDES],
+        record_events=False,
+    )
+    assert len(got) == 101 and max(got[f"{side}.drift"].max() for side in SIDES) < 1e-12
+
+    references = {n: v.valueReference for n, v in fmu.variables.items()}
+    kind, call = (FMU2Model, "Real") if fmi == 2 else (FMU3Model, "Float64")
+    unit = kind(
+        guid=fmu.description.guid or fmu.description.instantiationToken,
+        unzipDirectory=fmu.folder,
+        modelIdentifier="ChainUnitFlexible",
+        instanceName="unit",
+    )
+    get, put = getattr(unit, f"get{call}"), getattr(unit, f"set{call}")
+    update = unit.newDiscreteStates if fmi == 2 else unit.updateDiscreteStates
+    drift = [references[f"{side}.drift"] for side in SIDES]
+
+    def at(t):
+        unit.setTime(t)
+        put([references[k] for k in ("phi", "w", "a")], [W * t, W, 0.0])
+
+    unit.instantiate()
+    if fmi == 2:
+        unit.setupExperiment()
+    unit.enterInitializationMode()
+    put([references[k] for k in ("phi", "w", "a")], [0.0, W, 0.0])
+    unit.exitInitializationMode()
+    assert not update()[3]
+    unit.enterContinuousTimeMode()
+    n = fmu.description.numberOfContinuousStates
+    solver = CVodeSolver(
+        n, 0, unit.getContinuousStates, unit.setContinuousStates,
+        unit.getDerivatives if fmi == 2 else unit.getContinuousStateDerivatives, unit.getEventIndicators,
+        unit.getNominalsOfContinuousStates, at, None, 0.0, relativeTolerance=1e-6,
+    )  # fmt: skip
+    events = 0
+    for k in range(100):
+        solver.step(0.01 * k, 0.01 * (k + 1))
+        at(0.01 * (k + 1))
+        events += unit.completedIntegratorStep()[0]
+    assert events == 0 and max(get(drift)) < 2e-5
+    # thrown off by a hundredth of a radian
+    x = (ctypes.c_double * n)()
+    unit.getContinuousStates(x, n)
+    for k, name in enumerate(flexible(2, 1).state_layout.names):
+        x[k] += 0.01 * ("theta" in name)
+    unit.setContinuousStates(x, n)
+    assert max(get(drift)) > 1e-3 and unit.completedIntegratorStep()[0]
+    unit.enterEventMode()
+    assert update()[3]
+    unit.enterContinuousTimeMode()
+    assert max(get(drift)) < 1e-7 and not unit.completedIntegratorStep()[0]
     unit.terminate()
     unit.freeInstance()
 

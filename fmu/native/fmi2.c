@@ -206,7 +206,7 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info) {
     NEED(EVENT);
     NOT_NULL(info);
     memset(info, 0, sizeof *info);
-    return fmi2OK;
+    return (fmi2Status)project(INSTANCE, &info->valuesOfContinuousStatesChanged);
 }
 
 fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) {
@@ -220,7 +220,8 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_set, fmi2
     (void)no_set;
     NEED(CONTINUOUS);
     NOT_NULL(enter_event && terminate);
-    *enter_event = *terminate = fmi2False;
+    *enter_event = drifted(INSTANCE);
+    *terminate = fmi2False;
     return fmi2OK;
 }
 

@@ -273,9 +273,12 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *again, fmi3Bool
                                     fmi3Boolean *values, fmi3Boolean *has_next, fmi3Float64 *next) {
     NEED(EVENT | STEP);
     NOT_NULL(again && terminate && nominals && values && has_next && next);
-    *again = *terminate = *nominals = *values = *has_next = fmi3False;
+    *again = *terminate = *nominals = *has_next = fmi3False;
     *next = 0.0;
-    return fmi3OK;
+    int moved;
+    const Status status = project(INSTANCE, &moved);
+    *values = moved;
+    return (fmi3Status)status;
 }
 
 fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance c) {
@@ -289,7 +292,8 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean no_set, fmi3B
     (void)no_set;
     NEED(CONTINUOUS);
     NOT_NULL(enter_event && terminate);
-    *enter_event = *terminate = fmi3False;
+    *enter_event = drifted(INSTANCE);
+    *terminate = fmi3False;
     return fmi3OK;
 }
 

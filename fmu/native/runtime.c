@@ -586,6 +586,44 @@ Status step(Instance *c, double time, double size) {
     return OK;
 }
 
+/* -- model exchange */
+
+/* What a state may lie off the constraints, in parts of the integrator's tolerance, before an event corrects it: much,
+ * as an importer's solver begins anew after each event, and errs more by that than by a small drift. */
+#define OFF_MOST 1e3
+
+/* The states that meet the constraints, in `work`; the largest correction in parts of `tolerance` and the size of the
+ * state, or NaN where there are none. */
+static double off(Instance *c) {
+    const double tolerance = number(model.tolerance, c), *arg[4] = {c->p, c->u, c->x, c->k};
+    double *res[1] = {c->work}, most = 0.0;
+    model.closed(arg, res, NULL, NULL, 0);
+    if (!all_finite(c->work, model.n_x)) return NAN;
+    for (int i = 0; i < model.n_x; ++i) {
+        const double size = fabs(c->x[i]) > model.nominal[i] ? fabs(c->x[i]) : model.nominal[i];
+        const double share = fabs(c->work[i] - c->x[i]) / (tolerance * size);
+        if (share > most) most = share;
+    }
+    return most;
+}
+
+int drifted(Instance *c) { return model.closed && off(c) > OFF_MOST; }
+
+Status project(Instance *c, int *moved) {
+    *moved = 0;
+    if (!model.closed || !c->model_exchange) return OK;
+    for (int round = 0; round < 4; ++round) {
+        const double share = off(c);
+        if (isnan(share)) return complain(c, ERROR, "no states near these meet the constraints at t = %g s", c->time);
+        /* below it the correction would cost the importer a new start and gain nothing */
+        if (share <= 1.0) break;
+        memcpy(c->x, c->work, (size_t)model.n_x * sizeof(double));
+        c->fresh = 0;
+        *moved = 1;
+    }
+    return OK;
+}
+
 /* -- saved states */
 
 size_t state_size(const Instance *c) { return sizeof(Saved) + c->block_size; }

@@ -61,6 +61,10 @@ Status forward(Instance *c, const unsigned *unknown, size_t n_unknown, const uns
                const double *seed, double *sensitivity);
 Status output_derivative(Instance *c, unsigned reference, double *value);
 Status step(Instance *c, double time, double size);
+/* Model Exchange: whether the states have drifted off the constraints, and an event is to correct them; and that
+ * correction, with whether it has moved a state. */
+int drifted(Instance *c);
+Status project(Instance *c, int *moved);
 Status states_set(Instance *c, const double *x, size_t n, const char *call);
 /* `from` is the states, their derivatives or their nominal sizes */
 Status states_get(Instance *c, const double *from, double *to, size_t n, const char *call);

@@ -95,10 +95,15 @@ def export(
     layer = (*_LAYER, wanted.layer)
     compiled = ("kernels.c", "model.c", *(name for name in layer if name.endswith(".c")))
 
+    kinds = dict(wanted.kinds)
+    if fmi == 3 and model.controlled:
+        # FMI 2.0 expects the call from every importer
+        kinds["ModelExchange"] = {**kinds["ModelExchange"], "needsCompletedIntegratorStep": "true"}
+
     def description(token: str) -> bytes:
         if fmi == 2:
-            return written(model_description(interface, token, wanted.kinds, version, compiled))
-        return written(model_description_3(interface, token, wanted.kinds, version))
+            return written(model_description(interface, token, kinds, version, compiled))
+        return written(model_description_3(interface, token, kinds, version))
 
     report("generating C")
     functions = kernels(interface)
