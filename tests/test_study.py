@@ -322,3 +322,81 @@ def test_cycle_and_the_side_that_is_gone():
     assert c.crank_torque[100] == pytest.approx(7.0 * float(out.tau))
     alone = cycle(without_right(machine), 3.0, loads, EMPTY)
     assert np.all(alone.outputs.right.tangential_load == 0.0)
+
+
+LIGHT = "events = []\n[run]\nstep = 0.002\n"
+TWICE = """
+events = []
+[ratios]
+l = 3.0
+l1 = 2.7
+[machine]
+ratio = 100
+[feed]
+left = { material_mass = 300 }
+right = { material_mass = 300 }
+[run]
+crank_speed = "15 rev/min"
+step = 0.002
+"""
+
+
+def ran(text, folder):
+    """A study that was run in this process, with its files in `folder`."""
+    from chainunit import config
+    from chainunit.report import files
+    from chainunit.studies.overload import as_dict, run_study
+
+    study = run_study(config.parse(text), folder)
+    files.write(study, folder)
+    return study, as_dict(study)
+
+
+@pytest.mark.parametrize(("text", "turns"), [(LIGHT, 1), (TWICE, 1), (LIGHT + "turns = 3\n", 3)])
+def test_the_load_cycle_is_whole_turns_that_the_numbers_follow_from(text, turns, tmp_path):
+    study, numbers = ran(text, tmp_path)
+    time, speed, torque, inertia = np.loadtxt(tmp_path / "load_cycle.csv", delimiter=",", skiprows=1).T
+    ratio, steady = study.drive.ratio, {n: e["value"] for n, e in numbers["answers"]["steady"].items()}
+    whole = time[-1]
+    assert time[0] == 0.0
+    assert np.trapezoid(speed, time) == pytest.approx(2.0 * math.pi * ratio * turns, rel=1e-6)
+    # closed
+    for x in (speed, torque, inertia):
+        assert x[-1] == pytest.approx(x[0], abs=1e-3 * np.max(np.abs(x)))
+    assert steady["cycle_gap"] < 1e-3
+    # mean power as the work over the angle, in place of the power over the time
+    angle = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time))])
+    assert np.trapezoid(torque, angle) / whole == pytest.approx(steady["power_mean"], rel=1e-4)
+    assert np.trapezoid(torque, time) / whole * ratio == pytest.approx(steady["crank_torque_mean"], rel=1e-6)
+    rms = math.sqrt(np.trapezoid(torque**2, time) / whole) * ratio
+    assert rms == pytest.approx(steady["crank_torque_rms"], rel=1e-6)
+    assert np.max(np.abs(torque)) * ratio == pytest.approx(steady["crank_torque_peak"], rel=1e-8)
+    # what friction and the processing force take, by inverse dynamics at the mean speed
+    ideal = study.cycles["both sides"].crank_torque
+    assert steady["power_mean"] == pytest.approx(np.mean(ideal) * study.config.run.crank_speed, rel=0.02)
+
+
+def test_a_slow_motor_still_makes_its_turns(tmp_path):
+    """At 60 V the crank turns more slowly than is asked: the run is as long as the turns take."""
+    study, numbers = ran(LIGHT.replace("[run]", "[run]\ncrank_speed = 6\nturns = 2") + LOW_VOLTAGE, tmp_path)
+    steady = numbers["answers"]["steady"]
+    assert steady["speed_mean"]["value"] < 0.7 * 6.0
+    time, speed = np.loadtxt(tmp_path / "load_cycle.csv", delimiter=",", skiprows=1).T[:2]
+    assert np.trapezoid(speed, time) == pytest.approx(4.0 * math.pi * study.drive.ratio, rel=1e-6)
+
+
+LOW_VOLTAGE = "[motor]\nlimit = { v = 60 }\n[machine]\nratio = 25\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "told", "there"),
+    [
+        # the crank still starts in the turn that is evaluated
+        (LIGHT + "settle_turns = 0\nramp = 0.01\n", "do not close", True),
+        (LIGHT + "[motor]\nlimit = { i = 0.2 }\n", "does not make a whole turn", False),
+    ],
+)
+def test_a_cycle_that_does_not_close_is_told(text, told, there, tmp_path):
+    study, _ = ran(text, tmp_path)
+    assert any(told in note for note in study.notes)
+    assert (tmp_path / "load_cycle.csv").exists() == there

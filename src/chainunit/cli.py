@@ -89,9 +89,9 @@ def study(
         check_own(loaded.catalogue)
     with claimed(output):
         from .report import files, page, plots, table
-        from .studies.overload import run_study
+        from .studies.overload import LOAD_CYCLE, run_study
 
-        _clear(output, "result.json", "result.nc", files.LOAD_CYCLE, page.NAME, *plots.NAMES)
+        _clear(output, "result.json", "result.nc", LOAD_CYCLE, page.NAME, *plots.NAMES)
         console, errors = _console(), _console(stderr=True)
         with _progress("exporting FMUs", errors) as report:
             result = run_study(

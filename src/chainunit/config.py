@@ -55,10 +55,14 @@ class Run:
         "s", "time in which the speed reference rises from rest", default=1.5, min=0.001, max=1e4
     )
     settle_turns: Value = quantity(
-        "1", "crank turns after the ramp, before running counts as steady", default=1.0, min=0.0, max=1e4
+        "1", "crank turns after the ramp, before running counts as steady", default=2.0, min=0.0, max=1e4
     )
     turns: Value = quantity(
-        "1", "crank turns of steady running that are evaluated", default=2.0, min=1.0, max=1e4
+        "1",
+        "whole crank turns of steady running that are evaluated and that load_cycle.csv holds",
+        default=1.0,
+        min=1.0,
+        max=1e4,
     )
     step: Value = quantity("s", "communication step of the co-simulation", default=0.001, min=1e-5, max=0.02)
 
@@ -443,6 +447,7 @@ def _consistent(data: Mapping[str, Any], checked: Any) -> None:
             f"sizing.temperature = {sizing.temperature:g} K: must be > sizing.ambient, {sizing.ambient:g} K"
         )
     for name, number in (
+        ("run.turns", instance(Run, given_values(checked.run)).turns),
         ("monte_carlo.runs", random.runs),
         ("monte_carlo.seed", random.seed),
         *((f"chain.{n}", getattr(chain, n)) for n in ("rods", "sweep_points", "starts", "turns")),

@@ -11,16 +11,13 @@ import xarray as xr
 
 from .. import __version__
 from ..files import whole
-from ..studies.overload import SCENARIOS, Study, as_dict
-
-LOAD_CYCLE = "load_cycle.csv"
+from ..studies.overload import LOAD_CYCLE, SCENARIOS, Study, as_dict
 
 
-def _load_cycle(study: Study, file: Path) -> Path:
-    """The load that the motor shaft sees in steady running, in the form that sizing tools import: a row per instant
-    with time, speed, torque of the load and inertia of the load, units in the head."""
-    settled = study.settled
-    steady = study.runs["start_up"].sel(time=slice(settled, None))
+def _load_cycle(study: Study, turns: xr.Dataset, file: Path) -> Path:
+    """The load that the motor shaft sees in the steady turns, in the form that sizing tools import: a row per instant
+    with time, speed, torque of the load and inertia of the load, units in the head. The last row is the first of the
+    next turn."""
     names = {
         "time": "time",
         "motor.w": "speed",
@@ -29,9 +26,10 @@ def _load_cycle(study: Study, file: Path) -> Path:
     }
     with whole(file) as part, part.open("w", newline="", encoding="utf-8") as out:
         writer = csv.writer(out)
-        writer.writerow(f"{title} [{steady[name].attrs['units']}]" for name, title in names.items())
-        columns = [steady[name].values - (settled if name == "time" else 0.0) for name in names]
-        columns[-1] = study.drive.load_inertia(steady)
+        writer.writerow(f"{title} [{turns[name].attrs['units']}]" for name, title in names.items())
+        columns = [turns[name].values for name in names]
+        columns[0] = columns[0] - columns[0][0]
+        columns[-1] = study.drive.load_inertia(turns)
         writer.writerows([f"{x:.9g}" for x in row] for row in zip(*columns, strict=True))
     return file
 
@@ -46,8 +44,8 @@ def write(study: Study, folder: Path) -> list[Path]:
     with whole(numbers) as part:
         part.write_text(json.dumps(as_dict(study), indent=2, allow_nan=False) + "\n", "utf-8")
     written = [numbers]
-    if "steady" in study.answers:
-        written.append(_load_cycle(study, folder / LOAD_CYCLE))
+    if "steady" in study.answers and study.drive.whole_turns(study.steady) is not None:
+        written.append(_load_cycle(study, study.steady, folder / LOAD_CYCLE))
     if study.runs:
         series = folder / "result.nc"
         tree = xr.DataTree.from_dict(

@@ -556,7 +556,7 @@ def _card(t: Traced, family: str, members: list[tuple[str, Variable]], run: str)
 
 def _answer_number(t: Traced, run: str, v: Variable) -> str:
     none = "not reached" if v.name == "recovery_time" and run != "steady" else "–"
-    form = "percent" if v.name in ("speed_dip", "speed_ripple", "slack_time") else _angle(v.unit)
+    form = "percent" if v.name in ("speed_dip", "speed_ripple", "slack_time", "cycle_gap") else _angle(v.unit)
     return t.number(f"answers.{run}.{v.name}", form=form, none=none)
 
 

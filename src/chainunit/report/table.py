@@ -33,6 +33,7 @@ _HIDDEN = {
     "speed_least",
     "power_mean",
     "crank_torque_mean",
+    "cycle_gap",
 }
 _IF_ANY = {
     "slack_time",

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from ..cosim import Profile, System, port_connections
@@ -115,6 +117,22 @@ class Drive:
         phi, w = ("phi0", "w0") if "machine.phi0" in run else ("phi", "w")
         ratio = self.driven.p.ratio
         return run[f"machine.{phi}"].values / ratio, run[f"machine.{w}"].values / ratio
+
+    def whole_turns(self, run: xr.Dataset, most: float = math.inf) -> xr.Dataset | None:
+        """The run up to the instant at which the crank has made whole turns since the first row, both ends included:
+        as many turns as it makes, at most `most`; None where it makes less than one.
+
+        The last row is interpolated linearly; where the running is periodic it equals the first.
+        """
+        angle, _ = self.crank_motion(run)
+        turned = (angle - angle[0]) / (2.0 * math.pi)
+        turns = min(math.floor(float(np.max(turned))), most)
+        if turns < 1:
+            return None
+        last = int(np.argmax(turned >= turns))
+        pair = run.isel(time=slice(last - 1, last + 1))
+        end = float(np.interp(turns, turned[last - 1 : last + 1], pair["time"].values))
+        return xr.concat([run.isel(time=slice(0, last)), pair.interp(time=[end])], "time", data_vars="all")
 
     def start(self) -> dict[str, float]:
         """Parameters of the whole system by full name."""

@@ -53,14 +53,19 @@ PINS = {
 }
 
 
+LOAD_CYCLE = "load_cycle.csv"
+"""File with the steady turns as the motor's shaft sees them."""
+
+
 @declaration
 class Answers:
     """What a run asks of the drive; torques and speeds are the crank's unless they are called the motor's. Means
-    and RMS are over whole turns of the crank.
+    and RMS are over the time of whole turns of the crank; steady running is the turns that `load_cycle.csv` holds.
 
     The ripple is (largest - least)/mean of the speed; `shaft_share` the peak torque on the machine's shaft over
     that of the motor (the rest is the rotor's inertia); `shaking_*` the largest deviation of the frame's load
     from its mean, the moment about C; `breakdown_margin` the largest steady torque of the motor over its peak;
+    `cycle_gap` is the difference between the ends of the steady turns, of speed or torque, over the largest value;
     times count from the event; `energy_after_trip` passes the safety coupling while it opens, `energy_behind`
     stays in the machine."""
 
@@ -79,6 +84,7 @@ class Answers:
     speed_mean: Value = quantity("rad/s", "crank speed, mean")
     speed_least: Value = quantity("rad/s", "crank speed, least")
     speed_ripple: Value = quantity("1", "speed ripple")
+    cycle_gap: Value = quantity("1", "gap between the ends of the steady turns")
     speed_dip: Value = quantity("1", "speed dip")
     recovery_time: Value = quantity("s", "recovery")
     web_pull_least: Value = quantity("N", "least pull in a web")
@@ -128,6 +134,11 @@ _ROCKER_GOOD, _CRANK_GOOD = (0.2, 0.4), 0.6
 """Crank speeds, in parts of the organ's lowest natural frequency, up to which two bars give the rocker torque (empty,
 loaded) and the crank torque to a tenth of the peak of chains: on the packaged machine, docs/physics.md."""
 
+_STANDS = 0.1
+"""Share of the speed asked for below which the crank counts as standing."""
+_CLOSED = 0.01
+"""Gap between the ends of the steady turns up to which they count as closed."""
+
 Report = Callable[[str, float, float], None]
 """Called with what is running, the time done and the time to do [s]."""
 
@@ -172,6 +183,13 @@ class Study:
     def settled(self) -> float:
         """Time from which running counts as steady [s]."""
         return self.config.settled
+
+    @property
+    def steady(self) -> xr.Dataset:
+        """The steady turns that are evaluated, both ends included; where the crank does not make them, all that was
+        run since it should be steady."""
+        run = self.runs["start_up"].sel(time=slice(self.settled, None))
+        return _turns(self.drive, run, self.config.run.turns)
 
     @property
     def motor(self) -> Any:
@@ -361,19 +379,15 @@ def _simulate(
     )
     guards = _guards(study)
     with CoSimulation(drive.system(files), signals) as simulation:
-        start_up = simulation.run(
-            stop,
-            run.step,
-            partial(_progress, report, "start-up and steady running", 0.0, total),
-            guards=guards,
-        )
+        progress = partial(_progress, report, "start-up and steady running", 0.0, total)
+        start_up, stop = _started(study, simulation, stop, progress, guards)
         _certify(study, "start_up", start_up, bond)
         if simulation.time < stop - 0.5 * run.step:
             raise RunError(
                 f"the safety coupling opens in the start-up, at t = {simulation.time:.3g} s; coupling.trip_torque "
                 "must be above what starting takes"
             )
-        steady = start_up.sel(time=slice(settled, None))
+        steady = study.steady
         study.answers["steady"] = _answers(study, steady, None, steady)
         study.pins["steady"] = _pins(study, steady)
         start = simulation.save()
@@ -400,6 +414,7 @@ def _simulate(
         without = {**plain.loads(config.feed), **plain.reference(run.crank_speed, run.ramp)}
         with CoSimulation(plain.system(files), without) as simulation:
             again = simulation.run(stop, run.step).sel(time=slice(settled, None))
+        again = _turns(drive, again, run.turns)
         study.ripple_without = _answers(study, again, None, again).speed_ripple
     if "start_loaded" in config.events:
         loaded = {
@@ -421,6 +436,29 @@ def _simulate(
         _shaft(study, rigid)
     if config.monte_carlo.runs:
         study.monte_carlo = run_monte_carlo(Task(config, drive, files, stop), folder, report)
+
+
+def _started(
+    study: Study,
+    simulation: CoSimulation,
+    stop: float,
+    progress: Callable[[float], None],
+    guards: Mapping[str, float],
+) -> tuple[xr.Dataset, float]:
+    """The start-up and steady running to the time `stop`, or to a later one where a crank that turns too slowly needs
+    it for the turns that are evaluated; with that time."""
+    run, drive = study.config.run, study.drive
+    found = simulation.run(stop, run.step, progress, guards=guards)
+    longest = study.settled + (stop - study.settled) / _STANDS
+    while stop - 0.5 * run.step <= simulation.time < longest:
+        angle, _ = drive.crank_motion(found.sel(time=slice(study.settled, None)))
+        missing = run.turns - (angle[-1] - angle[0]) / (2.0 * math.pi)
+        if missing < 0.0:
+            break
+        # at the speed that is asked at most; what is still missing then is seen in the next round
+        stop = min(longest, stop + max((missing + 0.1) * 2.0 * math.pi / run.crank_speed, run.step))
+        found = _joined([found, simulation.run(stop, run.step, progress, guards=guards)])
+    return found, stop
 
 
 def _rigid(study: Study, files: Mapping[str, Path], stop: float) -> dict[str, xr.Dataset]:
@@ -456,9 +494,7 @@ def _shaft(study: Study, rigid: Mapping[str, xr.Dataset]) -> None:
     for name, run in [("steady", "start_up"), *((name, name) for name in study.event)]:
         study.runs[run] = with_rigid(study.drive, study.runs[run], rigid[run])
         since = slice(study.settled if name == "steady" else study.event[name], None)
-        elastic = study.runs[run].sel(time=since)
-        if name == "steady":
-            elastic = elastic.isel(time=_whole_turns(study, elastic))
+        elastic = study.steady if name == "steady" else study.runs[run].sel(time=since)
         study.shaft[name], study.cycles_of[name], damage = shaft_answers(
             study.drive, elastic, rigid[run].sel(time=since), study.config.driveline.exponent, per_turn
         )
@@ -534,8 +570,7 @@ def _close(
         }
     _certify(study, name, run, bond)
     after = run.sel(time=slice(event, None))
-    steady = study.runs["start_up"]
-    answers = _answers(study, after, event, steady.sel(time=slice(study.settled, None)))
+    answers = _answers(study, after, event, study.steady)
     study.answers[name] = replace(answers, **tripped)
     study.pins[name] = _pins(study, after)
 
@@ -612,18 +647,23 @@ def _compare(study: Study, run: xr.Dataset, signals: Mapping[str, Any]) -> None:
         )
 
 
-def _whole_turns(study: Study, run: xr.Dataset) -> Any:
-    """Which rows belong to whole turns of the crank: over anything else the mean of a cyclic torque means nothing."""
-    angle, _ = study.drive.crank_motion(run)
-    turned = (angle - angle[0]) / (2.0 * math.pi)
-    return turned <= max(1.0, math.floor(turned[-1]))
+def _turns(drive: Drive, run: xr.Dataset, most: float = math.inf) -> xr.Dataset:
+    """Whole turns of a run, see `Drive.whole_turns`; all of it where the crank does not make one."""
+    turns = drive.whole_turns(run, most)
+    return run if turns is None else turns
+
+
+def _mean(run: xr.Dataset, x: Any) -> float:
+    """Mean over the time of a run, by the trapezoidal rule."""
+    time = run["time"].values
+    return float(np.trapezoid(x, time) / (time[-1] - time[0]))
 
 
 def _answers(study: Study, run: xr.Dataset, event: float | None, steady: xr.Dataset) -> Answers:
     """The numbers of one run."""
     config, drive = study.config, study.drive
     w_ref = config.run.crank_speed
-    whole = _whole_turns(study, run)
+    turns = _turns(drive, run)
 
     def value(name: str) -> Any:
         return run[name].values
@@ -631,15 +671,15 @@ def _answers(study: Study, run: xr.Dataset, event: float | None, steady: xr.Data
     def peak(x: Any) -> float:
         return float(np.max(np.abs(x)))
 
-    def mean(x: Any) -> float:
-        return float(np.mean(x[whole]))
+    def mean(read: Callable[[xr.Dataset], Any]) -> float:
+        return _mean(turns, read(turns))
 
-    def rms(x: Any) -> float:
-        return math.sqrt(mean(x * x))
+    def rms(read: Callable[[xr.Dataset], Any]) -> float:
+        return math.sqrt(mean(lambda r: read(r) ** 2))
 
     def swing(*names: str) -> float:
-        parts = [value(f"machine.frame.{name}") for name in names]
-        return float(np.max(np.sqrt(sum((x - mean(x)) ** 2 for x in parts))))
+        parts = [(value(full), mean(_series(full))) for full in (f"machine.frame.{name}" for name in names)]
+        return float(np.max(np.sqrt(sum((x - middle) ** 2 for x, middle in parts))))
 
     sides = drive.machine.loaded_sides(config.feed.left, config.feed.right)
 
@@ -648,7 +688,8 @@ def _answers(study: Study, run: xr.Dataset, event: float | None, steady: xr.Data
 
     crank_torque, motor_torque = drive.crank_torque(run), value("motor.air_gap_tau")
     _, speed = drive.crank_motion(run)
-    power, current = value(f"{drive.loading}.power"), value(f"motor.{drive.motor.current}")
+    power, current = f"{drive.loading}.power", f"motor.{drive.motor.current}"
+    speed_mean = mean(lambda r: drive.crank_motion(r)[1])
     asked = w_ref if drive.follows or event is None else study.answers["steady"].speed_mean
     since = value("time") - (event or 0.0)
     recovery = None
@@ -656,26 +697,29 @@ def _answers(study: Study, run: xr.Dataset, event: float | None, steady: xr.Data
         recovery = _recovery(since, speed, drive.crank_motion(steady)[1], asked)
     return Answers(
         crank_torque_peak=peak(crank_torque),
-        crank_torque_rms=rms(crank_torque),
-        crank_torque_mean=mean(crank_torque),
+        crank_torque_rms=rms(drive.crank_torque),
+        crank_torque_mean=mean(drive.crank_torque),
         motor_torque_peak=peak(motor_torque),
-        motor_torque_rms=rms(motor_torque),
-        power_peak=float(np.max(power)),
-        power_mean=mean(power),
-        supply_power_mean=mean(value("motor.supply_power")),
-        current_peak=peak(current),
-        current_rms=rms(current),
+        motor_torque_rms=rms(_series("motor.air_gap_tau")),
+        power_peak=float(np.max(value(power))),
+        power_mean=mean(_series(power)),
+        supply_power_mean=mean(_series("motor.supply_power")),
+        current_peak=peak(value(current)),
+        current_rms=rms(_series(current)),
         winding_temperature=float(value(f"motor.{drive.motor.temperature}")[-1]),
         rocker_torque_peak=peak(value("machine.rocker.tau")),
-        speed_mean=mean(speed),
+        speed_mean=speed_mean,
         speed_least=float(np.min(speed)),
-        speed_ripple=float(np.ptp(speed[whole])) / max(abs(mean(speed)), 1e-9) if event is None else None,
+        speed_ripple=float(np.ptp(speed)) / max(abs(speed_mean), 1e-9) if event is None else None,
+        cycle_gap=max(abs(float(x[-1] - x[0])) / max(peak(x), 1e-9) for x in (speed, crank_torque))
+        if event is None
+        else None,
         # a start begins at rest
         speed_dip=float((asked - np.min(speed)) / asked) if event != 0.0 else None,
         recovery_time=recovery,
         web_pull_least=least("web"),
         wall_pull_least=least("wall"),
-        slack_time=mean(_any_slack(run, sides)) if drive.chain is not None else None,
+        slack_time=mean(lambda r: _any_slack(r, sides)) if drive.chain is not None else None,
         fold_largest=max(
             (float(np.max(value(f"machine.{side}.fold_largest"))) for side in sides), default=0.0
         )
@@ -686,12 +730,17 @@ def _answers(study: Study, run: xr.Dataset, event: float | None, steady: xr.Data
         shaking_moment=swing("moment"),
         breakdown_margin=drive.largest_torque() / peak(motor_torque),
         stall_time=None if event is None else protection.stall(since, speed, asked),
-        thermal_trip_time=_relay(study, since, current) if event is not None else None,
+        thermal_trip_time=_relay(study, since, value(current)) if event is not None else None,
         coupling_trip_time=None,
         energy_after_trip=None,
         energy_behind=None,
         standstill_time=None,
     )
+
+
+def _series(name: str) -> Callable[[xr.Dataset], Any]:
+    """Reads a variable of a run, shape (time,)."""
+    return lambda run: run[name].values
 
 
 def _any_slack(run: xr.Dataset, sides: list[str]) -> Any:
@@ -728,16 +777,20 @@ def _recovery(since: Any, speed: Any, steady: Any, w_ref: float) -> float | None
 
 def _pins(study: Study, run: xr.Dataset) -> dict[str, dict[str, float]]:
     """Peak, RMS and equivalent load (mean of ISO 281 over what the pin turns) of the reaction of every pin [N]."""
-    table, whole = {}, _whole_turns(study, run)
-    turned = study.drive.driven.pin_turns(run["machine.phi0"].values[whole])
+    table, turns = {}, _turns(study.drive, run)
+    turned = study.drive.driven.pin_turns(turns["machine.phi0"].values)
     if study.drive.chain is not None:
-        turned[4:] = _chain_turns(study.drive, run.isel(time=whole))
+        turned[4:] = _chain_turns(study.drive, turns)
+
+    def size(name: str, of: xr.Dataset) -> Any:
+        return np.hypot(of[f"machine.{name}.fx"].values, of[f"machine.{name}.fy"].values)
+
     for (title, name), angle in zip(PINS.items(), turned, strict=True):
-        size = np.hypot(run[f"machine.{name}.fx"].values, run[f"machine.{name}.fy"].values)
+        evaluated = size(name, turns)
         table[title] = {
-            "peak": float(np.max(size)),
-            "rms": float(np.sqrt(np.mean(size[whole] ** 2))),
-            "equivalent": protection.mean_load(size[whole], angle),
+            "peak": float(np.max(size(name, run))),
+            "rms": math.sqrt(_mean(turns, evaluated**2)),
+            "equivalent": protection.mean_load(evaluated, angle),
         }
     return table
 
@@ -793,6 +846,17 @@ def _note(study: Study) -> None:
                 else "a motor on the line takes the speed that gear ratio and slip give."
             )
             + " Overloads are those of this state."
+        )
+    if steady is not None and study.drive.whole_turns(study.steady) is None:
+        note(
+            "steady running: the crank does not make a whole turn; means are over all that was run, and there is no "
+            f"{LOAD_CYCLE}."
+        )
+    elif steady is not None and steady.cycle_gap > _CLOSED:
+        repeats = "chains do not repeat a turn" if config.chain else "the motor has not settled"
+        note(
+            f"steady running: the turns do not close, their ends differ by {100 * steady.cycle_gap:.2g} % in speed "
+            f"or torque: {repeats}; raise run.settle_turns or run.turns."
         )
     if study.sizing is not None:
         study.notes.extend(study.sizing.notes)
