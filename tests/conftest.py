@@ -1,13 +1,111 @@
+"""What the tests share, and how they run: in parallel, a file at a time, when no file is named.
+
+An FMU costs a test little: the C compiler that exports find is `cc.py`, which compiles the same sources once a
+session, whichever worker, test or process asks. Beyond that,
+
+- `fmus` has the Python FMU of every model, `native_fmus` the native ones: take them where start values do not matter;
+- `once` fills a folder once a session, for all workers: take it for a study that tests of several files read, or for
+  anything else that costs seconds and is only read;
+- a module's own fixtures (`scope="module"`) are made once, as a file is never split between workers;
+- `monkeypatch.setenv("PATH", plain_path)` gives the system's own compiler to a test of the compiler itself.
+"""
+
 from __future__ import annotations
 
+import fcntl
+import os
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+import cc
+import fmpy
 import pytest
 
 from chainunit.fmu.export import export
+from chainunit.fmu.native.export import export as export_native
 from chainunit.models import MODELS
+
+_PLAIN_PATH = "CHAINUNIT_TESTS_PLAIN_PATH"
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_cmdline_main(config):
+    """Before xdist reads its options: one worker for each processor, for a run of all tests."""
+    options = config.option
+    whole = config.args_source is pytest.Config.ArgsSource.TESTPATHS
+    worker = hasattr(config, "workerinput")  # a worker comes here, too: it must not start workers of its own
+    one = worker or options.usepdb or options.collectonly or not config.pluginmanager.hasplugin("xdist")
+    if whole and not one and options.numprocesses is None:
+        options.numprocesses = config.hook.pytest_xdist_auto_num_workers(config=config)
+        options.dist = "loadfile"
+
+
+def pytest_configure(config):
+    """The compiler that remembers, for this process and all that it starts, the workers too."""
+    if sys.platform == "linux" and _PLAIN_PATH not in os.environ:
+        os.environ[_PLAIN_PATH] = os.environ["PATH"]
+        store = Path(tempfile.mkdtemp(prefix="chainunit_tests_"))
+        cc.install(store)
+        config.add_cleanup(lambda: shutil.rmtree(store, ignore_errors=True))
 
 
 @pytest.fixture(scope="session")
-def fmus(tmp_path_factory):
-    """Both FMUs, in a folder whose name has spaces."""
-    folder = tmp_path_factory.mktemp("path with spaces")
-    return {name: export(model, folder / f"{name}.fmu") for name, model in MODELS.items()}
+def plain_path():
+    """PATH without the compiler that remembers."""
+    return os.environ.get(_PLAIN_PATH, os.environ["PATH"])
+
+
+@pytest.fixture(scope="session")
+def once(tmp_path_factory):
+    """``once(name, fill)``: the folder `name`, which ``fill(folder)`` has filled, once a session for all workers.
+
+    What is in it must only be read. A `fill` that fails is tried again by the next that asks, in an empty folder.
+    """
+    base = tmp_path_factory.getbasetemp()
+    shared = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "once"
+    shared.mkdir(exist_ok=True)
+
+    def filled(name, fill):
+        folder, done = shared / name, shared / f"{name}.done"
+        with (shared / f"{name}.lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not done.exists():
+                shutil.rmtree(folder, ignore_errors=True)
+                folder.mkdir()
+                fill(folder)
+                done.touch()
+        return folder
+
+    return filled
+
+
+@pytest.fixture(scope="session")
+def fmus(once):
+    """The Python FMU of every model, by its name, in a folder whose name has spaces."""
+
+    def fill(folder):
+        for name, model in MODELS.items():
+            export(model, folder / f"{name}.fmu")
+
+    folder = once("path with spaces", fill)
+    return {name: folder / f"{name}.fmu" for name in MODELS}
+
+
+@pytest.fixture(scope="session")
+def native_fmus(once):
+    """Native FMUs by FMI 2 and 3 of every model, unpacked: {(name, fmi): (file, folder)}."""
+
+    def fill(folder):
+        for name, model in MODELS.items():
+            for fmi in (2, 3):
+                file = export_native(model, folder / f"{name}{fmi}.fmu", fmi=fmi)
+                fmpy.extract(str(file), unzipdir=str(folder / f"{name}{fmi}"))
+
+    folder = once("native fmus", fill)
+    return {
+        (name, fmi): (folder / f"{name}{fmi}.fmu", str(folder / f"{name}{fmi}"))
+        for name in MODELS
+        for fmi in (2, 3)
+    }

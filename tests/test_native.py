@@ -33,6 +33,7 @@ from chainunit.models import MODELS
 from chainunit.quantities import TYPES
 
 HERE = Path(__file__).parent
+LARGE = ("KnifeDrive", "ChainUnitFlexible")  # whose kernels take a compiler ten seconds
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 
 
@@ -50,16 +51,9 @@ def host_torque():
     return ChainUnit().evaluate({"phi": 0.5 * np.arange(10), "w": 6.0} | loads)["tau"]
 
 
-@pytest.fixture(scope="module")
-def native(tmp_path_factory):
-    """FMI 2 and 3 of both models, unpacked: {(name, fmi): (file, folder)}."""
-    folder = tmp_path_factory.mktemp("native fmus")
-    made = {}
-    for name, model in MODELS.items():
-        for fmi in (2, 3):
-            file = export(model, folder / f"{name}{fmi}.fmu", fmi=fmi)
-            made[name, fmi] = file, fmpy.extract(str(file), unzipdir=str(folder / f"{name}{fmi}"))
-    return made
+@pytest.fixture
+def native(native_fmus):
+    return native_fmus
 
 
 @contextmanager
@@ -296,10 +290,17 @@ def test_a_wrong_guid_is_refused(native):
     fmu.close()
 
 
-def test_same_model_same_file(native, tmp_path):
-    for (name, fmi), (file, _) in native.items():
+@pytest.mark.parametrize(
+    "name", [n if n not in LARGE else pytest.param(n, marks=pytest.mark.slow) for n in MODELS]
+)
+def test_same_model_same_file(native, name, tmp_path, monkeypatch, plain_path):
+    monkeypatch.setenv("PATH", plain_path)
+    for fmi in (2, 3):
         again = export(MODELS[name], tmp_path / "again.fmu", fmi=fmi)
-        assert again.read_bytes() == file.read_bytes()
+        assert again.read_bytes() == native[name, fmi][0].read_bytes()
+
+
+def test_other_start_values_are_another_fmu(native, tmp_path):
     other = export(ChamberForces, tmp_path / "other.fmu", {"r": 0.14})
     assert fmpy.read_model_description(str(other)).guid != Fmu(native["ChamberForces", 2][0]).description.guid
 
