@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import json
 import math
@@ -55,7 +56,7 @@ SCRIPT = """
 """
 
 
-def start(folder, runs):
+def start(folder, runs, **more):
     (folder / "study.toml").write_text(STUDY.format(runs=runs))
     (folder / "script.py").write_text(textwrap.dedent(SCRIPT))
     return subprocess.Popen(
@@ -65,6 +66,7 @@ def start(folder, runs):
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        **more,
     )
 
 
@@ -73,7 +75,7 @@ def killed(tmp_path_factory):
     """A run that was killed after its first results, a torn line left behind, and then resumed."""
     folder = tmp_path_factory.mktemp("monte carlo")
     first = start(folder, 100_000)
-    while not list(folder.glob("*.jsonl")) or not next(folder.glob("*.jsonl")).stat().st_size:
+    while not list(folder.glob("*.jsonl")) or next(folder.glob("*.jsonl")).read_text().count("\n") < 25:
         assert first.poll() is None, first.stderr.read()
         time.sleep(0.05)
     os.killpg(first.pid, signal.SIGKILL)
@@ -81,7 +83,7 @@ def killed(tmp_path_factory):
     (file,) = folder.glob("*.jsonl")
     with file.open("a") as out:
         out.write('{"run": 99999, "crank_a')
-    before = monte_carlo.read(file)
+    before, _ = monte_carlo.read(file)
     second = start(folder, len(before) + 10)
     said, errors = second.communicate()
     assert second.returncode == 0, errors
@@ -90,7 +92,7 @@ def killed(tmp_path_factory):
 
 def test_a_killed_study_goes_on_from_what_it_saved(killed):
     file, before, said = killed
-    assert len(before) >= 25 and f"resumed {len(before)}" in said
+    assert before and f"resumed {len(before)}" in said
     rows = [json.loads(line) for line in file.read_text().splitlines()]
     assert sorted(row["run"] for row in rows) == list(range(len(before) + 10))
     for row in rows:
@@ -158,8 +160,94 @@ def test_a_run_that_fails_is_a_row(killed, monkeypatch):
         return good(task, number, simulation)
 
     monkeypatch.setattr(monte_carlo, "one", fails)
-    rows = monte_carlo.batch(task, task.digest(), [1, 2, 3])
+    rows = [monte_carlo.row_of(task, task.digest(), k) for k in (1, 2, 3)]
     monte_carlo._worker.popitem()[1].close()
     assert [row["failed"] for row in rows] == [None, "machine: it broke", None]
     result = monte_carlo.MonteCarloResult(rows, killed[0], 0)
     assert result.failed == 1 and result.quantiles()["crank_torque_peak"]["q50"] > 0.0
+
+
+def line(number, **changed):
+    good = dict.fromkeys(monte_carlo.Layout(monte_carlo.Sample).names, 1.0)
+    return json.dumps({"run": number, "failed": None, **good, **changed}).encode()
+
+
+BAD = {
+    "null": b"null",
+    "5": b"5",
+    "{}": b"{}",
+    "[]": b"[]",
+    "no text": b"\xff",
+    "no text in a text": line(3, failed="\x01").replace(b"\\u0001", b"\xff"),
+    "not a number": line(3, force=math.nan),
+    "infinite": line(3, force=math.inf),
+    "run -1": line(-1),
+    "run 0.5": line(0.5),
+    "run true": line(True),
+    "no run": line(3).replace(b'"run"', b'"ran"'),
+    "a value missing": line(3).replace(b'"force": 1.0, ', b""),
+    "null in a run that did not fail": line(3, force=None),
+    "text": line(3, force="1.0"),
+    "unknown key": line(3, what=1.0),
+    "failed, and numbers": line(3, failed="it broke"),
+    "nested": b"[" * 100_000,
+    "empty": b"",
+}
+
+
+@pytest.mark.parametrize("what", BAD)
+def test_a_line_that_is_no_row_is_left_out_and_counted(what, tmp_path):
+    file = tmp_path / "rows.jsonl"
+    file.write_bytes(b"\n".join([line(1), BAD[what], line(2, trip_torque=None), b""]))
+    rows, left_out = monte_carlo.read(file)
+    assert sorted(rows) == [1, 2] and left_out == 1
+    assert monte_carlo.MonteCarloResult(list(rows.values()), file, 2).quantiles()
+
+
+def test_rows_of_one_number(tmp_path):
+    """Twice the same is one row; two that differ are none."""
+    file = tmp_path / "rows.jsonl"
+    file.write_bytes(
+        b"\n".join([line(1), line(1), line(2), line(2, force=7.0), line(3), b'{"run": 4, "crank'])
+    )
+    rows, left_out = monte_carlo.read(file)
+    assert sorted(rows) == [1, 3] and left_out == 3
+
+
+def test_what_is_left_out_is_computed_anew_and_told(killed, tmp_path):
+    """In a copy of the folder: two rows spoilt, then run again."""
+    file, before, _ = killed
+    config = parse(STUDY.format(runs=5))
+    drive = Drive(DcMotor, config.motor, config.machine)
+    files = {name: file.parent / f"{model.name}.fmu" for name, (model, _) in drive.models().items()}
+    task = monte_carlo.Task(config, drive, files, 1.0)
+    lines = [json.dumps(before[k]) for k in (0, 1, 2)]
+    (tmp_path / file.name).write_text("\n".join([*lines, lines[0].replace(":", ";"), "5"]) + "\n")
+    told = []
+    result = monte_carlo.run(task, tmp_path, lambda *said: told.append(said[1:]), workers=1)
+    assert (result.resumed, result.left_out) == (3, 2)
+    assert result.rows == [before[k] for k in range(5)]
+    assert result.as_dict()["left_out"]["value"] == 2
+    # one at a time
+    assert told == [(3, 5), (4, 5), (5, 5)]
+    assert monte_carlo.read(tmp_path / file.name) == ({k: before[k] for k in range(5)}, 0)
+
+
+@pytest.mark.parametrize("end", [None, signal.SIGTERM])
+def test_processes_leave_nothing_behind(end, tmp_path):
+    """Neither when they end, nor after SIGTERM to all of them."""
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    running = start(tmp_path, 4 if end is None else 10_000, env=os.environ | {"TMPDIR": str(scratch)})
+    if end is not None:
+        while not list(tmp_path.glob("*.jsonl")) or len(list(scratch.glob("chainunit*"))) < 4:
+            assert running.poll() is None
+            time.sleep(0.02)
+        os.killpg(running.pid, end)
+    _, errors = running.communicate(timeout=120)
+    assert (running.returncode == 0) == (end is None), errors
+    with contextlib.suppress(ProcessLookupError):
+        while True:  # until the last of its processes is gone
+            os.killpg(running.pid, 0)
+            time.sleep(0.02)
+    assert list(scratch.glob("chainunit*")) == []

@@ -15,6 +15,14 @@ from ..errors import InputError, RunError
 
 log = logging.getLogger("chainunit.fmu")
 _FATAL = 4  # fmi2Fatal
+_unpacked: set[str] = set()
+"""Folders of the FMUs that this process has unpacked."""
+
+
+def remove_unpacked() -> None:
+    """Remove the files of every FMU, for a process that ends at once and closes none."""
+    while _unpacked:
+        shutil.rmtree(_unpacked.pop(), ignore_errors=True)
 
 
 class Fmu:
@@ -26,6 +34,7 @@ class Fmu:
         if not Path(file).is_file():
             raise InputError(f"{file}: no such FMU")
         self.folder = tempfile.mkdtemp(prefix="chainunit_fmu_")
+        _unpacked.add(self.folder)
         try:
             extract(str(file), unzipdir=self.folder)
             self.description = read_model_description(self.folder, validate=False)
@@ -50,6 +59,7 @@ class Fmu:
     def close(self) -> None:
         """Remove the unpacked files."""
         shutil.rmtree(self.folder, ignore_errors=True)
+        _unpacked.discard(self.folder)
 
 
 class Instance:

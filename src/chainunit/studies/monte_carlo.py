@@ -1,30 +1,36 @@
 """Overloads at random crank angles, times and sizes, in local processes.
 
-Each run branches from the same steady state and is determined by the study and its own number alone. Results are
-appended as they come to ``monte_carlo_<study>.jsonl``, where <study> is a digest of all that they depend on: a run
-that is killed goes on from there, and another study never mixes with them.
+Each run branches from the same steady state and is determined by the study and its own number alone. Its row is
+appended, when it ends, to ``monte_carlo_<study>.jsonl``, where <study> is a digest of all that the rows depend on: a
+study that is killed goes on from there, and another study never mixes with them. Rows that are none are left out.
 """
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import json
 import math
 import os
+import signal
 from collections.abc import Callable, Mapping
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass
+from itertools import islice
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from .. import __version__
 from ..config import Config
 from ..cosim import CoSimulation, Profile
+from ..cosim.instance import remove_unpacked
 from ..errors import InterruptedRunError, RunError
+from ..files import whole, writing
 from ..quantities import Layout, Value, declaration, quantity
 from . import protection
 from .drive import Drive
@@ -47,8 +53,22 @@ class Sample:
     trips: Value = quantity("1", "1 where the safety coupling opens")
 
 
+def _row_form() -> type[BaseModel]:
+    """The form of a row, from the declaration of a sample. What a run that failed does not have is null; so is the
+    trip torque without a coupling."""
+    number = float | None
+    fields: dict[str, Any] = {v.name: (number, Field(allow_inf_nan=False)) for v in Layout(Sample).variables}
+    return create_model(
+        "Row",
+        __config__=ConfigDict(extra="forbid", strict=True),
+        run=(int, Field(ge=0)),
+        failed=(str | None, Field()),
+        **fields,
+    )
+
+
+_Row = _row_form()
 QUANTILES = (0.05, 0.5, 0.95, 0.99)
-_BATCH = 25  # runs between two appendings to the file
 
 
 @dataclass(frozen=True)
@@ -83,12 +103,29 @@ class Task:
 _worker: dict[str, CoSimulation] = {}
 
 
+def _close() -> None:
+    for simulation in _worker.values():
+        simulation.close()
+    _worker.clear()
+
+
+def _begin() -> None:
+    """Prepare a process: the one that started it handles Ctrl-C; nothing stays behind after SIGTERM."""
+
+    def leave(number: int, frame: Any) -> None:
+        # perhaps out of the middle of an FMU, which then cannot be closed
+        remove_unpacked()
+        os._exit(128 + number)
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, leave)
+    atexit.register(_close)
+
+
 def _prepared(task: Task, digest: str) -> CoSimulation:
     """The co-simulation of this process, started up and saved in its steady state."""
     if digest not in _worker:
-        for other in _worker.values():
-            other.close()
-        _worker.clear()
+        _close()
         run = task.config.run
         signals = {**task.drive.loads(task.config.feed), **task.drive.reference(run.crank_speed, run.ramp)}
         simulation = CoSimulation(task.drive.system(task.files), signals)
@@ -147,33 +184,53 @@ def one(task: Task, number: int, simulation: CoSimulation) -> Sample:
     )
 
 
-def batch(task: Task, digest: str, numbers: list[int]) -> list[dict[str, Any]]:
-    """Results of several runs, as rows of the file."""
+def row_of(task: Task, digest: str, number: int) -> dict[str, Any]:
+    """The result of the run of that number, as a row of the file."""
     simulation = _prepared(task, digest)
     layout = Layout(Sample)
-    rows: list[dict[str, Any]] = []
-    for k in numbers:
-        try:
-            rows.append({"run": k, "failed": None, **layout.named(one(task, k, simulation))})
-        except InterruptedRunError:
-            raise
-        except RunError as error:
-            # one run that fails is an answer, too; the next starts from the saved state again
-            rows.append({"run": k, "failed": str(error), **dict.fromkeys(layout.names)})
-    return rows
+    try:
+        return {"run": number, "failed": None, **layout.named(one(task, number, simulation))}
+    except InterruptedRunError:
+        raise
+    except RunError as error:
+        # one run that fails is an answer, too; the next starts from the saved state again
+        return {"run": number, "failed": str(error), **dict.fromkeys(layout.names)}
 
 
-def read(file: Path) -> dict[int, dict[str, Any]]:
-    """Rows of a results file by their number; a last line that a kill cut off is left out."""
+def read(file: Path) -> tuple[dict[int, dict[str, Any]], int]:
+    """Rows of a results file by their number, and how many lines were left out.
+
+    A line counts that is a row in its whole form: every number is there and finite, or the run failed and none is. Of
+    rows of one number that differ none counts. A last line that a kill cut off is passed over.
+    """
     rows: dict[int, dict[str, Any]] = {}
-    if file.exists():
-        for line in file.read_text("utf-8").splitlines():
-            try:
-                row = json.loads(line)
-            except ValueError:
-                continue
-            rows[row["run"]] = row
-    return rows
+    twice: set[int] = set()
+    left_out = 0
+    if not file.exists():
+        return rows, left_out
+    with file.open("rb") as lines:
+        for line in lines:
+            found = _checked(line)
+            if found is None:
+                left_out += line.endswith(b"\n")
+            elif rows.setdefault(found["run"], found) is not found:
+                left_out += 1
+                if rows[found["run"]] != found:
+                    twice.add(found["run"])
+    return {number: row for number, row in rows.items() if number not in twice}, left_out + len(twice)
+
+
+def _checked(line: bytes) -> dict[str, Any] | None:
+    """The row of a line, or None where it is none."""
+    try:
+        found = _Row.model_validate_json(line).model_dump()
+    except ValidationError:
+        return None
+    missing = {name for name in Layout(Sample).names if found[name] is None}
+    whole_row = (
+        missing <= {"trip_torque"} if found["failed"] is None else len(missing) == len(Layout(Sample).names)
+    )
+    return found if whole_row else None
 
 
 @dataclass(frozen=True)
@@ -184,6 +241,8 @@ class MonteCarloResult:
     file: Path
     resumed: int
     """runs that were there before"""
+    left_out: int = 0
+    """lines of the file that were no rows, or rows of one run that differ; their runs were computed anew"""
 
     def quantiles(self) -> dict[str, dict[str, float]]:
         """Quantiles of every answer, and shares of runs that stall or trip."""
@@ -210,6 +269,7 @@ class MonteCarloResult:
         return {
             "runs": {"value": len(self.rows), "unit": "1"},
             "failed": {"value": self.failed, "unit": "1"},
+            "left_out": {"value": self.left_out, "unit": "1"},
             "file": self.file.name,
             "quantiles": {
                 name: {
@@ -223,46 +283,51 @@ class MonteCarloResult:
 def run(
     task: Task, folder: Path, report: Callable[[str, float, float], None], workers: int | None = None
 ) -> MonteCarloResult:
-    """Run what is missing of the task's runs, on all processors, and append each batch to the file in `folder`.
+    """Run what is missing of the task's runs, on all processors, and append each row to the file in `folder` when its
+    run ends.
 
     Raises
     ------
     RunError
-        where an FMU fails; what was computed is in the file.
+        where an FMU fails, or the file cannot be written; what was computed before is in the file.
     InterruptedRunError
         after Ctrl-C; likewise.
     """
-    from dask.base import compute
-    from dask.delayed import delayed
-
     digest = task.digest()
     file = folder / f"monte_carlo_{digest}.jsonl"
-    rows = read(file)
+    rows, left_out = read(file)
     resumed = len(rows)
     wanted = int(task.config.monte_carlo.runs)
     missing = [k for k in range(wanted) if k not in rows]
     workers = workers or os.cpu_count() or 1
-    batches = [missing[k : k + _BATCH] for k in range(0, len(missing), _BATCH)]
-    if file.exists() and not file.read_bytes().endswith(b"\n"):
-        # what a kill cut off must not run into the next line
-        file.write_text("".join(json.dumps(row) + "\n" for row in rows.values()), "utf-8")
     what = "overloads at random"
-    report(what, len(rows), wanted)
+    done = wanted - len(missing)
+    report(what, done, wanted)
+    if left_out or (file.exists() and not file.read_bytes().endswith(b"\n")):
+        # what is no row, or was cut off by a kill, must not run into the next line
+        with whole(file) as part:
+            part.write_text("".join(_line(row) for row in rows.values()), "utf-8")
     with (
-        ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool,
+        ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_begin) as pool,
+        writing(file),
         file.open("a", encoding="utf-8") as out,
     ):
+        waiting: set[Future[dict[str, Any]]] = set()
+        numbers = iter(missing)
         try:
-            for first in range(0, len(batches), workers):
-                tasks = [
-                    delayed(batch)(task, digest, numbers) for numbers in batches[first : first + workers]
-                ]
-                for found in compute(*tasks, scheduler="processes", pool=pool):
-                    for row in found:
-                        rows[row["run"]] = row
-                        out.write(json.dumps(row) + "\n")
-                    out.flush()
-                report(what, len(rows), wanted)
+            while True:
+                # a few at a time: a study may have a million
+                for k in islice(numbers, 2 * workers - len(waiting)):
+                    waiting.add(pool.submit(row_of, task, digest, k))
+                if not waiting:
+                    break
+                ended, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+                for found in sorted((future.result() for future in ended), key=lambda row: row["run"]):
+                    rows[found["run"]] = found
+                    out.write(_line(found))
+                out.flush()
+                done += len(ended)
+                report(what, done, wanted)
         except BrokenProcessPool as error:
             raise RunError(
                 f"a process of the random overloads was ended from outside after {len(rows)} of {wanted} runs; "
@@ -273,4 +338,8 @@ def run(
             raise InterruptedRunError(
                 f"interrupted after {len(rows)} of {wanted} random overloads"
             ) from error
-    return MonteCarloResult([rows[k] for k in sorted(rows) if k < wanted], file, resumed)
+    return MonteCarloResult([rows[k] for k in sorted(rows) if k < wanted], file, resumed, left_out)
+
+
+def _line(row: Mapping[str, Any]) -> str:
+    return json.dumps(row, allow_nan=False) + "\n"

@@ -906,6 +906,12 @@ def _note(study: Study) -> None:
             "Feed-forward of the machine's torque brings the ripple of the speed from "
             f"{100 * study.ripple_without:.2g} % to {100 * steady.speed_ripple:.2g} %."
         )
+    random = study.monte_carlo
+    if random is not None and random.left_out:
+        note(
+            f"overloads at random: {random.left_out} lines of {random.file.name} were no rows of this study and are "
+            "left out; runs that they may have stood for were computed anew."
+        )
     if study.torsion is not None:
         _note_shaft(study)
     for name, certificate in study.certificate.items():
