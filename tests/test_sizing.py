@@ -13,13 +13,13 @@ from chainunit.config import parse
 from chainunit.cosim import CoSimulation, Profile, System
 from chainunit.drives.catalogue import catalogue
 from chainunit.drives.dc_motor import DcMotor
-from chainunit.drives.induction_motor import breakdown, steady
+from chainunit.drives.induction_motor import InductionMotor, breakdown, steady
 from chainunit.drives.motor import T_RATED
 from chainunit.engines import MATH
 from chainunit.errors import InterruptedRunError
 from chainunit.fmu.backends import export
 from chainunit.studies import sizing
-from chainunit.studies.sizing import Check, flywheel, permitted_starts, rms, start_time, warm_temperature
+from chainunit.studies.sizing import Check, flywheel, permitted_starts, rms, start_time
 
 ANGLE = np.linspace(0.0, 2.0 * math.pi, 7200, endpoint=False)
 
@@ -192,17 +192,21 @@ def test_a_motor_at_its_rated_load_is_as_warm_as_its_nameplate_says():
     """The heat of a run with a cold winding, brought to the temperature at which it is in balance, 80 K above."""
     motor = next(m for m in catalogue() if m.nameplate.power == 1100.0 and m.nameplate.poles == 4.0)
     p, plate = motor.identify().parameters, motor.nameplate
-    cooling = p.cooling.still + (1.0 - p.cooling.still) * plate.speed / plate.synchronous
+    warm = InductionMotor.settled_temperature
     # at the slip that the cold motor needs for its rated torque
     slips = np.linspace(0.0, 0.1, 2001)
     cold = [steady(MATH, p, plate.synchronous * (1.0 - s), T=T_RATED) for s in slips]
     k = int(np.argmin([abs(c.tau - plate.torque) for c in cold]))
-    rise = warm_temperature(p, cold[k].heat, T_RATED, cooling) - p.ambient.T
+    rise = warm(p, cold[k].heat, T_RATED, plate.speed) - p.ambient.T
     assert rise == pytest.approx(80.0, rel=0.06)
-    # without growth of the losses the balance is the plain one, and a hopeless one is bounded
+    # without growth of the losses the balance is the plain one, and a hopeless one has none
     plain = dataclasses.replace(p, stator=dataclasses.replace(p.stator, alpha=0.0))
-    assert warm_temperature(plain, 100.0, T_RATED, 1.0) == pytest.approx(p.ambient.T + 100.0 * p.stator.R_th)
-    assert warm_temperature(p, 1e6, T_RATED, 1.0) == 2000.0
+    settled = warm(plain, 100.0, T_RATED, plate.synchronous)
+    assert settled == pytest.approx(p.ambient.T + 100.0 * p.stator.R_th)
+    assert warm(plain, 100.0, T_RATED, 0.0) - p.ambient.T == pytest.approx(
+        100.0 * p.stator.R_th / p.cooling.still
+    )
+    assert warm(p, 1e6, T_RATED, plate.speed) == math.inf
 
 
 def test_above_the_corner_an_inverter_has_less_torque(tmp_path):

@@ -75,8 +75,10 @@ def test_study_numbers_are_those_of_the_series(done):
     numbers = json.loads((folder / "result.json").read_text())
     assert numbers["status"] == "complete"
     with xr.open_datatree(folder / "result.nc") as tree:
-        assert set(tree.children) == {"start_up", "right_empties", "feed_left", "jam_left"}
-        for name in ("right_empties", "feed_left", "jam_left"):
+        overloads = {f"{side}_empties" for side in ("left", "right")}
+        overloads |= {f"{what}_{side}" for what in ("feed", "jam") for side in ("left", "right")}
+        assert set(tree.children) == {"start_up"} | overloads
+        for name in overloads:
             run = tree[name].to_dataset()
             event = numbers["events"][name]["value"]
             crank = float(run["motor.phi"].interp(time=event)) / 25.0
@@ -100,7 +102,7 @@ def test_study_numbers_are_those_of_the_series(done):
 def test_study_certifies_itself(done):
     numbers = json.loads((done[1] / "result.json").read_text())
     shares = [c["energy_residual_share"] for c in numbers["certificate"].values()]
-    assert len(shares) == 4 and max(s["value"] for s in shares) < 2e-3
+    assert len(shares) == 7 and max(s["value"] for s in shares) < 2e-3
     start_up = numbers["certificate"]["start_up"]
     assert start_up["machine.tau_difference_to_monolithic"]["value"] < 1e-2
     # a start in 0.3 s at 4 ms; 6.9e-5 at 2 ms and 1.8e-5 at 1 ms
@@ -400,3 +402,94 @@ def test_a_cycle_that_does_not_close_is_told(text, told, there, tmp_path):
     study, _ = ran(text, tmp_path)
     assert any(told in note for note in study.notes)
     assert (tmp_path / "load_cycle.csv").exists() == there
+
+
+def test_the_winding_temperature_is_that_of_the_duty_for_ever(tmp_path):
+    """The same duty with a winding that stores little heat: it comes to rest in a run of seven time constants."""
+    settings = "[motor]\narmature = {{ R = 9.5, L = 0.11, k = 1.27, R_th = 9, C = {} }}\n"
+    slow, numbers = ran(LIGHT + settings.format(2000), tmp_path)
+    warm = numbers["answers"]["steady"]["winding_temperature"]["value"]
+    end = float(slow.runs["start_up"]["motor.armature.T"][-1])
+    assert end < 294.0 and warm > end + 20.0
+    quick, _ = ran(LIGHT + "settle_turns = 15\n" + settings.format(0.5), tmp_path)
+    turns = quick.steady
+    mean = np.trapezoid(turns["motor.armature.T"], turns["time"]) / np.ptp(turns["time"].values)
+    assert mean == pytest.approx(warm, abs=0.2)
+    assert quick.answers["steady"].winding_temperature == pytest.approx(mean, abs=0.2)
+
+
+def test_each_overload_has_its_mirror_on_the_other_side():
+    """What happens to the left of a feed happens to the right of the mirrored feed."""
+    from chainunit import config
+    from chainunit.config import OVERLOADS, STANDARD
+    from chainunit.studies.drive import Drive
+    from chainunit.studies.overload import scenario_signals
+
+    lopsided = "[feed]\n%s = { material_mass = 30, processing_force = 10 }\n%s = { material_mass = 70 }\n"
+    here, there = (config.parse(lopsided % sides) for sides in (("left", "right"), ("right", "left")))
+    assert config.parse("").events == STANDARD
+    pairs = [
+        (a, b)
+        for a, left in OVERLOADS.items()
+        for b, right in OVERLOADS.items()
+        if left.side == "left" and (right.kind, right.side) == (left.kind, "right")
+    ]
+    assert (
+        len(pairs) == 5 and ("right_empties", "left_empties") in pairs and ("lumps", "lumps_right") in pairs
+    )
+    swap = {"left": "right", "right": "left"}
+    for a, b in pairs:
+        assert OVERLOADS[b].title == re.sub("left|right", lambda m: swap[m[0]], OVERLOADS[a].title)
+        one, other = (
+            scenario_signals(c, Drive(None, None, c.machine), name, 2.0)
+            for c, name in ((here, a), (there, b))
+        )
+        assert any(callable(signal) for signal in one.values()) or OVERLOADS[a].kind == "start"
+        for name, signal in one.items():
+            mirrored = other[re.sub("left|right", lambda m: swap[m[0]], name)]
+            for t in (0.0, 2.005, 2.2, 2.33, 4.0):
+                assert (signal(t) if callable(signal) else signal) == (
+                    mirrored(t) if callable(mirrored) else mirrored
+                )
+
+
+def test_both_sides_are_run_and_differ(tmp_path):
+    """The rocker swings 9.06 deg to the right and 8.19 deg to the left."""
+    study, numbers = ran(LIGHT.replace("events = []\n", "") + "[overload]\nturns = 1\n", tmp_path)
+    assert set(numbers["answers"]) == {"steady", *study.config.events}
+    peaks = {n: a["crank_torque_peak"]["value"] for n, a in numbers["answers"].items()}
+    assert peaks["jam_left"] > 1.05 * peaks["jam_right"] > 1.05 * peaks["steady"]
+    assert peaks["feed_left"] != pytest.approx(peaks["feed_right"], rel=0.05)
+    left, right = (study.runs[name] for name in ("right_empties", "left_empties"))
+    assert (
+        float(left["machine.right.material_mass"][-1])
+        == float(right["machine.left.material_mass"][-1])
+        == 0.0
+    )
+    assert (
+        float(left["machine.left.material_mass"][-1])
+        == float(right["machine.right.material_mass"][-1])
+        == 30.0
+    )
+
+
+@pytest.mark.parametrize(("columns", "tables"), [(80, 2), (160, 1)])
+def test_the_overloads_of_both_sides_are_readable(columns, tables):
+    import io
+
+    from rich.console import Console
+    from rich.table import Table
+
+    from chainunit.config import OVERLOADS, STANDARD
+    from chainunit.report.table import _print_runs
+
+    def table(runs):
+        made = Table("crank torque, peak, here", *(OVERLOADS[r].short if r in OVERLOADS else r for r in runs))
+        made.add_row("", *("10.0 N m" for _ in runs))
+        return made
+
+    said = io.StringIO()
+    _print_runs(Console(file=said, width=columns), table, ["steady", *STANDARD])
+    heads = [line for line in said.getvalue().splitlines() if "steady" in line]
+    assert len(heads) == tables and all("jam left" in heads[0] for _ in heads)
+    assert "jam right" in heads[-1] and all(len(line) <= columns for line in heads)

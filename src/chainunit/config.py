@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
@@ -80,9 +80,7 @@ class Overload:
     shift: Value = quantity(
         "s", "time in which material leaves or changes sides", default=0.3, min=1e-4, max=1e4
     )
-    jam_force: Value = quantity(
-        "N", "processing force of a lump that jams the left organ", default=2000.0, min=0.0
-    )
+    jam_force: Value = quantity("N", "processing force of a lump that jams an organ", default=2000.0, min=0.0)
     jam_duration: Value = quantity("s", "time for which the lump holds", default=0.3, min=1e-4, max=1e4)
     jam_rise: Value = quantity("s", "time in which the jam rises and falls", default=0.02, min=1e-4, max=1e4)
     lumps: Value = quantity(
@@ -101,16 +99,53 @@ class Overload:
     dip_duration: Value = quantity("s", "time for which the voltage is down", default=0.3, min=1e-3, max=1e4)
 
 
-SCENARIOS = {
-    "right_empties": "the right side empties",
-    "feed_left": "all feed moves to the left",
-    "jam_left": "a lump jams the left side",
-    "lumps": "lumps come one after the other",
-    "blocked": "the rocker is blocked",
-    "dip": "the voltage dips",
-    "start_loaded": "start with all feed on the left",
+@dataclasses.dataclass(frozen=True)
+class Scenario:
+    """An overload: what happens, and to which side."""
+
+    kind: Literal["empties", "feed", "jam", "lumps", "blocked", "dip", "start"]
+    side: Literal["left", "right", ""]
+    """the side that has to carry it; none where both do"""
+    title: str
+    short: str
+
+
+def _of_side(side: Literal["left", "right"], other: str) -> dict[str, Scenario]:
+    suffix = "" if side == "left" else "_right"
+    return {
+        f"{other}_empties": Scenario("empties", side, f"the {other} side empties", f"{other} empties"),
+        f"feed_{side}": Scenario("feed", side, f"all feed moves to the {side}", f"feed to {side}"),
+        f"jam_{side}": Scenario("jam", side, f"a lump jams the {side} side", f"jam {side}"),
+        f"lumps{suffix}": Scenario(
+            "lumps", side, f"lumps come one after the other on the {side}", f"lumps {side}"
+        ),
+        f"start_loaded{suffix}": Scenario(
+            "start", side, f"start with all feed on the {side}", f"{side} start"
+        ),
+    }
+
+
+OVERLOADS: Mapping[str, Scenario] = {
+    **_of_side("left", "right"),
+    **_of_side("right", "left"),
+    "blocked": Scenario("blocked", "", "the rocker is blocked", "blocked"),
+    "dip": Scenario("dip", "", "the voltage dips", "dip"),
 }
 """The overloads by the names that `events` takes in a study file."""
+SCENARIOS = {name: scenario.title for name, scenario in OVERLOADS.items()}
+"""Their titles."""
+STANDARD = ("right_empties", "left_empties", "feed_left", "feed_right", "jam_left", "jam_right")
+"""The overloads of a study that names none: the rocker swings farther to one side than to the other, so that both
+count."""
+
+
+def by_side(names: Collection[str]) -> list[list[str]]:
+    """The overloads among `names`: what the left side has to carry, the right side, both; without empty groups."""
+    groups = [
+        [name for name in OVERLOADS if name in names and OVERLOADS[name].side == side]
+        for side in ("left", "right", "")
+    ]
+    return [group for group in groups if group]
 
 
 @declaration
@@ -264,7 +299,7 @@ _File = create_model(
     start=(Literal[STARTS], "direct"),
     organ=(Literal[ORGANS], "two-bar"),
     catalogue=(str, ""),
-    events=(list[Literal[*SCENARIOS]], ["right_empties", "feed_left", "jam_left"]),  # type: ignore[valid-type]
+    events=(list[Literal[*SCENARIOS]], list(STANDARD)),  # type: ignore[valid-type]
 )  # type: ignore[call-overload]
 
 

@@ -188,7 +188,7 @@ class DcMotor(Motor):
     files = ("drives/__init__.py", "drives/motor.py", "drives/dc_motor.py")
     terminals = (flange("outflow"), load_terminal("load."))
     icon = "motor"
-    current, temperature = "armature.i", "armature.T"
+    current, temperature, winding = "armature.i", "armature.T", "armature"
     required = (
         Requirement(
             "armature.L",

@@ -341,6 +341,11 @@ def breakdown(p: Any, voltage_share: float = 1.0, f: float | None = None, T: flo
     return max(at_left, at_right, at(high), key=lambda s: s.tau)
 
 
+def _cooling(xp: Any, p: Any, w: Any) -> Any:
+    turning = xp.minimum(xp.abs(w) * p.pole_pairs / (_TURN * p.supply.f), 1.0)
+    return p.cooling.still + (1.0 - p.cooling.still) * turning
+
+
 class _Point:
     """Everything at one state: supply, circuit, shaft."""
 
@@ -369,8 +374,7 @@ class _Point:
             self.R_s * (self.i_d * self.i_d + self.i_q * self.i_q)
             + self.R_r * (self.ir_d * self.ir_d + self.ir_q * self.ir_q)
         )
-        turning = xp.minimum(xp.abs(x.w) * p.pole_pairs / (_TURN * p.supply.f), 1.0)
-        self.cooling = p.cooling.still + (1.0 - p.cooling.still) * turning
+        self.cooling = _cooling(xp, p, x.w)
         load, inertia = load_torque(u.load, x.phi, x.w), load_inertia(u.load, x.phi)
         self.a = (self.air_gap - p.rotor.d * x.w - load) / (p.rotor.J + inertia)
         self.tau = inertia * self.a + load
@@ -414,7 +418,7 @@ class InductionMotor(Motor):
     files = ("drives/__init__.py", "drives/motor.py", "drives/induction_motor.py")
     terminals = (flange("outflow"), load_terminal("load."))
     icon = "motor"
-    current, temperature = "i", "stator.T"
+    current, temperature, winding = "i", "stator.T", "stator"
     required = (
         Requirement(
             "cage.L",
@@ -439,6 +443,11 @@ class InductionMotor(Motor):
             f = xp.maximum(p.pole_pairs * w / _TURN, 0.0) + slip * p.supply.f
             most = xp.maximum(most, steady(xp, p, w, volts_per_hertz(xp, p, f), f).air_gap_tau)
         return on_line + p.inverter.on * (most - on_line)
+
+    @staticmethod
+    def cooling(xp: Any, p: Any, w: Any) -> Any:
+        """The fan turns with the shaft: least at rest, whole at synchronous speed and above."""
+        return _cooling(xp, p, w)
 
     @staticmethod
     def largest_torque(p: Any) -> float:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, ClassVar
 
+from ..engines import MATH
 from ..model import Model
 from ..quantities import Value, declaration, quantity
 
@@ -28,6 +30,31 @@ class Motor(Model):
     """Output that is the current [A]."""
     temperature: ClassVar[str]
     """Output that is the temperature of the winding [K]."""
+    winding: ClassVar[str]
+    """Parameters that heat and cool the winding: among them `alpha` [1/K] and `R_th` [K/W]."""
+
+    @staticmethod
+    def cooling(xp: Any, p: Any, w: Any) -> Any:
+        """Cooling at the speed `w` [rad/s], in parts of that for which `R_th` holds."""
+        return 1.0
+
+    @classmethod
+    def settled_temperature(cls, p: Any, heat: float, ran_at: float, w: float) -> float:
+        """Temperature [K] at which the winding comes to rest where a duty heats it for ever.
+
+        `heat` [W] is the mean loss of the duty in a run with the winding at `ran_at` [K], `w` [rad/s] its mean speed.
+        The currents stay as they are and the loss grows with the resistance,
+
+            T = T_a + R_th/cooling heat (1 + alpha (T - T_0))/(1 + alpha (ran_at - T_0)).
+
+        Infinite where the loss grows faster than the cooling.
+        """
+        winding = getattr(p, cls.winding)
+        resistance = winding.R_th / cls.cooling(MATH, p, w)
+        gain = resistance * heat / (1.0 + winding.alpha * (ran_at - T_RATED))
+        if gain * winding.alpha >= 1.0:
+            return math.inf
+        return float((p.ambient.T + gain * (1.0 - winding.alpha * T_RATED)) / (1.0 - gain * winding.alpha))
 
     @staticmethod
     def limit(xp: Any, p: Any, w: Any) -> Any:

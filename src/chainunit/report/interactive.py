@@ -28,20 +28,23 @@ _TITLES = {
     "unfinished": "the run that stopped early",
 }
 
-_DASH = {"-": "solid", "--": "dash", "-.": "dashdot", ":": "dot"}
+_DASH = {
+    "-": "solid",
+    "--": "dash",
+    "-.": "dashdot",
+    ":": "dot",
+    (0, (8, 3)): "longdash",
+    (0, (8, 3, 2, 3)): "longdashdot",
+    (0, (1, 3)): "2px 6px",
+    (0, (6, 2, 1, 2, 1, 2)): "12px 3px 2px 3px 2px 3px",
+}
 
 
 def _as_in_print(line: dict[str, Any]) -> dict[str, Any]:
     return {"color": line["color"], "width": line["linewidth"] + 0.2, "dash": _DASH[line["linestyle"]]}
 
 
-_STYLES: list[dict[str, Any]] = [
-    *map(_as_in_print, LINES),
-    {"color": "#7b3f98", "width": 2.0, "dash": "longdash"},
-    {"color": "#8a6d00", "width": 2.0, "dash": "longdashdot"},
-    {"color": "#4d4d4d", "width": 2.6, "dash": "2px 6px"},
-    {"color": "#00796b", "width": 2.0, "dash": "12px 3px 2px 3px 2px 3px"},
-]
+_STYLES: list[dict[str, Any]] = [_as_in_print(line) for line in LINES]
 _INK = "#1b1b1b"
 _LIMIT = {"color": "#777777", "width": 3.5}
 _MARK = {"color": "#555555", "width": 1.2, "dash": "dash"}
@@ -240,7 +243,7 @@ def _turn(study: Study) -> Plot:
         "turn",
         "Torque over a crank turn at constant speed",
         "Crank torque and, below, the torque that both organs ask of the rocker, over the crank angle: both "
-        "sides loaded, the right side empty, all feed on the left.",
+        "sides loaded, one side empty, all feed on one side.",
         figure,
     )
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from functools import partial
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
 
+from ..config import by_side
 from ..drives.dc_motor import DcMotor
 from ..engines import numpy_
 from ..studies.chain import HIGH
@@ -51,7 +53,7 @@ def write(study: Study, folder: Path) -> list[Path]:
 
 def _torque_angle(study: Study) -> Any:
     figure, (top, bottom) = plt.subplots(2, 1, figsize=(8, 6.5), sharex=True)
-    for line, (name, c) in zip(LINES, study.cycles.items(), strict=False):
+    for line, (name, c) in zip(cycle(LINES), study.cycles.items(), strict=False):
         degrees = np.degrees(c.angle)
         top.plot(degrees, c.crank_torque, label=name, **line)
         bottom.plot(degrees, c.outputs.rocker.tau, label=name, **line)
@@ -143,24 +145,35 @@ def _start_up(study: Study) -> Any:
 
 
 def _overload_time(study: Study) -> Any:
-    names = [n for n in SCENARIOS if n in study.runs]
+    """A band of three rows for each side, the scales alike in all."""
+    groups = by_side(study.runs)
+    widest = max(len(names) for names in groups)
     figure, axes = plt.subplots(
-        3, len(names), figsize=(4.2 * len(names), 7.5), sharex=True, sharey="row", squeeze=False
+        3 * len(groups), widest, figsize=(4.2 * widest, 7.5 * len(groups)), squeeze=False
     )
     labels = ("crank torque [N m]", "crank speed [rad/s]", "motor current [A]")
-    for column, name in zip(axes.T, names, strict=True):
-        time, torque, speed, current = _series(study, name)
-        for axis, y in zip(column, (torque, speed, current), strict=True):
-            axis.plot(time, y, **LINES[0])
-        if study.drive.motor is DcMotor:
-            column[2].axhline(study.motor.limit.i, label="current limit", **LINES[1])
-        column[0].set_title(SCENARIOS[name])
-        column[-1].set_xlabel("time after the event [s]")
-        column[-1].set_xlim(time[0], time[-1])
+    for kind in range(3):
+        alike = axes[kind::3].ravel()
+        for axis in alike[1:]:
+            axis.sharey(alike[0])
+    for band, names in enumerate(groups):
+        rows = axes[3 * band : 3 * band + 3]
+        for column in rows.T[len(names) :]:
+            for axis in column:
+                axis.remove()
+        for column, name in zip(rows.T, names, strict=False):
+            time, torque, speed, current = _series(study, name)
+            for axis, y in zip(column, (torque, speed, current), strict=True):
+                axis.plot(time, y, **LINES[0])
+                axis.set_xlim(time[0], time[-1])
+            if study.drive.motor is DcMotor:
+                column[2].axhline(study.motor.limit.i, label="current limit", **LINES[1])
+            column[0].set_title(SCENARIOS[name])
+            column[-1].set_xlabel("time after the event [s]")
+        for axis, label in zip(rows[:, 0], labels, strict=True):
+            axis.set_ylabel(label)
     if study.drive.motor is DcMotor:
         axes[2, 0].legend(loc="center right", fontsize=9)
-    for axis, label in zip(axes[:, 0], labels, strict=True):
-        axis.set_ylabel(label)
     return figure
 
 
@@ -277,7 +290,7 @@ def _torque_speed(study: Study) -> Any:
     figure, axis = plt.subplots(figsize=(7.5, 5.5))
     names = ["start_up", *(n for n in SCENARIOS if n in study.runs)]
     fastest = 0.0
-    for line, name in zip(LINES, names, strict=False):
+    for line, name in zip(cycle(LINES), names, strict=False):
         run = study.runs[name]
         axis.plot(
             run["motor.w"], run["motor.air_gap_tau"], label=SCENARIOS.get(name, "start-up and steady"), **line
@@ -308,8 +321,8 @@ def _reactions(study: Study) -> Any:
             peaks,
             height,
             label=SCENARIOS.get(name, "steady"),
-            color=shades[i],
-            hatch=hatches[i],
+            color=shades[i % len(shades)],
+            hatch=hatches[(i + i // len(shades)) % len(hatches)],
             edgecolor="#1b1b1b",
             linewidth=0.6,
         )

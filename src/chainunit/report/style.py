@@ -28,6 +28,10 @@ LINES = [
     {"color": "#c1440e", "linestyle": "--", "linewidth": 1.6},
     {"color": "#0b6fa4", "linestyle": "-.", "linewidth": 1.6},
     {"color": "#6a994e", "linestyle": ":", "linewidth": 2.0},
+    {"color": "#7b3f98", "linestyle": (0, (8, 3)), "linewidth": 1.8},
+    {"color": "#8a6d00", "linestyle": (0, (8, 3, 2, 3)), "linewidth": 1.8},
+    {"color": "#4d4d4d", "linestyle": (0, (1, 3)), "linewidth": 2.4},
+    {"color": "#00796b", "linestyle": (0, (6, 2, 1, 2, 1, 2)), "linewidth": 1.8},
 ]
 WIDE = 30.0
 """From that ratio of largest to least on an axis is logarithmic."""

@@ -3,28 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Collection
 
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from ..config import OVERLOADS, by_side
 from ..quantities import Layout, Variable
 from ..studies.chain import HIGH, ChainResult
 from ..studies.monte_carlo import QUANTILES, MonteCarloResult, Sample
-from ..studies.overload import SCENARIOS, Answers, Study
+from ..studies.overload import Answers, Study
 from ..studies.shaft import ShaftAnswers
 from ..studies.sizing import recommended
-
-_SHORT = {
-    "steady": "steady",
-    "right_empties": "right empties",
-    "feed_left": "feed to left",
-    "jam_left": "jam left",
-    "lumps": "lumps",
-    "blocked": "blocked",
-    "dip": "dip",
-    "start_loaded": "loaded start",
-}
 
 _HIDDEN = {
     "supply_power_mean",
@@ -67,22 +58,42 @@ def _cell(study: Study, run: str, v: Variable) -> str:
     return _number(value, v.unit)
 
 
+def _short(run: str) -> str:
+    """Heading of the column of a run."""
+    return OVERLOADS[run].short if run in OVERLOADS else run
+
+
+def _print_runs(console: Console, table: Callable[[list[str]], Table], runs: Collection[str]) -> None:
+    """One table of all runs, a column each; where it is too wide, one for each side with steady running beside."""
+    first, overloads = [run for run in runs if run not in OVERLOADS], by_side(runs)
+    whole = table([*first, *(run for names in overloads for run in names)])
+    unbounded = console.options.update(width=10_000)
+    if console.measure(whole, options=unbounded).maximum <= console.width or not overloads:
+        console.print(whole)
+        return
+    for names in overloads:
+        console.print(table([*first, *names]))
+
+
 def show(study: Study, console: Console) -> None:
     """Print tables and notes."""
     config = study.config
     if study.sizing is not None:
         _show_sizing(study, console)
-    runs = [name for name in ("steady", *SCENARIOS) if name in study.answers]
-    if runs:
+
+    def answers(runs: list[str]) -> Table:
         table = Table(title=Text(config.title) if config.title else None, title_justify="left")
         table.add_column(f"crank at {config.run.crank_speed:g} rad/s")
         for name in runs:
-            table.add_column(_SHORT[name], justify="right")
+            table.add_column(_short(name), justify="right")
         for v in Layout(Answers).variables:
             known = any(getattr(study.answers[run], v.name) is not None for run in runs)
             if v.name not in _HIDDEN and (known or v.name not in _IF_ANY):
                 table.add_row(v.description, *(_cell(study, run, v) for run in runs))
-        console.print(table)
+        return table
+
+    if study.answers:
+        _print_runs(console, answers, study.answers)
     if study.chain is not None:
         _show_chain(study.chain, console)
     if study.monte_carlo is not None:
@@ -108,7 +119,7 @@ def show(study: Study, console: Console) -> None:
                 f"{steady['equivalent']:.0f} N",
                 f"{steady['peak']:.0f} N",
                 f"{heaviest[pin]:.0f} N",
-                _SHORT[worst],
+                _short(worst),
             )
         console.print(table)
     if study.shaft:
@@ -207,14 +218,18 @@ def _show_chain(found: ChainResult, console: Console) -> None:
 
 def _show_shaft(study: Study, console: Console) -> None:
     """What the runs ask of the driveline."""
-    table = Table(title="What the driveline carries", title_justify="left")
-    table.add_column("")
-    for name in study.shaft:
-        table.add_column(_SHORT[name], justify="right")
-    for v in Layout(ShaftAnswers).variables:
-        values = [getattr(answers, v.name) for answers in study.shaft.values()]
-        table.add_row(v.description, *("-" if x is None else _plain(x, v.unit) for x in values))
-    console.print(table)
+
+    def shaft(runs: list[str]) -> Table:
+        table = Table(title="What the driveline carries", title_justify="left")
+        table.add_column("")
+        for name in runs:
+            table.add_column(_short(name), justify="right")
+        for v in Layout(ShaftAnswers).variables:
+            values = [getattr(study.shaft[run], v.name) for run in runs]
+            table.add_row(v.description, *("-" if x is None else _plain(x, v.unit) for x in values))
+        return table
+
+    _print_runs(console, shaft, study.shaft)
     found = study.torsion
     assert found is not None
     console.print(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -33,12 +33,15 @@ def cycle(
     return Cycle(angle, out.tau * ratio, out)
 
 
-def all_on_one(one: SideLoads, other: SideLoads) -> SideLoads:
-    """What both organs carry, on one of them."""
-    return SideLoads(
-        material_mass=one.material_mass + other.material_mass,
-        processing_force=one.processing_force + other.processing_force,
+def all_on_one(
+    side: Literal["left", "right"], left: SideLoads, right: SideLoads
+) -> tuple[SideLoads, SideLoads]:
+    """Loads of the left and of the right organ where that of `side` has what both carry."""
+    whole = SideLoads(
+        material_mass=left.material_mass + right.material_mass,
+        processing_force=left.processing_force + right.processing_force,
     )
+    return (whole, EMPTY) if side == "left" else (EMPTY, whole)
 
 
 def without_right(machine: ChainUnit) -> ChainUnit:

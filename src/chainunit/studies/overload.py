@@ -17,8 +17,8 @@ import numpy as np
 import xarray as xr
 
 from .. import __version__
+from ..config import OVERLOADS, Chain, Config
 from ..config import SCENARIOS as SCENARIOS
-from ..config import Chain, Config
 from ..cosim import Bond, CoSimulation, Profile, System, energy_residual, monolithic
 from ..drives.cardan import ORDERS, two_joints
 from ..drives.dc_motor import DcMotor
@@ -65,6 +65,7 @@ class Answers:
     The ripple is (largest - least)/mean of the speed; `shaft_share` the peak torque on the machine's shaft over
     that of the motor (the rest is the rotor's inertia); `shaking_*` the largest deviation of the frame's load
     from its mean, the moment about C; `breakdown_margin` the largest steady torque of the motor over its peak;
+    `winding_temperature` is where the winding comes to rest if the steady turns go on for ever;
     `cycle_gap` is the difference between the ends of the steady turns, of speed or torque, over the largest value;
     times count from the event; `energy_after_trip` passes the safety coupling while it opens, `energy_behind`
     stays in the machine."""
@@ -79,7 +80,7 @@ class Answers:
     supply_power_mean: Value = quantity("W", "electric power, mean")
     current_peak: Value = quantity("A", "motor current, peak")
     current_rms: Value = quantity("A", "motor current, RMS")
-    winding_temperature: Value = quantity("K", "winding temperature")
+    winding_temperature: Value = quantity("K", "winding temperature, thermal steady state")
     rocker_torque_peak: Value = quantity("N.m", "rocker torque, peak")
     speed_mean: Value = quantity("rad/s", "crank speed, mean")
     speed_least: Value = quantity("rad/s", "crank speed, least")
@@ -285,7 +286,9 @@ def _statics(study: Study) -> None:
     study.cycles = {
         "both sides": cycle(machine, w, feed.left, feed.right),
         "right side empty": cycle(machine, w, feed.left, EMPTY),
-        "all feed on the left": cycle(machine, w, all_on_one(feed.left, feed.right), EMPTY),
+        "left side empty": cycle(machine, w, EMPTY, feed.right),
+        "all feed on the left": cycle(machine, w, *all_on_one("left", feed.left, feed.right)),
+        "all feed on the right": cycle(machine, w, *all_on_one("right", feed.left, feed.right)),
     }
     study.factors = overload_factors(machine, w, feed.left, feed.right)
     study.sides = sides_over_speed(machine, feed.left, feed.right)
@@ -306,31 +309,34 @@ def scenario_signals(config: Config, drive: Drive, name: str, at: float) -> dict
     comes with its own angle, see `_block`."""
     normal, o = drive.loads(config.feed), config.overload
     signals: dict[str, Any] = dict(normal)
-    if name in ("jam_left", "lumps"):
-        force = normal["machine.left.processing_force"]
+    scenario = OVERLOADS[name]
+    side = f"machine.{scenario.side}"
+    if scenario.kind in ("jam", "lumps"):
+        force = normal[f"{side}.processing_force"]
         pulse = 2.0 * o.jam_rise + o.jam_duration + o.lump_pause
         changes: list[tuple[float, float, float]] = []
-        for k in range(int(o.lumps) if name == "lumps" else 1):
+        for k in range(int(o.lumps) if scenario.kind == "lumps" else 1):
             begin = at + k * pulse
             changes += [
                 (begin, o.jam_rise, force + o.jam_force),
                 (begin + o.jam_rise + o.jam_duration, o.jam_rise, force),
             ]
-        signals["machine.left.processing_force"] = Profile(force, tuple(changes))
-    elif name == "dip":
+        signals[f"{side}.processing_force"] = Profile(force, tuple(changes))
+    elif scenario.kind == "dip":
         edge = 1e-3
         signals["motor.voltage"] = Profile(
             1.0, ((at, edge, 1.0 - o.dip_depth), (at + o.dip_duration, edge, 1.0))
         )
-    elif name in ("right_empties", "feed_left", "start_loaded"):
+    elif scenario.kind in ("empties", "feed", "start"):
+        other = f"machine.{'right' if scenario.side == 'left' else 'left'}"
         for load in ("material_mass", "processing_force"):
-            left, right = normal[f"machine.left.{load}"], normal[f"machine.right.{load}"]
-            if name == "start_loaded":
-                signals |= {f"machine.left.{load}": left + right, f"machine.right.{load}": 0.0}
+            here, there = normal[f"{side}.{load}"], normal[f"{other}.{load}"]
+            if scenario.kind == "start":
+                signals |= {f"{side}.{load}": here + there, f"{other}.{load}": 0.0}
                 continue
-            signals[f"machine.right.{load}"] = Profile(right, ((at, o.shift, 0.0),))
-            if name == "feed_left":
-                signals[f"machine.left.{load}"] = Profile(left, ((at, o.shift, left + right),))
+            signals[f"{other}.{load}"] = Profile(there, ((at, o.shift, 0.0),))
+            if scenario.kind == "feed":
+                signals[f"{side}.{load}"] = Profile(here, ((at, o.shift, here + there),))
     return signals
 
 
@@ -339,7 +345,7 @@ def follow_time(config: Config, name: str) -> float:
     turn, o = 2.0 * math.pi / config.run.crank_speed, config.overload
     # a little more than asked, so that a dip in speed does not cost a whole turn
     follow = (o.turns + 0.1) * turn
-    if name == "lumps":
+    if OVERLOADS[name].kind == "lumps":
         follow = max(follow, o.lumps * (2.0 * o.jam_rise + o.jam_duration + o.lump_pause))
     return follow
 
@@ -364,12 +370,13 @@ def _simulate(
     turn = 2.0 * math.pi / run.crank_speed
     settled = study.settled
     stop = settled + (run.turns + 0.1) * turn
-    events = [name for name in config.events if name != "start_loaded"]
+    starts = [name for name in config.events if OVERLOADS[name].kind == "start"]
+    events = [name for name in config.events if name not in starts]
     if "dip" in events and "voltage" not in drive.motor.input_layout.names:
         events.remove("dip")
         study.notes.append("the voltage dip was left out: this motor's drive has no line voltage of its own.")
     total = stop + sum(turn + follow_time(config, name) for name in events)
-    total += stop * ("start_loaded" in config.events)
+    total += stop * len(starts)
 
     signals = {**drive.loads(config.feed), **drive.reference(run.crank_speed, run.ramp)}
     bond = Bond(
@@ -416,15 +423,16 @@ def _simulate(
             again = simulation.run(stop, run.step).sel(time=slice(settled, None))
         again = _turns(drive, again, run.turns)
         study.ripple_without = _answers(study, again, None, again).speed_ripple
-    if "start_loaded" in config.events:
+    for k, name in enumerate(starts):
         loaded = {
-            **scenario_signals(config, drive, "start_loaded", 0.0),
+            **scenario_signals(config, drive, name, 0.0),
             **drive.reference(run.crank_speed, run.ramp),
         }
         with CoSimulation(drive.system(files), loaded) as simulation:
-            progress = partial(_progress, report, SCENARIOS["start_loaded"], total - stop, total)
+            before = total - (len(starts) - k) * stop
+            progress = partial(_progress, report, SCENARIOS[name], before, total)
             transient = simulation.run(stop, run.step, progress, guards=guards)
-            _close(study, "start_loaded", transient, 0.0, stop, bond, simulation, folder, backend)
+            _close(study, name, transient, 0.0, stop, bond, simulation, folder, backend)
     if drive.line is not None:
         report("the same with a rigid shaft", total, total)
         try:
@@ -471,7 +479,7 @@ def _rigid(study: Study, files: Mapping[str, Path], stop: float) -> dict[str, xr
         runs["start_up"] = simulation.run(stop, step)
         simulation.save()
         for name, event in study.event.items():
-            if name != "start_loaded":
+            if OVERLOADS[name].kind != "start":
                 simulation.restore()
                 simulation.signals = {
                     **scenario_signals(config, drive, name, event),
@@ -480,10 +488,10 @@ def _rigid(study: Study, files: Mapping[str, Path], stop: float) -> dict[str, xr
                 runs[name] = _event(
                     config, simulation, name, event, event + follow_time(config, name), guards=guards
                 )
-    if "start_loaded" in study.event:
-        loaded = scenario_signals(config, drive, "start_loaded", 0.0)
+    for name in (name for name in study.event if OVERLOADS[name].kind == "start"):
+        loaded = scenario_signals(config, drive, name, 0.0)
         with CoSimulation(system, {**loaded, **reference}) as simulation:
-            runs["start_loaded"] = simulation.run(stop, step, guards=guards)
+            runs[name] = simulation.run(stop, step, guards=guards)
     return runs
 
 
@@ -518,7 +526,7 @@ def _event(
     """Run a transient to the time `stop`, or until a guard ends it."""
     step = config.run.step
     pieces = []
-    if name == "blocked":
+    if OVERLOADS[name].kind == "blocked":
         simulation.signals |= dict.fromkeys(_block(config, 0.0), 0.0)
         pieces.append(simulation.run(event, step, progress))
         simulation.signals |= _block(config, float(pieces[0]["machine.rocker.psi"][-1]))
@@ -706,7 +714,14 @@ def _answers(study: Study, run: xr.Dataset, event: float | None, steady: xr.Data
         supply_power_mean=mean(_series("motor.supply_power")),
         current_peak=peak(value(current)),
         current_rms=rms(_series(current)),
-        winding_temperature=float(value(f"motor.{drive.motor.temperature}")[-1]),
+        winding_temperature=drive.motor.settled_temperature(
+            drive.parameters,
+            mean(_series("motor.heat")),
+            mean(_series(f"motor.{drive.motor.temperature}")),
+            mean(_series("motor.w")),
+        )
+        if event is None
+        else None,
         rocker_torque_peak=peak(value("machine.rocker.tau")),
         speed_mean=speed_mean,
         speed_least=float(np.min(speed)),
@@ -857,6 +872,10 @@ def _note(study: Study) -> None:
         note(
             f"steady running: the turns do not close, their ends differ by {100 * steady.cycle_gap:.2g} % in speed "
             f"or torque: {repeats}; raise run.settle_turns or run.turns."
+        )
+    if steady is not None and not math.isfinite(steady.winding_temperature):
+        note(
+            "steady running: the winding has no thermal steady state, its loss grows faster than the cooling."
         )
     if study.sizing is not None:
         study.notes.extend(study.sizing.notes)

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -27,7 +27,6 @@ from ..drives.motor import T_RATED
 from ..engines import MATH, numpy_
 from ..errors import InterruptedRunError, RunError
 from ..fmu.backends import Backend
-from ..machines.api import EMPTY
 from ..quantities import Layout, Value, declaration, quantity
 from .chain import HIGH, duty
 from .cycle import Cycle, all_on_one, cycle
@@ -62,6 +61,8 @@ def start_time(time: Any, speed: Any, share: float = 0.95) -> float | None:
     return float(time[int(np.argmax(speed >= share * final))])
 
 
+_BURNT = 2000.0
+"""Temperature that stands for a winding without a thermal steady state [K]."""
 _SPEED_DEVIATION = 0.03  # of the crank speed that is asked for
 
 
@@ -174,6 +175,7 @@ class SizingResult:
         assert self.config.sizing is not None
         return {
             "asked": _entries(self.config.sizing),
+            "one_sided": heavier_side(self.config),
             "cycle": _entries(self.cycle),
             "flywheel": wheel,
             "protection": protection,
@@ -200,11 +202,22 @@ def _entries(declared: Any) -> dict[str, Any]:
     }
 
 
-def duty_cycles(config: Config, folder: Path, backend: Backend | None) -> tuple[Cycle, Cycle]:
-    """The turn with both sides loaded, and with all feed on the left; with chains many turns, by their FMU, which is
-    written to `folder`."""
+def heavier_side(config: Config) -> Literal["left", "right"]:
+    """The side on which all feed asks the larger RMS torque of the crank, with two bars at constant speed: the rocker
+    swings farther to one side than to the other."""
     feed, w = config.feed, config.run.crank_speed
-    cases = (feed.left, feed.right), (all_on_one(feed.left, feed.right), EMPTY)
+
+    def asked(side: Literal["left", "right"]) -> float:
+        return rms((1.0, cycle(config.machine, w, *all_on_one(side, feed.left, feed.right)).crank_torque))
+
+    return "left" if asked("left") >= asked("right") else "right"
+
+
+def duty_cycles(config: Config, folder: Path, backend: Backend | None) -> tuple[Cycle, Cycle]:
+    """The turn with both sides loaded, and with all feed on the heavier side; with chains many turns, by their FMU,
+    which is written to `folder`."""
+    feed, w = config.feed, config.run.crank_speed
+    cases = (feed.left, feed.right), all_on_one(heavier_side(config), feed.left, feed.right)
     if config.chain is None:
         both, one_sided = (cycle(config.machine, w, *case) for case in cases)
         return both, one_sided
@@ -399,7 +412,7 @@ def judge(config: Config, c: Candidate, numbers: CycleNumbers, files: Mapping[st
             start = simulation.run(window, config.run.step)
             steady = simulation.run(window + 2.0 * turn, config.run.step)
             event = simulation.time
-            simulation.signals = {**feed_signals(config, event), **drive.reference(w)}
+            simulation.signals = {**feed_signals(config, event, heavier_side(config)), **drive.reference(w)}
             simulation.run(event + config.overload.shift + turn, config.run.step)
             one_sided = simulation.run(simulation.time + turn, config.run.step)
     except InterruptedRunError:
@@ -416,17 +429,19 @@ def judge(config: Config, c: Candidate, numbers: CycleNumbers, files: Mapping[st
     c.checks = _checks(config, c, start, steady, one_sided, started)
 
 
-def feed_signals(config: Config, shift_at: float | None) -> dict[str, Any]:
-    """Loads of both sides; from `shift_at` [s] on all feed moves to the left."""
+def feed_signals(
+    config: Config, shift_at: float | None, side: Literal["left", "right"] = "left"
+) -> dict[str, Any]:
+    """Loads of both sides; from `shift_at` [s] on all feed moves to `side`."""
     signals: dict[str, Any] = {}
-    for load in ("material_mass", "processing_force"):
-        left, right = getattr(config.feed.left, load), getattr(config.feed.right, load)
-        if shift_at is None:
-            signals |= {f"machine.left.{load}": left, f"machine.right.{load}": right}
-        else:
-            change = (shift_at, config.overload.shift)
-            signals[f"machine.left.{load}"] = Profile(left, ((*change, left + right),))
-            signals[f"machine.right.{load}"] = Profile(right, ((*change, 0.0),))
+    shifted = dict(zip(("left", "right"), all_on_one(side, config.feed.left, config.feed.right), strict=True))
+    for name, target in shifted.items():
+        for load in ("material_mass", "processing_force"):
+            begin = getattr(getattr(config.feed, name), load)
+            end = getattr(target, load)
+            signals[f"machine.{name}.{load}"] = (
+                begin if shift_at is None else Profile(begin, ((shift_at, config.overload.shift, end),))
+            )
     return signals
 
 
@@ -445,7 +460,8 @@ def _checks(
     running = steady["motor.w"].values
     mean_speed = float(np.mean(running))
     c.fluctuation = float(np.ptp(running[len(running) // 2 :])) / mean_speed if mean_speed > 0.0 else math.inf
-    cooling = p.cooling.still + (1.0 - p.cooling.still) * min(mean_speed / plate.speed, 1.0)
+    motor = c.drive.motor
+    cooling = motor.cooling(MATH, p, mean_speed)
 
     def checked(value: float | None) -> float | None:
         return value if started is not None else None
@@ -458,8 +474,8 @@ def _checks(
     extra = max(0.0, float(np.trapezoid(heat - steady_heat, time)))
     mean_heat = steady_heat + asked.starts_per_hour * extra / 3600.0
     # the runs are short and the winding in them as cold as the surroundings: as warm as it becomes, it heats more
-    ran_at = float(np.mean(steady[f"motor.{c.drive.motor.temperature}"]))
-    temperature = warm_temperature(p, mean_heat, ran_at, cooling)
+    ran_at = float(np.mean(steady[f"motor.{motor.temperature}"]))
+    temperature = min(_BURNT, motor.settled_temperature(p, mean_heat, ran_at, mean_speed))
     peak = max(float(np.max(np.abs(r[gap]))) for r in (steady, one_sided))
     reflected = float(np.max(steady["machine.J"]))
     torque = rms((1.0 - share, steady[gap].values), (share, one_sided[gap].values))
@@ -478,9 +494,10 @@ def _checks(
     # warm, and at the frequency at which it runs: above the corner an inverter has no more voltage to give
     c.breakdown_torque = float(breakdown(p, voltage, frequency, T=asked.temperature).air_gap_tau)
     weaker = min(1.0, plate.frequency / frequency)
+    cooled = min(1.0, cooling / motor.cooling(MATH, p, plate.speed))
     checks = {
         "start": Check("time to start", started, longest, "s"),
-        "rms_torque": Check("RMS torque", checked(torque), plate.torque * weaker * math.sqrt(cooling), "N.m"),
+        "rms_torque": Check("RMS torque", checked(torque), plate.torque * weaker * math.sqrt(cooled), "N.m"),
         "peak_torque": Check(
             "peak torque", checked(peak), c.breakdown_torque / asked.breakdown_margin, "N.m"
         ),
@@ -502,20 +519,6 @@ def _checks(
     if "torque_limit" in config.gear_given:
         checks["gear"] = Check("torque of the gear", c.peak_torque, gear.torque_limit, "N.m")
     return checks
-
-
-def warm_temperature(p: Any, heat: float, ran_at: float, cooling: float) -> float:
-    """Temperature [K] at which the winding comes to rest, from the `heat` [W] of a run at the winding temperature
-    `ran_at` [K]: copper losses grow with it,
-
-        T = T_a + R_th/cooling heat (1 + alpha (T - T_0))/(1 + alpha (ran_at - T_0)).
-
-    2000 K stands for a winding that runs away."""
-    alpha = p.stator.alpha
-    gain = p.stator.R_th / cooling * heat / (1.0 + alpha * (ran_at - T_RATED))
-    if gain * alpha >= 1.0:
-        return 2000.0
-    return min(2000.0, float((p.ambient.T + gain * (1.0 - alpha * T_RATED)) / (1.0 - gain * alpha)))
 
 
 def permitted_starts(
