@@ -318,7 +318,7 @@ def test_bad_rows_are_refused(tmp_path, column, cell, said):
         ("a.csv", 'designation\n"x\n', "no valid CSV"),
         ("a.toml", "x = ", "no valid TOML"),
         ("a.toml", "x = 1", '"x": unknown; each motor is a table'),
-        ("a.toml", "", "motor = null: each motor must be a table"),
+        ("a.toml", "", "has no motor; each motor must be a table"),
         ("a.toml", "motor = 1", "motor = 1: each motor must be a table"),
         ("a.toml", "[[motor]]\ncolour = 1", 'motor 1: "colour": unknown; known here: designation'),
         ("a.toml", TOML.replace("'pump, old'", "1"), "motor 1: designation = 1: must be a text of one line"),

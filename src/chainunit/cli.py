@@ -16,7 +16,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from . import __version__
-from .errors import InputError, InterruptedRunError, RunError, WriteError
+from .errors import InputError, InterruptedRunError, RunError, WriteError, printable
 from .files import claimed, full, leftovers
 
 
@@ -113,7 +113,7 @@ def study(
 
 
 def _show_written(written: list[Path], console: Console) -> None:
-    console.print("Written: " + ", ".join(str(path) for path in written), soft_wrap=True)
+    console.print("Written: " + ", ".join(printable(str(path), 500) for path in written), soft_wrap=True)
 
 
 @contextmanager
@@ -223,9 +223,8 @@ def knife(
 
 
 def _stopped_early(failure: RunError, output: Path, errors: Console) -> None:
-    errors.print(
-        f"The run stopped early: {failure}. What was computed before is in {output}.", soft_wrap=True
-    )
+    said = f"The run stopped early: {failure}. What was computed before is in {output}."
+    errors.print(printable(said, 2000), soft_wrap=True)
     raise typer.Exit(_status(failure))
 
 
@@ -426,7 +425,7 @@ def main() -> None:
 
 
 def _end(message: str, status: int) -> None:
-    print("chainunit: " + " ".join(message.split()), file=sys.stderr)
+    print("chainunit: " + printable(" ".join(message.split()), 2000), file=sys.stderr)
     sys.exit(status)
 
 

@@ -21,7 +21,7 @@ from .machines.api import ChainUnit, ratios
 from .machines.chain_unit import ChamberForces, SideLoads
 from .machines.flexible import LEAST, MOST, OrganLaw
 from .quantities import Layout, Value, declaration, group, quantity
-from .reading import filled, first_line, given_values, instance, merged, packaged, read, schema, toml
+from .reading import Title, filled, first_line, given_values, instance, merged, packaged, read, schema, toml
 
 
 @declaration
@@ -289,7 +289,7 @@ _Driveline = form(Driveline, "driveline", "driveline.", place=(Literal[PLACES], 
 _File = create_model(
     "Config",
     __config__=ConfigDict(extra="forbid"),
-    title=(str, ""),
+    title=(Title, ""),
     **{
         name: (section, Field(default_factory=section))
         for name, section in ((n, schema(d, n, n + ".")) for n, d in _SECTIONS.items())

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import reprlib
+import unicodedata
 from typing import Any
 
 
@@ -25,3 +28,37 @@ class InterruptedRunError(RunError):
 
 class WriteError(RunError):
     """A file could not be written, such as on a full disk; the message names it."""
+
+
+_JOINERS = "\u200c\u200d"  # which scripts and signs need inside a word
+
+
+def printable(text: str, most: int = 200) -> str:
+    """A text from outside in one line: what a terminal or a page would obey (control characters, directions of
+    writing) or not show is written as an escape; of more than `most` characters the end is left out."""
+    cut = text if len(text) <= most else text[:most]
+    shown = "".join(
+        x if x.isprintable() or x in _JOINERS or unicodedata.category(x) == "Zs" else _escape(x) for x in cut
+    )
+    return shown if len(text) <= most else f"{shown}... ({len(text) - most} more characters)"
+
+
+def _escape(character: str) -> str:
+    return character.encode("unicode_escape").decode()
+
+
+class _Brief(reprlib.Repr):
+    """Values of a file as Python writes them, cut in depth and length."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.maxlevel, self.maxstring, self.maxlong, self.maxother = 2, 60, 40, 60
+
+
+def shown(given: Any) -> str:
+    """What somebody gave, as a refusal cites it: in one short line, a text in quotation marks."""
+    if not isinstance(given, str):
+        return printable(_Brief().repr(given), 100)
+    most = 60
+    quoted = printable(json.dumps(given[:most], ensure_ascii=False), 8 * most)
+    return quoted if len(given) <= most else f"{quoted}... ({len(given) - most} more characters)"

@@ -7,7 +7,6 @@ converted. Every refusal is one line that names the field, its value and what is
 from __future__ import annotations
 
 import dataclasses
-import json
 import re
 import tomllib
 from collections.abc import Callable, Mapping
@@ -16,9 +15,17 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    create_model,
+)
 
-from .errors import InputError
+from .errors import InputError, printable, shown
 from .quantities import Layout, Variable, base_units, complaint, variables
 
 T = TypeVar("T")
@@ -63,7 +70,7 @@ def to_number(variable: Variable, given: Any) -> float:
         for what is no number, a unit of another kind, or a value out of bounds.
     """
     if isinstance(given, bool) or not isinstance(given, int | float | str):
-        raise ValueError(f"{variable.name} = {given!r}: must be {_kind(variable)}")
+        raise ValueError(f"{variable.name} = {shown(given)}: must be {_kind(variable)}")
     try:
         value = _converted(variable, given) if isinstance(given, str) else float(given)
     except OverflowError:
@@ -76,9 +83,7 @@ def to_number(variable: Variable, given: Any) -> float:
 def _converted(variable: Variable, text: str) -> float:
     import pint
 
-    refusal = ValueError(
-        f"{variable.name} = {json.dumps(text, ensure_ascii=False)}: must be {_kind(variable)}"
-    )
+    refusal = ValueError(f"{variable.name} = {shown(text)}: must be {_kind(variable)}")
     match = _NUMBER.fullmatch(text)
     if match is None:
         raise refusal
@@ -104,6 +109,10 @@ def _kind(variable: Variable) -> str:
     if variable.unit == "1":
         return f"a pure number ({variable.description})"
     return f'a number in {variable.unit}, or a text such as "2 {variable.unit}" ({variable.description})'
+
+
+Title = Annotated[str, AfterValidator(printable)]
+"""A text of the user's that is shown: in one line, without characters that a terminal or a page would obey."""
 
 
 def number(variable: Variable) -> Any:
@@ -141,17 +150,17 @@ def given_values(section: BaseModel) -> dict[str, float]:
 def first_line(error: ValidationError, file: type[BaseModel]) -> str:
     """The line that says what is wrong with a table of the form `file`."""
     first = error.errors()[0]
-    where = ".".join(str(part) for part in first["loc"]).encode("unicode_escape").decode()
+    where = printable(".".join(str(part) for part in first["loc"]), 80)
     if first["type"] == "extra_forbidden":
         section: Any = file
         for part in first["loc"][:-1]:
             section = section.model_fields[part].annotation
         return f"{where}: unknown key; known here: {', '.join(section.model_fields)}"
     if first["type"] == "model_type":
-        return f"{where} = {first['input']!r}: must be a table"
+        return f"{where} = {shown(first['input'])}: must be a table"
     if first["type"] == "value_error":
         return str(first["ctx"]["error"])
-    return f"{where} = {first['input']!r}: {first['msg'].lower()}"
+    return f"{where} = {shown(first['input'])}: {first['msg'].lower()}"
 
 
 def merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
@@ -189,7 +198,9 @@ def toml(text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except ValueError as error:  # TOMLDecodeError, and numbers that are too long
-        raise InputError(f"no valid TOML: {error}") from error
+        raise InputError(f"no valid TOML: {printable(str(error))}") from error
+    except RecursionError as error:
+        raise InputError("no valid TOML: tables or lists are nested too deeply") from error
 
 
 def read(file: Path | None, example: Callable[[], str], parse: Callable[[str, str], T]) -> T:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import logging
+import os
+import re
 import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError, RunError
+from ..errors import InputError, RunError, printable, shown
 
 log = logging.getLogger("chainunit.fmu")
 _FATAL = 4  # fmi2Fatal
@@ -31,6 +33,7 @@ class Fmu:
     def __init__(self, file: Path) -> None:
         from fmpy import extract, read_model_description
 
+        self.file = file
         if not Path(file).is_file():
             raise InputError(f"{file}: no such FMU")
         self.folder = tempfile.mkdtemp(prefix="chainunit_fmu_")
@@ -40,8 +43,29 @@ class Fmu:
             self.description = read_model_description(self.folder, validate=False)
         except Exception as error:
             self.close()
-            raise InputError(f"{file}: is no FMU ({error})") from error
+            raise InputError(f"{file}: is no FMU ({printable(str(error))})") from error
+        try:
+            self.identifier = self._checked()
+        except InputError:
+            self.close()
+            raise
         self.variables = {v.name: v for v in self.description.modelVariables}
+
+    def _checked(self) -> str:
+        """Its model identifier, where it is an FMU that can run here."""
+        description = self.description
+        if description.fmiVersion != "2.0" or description.coSimulation is None:
+            kind = "Co-Simulation" if description.coSimulation else "Model Exchange alone"
+            raise InputError(
+                f"{self.file}: is FMI {printable(description.fmiVersion)}, {kind}; must be FMI 2.0 for Co-Simulation"
+            )
+        identifier = description.coSimulation.modelIdentifier
+        # it becomes part of a path: a foreign one must not lead out of the folder
+        if re.fullmatch(r"[A-Za-z_]\w*", identifier, re.ASCII) is None:
+            raise InputError(
+                f"{self.file}: modelIdentifier = {shown(identifier)}: must be a name in C (letters, digits, _)"
+            )
+        return str(identifier)
 
     def outputs(self) -> list[str]:
         """Names of the outputs, in declared order."""
@@ -62,6 +86,18 @@ class Fmu:
         _unpacked.discard(self.folder)
 
 
+def _unloadable(fmu: Fmu, error: Exception) -> str:
+    """Why the library of an FMU cannot be loaded."""
+    from fmpy import platform, sharedLibraryExtension
+
+    library = f"binaries/{platform}/{fmu.identifier}{sharedLibraryExtension}"
+    if (Path(fmu.folder) / library).is_file():
+        return f"its library {library} cannot be loaded ({printable(str(error))})"
+    there = sorted(p.name for p in Path(fmu.folder, "binaries").glob("*"))
+    has = f"it has those for {printable(', '.join(there))}" if there else "it has none"
+    return f"has no library for this machine, {library}; {has}"
+
+
 class Instance:
     """A running instance; every failing call becomes a `RunError` that cites what the FMU logged."""
 
@@ -76,7 +112,7 @@ class Instance:
 
         def logger(_env: Any, _name: Any, status: int, _category: Any, message: bytes | None) -> None:
             if message and status > 0:
-                text = message.decode(errors="replace")
+                text = printable(message.decode(errors="replace"), 500)
                 self.messages.append(text)
                 if journal is not None:
                     journal.append(f"{name}: {text}")
@@ -86,15 +122,23 @@ class Instance:
         self._callbacks.logger = api.fmi2CallbackLoggerTYPE(logger)
         self._callbacks.allocateMemory = api.fmi2CallbackAllocateMemoryTYPE(calloc)
         self._callbacks.freeMemory = api.fmi2CallbackFreeMemoryTYPE(free)
-        description = fmu.description
-        self._fmi = api.FMU2Slave(
-            guid=description.guid,
-            unzipDirectory=fmu.folder,
-            modelIdentifier=description.coSimulation.modelIdentifier,
-            instanceName=name,
-        )
         self._alive = False
-        self._fmi.instantiate(callbacks=self._callbacks, loggingOn=True)
+        here = Path.cwd()
+        try:
+            self._fmi = api.FMU2Slave(
+                guid=fmu.description.guid,
+                unzipDirectory=fmu.folder,
+                modelIdentifier=fmu.identifier,
+                instanceName=name,
+            )
+        except Exception as error:  # fmpy knows no class of its own for this
+            os.chdir(here)  # it goes to the library and stays there
+            raise InputError(f"{fmu.file}: {_unloadable(fmu, error)}") from error
+        try:
+            self._fmi.instantiate(callbacks=self._callbacks, loggingOn=True)
+        except Exception as error:
+            said = f": {self.messages[-1]}" if self.messages else ""
+            raise RunError(f"{name}: cannot be instantiated{said}") from error
         self._alive = True
 
     def _call(self, what: str, function: Any, *args: Any) -> Any:

@@ -13,9 +13,7 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import re
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -23,7 +21,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError
+from ..errors import InputError, shown
 from ..quantities import DISPLAY_UNITS, Layout, Value, Variable, declaration, quantity
 from .nameplate import Identified, Nameplate, check, identify
 
@@ -45,6 +43,7 @@ class CatalogueData(Nameplate):
 LAYOUT = Layout(CatalogueData)
 _VARIABLES = {v.name: v for v in LAYOUT.variables}
 _TEXTS = ("designation", "source")
+_LONGEST = 200
 _HEADING = re.compile(r"\s*(\w+)\s*(?:\[\s*(.*?)\s*\])?\s*")
 
 
@@ -134,15 +133,17 @@ def _motor(origin: str, given: Mapping[str, Any], taken: set[str]) -> CatalogueM
 
     for name in given:
         if name not in _VARIABLES and name not in _TEXTS:
-            raise InputError(f"{_quoted(name)}: unknown; known here: {', '.join((*_TEXTS, *_VARIABLES))}")
+            raise InputError(f"{shown(name)}: unknown; known here: {', '.join((*_TEXTS, *_VARIABLES))}")
     texts = {}
     for name in _TEXTS:
         text = given.get(name, origin if name == "source" else "")
-        if not isinstance(text, str) or not text.strip() or not text.isprintable():
-            raise InputError(f"{name} = {_quoted(text)}: must be a text of one line")
+        if not isinstance(text, str) or not text.strip() or not text.isprintable() or len(text) > _LONGEST:
+            raise InputError(
+                f"{name} = {shown(text)}: must be a text of one line, of at most {_LONGEST} characters"
+            )
         texts[name] = text.strip()
     if texts["designation"] in taken:
-        raise InputError(f"designation = {_quoted(texts['designation'])}: stands in the catalogue already")
+        raise InputError(f"designation = {shown(texts['designation'])}: stands in the catalogue already")
     values = {}
     for name, variable in _VARIABLES.items():
         if name in given:
@@ -187,7 +188,7 @@ def _column(cell: str, file: str) -> tuple[str, str]:
     match = _HEADING.fullmatch(cell)
     if match is None or (match[1] not in _VARIABLES and match[1] not in _TEXTS):
         known = ", ".join((*_TEXTS, *(heading(v) for v in _VARIABLES.values())))
-        raise InputError(f"{file}: heading {_quoted(cell)}: unknown; known here: {known}")
+        raise InputError(f"{file}: heading {shown(cell)}: unknown; known here: {known}")
     return match[1], match[2] or ""
 
 
@@ -200,20 +201,18 @@ def _with_unit(cell: str, unit: str) -> str:
 
 
 def _toml_rows(text: str, file: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    from ..reading import toml
+
     try:
-        data = tomllib.loads(text)
-    except ValueError as error:  # TOMLDecodeError, and numbers that are too long
-        raise InputError(f"{file}: no valid TOML: {error}") from error
+        data = toml(text)
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from error
     tables = data.pop("motor", None)
     for name in data:
-        raise InputError(f"{file}: {_quoted(name)}: unknown; each motor is a table [[motor]]")
+        raise InputError(f"{file}: {shown(name)}: unknown; each motor is a table [[motor]]")
+    if tables is None:
+        raise InputError(f"{file}: has no motor; each motor must be a table [[motor]]")
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
-        raise InputError(f"{file}: motor = {_quoted(tables)}: each motor must be a table [[motor]]")
+        raise InputError(f"{file}: motor = {shown(tables)}: each motor must be a table [[motor]]")
     for number, table in enumerate(tables, 1):
         yield f"{file}: motor {number}", table
-
-
-def _quoted(given: Any) -> str:
-    """A value as it was given, in one line of bearable length."""
-    text = json.dumps(given, ensure_ascii=True, default=str)
-    return text if len(text) <= 80 else text[:77] + "..."

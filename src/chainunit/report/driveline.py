@@ -21,6 +21,7 @@ from ..files import whole
 from ..quantities import DISPLAY_UNITS, Layout
 from ..studies.driveline import DrivelineStudy, as_dict, both_units, rev
 from .style import LINES, draw
+from .trace import markdown_text
 
 NUMBERS, TEXT = "driveline.json", "driveline.md"
 PLOTS = ("campbell.png", "stability.png", "resonance.png", "ratio.png")
@@ -100,7 +101,7 @@ def show(study: DrivelineStudy, console: Console) -> None:
 
 def markdown(study: DrivelineStudy) -> str:
     """The answers, the warnings, what was given, and the plots."""
-    lines = [f"# {study.config.title or 'Driveline'}", "", "| quantity | value |", "|---|---|"]
+    lines = [f"# {markdown_text(study.config.title) or 'Driveline'}", "", "| quantity | value |", "|---|---|"]
     lines += [f"| {name} | {value} |" for name, value in answers(study)]
     for title, said in (("Warnings", study.warnings), ("Notes", study.notes)):
         if said:

@@ -23,6 +23,7 @@ from ..machines.knife_drive import Mechanism
 from ..quantities import DISPLAY_UNITS, Layout
 from ..studies.knife import Answers, KnifeStudy, Turn, Wheel, as_dict
 from .style import LINES, draw
+from .trace import markdown_text
 
 NUMBERS, TEXT = "knife.json", "knife.md"
 PLOTS = ("blade_path.png", "torque.png", "reactions.png", "flywheel.png")
@@ -152,9 +153,9 @@ def show(study: KnifeStudy, console: Console) -> None:
 def markdown(study: KnifeStudy, plots: list[str]) -> str:
     """The turn, the pins, the flywheels, the warnings, what was given, and the plots."""
     config, plate = study.config, study.config.motor.nameplate
-    lines = [f"# {config.title or 'Knife drive'}", ""]
+    lines = [f"# {markdown_text(config.title) or 'Knife drive'}", ""]
     if study.failure is not None:
-        lines += [f"The run stopped early: {study.failure}.", ""]
+        lines += [f"The run stopped early: {markdown_text(str(study.failure))}.", ""]
     lines += ["## A turn at constant speed", "", "| quantity | value |", "|---|---|"]
     lines += [f"| {name} | {value} |" for name, value in turn_rows(study)]
     lines += ["", "| pin | peak, cutting | at | peak, without cut | at |", "|---|---|---|---|---|"]

@@ -74,6 +74,11 @@ def digits_text(value: float, digits: int = 3, *, full: bool = True) -> str:
     return text.replace("-", "−")
 
 
+def markdown_text(text: str) -> str:
+    """A text that is not ours, as Markdown shows it literally: no link, no table cell, no HTML."""
+    return re.sub(r"([\\`*_\[\]<>#!|~&$])", r"\\\1", text)
+
+
 class Traced:
     """Renders entries of a `result` as HTML elements that carry their path and their value as it is there."""
 

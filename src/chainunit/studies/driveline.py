@@ -43,7 +43,18 @@ from ..drives.torsion import (
 from ..engines import numpy_
 from ..errors import InputError
 from ..quantities import Layout, Value, declaration, quantity, variables
-from ..reading import first_line, given_values, instance, merged, packaged, read, schema, to_number, toml
+from ..reading import (
+    Title,
+    first_line,
+    given_values,
+    instance,
+    merged,
+    packaged,
+    read,
+    schema,
+    to_number,
+    toml,
+)
 
 TONGUES = (1, 2, 3, 4)
 """n of the parametric resonances 2 speed = 2 k/n."""
@@ -123,7 +134,7 @@ _Stability = schema(
 _File: Any = create_model(
     "Driveline",
     __config__=ConfigDict(extra="forbid"),
-    title=(str, ""),
+    title=(Title, ""),
     driveline=(_Line, Field(default_factory=_Line)),
     running=(_Running, Field(default_factory=_Running)),
     stability=(_Stability, Field(default_factory=_Stability)),

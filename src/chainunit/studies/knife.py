@@ -22,12 +22,12 @@ from ..cosim import Bond, CoSimulation, System, energy_residual, port_connection
 from ..drives.catalogue import CatalogueMotor, catalogue
 from ..drives.induction_motor import InductionMotor
 from ..engines import numpy_
-from ..errors import InputError, RunError
+from ..errors import InputError, RunError, shown
 from ..fmu.backends import Backend, export
 from ..machines.knife_drive import KnifeDrive, Parameters
 from ..model import Model
 from ..quantities import Layout, Value, declaration, quantity, variables
-from ..reading import first_line, given_values, instance, packaged, read, schema, to_number, toml
+from ..reading import Title, first_line, given_values, instance, packaged, read, schema, to_number, toml
 from .overload import entries
 from .sizing import flywheel
 
@@ -128,7 +128,7 @@ _Running = schema(Running, "run", "run.")
 _File: Any = create_model(
     "Knife",
     __config__=ConfigDict(extra="forbid"),
-    title=(str, ""),
+    title=(Title, ""),
     machine=(_Machine, Field(default_factory=_Machine)),
     cut=(_Cut, Field(default_factory=_Cut)),
     drive=(_Train, Field(default_factory=_Train)),
@@ -245,7 +245,7 @@ def _motor(designation: str) -> CatalogueMotor:
     if designation not in motors:
         near = difflib.get_close_matches(designation, motors, n=3, cutoff=0.0)
         raise InputError(
-            f"drive.motor = {designation!r}: not in the catalogue; must be one of its designations, such as "
+            f"drive.motor = {shown(designation)}: not in the catalogue; must be one of its designations, such as "
             + ", ".join(f'"{name}"' for name in near)
         )
     return motors[designation]
