@@ -7,6 +7,7 @@ of: two FMUs in one process never share code by accident, and the same model giv
 from __future__ import annotations
 
 import hashlib
+import re
 import sys
 import tempfile
 import uuid
@@ -14,7 +15,7 @@ import zipfile
 from collections.abc import Iterator
 from importlib import metadata
 from pathlib import Path
-from xml.etree.ElementTree import tostring
+from xml.etree.ElementTree import Element, tostring
 
 # now, not at need: a Python FMU that has run in this process brings a pythonfmu of its own, without binaries
 from pythonfmu import FmuBuilder
@@ -22,8 +23,9 @@ from pythonfmu import FmuBuilder
 from ..files import folder, whole
 from ..model import Model
 from .accompany import accompanying
-from .description import model_description
-from .pack import checked, pack
+from .description import Interface, model_description
+from .pack import checked, pack, recipes
+from .slave import ModelSlave
 
 _PACKAGE = Path(__file__).parents[1]
 _COMMON = (
@@ -67,33 +69,54 @@ def export(model: type[Model], file: Path, start: dict[str, float] | None = None
     interface = checked(model, start)
     file = Path(file)
     folder(file.parent)
-    version = metadata.version("chainunit")
-    shipped = dict(_shipped(model))
-    digest = hashlib.sha256()
-    for name, content in sorted(shipped.items()):
-        digest.update(name.encode() + b"\0" + content + b"\0")
-    digest.update(metadata.version("pythonfmu").encode())
-    digest.update(tostring(model_description(interface, "", _KINDS, version)))
-    hashed = digest.hexdigest()[:32]
-    description = model_description(interface, f"{{{uuid.UUID(hashed)}}}", _KINDS, version)
-
     with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
         work = Path(scratch)
-        package = work / f"chainunit_{hashed[:12]}"
-        for name, content in shipped.items():
-            target = package / name
-            target.parent.mkdir(parents=True, exist_ok=True)
-            target.write_bytes(content)
-        (package / "__init__.py").write_text(
-            f'"""chainunit {version}, the part that {model.name} needs."""\n'
-        )
-        recipe = work / f"{model.name}_{hashed[:12]}.py"
-        recipe.write_text(_recipe(model, package.name, start or {}))
-        (work / "modelDescription.xml").write_bytes(tostring(description, "utf-8"))
-        raw = _build(recipe, package, work / "modelDescription.xml", work / "raw.fmu")
+        script = work / f"{model.name}_{_hash(interface)}.py"
+        script.write_text(_script(model, start or {}))
+        raw = _build(script, work / "raw.fmu")
+        version = metadata.version("chainunit")
         with whole(file) as part:
             pack(_contents(raw) | accompanying(interface, version, 2, ("pythonfmu",)), part)
     return file
+
+
+def complete(slave: type[ModelSlave], resources: Path) -> Element:
+    """Describe the FMU that pythonfmu is building from a script, and put beside that script the part of this package
+    that it imports, so that the FMU needs no installed chainunit.
+
+    Parameters
+    ----------
+    slave : the class of the script
+    resources : folder that pythonfmu packs after this call; the script in it imports from the added part
+
+    Raises
+    ------
+    KeyError, InputError
+        see `export`.
+    """
+    interface = checked(slave.model, slave.start)
+    version, hashed = metadata.version("chainunit"), _hash(interface)
+    package = resources / f"chainunit_{hashed[:12]}"
+    for name, content in _shipped(slave.model):
+        target = package / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(content)
+    (package / "__init__.py").write_text(
+        f'"""chainunit {version}, the part that {interface.model.name} needs."""\n'
+    )
+    script = resources / f"{slave.__module__}.py"
+    script.write_text(re.sub(r"(?m)^(from|import) chainunit\b", rf"\1 {package.name}", script.read_text()))
+    return model_description(interface, f"{{{uuid.UUID(hashed)}}}", _KINDS, version)
+
+
+def _hash(interface: Interface) -> str:
+    """Of all that the FMU is made of, 32 digits."""
+    digest = hashlib.sha256()
+    for name, content in sorted(_shipped(interface.model)):
+        digest.update(name.encode() + b"\0" + content + b"\0")
+    digest.update(metadata.version("pythonfmu").encode())
+    digest.update(tostring(model_description(interface, "", _KINDS, metadata.version("chainunit"))))
+    return digest.hexdigest()[:32]
 
 
 def _shipped(model: type[Model]) -> Iterator[tuple[str, bytes]]:
@@ -104,31 +127,26 @@ def _shipped(model: type[Model]) -> Iterator[tuple[str, bytes]]:
             yield source.relative_to(_PACKAGE).as_posix(), source.read_bytes()
 
 
-def _recipe(model: type[Model], package: str, given: dict[str, float]) -> str:
-    start = {name: float(given[name]) for name in sorted(given)}
-    module, made = model.__module__.removeprefix("chainunit"), model.built_by or model.__qualname__
-    return (
-        f'"""{model.description}."""\n'
-        f"from {package}.fmu.slave import ModelSlave, hold\n"
-        f"from {package}{module} import {made.partition('(')[0]}\n\n"
-        f"_Model = {made}\n"
-        "hold(globals())\n\n\n"
-        f"class {model.name}(ModelSlave):\n"
-        f"    model = _Model\n"
-        f"    start = {start!r}\n"
-    )
+def _script(model: type[Model], start: dict[str, float]) -> str:
+    """The model's script in `fmu/`, with those start values and, for a class that a function makes, that function's
+    arguments."""
+    text = (recipes() / f"{model.name}.py").read_text()
+    if model.built_by:
+        text = re.sub(r"(?m)^(    model = \w+\.)\w+\([\d, ]*\)", rf"\g<1>{model.built_by}", text)
+    given = {name: float(start[name]) for name in sorted(start)}
+    return text + (f"    start = {given!r}\n" if given else "")
 
 
-def _build(recipe: Path, package: Path, description: Path, file: Path) -> Path:
+def _build(script: Path, file: Path) -> Path:
     """pythonfmu's build, which leaves its traces in `sys.path` and `sys.modules` behind."""
     path = list(sys.path)
     modules = set(sys.modules)
     try:
-        FmuBuilder.build_FMU(recipe, file, project_files=[package, description])
+        FmuBuilder.build_FMU(script, file)
     finally:
         sys.path[:] = path
         for name in set(sys.modules) - modules:
-            if name.split(".")[0] in (package.name, recipe.stem):
+            if name == script.stem:
                 del sys.modules[name]
     return file
 
@@ -136,8 +154,4 @@ def _build(recipe: Path, package: Path, description: Path, file: Path) -> Path:
 def _contents(raw: Path) -> dict[str, bytes]:
     """What pythonfmu packed, the scaffold left out."""
     with zipfile.ZipFile(raw) as archive:
-        return {
-            name: archive.read(name)
-            for name in archive.namelist()
-            if name != "resources/modelDescription.xml" and "__pycache__" not in name
-        }
+        return {name: archive.read(name) for name in archive.namelist() if "__pycache__" not in name}

@@ -15,9 +15,10 @@ import json
 import math
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, ClassVar
-from xml.etree.ElementTree import Element, parse
+from typing import Any, ClassVar, TypeVar
+from xml.etree.ElementTree import Element
 
 from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
@@ -28,19 +29,27 @@ from ..model import Model
 from ..quantities import complaint
 
 _NAN = float("nan")
+_Slave = TypeVar("_Slave")
 
 
 _LIBRARIES: set[Path] = set()
 
 
-def hold(namespace: dict[str, Any]) -> None:
-    """Take one reference to the namespace of the exported module.
+def hold(namespace: dict[str, Any]) -> Callable[[type[_Slave]], type[_Slave]]:
+    """Decorate the class of a script with the script's own `namespace`, so that pythonfmu 0.7 runs it as it should.
 
-    pythonfmu 0.7 runs that module at every instantiation, and each time gives up a reference to its
-    namespace that it never took; without this, the second or third instance in a process works on freed
-    memory.
+    pythonfmu imports the script by its name, runs its text again in that module's namespace at every instantiation,
+    and takes the class from the module. So each run takes a reference to the namespace, as pythonfmu gives one up
+    that it never took, and later instances in a process would work on freed memory; and it puts its class there,
+    as a second FMU with a script of the same name would get the class of the first.
     """
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(namespace))
+
+    def held(slave: type[_Slave]) -> type[_Slave]:
+        namespace[slave.__name__] = slave
+        return slave
+
+    return held
 
 
 def _release_at_exit(library: Path) -> None:
@@ -63,10 +72,11 @@ def _release_at_exit(library: Path) -> None:
 
 
 class ModelSlave(Fmi2Slave):  # type: ignore[misc]
-    """A model as pythonfmu's slave; the exported module derives one class with `model` and `start`."""
+    """A model as pythonfmu's slave; a script in `fmu/` derives one class with `model` and perhaps `start`."""
 
     model: ClassVar[type[Model]]
-    start: ClassVar[dict[str, float]]
+    start: ClassVar[dict[str, float]] = {}
+    """Start values of parameters and inputs, by name, that replace the declared ones."""
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
@@ -371,6 +381,8 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         return read if isinstance(read, dict) else {}
 
     def to_xml(self, model_options: Any = None) -> Element:
-        """The description that the exporter wrote beside this module: pythonfmu's own lacks
-        units, bounds, dependencies and initial unknowns."""
-        return parse(Path(self.resources) / "modelDescription.xml").getroot()
+        """Called when pythonfmu builds the FMU: the description from the declarations (pythonfmu's own lacks units,
+        bounds, dependencies and initial unknowns), and into `resources` the files that the FMU needs."""
+        from .export import complete  # stays behind: importers never come here
+
+        return complete(type(self), Path(self.resources))

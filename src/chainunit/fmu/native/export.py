@@ -17,7 +17,7 @@ from ...files import folder, whole
 from ...model import Model
 from ..accompany import accompanying
 from ..description import model_description, model_description_3
-from ..pack import checked, pack, written
+from ..pack import checked, pack, recipes, written
 from .generate import kernels, tables
 from .platforms import build, chosen
 
@@ -107,7 +107,7 @@ def export(
 
     report("generating C")
     functions = kernels(interface)
-    layer_texts = {name: (_c_layer() / name).read_bytes() for name in layer}
+    layer_texts = {name: (recipes() / "native" / name).read_bytes() for name in layer}
     digest = hashlib.sha256(description(""))
     for text in (functions.encode(), tables(interface, "", "").encode(), *layer_texts.values()):
         digest.update(text + b"\0")
@@ -139,12 +139,6 @@ def _build_description(identifier: str, names: Sequence[str]) -> bytes:
     for name in names:
         SubElement(files, "SourceFile", name=name)
     return written(root)
-
-
-def _c_layer() -> Path:
-    """The folder of the C layer: in an installed package beside this file, in a checkout `fmu/native`."""
-    here = Path(__file__).parent
-    return here if (here / "runtime.c").exists() else here.parents[3] / "fmu" / "native"
 
 
 def _headers() -> Path:

@@ -1,0 +1,9 @@
+"""The FMU CardanDriveline: ``pythonfmu build -f fmu/CardanDriveline.py``, see README.md beside this file."""
+
+from chainunit.drives import driveline
+from chainunit.fmu.slave import ModelSlave, hold
+
+
+@hold(globals())
+class CardanDriveline(ModelSlave):
+    model = driveline.CardanDriveline

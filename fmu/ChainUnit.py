@@ -1,0 +1,9 @@
+"""The FMU ChainUnit: ``pythonfmu build -f fmu/ChainUnit.py``, see README.md beside this file."""
+
+from chainunit.fmu.slave import ModelSlave, hold
+from chainunit.machines import chain_unit
+
+
+@hold(globals())
+class ChainUnit(ModelSlave):
+    model = chain_unit.DirectChainUnit

@@ -1,0 +1,9 @@
+"""The FMU InductionMotor: ``pythonfmu build -f fmu/InductionMotor.py``, see README.md beside this file."""
+
+from chainunit.drives import induction_motor
+from chainunit.fmu.slave import ModelSlave, hold
+
+
+@hold(globals())
+class InductionMotor(ModelSlave):
+    model = induction_motor.InductionMotor
