@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from chainunit.config import parse
 from chainunit.cosim import CoSimulation, Profile, System
@@ -16,10 +18,10 @@ from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor, breakdown, steady
 from chainunit.drives.motor import T_RATED
 from chainunit.engines import MATH
-from chainunit.errors import InterruptedRunError
+from chainunit.errors import InputError, InterruptedRunError
 from chainunit.fmu.backends import export
 from chainunit.studies import sizing
-from chainunit.studies.sizing import Check, flywheel, permitted_starts, rms, start_time
+from chainunit.studies.sizing import Check, Verdict, flywheel, permitted_starts, rms, start_time
 
 ANGLE = np.linspace(0.0, 2.0 * math.pi, 7200, endpoint=False)
 
@@ -128,10 +130,10 @@ def test_the_smallest_that_fits_is_chosen_and_the_others_are_told_why(sized):
         assert c.reason
         used = [check.utilisation for check in c.checks.values()]
         fits = all(u is not None and u <= 1.0 for u in used)
-        assert fits == (c.verdict != "rejected")
-        if c.verdict == "fits":
+        assert fits == c.fits == (c.verdict is not Verdict.REJECTED)
+        if c.verdict is Verdict.FITS:
             assert c.motor.nameplate.power >= chosen.motor.nameplate.power
-    assert {c.verdict for c in sized.candidates} >= {"chosen", "fits"}
+    assert {c.verdict for c in sized.candidates} >= {Verdict.CHOSEN, Verdict.FITS}
 
 
 def test_the_crank_turns_as_asked(sized, tmp_path):
@@ -139,8 +141,8 @@ def test_the_crank_turns_as_asked(sized, tmp_path):
     files, _ = drive.export(tmp_path)
     config = parse(HEAVY)
     with CoSimulation(drive.system(files), sizing.feed_signals(config, None)) as simulation:
-        simulation.run(1.0, 1e-3)
-        run = simulation.run(1.0 + 4.0 * math.pi / 3.0, 1e-3)
+        simulation.run(8.0, 1e-3)
+        run = simulation.run(8.0 + 4.0 * math.pi / 3.0, 1e-3)
     assert float(run["motor.w"].mean()) / drive.ratio == pytest.approx(3.0, rel=0.01)
 
 
@@ -149,21 +151,85 @@ def one_candidate(more, **asked):
     return dataclasses.replace(config, sizing=dataclasses.replace(config.sizing, candidates=1.0, **asked))
 
 
-def test_a_fixed_ratio_is_kept_and_must_give_the_speed(tmp_path):
+def test_a_fixed_ratio_is_kept_and_must_give_the_speed(tmp_path, monkeypatch):
     """With 62 in place of 52 the crank turns a sixth too slowly."""
+    monkeypatch.setattr(sizing, "catalogue", lambda extra: small(1))
     found = sizing.size(one_candidate("[gear]\nratio = 62\n", fluctuation=0.5), tmp_path, lambda *said: None)
     (c,) = found.candidates
-    assert c.drive.ratio == 62.0 and c.verdict == "rejected"
+    assert c.drive.ratio == 62.0 and c.verdict is Verdict.INSUFFICIENT and found.chosen is None
     assert c.checks["crank_speed"].value == pytest.approx(1.0 - 52.0 / 62.0, abs=0.02)
 
 
-def test_a_weak_gear_rejects(tmp_path):
+def small(number, skipped=0):
+    """Some 4-pole motors of the catalogue, from 0.55 kW on."""
+    motors = [m for m in catalogue() if m.nameplate.poles == 4.0]
+    return sorted(motors, key=lambda m: m.nameplate.power)[skipped : skipped + number]
+
+
+def test_without_a_fit_the_whole_catalogue_is_tried_and_the_nearest_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr(sizing, "catalogue", lambda extra: small(4))
     found = sizing.size(
         one_candidate("[gear]\ntorque_limit = 150\n", fluctuation=0.5), tmp_path, lambda *said: None
     )
-    (c,) = found.candidates
-    assert found.chosen is None and found.untried > 10
-    assert c.checks["gear"].utilisation > 1.0 and "torque of the gear" in c.reason
+    assert found.chosen is None and len(found.candidates) == found.motors == 4
+    violations = [c.checks["gear"].utilisation for c in found.candidates]
+    assert violations == sorted(violations) and violations[0] > 1.0
+    assert [c.verdict for c in found.candidates] == [Verdict.INSUFFICIENT] + 3 * [Verdict.REJECTED]
+    assert found.best is found.candidates[0] and "torque of the gear" in found.answer
+    assert "4 of 4 were tried" in found.answer
+    result = found.as_dict()
+    assert (result["chosen"], result["nearest"]) == (None, 0)
+    assert result["tried"]["value"] == result["motors"]["value"] == 4
+
+
+def test_sizing_climbs_until_one_fits(tmp_path, monkeypatch):
+    """One is asked for; the smaller ones get too hot with so many starts, and the largest are spared."""
+    monkeypatch.setattr(sizing, "catalogue", lambda extra: small(8))
+    config = one_candidate("", starts_per_hour=700.0, fluctuation=0.9)
+    found = sizing.size(config, tmp_path, lambda *said: None)
+    assert found.chosen is not None and 1 < len(found.candidates) < found.motors
+    others = [c for c in found.candidates if c is not found.chosen]
+    assert all(c.verdict is Verdict.REJECTED for c in others)
+    assert all(c.motor.nameplate.power < found.chosen.motor.nameplate.power for c in others)
+
+
+def test_a_limit_of_the_inertia_ratio_is_for_inverters_or_who_asks_for_it(tmp_path, monkeypatch):
+    monkeypatch.setattr(sizing, "catalogue", lambda extra: small(1, 1))
+
+    def found(more):
+        return sizing.size(one_candidate(more, fluctuation=0.5), tmp_path, lambda *said: None)
+
+    assert "inertia" not in found("").best.checks
+    assert found("").as_dict()["asked"]["inertia_ratio"]["value"] is None
+    asked = found("inertia_ratio = 5\n").best
+    assert asked.checks["inertia"].limit == 5.0
+    inverter = parse('start = "inverter"\n' + HEAVY)
+    assert inverter.sizing.inertia_ratio == 10.0
+
+
+def test_poles_that_no_motor_has_are_refused(tmp_path):
+    with pytest.raises(InputError, match=r"sizing\.poles_least = 8"):
+        sizing.size(one_candidate("", poles_least=8.0, poles_most=12.0), tmp_path, lambda *said: None)
+
+
+def test_without_a_fit_the_study_goes_on_with_the_nearest(tmp_path, monkeypatch):
+    """All that was asked is run, marked as insufficient, and the command ends with 1."""
+    from chainunit import cli
+
+    monkeypatch.setattr(sizing, "catalogue", lambda extra: small(2))
+    (tmp_path / "weak.toml").write_text(
+        'events = ["feed_right"]\n' + HEAVY + "fluctuation = 0.5\n[gear]\ntorque_limit = 150\n"
+    )
+    said = CliRunner().invoke(cli.app, ["study", str(tmp_path / "weak.toml"), "-o", str(tmp_path / "out")])
+    assert said.exit_code == 1, said.output
+    assert "No motor of the catalogue fits (2 of 2 were tried)" in said.output
+    assert "the motor is insufficient" in said.output
+    numbers = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert set(numbers["answers"]) == {"steady", "feed_right"} and numbers["status"] == "complete"
+    nearest = numbers["sizing"]["candidates"][numbers["sizing"]["nearest"]]
+    assert numbers["sizing"]["chosen"] is None and nearest["verdict"] == "insufficient"
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "No motor of the catalogue fits." in page and "which is insufficient" in page
 
 
 def test_a_long_soft_start_is_waited_for(tmp_path):

@@ -18,10 +18,12 @@ import numpy as np
 import pytest
 from fmpy.ssp.ssd import read_ssd, read_ssv
 
-from chainunit import InputError, cli, config
+from chainunit import InputError, RunError, cli, config
 from chainunit.cosim import CoSimulation, System, port_connections
+from chainunit.drives.catalogue import catalogue
 from chainunit.fmu import ssp
 from chainunit.models import MODELS
+from chainunit.studies import sizing
 from chainunit.studies.choice import choose
 from chainunit.studies.package import export_study, start_of
 
@@ -317,7 +319,7 @@ def test_a_driveline_between_runs_near_the_own_master(tool, tmp_path):
 # -- the file, and what is refused
 
 
-def test_feed_forward_and_sizing(tmp_path):
+def test_feed_forward_and_sizing(tmp_path, monkeypatch):
     """The machine that the control asks is in the package, and shares the machine's FMU."""
     export_study(config.parse("feed_forward = true"), tmp_path / "x.ssp", backend="python")
     elements = read_ssd(str(tmp_path / "x.ssp")).system.elements
@@ -327,7 +329,11 @@ def test_feed_forward_and_sizing(tmp_path):
         ("model", "resources/ChamberForces.fmu"),
     ]
     assert ("model.tau", "motor.tau_ff") in connections(tmp_path / "x.ssp")
-    with pytest.raises(InputError, match=r"no motor of the catalogue fits \(IE3 .*inertia"):
+    first = catalogue()[0]
+    monkeypatch.setattr(sizing, "catalogue", lambda extra: [first])
+    with pytest.raises(
+        RunError, match=r"no motor of the catalogue fits \(1 of 1 were tried\); IE3 .*inertia"
+    ):
         export_study(
             config.parse("[sizing]\ncandidates = 1\ninertia_ratio = 1e-6"),
             tmp_path / "y.ssp",

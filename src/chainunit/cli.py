@@ -110,6 +110,9 @@ def study(
         _stopped_early(result.failure, output, errors)
     if unwritten is not None:
         raise unwritten
+    if result.insufficient:
+        errors.print("No motor of the catalogue fits; all is run with the nearest, which is insufficient.")
+        raise typer.Exit(1)
 
 
 def _show_written(written: list[Path], console: Console) -> None:

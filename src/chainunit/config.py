@@ -200,7 +200,8 @@ class Sizing:
     )
     inertia_ratio: Value = quantity(
         "1",
-        "permitted ratio of all other inertia at the motor shaft, flywheel included, to that of the rotor",
+        "permitted ratio of all other inertia at the motor shaft, flywheel included, to that of the rotor; of motors "
+        "on the line only where it is given",
         default=10.0,
         above=0.0,
         max=1000.0,
@@ -212,7 +213,11 @@ class Sizing:
     poles_least: Value = quantity("1", "least number of poles", default=2.0, min=2.0, max=48.0)
     poles_most: Value = quantity("1", "largest number of poles", default=6.0, min=2.0, max=48.0)
     candidates: Value = quantity(
-        "1", "number of motors that are co-simulated", default=9.0, min=1.0, max=200.0
+        "1",
+        "least number of motors that are co-simulated; more follow until one fits",
+        default=9.0,
+        min=1.0,
+        max=200.0,
     )
 
 
@@ -405,7 +410,7 @@ def parse(text: str, source: str = "config") -> Config:
         overload=instance(Overload, given_values(checked.overload)),
         coupling=instance(Coupling, given_values(checked.coupling)) if "coupling" in data else None,
         monte_carlo=instance(MonteCarlo, given_values(checked.monte_carlo)),
-        sizing=instance(Sizing, given_values(checked.sizing)) if "sizing" in data else None,
+        sizing=_sizing(checked) if "sizing" in data else None,
         feed_forward=checked.feed_forward,
         gear=instance(
             Transmission, {**Layout(Transmission).named(KINDS["gear"]), **given_values(checked.gear)}
@@ -430,6 +435,14 @@ def parse(text: str, source: str = "config") -> Config:
             "lengthen the step, raise the speed, or lessen the turns"
         )
     return config
+
+
+def _sizing(checked: Any) -> Sizing:
+    """What is asked of the motor; a motor on the line has a limit of the inertia ratio only where one is given."""
+    given = given_values(checked.sizing)
+    limit = {} if checked.start == "inverter" else {"inertia_ratio": math.inf}
+    asked: Sizing = instance(Sizing, limit | given)
+    return asked
 
 
 def _driveline(section: Any) -> Driveline:

@@ -224,6 +224,11 @@ def variables(cls: type, prefix: str = "", context: str = "", default: Any = Non
             yield from variables(field.metadata["of"], name + ".", described, inner)
 
 
+def finite(value: Any) -> float | None:
+    """A number as JSON can have it: None where it is not finite, or none."""
+    return None if value is None or not math.isfinite(value) else float(value)
+
+
 class Layout:
     """Converts between an instance of a declaration and the flat list of its values."""
 

@@ -26,6 +26,7 @@ from ..quantities import Layout, Variable
 from ..studies.monte_carlo import Sample
 from ..studies.overload import SCENARIOS, Answers, Limits, Study, as_dict
 from ..studies.shaft import ShaftAnswers, Torsion
+from ..studies.sizing import Verdict
 from .interactive import Plot, called, plots
 from .motion import motion
 from .trace import Traced, at
@@ -258,6 +259,13 @@ def _families(names: Iterable[str]) -> dict[str, list[tuple[str, Variable]]]:
 def _answer(t: Traced, study: Study) -> str:
     answers = t.result["answers"]
     parts, cards = [], []
+    nearest = t.result["sizing"].get("nearest") if "sizing" in t.result else None
+    if nearest is not None:
+        parts.append(
+            '<p class="alarm"><strong>No motor of the catalogue fits.</strong> All runs are with '
+            f"{t.text(f'sizing.candidates.{nearest}.motor')}, which is insufficient: "
+            f"{t.text(f'sizing.candidates.{nearest}.reason')}.</p>"
+        )
     if answers:
         reference = "steady" if "steady" in answers else next(iter(answers))
         cards = [
@@ -581,12 +589,22 @@ def _notes(t: Traced) -> Iterator[tuple[str, bool]]:
 
 def _sizing(t: Traced) -> str:
     sizing = t.result["sizing"]
-    chosen, candidates = sizing.get("chosen"), sizing.get("candidates", [])
+    chosen, nearest, candidates = (sizing.get(name) for name in ("chosen", "nearest", "candidates"))
     parts = []
-    if chosen is not None:
-        best = f"sizing.candidates.{chosen}"
+    if chosen is None and candidates:
+        reasons = "".join(
+            f"<li><strong>{t.text(f'sizing.candidates.{i}.motor')}</strong>: "
+            f"{t.text(f'sizing.candidates.{i}.reason')}</li>"
+            for i in _ranked(candidates, nearest)[:_NAMED]
+        )
+        parts.append(
+            f'<div class="alarm"><strong>No candidate fits, because</strong><ul>{reasons}</ul></div>'
+        )
+    best_one = nearest if chosen is None else chosen
+    if best_one is not None:
+        best = f"sizing.candidates.{best_one}"
         cards = [
-            _large("Motor", t.text(f"{best}.motor"), "chosen", css=" name"),
+            _large("Motor", t.text(f"{best}.motor"), candidates[best_one]["verdict"], css=" name"),
             _large(
                 "Gear ratio", t.number(f"{best}.ratio", digits=4, given=True), "motor turns per crank turn"
             ),
@@ -604,21 +622,16 @@ def _sizing(t: Traced) -> str:
                     )
                 )
         parts.append(f'<div class="cards four">{"".join(cards)}</div>')
-        parts.append(f'<p class="reason">Chosen because: {t.text(f"{best}.reason")}</p>')
-    elif candidates:
-        reasons = "".join(
-            f"<li><strong>{t.text(f'sizing.candidates.{i}.motor')}</strong>: "
-            f"{t.text(f'sizing.candidates.{i}.reason')}</li>"
-            for i in _ranked(candidates, None)
-        )
-        parts.append(
-            f'<div class="alarm"><strong>No candidate fits, because</strong><ul>{reasons}</ul></div>'
-        )
+        why = "Chosen because" if chosen is not None else "Insufficient, and shown because"
+        parts.append(f'<p class="reason">{why}: {t.text(f"{best}.reason")}</p>')
     parts.extend(
         f'<p class="note">{t.text(f"sizing.notes.{i}")}</p>' for i in range(len(sizing.get("notes", [])))
     )
     if candidates:
-        parts.append(_candidates(t, candidates, chosen))
+        if "tried" in sizing:
+            counts = t.number("sizing.tried", given=True), t.number("sizing.motors", given=True)
+            parts.append(f'<p class="note">Tried: {" of ".join(counts)} motors of the catalogue.</p>')
+        parts.append(_candidates(t, candidates, best_one))
     groups = [
         (_capital(_words(name)), list(_leaves(sizing[name], f"sizing.{name}")))
         for name in ("asked", "cycle", "flywheel", "protection")
@@ -674,8 +687,9 @@ def _leaf(t: Traced, path: str) -> str:
     return t.number(path, given=path.startswith("sizing.asked"), form=form, none="none")
 
 
-_RANK = {"chosen": 0, "fits": 1, "rejected": 2}
-_SIGN = {"chosen": "✓", "fits": "○", "rejected": "✗"}
+_NAMED = 5  # of the candidates that do not fit; the table has all
+_RANK = {v.value: i for i, v in enumerate(Verdict)}
+_SIGN = {Verdict.CHOSEN: "✓", Verdict.FITS: "○", Verdict.INSUFFICIENT: "✗", Verdict.REJECTED: "✗"}
 
 
 def _ranked(candidates: list[Any], chosen: int | None) -> list[int]:

@@ -80,9 +80,11 @@ def show(study: Study, console: Console) -> None:
     config = study.config
     if study.sizing is not None:
         _show_sizing(study, console)
+    warning = "the motor is insufficient" if study.insufficient else ""
+    title = ": ".join(part for part in (config.title, warning) if part)
 
     def answers(runs: list[str]) -> Table:
-        table = Table(title=Text(config.title) if config.title else None, title_justify="left")
+        table = Table(title=Text(title) if title else None, title_justify="left")
         table.add_column(f"crank at {config.run.crank_speed:g} rad/s")
         for name in runs:
             table.add_column(_short(name), justify="right")
@@ -246,24 +248,28 @@ def _show_sizing(study: Study, console: Console) -> None:
     """The candidates in their order, with how much of each limit they use."""
     sized = study.sizing
     assert sized is not None
-    chosen = sized.chosen
-    if chosen is not None:
-        settings = recommended(study.config, chosen)
-        wheel = f"flywheel {chosen.flywheel:.3g} kg m2" if chosen.flywheel else "no flywheel"
-        console.print(
-            f"Motor: {chosen.motor.designation}, ratio {chosen.drive.ratio:.2f}, {wheel}; recommended: safety "
-            f"coupling at {settings.trip_torque:.0f} N m of the crank, relay at {settings.relay_current:.2f} A."
-        )
-    else:
-        console.print("No motor of the catalogue fits.")
+    best = sized.best
+    settings = recommended(study.config, best)
+    wheel = f"flywheel {best.flywheel:.3g} kg m2" if best.flywheel else "no flywheel"
+    console.print(f"{sized.answer[:1].upper()}{sized.answer[1:]}.", soft_wrap=True)
+    console.print(
+        f"{'Insufficient motor' if study.insufficient else 'Motor'}: {best.motor.designation}, ratio "
+        f"{best.drive.ratio:.2f}, {wheel}; recommended: safety coupling at {settings.trip_torque:.0f} N m of the "
+        f"crank, relay at {settings.relay_current:.2f} A.",
+        soft_wrap=True,
+    )
     table = Table(title="Candidates, best first", title_justify="left")
     table.add_column("motor", no_wrap=True)
     table.add_column("ratio", justify="right")
     table.add_column("verdict", no_wrap=True)
     table.add_column("because")
-    for c in sized.candidates:
+    assert study.config.sizing is not None
+    listed = int(study.config.sizing.candidates)
+    for c in sized.candidates[:listed]:
         table.add_row(c.motor.designation, f"{c.drive.ratio:.2f}", c.verdict, c.reason)
     console.print(table)
+    if sized.candidates[listed:]:
+        console.print(f"{len(sized.candidates) - listed} more were tried; report.html lists them.")
 
 
 def _show_monte_carlo(found: MonteCarloResult, console: Console) -> None:

@@ -36,17 +36,15 @@ def choose(
     report: Callable[[str, float, float], None],
     backend: Backend | None = None,
 ) -> Choice:
-    """The drive of a study; FMUs that sizing needs are written to `folder`. Where no candidate fits, the first of the
-    list stands for the machine's own numbers."""
+    """The drive of a study, with the nearest motor where sizing finds none that fits; FMUs that sizing needs are
+    written to `folder`."""
     if config.sizing is None:
         drive = Drive(
             DcMotor, config.motor, config.machine, feed_forward=config.feed_forward, chain=config.chain
         )
         return Choice(*tuned(config, with_line(config, drive)))
     sized = size(config, folder, report, backend)
-    best = sized.chosen or (sized.candidates[0] if sized.candidates else None)
-    drive = best.drive if best else Drive(DcMotor, config.motor, config.machine, chain=config.chain)
-    return Choice(with_line(config, drive), sizing=sized)
+    return Choice(with_line(config, sized.best.drive), sizing=sized)
 
 
 def with_line(config: Config, drive: Drive) -> Drive:

@@ -118,6 +118,11 @@ class Drive:
         ratio = self.driven.p.ratio
         return run[f"machine.{phi}"].values / ratio, run[f"machine.{w}"].values / ratio
 
+    def turns(self, run: xr.Dataset) -> float:
+        """Turns that the crank makes from the first to the last row of a run."""
+        angle, _ = self.crank_motion(run)
+        return float(angle[-1] - angle[0]) / (2.0 * math.pi)
+
     def whole_turns(self, run: xr.Dataset, most: float = math.inf) -> xr.Dataset | None:
         """The run up to the instant at which the crank has made whole turns since the first row, both ends included:
         as many turns as it makes, at most `most`; None where it makes less than one.

@@ -28,7 +28,7 @@ from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
 from ..machines.api import EMPTY
 from ..machines.chain_unit import ChamberForces
-from ..quantities import Layout, Value, declaration, quantity
+from ..quantities import Layout, Value, declaration, finite, quantity
 from . import protection
 from .chain import ChainResult, study_chain
 from .choice import choose
@@ -122,21 +122,17 @@ def entries(declared: Any) -> dict[str, Any]:
     """The declared values of an instance as ``{name: {"value": .., "unit": ..}}``; what is not finite is null."""
     layout = Layout(type(declared))
     return {
-        v.name: {"value": _number(value), "unit": v.unit}
+        v.name: {"value": finite(value), "unit": v.unit}
         for v, value in zip(layout.variables, layout.values(declared), strict=True)
     }
-
-
-def _number(value: Any) -> float | None:
-    return None if value is None or not math.isfinite(value) else float(value)
 
 
 _ROCKER_GOOD, _CRANK_GOOD = (0.2, 0.4), 0.6
 """Crank speeds, in parts of the organ's lowest natural frequency, up to which two bars give the rocker torque (empty,
 loaded) and the crank torque to a tenth of the peak of chains: on the packaged machine, docs/physics.md."""
 
-_STANDS = 0.1
-"""Share of the speed asked for below which the crank counts as standing."""
+_PATIENCE = 20.0
+"""Turns, at the speed that is asked, that a study runs on until the motor has settled and made its turns."""
 _CLOSED = 0.01
 """Gap between the ends of the steady turns up to which they count as closed."""
 
@@ -162,6 +158,8 @@ class Study:
     sides: Sides | None = None
     limits: Limits | None = None
     runs: dict[str, xr.Dataset] = field(default_factory=dict)
+    steady_from: float | None = None
+    """when running became steady [s], where that was later than `config.settled`"""
     event: dict[str, float] = field(default_factory=dict)
     answers: dict[str, Answers] = field(default_factory=dict)
     pins: dict[str, dict[str, dict[str, float]]] = field(default_factory=dict)
@@ -183,7 +181,12 @@ class Study:
     @property
     def settled(self) -> float:
         """Time from which running counts as steady [s]."""
-        return self.config.settled
+        return self.config.settled if self.steady_from is None else self.steady_from
+
+    @property
+    def insufficient(self) -> bool:
+        """Whether sizing found no motor that fits, so that all is run with the nearest."""
+        return self.sizing is not None and self.sizing.chosen is None
 
     @property
     def steady(self) -> xr.Dataset:
@@ -217,9 +220,6 @@ def run_study(
     if study.drive.motor is DcMotor:
         study.loops = _loops(study)
     _statics(study)
-    if study.sizing is not None and study.sizing.chosen is None:
-        _note(study)
-        return study
     if study.drive.line is not None:
         study.torsion = _torsion(study)
     files, study.made = study.drive.export(folder / "fmu", backend)
@@ -454,17 +454,24 @@ def _started(
     guards: Mapping[str, float],
 ) -> tuple[xr.Dataset, float]:
     """The start-up and steady running to the time `stop`, or to a later one where a crank that turns too slowly needs
-    it for the turns that are evaluated; with that time."""
+    it for the turns that are evaluated, or the motor to settle; with that time. Sets `study.steady_from`."""
     run, drive = study.config.run, study.drive
+    turn = 2.0 * math.pi / run.crank_speed
+    study.steady_from = study.config.settled
+    longest = stop + _PATIENCE * turn
     found = simulation.run(stop, run.step, progress, guards=guards)
-    longest = study.settled + (stop - study.settled) / _STANDS
     while stop - 0.5 * run.step <= simulation.time < longest:
-        angle, _ = drive.crank_motion(found.sel(time=slice(study.settled, None)))
-        missing = run.turns - (angle[-1] - angle[0]) / (2.0 * math.pi)
-        if missing < 0.0:
-            break
+        since = found.sel(time=slice(study.steady_from, None))
+        turns = drive.whole_turns(since, run.turns)
+        if turns is not None and drive.turns(turns) > run.turns - 0.5:
+            if study.config.chain is not None or _gap(drive, turns) <= _CLOSED:
+                break
+            # as if one turn more had been waited for
+            study.steady_from = float(_turns(drive, since, 1)["time"][-1])
+            since = found.sel(time=slice(study.steady_from, None))
         # at the speed that is asked at most; what is still missing then is seen in the next round
-        stop = min(longest, stop + max((missing + 0.1) * 2.0 * math.pi / run.crank_speed, run.step))
+        missing = run.turns + 0.1 - drive.turns(since)
+        stop = min(longest, stop + max(missing * turn, run.step))
         found = _joined([found, simulation.run(stop, run.step, progress, guards=guards)])
     return found, stop
 
@@ -661,6 +668,13 @@ def _turns(drive: Drive, run: xr.Dataset, most: float = math.inf) -> xr.Dataset:
     return run if turns is None else turns
 
 
+def _gap(drive: Drive, turns: xr.Dataset) -> float:
+    """Difference between the ends of `turns`, of crank speed or torque, over the largest value."""
+    _, speed = drive.crank_motion(turns)
+    sizes = ((x[-1] - x[0]) / max(np.max(np.abs(x)), 1e-9) for x in (speed, drive.crank_torque(turns)))
+    return max(abs(float(size)) for size in sizes)
+
+
 def _mean(run: xr.Dataset, x: Any) -> float:
     """Mean over the time of a run, by the trapezoidal rule."""
     time = run["time"].values
@@ -726,9 +740,7 @@ def _answers(study: Study, run: xr.Dataset, event: float | None, steady: xr.Data
         speed_mean=speed_mean,
         speed_least=float(np.min(speed)),
         speed_ripple=float(np.ptp(speed)) / max(abs(speed_mean), 1e-9) if event is None else None,
-        cycle_gap=max(abs(float(x[-1] - x[0])) / max(peak(x), 1e-9) for x in (speed, crank_torque))
-        if event is None
-        else None,
+        cycle_gap=_gap(drive, turns) if event is None else None,
         # a start begins at rest
         speed_dip=float((asked - np.min(speed)) / asked) if event != 0.0 else None,
         recovery_time=recovery,
@@ -868,7 +880,7 @@ def _note(study: Study) -> None:
             f"{LOAD_CYCLE}."
         )
     elif steady is not None and steady.cycle_gap > _CLOSED:
-        repeats = "chains do not repeat a turn" if config.chain else "the motor has not settled"
+        repeats = "chains do not repeat a turn" if config.chain else "the machine has not settled"
         note(
             f"steady running: the turns do not close, their ends differ by {100 * steady.cycle_gap:.2g} % in speed "
             f"or torque: {repeats}; raise run.settle_turns or run.turns."
@@ -879,16 +891,8 @@ def _note(study: Study) -> None:
         )
     if study.sizing is not None:
         study.notes.extend(study.sizing.notes)
-        if study.sizing.chosen is None:
-            left = study.sizing.untried
-            note(
-                f"none of the {len(study.sizing.candidates)} motors that were tried fits; the list says why. "
-                + (
-                    f"{left} larger ones were not tried (sizing.candidates)."
-                    if left
-                    else "There is no larger one."
-                )
-            )
+        if study.insufficient:
+            note(f"{study.sizing.answer}. All runs are with it.")
     for name, answers in study.answers.items():
         title = SCENARIOS.get(name, "steady running")
         if answers.slack_time is not None:
@@ -1094,4 +1098,4 @@ def _driveline(study: Study) -> dict[str, Any]:
 
 
 def _pure(values: Mapping[str, float]) -> dict[str, Any]:
-    return {name: {"value": _number(value), "unit": "1"} for name, value in values.items()}
+    return {name: {"value": finite(value), "unit": "1"} for name, value in values.items()}

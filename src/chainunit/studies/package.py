@@ -10,7 +10,7 @@ from pathlib import Path
 from ..config import Config
 from ..drives.driveline import CardanDriveline
 from ..drives.motor import Motor
-from ..errors import InputError
+from ..errors import InputError, RunError
 from ..fmu.backends import Backend
 from ..fmu.ssp import ModelSystem, export
 from ..machines.api import ChainUnit
@@ -56,7 +56,9 @@ def start_of(
     Raises
     ------
     InputError
-        where the study's motor is another, it has no driveline, or sizing finds none.
+        where the study's motor is another, or it has no driveline.
+    RunError
+        where sizing finds no motor.
     """
     drive = _drive(config, backend, report)
     if model is CardanDriveline:
@@ -101,8 +103,7 @@ def _drive(config: Config, backend: Backend | None, report: Callable[[str], None
     with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
         choice = choose(config, Path(scratch), lambda what, done, todo: report(what), backend)
     if choice.sizing is not None and choice.sizing.chosen is None:
-        why = "; ".join(f"{c.motor.designation}: {c.reason}" for c in choice.sizing.candidates[:3])
-        raise InputError(f"[sizing]: no motor of the catalogue fits ({why})")
+        raise RunError(f"[sizing]: {choice.sizing.answer}")
     return choice.drive
 
 

@@ -11,6 +11,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
 from typing import Any, Literal
 
@@ -25,9 +26,9 @@ from ..drives.gearing import motor_side
 from ..drives.induction_motor import InductionMotor, breakdown, volts_per_hertz
 from ..drives.motor import T_RATED
 from ..engines import MATH, numpy_
-from ..errors import InterruptedRunError, RunError
+from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
-from ..quantities import Layout, Value, declaration, quantity
+from ..quantities import Layout, Value, declaration, finite, quantity
 from .chain import HIGH, duty
 from .cycle import Cycle, all_on_one, cycle
 from .drive import Drive
@@ -124,6 +125,20 @@ class Check:
         }
 
 
+class Verdict(StrEnum):
+    """How a candidate came off."""
+
+    CHOSEN = "chosen"
+    FITS = "fits"
+    INSUFFICIENT = "insufficient"
+    """the nearest of those that do not fit, where none does: the study goes on with it"""
+    REJECTED = "rejected"
+
+
+_WORSE_WITH_INERTIA = ("start", "starts", "inertia")
+"""Checks that no flywheel heals."""
+
+
 @dataclass
 class Candidate:
     """A motor behind a gear, with what its runs gave."""
@@ -138,15 +153,24 @@ class Candidate:
     breakdown_torque: float
     """of the motor [N m]"""
     fluctuation: float
-    verdict: str = ""
+    verdict: Verdict | None = None
+    """None until it is judged or ranked"""
     reason: str = ""
 
     @property
-    def worst(self) -> tuple[str, float]:
-        """The check that is used most."""
-        sizes = {n: math.inf if c.utilisation is None else c.utilisation for n, c in self.checks.items()}
-        name = max(sizes, key=lambda n: sizes[n])
-        return name, sizes[name]
+    def sizes(self) -> dict[str, float]:
+        """Utilisation by check; infinite where the candidate does not get that far."""
+        return {n: math.inf if c.utilisation is None else c.utilisation for n, c in self.checks.items()}
+
+    @property
+    def violation(self) -> float:
+        """Utilisation of the check that is used most; infinite where its run failed."""
+        return max(self.sizes.values(), default=math.inf)
+
+    @property
+    def fits(self) -> bool:
+        """Whether every check is within its limit."""
+        return self.violation <= 1.0
 
 
 @dataclass
@@ -157,28 +181,41 @@ class SizingResult:
     cycle: CycleNumbers
     candidates: list[Candidate]
     notes: list[str]
-    untried: int = 0
-    """motors of the catalogue that are larger than those tried"""
+    motors: int
+    """motors of the catalogue with a permitted number of poles; `candidates` are those of them that were tried"""
 
     @property
     def chosen(self) -> Candidate | None:
         """The candidate that was chosen, if one fits."""
-        return next((c for c in self.candidates if c.verdict == "chosen"), None)
+        return self.candidates[0] if self.candidates[0].verdict is Verdict.CHOSEN else None
+
+    @property
+    def best(self) -> Candidate:
+        """The candidate that the study goes on with: the chosen one, or the nearest where none fits."""
+        return self.candidates[0]
+
+    @property
+    def answer(self) -> str:
+        """What sizing found, in a sentence; with the words of `rank`."""
+        tried = f"{len(self.candidates)} of {self.motors} were tried"
+        if self.chosen:
+            return f"{self.best.motor.designation} is {self.best.reason} ({tried})"
+        return (
+            f"no motor of the catalogue fits ({tried}); {self.best.motor.designation} is {self.best.reason}"
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON, each number with its unit."""
-        chosen = self.chosen
-        wheel = protection = {}
-        if chosen:
-            wheel = _entries(Flywheel(J=chosen.flywheel, fluctuation=chosen.fluctuation))
-            protection = _entries(recommended(self.config, chosen))
+        best = self.best
         assert self.config.sizing is not None
         return {
             "asked": _entries(self.config.sizing),
             "one_sided": heavier_side(self.config),
             "cycle": _entries(self.cycle),
-            "flywheel": wheel,
-            "protection": protection,
+            "flywheel": _entries(Flywheel(J=best.flywheel, fluctuation=best.fluctuation)),
+            "protection": _entries(recommended(self.config, best)),
+            "tried": {"value": len(self.candidates), "unit": "1"},
+            "motors": {"value": self.motors, "unit": "1"},
             "candidates": [
                 {
                     "motor": c.motor.designation,
@@ -189,7 +226,8 @@ class SizingResult:
                 }
                 for c in self.candidates
             ],
-            "chosen": self.candidates.index(chosen) if chosen else None,
+            "chosen": self.candidates.index(self.chosen) if self.chosen else None,
+            "nearest": None if self.chosen else self.candidates.index(best),
             "notes": self.notes,
         }
 
@@ -197,7 +235,7 @@ class SizingResult:
 def _entries(declared: Any) -> dict[str, Any]:
     layout = Layout(type(declared))
     return {
-        v.name: {"value": value, "unit": v.unit, "title": v.description}
+        v.name: {"value": finite(value), "unit": v.unit, "title": v.description}
         for v, value in zip(layout.variables, layout.values(declared), strict=True)
     }
 
@@ -267,7 +305,8 @@ def size(
     report: Callable[[str, float, float], None],
     backend: Backend | None = None,
 ) -> SizingResult:
-    """Choose a motor of the catalogue for the study.
+    """Choose a motor of the catalogue for the study: at least `sizing.candidates` are tried, from small to large, and
+    then more until one fits or the catalogue ends.
 
     Parameters
     ----------
@@ -278,7 +317,7 @@ def size(
     Raises
     ------
     InputError
-        for a catalogue that cannot be read.
+        for a catalogue that cannot be read, or that has no motor with the poles that are asked.
     """
     asked = config.sizing
     assert asked is not None
@@ -300,26 +339,37 @@ def size(
     # from below what the mean power and RMS torque need, so that the first that fits is the smallest
     needed = max(numbers.power_mean, numbers.torque_rms * config.run.crank_speed)
     motors.sort(key=lambda m: (m.nameplate.power, abs(m.nameplate.poles - 4.0)))
-    first = next((k for k, m in enumerate(motors) if m.nameplate.power >= 0.7 * needed), len(motors))
-    shortlist = motors[first : first + int(asked.candidates)]
-    if not shortlist:
-        notes.append(f"No motor of the catalogue has 0.7 times the power of the cycle, {0.7 * needed:.3g} W.")
+    if not motors:
+        raise InputError(
+            f"sizing.poles_least = {asked.poles_least:g}, sizing.poles_most = {asked.poles_most:g}: the catalogue "
+            "has no motor with so many poles"
+        )
+    strong = [m for m in motors if m.nameplate.power >= 0.7 * needed]
+    if not strong:
+        notes.append(
+            f"No motor of the catalogue has 0.7 times the power of the cycle, {0.7 * needed:.3g} W: the largest were "
+            "tried."
+        )
+        strong = [m for m in motors if m.nameplate.power == motors[-1].nameplate.power]
     found: list[Candidate] = []
     files: Mapping[str, Path] = {}
-    for k, motor in enumerate(shortlist):
-        report(f"co-simulating {motor.designation}", float(k), float(len(shortlist)))
+    for k, motor in enumerate(strong):
+        if len(found) >= asked.candidates and any(c.fits for c in found):
+            break
+        report(f"co-simulating {motor.designation}", float(k), float(len(strong)))
         candidate = proposed(config, motor, numbers, both)
         if not files:
             files, _ = candidate.drive.export(folder, backend)
         found.append(with_flywheel(config, candidate, numbers, files))
     rank(found)
-    return SizingResult(config, numbers, found, notes, len(motors) - first - len(shortlist))
+    return SizingResult(config, numbers, found, notes, len(motors))
 
 
 def with_flywheel(
     config: Config, bare: Candidate, numbers: CycleNumbers, files: Mapping[str, Path]
 ) -> Candidate:
-    """The candidate as it is, or with the least flywheel, to about a tenth, that keeps the speed as asked.
+    """The candidate as it is, or with the least flywheel, to about a tenth, that keeps the speed as asked; as it is,
+    too, where it misses a limit that no flywheel heals.
 
     The largest tried is that of the hand formula, which leaves out that a motor's torque falls with speed and evens
     it, too."""
@@ -334,10 +384,9 @@ def with_flywheel(
         return candidate
 
     def even(candidate: Candidate) -> bool:
-        speed = candidate.checks.get("speed")
-        return (
-            bool(candidate.verdict) or speed is None or speed.utilisation is None or speed.utilisation <= 1.0
-        )
+        sizes = candidate.sizes
+        hopeless = any(sizes.get(name, 0.0) > 1.0 for name in _WORSE_WITH_INERTIA)
+        return hopeless or not 1.0 < sizes.get("speed", 0.0) < math.inf
 
     best, below = tried(0.0), 0.0
     if even(best):
@@ -418,7 +467,7 @@ def judge(config: Config, c: Candidate, numbers: CycleNumbers, files: Mapping[st
     except InterruptedRunError:
         raise
     except RunError as error:
-        c.verdict, c.reason = "rejected", f"its run failed: {error}"
+        c.reason = f"its run failed: {error}"
         return
     speed = np.concatenate([start["motor.w"].values, steady["motor.w"].values])
     times = np.concatenate([start["time"].values, steady["time"].values])
@@ -505,9 +554,6 @@ def _checks(
             "rise of temperature", checked(temperature - p.ambient.T), asked.temperature - p.ambient.T, "K"
         ),
         "starts": Check("starts per hour", asked.starts_per_hour, permitted, "1"),
-        "inertia": Check(
-            "inertia ratio", (reflected + p.rotor.J - plate.J) / plate.J, asked.inertia_ratio, "1"
-        ),
         "crank_speed": Check(
             "deviation of the crank speed",
             checked(abs(mean_speed / (c.drive.ratio * config.run.crank_speed) - 1.0)),
@@ -516,6 +562,9 @@ def _checks(
         ),
         "speed": Check("speed fluctuation", checked(c.fluctuation), asked.fluctuation, "1"),
     }
+    if math.isfinite(asked.inertia_ratio):
+        ratio = (reflected + p.rotor.J - plate.J) / plate.J
+        checks["inertia"] = Check("inertia ratio", ratio, asked.inertia_ratio, "1")
     if "torque_limit" in config.gear_given:
         checks["gear"] = Check("torque of the gear", c.peak_torque, gear.torque_limit, "N.m")
     return checks
@@ -531,49 +580,45 @@ def permitted_starts(
 
 
 def rank(candidates: list[Candidate]) -> None:
-    """Order by rank and say why: what fits by size, then what does not by how far it is off."""
+    """Order by rank and say why: what fits by size, then what does not by how far it is off, which is the utilisation
+    of its most used check; of those that do not start at all the larger is nearer."""
     for c in candidates:
-        if c.verdict:
-            continue
-        name, used = c.worst
-        check = c.checks[name]
-        if math.isinf(used):
-            c.verdict, c.reason = "rejected", "it does not bring the machine up to speed"
-        elif used > 1.0:
-            c.verdict = "rejected"
-            over = [
-                f"{k.title} {100 * (k.utilisation or 0):.0f} %"
-                for k in c.checks.values()
-                if (k.utilisation or 0) > 1
-            ]
-            unit = "" if check.unit == "1" else f" {check.unit}"
-            c.reason = (
-                f"{check.title} {check.value:.3g}{unit} of {check.limit:.3g}{unit} permitted"
-                if len(over) == 1
-                else "above 100 %: " + ", ".join(over)
-            )
+        over = [check for name, check in c.checks.items() if c.sizes[name] > 1.0]
+        if c.fits:
+            most = max(c.checks.values(), key=lambda check: check.utilisation or 0.0)
+            c.verdict, c.reason = Verdict.FITS, f"most used: {most.title}, {100 * c.violation:.0f} %"
+        elif not c.checks:
+            # its run failed, and the reason is there
+            c.verdict = Verdict.REJECTED
+        elif math.isinf(c.violation):
+            c.verdict, c.reason = Verdict.REJECTED, "it does not bring the machine up to speed"
+        elif len(over) == 1:
+            (check,) = over
+            unit = "" if check.unit == "1" else f" {check.unit.replace('.', ' ')}"
+            c.verdict = Verdict.REJECTED
+            c.reason = f"{check.title} {check.value:.4g}{unit} of {check.limit:.4g}{unit} permitted"
         else:
-            c.verdict, c.reason = "fits", f"most used: {check.title}, {100 * used:.0f} %"
-    for c in candidates:
+            sizes = ", ".join(f"{check.title} {100 * (check.utilisation or 0):.0f} %" for check in over)
+            c.verdict, c.reason = Verdict.REJECTED, f"above 100 %: {sizes}"
         if c.flywheel:
             c.reason += f", with the flywheel of {c.flywheel:.3g} kg m2 that the speed needs"
     candidates.sort(
         key=lambda c: (
-            c.verdict == "rejected",
-            c.motor.nameplate.power if c.verdict == "fits" else c.worst[1] if c.checks else math.inf,
-            c.worst[1] if c.checks else math.inf,
+            not c.fits,
+            c.motor.nameplate.power if c.fits else c.violation,
+            c.violation if c.fits else -c.motor.nameplate.power,
         )
     )
-    if candidates and candidates[0].verdict == "fits":
-        best = candidates[0]
-        best.verdict = "chosen"
-        best.reason = f"the smallest that fits; {best.reason}"
-        for c in candidates[1:]:
-            if c.verdict == "fits":
-                larger = c.motor.nameplate.power > best.motor.nameplate.power
-                c.reason = (
-                    f"{'larger than needed' if larger else 'more used than the chosen one'}; {c.reason}"
-                )
+    best = candidates[0]
+    if not best.fits:
+        best.verdict = Verdict.INSUFFICIENT
+        best.reason = f"the nearest of those that do not fit; {best.reason}"
+        return
+    best.verdict, best.reason = Verdict.CHOSEN, f"the smallest that fits; {best.reason}"
+    for c in candidates[1:]:
+        if c.fits:
+            larger = c.motor.nameplate.power > best.motor.nameplate.power
+            c.reason = f"{'larger than needed' if larger else 'more used than the chosen one'}; {c.reason}"
 
 
 def recommended(config: Config, c: Candidate) -> Protection:
