@@ -15,7 +15,6 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from . import __version__
 from .errors import InputError, InterruptedRunError, RunError, WriteError, printable
 from .files import claimed, full, leftovers
 
@@ -38,6 +37,8 @@ app = typer.Typer(
 
 def _version(wanted: bool) -> None:
     if wanted:
+        from . import __version__
+
         print(f"chainunit {__version__}")
         raise typer.Exit
 

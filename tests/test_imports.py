@@ -1,0 +1,45 @@
+"""What takes long to import is not imported before it is needed."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from importlib import metadata
+
+import pytest
+
+import chainunit
+
+DEPENDENCIES = {
+    re.match(r"[\w-]+", line)[0].lower()
+    for line in metadata.requires("chainunit")
+    if "extra ==" not in line.replace("'", "").replace('"', "")
+}
+
+
+@pytest.mark.parametrize(
+    ("code", "needed"),
+    [
+        ("import chainunit", set()),
+        ("from chainunit.cli import app; app(['--help'], standalone_mode=False)", {"typer", "rich"}),
+        ("import chainunit; chainunit.ChainUnit", {"numpy", "scipy"}),
+    ],
+)
+def test_imports_no_more_than_is_needed(code, needed):
+    assert {"numpy", "scipy", "xarray", "casadi", "fmpy", "matplotlib", "typer", "rich"} <= DEPENDENCIES
+    after = f"import sys\n{code}\nprint('loaded', *{{m.split('.')[0].lower() for m in sys.modules}})"
+    done = subprocess.run([sys.executable, "-c", after], capture_output=True, text=True, check=True)
+    loaded = set(done.stdout.splitlines()[-1].split())
+    assert loaded & DEPENDENCIES == needed
+
+
+def test_public_names():
+    assert {"ChainUnit", "ChamberForces", "SideLoads", "InputError"} <= set(chainunit.__all__)
+    for name in chainunit.__all__:
+        assert getattr(chainunit, name) is getattr(chainunit, name) and name in dir(chainunit)
+    assert chainunit.__version__ == metadata.version("chainunit")
+    with pytest.raises(AttributeError, match="module 'chainunit' has no attribute 'Chainunit'"):
+        chainunit.Chainunit  # noqa: B018
+    with pytest.raises(ImportError):
+        from chainunit import nothing  # noqa: F401
