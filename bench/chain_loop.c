@@ -61,7 +61,7 @@ int main(int argc, char **argv) {
         for (int round = 0; round < 9; ++round) {
             const double from = now();
             for (int i = 0; i < 20000; ++i) {
-                (what ? model.closed : model.derivatives)(arg, res, NULL, NULL, 0);
+                (what ? kernels.closed : kernels.derivatives)(arg, res, NULL, NULL, 0);
                 sink += dx[0];
             }
             const double spent = (now() - from) / 20000;

@@ -17,6 +17,29 @@ static double random_value(void) {
 
 static long messages, count[4]; /* of status OK, discard, error, other */
 
+/* A pointer, now and then none. */
+#define MAYBE(pointer) (random_below(40) ? (pointer) : NULL)
+
+/* Linked with --wrap: now and then there is no memory, where it is said to be scarce. */
+static int scarce;
+void *__real_malloc(size_t size);
+void *__real_calloc(size_t n, size_t size);
+void *__wrap_malloc(size_t size) { return scarce && !random_below(3) ? NULL : __real_malloc(size); }
+void *__wrap_calloc(size_t n, size_t size) { return scarce && !random_below(3) ? NULL : __real_calloc(n, size); }
+
+/* Flip a bit of a saved state; where it is not sealed anew with the checksum of runtime.c, it must be refused. */
+static int flipped(unsigned char *bytes, size_t size) {
+    bytes[random_below((unsigned)size)] ^= (unsigned char)(1 << random_below(8));
+    if (random_below(2)) return 1;
+    unsigned long long h = 14695981039346656037ull, word;
+    for (size_t at = sizeof word; at < size; at += sizeof word) {
+        memcpy(&word, bytes + at, sizeof word);
+        h = (h ^ word) * 1099511628211ull;
+    }
+    memcpy(bytes, &h, sizeof h);
+    return 0;
+}
+
 static int counted(long calls) {
     printf("%ld calls: %ld ok, %ld discarded, %ld errors, %ld other; %ld messages\n", calls, count[0], count[1], count[2],
            count[3], messages);

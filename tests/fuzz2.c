@@ -12,7 +12,6 @@ static void logger(fmi2ComponentEnvironment e, fmi2String n, fmi2Status s, fmi2S
 
 int main(int argc, char **argv) {
     const long calls = argc > 1 ? atol(argv[1]) : 1000000;
-    const fmi2CallbackFunctions functions = {logger, calloc, free, NULL, NULL};
     enum { N = 4, MOST = 128 };
     fmi2Component instance[N] = {0};
     fmi2FMUstate state[N] = {0};
@@ -23,10 +22,11 @@ int main(int argc, char **argv) {
     size_t size = 0;
     for (long k = 0; k < calls; ++k) {
         const unsigned i = random_below(N);
-        fmi2Component c = instance[i];
+        fmi2Component c = instance[i], alive = c;
+        if (!random_below(100)) c = NULL; /* a host that lost it */
         size_t n = random_below(random_below(10) ? 5 : MOST);
         for (size_t j = 0; j < n; ++j) {
-            vr[j] = random_below(50) ? random_below((unsigned)references) : 4000000000u + random_below(1000);
+            vr[j] = random_below(50) ? random_below((unsigned)references) : 0x7fffff00u + random_below(512);
             known[j] = random_below(20) ? (unsigned)model.n_p + random_below((unsigned)(model.n_u + model.n_x)) : vr[j];
             value[j] = random_value();
         }
@@ -34,70 +34,100 @@ int main(int argc, char **argv) {
         fmi2EventInfo info;
         fmi2Boolean a, b;
         double x[MOST];
-        fmi2Integer order[MOST];
+        fmi2Integer order[MOST], number[MOST] = {0};
+        fmi2String text[MOST] = {0}, category[1] = {"logAll"}, said;
+        fmi2Status kind;
+        const fmi2StatusKind asked = (fmi2StatusKind)random_below(4);
+        double time = 0.0;
         for (size_t j = 0; j < n; ++j) order[j] = random_below(20) ? 1 : 2;
-        switch (random_below(c ? 34 : 1)) {
+        scarce = !random_below(20);
+        switch (random_below(alive ? 44 : 1)) {
         case 0:
-            if (!c) {
+            if (!alive) {
                 const int wrong = !random_below(20);
+                /* gone after the call: the FMU must not keep its address */
+                fmi2CallbackFunctions lent = {random_below(10) ? logger : NULL, calloc, free, NULL, NULL};
                 instance[i] = fmi2Instantiate(random_below(20) ? "unit" : random_below(2) ? "" : NULL,
                                               random_below(2) ? fmi2CoSimulation : fmi2ModelExchange,
-                                              wrong ? random_below(2) ? "no" : NULL : model.guid, NULL, &functions, 0, 1);
+                                              wrong ? random_below(2) ? "no" : NULL : model.guid, NULL,
+                                              random_below(20) ? &lent : NULL, 0, 1);
+                memset(&lent, 0, sizeof lent);
                 if (wrong && instance[i]) return puts("a wrong GUID was taken"), 1;
             } else if (!random_below(20)) {
-                fmi2FreeFMUstate(c, &state[i]);
-                fmi2FreeInstance(c);
+                fmi2FreeFMUstate(alive, &state[i]);
+                fmi2FreeInstance(alive);
+                fmi2FreeInstance(NULL);
                 instance[i] = NULL;
             }
             break;
-        case 1: s = fmi2SetupExperiment(c, 0, 0.0, random_value(), 0, 0.0); break;
+        case 1: s = fmi2SetupExperiment(c, 0, 0.0, random_below(4) ? 0.0 : random_value(), random_below(2), random_value()); break;
         case 2: case 3: s = fmi2EnterInitializationMode(c); break;
         case 4: case 5: s = fmi2ExitInitializationMode(c); break;
         case 6: if (!random_below(10)) s = fmi2Terminate(c); break;
         case 7: if (!random_below(5)) s = fmi2Reset(c); break;
-        case 8: case 9: case 10: s = fmi2SetReal(c, vr, n, value); break;
+        case 8: case 9: case 10: s = fmi2SetReal(c, MAYBE(vr), n, MAYBE(value)); break;
         case 11: case 12: case 13:
             memset(x, 0, sizeof x);
-            s = fmi2GetReal(c, vr, n, x);
+            s = fmi2GetReal(c, MAYBE(vr), n, MAYBE(x));
             if (s == fmi2OK)
                 for (size_t j = 0; j < n; ++j)
                     if (!isfinite(x[j])) return printf("reference %u: %g with status OK\n", vr[j], x[j]), 1;
             break;
-        case 14: case 15: s = fmi2DoStep(c, 0.0, random_below(20) ? 1e-3 : random_value(), 1); break;
-        case 16: s = fmi2GetFMUstate(c, &state[i]); break;
+        case 14: case 15:
+            fmi2GetRealStatus(alive, fmi2LastSuccessfulTime, &time);
+            s = fmi2DoStep(c, random_below(20) ? time : random_value(), random_below(10) ? 1e-3 : random_value(), 1);
+            break;
+        case 16: s = fmi2GetFMUstate(c, MAYBE(&state[i])); break;
         case 17: s = fmi2SetFMUstate(c, state[random_below(N)]); break;
         case 18:
-            if (state[i] && fmi2SerializedFMUstateSize(c, state[i], &size) == fmi2OK) {
+            if (state[i] && fmi2SerializedFMUstateSize(alive, state[i], &size) == fmi2OK) {
                 bytes = realloc(bytes, size);
-                s = fmi2SerializeFMUstate(c, state[i], bytes, size);
+                memset(bytes, 0, size);
+                s = fmi2SerializeFMUstate(c, MAYBE(state[i]), MAYBE(bytes), random_below(50) ? size : size - 1);
             }
             break;
         case 19:
             if (bytes) {
-                if (!random_below(50)) bytes[random_below((unsigned)size)] ^= 1 << random_below(8);
-                s = fmi2DeSerializeFMUstate(c, bytes, random_below(20) ? size : random_below((unsigned)size), &state[i]);
+                const int damaged = !random_below(10) && flipped((unsigned char *)bytes, size);
+                s = fmi2DeSerializeFMUstate(c, MAYBE(bytes), random_below(20) ? size : random_below((unsigned)size),
+                                            MAYBE(&state[i]));
+                if (damaged && s == fmi2OK) return puts("a damaged state was taken"), 1;
+                if (damaged) free(bytes), bytes = NULL;
             }
             break;
-        case 20: s = fmi2FreeFMUstate(c, &state[i]); break;
-        case 21: case 22: s = fmi2GetDirectionalDerivative(c, vr, n, known, n, value, sense); break;
+        case 20: s = fmi2FreeFMUstate(c, MAYBE(&state[i])); break;
+        case 21: case 22: s = fmi2GetDirectionalDerivative(c, MAYBE(vr), n, MAYBE(known), n, MAYBE(value), MAYBE(sense)); break;
         case 23: s = fmi2EnterEventMode(c); break;
-        case 24: s = fmi2NewDiscreteStates(c, random_below(20) ? &info : NULL); break;
+        case 24: s = fmi2NewDiscreteStates(c, MAYBE(&info)); break;
         case 25: s = fmi2EnterContinuousTimeMode(c); break;
-        case 26: s = fmi2CompletedIntegratorStep(c, 1, &a, random_below(20) ? &b : NULL); break;
+        case 26: s = fmi2CompletedIntegratorStep(c, 1, MAYBE(&a), MAYBE(&b)); break;
         case 27: s = fmi2SetTime(c, random_value()); break;
         case 28:
             for (int j = 0; j < MOST; ++j) x[j] = random_below(50) ? 1.0 : random_value();
-            s = fmi2SetContinuousStates(c, x, random_below(20) ? (size_t)model.n_x : n);
+            s = fmi2SetContinuousStates(c, MAYBE(x), random_below(20) ? (size_t)model.n_x : n);
             break;
-        case 29: s = fmi2GetDerivatives(c, x, random_below(20) ? (size_t)model.n_x : n); break;
-        case 30: s = fmi2GetContinuousStates(c, x, random_below(20) ? (size_t)model.n_x : n); break;
-        case 31: s = fmi2SetRealInputDerivatives(c, known, n, order, value); break;
-        case 32: s = fmi2GetRealOutputDerivatives(c, vr, n, order, x); break;
+        case 29: s = fmi2GetDerivatives(c, MAYBE(x), random_below(20) ? (size_t)model.n_x : n); break;
+        case 30: s = fmi2GetContinuousStates(c, MAYBE(x), random_below(20) ? (size_t)model.n_x : n); break;
+        case 31: s = fmi2SetRealInputDerivatives(c, MAYBE(known), n, MAYBE(order), MAYBE(value)); break;
+        case 32: s = fmi2GetRealOutputDerivatives(c, MAYBE(vr), n, MAYBE(order), MAYBE(x)); break;
+        case 33: s = fmi2CancelStep(c); break;
+        case 34: s = fmi2GetStatus(c, asked, &kind); break;
+        case 35: s = fmi2GetRealStatus(c, asked, MAYBE(x)); break;
+        case 36: s = fmi2GetIntegerStatus(c, asked, number); break;
+        case 37: s = fmi2GetBooleanStatus(c, asked, MAYBE(&a)); break;
+        case 38: s = fmi2GetStringStatus(c, asked, &said); break;
+        case 39: s = fmi2SetDebugLogging(c, random_below(2), random_below(2), category); break;
+        case 40: s = random_below(2) ? fmi2GetInteger(c, vr, n, number) : fmi2SetInteger(c, vr, n, number); break;
+        case 41: s = random_below(2) ? fmi2GetBoolean(c, vr, n, number) : fmi2SetBoolean(c, vr, n, number); break;
+        case 42: s = random_below(2) ? fmi2GetString(c, vr, n, text) : fmi2SetString(c, vr, n, text); break;
         default:
             s = random_below(2) ? fmi2GetReal(c, NULL, n, NULL) : fmi2SetReal(c, NULL, n, NULL);
-            fmi2GetInteger(c, vr, n, order);
-            fmi2GetRealStatus(c, fmi2LastSuccessfulTime, random_below(2) ? x : NULL);
+            fmi2GetNominalsOfContinuousStates(c, x, (size_t)model.n_x);
+            fmi2GetEventIndicators(c, x, random_below(2));
+            fmi2SerializedFMUstateSize(c, MAYBE(state[i]), MAYBE(&size));
+            if (strcmp(fmi2GetVersion(), "2.0") || strcmp(fmi2GetTypesPlatform(), "default")) return 1;
         }
+        scarce = 0;
         ++count[s == fmi2OK ? 0 : s == fmi2Discard ? 1 : s == fmi2Error ? 2 : 3];
     }
     for (int i = 0; i < N; ++i) {

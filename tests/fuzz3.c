@@ -21,12 +21,13 @@ int main(int argc, char **argv) {
     size_t size = 0;
     for (long k = 0; k < calls; ++k) {
         const unsigned i = random_below(N);
-        fmi3Instance c = instance[i];
+        fmi3Instance c = instance[i], alive = c;
+        if (!random_below(100)) c = NULL; /* a host that lost it */
         size_t n = random_below(random_below(10) ? 5 : MOST);
         const size_t m = random_below(20) ? n : random_below(MOST); /* a wrong number of values now and then */
         fmi3Int32 order[MOST];
         for (size_t j = 0; j < n; ++j) {
-            vr[j] = random_below(50) ? random_below(references) : 4000000000u + random_below(1000);
+            vr[j] = random_below(50) ? random_below(references) : 0x7fffff00u + random_below(512);
             known[j] = random_below(20) ? (unsigned)model.n_p + random_below((unsigned)(model.n_u + model.n_x)) : vr[j];
             value[j] = random_value();
             order[j] = random_below(20) ? 1 : 2;
@@ -35,76 +36,131 @@ int main(int argc, char **argv) {
         fmi3Status s = fmi3OK;
         fmi3Boolean a, b, d, e, f;
         double last;
-        switch (random_below(c ? 36 : 1)) {
+        const fmi3ValueReference clock = references - 3; /* the time, which stands behind all others */
+        double time = 0.0;
+        fmi3IntervalQualifier qualifier[MOST];
+        fmi3UInt64 counter[MOST] = {0}, resolution[MOST] = {0};
+        fmi3Clock ticks[MOST] = {0};
+        fmi3Binary binary[MOST] = {0};
+        fmi3String text[MOST] = {0}, category[1] = {"logAll"};
+        fmi3DependencyKind dependency[MOST];
+        size_t sizes[MOST] = {0};
+        double room[MOST] = {0}; /* of the size of any other type, too */
+        scarce = !random_below(20);
+        switch (random_below(alive ? 45 : 1)) {
         case 0:
-            if (!c) {
+            if (!alive) {
                 const int wrong = !random_below(20);
                 const char *token = wrong ? random_below(2) ? "no" : NULL : model.token;
                 const char *name = random_below(20) ? "unit" : random_below(2) ? "" : NULL;
-                instance[i] = random_below(2) ? fmi3InstantiateModelExchange(name, token, NULL, 0, 1, NULL, logger)
+                const fmi3LogMessageCallback log = random_below(10) ? logger : NULL;
+                instance[i] = random_below(2) ? fmi3InstantiateModelExchange(name, token, NULL, 0, 1, NULL, log)
                                               : fmi3InstantiateCoSimulation(name, token, NULL, 0, 1, 0, 0, NULL, 0, NULL,
-                                                                            logger, NULL);
+                                                                            log, NULL);
+                if (fmi3InstantiateScheduledExecution(name, token, NULL, 0, 1, NULL, log, NULL, NULL, NULL)) return 1;
                 if (wrong && instance[i]) return puts("a wrong token was taken"), 1;
             } else if (!random_below(20)) {
-                fmi3FreeFMUState(c, &state[i]);
-                fmi3FreeInstance(c);
+                fmi3FreeFMUState(alive, &state[i]);
+                fmi3FreeInstance(alive);
+                fmi3FreeInstance(NULL);
                 instance[i] = NULL;
             }
             break;
-        case 1: case 2: case 3: s = fmi3EnterInitializationMode(c, 0, 0.0, random_value(), 0, 0.0); break;
+        case 1: case 2: case 3:
+            s = fmi3EnterInitializationMode(c, 0, 0.0, random_below(4) ? 0.0 : random_value(), random_below(2), random_value());
+            break;
         case 4: case 5: s = fmi3ExitInitializationMode(c); break;
         case 6: if (!random_below(10)) s = fmi3Terminate(c); break;
         case 7: if (!random_below(5)) s = fmi3Reset(c); break;
-        case 8: case 9: case 10: s = fmi3SetFloat64(c, vr, n, value, m); break;
+        case 8: case 9: case 10: s = fmi3SetFloat64(c, MAYBE(vr), n, MAYBE(value), m); break;
         case 11: case 12: case 13:
             memset(x, 0, sizeof x);
-            s = fmi3GetFloat64(c, vr, n, x, m);
+            s = fmi3GetFloat64(c, MAYBE(vr), n, MAYBE(x), m);
             if (s == fmi3OK)
                 for (size_t j = 0; j < n; ++j)
                     if (!isfinite(x[j])) return printf("reference %u: %g with status OK\n", vr[j], x[j]), 1;
             break;
         case 14: case 15: case 16:
-            s = fmi3DoStep(c, 0.0, random_below(20) ? 1e-3 : random_value(), 1, &a, &b, random_below(20) ? &d : NULL, &last);
+            fmi3GetFloat64(alive, &clock, 1, &time, 1);
+            s = fmi3DoStep(c, random_below(20) ? time : random_value(), random_below(10) ? 1e-3 : random_value(), 1, MAYBE(&a), MAYBE(&b),
+                           MAYBE(&d), MAYBE(&last));
             break;
-        case 17: s = fmi3GetFMUState(c, &state[i]); break;
+        case 17: s = fmi3GetFMUState(c, MAYBE(&state[i])); break;
         case 18: s = fmi3SetFMUState(c, state[random_below(N)]); break;
         case 19:
-            if (state[i] && fmi3SerializedFMUStateSize(c, state[i], &size) == fmi3OK) {
+            if (state[i] && fmi3SerializedFMUStateSize(alive, state[i], &size) == fmi3OK) {
                 bytes = realloc(bytes, size);
-                s = fmi3SerializeFMUState(c, state[i], bytes, size);
+                memset(bytes, 0, size);
+                s = fmi3SerializeFMUState(c, MAYBE(state[i]), MAYBE(bytes), random_below(50) ? size : size - 1);
             }
             break;
         case 20:
             if (bytes) {
-                if (!random_below(50)) bytes[random_below((unsigned)size)] ^= (fmi3Byte)(1 << random_below(8));
-                s = fmi3DeserializeFMUState(c, bytes, random_below(20) ? size : random_below((unsigned)size), &state[i]);
+                const int damaged = !random_below(10) && flipped(bytes, size);
+                s = fmi3DeserializeFMUState(c, MAYBE(bytes), random_below(20) ? size : random_below((unsigned)size),
+                                            MAYBE(&state[i]));
+                if (damaged && s == fmi3OK) return puts("a damaged state was taken"), 1;
+                if (damaged) free(bytes), bytes = NULL;
             }
             break;
-        case 21: s = fmi3FreeFMUState(c, &state[i]); break;
-        case 22: case 23: s = fmi3GetDirectionalDerivative(c, vr, n, known, n, value, m, x, random_below(20) ? n : m); break;
+        case 21: s = fmi3FreeFMUState(c, MAYBE(&state[i])); break;
+        case 22: case 23: s = fmi3GetDirectionalDerivative(c, MAYBE(vr), n, MAYBE(known), n, MAYBE(value), m, MAYBE(x), random_below(20) ? n : m); break;
         case 24: s = fmi3EnterEventMode(c); break;
-        case 25: s = fmi3UpdateDiscreteStates(c, &a, &b, &d, &e, random_below(20) ? &f : NULL, &last); break;
+        case 25: s = fmi3UpdateDiscreteStates(c, MAYBE(&a), MAYBE(&b), MAYBE(&d), MAYBE(&e), MAYBE(&f), MAYBE(&last)); break;
         case 26: s = fmi3EnterContinuousTimeMode(c); break;
-        case 27: s = fmi3CompletedIntegratorStep(c, 1, &a, random_below(20) ? &b : NULL); break;
+        case 27: s = fmi3CompletedIntegratorStep(c, 1, MAYBE(&a), MAYBE(&b)); break;
         case 28: s = fmi3SetTime(c, random_value()); break;
         case 29:
             for (int j = 0; j < MOST; ++j) x[j] = random_below(50) ? 1.0 : random_value();
-            s = fmi3SetContinuousStates(c, x, n_x);
+            s = fmi3SetContinuousStates(c, MAYBE(x), n_x);
             break;
-        case 30: s = fmi3GetContinuousStateDerivatives(c, x, n_x); break;
-        case 31: s = fmi3GetContinuousStates(c, x, n_x); break;
-        case 32: s = fmi3GetOutputDerivatives(c, vr, n, order, x, m); break;
+        case 30: s = fmi3GetContinuousStateDerivatives(c, MAYBE(x), n_x); break;
+        case 31: s = fmi3GetContinuousStates(c, MAYBE(x), n_x); break;
+        case 32: s = fmi3GetOutputDerivatives(c, MAYBE(vr), n, MAYBE(order), MAYBE(x), m); break;
         case 33: s = random_below(2) ? fmi3EnterStepMode(c) : fmi3EvaluateDiscreteStates(c); break;
         case 34:
             s = random_below(2) ? fmi3GetNominalsOfContinuousStates(c, x, n_x) : fmi3GetEventIndicators(c, x, n);
             break;
+#define TYPE(number, type) \
+    case number: s = random_below(2) ? fmi3Get##type(c, vr, n, (void *)room, n) : fmi3Set##type(c, vr, n, (void *)room, n); break
+        TYPE(35, Float32);
+        TYPE(36, Int8);
+        TYPE(37, UInt8);
+        TYPE(38, Int16);
+        TYPE(39, UInt16);
+        TYPE(40, Int32);
+        TYPE(41, UInt32);
+        case 42:
+            s = random_below(2) ? fmi3GetInt64(c, vr, n, (void *)room, n) : fmi3SetInt64(c, vr, n, (void *)room, n);
+            fmi3GetUInt64(c, vr, n, counter, n), fmi3SetUInt64(c, vr, n, counter, n);
+            fmi3GetBoolean(c, vr, n, (void *)room, n), fmi3SetBoolean(c, vr, n, (void *)room, n);
+            fmi3GetString(c, vr, n, text, n), fmi3SetString(c, vr, n, text, n);
+            fmi3GetBinary(c, vr, n, sizes, binary, n), fmi3SetBinary(c, vr, n, sizes, binary, n);
+            break;
+        case 43:
+            s = random_below(2) ? fmi3GetClock(c, vr, n, ticks) : fmi3SetClock(c, vr, n, ticks);
+            fmi3GetIntervalDecimal(c, vr, n, x, qualifier), fmi3SetIntervalDecimal(c, vr, n, x);
+            fmi3GetIntervalFraction(c, vr, n, counter, resolution, qualifier);
+            fmi3SetIntervalFraction(c, vr, n, counter, resolution);
+            fmi3GetShiftDecimal(c, vr, n, x), fmi3SetShiftDecimal(c, vr, n, x);
+            fmi3GetShiftFraction(c, vr, n, counter, resolution), fmi3SetShiftFraction(c, vr, n, counter, resolution);
+            fmi3ActivateModelPartition(c, vr[0], 0.0);
+            break;
+        case 44:
+            s = fmi3SetDebugLogging(c, random_below(2), random_below(2), category);
+            fmi3GetAdjointDerivative(c, vr, n, known, n, value, n, x, n);
+            fmi3GetNumberOfVariableDependencies(c, 0, sizes);
+            fmi3GetVariableDependencies(c, 0, sizes, vr, sizes, dependency, n);
+            fmi3EnterConfigurationMode(c), fmi3ExitConfigurationMode(c);
+            break;
         default:
             s = random_below(2) ? fmi3GetFloat64(c, NULL, n, NULL, n) : fmi3SetFloat64(c, NULL, n, NULL, n);
-            fmi3GetInt32(c, vr, n, order, n);
-            fmi3GetAdjointDerivative(c, vr, n, known, n, value, n, x, n);
-            fmi3GetNumberOfContinuousStates(c, random_below(2) ? &size : NULL);
-            if (bytes) size = 0, free(bytes), bytes = NULL;
+            fmi3GetNumberOfContinuousStates(c, MAYBE(sizes));
+            fmi3SerializedFMUStateSize(c, MAYBE(state[i]), MAYBE(&size));
+            fmi3GetNumberOfEventIndicators(c, MAYBE(sizes));
+            if (strcmp(fmi3GetVersion(), "3.0")) return 1;
         }
+        scarce = 0;
         ++count[s == fmi3OK ? 0 : s == fmi3Discard ? 1 : s == fmi3Error ? 2 : 3];
     }
     for (int i = 0; i < N; ++i) {

@@ -3,7 +3,20 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#ifdef _WIN32
+#ifdef LINKED /* the FMU is a part of the program, its functions have this prefix, as ours will */
+#define JOIN_(a, b) a##b
+#define JOIN(a, b) JOIN_(a, b)
+#define OPEN(file) (void *)file
+#define REASON() ""
+#define LOAD(name)                \
+    name##TYPE JOIN(LINKED, name); \
+    name##TYPE *name = JOIN(LINKED, name)
+#if FMI == 3
+#define main JOIN(LINKED, host3)
+#else
+#define main JOIN(LINKED, host2)
+#endif
+#elif defined _WIN32
 #include <windows.h>
 #define OPEN(file) (void *)LoadLibraryA(file)
 #define SYMBOL(library, name) GetProcAddress((HMODULE)library, name)
@@ -14,7 +27,9 @@
 #define SYMBOL(library, name) dlsym(library, name)
 #define REASON() dlerror()
 #endif
+#ifndef LOAD
 #define LOAD(name) name##TYPE *name = (name##TYPE *)SYMBOL(library, #name)
+#endif
 
 #if FMI == 3
 #include "fmi3FunctionTypes.h"
@@ -33,6 +48,7 @@ static fmi3DoStepTYPE *step;
 static fmi3TerminateTYPE *end;
 static fmi3FreeInstanceTYPE *release;
 static int load(void *library) {
+    (void)library;
     LOAD(fmi3InstantiateCoSimulation);
     LOAD(fmi3EnterInitializationMode);
     LOAD(fmi3ExitInitializationMode);
@@ -74,6 +90,7 @@ static fmi2DoStepTYPE *step;
 static fmi2TerminateTYPE *end;
 static fmi2FreeInstanceTYPE *release;
 static int load(void *library) {
+    (void)library;
     LOAD(fmi2Instantiate);
     LOAD(fmi2SetupExperiment);
     LOAD(fmi2EnterInitializationMode);

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import binascii
 import json
 import math
 import subprocess
@@ -299,6 +300,69 @@ def test_inputs_beyond_any_machine_give_nan_and_a_reason(chamber, name, value):
         assert len(unit.messages) == 1
 
 
+@pytest.mark.parametrize("early", [True, False])
+def test_an_input_out_of_its_bounds_is_refused_until_it_is_good(chamber, early):
+    """Set before the initialization, it used to be computed with."""
+    bad = {"left.material_mass": -50.0}
+    with Running(chamber, bad if early else {}) as unit:
+        unit.set([*bad], [*bad.values()])
+        assert math.isnan(unit.get(["tau"])[0])
+        with pytest.raises(RunError, match=r"left\.material_mass = -50 kg: must be >= 0 kg"):
+            unit.step(0.0, 0.1)
+        unit.set(["left.material_mass"], [-1e-12])  # zero but for rounding
+        unit.step(0.0, 0.1)
+        assert unit.get(["left.material_mass"]) == [0.0]
+        assert math.isfinite(unit.get(["tau"])[0])
+
+
+def test_the_communication_point_and_the_stop_time_are_honoured(motor):
+    unit = Instance(motor, "unit")
+    unit._fmi.setupExperiment(None, 2.0, 3.0)
+    unit._fmi.enterInitializationMode()
+    unit._fmi.exitInitializationMode()
+    with pytest.raises(RunError, match=r"step from t = 0 s: the FMU is at t = 2 s"):
+        unit.step(0.0, 0.1)
+    t = 2.0
+    for _ in range(10):
+        unit.step(t, 0.1)
+        t += 0.1
+    assert t != 3.0, "the sum is off by rounding"
+    with pytest.raises(
+        RunError, match=r"step of 0\.1 s from t = 3 s: must end at 3 s, the stop time, or before"
+    ):
+        unit.step(t, 0.1)
+    unit.close()
+
+
+def test_a_step_that_takes_too_long_is_discarded(motor):
+    with Running(motor, {"solver.max_steps": 100.0, "w_ref": 50.0}) as unit:
+        before = unit.get(["phi", "w"])
+        with pytest.raises(RunError, match=r"takes more than solver\.max_steps = 100 steps of its own"):
+            unit.step(0.0, 0.1)
+        assert unit.get(["phi", "w"]) == before
+        unit.step(0.0, 0.01)
+        assert unit.get(["phi", "w"]) != before
+
+
+def test_a_damaged_state_is_refused(motor):
+    with Running(motor, {"w_ref": 50.0}) as unit:
+        unit.step(0.0, 0.01)
+        raw = unit._fmi.serializeFMUstate(unit.state())
+        kept = unit.get(["w", "phi"])
+        unit.step(0.01, 0.01)
+        after = unit.get(["w", "phi"])
+        for bit in range(0, 8 * len(raw), 7):
+            flipped = bytearray(raw)
+            flipped[bit // 8] ^= 1 << bit % 8
+            unit.restore(unit._fmi.deSerializeFMUstate(bytes(flipped)))
+            assert unit.get(["w", "phi"]) == after
+        text = raw[8:].replace(b'"set": [', b'"set": [-')  # the first parameter, armature.R
+        unit.restore(unit._fmi.deSerializeFMUstate(b"%08x" % binascii.crc32(text) + text))
+        assert "armature.R = -" in unit.messages[-1] and unit.get(["w", "phi"]) == after
+        unit.restore(unit._fmi.deSerializeFMUstate(raw))
+        assert unit.get(["w", "phi"]) == kept
+
+
 def test_calls_of_other_types_and_unknown_references_are_not_fatal(motor):
     with Running(motor) as unit:
         api = unit._fmi
@@ -310,9 +374,12 @@ def test_calls_of_other_types_and_unknown_references_are_not_fatal(motor):
         api.setInteger([0], [1])
         state = unit.state()
         before = unit.get(["w"])
-        unit.restore(api.deSerializeFMUstate(b"no state at all"))
-        unit.restore(api.deSerializeFMUstate(b'{"set": [1], "x": "y"}'))
-        assert "not one of this model" in unit.messages[-1]
+        for no_state in (b"no state at all", b'{"set": [1], "x": "y"}'):
+            unit.restore(api.deSerializeFMUstate(no_state))
+            assert unit.messages[-1] == "saved state: it is damaged; not restored"
+        for text in (b"no state at all", b"[]", b'{"of": "chainunit", "set": [1], "x": "y"}'):
+            unit.restore(api.deSerializeFMUstate(b"%08x" % binascii.crc32(text) + text))
+            assert unit.messages[-1].startswith("saved state: it ")
         unit.restore(state)
         assert unit.get(["w"]) == before
 

@@ -1,25 +1,23 @@
-/* FMI 2.0, Co-Simulation and Model Exchange, over runtime.h. Names no model. */
-#include <stdlib.h>
-#include <string.h>
-
+/* FMI 2.0, Co-Simulation and Model Exchange, over runtime.c. Names no model. */
 #include "fmi2Functions.h"
-#include "runtime.h"
+#include "runtime.c"
+
+/* there are headers about that leave the prefix out */
+#ifdef FMI2_FUNCTION_PREFIX
+#undef fmi2FullName
+#define fmi2FullName(name) CHAINUNIT_JOIN(FMI2_FUNCTION_PREFIX, name)
+#endif
 
 #define INSTANCE ((Instance *)c)
-#define RUNNING (EVENT | CONTINUOUS | STEP)
-#define NEED(modes)                                                  \
-    do {                                                             \
-        if (!c) return fmi2Error;                                    \
-        if (expect(INSTANCE, (modes), __func__)) return fmi2Error;   \
-    } while (0)
-#define NOT_NULL(pointer)                                                                              \
-    do {                                                                                               \
-        if (!(pointer)) return (fmi2Status)complain(INSTANCE, ERROR, "%s: null argument", __func__); \
-    } while (0)
+#define NEED(modes) \
+    if (expect(INSTANCE, (modes), __func__)) return fmi2Error
+#define CHECK(condition, what) \
+    if (!(condition)) return (fmi2Status)complain(INSTANCE, ERROR, "%s: %s", __func__, what)
+#define NOT_NULL(pointer) CHECK(pointer, "null argument")
 
 static void report(const Instance *c, Status status, const char *message) {
-    const fmi2CallbackFunctions *functions = c->host[0];
-    if (!functions || !functions->logger) return;
+    const fmi2CallbackLogger log = (fmi2CallbackLogger)c->log;
+    if (!log) return;
     /* the message is a format to the host, but not every host takes it as one: no arguments, and no stray % */
     char format[1400];
     size_t n = 0;
@@ -28,8 +26,7 @@ static void report(const Instance *c, Status status, const char *message) {
         if (*message == '%') format[n++] = '%';
     }
     format[n] = 0;
-    functions->logger(functions->componentEnvironment, c->name, (fmi2Status)status,
-                      status == DISCARD ? "logStatusDiscard" : "logStatusError", format);
+    log(c->environment, c->name, (fmi2Status)status, status == DISCARD ? "logStatusDiscard" : "logStatusError", format);
 }
 
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
@@ -43,7 +40,9 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     if (!functions) return NULL;
     Instance *c = instance_new(name && *name ? name : model.name, report);
     if (!c) return NULL;
-    c->host[0] = (void *)functions;
+    /* the host may give up the structure after this call */
+    c->log = (void (*)(void))functions->logger;
+    c->environment = functions->componentEnvironment;
     c->model_exchange = type == fmi2ModelExchange;
     if (!name || !*name)
         complain(c, ERROR, "the instance has no name");
@@ -58,20 +57,17 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
 void fmi2FreeInstance(fmi2Component c) { instance_free(INSTANCE); }
 
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String categories[]) {
-    (void)on;
-    (void)n;
-    (void)categories;
-    return c ? fmi2OK : fmi2Error;
+    (void)on, (void)n, (void)categories;
+    NEED(ANY);
+    return fmi2OK;
 }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2Real tolerance, fmi2Real time,
                                fmi2Boolean has_stop, fmi2Real stop) {
     (void)has_tolerance;
     (void)tolerance;
-    (void)has_stop;
-    (void)stop;
     NEED(INSTANTIATED);
-    return (fmi2Status)set_time(INSTANCE, time);
+    return (fmi2Status)set_experiment(INSTANCE, time, has_stop, stop);
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
@@ -97,20 +93,20 @@ fmi2Status fmi2Terminate(fmi2Component c) {
 }
 
 fmi2Status fmi2Reset(fmi2Component c) {
-    if (!c) return fmi2Error;
+    NEED(ANY);
     instance_reset(INSTANCE);
     return fmi2OK;
 }
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Real value[]) {
-    if (!c) return fmi2Error;
-    if (n) NOT_NULL(vr && value);
+    NEED(ANY);
+    NOT_NULL(!n || (vr && value));
     return (fmi2Status)get(INSTANCE, vr, n, value);
 }
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Real value[]) {
     NEED(INSTANTIATED | INITIALIZATION | RUNNING);
-    if (n) NOT_NULL(vr && value);
+    NOT_NULL(!n || (vr && value));
     for (size_t i = 0; i < n; ++i) {
         const Status status = set(INSTANCE, vr[i], value[i]);
         if (status) return (fmi2Status)status;
@@ -122,8 +118,9 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
     fmi2Status name(fmi2Component c, const fmi2ValueReference vr[], size_t n, qualifier type value[]) {   \
         (void)vr;                                                                                         \
         (void)value;                                                                                      \
-        if (!c) return fmi2Error;                                                                         \
-        return n ? (fmi2Status)complain(INSTANCE, ERROR, "%s: every variable is a Real", __func__) : fmi2OK; \
+        NEED(ANY);                                                                                        \
+        CHECK(!n, "every variable is a Real");                                                            \
+        return fmi2OK;                                                                                    \
     }
 NO_SUCH_TYPE(fmi2GetInteger, fmi2Integer, )
 NO_SUCH_TYPE(fmi2GetBoolean, fmi2Boolean, )
@@ -135,53 +132,44 @@ NO_SUCH_TYPE(fmi2SetString, fmi2String, const)
 /* -- saved states */
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
-    if (!c) return fmi2Error;
+    NEED(ANY);
     NOT_NULL(state);
-    if (!*state) *state = malloc(state_size(INSTANCE));
-    if (!*state) return (fmi2Status)complain(INSTANCE, ERROR, "out of memory");
-    state_write(INSTANCE, *state);
-    return fmi2OK;
+    return (fmi2Status)state_get(INSTANCE, state);
 }
 
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
-    if (!c) return fmi2Error;
+    NEED(ANY);
     NOT_NULL(state);
-    return (fmi2Status)state_read(INSTANCE, state, state_size(INSTANCE));
+    return (fmi2Status)state_set(INSTANCE, state);
 }
 
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state) {
-    if (!c) return fmi2Error;
-    if (state) {
-        free(*state);
-        *state = NULL;
-    }
+    NEED(ANY);
+    if (!state) return fmi2OK;
+    free(*state);
+    *state = NULL;
     return fmi2OK;
 }
 
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size) {
-    if (!c) return fmi2Error;
+    NEED(ANY);
     NOT_NULL(state && size);
     *size = state_size(INSTANCE);
     return fmi2OK;
 }
 
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size) {
-    if (!c) return fmi2Error;
+    NEED(ANY);
     NOT_NULL(state && bytes);
-    if (size < state_size(INSTANCE)) return (fmi2Status)complain(INSTANCE, ERROR, "%s: too little room", __func__);
+    CHECK(size >= state_size(INSTANCE), "too little room");
     memcpy(bytes, state, state_size(INSTANCE));
     return fmi2OK;
 }
 
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state) {
-    if (!c) return fmi2Error;
+    NEED(ANY);
     NOT_NULL(bytes && state);
-    if (size != state_size(INSTANCE))
-        return (fmi2Status)complain(INSTANCE, ERROR, "%s: the size is not this model's", __func__);
-    if (!*state) *state = malloc(size);
-    if (!*state) return (fmi2Status)complain(INSTANCE, ERROR, "out of memory");
-    memcpy(*state, bytes, size);
-    return fmi2OK;
+    return (fmi2Status)state_from(INSTANCE, bytes, size, state);
 }
 
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[], size_t n_unknown,
@@ -189,8 +177,6 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
                                         fmi2Real sensitivity[]) {
     NEED(INITIALIZATION | RUNNING);
     NOT_NULL(unknown && known && seed && sensitivity);
-    const Status status = INSTANCE->mode == INITIALIZATION ? start(INSTANCE) : OK;
-    if (status) return (fmi2Status)status;
     return (fmi2Status)forward(INSTANCE, unknown, n_unknown, known, n_known, seed, sensitivity);
 }
 
@@ -222,7 +208,7 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_set, fmi2
     NOT_NULL(enter_event && terminate);
     *enter_event = drifted(INSTANCE);
     *terminate = fmi2False;
-    return fmi2OK;
+    return (fmi2Status)step_taken(INSTANCE);
 }
 
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {
@@ -244,7 +230,8 @@ fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real dx[], size_t n) {
 fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real z[], size_t n) {
     (void)z;
     NEED(INITIALIZATION | EVENT | CONTINUOUS);
-    return n ? (fmi2Status)complain(INSTANCE, ERROR, "%s: there are none", __func__) : fmi2OK;
+    CHECK(!n, "there are none");
+    return fmi2OK;
 }
 
 fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t n) {
@@ -253,7 +240,7 @@ fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t n) {
 }
 
 fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x[], size_t n) {
-    if (!c) return fmi2Error;
+    NEED(ANY);
     return (fmi2Status)states_get(INSTANCE, model.nominal, x, n, __func__);
 }
 
@@ -262,11 +249,13 @@ fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x[], size
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
                                        const fmi2Integer order[], const fmi2Real value[]) {
     NEED(INITIALIZATION | STEP);
-    if (n) NOT_NULL(vr && order && value);
+    NOT_NULL(!n || (vr && order && value));
     for (size_t i = 0; i < n; ++i) {
-        if (order[i] != 1) return (fmi2Status)complain(INSTANCE, ERROR, "%s: only the first derivative", __func__);
-        const Status status = set_input_derivative(INSTANCE, vr[i], value[i]);
-        if (status) return (fmi2Status)status;
+        CHECK(order[i] == 1, "only the first derivative");
+        const unsigned k = vr[i] - (unsigned)model.n_p;
+        CHECK(k < (unsigned)model.n_u, "a value reference is not that of an input");
+        CHECK(isfinite(value[i]), "a derivative is not a finite number");
+        INSTANCE->du[k] = value[i];
     }
     return fmi2OK;
 }
@@ -274,9 +263,9 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
 fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n,
                                         const fmi2Integer order[], fmi2Real value[]) {
     NEED(STEP);
-    if (n) NOT_NULL(vr && order && value);
+    NOT_NULL(!n || (vr && order && value));
     for (size_t i = 0; i < n; ++i) {
-        if (order[i] != 1) return (fmi2Status)complain(INSTANCE, ERROR, "%s: only the first derivative", __func__);
+        CHECK(order[i] == 1, "only the first derivative");
         const Status status = output_derivative(INSTANCE, vr[i], &value[i]);
         if (status) return (fmi2Status)status;
     }
@@ -290,19 +279,18 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean
 }
 
 fmi2Status fmi2CancelStep(fmi2Component c) {
-    if (!c) return fmi2Error;
+    NEED(ANY);
     return (fmi2Status)complain(INSTANCE, ERROR, "%s: steps are not asynchronous", __func__);
 }
 
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Status *value) {
-    (void)kind;
-    (void)value;
-    if (!c) return fmi2Error;
+    (void)kind, (void)value;
+    NEED(ANY);
     return (fmi2Status)complain(INSTANCE, DISCARD, "%s: steps are not asynchronous", __func__);
 }
 
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value) {
-    if (!c) return fmi2Error;
+    NEED(ANY);
     NOT_NULL(value);
     if (kind != fmi2LastSuccessfulTime) return (fmi2Status)complain(INSTANCE, DISCARD, "%s: not available", __func__);
     *value = INSTANCE->time;
@@ -310,14 +298,13 @@ fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Rea
 }
 
 fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Integer *value) {
-    (void)kind;
-    (void)value;
-    if (!c) return fmi2Error;
+    (void)kind, (void)value;
+    NEED(ANY);
     return (fmi2Status)complain(INSTANCE, DISCARD, "%s: not available", __func__);
 }
 
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value) {
-    if (!c) return fmi2Error;
+    NEED(ANY);
     NOT_NULL(value);
     if (kind != fmi2Terminated) return (fmi2Status)complain(INSTANCE, DISCARD, "%s: not available", __func__);
     *value = fmi2False;
@@ -325,8 +312,7 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2
 }
 
 fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2String *value) {
-    (void)kind;
-    (void)value;
-    if (!c) return fmi2Error;
+    (void)kind, (void)value;
+    NEED(ANY);
     return (fmi2Status)complain(INSTANCE, DISCARD, "%s: not available", __func__);
 }

@@ -1,26 +1,17 @@
-/* FMI 3.0, Co-Simulation and Model Exchange, over runtime.h. Names no model. */
-#include <stdlib.h>
-#include <string.h>
-
+/* FMI 3.0, Co-Simulation and Model Exchange, over runtime.c. Names no model. */
 #include "fmi3Functions.h"
-#include "runtime.h"
+#include "runtime.c"
 
 #define INSTANCE ((Instance *)c)
-#define RUNNING (EVENT | CONTINUOUS | STEP)
-#define NEED(modes)                                                \
-    do {                                                           \
-        if (!c) return fmi3Error;                                  \
-        if (expect(INSTANCE, (modes), __func__)) return fmi3Error; \
-    } while (0)
-#define CHECK(condition, what)                                                                        \
-    do {                                                                                              \
-        if (!(condition)) return (fmi3Status)complain(INSTANCE, ERROR, "%s: %s", __func__, what); \
-    } while (0)
+#define NEED(modes) \
+    if (expect(INSTANCE, (modes), __func__)) return fmi3Error
+#define CHECK(condition, what) \
+    if (!(condition)) return (fmi3Status)complain(INSTANCE, ERROR, "%s: %s", __func__, what)
 #define NOT_NULL(pointer) CHECK(pointer, "null argument")
 
 static void report(const Instance *c, Status status, const char *message) {
-    const fmi3LogMessageCallback log = (fmi3LogMessageCallback)c->host[0];
-    if (log) log(c->host[1], (fmi3Status)status, status == DISCARD ? "logStatusDiscard" : "logStatusError", message);
+    const fmi3LogMessageCallback log = (fmi3LogMessageCallback)c->log;
+    if (log) log(c->environment, (fmi3Status)status, status == DISCARD ? "logStatusDiscard" : "logStatusError", message);
 }
 
 const char *fmi3GetVersion(void) { return fmi3Version; }
@@ -29,8 +20,8 @@ static fmi3Instance instantiate(fmi3String name, fmi3String token, int model_exc
                                 fmi3LogMessageCallback log) {
     Instance *c = instance_new(name && *name ? name : model.name, report);
     if (!c) return NULL;
-    c->host[0] = (void *)log;
-    c->host[1] = environment;
+    c->log = (void (*)(void))log;
+    c->environment = environment;
     c->model_exchange = model_exchange;
     if (!name || !*name)
         complain(c, ERROR, "the instance has no name");
@@ -73,14 +64,15 @@ void fmi3FreeInstance(fmi3Instance c) { instance_free(INSTANCE); }
 
 fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t n, const fmi3String categories[]) {
     (void)on, (void)n, (void)categories;
-    return c ? fmi3OK : fmi3Error;
+    NEED(ANY);
+    return fmi3OK;
 }
 
 fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean has_tolerance, fmi3Float64 tolerance, fmi3Float64 time,
                                        fmi3Boolean has_stop, fmi3Float64 stop) {
-    (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
+    (void)has_tolerance, (void)tolerance;
     NEED(INSTANTIATED);
-    Status status = set_time(INSTANCE, time);
+    Status status = set_experiment(INSTANCE, time, has_stop, stop);
     if (!status) status = start(INSTANCE);
     if (status) return (fmi3Status)status;
     INSTANCE->mode = INITIALIZATION;
@@ -108,7 +100,7 @@ fmi3Status fmi3Terminate(fmi3Instance c) {
 }
 
 fmi3Status fmi3Reset(fmi3Instance c) {
-    if (!c) return fmi3Error;
+    NEED(ANY);
     instance_reset(INSTANCE);
     return fmi3OK;
 }
@@ -116,8 +108,8 @@ fmi3Status fmi3Reset(fmi3Instance c) {
 /* -- values: every variable is a Float64 */
 
 fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3Float64 value[], size_t n_values) {
-    if (!c) return fmi3Error;
-    if (n) NOT_NULL(vr && value);
+    NEED(ANY);
+    NOT_NULL(!n || (vr && value));
     CHECK(n == n_values, "as many values as references are needed");
     return (fmi3Status)get(INSTANCE, vr, n, value);
 }
@@ -125,7 +117,7 @@ fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t 
 fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3Float64 value[],
                           size_t n_values) {
     NEED(INSTANTIATED | INITIALIZATION | RUNNING);
-    if (n) NOT_NULL(vr && value);
+    NOT_NULL(!n || (vr && value));
     CHECK(n == n_values, "as many values as references are needed");
     for (size_t i = 0; i < n; ++i) {
         const Status status = set(INSTANCE, vr[i], value[i]);
@@ -138,14 +130,14 @@ fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t 
     fmi3Status fmi3Get##type(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3##type value[],          \
                              size_t n_values) {                                                                    \
         (void)vr, (void)value, (void)n_values;                                                                     \
-        if (!c) return fmi3Error;                                                                                  \
+        NEED(ANY);                                                                                                 \
         CHECK(!n, "every variable is a Float64");                                                                  \
         return fmi3OK;                                                                                             \
     }                                                                                                              \
     fmi3Status fmi3Set##type(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3##type value[],    \
                              size_t n_values) {                                                                    \
         (void)vr, (void)value, (void)n_values;                                                                     \
-        if (!c) return fmi3Error;                                                                                  \
+        NEED(ANY);                                                                                                 \
         CHECK(!n, "every variable is a Float64");                                                                  \
         return fmi3OK;                                                                                             \
     }
@@ -163,7 +155,7 @@ NO_SUCH_TYPE(String)
 
 #define NOT_THERE(what)                                    \
     {                                                      \
-        if (!c) return fmi3Error;                          \
+        NEED(ANY);                                         \
         CHECK(0, what);                                    \
     }
 #define V const fmi3ValueReference vr[], size_t n
@@ -203,38 +195,34 @@ fmi3Status fmi3ExitConfigurationMode(fmi3Instance c) NOT_THERE("there are no str
 /* -- saved states */
 
 fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state) {
-    if (!c) return fmi3Error;
+    NEED(ANY);
     NOT_NULL(state);
-    if (!*state) *state = malloc(state_size(INSTANCE));
-    CHECK(*state, "out of memory");
-    state_write(INSTANCE, *state);
-    return fmi3OK;
+    return (fmi3Status)state_get(INSTANCE, state);
 }
 
 fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state) {
-    if (!c) return fmi3Error;
+    NEED(ANY);
     NOT_NULL(state);
-    return (fmi3Status)state_read(INSTANCE, state, state_size(INSTANCE));
+    return (fmi3Status)state_set(INSTANCE, state);
 }
 
 fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState *state) {
-    if (!c) return fmi3Error;
-    if (state) {
-        free(*state);
-        *state = NULL;
-    }
+    NEED(ANY);
+    if (!state) return fmi3OK;
+    free(*state);
+    *state = NULL;
     return fmi3OK;
 }
 
 fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state, size_t *size) {
-    if (!c) return fmi3Error;
+    NEED(ANY);
     NOT_NULL(state && size);
     *size = state_size(INSTANCE);
     return fmi3OK;
 }
 
 fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[], size_t size) {
-    if (!c) return fmi3Error;
+    NEED(ANY);
     NOT_NULL(state && bytes);
     CHECK(size >= state_size(INSTANCE), "too little room");
     memcpy(bytes, state, state_size(INSTANCE));
@@ -242,13 +230,9 @@ fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte by
 }
 
 fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size, fmi3FMUState *state) {
-    if (!c) return fmi3Error;
+    NEED(ANY);
     NOT_NULL(bytes && state);
-    CHECK(size == state_size(INSTANCE), "the size is not this model's");
-    if (!*state) *state = malloc(size);
-    CHECK(*state, "out of memory");
-    memcpy(*state, bytes, size);
-    return fmi3OK;
+    return (fmi3Status)state_from(INSTANCE, bytes, size, state);
 }
 
 fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknown[], size_t n_unknown,
@@ -257,8 +241,6 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference
     NEED(INITIALIZATION | RUNNING);
     NOT_NULL(unknown && known && seed && sensitivity);
     CHECK(n_seed == n_known && n_sensitivity == n_unknown, "as many values as references are needed");
-    const Status status = INSTANCE->mode == INITIALIZATION ? start(INSTANCE) : OK;
-    if (status) return (fmi3Status)status;
     return (fmi3Status)forward(INSTANCE, unknown, n_unknown, known, n_known, seed, sensitivity);
 }
 
@@ -294,7 +276,7 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean no_set, fmi3B
     NOT_NULL(enter_event && terminate);
     *enter_event = drifted(INSTANCE);
     *terminate = fmi3False;
-    return fmi3OK;
+    return (fmi3Status)step_taken(INSTANCE);
 }
 
 fmi3Status fmi3SetTime(fmi3Instance c, fmi3Float64 time) {
@@ -326,19 +308,19 @@ fmi3Status fmi3GetContinuousStates(fmi3Instance c, fmi3Float64 x[], size_t n) {
 }
 
 fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance c, fmi3Float64 x[], size_t n) {
-    if (!c) return fmi3Error;
+    NEED(ANY);
     return (fmi3Status)states_get(INSTANCE, model.nominal, x, n, __func__);
 }
 
 fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance c, size_t *n) {
-    if (!c) return fmi3Error;
+    NEED(ANY);
     NOT_NULL(n);
     *n = 0;
     return fmi3OK;
 }
 
 fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance c, size_t *n) {
-    if (!c) return fmi3Error;
+    NEED(ANY);
     NOT_NULL(n);
     *n = (size_t)model.n_x;
     return fmi3OK;
@@ -356,7 +338,7 @@ fmi3Status fmi3EnterStepMode(fmi3Instance c) {
 fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3Int32 order[],
                                     fmi3Float64 value[], size_t n_values) {
     NEED(STEP);
-    if (n) NOT_NULL(vr && order && value);
+    NOT_NULL(!n || (vr && order && value));
     CHECK(n == n_values, "as many values as references are needed");
     for (size_t i = 0; i < n; ++i) {
         CHECK(order[i] == 1, "only the first derivative");

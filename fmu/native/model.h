@@ -7,6 +7,40 @@
 #ifndef CHAINUNIT_MODEL_H
 #define CHAINUNIT_MODEL_H
 
+/* What several files of an FMU know by name. Where the FMI functions have a prefix, so that one program can hold
+ * several FMUs, the names have it, too, and the version of FMI: a program may hold a model in both. All else is
+ * static. */
+#define CHAINUNIT_PASTE(a, b) a##b
+#define CHAINUNIT_JOIN(a, b) CHAINUNIT_PASTE(a, b)
+#if defined FMI3_FUNCTION_PREFIX
+#define CHAINUNIT_NAME(name) CHAINUNIT_JOIN(FMI3_FUNCTION_PREFIX, CHAINUNIT_PASTE(fmi3_, name))
+#elif defined FMI2_FUNCTION_PREFIX
+#define CHAINUNIT_NAME(name) CHAINUNIT_JOIN(FMI2_FUNCTION_PREFIX, CHAINUNIT_PASTE(fmi2_, name))
+#else
+#define CHAINUNIT_NAME(name) CHAINUNIT_PASTE(chainunit_, name)
+#endif
+#define model CHAINUNIT_NAME(model)
+#define kernels CHAINUNIT_NAME(kernels)
+
+/* For a library that runs with glibc 2.17: a newer one links these in versions of its own. */
+#if defined CHAINUNIT_OLD_GLIBC && defined __GNUC__ && defined __linux__
+#include <math.h>
+#if defined __GLIBC__ && defined __x86_64__
+#define CHAINUNIT_OLD(name) __asm__(".symver " #name "," #name "@GLIBC_2.2.5")
+#elif defined __GLIBC__ && defined __aarch64__
+#define CHAINUNIT_OLD(name) __asm__(".symver " #name "," #name "@GLIBC_2.17")
+#endif
+#endif
+#ifdef CHAINUNIT_OLD
+CHAINUNIT_OLD(exp);
+CHAINUNIT_OLD(exp2);
+CHAINUNIT_OLD(fmod);
+CHAINUNIT_OLD(hypot);
+CHAINUNIT_OLD(log);
+CHAINUNIT_OLD(log2);
+CHAINUNIT_OLD(pow);
+#endif
+
 /* A host that compiles the sources shows every name by default; ours must not meet those of libc or of another FMU. */
 #if defined __GNUC__ && !defined _WIN32
 #pragma GCC visibility push(hidden)
@@ -20,6 +54,7 @@ typedef struct {
     const char *unit;
     const char *allowed; /* the bounds in words */
     double low, high;
+    double slack; /* a value that is beyond a bound by no more counts as the bound */
     int open_low; /* low itself is forbidden */
     int tunable;  /* may change in a run */
 } Quantity;
@@ -27,8 +62,6 @@ typedef struct {
 /* Outputs that are evaluated together, once per state, when one of them is asked for. */
 typedef struct {
     int first, count; /* places among the outputs as they are stored */
-    Kernel values;
-    Kernel forward; /* directional derivative by inputs and states; NULL: by central differences */
 } Group;
 
 /* What parameters must meet beyond their own bounds: value between two limits. */
@@ -38,35 +71,43 @@ typedef struct {
     const int *given; /* parameters named beside the reason */
 } Requirement;
 
+/* The equations. */
+typedef struct {
+    const Kernel *values;       /* of each group: (p, u, x) -> its outputs */
+    const Kernel *forward;      /* of each group: their directional derivative; NULL: by central differences */
+    Kernel all;                 /* (p, u, x) -> outputs of all groups; cheaper than one after the other */
+    Kernel requirements;        /* (p, k) -> value, low, high of each */
+    Kernel start_limits;        /* (p, u, x, k) -> value, low, high of each, at the start */
+    Kernel derive;              /* (p) -> what follows from fixed parameters and is computed once */
+    Kernel guess;               /* (p, u) -> first guess z of what the start is found from */
+    Kernel improved;            /* (p, u, z) -> z after one more round */
+    Kernel initial;             /* (p, u, z) -> states at the start */
+    Kernel derivatives;         /* (p, u, x) */
+    Kernel derivatives_forward; /* (p, u, x, du, dx) */
+    Kernel internal_step;       /* (p) -> longest step of the internal integrator [s] */
+    Kernel tolerance;           /* (p) -> its relative tolerance, where it controls its error */
+    Kernel closed;              /* (p, u, x, k) -> states that meet the constraints; after each of its steps */
+} Kernels;
+
 typedef struct {
     const char *name;
-    const char *guid; /* of the FMI 2.0 description */
+    const char *guid;  /* of the FMI 2.0 description */
     const char *token; /* of the FMI 3.0 description */
     int n_p, n_u, n_x, n_y, n_k, n_z, n_groups, n_required, n_start_required;
-    const double *start;          /* parameters, inputs */
-    const Quantity *declared;     /* parameters, inputs */
-    const double *nominal;        /* of the states */
-    const int *rate_of;           /* of each input: the input that is its time derivative, or -1 */
-    const int *place;             /* of each output, by value reference, as they are stored */
-    const int *group_of;          /* of each output, by value reference */
+    const double *start;         /* parameters, inputs */
+    const Quantity *declared;    /* parameters, inputs */
+    const double *nominal;       /* of the states */
+    const int *rate_of;          /* of each input: the input that is its time derivative, or -1 */
+    const int *place;            /* of each output, by value reference, as they are stored */
+    const int *group_of;         /* of each output, by value reference */
     const Group *groups;
-    Kernel all;                   /* (p, u, x) -> outputs of all groups; cheaper than one after the other */
-    const Requirement *required;  /* of the parameters, then of the states at the start */
-    Kernel requirements;          /* (p, k) -> value, low, high of each */
-    Kernel start_limits;          /* (p, u, x, k) -> value, low, high of each, at the start */
-    Kernel derive;                /* (p) -> what follows from fixed parameters and is computed once */
+    const Requirement *required; /* of the parameters, then of the states at the start */
     int start_rounds;
-    Kernel guess;                 /* (p, u) -> first guess z of what the start is found from */
-    Kernel improved;              /* (p, u, z) -> z after one more round */
-    Kernel initial;               /* (p, u, z) -> states at the start */
-    Kernel derivatives;           /* (p, u, x) */
-    Kernel derivatives_forward;   /* (p, u, x, du, dx) */
-    Kernel internal_step;         /* (p) -> longest step of the internal integrator [s] */
-    Kernel tolerance;             /* (p) -> its relative tolerance, where it controls its error */
-    Kernel closed;                /* (p, u, x, k) -> states that meet the constraints; after each of its steps */
+    int max_steps; /* the parameter that says how many steps of its own a step may take; of models with states */
 } Model;
 
 extern const Model model;
+extern const Kernels kernels;
 
 #if defined __GNUC__ && !defined _WIN32
 #pragma GCC visibility pop

@@ -1,30 +1,77 @@
-#include "runtime.h"
-
+/* An instance of the model, for any FMI version, which includes this file. Names neither. */
 #include <math.h>
 #include <stdarg.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "model.h"
+
+typedef enum { OK = 0, DISCARD = 2, ERROR = 3 } Status;
+
+typedef enum {
+    INSTANTIATED = 1,
+    INITIALIZATION = 2,
+    EVENT = 4,      /* Model Exchange */
+    CONTINUOUS = 8, /* Model Exchange */
+    STEP = 16,      /* Co-Simulation */
+    TERMINATED = 32
+} Mode;
+#define RUNNING (EVENT | CONTINUOUS | STEP)
+#define ANY (INSTANTIATED | INITIALIZATION | RUNNING | TERMINATED)
+
+typedef struct Instance Instance;
+typedef void (*Report)(const Instance *instance, Status status, const char *message);
+
+struct Instance {
+    Mode mode;
+    int model_exchange;
+    double time, stop; /* the last that is allowed, with what rounding adds to it */
+    /* one block: parameters, inputs, their derivatives, states, derived from parameters, derivatives, outputs, work */
+    double *block, *p, *u, *du, *x, *k, *dx, *y, *work;
+    size_t block_size;
+    unsigned n_references;
+    unsigned *slot, *needs; /* of each value reference: place in the block, and what must be evaluated for it */
+    unsigned fresh;         /* a bit per group of outputs; the highest for the derivatives */
+    int changed;    /* parameters or inputs set since the states were started */
+    int doubtful;   /* an input was set to a value out of its bounds */
+    int closed;     /* the states meet the constraints at the present inputs, as the last step left them */
+    double pace;    /* what the integrator that controls its error would step next [s]; 0 not known */
+    char *name;
+    Report report;
+    void (*log)(void); /* the host's, and what it wants to be told with it */
+    void *environment;
+};
+
 /* bits of `needs` and `fresh` beside those of the groups */
 enum { STARTED_BIT = 30, DERIVATIVES_BIT = 31 };
 
-typedef struct {
-    int mode, model_exchange, closed;
-    double time, pace;
-    unsigned guard; /* of the model: a state of another one is refused */
-} Saved;
-
-static unsigned guard(void) {
-    unsigned h = 2166136261u;
-    for (const char *s = model.guid; *s; ++s) h = (h ^ (unsigned char)*s) * 16777619u;
-    return h;
+static void instance_free(Instance *c) {
+    if (!c) return;
+    free(c->block);
+    free(c->slot);
+    free(c->name);
+    free(c);
 }
 
-Instance *instance_new(const char *name, Report report) {
+static void instance_reset(Instance *c) {
+    memset(c->block, 0, c->block_size);
+    memcpy(c->p, model.start, (size_t)(model.n_p + model.n_u) * sizeof(double));
+    c->mode = INSTANTIATED;
+    c->time = 0.0;
+    c->stop = INFINITY;
+    c->fresh = 0;
+    c->changed = 1;
+    c->doubtful = 0;
+    c->closed = 0;
+    c->pace = 0.0;
+}
+
+static Instance *instance_new(const char *name, Report report) {
     const int n_in = model.n_u + model.n_x;
     int work = 4 * model.n_x + 3 * n_in + 2 * model.n_y + model.n_x + 3 * (model.n_required + model.n_start_required) + 2 * model.n_z;
-    if (model.closed && work < 3 * model.n_u + 10 * model.n_x) work = 3 * model.n_u + 10 * model.n_x;
+    if (kernels.closed && work < 3 * model.n_u + 10 * model.n_x) work = 3 * model.n_u + 10 * model.n_x;
     const int saved = model.n_p + n_in + model.n_u + model.n_k;
     if (work < saved) work = saved;
     const size_t n = (size_t)(model.n_p + 2 * model.n_u + 2 * model.n_x + model.n_k + model.n_y + work + 1);
@@ -64,36 +111,59 @@ Instance *instance_new(const char *name, Report report) {
     return c;
 }
 
-void instance_free(Instance *c) {
-    if (!c) return;
-    free(c->block);
-    free(c->slot);
-    free(c->name);
-    free(c);
+/* -- messages */
+
+/* Add to a text, as printf's %s, %d, %u and %g do, but with a decimal point in any locale of the host. */
+static void append_list(char *text, size_t room, const char *format, va_list list) {
+    size_t at = strlen(text);
+    for (; *format && at + 1 < room; ++format) {
+        char digits[32] = {*format, 0};
+        const char *piece = digits;
+        if (*format == '%') {
+            ++format;
+            if (*format == 's')
+                piece = va_arg(list, const char *);
+            else if (*format == 'd')
+                snprintf(digits, sizeof digits, "%d", va_arg(list, int));
+            else if (*format == 'u')
+                snprintf(digits, sizeof digits, "%u", va_arg(list, unsigned));
+            else {
+                snprintf(digits, sizeof digits, "%g", va_arg(list, double));
+                /* a locale's decimal sign may take several bytes */
+                char *sign = digits + strspn(digits, "+-0123456789einfa");
+                const size_t length = strcspn(sign, "+-0123456789einfa");
+                if (length) {
+                    *sign = '.';
+                    memmove(sign + 1, sign + length, strlen(sign + length) + 1);
+                }
+            }
+        }
+        for (; *piece && at + 1 < room; ++piece) text[at++] = *piece;
+    }
+    text[at] = 0;
 }
 
-void instance_reset(Instance *c) {
-    memset(c->block, 0, c->block_size);
-    memcpy(c->p, model.start, (size_t)(model.n_p + model.n_u) * sizeof(double));
-    c->mode = INSTANTIATED;
-    c->time = 0.0;
-    c->fresh = 0;
-    c->changed = 1;
-    c->closed = 0;
-    c->pace = 0.0;
-}
-
-Status complain(Instance *c, Status status, const char *format, ...) {
-    char message[640];
+static void append(char *text, size_t room, const char *format, ...) {
     va_list list;
     va_start(list, format);
-    vsnprintf(message, sizeof message, format, list);
+    append_list(text, room, format, list);
+    va_end(list);
+}
+
+/* Say what is wrong, in one line, and hand the status on. */
+static Status complain(Instance *c, Status status, const char *format, ...) {
+    char message[640] = "";
+    va_list list;
+    va_start(list, format);
+    append_list(message, sizeof message, format, list);
     va_end(list);
     c->report(c, status, message);
     return status;
 }
 
-Status expect(Instance *c, int modes, const char *call) {
+/* Whether there is an instance, in one of the modes; else ERROR, with the name of the call. */
+static Status expect(Instance *c, int modes, const char *call) {
+    if (!c) return ERROR;
     if (c->mode & modes) return OK;
     return complain(c, ERROR, "%s is not allowed now (%s)", call,
                     c->mode == INSTANTIATED     ? "before initialization"
@@ -102,10 +172,30 @@ Status expect(Instance *c, int modes, const char *call) {
                                                 : "in this mode");
 }
 
-Status set_time(Instance *c, double time) {
+/* -- time */
+
+/* In parts of a time: what rounding makes of it where a host adds up a million steps, 1e6 * 2^-53 at worst, and more. */
+#define SAME_TIME 1e-9
+
+static double larger(double a, double b) { return fabs(a) > fabs(b) ? fabs(a) : fabs(b); }
+
+static Status set_time(Instance *c, double time) {
     if (!isfinite(time)) return complain(c, ERROR, "time = %g s: must be a finite number", time);
     c->time = time;
     return OK;
+}
+
+/* Integrators look beyond the stop time before they interpolate; a step that they take must not end there. */
+static Status step_taken(Instance *c) {
+    if (c->time <= c->stop) return OK;
+    return complain(c, ERROR, "time = %g s: must be <= %g s, the stop time", c->time, c->stop);
+}
+
+static Status set_experiment(Instance *c, double time, int has_stop, double stop) {
+    if (has_stop && !(stop >= time))
+        return complain(c, ERROR, "stop time = %g s: must be >= %g s, the start time", stop, time);
+    c->stop = has_stop ? stop + SAME_TIME * larger(stop, time) : INFINITY;
+    return set_time(c, time);
 }
 
 static int all_finite(const double *v, int n) {
@@ -118,6 +208,29 @@ static int all_finite(const double *v, int n) {
     return sum[0] + sum[1] + sum[2] + sum[3] == 0.0;
 }
 
+/* -- bounds; the rule is that of quantities.py */
+
+static int admitted(const Quantity *q, double v) {
+    return isfinite(v) && (q->open_low ? v > q->low : v >= q->low - q->slack) && v <= q->high + q->slack;
+}
+
+static double bounded(const Quantity *q, double v) { return v < q->low ? q->low : v > q->high ? q->high : v; }
+
+static Status refuse(Instance *c, Status status, const char *where, int i, double v) {
+    const Quantity *q = &model.declared[i];
+    return complain(c, status, "%s%s = %g%s%s: must be %s%s", where, q->name, v, q->unit[0] ? " " : "", q->unit,
+                    isfinite(v) ? "" : "finite, ", q->allowed);
+}
+
+/* Inputs may be set one by one: they are judged by the first call that computes with them. */
+static Status judge_inputs(Instance *c) {
+    if (!c->doubtful) return OK;
+    for (int i = model.n_p; i < model.n_p + model.n_u; ++i)
+        if (!admitted(&model.declared[i], c->p[i])) return refuse(c, ERROR, "", i, c->p[i]);
+    c->doubtful = 0;
+    return OK;
+}
+
 /* -- start */
 
 /* Whether each value lies between its limits; refuses the first that does not, in one line. */
@@ -128,45 +241,39 @@ static Status meets(Instance *c, const Requirement *required, int n, const doubl
         if (value > low && value < high) continue;
         const char *gap = r->unit[0] ? " " : "";
         char given[256] = "", range[160] = "";
-        size_t at = 0;
-        for (int k = 0; k < r->n_given && at < sizeof given; ++k)
-            at += (size_t)snprintf(given + at, sizeof given - at, "%s%s = %g", k ? ", " : " with ",
-                                   model.declared[r->given[k]].name, c->p[r->given[k]]);
+        for (int k = 0; k < r->n_given; ++k)
+            append(given, sizeof given, "%s%s = %g", k ? ", " : " with ", model.declared[r->given[k]].name,
+                   c->p[r->given[k]]);
         if (!(low < high))
-            snprintf(range, sizeof range, "no value fits; %s", r->remedy);
+            append(range, sizeof range, "no value fits; %s", r->remedy);
         else if (isfinite(low) && isfinite(high))
-            snprintf(range, sizeof range, "must be > %g and < %g%s%s", low, high, gap, r->unit);
+            append(range, sizeof range, "must be > %g and < %g%s%s", low, high, gap, r->unit);
         else
-            snprintf(range, sizeof range, "must be %s %g%s%s", isfinite(low) ? ">" : "<", isfinite(low) ? low : high,
-                     gap, r->unit);
+            append(range, sizeof range, "must be %s %g%s%s", isfinite(low) ? ">" : "<", isfinite(low) ? low : high, gap,
+                   r->unit);
         return complain(c, ERROR, "%s = %g%s%s: %s%s; %s", r->subject, value, gap, r->unit, r->why, given, range);
     }
     return OK;
 }
 
 static Status check(Instance *c) {
-    for (int i = 0; i < model.n_p + model.n_u; ++i) {
-        const Quantity *q = &model.declared[i];
-        const double v = c->p[i];
-        const int above = q->open_low ? v > q->low : v >= q->low;
-        if (!isfinite(v) || (i < model.n_p && !(above && v <= q->high)))
-            return complain(c, ERROR, "%s = %g %s: must be %s%s", q->name, v, q->unit, isfinite(v) ? "" : "finite, ",
-                            q->allowed);
-    }
+    for (int i = 0; i < model.n_p + model.n_u; ++i)
+        if (!admitted(&model.declared[i], c->p[i])) return refuse(c, ERROR, "", i, c->p[i]);
+    c->doubtful = 0;
     const double *arg[2] = {c->p, c->k};
     if (model.n_k) {
         double *into[1] = {c->k};
-        model.derive(arg, into, NULL, NULL, 0);
+        kernels.derive(arg, into, NULL, NULL, 0);
     }
     if (!model.n_required) return OK;
     double *res[1] = {c->work};
-    model.requirements(arg, res, NULL, NULL, 0);
+    kernels.requirements(arg, res, NULL, NULL, 0);
     Status status = meets(c, model.required, model.n_required, c->work);
     if (status) memset(c->k, 0, (size_t)model.n_k * sizeof(double)); /* nothing that is not finite stays behind */
     return status;
 }
 
-Status start(Instance *c) {
+static Status start(Instance *c) {
     if (!c->changed) return OK;
     Status status = check(c);
     if (status) return status;
@@ -174,14 +281,14 @@ Status start(Instance *c) {
         double *z = c->work, *next = z + model.n_z;
         const double *arg[3] = {c->p, c->u, z};
         double *res[1] = {z};
-        if (model.n_z) model.guess(arg, res, NULL, NULL, 0);
+        if (model.n_z) kernels.guess(arg, res, NULL, NULL, 0);
         for (int round = 0; round < model.start_rounds; ++round) {
             res[0] = next;
-            model.improved(arg, res, NULL, NULL, 0);
+            kernels.improved(arg, res, NULL, NULL, 0);
             memcpy(z, next, (size_t)model.n_z * sizeof(double));
         }
         res[0] = c->x;
-        model.initial(arg, res, NULL, NULL, 0);
+        kernels.initial(arg, res, NULL, NULL, 0);
         if (!all_finite(c->x, model.n_x)) {
             memset(c->x, 0, (size_t)model.n_x * sizeof(double));
             return complain(c, ERROR, "a state at the start is not a finite number");
@@ -189,7 +296,7 @@ Status start(Instance *c) {
         if (model.n_start_required) {
             const double *of[4] = {c->p, c->u, c->x, c->k};
             res[0] = c->work;
-            model.start_limits(of, res, NULL, NULL, 0);
+            kernels.start_limits(of, res, NULL, NULL, 0);
             status = meets(c, model.required + model.n_required, model.n_start_required, c->work);
             if (status) return status;
         }
@@ -211,16 +318,17 @@ static Status unknown_reference(Instance *c, unsigned reference) {
 static Status evaluate(Instance *c, unsigned wanted) {
     wanted &= ~c->fresh;
     if (!wanted) return OK;
+    if (judge_inputs(c)) return ERROR;
     const double *arg[4] = {c->p, c->u, c->x, c->k};
     double *res[1] = {c->y};
     if (wanted & (wanted - 1)) { /* more than one */
-        model.all(arg, res, NULL, NULL, 0);
+        kernels.all(arg, res, NULL, NULL, 0);
         wanted = (1u << model.n_groups) - 1u;
     } else {
         for (int g = 0; g < model.n_groups; ++g)
             if (wanted >> g & 1u) {
                 res[0] = c->y + model.groups[g].first;
-                model.groups[g].values(arg, res, NULL, NULL, 0);
+                kernels.values[g](arg, res, NULL, NULL, 0);
             }
     }
     for (int g = 0; g < model.n_groups; ++g)
@@ -230,19 +338,20 @@ static Status evaluate(Instance *c, unsigned wanted) {
     return OK;
 }
 
-Status derivatives(Instance *c) {
+static Status derivatives(Instance *c) {
     /* what was set since decides where the states start */
     Status status = c->mode == INITIALIZATION ? start(c) : OK;
+    if (!status) status = judge_inputs(c);
     if (status || !model.n_x || (c->fresh >> DERIVATIVES_BIT)) return status;
     const double *arg[4] = {c->p, c->u, c->x, c->k};
     double *res[1] = {c->dx};
-    model.derivatives(arg, res, NULL, NULL, 0);
+    kernels.derivatives(arg, res, NULL, NULL, 0);
     if (!all_finite(c->dx, model.n_x)) return complain(c, ERROR, "a derivative is not a finite number at t = %g s", c->time);
     c->fresh |= 1u << DERIVATIVES_BIT;
     return OK;
 }
 
-Status get(Instance *c, const unsigned *reference, size_t n, double *value) {
+static Status get(Instance *c, const unsigned *reference, size_t n, double *value) {
     unsigned needs = 0;
     for (size_t k = 0; k < n; ++k) {
         if (reference[k] > c->n_references) return unknown_reference(c, reference[k]);
@@ -261,35 +370,30 @@ Status get(Instance *c, const unsigned *reference, size_t n, double *value) {
     return OK;
 }
 
-Status set(Instance *c, unsigned reference, double value) {
-    const int i = (int)reference;
+static Status set(Instance *c, unsigned reference, double value) {
     if (reference >= c->n_references) return unknown_reference(c, reference);
+    const int i = (int)reference;
     if (i >= model.n_p + model.n_u)
         return complain(c, ERROR, "value reference %u is an output and cannot be set", reference);
     const Quantity *q = &model.declared[i];
-    if (!isfinite(value)) return complain(c, ERROR, "%s = %g %s: must be a finite number", q->name, value, q->unit);
-    if (i < model.n_p && !(c->mode & (INSTANTIATED | INITIALIZATION))) {
+    if (!isfinite(value)) return refuse(c, ERROR, "", i, value);
+    const int before = c->mode & (INSTANTIATED | INITIALIZATION), good = admitted(q, value);
+    if (i < model.n_p && !before) {
         if (!q->tunable)
             return complain(c, ERROR, "%s is fixed: set it before initialization or after reset", q->name);
-        if (!((q->open_low ? value > q->low : value >= q->low) && value <= q->high))
-            return complain(c, ERROR, "%s = %g %s: must be %s", q->name, value, q->unit, q->allowed);
+        if (!good) return refuse(c, ERROR, "", i, value);
     }
+    if (good)
+        value = bounded(q, value);
+    else
+        c->doubtful = 1;
     if (c->p[i] != value) {
         c->p[i] = value;
         c->fresh = 0;
         c->closed = 0;
-        if (c->mode & (INSTANTIATED | INITIALIZATION)) c->changed = 1;
+        if (before) c->changed = 1;
     }
     if (i >= model.n_p) c->du[i - model.n_p] = 0.0;
-    return OK;
-}
-
-Status set_input_derivative(Instance *c, unsigned reference, double value) {
-    const int i = (int)reference - model.n_p;
-    if (i < 0 || i >= model.n_u) return complain(c, ERROR, "value reference %u is not an input", reference);
-    if (!isfinite(value))
-        return complain(c, ERROR, "derivative of %s: must be a finite number", model.declared[reference].name);
-    c->du[i] = value;
     return OK;
 }
 
@@ -299,7 +403,7 @@ static Status count_states(Instance *c, size_t n, const void *pointer, const cha
     return OK;
 }
 
-Status states_set(Instance *c, const double *x, size_t n, const char *call) {
+static Status states_set(Instance *c, const double *x, size_t n, const char *call) {
     Status status = count_states(c, n, x, call);
     if (status) return status;
     if (n && !all_finite(x, (int)n)) return complain(c, ERROR, "%s: a state is not a finite number", call);
@@ -309,7 +413,7 @@ Status states_set(Instance *c, const double *x, size_t n, const char *call) {
     return OK;
 }
 
-Status states_get(Instance *c, const double *from, double *to, size_t n, const char *call) {
+static Status states_get(Instance *c, const double *from, double *to, size_t n, const char *call) {
     Status status = count_states(c, n, to, call);
     if (!status && c->mode == INITIALIZATION) status = start(c);
     if (!status && n) memcpy(to, from, n * sizeof *to);
@@ -320,8 +424,9 @@ Status states_get(Instance *c, const double *from, double *to, size_t n, const c
 
 /* The directional derivative of a group without a kernel for it, of relative error 1e-9 or so: outputs on both sides
  * at a distance that is small against inputs and states of the size of 1 and more. */
-static void differences(Instance *c, const Group *g, const double *du, const double *dx, double *dy) {
+static void differences(Instance *c, int group, const double *du, const double *dx, double *dy) {
     const int n_u = model.n_u, n_x = model.n_x;
+    const Group *g = &model.groups[group];
     double *u = dy + model.n_y + n_x, *x = u + n_u, *other = x + n_x, steepest = 0.0;
     for (int i = 0; i < n_u + n_x; ++i) {
         const double at = i < n_u ? c->u[i] : c->x[i - n_u], seed = i < n_u ? du[i] : dx[i - n_u];
@@ -335,47 +440,41 @@ static void differences(Instance *c, const Group *g, const double *du, const dou
         for (int i = 0; i < n_u; ++i) u[i] = c->u[i] + sense * distance * du[i];
         for (int i = 0; i < n_x; ++i) x[i] = c->x[i] + sense * distance * dx[i];
         res[0] = sense > 0 ? dy + g->first : other;
-        g->values(arg, res, NULL, NULL, 0);
+        kernels.values[group](arg, res, NULL, NULL, 0);
     }
     for (int i = 0; i < g->count; ++i) dy[g->first + i] = (dy[g->first + i] - other[i]) / (2.0 * distance);
 }
 
-Status forward(Instance *c, const unsigned *unknown, size_t n_unknown, const unsigned *known, size_t n_known,
-               const double *seed, double *sensitivity) {
+/* The derivatives of unknowns along the directions of inputs and states that lie at the begin of `work`. */
+static Status along(Instance *c, const unsigned *unknown, size_t n_unknown, double *sensitivity) {
     double *du = c->work, *dx = du + model.n_u, *dy = dx + model.n_x, *ddx = dy + model.n_y;
-    memset(du, 0, (size_t)(model.n_u + model.n_x) * sizeof(double));
-    for (size_t k = 0; k < n_known; ++k) {
-        const int i = (int)known[k] - model.n_p;
-        if (i < 0 || i >= model.n_u + model.n_x || known[k] > 1000000u)
-            return complain(c, ERROR, "directional derivative: value reference %u is neither input nor state", known[k]);
-        du[i] += seed[k]; /* inputs and states follow each other in both */
-    }
     const double *arg[6] = {c->p, c->u, c->x, du, dx, c->k};
     unsigned done = 0;
     for (size_t k = 0; k < n_unknown; ++k) {
-        int i = (int)unknown[k] - model.n_p - model.n_u;
-        if (i < 0 || i >= 2 * model.n_x + model.n_y || unknown[k] > 1000000u)
+        /* below the first, the difference of the unsigned numbers is a large one */
+        const unsigned place = unknown[k] - (unsigned)(model.n_p + model.n_u);
+        if (place >= (unsigned)(2 * model.n_x + model.n_y))
             return complain(c, ERROR, "directional derivative: value reference %u is no output", unknown[k]);
-        if (i < model.n_x) {
-            sensitivity[k] = dx[i];
+        const int i = (int)place - model.n_x;
+        if (i < 0) {
+            sensitivity[k] = dx[place];
             continue;
         }
-        i -= model.n_x;
         if (i < model.n_y) {
             const int g = model.group_of[i];
             if (!(done & (1u << g))) {
                 double *res[1] = {dy + model.groups[g].first};
-                if (model.groups[g].forward)
-                    model.groups[g].forward(arg, res, NULL, NULL, 0);
+                if (kernels.forward[g])
+                    kernels.forward[g](arg, res, NULL, NULL, 0);
                 else
-                    differences(c, &model.groups[g], du, dx, dy);
+                    differences(c, g, du, dx, dy);
                 done |= 1u << g;
             }
             sensitivity[k] = dy[model.place[i]];
         } else {
             if (!(done >> DERIVATIVES_BIT)) {
                 double *res[1] = {ddx};
-                model.derivatives_forward(arg, res, NULL, NULL, 0);
+                kernels.derivatives_forward(arg, res, NULL, NULL, 0);
                 done |= 1u << DERIVATIVES_BIT;
             }
             sensitivity[k] = ddx[i - model.n_y];
@@ -384,6 +483,21 @@ Status forward(Instance *c, const unsigned *unknown, size_t n_unknown, const uns
             return complain(c, ERROR, "directional derivative is not a finite number at t = %g s", c->time);
     }
     return OK;
+}
+
+static Status forward(Instance *c, const unsigned *unknown, size_t n_unknown, const unsigned *known, size_t n_known,
+               const double *seed, double *sensitivity) {
+    Status status = c->mode == INITIALIZATION ? start(c) : judge_inputs(c);
+    if (status) return status;
+    const unsigned n = (unsigned)(model.n_u + model.n_x);
+    memset(c->work, 0, n * sizeof(double));
+    for (size_t k = 0; k < n_known; ++k) {
+        const unsigned i = known[k] - (unsigned)model.n_p;
+        if (i >= n)
+            return complain(c, ERROR, "directional derivative: value reference %u is neither input nor state", known[k]);
+        c->work[i] += seed[k]; /* inputs and states follow each other in both */
+    }
+    return along(c, unknown, n_unknown, sensitivity);
 }
 
 /* The time derivative of an input: as the host gave it, else the input that the model declares to be it. */
@@ -396,25 +510,12 @@ static double input_curvature(const Instance *c, int i) {
     return c->du[i] != 0.0 || model.rate_of[i] < 0 ? 0.0 : input_rate(c, model.rate_of[i]);
 }
 
-Status output_derivative(Instance *c, unsigned reference, double *value) {
+static Status output_derivative(Instance *c, unsigned reference, double *value) {
     Status status = derivatives(c);
     if (status) return status;
-    const int n = model.n_u + model.n_x;
-    unsigned *known = malloc((size_t)(n ? n : 1) * sizeof *known);
-    double *seed = malloc((size_t)(n ? n : 1) * sizeof *seed);
-    if (!known || !seed) {
-        free(known);
-        free(seed);
-        return complain(c, ERROR, "out of memory");
-    }
-    for (int i = 0; i < n; ++i) {
-        known[i] = (unsigned)(model.n_p + i);
-        seed[i] = i < model.n_u ? input_rate(c, i) : c->dx[i - model.n_u];
-    }
-    status = forward(c, &reference, 1, known, (size_t)n, seed, value);
-    free(known);
-    free(seed);
-    return status;
+    for (int i = 0; i < model.n_u; ++i) c->work[i] = input_rate(c, i);
+    memcpy(c->work + model.n_u, c->dx, (size_t)model.n_x * sizeof(double));
+    return along(c, &reference, 1, value);
 }
 
 /* -- co-simulation; inputs run along their derivatives, to the end of the step */
@@ -433,7 +534,7 @@ static int slope(Instance *c, const Course *u, double since, const double *x, do
     run_to(c, u, since);
     const double *arg[4] = {c->p, u->at, x, c->k};
     double *res[1] = {dx};
-    model.derivatives(arg, res, NULL, NULL, 0);
+    kernels.derivatives(arg, res, NULL, NULL, 0);
     return all_finite(dx, model.n_x);
 }
 
@@ -449,17 +550,21 @@ static Status astray(Instance *c, double time) {
     return complain(c, DISCARD, "the states left all bounds in the step from t = %g s", time);
 }
 
-#define MOST_STEPS 1e6 /* that a step may take of its own */
+static double most_steps(const Instance *c) { return c->p[model.max_steps]; }
+
+static Status over_budget(Instance *c, double time, double size) {
+    return complain(c, DISCARD, "step of %g s from t = %g s: takes more than %s = %g steps of its own; shorten it, or raise that",
+                    size, time, model.declared[model.max_steps].name, most_steps(c));
+}
 
 /* The classical Runge-Kutta method with equal steps, its cost known beforehand. */
 static Status even_steps(Instance *c, double time, double size, const Course *u, double *work) {
     const int n_x = model.n_x;
     double *x = work, *k = x + n_x, *sum = k + n_x, *at = sum + n_x;
-    const double longest = number(model.internal_step, c);
-    const double wanted = ceil(size / longest - 1e-9);
-    if (!(wanted < MOST_STEPS))
-        return complain(c, DISCARD, "step of %g s: must be < %g s", size, MOST_STEPS * longest);
-    const long n = wanted < 1.0 ? 1 : (long)wanted;
+    const double longest = number(kernels.internal_step, c);
+    const double wanted = size / longest - 1e-9;
+    if (!(wanted <= most_steps(c))) return over_budget(c, time, size);
+    const long n = wanted < 1.0 ? 1 : (long)ceil(wanted);
     const double h = size / (double)n;
     static const double node[4] = {0.0, 0.5, 0.5, 1.0}, weight[4] = {1.0, 2.0, 2.0, 1.0};
     memcpy(x, c->x, (size_t)n_x * sizeof(double));
@@ -481,7 +586,7 @@ static int close_states(Instance *c, const Course *u, double since, double *x, d
     run_to(c, u, since);
     const double *arg[4] = {c->p, u->at, x, c->k};
     double *res[1] = {spare};
-    model.closed(arg, res, NULL, NULL, 0);
+    kernels.closed(arg, res, NULL, NULL, 0);
     if (!all_finite(spare, model.n_x)) return 0;
     memcpy(x, spare, (size_t)model.n_x * sizeof(double));
     return 1;
@@ -507,18 +612,14 @@ static Status controlled_steps(Instance *c, double time, double size, const Cour
                                     -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0};
     const int n_x = model.n_x;
     double *x = work, *at = x + n_x, *k = at + n_x;
-    const double longest = number(model.internal_step, c), tolerance = number(model.tolerance, c);
+    const double longest = number(kernels.internal_step, c), tolerance = number(kernels.tolerance, c);
     memcpy(x, c->x, (size_t)n_x * sizeof(double));
     for (int round = 0; !c->closed && round < 2; ++round)
         if (!close_states(c, u, 0.0, x, at)) return astray(c, time);
-    if (!(size < MOST_STEPS * longest))
-        return complain(c, DISCARD, "step of %g s: must be < %g s", size, MOST_STEPS * longest);
     long taken = 0;
     double since = 0.0, pace = c->pace > 0.0 ? c->pace : 0.01 * longest;
     while (since < size) {
-        if (++taken > MOST_STEPS)
-            return complain(c, DISCARD, "step of %g s from t = %g s takes more than %g of its own; shorten it", size,
-                            time, MOST_STEPS);
+        if ((double)++taken > most_steps(c)) return over_budget(c, time, size);
         const double left = size - since;
         /* no tiny rest: what is left is taken in one step or in two alike */
         const double h = pace >= left ? left : pace > 0.5 * left ? 0.5 * left : pace;
@@ -558,28 +659,36 @@ static Status controlled_steps(Instance *c, double time, double size, const Cour
     return OK;
 }
 
-Status step(Instance *c, double time, double size) {
+static Status step(Instance *c, double time, double size) {
     if (!isfinite(time) || !isfinite(size) || size < 0.0)
         return complain(c, ERROR, "step of %g s from t = %g s: must be finite and not negative", size, time);
+    if (fabs(time - c->time) > SAME_TIME * larger(c->time, size))
+        return complain(c, ERROR, "step from t = %g s: the FMU is at t = %g s", time, c->time);
+    if (time + size > c->stop)
+        return complain(c, ERROR, "step of %g s from t = %g s: must end at %g s, the stop time, or before", size, time,
+                        c->stop);
+    if (judge_inputs(c)) return ERROR;
     const int n_x = model.n_x, n_u = model.n_u;
     double *u = c->work, *rate = u + n_u, *half = rate + n_u;
     for (int i = 0; i < n_u; ++i) {
         rate[i] = input_rate(c, i);
         half[i] = 0.5 * input_curvature(c, i);
         u[i] = c->u[i] + size * (rate[i] + size * half[i]);
-        if (!isfinite(u[i]))
-            return complain(c, DISCARD, "%s leaves all bounds in the step from t = %g s",
-                            model.declared[model.n_p + i].name, time);
+        if (!admitted(&model.declared[model.n_p + i], u[i])) {
+            char where[96] = "";
+            append(where, sizeof where, "at the end of the step from t = %g s, ", time);
+            return refuse(c, DISCARD, where, model.n_p + i, u[i]);
+        }
     }
     if (n_x && size > 0.0) {
         const Course course = {u, rate, half};
-        Status status = (model.closed ? controlled_steps : even_steps)(c, time, size, &course, half + n_u);
+        Status status = (kernels.closed ? controlled_steps : even_steps)(c, time, size, &course, half + n_u);
         if (status) return status;
         c->fresh = 0;
     }
     for (int i = 0; i < n_u; ++i)
         if (rate[i] != 0.0 || half[i] != 0.0) {
-            c->u[i] += size * (rate[i] + size * half[i]);
+            c->u[i] = bounded(&model.declared[model.n_p + i], c->u[i] + size * (rate[i] + size * half[i]));
             c->fresh = 0;
         }
     c->time = time + size;
@@ -595,9 +704,9 @@ Status step(Instance *c, double time, double size) {
 /* The states that meet the constraints, in `work`; the largest correction in parts of `tolerance` and the size of the
  * state, or NaN where there are none. */
 static double off(Instance *c) {
-    const double tolerance = number(model.tolerance, c), *arg[4] = {c->p, c->u, c->x, c->k};
+    const double tolerance = number(kernels.tolerance, c), *arg[4] = {c->p, c->u, c->x, c->k};
     double *res[1] = {c->work}, most = 0.0;
-    model.closed(arg, res, NULL, NULL, 0);
+    kernels.closed(arg, res, NULL, NULL, 0);
     if (!all_finite(c->work, model.n_x)) return NAN;
     for (int i = 0; i < model.n_x; ++i) {
         const double size = fabs(c->x[i]) > model.nominal[i] ? fabs(c->x[i]) : model.nominal[i];
@@ -607,11 +716,14 @@ static double off(Instance *c) {
     return most;
 }
 
-int drifted(Instance *c) { return model.closed && off(c) > OFF_MOST; }
+/* Whether the states have drifted off the constraints, and an event is to correct them. */
+static int drifted(Instance *c) { return kernels.closed && off(c) > OFF_MOST; }
 
-Status project(Instance *c, int *moved) {
+/* Correct them, and say whether that moved a state. */
+static Status project(Instance *c, int *moved) {
     *moved = 0;
-    if (!model.closed || !c->model_exchange) return OK;
+    if (!kernels.closed || !c->model_exchange) return OK;
+    if (judge_inputs(c)) return ERROR;
     for (int round = 0; round < 4; ++round) {
         const double share = off(c);
         if (isnan(share)) return complain(c, ERROR, "no states near these meet the constraints at t = %g s", c->time);
@@ -626,40 +738,95 @@ Status project(Instance *c, int *moved) {
 
 /* -- saved states */
 
-size_t state_size(const Instance *c) { return sizeof(Saved) + c->block_size; }
+typedef struct {
+    uint64_t sum;   /* of all that follows: any flipped bit changes it */
+    uint64_t guard; /* of the model in its version: a state of another one is refused */
+    int mode, model_exchange, closed, spare;
+    double time, stop, pace;
+} Saved;
 
-void state_write(const Instance *c, void *memory) {
+static uint64_t guard(void) {
+    uint64_t h = 14695981039346656037u;
+    for (const char *s = model.guid; *s; ++s) h = (h ^ (unsigned char)*s) * 1099511628211u;
+    return h;
+}
+
+/* FNV-1a by words of 8 bytes: each step maps different sums to different ones, so that a change in one word shows. */
+static uint64_t sum_of(const void *memory, size_t size) {
+    uint64_t h = 14695981039346656037u, word;
+    for (size_t at = sizeof word; at < size; at += sizeof word) {
+        memcpy(&word, (const char *)memory + at, sizeof word);
+        h = (h ^ word) * 1099511628211u;
+    }
+    return h;
+}
+
+/* parameters, inputs and their derivatives, states and what is derived: what follows from them is evaluated anew */
+static size_t kept(const Instance *c) { return (size_t)(c->dx - c->block); }
+
+static size_t state_size(const Instance *c) { return sizeof(Saved) + kept(c) * sizeof(double); }
+
+static Status state_check(Instance *c, const void *memory) {
+    Saved saved;
+    memcpy(&saved, memory, sizeof saved);
+    if (saved.guard != guard() || saved.model_exchange != c->model_exchange)
+        return complain(c, ERROR, "saved state: it belongs to another model, another version or kind of simulation");
+    if (saved.sum != sum_of(memory, state_size(c))) return complain(c, ERROR, "saved state: it is damaged");
+    /* what a host wrote itself */
+    double *values = c->work;
+    memcpy(values, (const char *)memory + sizeof saved, kept(c) * sizeof(double));
+    const int mode = saved.mode;
+    if (mode < INSTANTIATED || mode > TERMINATED || (mode & (mode - 1)) || !isfinite(saved.time) || isnan(saved.stop) ||
+        !(saved.pace >= 0.0) || !all_finite(values, (int)kept(c)))
+        return complain(c, ERROR, "saved state: a value in it is not one of a state");
+    /* before the run, `start` judges them */
+    for (int i = 0; i < model.n_p && mode > INITIALIZATION; ++i)
+        if (!admitted(&model.declared[i], values[i])) return refuse(c, ERROR, "saved state: ", i, values[i]);
+    return OK;
+}
+
+static Status state_new(Instance *c, void **state) {
+    if (!*state) *state = malloc(state_size(c));
+    return *state ? OK : complain(c, ERROR, "out of memory");
+}
+
+static Status state_get(Instance *c, void **state) {
+    if (state_new(c, state)) return ERROR;
     Saved saved;
     memset(&saved, 0, sizeof saved);
+    saved.guard = guard();
     saved.mode = (int)c->mode;
     saved.model_exchange = c->model_exchange;
     saved.closed = c->closed;
     saved.time = c->time;
+    saved.stop = c->stop;
     saved.pace = c->pace;
-    saved.guard = guard();
-    memcpy(memory, &saved, sizeof saved);
-    memcpy((char *)memory + sizeof saved, c->block, c->block_size);
+    memcpy(*state, &saved, sizeof saved);
+    memcpy((char *)*state + sizeof saved, c->block, kept(c) * sizeof(double));
+    saved.sum = sum_of(*state, state_size(c));
+    memcpy(*state, &saved.sum, sizeof saved.sum);
+    return OK;
 }
 
-Status state_read(Instance *c, const void *memory, size_t size) {
+static Status state_set(Instance *c, const void *state) {
     Saved saved;
-    if (size != state_size(c)) return complain(c, ERROR, "saved state: its size is not this model's");
-    memcpy(&saved, memory, sizeof saved);
-    if (saved.guard != guard() || saved.model_exchange != c->model_exchange)
-        return complain(c, ERROR, "saved state: it belongs to another model or kind of simulation");
-    const int mode = saved.mode, known = INSTANTIATED | INITIALIZATION | EVENT | CONTINUOUS | STEP | TERMINATED;
-    /* parameters, inputs and states come first; what follows from them is evaluated anew */
-    const size_t first = (size_t)(c->dx - c->block) * sizeof(double);
-    double *values = c->work;
-    memcpy(values, (const char *)memory + sizeof saved, first);
-    if (!(mode & known) || (mode & (mode - 1)) || !isfinite(saved.time) || !(saved.pace >= 0.0) || !all_finite(values, (int)(c->dx - c->block)))
-        return complain(c, ERROR, "saved state: it is damaged");
-    memcpy(c->block, values, first);
+    if (state_check(c, state)) return ERROR;
+    memcpy(&saved, state, sizeof saved);
+    memcpy(c->block, (const char *)state + sizeof saved, kept(c) * sizeof(double));
     c->mode = (Mode)saved.mode;
     c->time = saved.time;
+    c->stop = saved.stop;
     c->pace = saved.pace;
     c->closed = saved.closed;
     c->fresh = 0;
+    c->doubtful = 1;
     c->changed = c->mode == INSTANTIATED || c->mode == INITIALIZATION;
+    return OK;
+}
+
+static Status state_from(Instance *c, const void *bytes, size_t size, void **state) {
+    if (size != state_size(c)) return complain(c, ERROR, "saved state: its size is not this model's");
+    if (state_check(c, bytes) || state_new(c, state)) return ERROR;
+    memcpy(*state, bytes, size);
     return OK;
 }

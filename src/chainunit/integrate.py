@@ -13,16 +13,54 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
+from .quantities import Value, declaration, quantity
+
+
+@declaration
+class Solver:
+    """Limits of the internal integrator, a parameter of each model with states."""
+
+    max_steps: Value = quantity(
+        "1",
+        "most steps of its own that a communication step may take; the step is discarded where it takes more",
+        default=2e5,
+        min=1.0,
+        max=1e9,
+    )
+
+
+MAX_STEPS = "solver.max_steps"
+"""the full name of that parameter"""
+
+
+class BudgetError(ArithmeticError):
+    """A communication step takes more steps of the integrator than it may."""
+
+    def __init__(self, most: float) -> None:
+        super().__init__(
+            f"takes more than {MAX_STEPS} = {most:g} steps of its own; shorten it, or raise that"
+        )
+
 
 def rk4(
     rates: Callable[[float, Sequence[float]], Sequence[float]],
     x: Sequence[float],
     step: float,
     longest: float,
+    most: float = math.inf,
 ) -> list[float]:
     """The states `step` later, in equal substeps of at most `longest`; `rates` gives their derivatives at a time
-    since the start of the step, and the states there."""
-    n = max(1, math.ceil(step / longest - 1e-9))
+    since the start of the step, and the states there.
+
+    Raises
+    ------
+    BudgetError
+        where it takes more than `most` of them, before it begins.
+    """
+    wanted = step / longest - 1e-9
+    if wanted > most:
+        raise BudgetError(most)
+    n = max(1, math.ceil(wanted))
     h = step / n
     now = list(x)
     for s in range(n):
@@ -48,8 +86,6 @@ _STAGES = (
     (35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84),
 )
 _WRONG = (71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40)
-MOST_STEPS = 1_000_000
-"""that a communication step may take of its own"""
 _SHORTEST = 1e-6
 """of the longest step: one as short is taken as it is, as a snatch must not stop a run"""
 
@@ -63,6 +99,7 @@ def controlled(
     longest: float,
     tolerance: float,
     nominal: Sequence[float],
+    most: float = math.inf,
 ) -> tuple[list[float], float]:
     """The states `step` later, and the next substep that the error allows; see the native runtime, which does the
     same.
@@ -77,13 +114,15 @@ def controlled(
     Raises
     ------
     ArithmeticError
-        where the states leave all bounds, or it takes more than `MOST_STEPS`.
+        where the states leave all bounds.
+    BudgetError
+        where it takes more than `most` steps.
     """
     now, since, taken = list(x), 0.0, 0
     while since < step:
         taken += 1
-        if taken > MOST_STEPS:
-            raise ArithmeticError(f"it takes more than {MOST_STEPS:g} of its own; shorten it")
+        if taken > most:
+            raise BudgetError(most)
         left = step - since
         h = left if pace >= left else 0.5 * left if pace > 0.5 * left else pace
         k: list[Sequence[float]] = []

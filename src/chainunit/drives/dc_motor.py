@@ -20,6 +20,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
+from ..integrate import Solver
 from ..model import Part, Requirement
 from ..ports import NO_LOAD, LoadPort, flange, load_inertia, load_terminal, load_torque
 from ..quantities import Value, declaration, group, quantity
@@ -88,6 +89,7 @@ class Parameters:
     ambient: Ambient = group(Ambient, "surroundings", default=Ambient())
     phi_start: Value = quantity("rad", "rotor angle at the start", default=0.0)
     w_start: Value = quantity("rad/s", "rotor speed at the start", default=0.0)
+    solver: Solver = group(Solver, "internal integrator", default=Solver())
 
 
 @declaration

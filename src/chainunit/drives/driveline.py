@@ -21,6 +21,7 @@ from types import MappingProxyType
 from typing import Any
 
 from ..engines import Dual, dual, slope
+from ..integrate import Solver
 from ..model import Model, Part, Requirement
 from ..ports import (
     NO_LOAD,
@@ -62,6 +63,7 @@ class Parameters(Mounted):
         "rad", "angle of the motor at the start, where the line is untwisted", default=0.0
     )
     w_start: Value = quantity("rad/s", "speed of the motor at the start", default=0.0)
+    solver: Solver = group(Solver, "internal integrator", default=Solver())
 
 
 @declaration

@@ -9,6 +9,7 @@ evaluated when they are asked for, part by part, once per state.
 from __future__ import annotations
 
 import atexit
+import binascii
 import contextlib
 import ctypes
 import json
@@ -24,14 +25,15 @@ from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
 from ..engines import MATH
-from ..integrate import MOST_STEPS, controlled, rk4
+from ..errors import InputError
+from ..integrate import BudgetError, controlled, rk4
 from ..model import Model
 from ..quantities import complaint
 
 _NAN = float("nan")
 _Slave = TypeVar("_Slave")
-
-
+_SAME_TIME = 1e-9
+"""in parts of a time, as in the native runtime: what rounding makes of it where a host adds up a million steps"""
 _LIBRARIES: set[Path] = set()
 
 
@@ -71,6 +73,10 @@ def _release_at_exit(library: Path) -> None:
     atexit.register(release)
 
 
+_IDENTITY = __name__.partition(".")[0]
+"""inside an FMU the name of its package, which holds a hash of all that it is made of"""
+
+
 class ModelSlave(Fmi2Slave):  # type: ignore[misc]
     """A model as pythonfmu's slave; a script in `fmu/` derives one class with `model` and perhaps `start`."""
 
@@ -82,11 +88,11 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         super().__init__(**kwargs)
         model = self.model
         _release_at_exit(Path(self.resources).parent / "binaries" / "linux64" / f"{model.name}.so")
-        parameters, inputs = model.parameter_layout.variables, model.input_layout.variables
+        self._variables = (*model.parameter_layout.variables, *model.input_layout.variables)
         self._set: list[float] = [
-            float(self.start.get(v.name, v.quantity.start or 0.0)) for v in (*parameters, *inputs)
+            float(self.start.get(v.name, v.quantity.start or 0.0)) for v in self._variables
         ]
-        self._n_p = len(parameters)
+        self._n_p = len(model.parameter_layout.variables)
         self._first = len(self._set)
         self._n_x = len(model.state_layout.names) if model.state_layout else 0
         self._ranges = []
@@ -105,10 +111,22 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         self._pace = 0.0  # next substep of an integrator that controls its error
         self._closed = False
         self._initialized = False
-        self._refused = ""  # why the parameters make no model
+        self._doubtful = True  # an input may be out of its bounds
+        self._time = 0.0
+        self._stop = math.inf  # the last time that is allowed, with what rounding adds to it
+        self._refused = ""  # why the parameters or the times make no model
         self._told = ""
 
     # -- life cycle
+
+    def setup_experiment(
+        self, start_time: float, stop_time: float | None = None, tolerance: float | None = None
+    ) -> None:
+        """Time at the start, and the last one, if it is known."""
+        self._time = start_time
+        self._stop = math.inf
+        if stop_time is not None:
+            self._stop = stop_time + _SAME_TIME * max(abs(stop_time), abs(start_time))
 
     def enter_initialization_mode(self) -> None:
         """Parameters are settled: check them and start the states."""
@@ -122,14 +140,18 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
     def do_step(self, current_time: float, step_size: float) -> bool:
         """One communication step; False (discard) where the model, its inputs or the step are not usable."""
         try:
-            bad = self._prepare() or self._bad_input()
-            if not bad and not 0.0 <= step_size < math.inf:
-                bad = f"step of {step_size:g} s: must be finite and not negative"
+            bad = self._bad_step(current_time, step_size) or self._prepare() or self._bad_input()
             if bad:
                 self._touch()
                 self._tell(bad)
                 return False
-            return not self._n_x or not step_size or self._integrate(current_time, step_size)
+            if self._n_x and step_size and not self._integrate(current_time, step_size):
+                return False
+            self._time = current_time + step_size
+            return True
+        except BudgetError as reason:
+            self._tell(f"step of {step_size:g} s from t = {current_time:g} s: {reason}")
+            return False
         except ArithmeticError as reason:
             self._tell(f"step from t = {current_time:g} s: {reason}")
             return False
@@ -137,14 +159,21 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
             self._tell(f"step from t = {current_time:g} s failed: {reason!r}")
             return False
 
+    def _bad_step(self, time: float, size: float) -> str:
+        if not (math.isfinite(time) and 0.0 <= size < math.inf):
+            return f"step of {size:g} s from t = {time:g} s: must be finite and not negative"
+        if abs(time - self._time) > _SAME_TIME * max(abs(self._time), size):
+            return f"step from t = {time:g} s: the FMU is at t = {self._time:g} s"
+        if not time + size <= self._stop:
+            stop = f"must end at {self._stop:g} s, the stop time, or before"
+            return f"step of {size:g} s from t = {time:g} s: {stop}"
+        return ""
+
     def _integrate(self, time: float, step: float) -> bool:
         p, model, run = self._p, self.model, self._running()
         layout = model.state_layout
         assert layout is not None
         longest = model.internal_step(MATH, p)
-        if step > MOST_STEPS * longest:
-            self._tell(f"step of {step:g} s: must be < {MOST_STEPS * longest:g} s")
-            return False
 
         def rates(since: float, x: Any) -> list[float]:
             return model.derivatives(MATH, p, self._inputs(run, since), layout.instance(x))
@@ -152,7 +181,7 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         if model.controlled:
             x = self._controlled(rates, run, step, longest)
         else:
-            x = rk4(rates, self._x, step, longest)
+            x = rk4(rates, self._x, step, longest, p.solver.max_steps)
         if not all(map(math.isfinite, x)):
             self._tell(f"the states left all bounds in the step from t = {time:g} s")
             return False
@@ -161,6 +190,7 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
             self._set[at] += step * (rate + step * half)
         if run:
             self._u = None
+            self._doubtful = True
         self._touch()
         self._closed = model.controlled
         return True
@@ -177,7 +207,8 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
             x = close(0.0, x)
         nominal = [v.quantity.nominal or 1.0 for v in layout.variables]
         pace, tolerance = self._pace or 0.01 * longest, model.tolerance(MATH, p)
-        x, self._pace = controlled(rates, close, x, step, pace, longest, tolerance, nominal)
+        most = p.solver.max_steps
+        x, self._pace = controlled(rates, close, x, step, pace, longest, tolerance, nominal, most)
         return x
 
     # -- values
@@ -187,11 +218,16 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         for vr, value in zip(vrs, values, strict=True):
             if not 0 <= vr < self._first:
                 self._tell(f"value reference {vr} is not a parameter or input: not set")
-            elif self._set[vr] == value:
                 continue
-            elif vr >= self._n_p:
+            quantity = self._variables[vr].quantity
+            if quantity.admits(value):
+                value = quantity.bounded(value)
+            if self._set[vr] == value:
+                continue
+            if vr >= self._n_p:
                 self._set[vr] = value
                 self._u = None
+                self._doubtful = True
                 if not self._initialized and self.model.start_unknowns:
                     self._p = None  # the start depends on the inputs, too
                 self._touch()
@@ -203,7 +239,7 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
                 self._tune(vr, value)
 
     def _tune(self, vr: int, value: float) -> None:
-        variable = self.model.parameter_layout.variables[vr]
+        variable = self._variables[vr]
         if not variable.quantity.tunable:
             self._tell(f"{variable.name} is fixed: set it before initialisation or after reset; not changed")
         elif not variable.quantity.admits(value):
@@ -267,6 +303,8 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
                 p = self._p = self.model.parameter_layout.instance(self._set[: self._n_p])
                 p = self._p = self.model.check(p, self._derived if self._initialized else None)
                 self._derived = getattr(p, "derived", None)
+                if self.model.start_unknowns and (bad := self._bad_input()):
+                    raise InputError(bad)
                 if self.model.state_layout and not self._initialized:
                     self._x = self.model.state_layout.values(self.model.begin(p, self._inputs()))
                     self._pace = 0.0
@@ -297,12 +335,12 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         return [(self._n_p + names.index(name), rate(name), 0.5 * rate(along[name])) for name in along]
 
     def _bad_input(self) -> str:
-        if self._u is None:
-            for variable, value in zip(
-                self.model.input_layout.variables, self._set[self._n_p :], strict=True
-            ):
+        if self._doubtful:
+            inputs = slice(self._n_p, None)
+            for variable, value in zip(self._variables[inputs], self._set[inputs], strict=True):
                 if not variable.quantity.admits(value):
                     return f"input {complaint(variable, value)}"
+            self._doubtful = False
         return ""
 
     def _tell(self, reason: str) -> None:
@@ -341,41 +379,64 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
 
     def _get_fmu_state(self) -> dict[str, Any]:
         return {
+            "of": _IDENTITY,
             "set": list(self._set),
             "x": list(self._x),
+            "time": self._time,
+            "stop": self._stop,
             "initialized": self._initialized,
             "pace": self._pace,
             "closed": self._closed,
         }
 
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
-        values, x = state.get("set"), state.get("x")
-        if not (
-            isinstance(values, list)
-            and isinstance(x, list)
-            and len(values) == self._first
-            and len(x) in (0, self._n_x)
-            and all(isinstance(v, int | float) for v in (*values, *x))
-        ):
-            self._tell("the saved state is not one of this model: not restored")
+        try:
+            refused = self._bad_state(state)
+        except (KeyError, TypeError, ValueError, AttributeError):
+            refused = "it is none of this model"
+        if refused:
+            self._tell(f"saved state: {refused}; not restored")
             return
-        self._set, self._x = list(values), list(x)
-        self._initialized = bool(state.get("initialized"))
+        self._set, self._x = list(state["set"]), list(state["x"])
+        self._time, self._stop, self._pace = state["time"], state["stop"], state["pace"]
+        self._initialized = state["initialized"]
+        self._doubtful = True
         # the state may be that of another geometry
         self._p = self._u = self._derived = None
         self._touch()
-        pace = state.get("pace")
-        self._pace = pace if isinstance(pace, float) and pace >= 0.0 else 0.0
-        self._closed = state.get("closed") is True
+        self._closed = state["closed"]
+
+    def _bad_state(self, state: dict[str, Any]) -> str:
+        """Why the state cannot be taken."""
+        if "damaged" in state:
+            return str(state["damaged"])
+        if state["of"] != _IDENTITY:
+            return "it belongs to another model, or another version of it"
+        values, x = state["set"], state["x"]
+        if len(values) != self._first or len(x) not in (0, self._n_x):
+            return "it is none of this model"
+        if not all(map(math.isfinite, (*values, *x, state["time"]))) or math.isnan(state["stop"]):
+            return "a value in it is not finite"
+        if not state["pace"] >= 0.0 or {type(state["initialized"]), type(state["closed"])} != {bool}:
+            return "it is none of this model"
+        if state["initialized"]:  # before, `_prepare` judges them
+            for variable, value in zip(self._variables[: self._n_p], values, strict=False):
+                if not variable.quantity.admits(value):
+                    return complaint(variable, value)
+        return ""
 
     @staticmethod
     def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
-        return json.dumps(state).encode()
+        text = json.dumps(state).encode()
+        return b"%08x" % binascii.crc32(text) + text
 
     @staticmethod
     def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
+        checksum, text = state[:8], state[8:]
+        if checksum != b"%08x" % binascii.crc32(text):
+            return {"damaged": "it is damaged"}
         try:
-            read = json.loads(state.decode())
+            read = json.loads(text)
         except ValueError:
             return {}
         return read if isinstance(read, dict) else {}

@@ -23,6 +23,7 @@ from ..groups.body import Body, point_load, reflected, total
 from ..groups.driver import crank, driving_torque
 from ..groups.dyad import Dyad
 from ..groups.friction import pin_losses
+from ..integrate import Solver
 from ..model import Model, Part, Requirement
 from ..planar import ZERO, Link, Motion, Vec2
 from ..ports import PortSlopes, PortValues, flange, load_terminal
@@ -237,6 +238,7 @@ class DirectParameters(Parameters):
     )
     phi_start: Value = quantity("rad", "motor angle at the start", default=0.0)
     w_start: Value = quantity("rad/s", "motor speed at the start", default=0.0)
+    solver: Solver = group(Solver, "internal integrator", default=Solver())
 
 
 @declaration

@@ -42,6 +42,7 @@ from ..errors import InputError
 from ..groups import chain
 from ..groups.dyad import Dyad
 from ..groups.friction import pin_losses
+from ..integrate import Solver
 from ..model import Model, Part, Requirement
 from ..planar import ZERO, Link, Motion, Vec2
 from ..ports import PortSlopes
@@ -119,6 +120,7 @@ class Parameters(chain_unit.Parameters):
         max=1e-2,
         tunable=True,
     )
+    solver: Solver = group(Solver, "internal integrator", default=Solver(max_steps=5e4))
 
 
 @declaration

@@ -21,7 +21,7 @@ from ..pack import checked, pack, recipes, written
 from .generate import kernels, tables
 from .platforms import build, chosen
 
-_LAYER = ("model.h", "runtime.h", "runtime.c")
+_LAYER = ("model.h", "runtime.c")
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def export(
     wanted = _VERSIONS[fmi]
     version = metadata.version("chainunit")
     layer = (*_LAYER, wanted.layer)
-    compiled = ("kernels.c", "model.c", *(name for name in layer if name.endswith(".c")))
+    compiled = ("kernels.c", "model.c", wanted.layer)
 
     kinds = dict(wanted.kinds)
     if fmi == 3 and model.controlled:

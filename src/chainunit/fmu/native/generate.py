@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ...engines import casadi_
+from ...integrate import MAX_STEPS
 from ...quantities import Variable
 from ..description import Interface
 
@@ -100,7 +101,42 @@ def kernels(interface: Interface) -> str:
         generator.add(function)
     with tempfile.TemporaryDirectory() as folder:
         generator.generate(folder + "/")
-        return Path(folder, "kernels.c").read_text()
+        written = Path(folder, "kernels.c").read_text()
+    return _BEFORE_KERNELS + written + _kernel_table(interface, {f.name() for f in functions})
+
+
+_BEFORE_KERNELS = """\
+#include "model.h"
+
+/* one table is all that other files see, see the end */
+#define CASADI_SYMBOL_EXPORT static
+#define CASADI_CODEGEN_PREFIX
+#define CODEGEN_PREFIX CHAINUNIT_NAME(kernels_)
+#ifdef __GNUC__
+#pragma GCC diagnostic ignored "-Wunused-function"
+#endif
+
+"""
+
+
+def _kernel_table(interface: Interface, functions: set[str]) -> str:
+    def of_groups(suffix: str) -> list[str]:
+        names = [f"kernel_group_{g}{suffix}" for g in range(len(groups(interface)))]
+        return [name if name in functions else "NULL" for name in names]
+
+    lines = [
+        "",
+        "#include <stddef.h>",
+        "",
+        _array("Kernel", "values", of_groups("")),
+        _array("Kernel", "forwards", of_groups("_forward")),
+        "const Kernels kernels = {",
+        "    .values = values,",
+        "    .forward = forwards,",
+        *(f"    .{f.removeprefix('kernel_')} = {f}," for f in sorted(functions) if "_group_" not in f),
+        "};",
+    ]
+    return "\n".join(lines) + "\n"
 
 
 def _number(x: float) -> str:
@@ -126,24 +162,12 @@ def _array(kind: str, name: str, items: list[str]) -> str:
 def tables(interface: Interface, guid: str, token: str) -> str:
     """``model.c``: what model.h asks for, with the FMI 2.0 GUID and the FMI 3.0 instantiation token given."""
     model = interface.model
-    groups_, apart = groups(interface), differenced(interface)
-    functions = ["all", *(f"group_{i}" for i in range(len(groups_)))]
-    functions += [f"group_{i}_forward" for i in range(len(groups_)) if i not in apart]
-    if interface.states:
-        functions += ["derivatives", "derivatives_forward", "initial", "internal_step"]
-        functions += ["guess", "improved"] if model.start_unknowns else []
-        functions += ["start_limits"] if model.start_required else []
-        functions += ["tolerance", "closed"] if model.controlled else []
-    if model.required:
-        functions.append("requirements")
-    if model.derived:
-        functions.append("derive")
 
     def quantity(v: Variable) -> str:
         q = v.quantity
         return (
             f"{{{_text(v.name)}, {_unit(v.unit)}, {_text(q.allowed)}, {_number(q.low)}, {_number(q.high)}, "
-            f"{int(q.open_low)}, {int(q.tunable)}}}"
+            f"{_number(q.slack)}, {int(q.open_low)}, {int(q.tunable)}}}"
         )
 
     def rate_of(name: str) -> int:
@@ -152,9 +176,8 @@ def tables(interface: Interface, guid: str, token: str) -> str:
     place, group_of = {}, {}
     first = 0
     group_rows = []
-    for g, group in enumerate(groups_):
-        derivative = "NULL" if g in apart else f"kernel_group_{g}_forward"
-        group_rows.append(f"{{{first}, {len(group)}, kernel_group_{g}, {derivative}}}")
+    for g, group in enumerate(groups(interface)):
+        group_rows.append(f"{{{first}, {len(group)}}}")
         for k, output in enumerate(group):
             place[output], group_of[output] = first + k, g
         first += len(group)
@@ -167,17 +190,6 @@ def tables(interface: Interface, guid: str, token: str) -> str:
         "#include <stddef.h>",
         "",
         '#include "model.h"',
-        "",
-        "#if defined __GNUC__ && !defined _WIN32",
-        "#pragma GCC visibility push(hidden)",
-        "#endif",
-        *(
-            f"int kernel_{k}(const double **arg, double **res, long long int *iw, double *w, int mem);"
-            for k in functions
-        ),
-        "#if defined __GNUC__ && !defined _WIN32",
-        "#pragma GCC visibility pop",
-        "#endif",
         "",
         _array("double", "starts", [_number(x or 0.0) for x in starts]),
         _array("Quantity", "declared", [quantity(v) for v in (*interface.parameters, *interface.inputs)]),
@@ -196,7 +208,6 @@ def tables(interface: Interface, guid: str, token: str) -> str:
     ]
     if rows:
         lines.append(_array("Requirement", "required", rows))
-    states = bool(interface.states)
     fields = {
         "name": _text(model.name),
         "guid": _text(guid),
@@ -207,7 +218,7 @@ def tables(interface: Interface, guid: str, token: str) -> str:
         "n_y": n_y,
         "n_k": model.derived,
         "n_z": model.start_unknowns,
-        "n_groups": len(groups_),
+        "n_groups": len(group_rows),
         "n_required": len(model.required),
         "n_start_required": len(model.start_required),
         "start": "starts",
@@ -217,20 +228,9 @@ def tables(interface: Interface, guid: str, token: str) -> str:
         "place": "place",
         "group_of": "group_of",
         "groups": "group",
-        "all": "kernel_all",
         "required": "required" if rows else "NULL",
-        "requirements": "kernel_requirements" if model.required else "NULL",
-        "start_limits": "kernel_start_limits" if model.start_required else "NULL",
-        "derive": "kernel_derive" if model.derived else "NULL",
         "start_rounds": model.start_rounds,
-        "guess": "kernel_guess" if model.start_unknowns else "NULL",
-        "improved": "kernel_improved" if model.start_unknowns else "NULL",
-        "initial": "kernel_initial" if states else "NULL",
-        "derivatives": "kernel_derivatives" if states else "NULL",
-        "derivatives_forward": "kernel_derivatives_forward" if states else "NULL",
-        "internal_step": "kernel_internal_step" if states else "NULL",
-        "tolerance": "kernel_tolerance" if model.controlled else "NULL",
-        "closed": "kernel_closed" if model.controlled else "NULL",
+        "max_steps": parameter_names.index(MAX_STEPS) if interface.states else -1,
     }
     lines.append("const Model model = {")
     lines += [f"    .{name} = {value}," for name, value in fields.items()]

@@ -1,7 +1,7 @@
 """Platforms of native FMUs, and the C compilers that make code for them.
 
 The system's own compiler makes code for this machine. The ``ziglang`` wheel (extra `cross`) makes code for
-every platform, with fixed floors: glibc 2.17, macOS 10.15 on x86_64 and 11.0 on arm64.
+every platform. Floors: glibc 2.17, by either compiler; macOS 10.15 on x86_64 and 11.0 on arm64.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ...errors import InputError, RunError
 
 _FLAGS = ("-std=c99", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off")
 _SHARED = ("-shared", "-s")
-KERNELS, KERNELS_OBJECT = "kernels.c", "kernels.o"
+KERNELS, KERNELS_OBJECT, HEADER = "kernels.c", "kernels.o", "model.h"
 
 
 @dataclass(frozen=True)
@@ -166,21 +166,22 @@ def _compile(
         work = Path(scratch)
         for name, content in sources.items():
             (work / name).write_bytes(content)
-        own = ("-target", target) if compiler.zig else ("-Wl,--build-id=none",)
+        own = ("-target", target) if compiler.zig else ("-Wl,--build-id=none", "-DCHAINUNIT_OLD_GLIBC")
         math = () if "windows" in target else ("-lm",)
         flags = (*own, *_FLAGS)
-        (work / KERNELS_OBJECT).write_bytes(_object(compiler, flags, sources[KERNELS]))
+        (work / KERNELS_OBJECT).write_bytes(_object(compiler, flags, sources[KERNELS], sources[HEADER]))
         rest = [name for name in compiled if name != KERNELS]
         _run(compiler, (*flags, *_SHARED, *rest, KERNELS_OBJECT, "-o", library, *math), work)
         return (work / library).read_bytes()
 
 
 @lru_cache(maxsize=32)
-def _object(compiler: Compiler, flags: tuple[str, ...], kernels: bytes) -> bytes:
+def _object(compiler: Compiler, flags: tuple[str, ...], kernels: bytes, header: bytes) -> bytes:
     """Object code of the kernels, which take almost all of the time and are the same for whatever start values."""
     with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
         work = Path(scratch)
         (work / KERNELS).write_bytes(kernels)
+        (work / HEADER).write_bytes(header)
         _run(compiler, (*flags, "-c", KERNELS, "-o", KERNELS_OBJECT), work)
         return (work / KERNELS_OBJECT).read_bytes()
 

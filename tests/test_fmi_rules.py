@@ -1,0 +1,380 @@
+"""Rules of FMI that a native FMU keeps, by FMI 2.0 and 3.0 alike."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import re
+import shutil
+import struct
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Model, FMU2Slave
+from fmpy.fmi3 import FMU3Model, FMU3Slave
+
+from chainunit.fmu.native.platforms import compiler
+from chainunit.models import MODELS
+
+HERE = Path(__file__).parent
+pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
+both = pytest.mark.parametrize("fmi", [2, 3])
+
+
+class Unit:
+    """An instance by either version of FMI; `refused` cites what it logged."""
+
+    def __init__(self, native, name, fmi, capsys, exchange=False):
+        folder = native[name, fmi][1]
+        description = fmpy.read_model_description(folder)
+        self.fmi, self.capsys = fmi, capsys
+        self.reference = {v.name: v.valueReference for v in description.modelVariables}
+        made = {2: (FMU2Slave, FMU2Model), 3: (FMU3Slave, FMU3Model)}[fmi][exchange]
+        self.api = made(
+            guid=description.guid or description.instantiationToken,
+            unzipDirectory=folder, modelIdentifier=name, instanceName="unit",
+        )  # fmt: skip
+        self.api.instantiate()
+        self.status = None
+
+    def start(self, time=0.0, stop=None, **given):
+        self.set(given)
+        if self.fmi == 2:
+            self.api.setupExperiment(startTime=time, stopTime=stop)
+            self.api.enterInitializationMode()
+        else:
+            self.api.enterInitializationMode(startTime=time, stopTime=stop)
+        self.api.exitInitializationMode()
+        return self
+
+    def set(self, given):
+        names = [name.replace("__", ".") for name in given]
+        call = self.api.setReal if self.fmi == 2 else self.api.setFloat64
+        call([self.reference[n] for n in names], list(given.values()))
+
+    def get(self, *names):
+        call = self.api.getReal if self.fmi == 2 else self.api.getFloat64
+        return call([self.reference[n] for n in names])
+
+    def step(self, time, size):
+        self.api.doStep(time, size)
+
+    def serialized(self):
+        if self.fmi == 2:
+            return self.api.serializeFMUstate(self.api.getFMUState())
+        return self.api.serializeFMUState(self.api.getFMUState())
+
+    def restore(self, raw):
+        call = self.api.deSerializeFMUstate if self.fmi == 2 else self.api.deserializeFMUState
+        self.api.setFMUState(call(raw))
+
+    def refused(self, call, *args, **given):
+        """The line that an error or a discarded step is logged with; its status is kept."""
+        self.capsys.readouterr()
+        with pytest.raises(FMICallException) as caught:
+            call(*args, **given)
+        self.status = caught.value.status
+        return self.capsys.readouterr().out.strip().partition("] ")[2]
+
+
+@pytest.fixture
+def unit(native_fmus, capsys):
+    made = []
+
+    def one(name, fmi, **more):
+        made.append(Unit(native_fmus, name, fmi, capsys, **more))
+        return made[-1]
+
+    yield one
+    for each in made:
+        each.api.freeInstance()
+
+
+@both
+def test_an_input_out_of_its_bounds_is_an_error_of_the_call_that_computes_with_it(unit, fmi):
+    one = unit("ChamberForces", fmi)
+    line = "left.material_mass = -50 kg: must be >= 0 kg"
+    assert one.refused(one.start, left__material_mass=-50.0) == line  # before the initialization
+    one.set({"left.material_mass": 30.0})
+    one.api.enterInitializationMode() if fmi == 2 else one.api.enterInitializationMode(startTime=0.0)
+    one.api.exitInitializationMode()
+    good = one.get("tau")
+    one.set({"left.material_mass": -50.0})
+    assert one.get("left.material_mass") == [-50.0]
+    assert one.refused(one.get, "tau") == line and one.refused(one.step, 0.0, 0.1) == line
+    one.set({"left.material_mass": 30.0})
+    assert one.get("tau") == good
+    one.step(0.0, 0.1)
+    # zero but for rounding
+    one.set({"left.material_mass": -1e-12})
+    assert one.get("left.material_mass") == [0.0]
+    one.step(0.1, 0.1)
+
+
+@both
+def test_an_input_out_of_its_bounds_stops_model_exchange_too(unit, fmi):
+    one = unit("ChainUnit", fmi, exchange=True).start()
+    one.set({"right.processing_force": -1.0})
+    rates = (ctypes.c_double * 2)()
+    call = one.api.getDerivatives if fmi == 2 else one.api.getContinuousStateDerivatives
+    line = "right.processing_force = -1 N: must be >= 0 N"
+    assert one.refused(call, rates, 2) == line
+    known, unknown = one.reference["tau"], one.reference["a"]
+    assert one.refused(one.api.getDirectionalDerivative, [unknown], [known], [1.0]) == line
+    one.set({"right.processing_force": 0.0})
+    call(rates, 2)
+    one.api.getDirectionalDerivative([unknown], [known], [1.0])
+
+
+def test_an_input_that_runs_out_of_its_bounds_in_a_step_discards_it(unit):
+    one = unit("ChamberForces", 2).start(left__material_mass=1.0)
+    one.api.setRealInputDerivatives([one.reference["left.material_mass"]], [1], [-20.0])
+    line = one.refused(one.step, 0.0, 0.1)
+    assert line == "at the end of the step from t = 0 s, left.material_mass = -1 kg: must be >= 0 kg"
+    assert one.status == 2
+    one.step(0.0, 0.05)  # to zero exactly
+
+
+@both
+@pytest.mark.parametrize("name", ["ChamberForces", "DcMotor"])
+def test_the_communication_point_and_the_stop_time_are_honoured(unit, name, fmi):
+    one = unit(name, fmi).start(2.0, 3.0)
+    assert one.refused(one.step, 999.0, 0.1) == "step from t = 999 s: the FMU is at t = 2 s"
+    assert one.status == 3
+    t = 2.0
+    for _ in range(10):
+        one.step(t, 0.1)
+        t += 0.1
+    assert t != 3.0, "the sum is off by rounding"
+    line = "step of 0.1 s from t = 3 s: must end at 3 s, the stop time, or before"
+    assert one.refused(one.step, t, 0.1) == line and one.status == 3
+    late = unit(name, fmi)
+    assert late.refused(late.start, 2.0, 1.0) == "stop time = 1 s: must be >= 2 s, the start time"
+
+
+@both
+def test_a_million_steps_added_up_are_no_other_time(unit, fmi):
+    """A master that adds up its steps, and an FMU that is told the sum: no drift that is refused."""
+    one = unit("ChamberForces", fmi).start(0.0, 100.0)
+    h, n = 1e-4, 1_000_000
+    added = np.cumsum(np.full(n, h))
+    assert abs(added[-1] - 100.0) > 1e-9, "more than a rounding of the time itself"
+    for t in (*added[:3], *added[-1000:-1]):
+        one.restore(moved_to(one, t))
+        one.step(t + 2e-16 * t, h)
+    one.restore(moved_to(one, n * h - h))
+    one.step(added[-2], h)
+    assert "the stop time" in one.refused(one.step, added[-1], h)
+
+
+def sealed(body):
+    """A serialized state with the checksum that belongs to it: FNV-1a by words."""
+    h = 14695981039346656037
+    for (word,) in struct.iter_unpack("<Q", body):
+        h = (h ^ word) * 1099511628211 % 2**64
+    return struct.pack("<Q", h) + body
+
+
+def moved_to(one, time):
+    """The instance's state at another time."""
+    raw = bytearray(one.serialized())
+    raw[32:40] = struct.pack("<d", time)
+    return sealed(bytes(raw[8:]))
+
+
+@both
+def test_a_step_that_model_exchange_takes_past_the_stop_time_is_an_error(unit, fmi):
+    one = unit("DcMotor", fmi, exchange=True).start(0.0, 1.0)
+    one.api.enterContinuousTimeMode()
+    one.api.setTime(1.01)  # to look ahead is an integrator's right
+    line = one.refused(one.api.completedIntegratorStep)
+    assert line == "time = 1.01 s: must be <= 1 s, the stop time"
+    one.api.setTime(1.0)
+    one.api.completedIntegratorStep()
+
+
+@both
+@pytest.mark.parametrize("name", [name for name, model in MODELS.items() if model.state_layout])
+def test_a_step_beyond_the_budget_is_discarded_and_leaves_all_as_it_was(unit, name, fmi):
+    one = unit(name, fmi).start(solver__max_steps=20.0)
+    states = MODELS[name].state_layout.names
+    one.step(0.0, 1e-3)
+    before = one.get(*states)
+    line = one.refused(one.step, 1e-3, 10.0)
+    wanted = "takes more than solver.max_steps = 20 steps of its own; shorten it, or raise that"
+    assert line == f"step of 10 s from t = 0.001 s: {wanted}" and one.status == 2
+    assert one.get(*states) == before
+    if fmi == 2:
+        time = ctypes.c_double()
+        one.api.fmi2GetRealStatus(one.api.component, 2, ctypes.byref(time))
+        assert time.value == 1e-3
+    else:
+        assert one.get("time") == [1e-3]
+    one.step(1e-3, 1e-3)
+    fresh = unit(name, fmi)
+    assert "solver.max_steps = 0: must be >= 1" in fresh.refused(fresh.start, solver__max_steps=0.0)
+
+
+@both
+def test_a_serialized_state_with_any_flipped_bit_is_refused(unit, fmi):
+    one = unit("DcMotor", fmi).start(w_ref=50.0)
+    one.step(0.0, 0.01)
+    raw, kept = one.serialized(), one.get("w", "armature.i")
+    one.step(0.01, 0.01)
+    after = one.get("w", "armature.i")
+    lines = set()
+    for bit in range(8 * len(raw)):
+        flipped = bytearray(raw)
+        flipped[bit // 8] ^= 1 << bit % 8
+        lines.add(one.refused(one.restore, bytes(flipped)))
+        assert one.status == 3
+    another = "saved state: it belongs to another model, another version or kind of simulation"
+    assert lines == {"saved state: it is damaged", another}
+    assert one.get("w", "armature.i") == after
+    one.restore(raw)
+    assert one.get("w", "armature.i") == kept
+    assert one.refused(one.restore, raw[:-8]) == "saved state: its size is not this model's"
+
+
+@both
+def test_a_serialized_state_out_of_bounds_is_refused(unit, fmi):
+    one = unit("DcMotor", fmi).start(w_ref=50.0)
+    raw = one.serialized()
+    assert sealed(raw[8:]) == raw
+    first = len(raw) - 8 * (
+        len(MODELS["DcMotor"].parameter_layout.names) + 2 * len(MODELS["DcMotor"].input_layout.names)
+    )
+    first -= 8 * len(MODELS["DcMotor"].state_layout.names)
+    assert struct.unpack_from("<d", raw, first)[0] == one.get("armature.R")[0]
+    negative = bytearray(raw)
+    struct.pack_into("<d", negative, first, -1.0)
+    line = one.refused(one.restore, sealed(bytes(negative[8:])))
+    assert line == "saved state: armature.R = -1 Ohm: must be > 0 Ohm"
+    struct.pack_into("<d", negative, first, float("nan"))
+    line = one.refused(one.restore, sealed(bytes(negative[8:])))
+    assert line == "saved state: a value in it is not one of a state"
+
+
+@both
+@pytest.mark.parametrize("reference", [2**31, 2**31 + 5, 2**32 - 1])
+def test_references_beyond_all_are_refused(unit, fmi, reference):
+    one = unit("DcMotor", fmi).start()
+    known = one.reference["w_ref"]
+    for unknown, by in ((reference, known), (one.reference["a"], reference)):
+        assert f"value reference {reference} is n" in one.refused(
+            one.api.getDirectionalDerivative, [unknown], [by], [1.0]
+        )
+    set_values = one.api.setReal if fmi == 2 else one.api.setFloat64
+    assert one.refused(set_values, [reference], [1.0]) == f"value reference {reference} does not exist"
+
+
+@pytest.fixture(scope="module")
+def german(tmp_path_factory):
+    """A folder with a locale that writes 1,5."""
+    folder = tmp_path_factory.mktemp("locale")
+    if shutil.which("localedef") is None or not Path("/usr/share/i18n/locales/de_DE").exists():
+        pytest.skip("no localedef, or nothing that it makes locales of")
+    subprocess.run(["localedef", "-i", "de_DE", "-f", "UTF-8", folder / "de_DE.UTF-8"], check=True)
+    return folder
+
+
+@both
+def test_messages_do_not_follow_the_hosts_locale(native_fmus, german, fmi):
+    script = textwrap.dedent(
+        """
+        import ctypes, locale, sys
+        sys.path.insert(0, sys.argv[1])
+        from test_fmi_rules import Unit
+        unit = Unit({("DcMotor", int(sys.argv[3])): (None, sys.argv[2])}, "DcMotor", int(sys.argv[3]), None)
+        locale.setlocale(locale.LC_NUMERIC, "de_DE.UTF-8")
+        text = ctypes.create_string_buffer(30)
+        ctypes.CDLL(None).snprintf(text, 30, b"%g", ctypes.c_double(1.5))
+        assert text.value == b"1,5"
+        try:
+            unit.start(rotor__J=-1.5)
+        except Exception:
+            pass
+        """
+    )
+    folder = native_fmus["DcMotor", fmi][1]
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(HERE), folder, str(fmi)],
+        capture_output=True, text=True, env=os.environ | {"LOCPATH": str(german)},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == "[ERROR] rotor.J = -1.5 kg.m2: must be > 0 kg.m2"
+
+
+@pytest.mark.skipif(sys.platform != "linux" or shutil.which("objdump") is None, reason="no objdump")
+def test_libraries_run_with_an_old_glibc(native_fmus):
+    for (name, _), (_, folder) in native_fmus.items():
+        (library,) = Path(folder, "binaries").glob("*/*.so")
+        table = subprocess.run(["objdump", "-T", library], capture_output=True, text=True, check=True).stdout
+        versions = {tuple(map(int, v.split("."))) for v in re.findall(r"GLIBC_([\d.]+)", table)}
+        assert versions and max(versions) <= (2, 17), name
+
+
+@pytest.mark.skipif(sys.platform != "linux" or shutil.which("nm") is None, reason="no nm")
+def test_several_fmus_are_linked_into_one_program(native_fmus, tmp_path):
+    """Two models, each by both versions of FMI, with the prefixes of the standard's headers."""
+    cc, ends = (
+        shutil.which("cc"),
+        {"ChamberForces": ("phi", "w", "tau"), "DcMotor": ("w_ref", "load.tau_bias", "w")},
+    )
+    objects, defined, calls = [], [], []
+    for name in ends:
+        for fmi in (2, 3):
+            folder = native_fmus[name, fmi][1]
+            sources = Path(folder, "sources")
+            prefix = f"-DFMI{fmi}_FUNCTION_PREFIX={name}_"
+            files = [sources / f for f in ("kernels.c", "model.c", f"fmi{fmi}.c")]
+            for file in (*files, HERE / "host.c"):
+                made = tmp_path / f"{name}{fmi}{file.stem}.o"
+                more = (f"-DFMI={fmi}", f"-DLINKED={name}_") if file.stem == "host" else (prefix,)
+                flags = ("-std=c99", "-O1", "-fPIC", "-ffp-contract=off", *more, "-I", str(sources))
+                subprocess.run([cc, *flags, "-c", file, "-o", made], check=True)
+                objects.append(made)
+                if file.stem != "host":
+                    said = subprocess.run(
+                        ["nm", "-g", "--defined-only", made], capture_output=True, text=True
+                    ).stdout
+                    defined += [line.split()[-1] for line in said.splitlines()]
+            description = fmpy.read_model_description(folder)
+            reference = {v.name: str(v.valueReference) for v in description.modelVariables}
+            token = description.guid or description.instantiationToken
+            arguments = ", ".join(f'"{x}"' for x in ("", "", token, *(reference[n] for n in ends[name])))
+            calls.append(
+                (
+                    f"{name}_host{fmi}",
+                    f"{{{arguments}}}",
+                    folder,
+                    [token, *(reference[n] for n in ends[name])],
+                )
+            )
+    assert len(defined) == len(set(defined)), "a name that two of them have"
+    assert all(name.startswith(tuple(f"{model}_" for model in ends)) for name in defined)
+    lines = [f"int {call}(int, char **);" for call, *_ in calls]
+    lines += ["int main(void) {"]
+    lines += [f"    {{ char *a[] = {values}; if ({call}(6, a)) return 1; }}" for call, values, *_ in calls]
+    (tmp_path / "main.c").write_text("\n".join([*lines, "    return 0;", "}", ""]))
+    program = tmp_path / "program"
+    subprocess.run([cc, "-o", program, tmp_path / "main.c", *objects, "-lm"], check=True)
+    together = subprocess.run([program], capture_output=True, text=True, check=True).stdout.split()
+    # each FMU's own library, loaded by itself
+    alone = []
+    for call, _, folder, arguments in calls:
+        host = tmp_path / call
+        flags = [f"-DFMI={call[-1]}", "-I", f"{folder}/sources"]
+        subprocess.run([cc, *flags, "-o", host, HERE / "host.c", "-ldl"], check=True)
+        (library,) = Path(folder, "binaries").glob("*/*.so")
+        alone += subprocess.run(
+            [host, library, *arguments], capture_output=True, text=True, check=True
+        ).stdout.split()
+    assert len(alone) == 40
+    np.testing.assert_allclose([float(x) for x in together], [float(x) for x in alone], rtol=1e-12)
