@@ -87,7 +87,7 @@ def test_temperatures():
 @pytest.mark.parametrize(
     ("text", "line"),
     [
-        ("[machine]\ncrank = { m = -3 }", "machine.crank.m = -3 kg: must be >= 0 kg (mass)"),
+        ("[machine]\ncrank = { m = -3 }", "machine.crank.m = -3 kg: must be >= 0 kg and <= 1e+06 kg (mass)"),
         ("[machine]\nr = nan", "machine.r = nan m: must be finite, > 0 m and <= 10000 m (crank"),
         (
             "[feed]\nleft = { material_mass = inf }",

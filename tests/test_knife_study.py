@@ -353,7 +353,7 @@ def test_the_example_says_what_is_declared():
         ("[machine]\nmass = 3", "machine.mass: unknown key; known here: r, ab"),
         ("[cut]\nforce = 0", "cut.force = 0 N: must be > 0 N"),
         ('[cut]\nforce = "3 m"', 'cut.force = "3 m": must be a number in N'),
-        ("[drive]\nmotor = 'IE3 4-pole 2 kW'", 'drive.motor = "IE3 4-pole 2 kW": not in the catalogue; must be one"),
+        ("[drive]\nmotor = 'IE3 4-pole 2 kW'", 'drive.motor = "IE3 4-pole 2 kW": not in the catalogue; must be one'),
         ("[drive]\nflywheel = -1", "drive.flywheel = -1 kg.m2: must be >= 0 kg.m2"),
         ("[drive]\nflywheels = [1, -2]", "drive.flywheels = -2 kg.m2: must be >= 0 kg.m2"),
         ("[drive]\nflywheels = 3", "drive.flywheels = 3: input should be a valid list"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import re
 
 import numpy as np
@@ -11,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from machines import random_loads, random_machine, random_state
 
-from chainunit import EMPTY, ChainUnit, GeometryError, SideLoads, engines
+from chainunit import EMPTY, ChainUnit, GeometryError, InputError, SideLoads, engines
 from chainunit.machines.api import FREE
 from chainunit.machines.chain_unit import ChamberForces, Stop, half_width_range
 
@@ -269,3 +270,72 @@ def test_a_side_that_is_not_there_cannot_go_slack():
 def test_frozen_declarations():
     with pytest.raises(dataclasses.FrozenInstanceError):
         ChainUnit().p.r = 1.0
+
+
+BAD = [
+    ("material_mass", -50.0, r"left.material_mass = -50 kg: must be >= 0 kg and <= 1e\+06 kg"),
+    ("material_mass", math.nan, "left.material_mass = nan kg: must be finite"),
+    ("material_mass", np.array([1.0, -1e-3, 2.0]), "left.material_mass = -0.001 kg: must be >= 0 kg"),
+    ("processing_force", math.inf, "left.processing_force = inf N: must be finite"),
+]
+
+
+@pytest.mark.parametrize(("name", "value", "told"), BAD)
+def test_loads_out_of_bounds_are_refused_by_name(name, value, told):
+    machine = ChainUnit()
+    loads = dataclasses.replace(EMPTY, **{name: value})
+    for call in (
+        lambda: machine.forces(0.5, 3.0, left=loads),
+        lambda: machine.slopes(0.5, 3.0, left=loads),
+        lambda: machine.torque_by_reactions(0.5, 3.0, left=loads),
+        lambda: machine.friction_torque(0.5, 3.0, left=loads),
+        lambda: machine.chamber(0.1, left=loads),
+        lambda: machine.hanging("left", 0.1, loads),
+        lambda: machine.evaluate({f"left.{name}": value}),
+        lambda: machine.least_web_pull(3.0, left=loads),
+        lambda: machine.slack_speed(left=loads),
+    ):
+        with pytest.raises(InputError, match=told):
+            call()
+
+
+@pytest.mark.parametrize(
+    "bad", [math.nan, math.inf, np.array([0.0, math.nan]), np.array([[1.0], [-math.inf]])]
+)
+def test_motion_that_is_not_finite_is_refused_by_name(bad):
+    machine = ChainUnit()
+    for name in ("phi", "w", "a"):
+        state = {"phi": 0.5, "w": 3.0, "a": 0.0, name: bad}
+        with pytest.raises(InputError, match=rf"^{name} = (nan|inf|-inf) .*must be finite"):
+            machine.forces(**state)
+        with pytest.raises(InputError, match=rf"^{name} = "):
+            machine.evaluate(state)
+    for name in ("psi", "w", "a"):
+        with pytest.raises(InputError, match=rf"^{name} = .* of the rocker"):
+            machine.chamber(**{"psi": 0.1, name: bad})
+
+
+def test_what_is_beyond_a_bound_by_rounding_counts_as_the_bound():
+    machine = ChainUnit()
+    off = SideLoads(material_mass=-1e-12, processing_force=np.array([-1e-9, 0.0]))
+    none = machine.forces(0.5, 3.0, left=EMPTY)
+    assert np.array_equal(machine.forces(0.5, 3.0, left=off).tau, np.full(2, none.tau))
+
+
+def test_a_rocker_angle_at_which_no_organ_can_be_assembled():
+    """Refused alone, NaN in an array; nearer than the limit on either side both are there."""
+    machine = ChainUnit()
+    with pytest.raises(GeometryError, match=r"psi = 2 rad: the right organ cannot be assembled, A1-A2 = "):
+        machine.chamber(2.0)
+    psi = np.linspace(-2.5, 2.5, 101)
+    swept = machine.chamber(psi)
+    known = []
+    for x in psi:
+        try:
+            known.append(float(machine.chamber(float(x)).rocker.tau))
+        except GeometryError:
+            known.append(math.nan)
+    np.testing.assert_allclose(swept.rocker.tau, known, rtol=1e-12)
+    assert 0 < np.isnan(known).sum() < len(known)
+    # each side is masked by itself
+    assert np.any(np.isnan(swept.right.web_pull) & ~np.isnan(swept.left.web_pull))

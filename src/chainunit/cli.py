@@ -57,6 +57,16 @@ def _console(**options: Any) -> Console:
     return Console(markup=False, highlight=False, **options)
 
 
+def _study_file(file: Path | None) -> Any:
+    """A study from its file; what looks like a slip of a unit is said before anything is run."""
+    from . import config as configuration
+
+    loaded = configuration.load(file)
+    for remark in loaded.remarks:
+        _console(stderr=True).print(f"Remark: {remark}.", soft_wrap=True)
+    return loaded
+
+
 @app.command()
 def study(
     config: Annotated[
@@ -82,7 +92,7 @@ def study(
     if example:
         print(configuration.example(), end="")
         return
-    loaded = configuration.load(config)
+    loaded = _study_file(config)
     if loaded.sizing is not None:
         from .drives.catalogue import check_own
 
@@ -333,7 +343,7 @@ def export(
 
             start = knives.start_of(knives.load(config))
         elif config:
-            loaded = configuration.load(config)
+            loaded = _study_file(config)
             start = start_of(loaded, model, backend=kind, report=status.update)
             if rods is None and loaded.chain:
                 rods = int(loaded.chain.rods)
@@ -362,12 +372,11 @@ def export_ssp(
     ] = None,
 ) -> None:
     """Write motor and machine, connected, with their parameter sets, as an SSP 1.0 package of FMUs 2.0."""
-    from . import config as configuration
     from .studies.package import export_study
 
     if output.suffix != ".ssp":
         raise InputError(f"-o {output}: must be a file name that ends in .ssp")
-    loaded = configuration.load(config)
+    loaded = _study_file(config)
     with _console(stderr=True).status("exporting") as status:
         made = export_study(loaded, output, backend=backend.value if backend else None, report=status.update)
     print(f"{output}: {made}")

@@ -21,7 +21,20 @@ from .machines.api import ChainUnit, ratios
 from .machines.chain_unit import ChamberForces, SideLoads
 from .machines.flexible import LEAST, MOST, OrganLaw
 from .quantities import Layout, Value, declaration, group, quantity
-from .reading import Title, filled, first_line, given_values, instance, merged, packaged, read, schema, toml
+from .reading import (
+    Slip,
+    Title,
+    filled,
+    first_line,
+    given_values,
+    instance,
+    merged,
+    packaged,
+    read,
+    schema,
+    slips,
+    toml,
+)
 
 
 @declaration
@@ -49,10 +62,20 @@ class Run:
     """How the machine is run."""
 
     crank_speed: Value = quantity(
-        "rad/s", "speed of the crank in normal running", default=3.0, min=0.01, max=1000.0
+        "rad/s",
+        "speed of the crank in normal running",
+        default=3.0,
+        min=0.01,
+        max=1000.0,
+        usual=(0.05, 25.0),
     )
     ramp: Value = quantity(
-        "s", "time in which the speed reference rises from rest", default=1.5, min=0.001, max=1e4
+        "s",
+        "time in which the speed reference rises from rest",
+        default=1.5,
+        min=0.001,
+        max=1e4,
+        usual=(1e-3, 600.0),
     )
     settle_turns: Value = quantity(
         "1", "crank turns after the ramp, before running counts as steady", default=2.0, min=0.0, max=1e4
@@ -75,18 +98,32 @@ class Overload:
         "1", "crank turns that are followed after the event", default=2.0, min=1.0, max=1e4
     )
     crank_angle: Value = quantity(
-        "rad", "crank angle at which the event begins; at 0 the rocker is at its fastest", default=0.0
+        "rad",
+        "crank angle at which the event begins; at 0 the rocker is at its fastest",
+        default=0.0,
+        usual=(1e-6, 6.3),
     )
     shift: Value = quantity(
-        "s", "time in which material leaves or changes sides", default=0.3, min=1e-4, max=1e4
+        "s",
+        "time in which material leaves or changes sides",
+        default=0.3,
+        min=1e-4,
+        max=1e4,
+        usual=(1e-3, 60.0),
     )
     jam_force: Value = quantity("N", "processing force of a lump that jams an organ", default=2000.0, min=0.0)
-    jam_duration: Value = quantity("s", "time for which the lump holds", default=0.3, min=1e-4, max=1e4)
-    jam_rise: Value = quantity("s", "time in which the jam rises and falls", default=0.02, min=1e-4, max=1e4)
+    jam_duration: Value = quantity(
+        "s", "time for which the lump holds", default=0.3, min=1e-4, max=1e4, usual=(1e-3, 60.0)
+    )
+    jam_rise: Value = quantity(
+        "s", "time in which the jam rises and falls", default=0.02, min=1e-4, max=1e4, usual=(1e-4, 60.0)
+    )
     lumps: Value = quantity(
         "1", "number of lumps that come one after the other", default=4.0, min=1.0, max=1000.0
     )
-    lump_pause: Value = quantity("s", "time between two lumps", default=0.4, min=1e-3, max=1e4)
+    lump_pause: Value = quantity(
+        "s", "time between two lumps", default=0.4, min=1e-3, max=1e4, usual=(1e-3, 60.0)
+    )
     block_stiffness: Value = quantity(
         "N.m/rad", "stiffness of what blocks the rocker", default=2e5, above=0.0, max=1e9
     )
@@ -96,7 +133,9 @@ class Overload:
     dip_depth: Value = quantity(
         "1", "share of the voltage that a dip takes away", default=0.5, min=0.0, max=1.0
     )
-    dip_duration: Value = quantity("s", "time for which the voltage is down", default=0.3, min=1e-3, max=1e4)
+    dip_duration: Value = quantity(
+        "s", "time for which the voltage is down", default=0.3, min=1e-3, max=1e4, usual=(1e-3, 60.0)
+    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -174,7 +213,9 @@ class MonteCarlo:
     """Overloads at random crank angles and times."""
 
     runs: Value = quantity("1", "number of runs; 0 leaves the study out", default=0.0, min=0.0, max=1e6)
-    duration: Value = quantity("s", "time that is followed after a lump", default=2.0, min=0.05, max=1e4)
+    duration: Value = quantity(
+        "s", "time that is followed after a lump", default=2.0, min=0.05, max=1e4, usual=(0.05, 600.0)
+    )
     force_low: Value = quantity("N", "least processing force of the lump", default=1000.0, min=0.0)
     force_high: Value = quantity("N", "largest processing force of the lump", default=3000.0, min=0.0)
     seed: Value = quantity("1", "seed of the random numbers", default=1.0, min=0.0, max=1e9)
@@ -337,6 +378,8 @@ class Config:
     chain: Chain | None
     """the organs as chains, or None for two bars"""
     source: str
+    remarks: tuple[Slip, ...] = ()
+    """values that look like a slip of the unit"""
 
     @property
     def settled(self) -> float:
@@ -376,6 +419,17 @@ def parse(text: str, source: str = "config") -> Config:
         checked: Any = _File.model_validate(_over_example(data))
     except ValidationError as error:
         raise InputError(first_line(error, _File)) from error
+    remarks = tuple(slips({**_SECTIONS, "driveline": Driveline}, data))
+    try:
+        return _config(data, checked, source, remarks)
+    except InputError as error:
+        # what does not fit together may be a slip of the unit
+        hints = [f'was {slip.variable.name} = "{slip.meant}" meant?' for slip in remarks if slip.meant]
+        raise type(error)("; ".join([str(error), *hints])) from error
+
+
+def _config(data: Mapping[str, Any], checked: Any, source: str, remarks: tuple[Slip, ...]) -> Config:
+    """The study of a file whose values are each allowed."""
     _consistent(data, checked)
     machine_given = given_values(checked.machine)
     if checked.ratios.model_fields_set:
@@ -424,6 +478,7 @@ def parse(text: str, source: str = "config") -> Config:
         damping_ratio=checked.driveline.damping_ratio,
         chain=instance(Chain, given_values(checked.chain)) if checked.organ == "chain" else None,
         source=source,
+        remarks=remarks,
     )
     run, turn, o = config.run, 2.0 * math.pi / config.run.crank_speed, config.overload
     lumps = o.lumps * (2.0 * o.jam_rise + o.jam_duration + o.lump_pause) if "lumps" in config.events else 0.0

@@ -106,6 +106,41 @@ def base_units(unit: str) -> dict[str, int]:
     return {base: exponents[base] for base in SI if exponents.get(base)}
 
 
+MOST: dict[str, float] = {
+    "1": 1e6,
+    "m": 1e4,
+    "m/s": 1e4,
+    "m/s2": 1e4,
+    "rad/s": 1e6,
+    "kg": 1e6,
+    "kg.m2": 1e9,
+    "N": 1e8,
+    "N.m": 1e9,
+    "N.m/rad": 1e12,
+    "N.m.s/rad": 1e10,
+    "N.m/A": 1e6,
+    "W": 1e10,
+    "A": 1e6,
+    "V": 1e6,
+    "Ohm": 1e7,
+    "H": 1e4,
+    "K/W": 1e6,
+    "J/K": 1e12,
+    "1/K": 1.0,
+    "1/Wb": 1e6,
+    "Hz": 1e6,
+    "Hz/s": 1e9,
+    "s": 1e6,
+    "A.s/rad": 1e12,
+    "A/rad": 1e15,
+    "Ohm/s": 1e12,
+}
+"""Upper bound of what has a lower bound and declares no upper one, by unit: no machine reaches it, and the equations
+stay within the range of numbers."""
+
+USUAL: dict[str, tuple[float, float]] = {"m": (1e-4, 30.0), "kg": (1e-3, 2e4), "N": (1e-3, 1e6)}
+"""Sizes that machines of this kind have, by unit, where a declaration names none of its own; 0 is always one."""
+
 ROUNDING = 1e-9
 """in parts of a quantity's nominal size: what is beyond a bound by no more counts as the bound"""
 
@@ -113,7 +148,8 @@ ROUNDING = 1e-9
 @dataclass(frozen=True, slots=True)
 class Quantity:
     """One scalar: unit, description, bounds (`low` may itself be forbidden: `open_low`),
-    start value (None for outputs), size that is typical of it, and whether it may change in a run."""
+    start value (None for outputs), size that is typical of it, whether it may change in a run, and the sizes that are
+    usual (beyond them a slip of the unit is likely, nothing is refused)."""
 
     unit: str
     description: str
@@ -123,6 +159,12 @@ class Quantity:
     open_low: bool = False
     nominal: float | None = None
     tunable: bool = False
+    usual: tuple[float, float] | None = None
+
+    def is_usual(self, x: float) -> bool:
+        """Whether a machine of this kind may well have the value `x`."""
+        low, high = self.usual or (0.0, math.inf)
+        return x == 0.0 or low <= abs(x) <= high
 
     @property
     def allowed(self) -> str:
@@ -161,12 +203,17 @@ def quantity(
     above: float | None = None,
     nominal: float | None = None,
     tunable: bool = False,
+    usual: tuple[float, float] | None = None,
 ) -> Any:
     """A field that declares one scalar; `default` is its start value (outputs have none), `above` a
-    lower bound that is itself forbidden."""
+    lower bound that is itself forbidden. Without `max`, what has a lower bound has the upper one of `MOST`; without
+    `usual`, its sizes are those of `USUAL`."""
     base_units(unit)
     low = min if above is None else above
-    declared = Quantity(unit, description, default, low, max, above is not None, nominal, tunable)
+    high = MOST.get(unit, math.inf) if math.isinf(max) and math.isfinite(low) else max
+    declared = Quantity(
+        unit, description, default, low, high, above is not None, nominal, tunable, usual or USUAL.get(unit)
+    )
     metadata = {"quantity": declared}
     if default is None:
         return dataclasses.field(metadata=metadata)

@@ -7,9 +7,11 @@ converted. Every refusal is one line that names the field, its value and what is
 from __future__ import annotations
 
 import dataclasses
+import math
 import re
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -76,7 +78,8 @@ def to_number(variable: Variable, given: Any) -> float:
     except OverflowError:
         raise ValueError(f"{variable.name}: the number is too large; must be {_kind(variable)}") from None
     if not variable.quantity.admits(value):
-        raise ValueError(complaint(variable, value))
+        meant = _meant(variable, given)
+        raise ValueError(complaint(variable, value) + (f'; was "{meant}" meant?' if meant else ""))
     return variable.quantity.bounded(value)
 
 
@@ -103,6 +106,70 @@ def _converted(variable: Variable, text: str) -> float:
         )
     except (pint.PintError, ValueError, TypeError, AttributeError, AssertionError) as error:
         raise refusal from error
+
+
+_TAKEN_FOR = {
+    "m": ("mm", "cm"),
+    "kg": ("kg", "g"),
+    "N": ("N",),
+    "s": ("ms",),
+    "rad": ("deg",),
+    "rad/s": ("rev/min", "deg/s"),
+    "K": ("degC",),
+}
+"""Units that are taken for another one of their kind, the likely ones first, by declared unit."""
+
+
+@dataclass(frozen=True)
+class Slip:
+    """A value that no machine of this kind has: likely a slip of the unit. `meant` is what was probably meant, as a
+    study file takes it, or empty."""
+
+    variable: Variable
+    value: float
+    meant: str
+
+    def as_dict(self) -> dict[str, Any]:
+        """Ready for JSON; `said` is the remark in words."""
+        return {
+            "name": self.variable.name,
+            "given": {"value": self.value, "unit": self.variable.unit},
+            "meant": self.meant or None,
+            "said": str(self),
+        }
+
+    def __str__(self) -> str:
+        v, (low, high) = self.variable, self.variable.quantity.usual or (0.0, 0.0)
+        unit = "" if v.unit == "1" else f" {v.unit}"
+        hint = f'; was "{self.meant}" meant?' if self.meant else ""
+        usual = f"usual: {low:g} to {high:g}{unit}"
+        return f"{v.name} = {self.value:g}{unit}: is unusual ({v.description}; {usual}){hint}"
+
+
+def slips(declared: Mapping[str, type], data: Mapping[str, Any]) -> Iterator[Slip]:
+    """The unusual values among what the sections of a checked file give, `declared` by the name of the section."""
+    for section, of in declared.items():
+        for variable in variables(of, f"{section}."):
+            given: Any = data
+            for name in variable.name.split("."):
+                given = given.get(name) if isinstance(given, Mapping) else None
+            if given is not None:
+                value = to_number(variable, given)
+                if not variable.quantity.is_usual(value):
+                    yield Slip(variable, value, _meant(variable, given))
+
+
+def _meant(variable: Variable, given: Any) -> str:
+    """The number that was given, with the unit in which it is allowed and usual; empty where there is none."""
+    match = _NUMBER.fullmatch(str(given))
+    if match is None or not math.isfinite(float(match[1])):
+        return ""
+    for unit in _TAKEN_FOR.get(variable.unit, ()):
+        text = f"{float(match[1]):g} {unit}"
+        value = _converted(variable, text)
+        if variable.quantity.admits(value) and variable.quantity.is_usual(value):
+            return text
+    return ""
 
 
 def _kind(variable: Variable) -> str:

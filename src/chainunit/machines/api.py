@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..engines import MATH, numpy_
-from ..errors import GeometryError
+from ..errors import GeometryError, InputError
 from ..ports import PortSlopes
+from ..quantities import Layout, Quantity, Variable, complaint
 from . import chain_unit
 from .chain_unit import Chamber, ChamberForces, Inputs, Outputs, Parameters, SideLoads, State, Stop
 from .hanging import Hanging, Modes, modes, rods, split
@@ -20,13 +21,24 @@ CHAIN_RODS = 32
 """Rods of an organ with which its lowest frequency is that of a chain to a thousandth."""
 EMPTY = SideLoads(material_mass=0.0, processing_force=0.0)
 FREE = Stop()
+_INPUTS = {v.name: v for v in ChamberForces.input_layout.variables}
+_ROCKER = {
+    name: Variable(name, f"{what} of the rocker", Quantity(unit, what))
+    for name, what, unit in (
+        ("psi", "angle", "rad"),
+        ("w", "speed", "rad/s"),
+        ("a", "acceleration", "rad/s2"),
+    )
+}
 
 
 class ChainUnit:
     """A chain unit with its parameters checked.
 
     Angles and speeds are the motor's, as at the FMU; with ``ratio`` 1 they are the crank's.
-    Every argument may be a float or an array; shapes broadcast, and outputs have the common shape.
+    Every argument may be a float or an array; shapes broadcast, and outputs have the common shape. A value that
+    is not finite, or a load outside its declared bounds, is an `InputError` that names it, in an array as well as
+    alone; what is beyond a bound by rounding only counts as the bound.
 
     Parameters
     ----------
@@ -84,8 +96,16 @@ class ChainUnit:
     def _inputs(
         self, phi: Any, w: Any, a: Any, left: SideLoads, right: SideLoads, stop: Stop = FREE
     ) -> Inputs:
-        left, right = _arrays(left), _arrays(right)
-        return Inputs(phi=_array(phi), w=_array(w), a=_array(a), left=left, right=right, stop=stop)
+        return Inputs(
+            phi=_admitted(_INPUTS["phi"], phi),
+            w=_admitted(_INPUTS["w"], w),
+            a=_admitted(_INPUTS["a"], a),
+            left=_loads("left", left),
+            right=_loads("right", right),
+            stop=Stop(
+                **{name: _admitted(_INPUTS[f"stop.{name}"], getattr(stop, name)) for name in _STOP_NAMES}
+            ),
+        )
 
     def _state(self, u: Inputs) -> State:
         return ChamberForces.shared(_XP, self.p, u, None)
@@ -100,7 +120,13 @@ class ChainUnit:
         stop: Stop = FREE,
     ) -> Outputs:
         """Torque, load port (without slopes), energies and every reaction at motor angle `phi` [rad],
-        speed `w` [rad/s] and acceleration `a` [rad/s2] (see `Outputs` for names and units)."""
+        speed `w` [rad/s] and acceleration `a` [rad/s2] (see `Outputs` for names and units).
+
+        Raises
+        ------
+        InputError
+            see the class.
+        """
         u = self._inputs(phi, w, a, left, right, stop)
         part = ChamberForces.parts[0]
         out = part.equations(_XP, self.p, u, None, self._state(u))
@@ -125,10 +151,12 @@ class ChainUnit:
         ------
         KeyError
             for a name that is not an input.
+        InputError
+            see the class.
         """
-        names = ChamberForces.input_layout.names
-        u = ChamberForces.input_layout.from_names({**dict.fromkeys(names, 0.0), **inputs})
-        u = ChamberForces.input_layout.instance([_array(v) for v in ChamberForces.input_layout.values(u)])
+        layout = ChamberForces.input_layout
+        u = layout.from_names({**dict.fromkeys(layout.names, 0.0), **inputs})
+        u = layout.instance([_admitted(_INPUTS[n], v) for n, v in layout.named(u).items()])
         outputs = ChamberForces.evaluate(_XP, self.p, u)
         named: dict[str, Any] = {}
         for part, instance in zip(ChamberForces.parts, outputs, strict=True):
@@ -191,15 +219,40 @@ class ChainUnit:
         self, psi: Any, w: Any = 0.0, a: Any = 0.0, left: SideLoads = EMPTY, right: SideLoads = EMPTY
     ) -> Chamber:
         """Loads of the organs at a rocker angle `psi` [rad] (speed `w`, acceleration `a` of the
-        rocker), whatever drives it: the papers' statics at +-12 degrees, beyond this drive's swing."""
-        return chain_unit.chamber(
-            _XP, self.p, Inputs(left=_arrays(left), right=_arrays(right)), _array(psi), _array(w), _array(a)
-        )
+        rocker), whatever drives it: the papers' statics at +-12 degrees, beyond this drive's swing.
+
+        Where a side cannot be assembled an array of angles has NaN in the loads of that side and in those of the
+        rocker: a sweep may pass the limit.
+
+        Raises
+        ------
+        GeometryError
+            for a single angle at which a side cannot be assembled.
+        InputError
+            see the class.
+        """
+        loads = Inputs(left=_loads("left", left), right=_loads("right", right))
+        psi, w, a = (_admitted(_ROCKER[n], x) for n, x in (("psi", psi), ("w", w), ("a", a)))
+        if np.ndim(psi) == 0:
+            self._assembled(float(psi))
+        with np.errstate(invalid="ignore"):
+            return chain_unit.chamber(_XP, self.p, loads, psi, w, a)
+
+    def _assembled(self, psi: float) -> None:
+        p = self.p
+        for side in ("left", "right"):
+            span = float(np.hypot(*self._reach(side, psi)))
+            low, high = abs(p.l1 - p.l2), p.l1 + p.l2
+            if not low < span < high:
+                raise GeometryError(
+                    f"psi = {psi:g} rad: the {side} organ cannot be assembled, A1-A2 = {span:g} m; must be > "
+                    f"{low:g} and < {high:g} m, l1 - l2 and l1 + l2"
+                )
 
     def organ_rods(self, side: str, loads: SideLoads = EMPTY, number: int = CHAIN_RODS) -> tuple[Any, Any]:
         """Lengths [m] and masses [kg] of an organ as `number` rods, shape (number,), wall first, with the material on
         it: as many in wall and web as brings them nearest to equal length."""
-        p, own = self.p, getattr(self.p, side)
+        p, own, loads = self.p, getattr(self.p, side), _loads(side, loads)
         on_web = p.web_share * loads.material_mass
         masses = own.wall_mass + loads.material_mass - on_web, own.web_mass + on_web
         counts = split((p.l1, p.l2), number)
@@ -313,10 +366,23 @@ def ratios(rho: float, lam: float, mu: float, zeta: float, l: float, l1: float) 
     }
 
 
-def _arrays(loads: SideLoads) -> SideLoads:
+def _loads(side: str, loads: SideLoads) -> SideLoads:
     return SideLoads(
-        material_mass=_array(loads.material_mass), processing_force=_array(loads.processing_force)
+        **{name: _admitted(_INPUTS[f"{side}.{name}"], getattr(loads, name)) for name in _LOAD_NAMES}
     )
+
+
+_LOAD_NAMES = Layout(SideLoads).names
+_STOP_NAMES = Layout(Stop).names
+
+
+def _admitted(variable: Variable, given: Any) -> Any:
+    """A float or an array whose every value the declaration admits, what is beyond a bound by rounding on it."""
+    q, x = variable.quantity, _array(given)
+    for extreme in (np.min(x), np.max(x)) if np.size(x) else ():  # NaN is the extreme of what it is in
+        if not q.admits(float(extreme)):
+            raise InputError(complaint(variable, float(extreme)))
+    return q.bounded(x) if isinstance(x, float) else np.clip(x, q.low, q.high)
 
 
 def _array(x: Any) -> Any:

@@ -62,6 +62,7 @@ class Parameters:
         "m",
         "crank bearing O1 lies this far left of the pivot C",
         default=math.sqrt(1.5**2 - 0.15**2),
+        min=-1e4,
         max=1e4,
     )
     hy: Value = quantity(
@@ -97,6 +98,7 @@ class Parameters:
         "factor on m l^2/12 of rods and material: 1 uniform rods, 0 point masses at the middle",
         default=1.0,
         min=0.0,
+        max=100.0,
     )
     pin: Pin = group(Pin, "pins", default=Pin())
     joint_damping: Value = quantity(

@@ -12,7 +12,12 @@ class Rod:
 
     m: Value = quantity("kg", "mass", default=0.0, min=0.0, tunable=True)
     s: Value = quantity(
-        "m", "distance of the centroid from the first pin, along the link", default=0.0, tunable=True
+        "m",
+        "distance of the centroid from the first pin, along the link",
+        default=0.0,
+        min=-1e4,
+        max=1e4,
+        tunable=True,
     )
     I: Value = quantity("kg.m2", "moment of inertia about the centroid", default=0.0, min=0.0, tunable=True)
 
@@ -21,8 +26,10 @@ class Rod:
 class Pin:
     """The pins, all alike."""
 
-    friction: Value = quantity("1", "coefficient of friction", default=0.12, min=0.0, tunable=True)
-    diameter: Value = quantity("m", "diameter", default=0.06, min=0.0, tunable=True)
+    friction: Value = quantity("1", "coefficient of friction", default=0.12, min=0.0, max=100.0, tunable=True)
+    diameter: Value = quantity(
+        "m", "diameter", default=0.06, min=0.0, max=100.0, tunable=True, usual=(1e-3, 1.0)
+    )
     w_smooth: Value = quantity(
         "rad/s", "relative speed below which friction is smoothed", default=0.02, min=1e-9, tunable=True
     )

@@ -259,6 +259,9 @@ def _families(names: Iterable[str]) -> dict[str, list[tuple[str, Variable]]]:
 def _answer(t: Traced, study: Study) -> str:
     answers = t.result["answers"]
     parts, cards = [], []
+    if remarks := t.result.get("remarks"):
+        items = "".join(f"<li>{t.text(f'remarks.{i}.said')}</li>" for i in range(len(remarks)))
+        parts.append(f'<div class="alarm"><strong>Is this what was meant?</strong><ul>{items}</ul></div>')
     nearest = t.result["sizing"].get("nearest") if "sizing" in t.result else None
     if nearest is not None:
         parts.append(

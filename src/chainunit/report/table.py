@@ -78,6 +78,8 @@ def _print_runs(console: Console, table: Callable[[list[str]], Table], runs: Col
 def show(study: Study, console: Console) -> None:
     """Print tables and notes."""
     config = study.config
+    for remark in config.remarks:
+        console.print(f"Remark: {remark}.", soft_wrap=True)
     if study.sizing is not None:
         _show_sizing(study, console)
     warning = "the motor is insufficient" if study.insufficient else ""

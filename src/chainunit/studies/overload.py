@@ -1057,6 +1057,7 @@ def as_dict(study: Study) -> dict[str, Any]:
         },
         "ripple_without_feed_forward": {"value": study.ripple_without, "unit": "1"},
         "fmus": study.made,
+        "remarks": [slip.as_dict() for slip in config.remarks],
         "notes": study.notes,
         "machine": entries(study.drive.machine.p),
         "motor": {"kind": study.drive.motor.name, **entries(study.motor)},

@@ -1,0 +1,171 @@
+"""Bounds that no machine reaches, and what looks like a slip of the unit."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+
+import numpy as np
+import pytest
+from machines import random_machine
+from rich.console import Console
+
+from chainunit import config
+from chainunit.errors import InputError
+from chainunit.machines.chain_unit import ChamberForces
+from chainunit.models import MODELS
+from chainunit.quantities import Layout
+from chainunit.reading import slips
+
+MM = {"r": 150, "l": 1500, "h": 1000, "c": 1492.48, "hy": 1000, "e": 810, "l1": 1350, "l2": 540, "z": 853.815}
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_what_has_a_lower_bound_has_an_upper_one(name):
+    """Angles apart, whose sines stay finite."""
+    model = MODELS[name]
+    for layout in (model.parameter_layout, model.input_layout):
+        for v in layout.variables:
+            q = v.quantity
+            assert not (math.isfinite(q.low) and math.isinf(q.high)) or q.unit in ("rad", "Hz/(N.m)"), v.name
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (
+            "[feed]\nleft = { material_mass = 1e300 }",
+            "feed.left.material_mass = 1e+300 kg: must be >= 0 kg and <= ",
+        ),
+        (
+            "[feed]\nleft = { material_mass = 1e9 }",
+            "feed.left.material_mass = 1e+09 kg: must be >= 0 kg and <= 1e+06",
+        ),
+        (
+            "[feed]\nleft = { processing_force = 1e308 }",
+            "feed.left.processing_force = 1e+308 N: must be >= 0 N and",
+        ),
+        ("[overload]\njam_force = 1e15", "overload.jam_force = 1e+15 N: must be >= 0 N and <= 1e+08 N"),
+        ("[machine]\ncrank = { m = 1e12 }", "machine.crank.m = 1e+12 kg: must be >= 0 kg and <= 1e+06 kg"),
+        (
+            "[machine]\ncrank = { s = 1e200 }",
+            "machine.crank.s = 1e+200 m: must be >= -10000 m and <= 10000 m",
+        ),
+        ("[machine]\ng = 1e30", "machine.g = 1e+30 m/s2: must be >= 0 m/s2 and <= 10000 m/s2"),
+    ],
+)
+def test_what_no_machine_reaches_is_refused(text, told):
+    with pytest.raises(InputError) as refused:
+        config.parse(text)
+    assert str(refused.value).startswith(told)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_at_the_bounds_every_number_is_finite(seed):
+    """A random machine with each of its masses, forces and losses at its upper bound."""
+    rng = np.random.default_rng(seed)
+    machine = random_machine(rng)
+    for v in ChamberForces.parameter_layout.variables:
+        if (v.unit == "m" and "." not in v.name) or v.name == "ratio":
+            continue
+        heavy = machine.replace({v.name: v.quantity.high})
+        loads = {
+            f"{side}.{u.name}": u.quantity.high
+            for side in ("left", "right")
+            for u in Layout(type(config.Feed().left)).variables
+        }
+        out = heavy.evaluate({"phi": 0.3, "w": 100.0, "a": 50.0, **loads})
+        assert all(np.all(np.isfinite(x)) for x in out.values()), v.name
+
+
+def test_the_example_and_random_machines_give_no_remark():
+    assert config.load().remarks == ()
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        named = ChamberForces.parameter_layout.named(random_machine(rng).p)
+        table: dict = {}
+        for name, x in named.items():
+            *groups, last = name.split(".")
+            inner = table
+            for each in groups:
+                inner = inner.setdefault(each, {})
+            inner[last] = float(x)
+        found = list(slips({"machine": ChamberForces.Parameters}, {"machine": table}))
+        assert found == []
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "meant"),
+    [
+        ("[machine]\npin = { diameter = 60 }", "machine.pin.diameter", "60 mm"),
+        ('[machine]\npin = { diameter = "60 m" }', "machine.pin.diameter", "60 mm"),
+        ('[feed]\nleft = { material_mass = "30 t" }', "feed.left.material_mass", "30 kg"),
+        ("[feed]\nleft = { material_mass = 30000 }", "feed.left.material_mass", "30000 g"),
+        ("[machine]\ncrank = { s = 50 }", "machine.crank.s", "50 mm"),
+        ("[machine]\nrocker = { s = -120 }", "machine.rocker.s", "-120 mm"),
+        ('[overload]\njam_force = "2000 kN"', "overload.jam_force", "2000 N"),
+        ("[overload]\njam_force = 5e7", "overload.jam_force", ""),
+        ("[overload]\njam_duration = 300", "overload.jam_duration", "300 ms"),
+        ("[overload]\ncrank_angle = 90", "overload.crank_angle", "90 deg"),
+        ("[run]\ncrank_speed = 30", "run.crank_speed", "30 rev/min"),
+        ("[run]\nramp = 700", "run.ramp", "700 ms"),
+    ],
+)
+def test_a_slip_of_the_unit_is_named_with_what_was_meant(text, name, meant):
+    (slip,) = config.parse(text).remarks
+    assert (slip.variable.name, slip.meant) == (name, meant)
+    assert str(slip).startswith(f"{name} = ") and (f'was "{meant}" meant?' in str(slip)) == bool(meant)
+    if meant:
+        section, *keys = name.split(".")
+        inner = f'"{meant}"'
+        for key in reversed(keys[1:]):
+            inner = f"{{ {key} = {inner} }}"
+        assert config.parse(f"[{section}]\n{keys[0]} = {inner}").remarks == ()
+
+
+def test_a_machine_in_millimetres_is_told_for_each_length():
+    text = "[machine]\n" + "\n".join(f"{name} = {x}" for name, x in MM.items())
+    assert {slip.variable.name: slip.meant for slip in config.parse(text).remarks} == {
+        f"machine.{name}": f"{x:g} mm" for name, x in MM.items()
+    }
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("[machine]\nr = 150", r'machine: c = 1\.49248 m: .*; was machine\.r = "150 mm" meant\?'),
+        ("[run]\nramp = 1500", r'run\.step = .*; was run\.ramp = "1500 ms" meant\?'),
+        ("[motor]\nambient = { T = 20 }", r'motor\.ambient\.T = 20 K: must be .*; was "20 degC" meant\?'),
+        ("[machine]\nl1 = 13500", r'machine\.l1 = 13500 m: must be .*; was "13500 mm" meant\?'),
+    ],
+)
+def test_what_is_refused_for_a_slip_says_so(text, told):
+    with pytest.raises(InputError, match=told):
+        config.parse(text)
+
+
+def test_the_remark_stands_on_terminal_page_and_in_json():
+    from chainunit.report import page, table
+    from chainunit.studies.drive import Drive
+    from chainunit.studies.overload import Study, _statics, as_dict
+
+    given = config.parse("[machine]\npin = { diameter = 60 }")
+    study = Study(given, Drive(config.DcMotor, given.motor, given.machine))
+    _statics(study)
+    result = as_dict(study)
+    said = str(given.remarks[0])
+    assert result["remarks"] == [
+        {
+            "name": "machine.pin.diameter",
+            "given": {"value": 60.0, "unit": "m"},
+            "meant": "60 mm",
+            "said": said,
+        }
+    ]
+    json.dumps(result, allow_nan=False)
+    out = io.StringIO()
+    table.show(study, Console(file=out, markup=False, width=200))
+    assert said in out.getvalue()
+    html = page.render(study, result)
+    assert 'data-path="remarks.0.said"' in html and "Is this what was meant?" in html
