@@ -291,11 +291,20 @@ def test_limit_on_an_inverter_is_the_breakdown_torque():
 # --- switching, starters, inverter ---
 
 
-def test_without_voltage_the_motor_is_off():
+def test_without_voltage_the_terminals_are_short_circuited():
     p, u = parameters(COLD), inputs({"voltage": 0.0, "load.J": 0.1})
     _, x = standing(p, 152.0)
     assert outputs(p, u, x).supply_power == 0.0
     before = outputs(p, inputs({"load.J": 0.1}), x)
+    # currents as at a start, which brake with the energy of the field; open terminals would carry none
+    seen = []
+    for _ in range(20):
+        x = run(p, u, 1e-3, x)
+        seen.append(outputs(p, u, x))
+    locked = steady(engines.MATH, p, 0.0).i
+    assert max(s.i for s in seen) > 0.8 * locked > 3.0 * before.i
+    assert min(s.air_gap_tau for s in seen) < -before.air_gap_tau
+    assert "At 0 it short-circuits the terminals" in InductionMotor.__doc__
     x = run(p, u, 2.0, x)
     out = outputs(p, u, x)
     assert out.i < 1e-4 * before.i and abs(out.air_gap_tau) < 1e-4 * before.air_gap_tau

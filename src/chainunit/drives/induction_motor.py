@@ -406,7 +406,9 @@ class InductionMotor(Motor):
     """A squirrel-cage induction motor, on the line or on an inverter, that owns the shaft and takes a load port.
 
     Direct on line: the start values. Soft start: `soft_start.voltage` below 1. On an inverter: `inverter.on` = 1; the
-    motor then follows `w_ref`. The input `voltage` switches off (0) and makes dips.
+    motor then follows `w_ref`. The input `voltage` makes dips. At 0 it short-circuits the terminals: as long as the
+    field lasts, currents as large as at the start flow and brake the shaft. A motor that a contactor cuts off, with
+    open terminals, coasts instead; that is not in this model.
     """
 
     name = "InductionMotor"
