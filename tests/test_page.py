@@ -16,12 +16,14 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from chainunit import RunError, config
-from chainunit.config import Starter
+from chainunit import EMPTY, RunError, config
+from chainunit.config import Feed, Starter
 from chainunit.drives.induction_motor import SoftStart
 from chainunit.quantities import DISPLAY_UNITS
 from chainunit.report import interactive, motion, page, plots, table
 from chainunit.report.trace import at, digits_text, unit_text
+from chainunit.studies.chain import rest_forces
+from chainunit.studies.cycle import cycle
 from chainunit.studies.overload import as_dict, run_study
 
 SHORT = """
@@ -416,6 +418,31 @@ def test_chains_stand_beside_two_bars(chains, tmp_path):
         "(mode 1, order 1)",
     ):
         assert words in told.getvalue(), words
+
+
+def test_each_snatch_is_in_parts_of_its_own_rest(chains):
+    """At rest a chain of 8 rods pulls as two bars do with this feed, but not without: the parts differ by a fifth."""
+    machine, feed, own = chains.drive.machine, chains.config.feed, chains.chain.own
+    out = cycle(machine, own.speed, feed.left, feed.right).outputs
+    at_rest = machine.chamber(0.0, left=feed.left, right=feed.right)
+
+    def size(joint):
+        return np.hypot(joint.fx, joint.fy)
+
+    sides = ("left", "right")
+    wanted = [
+        np.max(size(getattr(out, side).rocker_joint)) / size(getattr(at_rest, side).rocker_joint)
+        for side in sides
+    ]
+    assert own.two_bar_snatch == pytest.approx(float(max(wanted)), rel=1e-12)
+    empty = Feed(left=EMPTY, right=EMPTY)
+    for given, more in ((feed, 0.9996), (empty, 1.1824)):
+        chain, bars = rest_forces(machine, "left", given, 8)
+        assert bars / chain == pytest.approx(more, abs=1e-4)
+        assert chain == pytest.approx(float(np.hypot(*machine.hanging("left", 0.0, given.left, 8).last)))
+        assert rest_forces(machine, "left", given, 2)[0] == pytest.approx(bars, rel=1e-9)
+    weightless = machine.replace(g=0.0)
+    assert all(math.isnan(x) for x in rest_forces(weightless, "left", feed, 8))
 
 
 def test_the_rods_of_chains_move_as_simulated(chains):

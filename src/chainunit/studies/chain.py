@@ -67,7 +67,7 @@ class SpeedNumbers:
     two_bar_crank_torque: Value = quantity("N.m", "crank torque of two bars, peak")
     two_bar_crank_torque_rms: Value = quantity("N.m", "crank torque of two bars, RMS")
     two_bar_rocker_torque: Value = quantity("N.m", "rocker torque of two bars, peak")
-    two_bar_snatch: Value = quantity("1", "force at A2 of two bars, peak, over that at rest")
+    two_bar_snatch: Value = quantity("1", "force at A2 of two bars, peak, over theirs at rest")
     two_bar_slack_time: Value = quantity(
         "1", "share of the time in which a bar is pushed, by its mean axial pull as a rod's"
     )
@@ -323,16 +323,13 @@ def numbers_at(
         return np.max(np.abs(x), axis=2)
 
     two = cycle(drive.machine, crank_speed, feed.left, feed.right)
-    at_rest = drive.machine.chamber(0.0, left=feed.left, right=feed.right)
     snatch, two_bar_snatch = [], []
     for side in _SIDES:
-        joint, bars = getattr(at_rest, side).rocker_joint, getattr(two.outputs, side)
+        bars = getattr(two.outputs, side).rocker_joint
         size = np.hypot(*(values[f"{side}.rocker_joint.{x}"] for x in ("fx", "fy")))
-        rest = _rest_force(drive.machine, side, getattr(feed, side), sum(drive.rods))
-        # without weight nothing is pulled at rest
-        rest = rest or float(np.hypot(joint.fx, joint.fy)) or math.nan
+        rest, two_bar_rest = rest_forces(drive.machine, side, feed, sum(drive.rods))
         snatch.append(peaks(size) / rest)
-        two_bar_snatch.append(np.max(np.hypot(bars.rocker_joint.fx, bars.rocker_joint.fy)) / rest)
+        two_bar_snatch.append(np.max(np.hypot(bars.fx, bars.fy)) / two_bar_rest)
     snatched = np.maximum(*snatch)
     pushed = two_bar_pulls(drive.machine, two.angle, crank_speed, feed.left, feed.right) < 0.0
     duration = 2.0 * math.pi / crank_speed * turns
@@ -367,11 +364,14 @@ def numbers_at(
     )
 
 
-def _rest_force(machine: ChainUnit, side: str, loads: SideLoads, rods: int) -> float:
-    """Force at A2 with the chain at rest, the rocker in the middle [N]; 0 without weight."""
+def rest_forces(machine: ChainUnit, side: str, feed: Any, rods: int) -> tuple[float, float]:
+    """Force at A2 with the machine at rest, the rocker in the middle [N], of a chain and of two bars: each snatch is in
+    parts of its own. NaN without weight, as nothing is pulled at rest."""
     if machine.p.g == 0.0:
-        return 0.0
-    return float(np.hypot(*machine.hanging(side, 0.0, loads, rods).last))
+        return math.nan, math.nan
+    bars = getattr(machine.chamber(0.0, left=feed.left, right=feed.right), side).rocker_joint
+    chain = machine.hanging(side, 0.0, getattr(feed, side), rods).last
+    return float(np.hypot(*chain)) or math.nan, float(np.hypot(bars.fx, bars.fy)) or math.nan
 
 
 def study_chain(
