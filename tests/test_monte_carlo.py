@@ -19,7 +19,7 @@ from chainunit.config import parse
 from chainunit.cosim import CoSimulation
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.errors import RunError
-from chainunit.studies import monte_carlo
+from chainunit.studies import monte_carlo, quantiles
 from chainunit.studies.drive import Drive
 
 STUDY = """
@@ -43,7 +43,7 @@ SCRIPT = """
     from pathlib import Path
     from chainunit.config import parse
     from chainunit.drives.dc_motor import DcMotor
-    from chainunit.studies import monte_carlo
+    from chainunit.studies import monte_carlo, quantiles
     from chainunit.studies.drive import Drive
 
     if __name__ == "__main__":
@@ -122,9 +122,33 @@ def test_answers_hang_together(killed):
         assert (row["crank_torque_peak"] > row["trip_torque"]) == bool(row["trips"])
         assert 4000.0 <= row["force"] <= 9000.0
     result = monte_carlo.MonteCarloResult(rows, killed[0], 0)
-    sizes = result.quantiles()["crank_torque_peak"]
-    assert sizes["q5"] < sizes["q50"] < sizes["q95"] <= sizes["q99"]
-    assert result.as_dict()["quantiles"]["trips"]["share"]["unit"] == "1"
+    found = result.as_dict()["quantiles"]
+    share = found["trips"]["share"]
+    assert share["unit"] == "1" and share["low"]["value"] < share["value"] < share["high"]["value"]
+
+
+def test_quantiles_have_intervals_or_are_left_out(killed):
+    """Of the few runs the median is told, of 100 like them the 5 % and 95 % quantiles, too, of 400 all."""
+    few = list(killed[1].values())
+    for number, told in ((30, ["q50"]), (100, ["q5", "q50", "q95"]), (400, ["q5", "q50", "q95", "q99"])):
+        rows = [
+            {**few[k % len(few)], "run": k, "crank_torque_peak": 100.0 + k % 97 + 1e-3 * k}
+            for k in range(number)
+        ]
+        result = monte_carlo.MonteCarloResult(rows, killed[0], 0)
+        sizes = result.quantiles()["crank_torque_peak"]
+        assert list(sizes) == told
+        values = [row["crank_torque_peak"] for row in rows]
+        for name, each in sizes.items():
+            assert each == quantiles.quantile(values, float(name[1:]) / 100.0)
+            assert each.low < each.value < each.high
+        entry = result.as_dict()["quantiles"]["crank_torque_peak"][told[-1]]
+        assert entry["low"] == {"value": sizes[told[-1]].low, "unit": "N.m"}
+        assert bool(result.remark) == (number < 368)
+    assert (
+        "30 runs are too few" in (monte_carlo.MonteCarloResult(few[:25] + few[:5], killed[0], 0).remark)
+        and "the 99 % quantile takes 368" in monte_carlo.MonteCarloResult(few, killed[0], 0).remark
+    )
 
 
 def test_lumps_come_anywhere_in_a_turn(killed):
@@ -164,7 +188,7 @@ def test_a_run_that_fails_is_a_row(killed, monkeypatch):
     monte_carlo._worker.popitem()[1].close()
     assert [row["failed"] for row in rows] == [None, "machine: it broke", None]
     result = monte_carlo.MonteCarloResult(rows, killed[0], 0)
-    assert result.failed == 1 and result.quantiles()["crank_torque_peak"]["q50"] > 0.0
+    assert result.failed == 1 and result.quantiles()["crank_torque_peak"] == {}
 
 
 def line(number, **changed):

@@ -21,10 +21,11 @@ from chainunit.config import Feed, Starter
 from chainunit.drives.induction_motor import SoftStart
 from chainunit.quantities import DISPLAY_UNITS
 from chainunit.report import interactive, motion, page, plots, table
-from chainunit.report.trace import at, digits_text, unit_text
+from chainunit.report.trace import at
 from chainunit.studies.chain import rest_forces
 from chainunit.studies.cycle import cycle
 from chainunit.studies.overload import as_dict, run_study
+from chainunit.text import digits_text, shown, unit_text
 
 SHORT = """
 title = "A mill <b>& more</b> </script><!--"
@@ -73,7 +74,7 @@ def candidate(motor, verdict, reason, **utilisations):
         "checks": {
             name: {
                 "title": name.replace("_", "-"),
-                "utilisation": number(used, "1"),
+                "utilisation": number(used, "1", kind="used"),
                 "value": number(None if used is None else 8.0 * used, "N.m"),
                 "limit": number(8.0, "N.m"),
             }
@@ -155,13 +156,21 @@ def check_traced(reader, result):
         if entry["value"] is None:
             assert not re.search(r"\d", n["text"]), n
             continue
+        words, follows = shown(entry["value"], entry["unit"], entry.get("kind", ""))
+        if not re.search(r"\d", words) or words.startswith(("over", "below")):
+            # a shaft that stands, a share beyond any sense
+            assert n["text"].removeprefix("▲ ").startswith(words), n
+            continue
+        if (words, follows) == ("0", "%"):
+            assert abs(entry["value"]) < 5e-5 and n["text"].startswith("0"), n
+            continue
         factor, offset = 1.0, 0.0
         if entry["unit"] in DISPLAY_UNITS and unit_text(DISPLAY_UNITS[entry["unit"]][0]) in n["text"]:
             _, factor, offset = DISPLAY_UNITS[entry["unit"]]
         elif "%" in n["text"]:
             factor = 100.0
-        else:
-            assert n["text"].endswith(unit_text(entry["unit"])), n
+        elif follows != "rev/min":
+            assert n["text"].endswith(follows), n
         assert shown_number(n["text"]) == pytest.approx(factor * entry["value"] + offset, rel=5.1e-3), n
     for w in reader.words:
         assert w["text"] == at(result, w["data-path"]), w
@@ -180,7 +189,8 @@ def test_every_number_is_traced_to_result_json(study, written):
         assert wanted <= paths, section
     for path in ("answers.steady.crank_torque_peak", "certificate.jam_left.energy_residual_share"):
         assert path in paths
-    assert {f"notes.{i}" for i in range(len(result["notes"]))} <= {w["data-path"] for w in reader.words}
+    said = {f"{name}.{i}" for name in ("notes", "warnings") for i in range(len(result[name]))}
+    assert said | {"verdict.model.text", "verdict.motor.text"} <= {w["data-path"] for w in reader.words}
     # what is not traced holds no number, but for the names of pins
     for section in ("header", "answer", "runs", "plots"):
         rest = re.sub(r"\b(A1|A2|O1)\b", "", reader.rest[section])
@@ -278,6 +288,86 @@ def test_steady_running_begins_where_the_study_takes_it(study):
     assert mark.text == "steady from here" and mark.x == slow.settled == pytest.approx(0.7 + math.pi / 3.0)
     first = motion.motion(slow)["runs"][0]
     assert first["time"][first["still"] - 1] < slow.settled <= first["time"][first["still"]]
+
+
+def said_of(study):
+    told = io.StringIO()
+    table.show(study, Console(file=told, width=200))
+    return told.getvalue()
+
+
+def test_the_verdict_comes_first_everywhere(study, written):
+    """Two bars at 6 rad/s, above the resonance: the doubt stands before the numbers, and once."""
+    verdict = as_dict(study)["verdict"]
+    assert verdict["model"]["holds"] == "false"
+    topics = [reason["topic"] for reason in verdict["model"]["reasons"]]
+    assert {"pushed", "crank torque"} <= set(topics)
+    pushed = [r for r in verdict["model"]["reasons"] if r["topic"] == "pushed"]
+    for reason in pushed:
+        name = f"{reason['quantity']}_least"
+        assert reason["value"]["value"] == getattr(study.answers[reason["run"]], name) < 0.0
+    lines = said_of(study).splitlines()
+    assert lines[:2] == [verdict["model"]["text"], verdict["motor"]["text"]]
+    assert sum("pushed" in line for line in study.warnings) == 1
+    assert not any("pull" in line for line in study.notes)
+    text = written.read_text("utf-8")
+    answer = text[text.index('<section id="answer"') :]
+    assert (
+        answer.index("verdict.model.text") < answer.index("verdict.motor.text") < answer.index('class="lead"')
+    )
+    assert 'class="judged false"' in answer
+
+
+def test_a_speed_that_is_not_reached_does_not_head_the_table(study):
+    answers = dict(study.answers)
+    answers["steady"] = dataclasses.replace(answers["steady"], speed_mean=3.74)
+    slow = dataclasses.replace(study, answers=answers)
+    text = said_of(slow)
+    assert "crank at 3.74 rad/s; 6 rad/s NOT reached" in text and "crank at 6 rad/s" not in text
+    assert "The motor does NOT reach the speed: 3.74 rad/s in place of 6 rad/s" in text
+    result = as_dict(slow)
+    assert result["verdict"]["motor"]["holds"] == "false"
+
+    def lead(study):
+        text = page.render(study, as_dict(study))
+        return text[text.index('class="lead"') :].partition("</p>")[0]
+
+    assert all(words in lead(slow) for words in ("answers.steady.speed_mean", "asked for", "▲"))
+    assert "crank at 6 rad/s" in said_of(study)
+    assert "run.crank_speed" in lead(study) and "asked for" not in lead(study)
+
+
+def test_each_overload_factor_says_its_use(study, written):
+    """On the terminal, on the page, in the data: which question each answers, and which one sizes the drive."""
+    factors = as_dict(study)["overload_factors"]
+    assert list(factors) == ["crank_torque", "rocker_torque", "static_at_extreme"]
+    assert [name for name, factor in factors.items() if "sizes the drive" in factor["for"]] == [
+        "crank_torque"
+    ]
+    assert "bearings" in factors["rocker_torque"]["for"] and "papers" in factors["static_at_extreme"]["for"]
+    told, page_text = said_of(study), written.read_text("utf-8")
+    for name, factor in factors.items():
+        assert (
+            factor["for"] in told and f'data-path="overload_factors.{name}.for">{factor["for"]}<' in page_text
+        )
+
+
+def test_one_number_of_the_reserve_everywhere(study, written):
+    """Steady running leaves (limit - peak)/limit, in %, on the terminal, on the page and in the data."""
+    answers, limit = study.answers, study.drive.largest_torque()
+    result = as_dict(study)
+    for run in answers:
+        wanted = (limit - answers[run].motor_torque_peak) / limit
+        assert result["answers"][run]["torque_reserve"]["value"] == pytest.approx(wanted, abs=1e-12)
+    shown_there = {
+        n["data-path"].split(".")[1]: n["text"].replace("\u00a0", " ").replace("−", "-")
+        for n in Reader(written.read_text("utf-8")).numbers
+        if n["data-path"].endswith(".torque_reserve")
+    }
+    row = next(line for line in said_of(study).splitlines() if "reserve of torque  " in line)
+    cells = [cell.strip() for cell in row.strip("│ ").split("│")][1:]
+    assert cells == [shown_there[run] for run in ("steady", "feed_left", "jam_left")]
+    assert all(cell.endswith(" %") for cell in cells)
 
 
 def test_a_long_study_is_thinned_out(study, monkeypatch):
@@ -391,14 +481,26 @@ def test_chains_stand_beside_two_bars(chains, tmp_path):
         f"{bar} {k}" for bar in ("wall", "web") for k in range(9)
     }
     assert any(
-        note.startswith("chains: the crank speed lies among those to avoid") for note in result["notes"]
+        note.startswith("chains: the crank speed lies among those to avoid") for note in result["warnings"]
     )
 
     text = page.render(chains, result)
     reader = Reader(text)
     check_traced(reader, result)
     paths = {n["data-path"] for n in reader.numbers}
-    assert {f"chain.own_speed.{name}" for name in own} <= paths
+    # starts that differ tell no quantile
+    missing = {
+        f"{name}{end}"
+        for name in ("crank_torque_high", "rocker_torque_high", "snatch_high")
+        if own[f"{name}_from"]["value"] is None
+        for end in ("", "_from", "_to")
+    }
+    assert {f"chain.own_speed.{name}" for name in own} - paths == {
+        f"chain.own_speed.{name}" for name in missing
+    }
+    for name in ("crank_torque_high", "rocker_torque_high", "snatch_high"):
+        ends = [own[f"{name}{end}"]["value"] for end in ("_from", "", "_to")]
+        assert name in missing or ends == sorted(ends)
     assert {"chain.distance_to_resonance", "chain.avoid.0.from", "chain.eta", "chain.starts"} <= paths
     assert {f"chain.avoid.{i}.why" for i in range(len(found["avoid"]))} <= {
         w["data-path"] for w in reader.words

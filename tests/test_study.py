@@ -413,7 +413,7 @@ def test_a_cycle_that_does_not_close_is_told(text, told, there, tmp_path, monkey
 
     monkeypatch.setattr(overload, "_PATIENCE", 0.0)
     study, _ = ran(text, tmp_path)
-    assert any(told in note for note in study.notes)
+    assert any(told in note for note in study.warnings)
     assert (tmp_path / "load_cycle.csv").exists() == there
 
 

@@ -148,8 +148,9 @@ ROUNDING = 1e-9
 @dataclass(frozen=True, slots=True)
 class Quantity:
     """One scalar: unit, description, bounds (`low` may itself be forbidden: `open_low`),
-    start value (None for outputs), size that is typical of it, whether it may change in a run, and the sizes that are
-    usual (beyond them a slip of the unit is likely, nothing is refused)."""
+    start value (None for outputs), size that is typical of it, whether it may change in a run, the sizes that are
+    usual (beyond them a slip of the unit is likely, nothing is refused), and how people show it beside its unit
+    (`kind`, see `chainunit.text`)."""
 
     unit: str
     description: str
@@ -160,6 +161,7 @@ class Quantity:
     nominal: float | None = None
     tunable: bool = False
     usual: tuple[float, float] | None = None
+    kind: str = ""
 
     def is_usual(self, x: float) -> bool:
         """Whether a machine of this kind may well have the value `x`."""
@@ -204,15 +206,25 @@ def quantity(
     nominal: float | None = None,
     tunable: bool = False,
     usual: tuple[float, float] | None = None,
+    kind: str = "",
 ) -> Any:
     """A field that declares one scalar; `default` is its start value (outputs have none), `above` a
     lower bound that is itself forbidden. Without `max`, what has a lower bound has the upper one of `MOST`; without
-    `usual`, its sizes are those of `USUAL`."""
+    `usual`, its sizes are those of `USUAL`. `kind` says how people show it (see `chainunit.text`)."""
     base_units(unit)
     low = min if above is None else above
     high = MOST.get(unit, math.inf) if math.isinf(max) and math.isfinite(low) else max
     declared = Quantity(
-        unit, description, default, low, high, above is not None, nominal, tunable, usual or USUAL.get(unit)
+        unit,
+        description,
+        default,
+        low,
+        high,
+        above is not None,
+        nominal,
+        tunable,
+        usual or USUAL.get(unit),
+        kind,
     )
     metadata = {"quantity": declared}
     if default is None:
@@ -250,6 +262,11 @@ class Variable:
     def unit(self) -> str:
         """The unit, as in the declaration."""
         return self.quantity.unit
+
+    @property
+    def kind(self) -> str:
+        """How people show it, as in the declaration."""
+        return self.quantity.kind
 
 
 def variables(cls: type, prefix: str = "", context: str = "", default: Any = None) -> Iterator[Variable]:

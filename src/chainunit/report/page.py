@@ -23,23 +23,19 @@ from plotly.offline import get_plotlyjs  # type: ignore[import-untyped]
 from .. import __version__
 from ..files import whole
 from ..quantities import Layout, Variable
+from ..studies.cycle import OverloadFactors
 from ..studies.monte_carlo import Sample
 from ..studies.overload import SCENARIOS, Answers, Limits, Study, as_dict
 from ..studies.shaft import ShaftAnswers, Torsion
 from ..studies.sizing import Verdict
 from .interactive import Plot, called, plots
 from .motion import motion
-from .trace import Traced, at
+from .trace import Traced
 
 NAME = "report.html"
 
 # the families of answers that are shown large, each by its first field
 _KEY = ("crank_torque_peak", "motor_torque_peak", "power_peak", "current_peak", "winding_temperature")
-_FACTORS = {
-    "static_at_extreme": "R_left/(R_left - R_right) at the right extreme, at rest",
-    "rocker_torque": "rocker torque, ratio of cycle maxima",
-    "crank_torque": "crank torque, ratio of cycle maxima",
-}
 _VERSIONS = ("numpy", "casadi", "fmpy", "plotly")
 _POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; "
@@ -153,19 +149,15 @@ def _table(
 def _given(t: Traced, section: str, declared: Any, caption: str) -> str:
     """The table of what was given for a declaration."""
     rows = [
-        (escape(_capital(v.description)), t.number(f"{section}.{v.name}", given=True, form=_angle(v.unit)))
+        (escape(_capital(v.description)), t.number(f"{section}.{v.name}", given=True))
         for v in _variables(declared, t.result[section])
     ]
     return _table((), rows, caption=caption)
 
 
-def _angle(unit: str) -> str:
-    return "display" if unit in ("rad", "K") else ""
-
-
 def _header(t: Traced, study: Study, title: str, sections: list[tuple[str, str, str]]) -> str:
-    def n(path: str, form: str = "", *, given: bool = True) -> str:
-        return t.number(path, form=form, given=given)
+    def n(path: str, kind: str | None = None, *, given: bool = True) -> str:
+        return t.number(path, kind=kind, given=given)
 
     overloads = [called(name) for name in study.answers if name in SCENARIOS]
     if "sizing" in t.result:
@@ -176,7 +168,7 @@ def _header(t: Traced, study: Study, title: str, sections: list[tuple[str, str, 
             f"{n('machine.ratio')}, in normal running at "
         )
     asked += (
-        f"{n('run.crank_speed')} ({n('run.crank_speed', 'display', given=False)}). The left organ carries "
+        f"{n('run.crank_speed')} ({n('run.crank_speed', 'rotation', given=False)}). The left organ carries "
         f"{n('feed.left.material_mass')} of material and works against {n('feed.left.processing_force')}, the right "
         f"one {n('feed.right.material_mass')} and {n('feed.right.processing_force')}."
     )
@@ -188,7 +180,7 @@ def _header(t: Traced, study: Study, title: str, sections: list[tuple[str, str, 
     if overloads:
         asked += (
             " Then come overloads, each by itself, which begin at a crank angle of "
-            f"{n('overload.crank_angle', 'display')} and are followed for {n('overload.turns')} turns or longer: "
+            f"{n('overload.crank_angle')} and are followed for {n('overload.turns')} turns or longer: "
             f"{escape('; '.join(overloads))}."
         )
     status = ""
@@ -258,7 +250,7 @@ def _families(names: Iterable[str]) -> dict[str, list[tuple[str, Variable]]]:
 
 def _answer(t: Traced, study: Study) -> str:
     answers = t.result["answers"]
-    parts, cards = [], []
+    parts, cards = [_verdict(t)], []
     if remarks := t.result.get("remarks"):
         items = "".join(f"<li>{t.text(f'remarks.{i}.said')}</li>" for i in range(len(remarks)))
         parts.append(f'<div class="alarm"><strong>Is this what was meant?</strong><ul>{items}</ul></div>')
@@ -276,7 +268,7 @@ def _answer(t: Traced, study: Study) -> str:
             for family, members in _families(answers[reference]).items()
             if members[0][1].name in _KEY
         ]
-        large = f"Large: {called(reference)} at {t.number('run.crank_speed', given=True)} of the crank."
+        large = f"Large: {called(reference)} at {_speed(t, reference)} of the crank."
         worst = " Below: the overload that asks most." if any(run in SCENARIOS for run in answers) else ""
         parts.append(f'<p class="lead">{large}{worst}</p>')
     elif t.result["status"] == "complete":
@@ -286,18 +278,44 @@ def _answer(t: Traced, study: Study) -> str:
     if t.result["overload_factors"]:
         cards.append(_factor_card(t))
     parts.append(f'<div class="cards">{"".join(cards)}</div>')
-    verdicts = [path for path, verdict in _notes(t) if verdict]
-    if verdicts:
+    warnings = range(len(t.result["warnings"]))
+    if warnings:
         parts.append(
             '<ul class="verdicts">'
             + "".join(
-                f'<li><span class="sign" aria-hidden="true">!</span> {t.text(p)}</li>' for p in verdicts
+                f'<li><span class="sign" aria-hidden="true">!</span> {t.text(f"warnings.{i}")}</li>'
+                for i in warnings
             )
             + "</ul>"
         )
     elif answers:
         parts.append('<p class="fine">No run gives cause for a warning.</p>')
     return "\n".join(parts)
+
+
+_HOLDS = {"true": "✓", "in part": "◐", "false": "✗"}
+
+
+def _verdict(t: Traced) -> str:
+    """First of all: whether the model holds, and whether the motor does what is asked of it."""
+    found = t.result["verdict"]
+    lines = [(name, found[name]["holds"]) for name in ("model", "motor") if found[name] is not None]
+    return "".join(
+        f'<p class="judged {holds.replace(" ", "-")}"><span class="sign" aria-hidden="true">{_HOLDS[holds]}</span> '
+        f"{t.text(f'verdict.{name}.text')}</p>"
+        for name, holds in lines
+    )
+
+
+def _speed(t: Traced, run: str) -> str:
+    """The crank speed that a run has: the one asked for, or the one reached and marked where it is another."""
+    asked = t.number("run.crank_speed", given=True)
+    if run != "steady" or t.result["verdict"]["motor"]["holds"] != "false":
+        return asked
+    return (
+        f'<strong class="missed"><span aria-hidden="true">▲</span> {t.number(f"answers.{run}.speed_mean")}</strong>, '
+        f"not the {asked} asked for,"
+    )
 
 
 def _runs(t: Traced) -> str:
@@ -333,7 +351,7 @@ def _runs(t: Traced) -> str:
         rows = [
             (
                 escape(_capital(v.description)),
-                t.number(f"limits.{v.name}", form=_angle(v.unit), none="none"),
+                t.number(f"limits.{v.name}", none="none"),
             )
             for v in Layout(Limits).variables
             if v.name in t.result["limits"]
@@ -345,7 +363,7 @@ def _runs(t: Traced) -> str:
 def _chains(t: Traced) -> str:
     """Chains beside two bars at the study's speed, and over the speeds of the sweep."""
     chain = t.result["chain"]
-    quantile = f"{t.number('chain.quantile', form='percent', given=True)} quantile"
+    quantile = f"{t.number('chain.quantile', given=True)} quantile"
     parts = [
         f'<p class="lead">The organs are chains of {t.number("chain.rods_of_wall", given=True)} rods in the wall and '
         f"{t.number('chain.rods_of_web', given=True)} in the web, the crank is held at constant speed, "
@@ -375,44 +393,48 @@ def _chains(t: Traced) -> str:
         ends = (t.number(f"chain.sweep.{i}.speed") for i in (0, len(chain["sweep"]) - 1))
         parts.append(f'<p class="fine">No speed to avoid from {" to ".join(ends)}.</p>')
 
-    def own(name: str, form: str = "") -> str:
-        return t.number(f"chain.own_speed.{name}", form=form) if name else ""
+    def own(name: str) -> str:
+        if not name:
+            return ""
+        shown, ends = t.number(f"chain.own_speed.{name}"), f"{name}_from"
+        return (
+            shown if ends not in chain["own_speed"] else _told(t, f"chain.own_speed.{name}", "_from", "_to")
+        )
 
     rows = [
-        (title, *(own(name, form) for name in names))
-        for title, form, names in (
+        (title, *(own(name) for name in names))
+        for title, names in (
             (
                 "Crank torque, peak",
-                "",
                 ("crank_torque_median", "crank_torque_high", "two_bar_crank_torque"),
             ),
-            ("Crank torque, RMS", "", ("crank_torque_rms", "", "two_bar_crank_torque_rms")),
+            ("Crank torque, RMS", ("crank_torque_rms", "", "two_bar_crank_torque_rms")),
             (
                 "Rocker torque, peak",
-                "",
                 ("rocker_torque_median", "rocker_torque_high", "two_bar_rocker_torque"),
             ),
-            ("Snatch: force at A2 over that at rest", "", ("snatch_median", "snatch_high", "two_bar_snatch")),
-            ("Snatch, largest over least median of a start", "", ("snatch_spread", "", "")),
+            ("Snatch: force at A2 over its own at rest", ("snatch_median", "snatch_high", "two_bar_snatch")),
+            ("Turns that count as independent, at the quantile", ("independent_turns", "", "")),
+            ("Snatch, largest over least median of a start", ("snatch_spread", "", "")),
             (
                 "Time with a slack rod; two bars: with one that pushes",
-                "percent",
                 ("slack_time", "", "two_bar_slack_time"),
             ),
-            ("Rods that are slack, mean over time", "percent", ("slack_rods", "", "")),
-            ("Largest angle between neighbouring rods", "display", ("fold_largest", "", "")),
-            ("Energy residual of an organ over the energy moved", "", ("energy_residual", "", "")),
+            ("Rods that are slack, mean over time", ("slack_rods", "", "")),
+            ("Largest angle between neighbouring rods", ("fold_largest", "", "")),
+            ("Energy residual of an organ over the energy moved", ("energy_residual", "", "")),
         )
     ]
     if chain["resonance"]["value"] is not None:
         rows.append(("Resonance of an organ, crank speed", t.number("chain.resonance"), "", ""))
-        distance = t.number("chain.distance_to_resonance", form="percent")
+        distance = t.number("chain.distance_to_resonance")
         rows.append(("Distance to it, relative; negative below", distance, "", ""))
     parts.append(
         _table(
             ("", "Chains, median", f"Chains, {quantile}", "Two bars"),
             rows,
-            caption=f"At {t.number('chain.own_speed.speed', given=True)} of the crank",
+            caption=f"At {t.number('chain.own_speed.speed', given=True)} of the crank; small: interval of "
+            f"{t.number('chain.confidence', given=True)} confidence",
         )
     )
     slack = [
@@ -420,7 +442,7 @@ def _chains(t: Traced) -> str:
             escape(_capital(side)),
             ", ".join(
                 f"{t.text(f'chain.slack_by_rod.{side}.{k}.rod')}: "
-                f"{t.number(f'chain.slack_by_rod.{side}.{k}', form='percent')}"
+                f"{t.number(f'chain.slack_by_rod.{side}.{k}')}"
                 for k, rod in enumerate(rods)
                 if rod["value"] > 0.0
             )
@@ -446,13 +468,16 @@ def _chains(t: Traced) -> str:
             (
                 t.number(f"chain.sweep.{i}.speed"),
                 *(
-                    t.number(f"chain.sweep.{i}.{name}", form="percent" if name == "slack_time" else "")
+                    "–"
+                    if speed.get(f"{name}_from", {"value": 0.0})["value"] is None
+                    else t.number(f"chain.sweep.{i}.{name}")
                     for name in columns
                 ),
             )
-            for i in range(len(chain["sweep"]))
+            for i, speed in enumerate(chain["sweep"])
         ]
-        parts.append(_table(("Crank speed", *columns.values()), sweep, caption="Over the crank speed"))
+        caption = "Over the crank speed; –: the starts differ by so much that they do not tell the quantile"
+        parts.append(_table(("Crank speed", *columns.values()), sweep, caption=caption))
     if chain["critical_speeds"]:
         found: dict[float, dict[float, int]] = {}
         for i, each in enumerate(chain["critical_speeds"]):
@@ -476,6 +501,14 @@ def _chains(t: Traced) -> str:
     return "\n".join(parts)
 
 
+def _told(t: Traced, path: str, low: str, high: str) -> str:
+    """An estimate with its interval; without one the number of runs, or starts that differ, cannot tell it."""
+    if t.value(path + low) is None:
+        return '<span class="none">starts differ</span>'
+    ends = " to ".join(t.number(path + end) for end in (low, high))
+    return f'{t.number(path)} <span class="of">{ends}</span>'
+
+
 def _random(t: Traced) -> str:
     """The quantiles of overloads at random."""
     found = t.result["monte_carlo"]["quantiles"]
@@ -485,17 +518,17 @@ def _random(t: Traced) -> str:
         (
             escape(_capital(named.get(name, _words(name)).removeprefix("1 where "))),
             *(
-                t.number(f"monte_carlo.quantiles.{name}.{k}", form="percent" if k == "share" else "")
-                if k in sizes
-                else ""
+                _told(t, f"monte_carlo.quantiles.{name}.{k}", ".low", ".high") if k in sizes else ""
                 for k in columns
             ),
         )
         for name, sizes in found.items()
+        if sizes
     ]
     heads = ("", *(f"{k[1:]} % of runs below" if k.startswith("q") else "Share of runs" for k in columns))
-    runs = t.number("monte_carlo.runs", given=True)
-    return _table(heads, rows, caption=f"Overloads at random angles and of random hardness, {runs} runs")
+    runs, certain = (t.number(f"monte_carlo.{name}", given=True) for name in ("runs", "confidence"))
+    caption = f"Overloads at random angles and of random hardness, {runs} runs"
+    return _table(heads, rows, caption=f"{caption}; small: interval of {certain} confidence")
 
 
 def _pins(t: Traced) -> str:
@@ -525,7 +558,7 @@ def _shaft(t: Traced) -> str:
     rows = [
         (
             escape(_capital(v.description)),
-            *(t.number(f"shaft.{run}.{v.name}", form=_angle(v.unit)) for run in runs),
+            *(t.number(f"shaft.{run}.{v.name}") for run in runs),
         )
         for v in Layout(ShaftAnswers).variables
     ]
@@ -567,27 +600,21 @@ def _card(t: Traced, family: str, members: list[tuple[str, Variable]], run: str)
 
 def _answer_number(t: Traced, run: str, v: Variable) -> str:
     none = "not reached" if v.name == "recovery_time" and run != "steady" else "–"
-    form = "percent" if v.name in ("speed_dip", "speed_ripple", "slack_time", "cycle_gap") else _angle(v.unit)
-    return t.number(f"answers.{run}.{v.name}", form=form, none=none)
+    return t.number(f"answers.{run}.{v.name}", none=none)
 
 
 def _factor_card(t: Traced) -> str:
+    described = {v.name: v.description for v in Layout(OverloadFactors).variables}
     rows = "".join(
         f'<div class="factor"><span class="large">{t.number(f"overload_factors.{name}", none="none")}</span>'
-        f'<span class="which">{escape(_FACTORS.get(name, _words(name)))}</span></div>'
+        f'<span class="which">{escape(described[name])}<br>{t.text(f"overload_factors.{name}.for")}</span></div>'
         for name in t.result["overload_factors"]
     )
+    speed = t.number("run.crank_speed", given=True)
     return (
         '<article class="card"><h3>Overload factor</h3>'
-        f'{rows}<p class="also">left organ alone against both</p></article>'
+        f'{rows}<p class="also">left organ alone against both, at {speed}</p></article>'
     )
-
-
-def _notes(t: Traced) -> Iterator[tuple[str, bool]]:
-    """Path of each note, and whether it is a verdict on a run (it begins with the run's name)."""
-    starts = tuple(f"{called(run)}:" for run in ("start_up", "steady", *SCENARIOS, "chains"))
-    for i, note in enumerate(t.result["notes"]):
-        yield f"notes.{i}", note.startswith(starts)
 
 
 def _sizing(t: Traced) -> str:
@@ -684,10 +711,7 @@ def _leaf(t: Traced, path: str) -> str:
         return t.text(path)
     if isinstance(entry, str):
         return t.text(f"{path}.value")
-    # a rise of temperature is in K, too, but never as large as a temperature
-    hot = at(t.result, path)["unit"] == "K" and (entry or 0.0) > 200.0
-    form = "display" if hot else ""
-    return t.number(path, given=path.startswith("sizing.asked"), form=form, none="none")
+    return t.number(path, given=path.startswith("sizing.asked"), none="none")
 
 
 _NAMED = 5  # of the candidates that do not fit; the table has all
@@ -744,9 +768,7 @@ def _candidates(t: Traced, candidates: list[Any], chosen: int | None) -> str:
 
 def _check(t: Traced, check: Any, path: str) -> str:
     size = check["utilisation"]["value"]
-    shown = t.number(
-        f"{path}.utilisation", form="percent", none="no value", prefix="▲ " if size and size > 1.0 else ""
-    )
+    shown = t.number(f"{path}.utilisation", none="no value", prefix="▲ " if size and size > 1.0 else "")
     over = size is not None and size > 1.0
     width = 0.0 if size is None else 100.0 * min(max(size, 0.0), 1.5) / 1.5
     bar = f'<span class="bar" aria-hidden="true"><span style="width:{width:.1f}%"></span></span>'
@@ -775,7 +797,7 @@ def _figures(t: Traced, drawn: list[Plot]) -> str:
             caption = "Upright, dashed: the event. Shaded: what the machine is given changes."
             if plot.run in t.result["answers"]:
                 caption += (
-                    f" The speed dips by {t.number(f'answers.{plot.run}.speed_dip', form='percent')}; recovery: "
+                    f" The speed dips by {t.number(f'answers.{plot.run}.speed_dip')}; recovery: "
                     f"{t.number(f'answers.{plot.run}.recovery_time', none='not reached')}."
                 )
         height = plot.figure.layout.height
@@ -830,9 +852,8 @@ width goes with its mass. Joints are those of the simulated run.</figcaption>
 
 def _basis(t: Traced, study: Study) -> str:
     parts = []
-    assumptions = [path for path, verdict in _notes(t) if not verdict]
-    if assumptions:
-        items = "".join(f"<li>{t.text(path)}</li>" for path in assumptions)
+    if t.result["notes"]:
+        items = "".join(f"<li>{t.text(f'notes.{i}')}</li>" for i in range(len(t.result["notes"])))
         parts.append(f"<h3>Assumptions</h3><ul>{items}</ul>")
     certificate = t.result["certificate"]
     if certificate:

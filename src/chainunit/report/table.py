@@ -11,11 +11,14 @@ from rich.text import Text
 
 from ..config import OVERLOADS, by_side
 from ..quantities import Layout, Variable
-from ..studies.chain import HIGH, ChainResult
+from ..studies.chain import HIGH, ChainResult, SpeedNumbers
+from ..studies.cycle import FACTOR_FOR, OverloadFactors
 from ..studies.monte_carlo import QUANTILES, MonteCarloResult, Sample
-from ..studies.overload import Answers, Study
+from ..studies.overload import Answers, Limits, Study, motor_verdict, reached
+from ..studies.quantiles import CONFIDENCE, Estimate
 from ..studies.shaft import ShaftAnswers
 from ..studies.sizing import recommended
+from ..text import number, plain, shown
 
 _HIDDEN = {
     "supply_power_mean",
@@ -38,24 +41,20 @@ _IF_ANY = {
 }
 
 
-def _number(value: float | None, unit: str) -> str:
-    if value is None or math.isnan(value):
-        return "not reached"
-    if unit == "1":
-        return f"{100.0 * value:.2f} %"
-    shown = unit.replace(".", " ")
-    return f"{value:.3g} {shown}" if abs(value) < 100.0 else f"{value:.0f} {shown}"
-
-
 def _cell(study: Study, run: str, v: Variable) -> str:
-    value = getattr(study.answers[run], v.name)
-    if value is None and v.name != "recovery_time":
-        return "-"
     if v.name == "recovery_time" and run == "steady":
         return ""
-    if v.unit == "rad":
-        return f"{math.degrees(value):.3g} deg"
-    return _number(value, v.unit)
+    none = "not reached" if v.name == "recovery_time" else "-"
+    return number(getattr(study.answers[run], v.name), v.unit, v.kind, none=none)
+
+
+def _head(study: Study) -> str:
+    """The speed that the crank reaches, and what was asked for where it is another."""
+    asked = number(study.config.run.crank_speed, "rad/s", full=False)
+    steady = study.answers.get("steady")
+    if steady is None or reached(steady, study.config.run.crank_speed):
+        return f"crank at {asked}"
+    return f"crank at {number(steady.speed_mean, 'rad/s')}; {asked} NOT reached"
 
 
 def _short(run: str) -> str:
@@ -78,6 +77,9 @@ def _print_runs(console: Console, table: Callable[[list[str]], Table], runs: Col
 def show(study: Study, console: Console) -> None:
     """Print tables and notes."""
     config = study.config
+    for line in (study.verdict and study.verdict.text, (motor_verdict(study) or {}).get("text")):
+        if line:
+            console.print(line, soft_wrap=True)
     for remark in config.remarks:
         console.print(f"Remark: {remark}.", soft_wrap=True)
     if study.sizing is not None:
@@ -87,7 +89,7 @@ def show(study: Study, console: Console) -> None:
 
     def answers(runs: list[str]) -> Table:
         table = Table(title=Text(title) if title else None, title_justify="left")
-        table.add_column(f"crank at {config.run.crank_speed:g} rad/s")
+        table.add_column(_head(study))
         for name in runs:
             table.add_column(_short(name), justify="right")
         for v in Layout(Answers).variables:
@@ -103,13 +105,15 @@ def show(study: Study, console: Console) -> None:
     if study.monte_carlo is not None:
         _show_monte_carlo(study.monte_carlo, console)
     if study.factors:
-        f = study.factors
-        table = Table(title="Overload factor, left organ alone against both", title_justify="left")
-        table.add_column("way")
-        table.add_column("factor", justify="right")
-        table.add_row("R_left/(R_left - R_right) at the right extreme, at rest", f"{f.static_at_extreme:.3f}")
-        table.add_row("rocker torque, ratio of cycle maxima", f"{f.rocker_torque:.3f}")
-        table.add_row("crank torque, ratio of cycle maxima", f"{f.crank_torque:.3f}")
+        asked = number(config.run.crank_speed, "rad/s", full=False)
+        table = Table(
+            title=f"Overload factor, left organ alone against both, at {asked}", title_justify="left"
+        )
+        for column in ("way", "factor", "is for"):
+            table.add_column(column, justify="right" if column == "factor" else "left")
+        for v in Layout(OverloadFactors).variables:
+            factor = number(getattr(study.factors, v.name), v.unit, v.kind)
+            table.add_row(v.description, factor, FACTOR_FOR[v.name])
         console.print(table)
     if study.pins:
         heaviest = {pin: max(t[pin]["peak"] for t in study.pins.values()) for pin in study.pins["steady"]}
@@ -120,9 +124,9 @@ def show(study: Study, console: Console) -> None:
             worst = max(study.pins, key=lambda run: study.pins[run][pin]["peak"])
             table.add_row(
                 pin,
-                f"{steady['equivalent']:.0f} N",
-                f"{steady['peak']:.0f} N",
-                f"{heaviest[pin]:.0f} N",
+                number(steady["equivalent"], "N"),
+                number(steady["peak"], "N"),
+                number(heaviest[pin], "N"),
                 _short(worst),
             )
         console.print(table)
@@ -130,19 +134,26 @@ def show(study: Study, console: Console) -> None:
         _show_shaft(study, console)
     limits = study.limits
     if limits is not None:
-        swing = (math.degrees(limits.rocker_extreme_left), math.degrees(limits.rocker_extreme_right))
-        console.print(f"Rocker swings from {swing[0]:.3f} to {swing[1]:.3f} deg; margin {limits.margin:.2f}.")
-        first = "A web" if study.drive.chain is None else "With two bars a web"
+        of = {v.name: number(getattr(limits, v.name), v.unit, v.kind) for v in Layout(Limits).variables}
         console.print(
-            f"{first} first goes slack at {limits.slack_speed:.2f} rad/s of the crank with this feed "
-            f"({limits.slack_speed_empty:.2f} rad/s empty); lowest chain mode near "
-            f"{limits.chain_resonance:.1f} rad/s."
+            f"Rocker swings from {of['rocker_extreme_left']} to {of['rocker_extreme_right']}; margin {of['margin']}."
+        )
+        first = "A web" if study.drive.chain is None else "With two bars a web"
+        slack = (
+            f"first goes slack at {of['slack_speed']} of the crank"
+            if limits.slack_speed
+            else "is slack at rest"
+        )
+        console.print(
+            f"{first} {slack} with this feed ({of['slack_speed_empty']} empty); lowest chain mode near "
+            f"{of['chain_resonance']}.",
+            soft_wrap=True,
         )
     for name, found in study.loops.items():
         console.print(
-            f"Speed loop, {name} ({found.inertia:.3g} kg m2): phase margin {found.phase_margin:.0f} deg at "
-            f"{found.crossover:.3g} rad/s; a step of 1 N m takes {found.speed_dip:.2g} rad/s off the motor speed, "
-            f"settled after {found.settling:.2g} s.",
+            f"Speed loop, {name} ({number(found.inertia, 'kg.m2')}): phase margin {found.phase_margin:.0f} deg at "
+            f"{number(found.crossover, 'rad/s')}; a step of 1 N m takes {number(found.speed_dip, 'rad/s')} off the "
+            f"motor speed, settled after {number(found.settling, 's')}.",
             soft_wrap=True,
         )
     if study.certificate:
@@ -152,13 +163,19 @@ def show(study: Study, console: Console) -> None:
             for kind, share in certificate.items()
             if kind.endswith("energy_residual_share")
         )
-        console.print(f"Energy residual of the shaft: at most {worst_share:.1e} of the energy moved.")
+        console.print(
+            f"Energy residual of the shaft: at most {number(worst_share, '1')} of the energy moved."
+        )
     for name, value in study.certificate.get("start_up", {}).items():
         if name.endswith("_difference_to_monolithic"):
             quantity = name.removesuffix("_difference_to_monolithic")
-            console.print(f"Difference of {quantity} to the monolithic solution: {value:.1e} of its peak.")
+            console.print(
+                f"Difference of {quantity} to the monolithic solution: {number(value, '1')} of its peak."
+            )
+    for warning in study.warnings:
+        console.print(f"Warning: {warning}", soft_wrap=True)
     for note in study.notes:
-        console.print(f"Note: {note}")
+        console.print(f"Note: {note}", soft_wrap=True)
 
 
 def _show_chain(found: ChainResult, console: Console) -> None:
@@ -169,37 +186,56 @@ def _show_chain(found: ChainResult, console: Console) -> None:
         title_justify="left",
     )
     table.add_column("peaks are of single turns")
-    for column in ("chains, median", f"chains, {high}", "two bars"):
+    for column in (
+        "chains, median",
+        f"chains, {high} of turns ({100 * CONFIDENCE:g} % interval)",
+        "two bars",
+    ):
         table.add_column(column, justify="right")
-    for title, name in (("crank torque, peak", "crank_torque"), ("rocker torque, peak", "rocker_torque")):
-        sizes = (f"{name}_median", f"{name}_high", f"two_bar_{name}")
-        table.add_row(title, *(_number(getattr(own, size), "N.m") for size in sizes))
-    one, two = _number(own.crank_torque_rms, "N.m"), _number(own.two_bar_crank_torque_rms, "N.m")
-    table.add_row("crank torque, RMS", one, "", two)
-    snatches = (own.snatch_median, own.snatch_high, own.two_bar_snatch)
-    table.add_row(
-        "snatch: force at A2 over that at rest", *(f"{x:.2f}" if math.isfinite(x) else "-" for x in snatches)
-    )
-    spread = f"{own.snatch_spread:.3f}" if math.isfinite(own.snatch_spread) else "-"
-    table.add_row("snatch, largest over least median of a start", spread, "", "")
-    table.add_row(
-        "time with a slack rod; two bars: with one that pushes",
-        _number(own.slack_time, "1"),
-        "",
-        _number(own.two_bar_slack_time, "1"),
-    )
-    table.add_row("rods that are slack, mean", _number(own.slack_rods, "1"), "", "")
-    table.add_row("largest angle between two rods", f"{math.degrees(own.fold_largest):.0f} deg", "", "")
-    table.add_row("energy residual over the energy moved", f"{own.energy_residual:.1e}", "", "")
+    kinds = {v.name: v for v in Layout(SpeedNumbers).variables}
+
+    def own_number(name: str) -> str:
+        v = kinds[name]
+        return number(getattr(own, name), v.unit, v.kind)
+
+    def told(name: str) -> str:
+        """The quantile with its interval, where the starts tell it."""
+        if math.isnan(getattr(own, f"{name}_from")):
+            return "starts differ"
+        ends = (number(getattr(own, f"{name}_{end}"), "1") for end in ("from", "to"))
+        return f"{own_number(name)} ({' to '.join(ends)})"
+
+    for title, name in (
+        ("crank torque, peak", "crank_torque"),
+        ("rocker torque, peak", "rocker_torque"),
+        ("snatch: force at A2 over its own at rest", "snatch"),
+    ):
+        table.add_row(
+            title, own_number(f"{name}_median"), told(f"{name}_high"), own_number(f"two_bar_{name}")
+        )
+    for title, name, two in (
+        ("crank torque, RMS", "crank_torque_rms", "two_bar_crank_torque_rms"),
+        ("snatch, largest over least median of a start", "snatch_spread", ""),
+        ("time with a slack rod; two bars: with one that pushes", "slack_time", "two_bar_slack_time"),
+        ("rods that are slack, mean", "slack_rods", ""),
+        ("largest angle between two rods", "fold_largest", ""),
+        ("energy residual over the energy moved", "energy_residual", ""),
+    ):
+        table.add_row(title, own_number(name), "", own_number(two) if two else "")
     console.print(table)
     if found.distance is not None:
         console.print(
-            f"The crank turns {100 * abs(found.distance):.0f} % {'above' if found.distance > 0.0 else 'below'} the "
-            f"resonance of an organ, {found.resonance:.2f} rad/s.",
+            f"The crank turns {number(abs(found.distance), '1', 'percent')} "
+            f"{'above' if found.distance > 0.0 else 'below'} the resonance of an organ, "
+            f"{number(found.resonance, 'rad/s')}.",
             soft_wrap=True,
         )
     for side, shares in found.slack_by_rod.items():
-        slack = [f"{found.rod_name(k)} {100 * share:.3g} %" for k, share in enumerate(shares) if share > 0.0]
+        slack = [
+            f"{found.rod_name(k)} {number(share, '1', 'percent')}"
+            for k, share in enumerate(shares)
+            if share > 0.0
+        ]
         if slack:
             console.print(f"Slack on the {side}, share of the time: {', '.join(slack)}.", soft_wrap=True)
     if len(found.sweep) > 1:
@@ -209,7 +245,7 @@ def _show_chain(found: ChainResult, console: Console) -> None:
             ends += ", where the sweep ends" if band.high == high_speed else ""
             console.print(f"Avoid {band}{ends}: {band.why}.", soft_wrap=True)
         if not found.avoid:
-            console.print(f"No speed to avoid from {low:.3g} to {high_speed:.3g} rad/s.")
+            console.print(f"No speed to avoid from {number(low, 'rad/s')} to {number(high_speed, 'rad/s')}.")
     inside = [
         f"{speed:.2f} (mode {mode}, order {order})"
         for mode, order, speed in sorted(found.within_sweep(), key=lambda each: each[2])
@@ -230,20 +266,16 @@ def _show_shaft(study: Study, console: Console) -> None:
             table.add_column(_short(name), justify="right")
         for v in Layout(ShaftAnswers).variables:
             values = [getattr(study.shaft[run], v.name) for run in runs]
-            table.add_row(v.description, *("-" if x is None else _plain(x, v.unit) for x in values))
+            table.add_row(v.description, *(number(x, v.unit, v.kind) for x in values))
         return table
 
     _print_runs(console, shaft, study.shaft)
     found = study.torsion
     assert found is not None
     console.print(
-        f"Natural frequency of torsion: {found.k_least:.4g} to {found.k_largest:.4g} rad/s; communication step at "
-        f"most {found.step_longest:.2g} s."
+        f"Natural frequency of torsion: {number(found.k_least, 'rad/s')} to {number(found.k_largest, 'rad/s')}; "
+        f"communication step at most {number(found.step_longest, 's')}."
     )
-
-
-def _plain(value: float, unit: str) -> str:
-    return f"{value:.3g}" if unit == "1" else _number(value, unit)
 
 
 def _show_sizing(study: Study, console: Console) -> None:
@@ -275,19 +307,28 @@ def _show_sizing(study: Study, console: Console) -> None:
 
 
 def _show_monte_carlo(found: MonteCarloResult, console: Console) -> None:
-    """Quantiles of the random overloads."""
+    """Quantiles of the random overloads that their number tells."""
+    declared, found_of = {v.name: v for v in Layout(Sample).variables}, found.quantiles()
     columns = [f"q{100 * q:.0f}" for q in QUANTILES]
+    columns = [c for c in columns if any(c in sizes for sizes in found_of.values())]
+    certain = f"{100 * CONFIDENCE:g} % interval"
     table = Table(title=f"Overloads at random, {len(found.rows)} runs", title_justify="left")
     table.add_column("quantile")
     for column in columns:
-        table.add_column(f"{column[1:]} %", justify="right")
-    declared = {v.name: v for v in Layout(Sample).variables}
-    for name, sizes in found.quantiles().items():
+        table.add_column(f"{column[1:]} % ({certain})", justify="right")
+
+    def told(each: Estimate | None, unit: str, kind: str = "") -> str:
+        if each is None:
+            return "-"
+        ends = [shown(x, unit, kind)[0] for x in (each.low, each.high)]
+        return f"{number(each.value, unit, kind)} ({plain(' to '.join(ends))})"
+
+    for name, sizes in found_of.items():
         v = declared[name]
         if "share" in sizes:
-            console.print(
-                f"{v.description.removeprefix('1 where ').capitalize()}: {100 * sizes['share']:.1f} % of runs."
-            )
-        else:
-            table.add_row(v.description, *(_number(sizes[c], v.unit) for c in columns))
-    console.print(table)
+            what = v.description.removeprefix("1 where ").capitalize()
+            console.print(f"{what}: {told(sizes['share'], '1', 'percent')} of runs; {certain}.")
+        elif columns:
+            table.add_row(v.description, *(told(sizes.get(c), v.unit) for c in columns))
+    if columns:
+        console.print(table)

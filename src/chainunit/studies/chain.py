@@ -28,8 +28,10 @@ from ..machines.api import ChainUnit
 from ..machines.chain_unit import ChamberForces, SideLoads
 from ..machines.flexible import flexible
 from ..quantities import Layout, Value, declaration, quantity
+from ..text import entry
 from .cycle import Cycle, cycle
 from .drive import Drive
+from .quantiles import CONFIDENCE, counted, quantile
 
 SETTLE = 5
 """Turns of each start that are left out."""
@@ -48,28 +50,40 @@ _SIDES = ("left", "right")
 
 @declaration
 class SpeedNumbers:
-    """Chains and two bars at one crank speed. Peaks are those of single turns, over all turns of all starts."""
+    """Chains and two bars at one crank speed. Peaks are those of single turns, over all turns of all starts.
+
+    The turns of a start are not independent; where they count for too few, a quantile has no interval (NaN): the
+    starts do not tell it."""
 
     speed: Value = quantity("rad/s", "crank speed")
     crank_torque_median: Value = quantity("N.m", "crank torque, peak of a turn, median")
     crank_torque_high: Value = quantity("N.m", f"crank torque, peak of a turn, {100 * HIGH:g} % quantile")
+    crank_torque_high_from: Value = quantity("N.m", "interval of that quantile, from")
+    crank_torque_high_to: Value = quantity("N.m", "interval of that quantile, to")
     crank_torque_rms: Value = quantity("N.m", "crank torque, RMS")
     rocker_torque_median: Value = quantity("N.m", "rocker torque, peak of a turn, median")
     rocker_torque_high: Value = quantity("N.m", f"rocker torque, peak of a turn, {100 * HIGH:g} % quantile")
+    rocker_torque_high_from: Value = quantity("N.m", "interval of that quantile, from")
+    rocker_torque_high_to: Value = quantity("N.m", "interval of that quantile, to")
     snatch_median: Value = quantity("1", "force at A2, peak of a turn over that at rest, median")
     snatch_high: Value = quantity(
         "1", f"force at A2, peak of a turn over that at rest, {100 * HIGH:g} % quantile"
     )
+    snatch_high_from: Value = quantity("1", "interval of that quantile, from")
+    snatch_high_to: Value = quantity("1", "interval of that quantile, to")
+    independent_turns: Value = quantity(
+        "1", "number of independent turns for which all turns count, least of the three peaks"
+    )
     snatch_spread: Value = quantity("1", "largest over least of the starts' medians of it")
-    slack_time: Value = quantity("1", "share of the time in which a rod is slack")
-    slack_rods: Value = quantity("1", "share of the rods that are slack, mean over time")
+    slack_time: Value = quantity("1", "share of the time in which a rod is slack", kind="percent")
+    slack_rods: Value = quantity("1", "share of the rods that are slack, mean over time", kind="percent")
     fold_largest: Value = quantity("rad", "largest angle between neighbouring rods")
     two_bar_crank_torque: Value = quantity("N.m", "crank torque of two bars, peak")
     two_bar_crank_torque_rms: Value = quantity("N.m", "crank torque of two bars, RMS")
     two_bar_rocker_torque: Value = quantity("N.m", "rocker torque of two bars, peak")
     two_bar_snatch: Value = quantity("1", "force at A2 of two bars, peak, over theirs at rest")
     two_bar_slack_time: Value = quantity(
-        "1", "share of the time in which a bar is pushed, by its mean axial pull as a rod's"
+        "1", "share of the time in which a bar is pushed, by its mean axial pull as a rod's", kind="percent"
     )
     energy_residual: Value = quantity("1", "largest energy residual of an organ over the energy moved")
 
@@ -148,22 +162,23 @@ class ChainResult:
         def row(numbers: SpeedNumbers) -> dict[str, Any]:
             layout = Layout(SpeedNumbers)
             return {
-                v.name: {"value": float(x) if math.isfinite(x) else None, "unit": v.unit}
+                v.name: entry(x, v.unit, v.kind)
                 for v, x in zip(layout.variables, layout.values(numbers), strict=True)
             }
 
-        def pure(value: float) -> dict[str, Any]:
-            return {"value": value, "unit": "1"}
+        def pure(value: float | None, kind: str = "") -> dict[str, Any]:
+            return entry(value, "1", kind)
 
         return {
             "rods_of_wall": pure(self.rods[0]),
             "rods_of_web": pure(self.rods[1]),
             "starts": pure(self.starts),
             "turns": pure(self.turns),
-            "quantile": pure(HIGH),
+            "quantile": pure(HIGH, "percent"),
+            "confidence": pure(CONFIDENCE, "percent"),
             "own_speed": row(self.own),
             "resonance": {"value": self.resonance, "unit": "rad/s"},
-            "distance_to_resonance": {"value": self.distance, "unit": "1"},
+            "distance_to_resonance": pure(self.distance, "percent"),
             "sweep": [row(numbers) for numbers in self.sweep],
             "avoid": [
                 {
@@ -178,7 +193,7 @@ class ChainResult:
                 for mode, order, speed in self.critical
             ],
             "slack_by_rod": {
-                side: [{"rod": self.rod_name(k), **pure(float(share))} for k, share in enumerate(shares)]
+                side: [{"rod": self.rod_name(k), **pure(share, "percent")} for k, share in enumerate(shares)]
                 for side, shares in self.slack_by_rod.items()
             },
         }
@@ -339,6 +354,12 @@ def numbers_at(
     all_rods = np.concatenate([slack[side] for side in _SIDES], axis=-1)
     crank, rocker = values["tau"] * ratio, values["rocker.tau"]
     medians = np.median(snatched, axis=1)
+    of_turns = {"crank_torque": peaks(crank), "rocker_torque": peaks(rocker), "snatch": snatched}
+    ends: dict[str, float] = {}
+    for name, sizes in of_turns.items():
+        told = quantile(sizes, HIGH)
+        ends |= {f"{name}_high_from": told.low if told else math.nan}
+        ends |= {f"{name}_high_to": told.high if told else math.nan}
     return (
         SpeedNumbers(
             speed=crank_speed,
@@ -359,14 +380,16 @@ def numbers_at(
             two_bar_snatch=float(max(two_bar_snatch)),
             two_bar_slack_time=float(np.mean(np.any(pushed, axis=0))),
             energy_residual=missing / max(moved, 1e-300),
+            independent_turns=float(min(counted(sizes, HIGH) for sizes in of_turns.values())),
+            **ends,
         ),
         {side: np.mean(slack[side], axis=(0, 1, 2)) for side in _SIDES},
     )
 
 
 def rest_forces(machine: ChainUnit, side: str, feed: Any, rods: int) -> tuple[float, float]:
-    """Force at A2 with the machine at rest, the rocker in the middle [N], of a chain and of two bars: each snatch is in
-    parts of its own. NaN without weight, as nothing is pulled at rest."""
+    """Force at A2 with the machine at rest, the rocker in the middle [N], of a chain and of two bars: each snatch is
+    in parts of its own. NaN without weight, as nothing is pulled at rest."""
     if machine.p.g == 0.0:
         return math.nan, math.nan
     bars = getattr(machine.chamber(0.0, left=feed.left, right=feed.right), side).rocker_joint

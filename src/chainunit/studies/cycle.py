@@ -10,6 +10,7 @@ import numpy as np
 
 from ..machines.api import EMPTY, ChainUnit
 from ..machines.chain_unit import SideLoads
+from ..quantities import Value, declaration, quantity
 
 
 @dataclass(frozen=True)
@@ -49,13 +50,22 @@ def without_right(machine: ChainUnit) -> ChainUnit:
     return machine.replace({"right.wall_mass": 0.0, "right.web_mass": 0.0})
 
 
-@dataclass(frozen=True)
+@declaration
 class OverloadFactors:
-    """How much more one side alone asks than both, three ways; see `overload_factors`."""
+    """How much more one side alone asks than both, three ways for three questions; see `overload_factors`. The first
+    is the one that sizes the drive."""
 
-    static_at_extreme: float
-    rocker_torque: float
-    crank_torque: float
+    crank_torque: Value = quantity("1", "crank torque, ratio of cycle maxima")
+    rocker_torque: Value = quantity("1", "rocker torque, ratio of cycle maxima")
+    static_at_extreme: Value = quantity("1", "R_left/(R_left - R_right) at the right extreme, at rest")
+
+
+FACTOR_FOR = {
+    "crank_torque": "sizes the drive: gear, motor, crank pin",
+    "rocker_torque": "strength of rocker, pivot, organ bearings",
+    "static_at_extreme": "comparison with the papers; no design factor",
+}
+"""What each overload factor is for."""
 
 
 def overload_factors(
@@ -79,9 +89,9 @@ def overload_factors(
         return float(np.max(np.abs(x))) / whole if whole > 0.0 else math.nan
 
     return OverloadFactors(
-        ratio(static.left.tangential_load, static.rocker.tangential_load),
-        ratio(alone.outputs.rocker.tau, both.outputs.rocker.tau),
-        ratio(alone.crank_torque, both.crank_torque),
+        crank_torque=ratio(alone.crank_torque, both.crank_torque),
+        rocker_torque=ratio(alone.outputs.rocker.tau, both.outputs.rocker.tau),
+        static_at_extreme=ratio(static.left.tangential_load, static.rocker.tangential_load),
     )
 
 

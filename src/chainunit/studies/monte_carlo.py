@@ -32,8 +32,10 @@ from ..cosim.instance import remove_unpacked
 from ..errors import InterruptedRunError, RunError
 from ..files import whole, writing
 from ..quantities import Layout, Value, declaration, quantity
+from ..text import entry
 from . import protection
 from .drive import Drive
+from .quantiles import CONFIDENCE, Estimate, quantile, runs_needed, share
 
 
 @declaration
@@ -244,19 +246,30 @@ class MonteCarloResult:
     left_out: int = 0
     """lines of the file that were no rows, or rows of one run that differ; their runs were computed anew"""
 
-    def quantiles(self) -> dict[str, dict[str, float]]:
-        """Quantiles of every answer, and shares of runs that stall or trip."""
-        found: dict[str, dict[str, float]] = {}
+    def quantiles(self) -> dict[str, dict[str, Estimate]]:
+        """Quantiles of every answer, and shares of runs that stall or trip, each with its interval; a quantile of
+        which the number of runs tells nothing is left out."""
+        found: dict[str, dict[str, Estimate]] = {}
         for v in Layout(Sample).variables:
             values = [row[v.name] for row in self.rows if row[v.name] is not None]
             if not values or v.name in ("event", "force", "crank_angle"):
                 continue
             if v.name in ("stalls", "trips"):
-                found[v.name] = {"share": float(np.mean(values))}
+                found[v.name] = {"share": share(sum(x > 0.5 for x in values), len(values))}
                 continue
-            sizes = np.quantile(values, QUANTILES)
-            found[v.name] = {f"q{100 * q:.0f}": float(x) for q, x in zip(QUANTILES, sizes, strict=True)}
+            estimates = {f"q{100 * q:.0f}": quantile(values, q) for q in QUANTILES}
+            found[v.name] = {name: each for name, each in estimates.items() if each is not None}
         return found
+
+    @property
+    def remark(self) -> str:
+        """Which quantiles the runs do not tell, in words; empty where they tell all."""
+        done = len(self.rows) - self.failed
+        missing = [q for q in QUANTILES if done < runs_needed(q)]
+        if not missing:
+            return ""
+        each = ", ".join(f"the {100 * q:.0f} % quantile takes {runs_needed(q)}" for q in missing)
+        return f"{done} runs are too few for some quantiles: {each} (monte_carlo.runs)."
 
     @property
     def failed(self) -> int:
@@ -265,18 +278,17 @@ class MonteCarloResult:
 
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON, each number with its unit."""
-        units = {v.name: v.unit for v in Layout(Sample).variables}
+        units, kinds = {v.name: v.unit for v in Layout(Sample).variables}, {"share": ("1", "percent")}
         return {
-            "runs": {"value": len(self.rows), "unit": "1"},
-            "failed": {"value": self.failed, "unit": "1"},
-            "left_out": {"value": self.left_out, "unit": "1"},
+            "runs": entry(len(self.rows), "1"),
+            "failed": entry(self.failed, "1"),
+            "left_out": entry(self.left_out, "1"),
             "file": self.file.name,
             "quantiles": {
-                name: {
-                    k: {"value": x, "unit": "1" if k == "share" else units[name]} for k, x in sizes.items()
-                }
+                name: {k: each.as_dict(*kinds.get(k, (units[name],))) for k, each in sizes.items()}
                 for name, sizes in self.quantiles().items()
             },
+            "confidence": entry(CONFIDENCE, "1", "percent"),
         }
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -28,16 +28,19 @@ from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
 from ..machines.api import EMPTY
 from ..machines.chain_unit import ChamberForces
-from ..quantities import Layout, Value, declaration, finite, quantity
-from . import protection
-from .chain import ChainResult, study_chain
+from ..quantities import Layout, Value, declaration, quantity
+from ..text import entry, number
+from . import protection, verdict
+from .chain import HIGH, ChainResult, study_chain
 from .choice import choose
-from .cycle import OverloadFactors, Sides, all_on_one, cycle, overload_factors, sides_over_speed
+from .cycle import FACTOR_FOR, OverloadFactors, Sides, all_on_one, cycle, overload_factors, sides_over_speed
 from .drive import Drive
 from .monte_carlo import MonteCarloResult, Task
 from .monte_carlo import run as run_monte_carlo
+from .quantiles import runs_needed
 from .shaft import AMPLIFIED, NEAR, Cycles, ShaftAnswers, Torsion, shaft_answers, torsion, with_rigid
 from .sizing import SizingResult
+from .verdict import RESIDUAL, STEADY, Holds, Verdict
 
 PINS = {
     "O1 crank bearing": "crank_bearing",
@@ -64,7 +67,8 @@ class Answers:
 
     The ripple is (largest - least)/mean of the speed; `shaft_share` the peak torque on the machine's shaft over
     that of the motor (the rest is the rotor's inertia); `shaking_*` the largest deviation of the frame's load
-    from its mean, the moment about C; `breakdown_margin` the largest steady torque of the motor over its peak;
+    from its mean, the moment about C; `torque_reserve` the part of the largest steady torque of the
+    motor that the peak leaves: 0 at the limit, less where a transient passes it;
     `winding_temperature` is where the winding comes to rest if the steady turns go on for ever;
     `cycle_gap` is the difference between the ends of the steady turns, of speed or torque, over the largest value;
     times count from the event; `energy_after_trip` passes the safety coupling while it opens, `energy_behind`
@@ -84,18 +88,18 @@ class Answers:
     rocker_torque_peak: Value = quantity("N.m", "rocker torque, peak")
     speed_mean: Value = quantity("rad/s", "crank speed, mean")
     speed_least: Value = quantity("rad/s", "crank speed, least")
-    speed_ripple: Value = quantity("1", "speed ripple")
-    cycle_gap: Value = quantity("1", "gap between the ends of the steady turns")
-    speed_dip: Value = quantity("1", "speed dip")
+    speed_ripple: Value = quantity("1", "speed ripple", kind="percent")
+    cycle_gap: Value = quantity("1", "gap between the ends of the steady turns", kind="percent")
+    speed_dip: Value = quantity("1", "speed dip", kind="dip")
     recovery_time: Value = quantity("s", "recovery")
     web_pull_least: Value = quantity("N", "least pull in a web")
     wall_pull_least: Value = quantity("N", "least pull in a wall")
-    slack_time: Value = quantity("1", "share of the time with a slack rod")
+    slack_time: Value = quantity("1", "share of the time with a slack rod", kind="percent")
     fold_largest: Value = quantity("rad", "largest angle between two rods")
-    shaft_share: Value = quantity("1", "shaft over motor torque")
+    shaft_share: Value = quantity("1", "shaft over motor torque", kind="percent")
     shaking_force: Value = quantity("N", "shaking force")
     shaking_moment: Value = quantity("N.m", "shaking moment")
-    breakdown_margin: Value = quantity("1", "reserve of torque")
+    torque_reserve: Value = quantity("1", "reserve of torque", kind="percent")
     stall_time: Value = quantity("s", "crank stands after")
     thermal_trip_time: Value = quantity("s", "thermal relay trips after")
     coupling_trip_time: Value = quantity("s", "safety coupling trips after")
@@ -122,14 +126,10 @@ def entries(declared: Any) -> dict[str, Any]:
     """The declared values of an instance as ``{name: {"value": .., "unit": ..}}``; what is not finite is null."""
     layout = Layout(type(declared))
     return {
-        v.name: {"value": finite(value), "unit": v.unit}
+        v.name: entry(value, v.unit, v.kind)
         for v, value in zip(layout.variables, layout.values(declared), strict=True)
     }
 
-
-_ROCKER_GOOD, _CRANK_GOOD = (0.2, 0.4), 0.6
-"""Crank speeds, in parts of the organ's lowest natural frequency, up to which two bars give the rocker torque (empty,
-loaded) and the crank torque to a tenth of the peak of chains: on the packaged machine, docs/physics.md."""
 
 _PATIENCE = 20.0
 """Turns, at the speed that is asked, that a study runs on until the motor has settled and made its turns."""
@@ -166,6 +166,11 @@ class Study:
     """By run and pin: peak, RMS and equivalent (ISO 281) load."""
     certificate: dict[str, dict[str, float]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    """What the numbers rest on."""
+    warnings: list[str] = field(default_factory=list)
+    """What is wrong, or not as was asked; of several runs at once."""
+    verdict: Verdict | None = None
+    """whether the model of the organs holds, once there are runs"""
     made: dict[str, str] = field(default_factory=dict)
     torsion: Torsion | None = None
     shaft: dict[str, ShaftAnswers] = field(default_factory=dict)
@@ -715,7 +720,7 @@ def _answers(study: Study, run: xr.Dataset, event: float | None, steady: xr.Data
     asked = w_ref if drive.follows or event is None else study.answers["steady"].speed_mean
     since = value("time") - (event or 0.0)
     recovery = None
-    if event is not None and (not drive.follows or _settled(study.answers["steady"], w_ref)):
+    if event is not None and (not drive.follows or reached(study.answers["steady"], w_ref)):
         recovery = _recovery(since, speed, drive.crank_motion(steady)[1], asked)
     return Answers(
         crank_torque_peak=peak(crank_torque),
@@ -755,7 +760,7 @@ def _answers(study: Study, run: xr.Dataset, event: float | None, steady: xr.Data
         shaft_share=peak(value("motor.tau")) / peak(motor_torque),
         shaking_force=swing("fx", "fy"),
         shaking_moment=swing("moment"),
-        breakdown_margin=drive.largest_torque() / peak(motor_torque),
+        torque_reserve=torque_reserve(drive.largest_torque(), peak(motor_torque)),
         stall_time=None if event is None else protection.stall(since, speed, asked),
         thermal_trip_time=_relay(study, since, value(current)) if event is not None else None,
         coupling_trip_time=None,
@@ -768,6 +773,11 @@ def _answers(study: Study, run: xr.Dataset, event: float | None, steady: xr.Data
 def _series(name: str) -> Callable[[xr.Dataset], Any]:
     """Reads a variable of a run, shape (time,)."""
     return lambda run: run[name].values
+
+
+def torque_reserve(limit: float, peak: float) -> float:
+    """What is left of the largest steady torque above the peak, over that torque; both of the motor [N m]."""
+    return (limit - peak) / limit
 
 
 def _any_slack(run: xr.Dataset, sides: list[str]) -> Any:
@@ -786,7 +796,7 @@ def _relay(study: Study, since: Any, current: Any) -> float | None:
     return protection.relay_trip(since, current, setting, study.answers["steady"].current_rms, lasts)
 
 
-def _settled(steady: Answers, w_ref: float) -> bool:
+def reached(steady: Answers, w_ref: float) -> bool:
     """Whether the machine runs at the speed that is asked of it, within 1 %."""
     return bool(abs(steady.speed_mean - w_ref) <= 0.01 * w_ref)
 
@@ -848,25 +858,17 @@ def _note(study: Study) -> None:
         "Friction is smoothed: at rest nothing sticks, so that the torque to break away from a loaded "
         "stop is not in the start-up."
     )
-    speed, mode = config.run.crank_speed, limits.chain_resonance
+    speed, warn = config.run.crank_speed, study.warnings.append
+    if study.answers:
+        study.verdict = model_verdict(study)
+        study.warnings.extend(study.verdict.details(_CALLED))
     if config.chain is not None:
         _note_chain(study, config.chain)
-    elif speed > _ROCKER_GOOD[0] * mode:
-        empty, loaded = (share * mode for share in _ROCKER_GOOD)
-        note(
-            "A chain has a mode that two bars lack: the rocker torque of two bars is good to 10 % only up to about "
-            f"{empty:.1f} rad/s (empty) or {loaded:.1f} rad/s (loaded) of the crank"
-            + (
-                f", the crank torque up to {_CRANK_GOOD * mode:.1f} rad/s"
-                if speed > _CRANK_GOOD * mode
-                else ""
-            )
-            + '; organ = "chain" has chains.'
-        )
     steady = study.answers.get("steady")
-    if steady is not None and not _settled(steady, speed):
-        note(
-            f"steady running: the crank turns at {steady.speed_mean:.3g} rad/s in place of {speed:g} rad/s; "
+    if steady is not None and not reached(steady, speed):
+        warn(
+            f"steady running: the crank turns at {number(steady.speed_mean, 'rad/s')} in place of "
+            f"{number(speed, 'rad/s', full=False)}; "
             + (
                 "the motor's voltage or current is at its limit, or the run is too short to settle."
                 if study.drive.follows
@@ -875,61 +877,34 @@ def _note(study: Study) -> None:
             + " Overloads are those of this state."
         )
     if steady is not None and study.drive.whole_turns(study.steady) is None:
-        note(
+        warn(
             "steady running: the crank does not make a whole turn; means are over all that was run, and there is no "
             f"{LOAD_CYCLE}."
         )
     elif steady is not None and steady.cycle_gap > _CLOSED:
         repeats = "chains do not repeat a turn" if config.chain else "the machine has not settled"
-        note(
-            f"steady running: the turns do not close, their ends differ by {100 * steady.cycle_gap:.2g} % in speed "
-            f"or torque: {repeats}; raise run.settle_turns or run.turns."
+        warn(
+            "steady running: the turns do not close, their ends differ by "
+            f"{number(steady.cycle_gap, '1', 'percent')} in speed or torque: {repeats}; raise run.settle_turns or "
+            "run.turns."
         )
     if steady is not None and not math.isfinite(steady.winding_temperature):
-        note(
+        warn(
             "steady running: the winding has no thermal steady state, its loss grows faster than the cooling."
         )
     if study.sizing is not None:
         study.notes.extend(study.sizing.notes)
         if study.insufficient:
-            note(f"{study.sizing.answer}. All runs are with it.")
-    for name, answers in study.answers.items():
-        title = SCENARIOS.get(name, "steady running")
-        if answers.slack_time is not None:
-            if answers.slack_time > 0.0:
-                note(
-                    f"{title}: a rod is slack for {100 * answers.slack_time:.3g} % of the time; what snatches has no "
-                    "single peak that is a prediction."
-                )
-            elif answers.web_pull_least < 0.0 or answers.wall_pull_least < 0.0:
-                note(
-                    f"{title}: an end of a rod is pushed, though the rod is pulled in the mean; more rods are nearer "
-                    "to a chain."
-                )
-        elif answers.web_pull_least < 0.0:
-            note(
-                f"{title}: web pull down to {answers.web_pull_least:.0f} N; a chain cannot push, it would go slack "
-                "and snatch."
-            )
-        if study.drive.motor is DcMotor and answers.current_peak > 0.999 * study.motor.limit.i:
-            note(f"{title}: the motor runs into its current limit of {study.motor.limit.i:g} A.")
-        if answers.stall_time is not None:
-            note(f"{title}: the crank stands {answers.stall_time:.2f} s after the event.")
-        if answers.coupling_trip_time is not None:
-            note(
-                f"{title}: the safety coupling trips {answers.coupling_trip_time:.3f} s after the event; "
-                f"{answers.energy_after_trip:.3g} J pass it while it opens, {answers.energy_behind:.3g} J stay "
-                "behind it."
-            )
-            continue
-        if name in SCENARIOS and answers.recovery_time is None:
-            note(f"{title}: the speed does not return to its steady band within the time followed.")
+            warn(f"{study.sizing.answer}. All runs are with it.")
+    _warn_of_runs(study)
     if study.ripple_without is not None and steady is not None:
         note(
             "Feed-forward of the machine's torque brings the ripple of the speed from "
-            f"{100 * study.ripple_without:.2g} % to {100 * steady.speed_ripple:.2g} %."
+            f"{number(study.ripple_without, '1', 'percent')} to {number(steady.speed_ripple, '1', 'percent')}."
         )
     random = study.monte_carlo
+    if random is not None and random.remark:
+        note(f"overloads at random: {random.remark}")
     if random is not None and random.left_out:
         note(
             f"overloads at random: {random.left_out} lines of {random.file.name} were no rows of this study and are "
@@ -937,13 +912,103 @@ def _note(study: Study) -> None:
         )
     if study.torsion is not None:
         _note_shaft(study)
-    for name, certificate in study.certificate.items():
-        share = max(x for kind, x in certificate.items() if kind.endswith("energy_residual_share"))
-        if not share < 1e-3:
-            note(
-                f"{SCENARIOS.get(name, 'start-up and steady running')}: the energy residual is {share:.1e} of "
-                "the energy moved; the step is too long for this run, lessen run.step."
+
+
+_CALLED = {STEADY: "steady running", "constant": "chains at constant speed", **SCENARIOS}
+"""Runs by name, as sentences call them."""
+_EMPTYING = ("empties", "feed", "start")
+"""Kinds of overloads in which a side carries no material."""
+
+
+def _warn_of_runs(study: Study) -> None:
+    """What happened in the runs, a line for each kind of event with all runs in which it did."""
+    happened: dict[str, list[str]] = {}
+
+    def tell(what: str, run: str, size: str = "") -> None:
+        happened.setdefault(what, []).append(f"{_CALLED[run]}{f' ({size})' if size else ''}")
+
+    for name, answers in study.answers.items():
+        pushed = answers.web_pull_least < 0.0 or answers.wall_pull_least < 0.0
+        if answers.slack_time == 0.0 and pushed:
+            tell(
+                "An end of a rod is pushed, though the rod is pulled in the mean; more rods are nearer to a chain",
+                name,
             )
+        if study.drive.motor is DcMotor and answers.current_peak > 0.999 * study.motor.limit.i:
+            tell(
+                f"The motor runs into its current limit of {number(study.motor.limit.i, 'A', full=False)}",
+                name,
+            )
+        if answers.stall_time is not None:
+            late = answers.stall_time > 10.0 * study.config.run.step
+            after = f"after {number(answers.stall_time, 's')}" if late else "as before it"
+            tell("The crank stands after the event", name, after)
+        if answers.coupling_trip_time is not None:
+            after = number(answers.coupling_trip_time, "s")
+            energies = (number(x, "J") for x in (answers.energy_after_trip, answers.energy_behind))
+            size = "after {}; {} pass it while it opens, {} stay behind it".format(after, *energies)
+            tell("The safety coupling opens after the event", name, size)
+        elif name in SCENARIOS and answers.recovery_time is None:
+            tell("The speed does not return to its steady band within the time followed", name)
+    study.warnings.extend(f"{what}: {'; '.join(runs)}." for what, runs in happened.items())
+
+
+def model_verdict(study: Study) -> Verdict:
+    """Whether the model of the organs holds, from the numbers of the runs."""
+    config, limits, answers = study.config, study.limits, study.answers
+    assert limits is not None
+    steady = answers.get(STEADY)
+    speed = max(config.run.crank_speed, steady.speed_mean if steady else 0.0)
+    residuals = {
+        STEADY if name == "start_up" else name: max(
+            x for kind, x in shares.items() if kind.endswith("energy_residual_share")
+        )
+        for name, shares in study.certificate.items()
+    }
+    if config.chain is None:
+        emptied = {name for name in answers if name in OVERLOADS and OVERLOADS[name].kind in _EMPTYING}
+        always = 0.0 in (config.feed.left.material_mass, config.feed.right.material_mass)
+        return verdict.two_bars(
+            speed,
+            limits.chain_resonance,
+            limits.slack_speed,
+            {name: (a.web_pull_least, a.wall_pull_least) for name, a in answers.items()},
+            residuals,
+            empty={""} if always else emptied,
+        )
+    folds = {name: a.fold_largest for name, a in answers.items()}
+    slack = {name: a.slack_time for name, a in answers.items()}
+    needed, turns = runs_needed(HIGH), math.inf
+    if study.chain is not None:
+        own = study.chain.own
+        folds["constant"], slack["constant"] = own.fold_largest, own.slack_time
+        residuals["constant"], turns = own.energy_residual, own.independent_turns
+    return verdict.chains(speed, residuals, folds, config.chain.fold_limit, slack, turns, needed)
+
+
+def motor_verdict(study: Study) -> dict[str, Any] | None:
+    """Whether the motor reaches the speed ("false" where not), and its least reserve of torque with the run of it
+    ("in part" where none is left), ready for JSON; None without steady running."""
+    steady, asked = study.answers.get(STEADY), study.config.run.crank_speed
+    if steady is None:
+        return None
+    run = min(study.answers, key=lambda name: float(study.answers[name].torque_reserve))
+    reserve, reaches = study.answers[run].torque_reserve, reached(steady, asked)
+    speed = number(steady.speed_mean, "rad/s")
+    if reaches:
+        text = f"The motor keeps the crank at {speed}"
+    else:
+        text = f"The motor does NOT reach the speed: {speed} in place of {number(asked, 'rad/s', full=False)}"
+    left = f"least reserve of torque {number(reserve, '1', 'percent')} ({_CALLED[run]})"
+    holds: Holds = "false" if not reaches else "true" if reserve > 0.0 else "in part"
+    return {
+        "holds": holds,
+        "text": f"{text}; {left}.",
+        "speed": entry(steady.speed_mean, "rad/s"),
+        "asked": entry(asked, "rad/s"),
+        "least_reserve": entry(reserve, "1", "percent"),
+        "run": run,
+    }
 
 
 def _note_chain(study: Study, chain: Chain) -> None:
@@ -955,30 +1020,18 @@ def _note_chain(study: Study, chain: Chain) -> None:
     )
     for band in found.avoid if found else ():
         if found and band.low <= found.own.speed <= band.high:
-            note(f"chains: the crank speed lies among those to avoid, {band}: {band.why}.")
-    folds = [answers.fold_largest for answers in study.answers.values()]
-    folded = max([found.own.fold_largest] * bool(found) + folds if found else folds, default=0.0)
-    if folded > math.pi:
-        note(
-            f"chains: rods fold up to {math.degrees(folded):.0f} deg against each other, through their stop; raise "
-            "chain.fold_stiffness, or take the result for a machine that breaks."
-        )
-    elif folded > chain.fold_limit:
-        note(
-            f"chains: rods fold up to {math.degrees(folded):.0f} deg and meet the stop between them, at "
-            f"{math.degrees(chain.fold_limit):.0f} deg, whose stiffness is assumed."
-        )
+            study.warnings.append(f"chains: the crank speed lies among those to avoid, {band}: {band.why}.")
     if walls + webs < 4:
         note(
             f"chains: {walls + webs} rods have {walls + webs - 2} natural frequencies; 8 rods show what a chain does."
         )
     if found:
         for speed, why in found.failed.items():
-            note(f"chains: {speed:.4g} rad/s is missing in the sweep: {why}")
+            study.warnings.append(f"chains: {speed:.4g} rad/s is missing in the sweep: {why}")
         residual = max(n.energy_residual for n in found.sweep)
-        if not residual < 1e-3:
-            note(
-                f"chains: the energy residual reaches {residual:.1e} of the energy moved; lessen "
+        if not residual < RESIDUAL:
+            study.warnings.append(
+                f"chains: the energy residual reaches {number(residual, '1')} of the energy moved; lessen "
                 "chain.fold_stiffness."
             )
     if study.coasting is not None:
@@ -995,7 +1048,7 @@ def _note_shaft(study: Study) -> None:
         note("The driveline has no damping: a vibration that was set off goes on; give d2 and d3.")
     fastest = max((found_loop.crossover for found_loop in study.loops.values()), default=0.0)
     if fastest > found.k_least / 3.0:
-        note(
+        study.warnings.append(
             f"The speed loop crosses over at {fastest:.3g} rad/s, near the line's natural frequency of "
             f"{found.k_least:.3g} rad/s: control and shaft disturb each other; lower the gains or stiffen the line."
         )
@@ -1006,13 +1059,13 @@ def _note_shaft(study: Study) -> None:
         note(f"The joints turn unevenly: i23 varies by {100 * unevenness:.2g} % twice a turn of the shaft.")
         for order in ORDERS:
             if (1.0 - NEAR) * found.k_least < order * speed < (1.0 + NEAR) * found.k_largest:
-                note(
+                study.warnings.append(
                     f"The shaft turns at {speed:.3g} rad/s: order {order} of the joints, {order * speed:.3g} rad/s, "
                     f"lies near the line's natural frequency, {found.k_least:.3g} to {found.k_largest:.3g} rad/s."
                 )
     for name, shaft in study.shaft.items():
         if shaft.amplification is not None and shaft.amplification > AMPLIFIED:
-            note(
+            study.warnings.append(
                 f"{SCENARIOS.get(name, 'steady running')}: the line's torque peaks at {shaft.amplification:.2f} "
                 "times that of a rigid drive."
             )
@@ -1028,7 +1081,11 @@ def as_dict(study: Study) -> dict[str, Any]:
         "source": config.source,
         "status": f"failed: {study.failure}" if study.failure else "complete",
         "answers": {name: entries(answers) for name, answers in study.answers.items()},
-        "overload_factors": _pure(asdict(study.factors)) if study.factors else None,
+        "overload_factors": {
+            name: factor | {"for": FACTOR_FOR[name]} for name, factor in entries(study.factors).items()
+        }
+        if study.factors
+        else None,
         "limits": entries(study.limits) if study.limits else None,
         "events": {name: {"value": at, "unit": "s"} for name, at in study.event.items()},
         "pins": {
@@ -1055,9 +1112,14 @@ def as_dict(study: Study) -> dict[str, Any]:
             }
             for name, found in study.loops.items()
         },
-        "ripple_without_feed_forward": {"value": study.ripple_without, "unit": "1"},
+        "ripple_without_feed_forward": entry(study.ripple_without, "1", "percent"),
         "fmus": study.made,
         "remarks": [slip.as_dict() for slip in config.remarks],
+        "verdict": {
+            "model": study.verdict.as_dict() if study.verdict else None,
+            "motor": motor_verdict(study),
+        },
+        "warnings": study.warnings,
         "notes": study.notes,
         "machine": entries(study.drive.machine.p),
         "motor": {"kind": study.drive.motor.name, **entries(study.motor)},
@@ -1099,4 +1161,4 @@ def _driveline(study: Study) -> dict[str, Any]:
 
 
 def _pure(values: Mapping[str, float]) -> dict[str, Any]:
-    return {name: {"value": finite(value), "unit": "1"} for name, value in values.items()}
+    return {name: entry(value, "1") for name, value in values.items()}

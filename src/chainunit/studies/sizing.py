@@ -28,7 +28,8 @@ from ..drives.motor import T_RATED
 from ..engines import MATH, numpy_
 from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
-from ..quantities import Layout, Value, declaration, finite, quantity
+from ..quantities import Layout, Value, declaration, quantity
+from ..text import entry, number
 from .chain import HIGH, duty
 from .cycle import Cycle, all_on_one, cycle
 from .drive import Drive
@@ -89,7 +90,7 @@ class Flywheel:
     """The flywheel of the chosen motor."""
 
     J: Value = quantity("kg.m2", "flywheel on the motor shaft")
-    fluctuation: Value = quantity("1", "fluctuation of the crank speed in the run")
+    fluctuation: Value = quantity("1", "fluctuation of the crank speed in the run", kind="percent")
 
 
 @declaration
@@ -109,19 +110,27 @@ class Check:
     value: float | None
     limit: float
     unit: str
+    kind: str = ""
 
     @property
     def utilisation(self) -> float | None:
         """value/limit; None where there is no value: the candidate does not get that far."""
         return None if self.value is None else self.value / self.limit
 
+    @property
+    def passed(self) -> str:
+        """A limit that is passed, in words."""
+        value, limit = (number(x, self.unit, self.kind, full=False) for x in (self.value, self.limit))
+        used = number(self.utilisation, "1", "used")
+        return f"{self.title} {value}, {used}{' of' if used.endswith('%') else ''} the permitted {limit}"
+
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON."""
         return {
             "title": self.title,
-            "utilisation": {"value": self.utilisation, "unit": "1"},
-            "value": {"value": self.value, "unit": self.unit},
-            "limit": {"value": self.limit, "unit": self.unit},
+            "utilisation": entry(self.utilisation, "1", "used"),
+            "value": entry(self.value, self.unit, self.kind),
+            "limit": entry(self.limit, self.unit, self.kind),
         }
 
 
@@ -235,7 +244,7 @@ class SizingResult:
 def _entries(declared: Any) -> dict[str, Any]:
     layout = Layout(type(declared))
     return {
-        v.name: {"value": finite(value), "unit": v.unit, "title": v.description}
+        v.name: entry(value, v.unit, v.kind) | {"title": v.description}
         for v, value in zip(layout.variables, layout.values(declared), strict=True)
     }
 
@@ -551,7 +560,11 @@ def _checks(
             "peak torque", checked(peak), c.breakdown_torque / asked.breakdown_margin, "N.m"
         ),
         "temperature": Check(
-            "rise of temperature", checked(temperature - p.ambient.T), asked.temperature - p.ambient.T, "K"
+            "rise of temperature",
+            checked(temperature - p.ambient.T),
+            asked.temperature - p.ambient.T,
+            "K",
+            "difference",
         ),
         "starts": Check("starts per hour", asked.starts_per_hour, permitted, "1"),
         "crank_speed": Check(
@@ -559,8 +572,9 @@ def _checks(
             checked(abs(mean_speed / (c.drive.ratio * config.run.crank_speed) - 1.0)),
             _SPEED_DEVIATION,
             "1",
+            "percent",
         ),
-        "speed": Check("speed fluctuation", checked(c.fluctuation), asked.fluctuation, "1"),
+        "speed": Check("speed fluctuation", checked(c.fluctuation), asked.fluctuation, "1", "percent"),
     }
     if math.isfinite(asked.inertia_ratio):
         ratio = (reflected + p.rotor.J - plate.J) / plate.J
@@ -586,20 +600,14 @@ def rank(candidates: list[Candidate]) -> None:
         over = [check for name, check in c.checks.items() if c.sizes[name] > 1.0]
         if c.fits:
             most = max(c.checks.values(), key=lambda check: check.utilisation or 0.0)
-            c.verdict, c.reason = Verdict.FITS, f"most used: {most.title}, {100 * c.violation:.0f} %"
+            c.verdict, c.reason = Verdict.FITS, f"most used: {most.title}, {number(c.violation, '1', 'used')}"
         elif not c.checks:
             # its run failed, and the reason is there
             c.verdict = Verdict.REJECTED
         elif math.isinf(c.violation):
             c.verdict, c.reason = Verdict.REJECTED, "it does not bring the machine up to speed"
-        elif len(over) == 1:
-            (check,) = over
-            unit = "" if check.unit == "1" else f" {check.unit.replace('.', ' ')}"
-            c.verdict = Verdict.REJECTED
-            c.reason = f"{check.title} {check.value:.4g}{unit} of {check.limit:.4g}{unit} permitted"
         else:
-            sizes = ", ".join(f"{check.title} {100 * (check.utilisation or 0):.0f} %" for check in over)
-            c.verdict, c.reason = Verdict.REJECTED, f"above 100 %: {sizes}"
+            c.verdict, c.reason = Verdict.REJECTED, ", ".join(check.passed for check in over)
         if c.flywheel:
             c.reason += f", with the flywheel of {c.flywheel:.3g} kg m2 that the speed needs"
     candidates.sort(

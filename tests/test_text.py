@@ -1,0 +1,60 @@
+"""Numbers as people read them: one form by unit and kind, in letters of a page and in plain ones."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from chainunit.studies.overload import torque_reserve
+from chainunit.text import entry, number, shown
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "kind", "page", "terminal"),
+    [
+        (44.2248, "N.m", "", ("44.2", "N\u00a0m"), "44.2 N m"),
+        (12345.6, "N", "", ("12\u202f346", "N"), "12346 N"),
+        (-995.2, "N", "", ("−995", "N"), "-995 N"),
+        (2.3392e-7, "kg.m2", "", ("2.34\u00a0×\u00a010⁻⁷", "kg\u00a0m²"), "2.34e-7 kg m2"),
+        (math.radians(9.06), "rad", "", ("9.06", "°"), "9.06 deg"),
+        (313.15, "K", "", ("40.0", "°C"), "40.0 degC"),
+        (80.0, "K", "difference", ("80.0", "K"), "80.0 K"),
+        (1.5707963, "rad/s", "", ("1.57", "rad/s"), "1.57 rad/s"),
+        (1.5707963, "rad/s", "rotation", ("15.0", "rev/min"), "15.0 rev/min"),
+        (1.43, "1", "", ("1.43", ""), "1.43"),
+        # one form of a share, whatever its size
+        (0.809, "1", "percent", ("80.9", "%"), "80.9 %"),
+        (1.19e-6, "1", "percent", ("0", "%"), "0 %"),
+        (-0.037, "1", "percent", ("−3.70", "%"), "-3.70 %"),
+        (32.9853, "1", "percent", ("over 1000", "%"), "over 1000 %"),
+        (-32.9853, "1", "percent", ("below −1000", "%"), "below -1000 %"),
+        # a shaft cannot lose more than its speed but by turning back
+        (0.1349, "1", "dip", ("13.5", "%"), "13.5 %"),
+        (1.0, "1", "dip", ("stands", ""), "stands"),
+        (1.6815, "1", "dip", ("turns back", ""), "turns back"),
+        (0.71, "1", "used", ("71.0", "%"), "71.0 %"),
+        (10.0, "1", "used", ("1000", "%"), "1000 %"),
+        (15.09, "1", "used", ("15.1", "times"), "15.1 times"),
+        (2e4, "1", "used", ("over 1000", "times"), "over 1000 times"),
+    ],
+)
+def test_one_form_by_unit_and_kind(value, unit, kind, page, terminal):
+    assert shown(value, unit, kind) == page
+    assert number(value, unit, kind) == terminal
+
+
+def test_what_is_not_there():
+    assert (
+        number(None, "N") == number(math.nan, "N") == "-"
+        and number(None, "s", none="not reached") == "not reached"
+    )
+    assert number(math.inf, "rad/s") == "inf rad/s"
+    assert entry(math.inf, "rad/s") == {"value": None, "unit": "rad/s"}
+    assert entry(0.5, "1", "percent") == {"value": 0.5, "unit": "1", "kind": "percent"}
+
+
+def test_the_reserve_is_what_the_limit_leaves():
+    """At the current limit nothing is left; half the torque leaves half; a transient may pass the steady limit."""
+    assert [torque_reserve(5.588, peak) for peak in (5.588, 2.794, 0.0)] == [0.0, 0.5, 1.0]
+    assert torque_reserve(20.0, 22.0) == pytest.approx(-0.1)
