@@ -280,9 +280,8 @@ def test_the_moving_machine_is_the_simulated_one(study, written):
 def test_steady_running_begins_where_the_study_takes_it(study):
     """A soft starter that ramps for longer than the reference moves the mark and the still picture, too."""
     soft = SoftStart(voltage=0.5, time=0.7)
-    slow = dataclasses.replace(
-        study, config=dataclasses.replace(study.config, start="soft", starter=Starter(soft_start=soft))
-    )
+    config = dataclasses.replace(study.config, start="soft", starter=Starter(soft_start=soft))
+    slow = dataclasses.replace(study, config=config, steady_from=None)
     start_up = next(plot for plot in interactive.plots(slow) if plot.run == "start_up")
     (mark,) = start_up.figure.layout.annotations
     assert mark.text == "steady from here" and mark.x == slow.settled == pytest.approx(0.7 + math.pi / 3.0)

@@ -398,7 +398,7 @@ def test_the_study_waits_until_the_turns_close(tmp_path):
     study, _ = ran(UNSETTLED, tmp_path)
     assert study.settled > study.config.settled + 1.5
     assert study.answers["steady"].cycle_gap < 0.01 and study.answers["steady"].speed_ripple < 0.05
-    assert not any("do not close" in note for note in study.notes)
+    assert not any("do not close" in note for note in study.warnings)
 
 
 @pytest.mark.parametrize(
