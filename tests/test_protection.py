@@ -7,7 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from chainunit.studies.protection import mean_load, relay_trip, stall
+from chainunit import config
+from chainunit.studies import overload, sizing
+from chainunit.studies.protection import Obstacle, Setting, mean_load, relay_trip, stall
 
 
 def test_a_relay_of_class_10_trips_when_its_class_says():
@@ -40,3 +42,83 @@ def test_mean_load_by_hand():
     force, way = np.array([1.0, 1.0, 2.0, 2.0]), np.array([0.0, 1.0, 1.0, 2.0])
     assert mean_load(force, way) == pytest.approx((0.5 * (1.0 + 8.0)) ** (1.0 / 3.0))
     assert mean_load(np.ones(3), np.zeros(3)) == 0.0
+
+
+def test_a_setting_lies_between_normal_duty_and_what_opens_it():
+    jam, blocked = {"jam_left": 400.0}, {"blocked": 900.0}
+    found = Setting(normal=200.0, motor=600.0, gear=1000.0, overloads=jam | blocked | {"dip": 230.0})
+    assert found.torque == 250.0 and found.obstacle is None and found.opens == jam | blocked
+    # what the motor cannot give, what the gear may not carry, and what no overload reaches
+    for least, obstacle in (
+        (Setting(500.0, 600.0, 1000.0, jam | blocked), Obstacle.MOTOR),
+        (Setting(200.0, 600.0, 240.0, jam | blocked), Obstacle.GEAR),
+        (Setting(350.0, 600.0, 1000.0, jam), Obstacle.OVERLOADS),
+        (Setting(350.0, 600.0, 1000.0, {}), Obstacle.OVERLOADS),
+    ):
+        assert least.torque is None and least.obstacle is obstacle
+
+
+HEAVY = """
+events = ["feed_left", "feed_right", "jam_left", "jam_right", "blocked", "dip"]
+[machine]
+crank = { m = 160, s = 0.05, I = 4 }
+coupler = { m = 120, s = 0.7, I = 24 }
+rocker = { m = 480, s = 0.5, I = 60 }
+left = { wall_mass = 540, web_mass = 216 }
+right = { wall_mass = 540, web_mass = 216 }
+[feed]
+left = { material_mass = 300, processing_force = 120 }
+right = { material_mass = 300, processing_force = 120 }
+[run]
+step = 0.002
+[overload]
+turns = 1
+jam_force = %g
+[sizing]
+candidates = 1
+fluctuation = 0.3
+"""
+
+
+def ran(text, folder, monkeypatch):
+    """A study with the motor of 1.1 kW and 4 poles."""
+    one = [m for m in sizing.catalogue(None) if (m.nameplate.power, m.nameplate.poles) == (1100.0, 4.0)]
+    monkeypatch.setattr(sizing, "catalogue", lambda extra: one)
+    return overload.run_study(config.parse(text), folder)
+
+
+def test_the_recommended_coupling_is_tried_in_its_own_study(tmp_path, monkeypatch):
+    """With it, the study opens it in just those overloads that the recommendation names."""
+    study = ran(HEAVY % 6000.0, tmp_path, monkeypatch)
+    found = study.setting
+    assert found.torque is not None and not study.insufficient
+    steady = study.answers["steady"].crank_torque_peak
+    assert 1.2 * steady < found.torque < found.motor < study.start_torque
+    assert "held shut in the start" in overload.coupling_sentence(study)
+    monkeypatch.undo()
+    tried = ran(HEAVY % 6000.0 + f"[coupling]\ntrip_torque = {found.torque}\n", tmp_path, monkeypatch)
+    assert tried.failure is None
+    opened = {n for n, a in tried.answers.items() if a.coupling_trip_time is not None}
+    assert opened == set(found.opens) == {"jam_left", "jam_right", "blocked", "dip"}
+    assert any("held shut in the start" in note for note in tried.warnings)
+
+
+def test_without_a_shock_no_coupling_is_recommended(tmp_path, monkeypatch):
+    text = HEAVY.replace(', "jam_left", "jam_right", "blocked", "dip"', "") % 6000.0
+    study = ran(text, tmp_path, monkeypatch)
+    assert study.setting.obstacle is Obstacle.OVERLOADS
+    numbers = overload.as_dict(study)["sizing"]["protection"]
+    assert numbers["trip_torque"]["value"] is None and numbers["coupling"].startswith("No safety coupling")
+
+
+def test_a_coupling_that_never_opens_gets_a_remark(tmp_path):
+    light = 'events = ["jam_left"]\n[run]\nstep = 0.002\n[overload]\nturns = 1\njam_force = %g\n'
+    study = overload.run_study(config.parse(light % 2000 + "[coupling]\ntrip_torque = 5000\n"), tmp_path)
+    (remark,) = [note for note in study.warnings if "opens in no overload" in note]
+    # what the jam asks, and the motor's current limit times its torque constant through the gear
+    assert f"{study.answers['jam_left'].crank_torque_peak:.0f} N m on it at most" in remark
+    assert f"motor gives {4.4 * 1.27 * 50:.0f} N m at most" in remark
+    study = overload.run_study(config.parse(light % 9000 + "[coupling]\ntrip_torque = 320\n"), tmp_path)
+    assert study.answers["jam_left"].coupling_trip_time is not None
+    assert any("stalls the motor" in note for note in study.warnings)
+    assert not any("opens in no overload" in note for note in study.warnings)

@@ -654,6 +654,8 @@ def _sizing(t: Traced) -> str:
         parts.append(f'<div class="cards four">{"".join(cards)}</div>')
         why = "Chosen because" if chosen is not None else "Insufficient, and shown because"
         parts.append(f'<p class="reason">{why}: {t.text(f"{best}.reason")}</p>')
+    if "coupling" in sizing.get("protection", {}):
+        parts.append(f'<p class="reason">{t.text("sizing.protection.coupling")}</p>')
     parts.extend(
         f'<p class="note">{t.text(f"sizing.notes.{i}")}</p>' for i in range(len(sizing.get("notes", [])))
     )

@@ -14,10 +14,9 @@ from ..quantities import Layout, Variable
 from ..studies.chain import HIGH, ChainResult, SpeedNumbers
 from ..studies.cycle import FACTOR_FOR, OverloadFactors
 from ..studies.monte_carlo import QUANTILES, MonteCarloResult, Sample
-from ..studies.overload import Answers, Limits, Study, motor_verdict, reached
+from ..studies.overload import Answers, Limits, Study, coupling_sentence, motor_verdict, reached
 from ..studies.quantiles import CONFIDENCE, Estimate
 from ..studies.shaft import ShaftAnswers
-from ..studies.sizing import recommended
 from ..text import number, plain, shown
 
 _HIDDEN = {
@@ -283,15 +282,15 @@ def _show_sizing(study: Study, console: Console) -> None:
     sized = study.sizing
     assert sized is not None
     best = sized.best
-    settings = recommended(study.config, best)
     wheel = f"flywheel {best.flywheel:.3g} kg m2" if best.flywheel else "no flywheel"
     console.print(f"{sized.answer[:1].upper()}{sized.answer[1:]}.", soft_wrap=True)
     console.print(
         f"{'Insufficient motor' if study.insufficient else 'Motor'}: {best.motor.designation}, ratio "
-        f"{best.drive.ratio:.2f}, {wheel}; recommended: safety coupling at {settings.trip_torque:.0f} N m of the "
-        f"crank, relay at {settings.relay_current:.2f} A.",
+        f"{best.drive.ratio:.2f}, {wheel}; relay at {best.motor.nameplate.rated_current:.2f} A.",
         soft_wrap=True,
     )
+    if study.setting is not None:
+        console.print(coupling_sentence(study), soft_wrap=True)
     table = Table(title="Candidates, best first", title_justify="left")
     table.add_column("motor", no_wrap=True)
     table.add_column("ratio", justify="right")

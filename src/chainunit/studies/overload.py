@@ -158,6 +158,10 @@ class Study:
     sides: Sides | None = None
     limits: Limits | None = None
     runs: dict[str, xr.Dataset] = field(default_factory=dict)
+    setting: protection.Setting | None = None
+    """the safety coupling that a sized drive should have"""
+    start_torque: float | None = None
+    """peak on the coupling in a start direct on line, at the crank [N m]: judged apart"""
     steady_from: float | None = None
     """when running became steady [s], where that was later than `config.settled`"""
     event: dict[str, float] = field(default_factory=dict)
@@ -192,6 +196,12 @@ class Study:
     def insufficient(self) -> bool:
         """Whether sizing found no motor that fits, so that all is run with the nearest."""
         return self.sizing is not None and self.sizing.chosen is None
+
+    @property
+    def start_apart(self) -> bool:
+        """Whether the start is judged apart: switched on to the line, a motor gives more for a moment than it ever
+        does in running, and a coupling has to be held shut."""
+        return self.config.sizing is not None and self.config.start == "direct"
 
     @property
     def steady(self) -> xr.Dataset:
@@ -237,6 +247,8 @@ def run_study(
     except KeyboardInterrupt:
         # between two runs, or in one that is not a co-simulation
         study.failure = InterruptedRunError("interrupted")
+    if study.sizing is not None and "steady" in study.answers:
+        study.setting = _setting(study)
     if study.drive.chain is not None and not isinstance(study.failure, InterruptedRunError):
         _chains(study, files["machine"], report)
     _note(study)
@@ -392,7 +404,7 @@ def _simulate(
     guards = _guards(study)
     with CoSimulation(drive.system(files), signals) as simulation:
         progress = partial(_progress, report, "start-up and steady running", 0.0, total)
-        start_up, stop = _started(study, simulation, stop, progress, guards)
+        start_up, stop = _started(study, simulation, stop, progress, {} if study.start_apart else guards)
         _certify(study, "start_up", start_up, bond)
         if simulation.time < stop - 0.5 * run.step:
             raise RunError(
@@ -402,6 +414,14 @@ def _simulate(
         steady = study.steady
         study.answers["steady"] = _answers(study, steady, None, steady)
         study.pins["steady"] = _pins(study, steady)
+        if study.start_apart:
+            study.start_torque = _on_coupling(drive, start_up.sel(time=slice(None, study.settled)))
+        asked = _on_coupling(drive, steady)
+        if config.coupling and asked > config.coupling.trip_torque:
+            raise RunError(
+                f"the safety coupling opens in steady running, which puts {asked:.4g} N m on it; "
+                "coupling.trip_torque must be above that"
+            )
         start = simulation.save()
         angle = float(drive.crank_motion(start_up)[0][-1])
         lead = _lead(config, angle, study.answers["steady"].speed_mean)
@@ -436,7 +456,7 @@ def _simulate(
         with CoSimulation(drive.system(files), loaded) as simulation:
             before = total - (len(starts) - k) * stop
             progress = partial(_progress, report, SCENARIOS[name], before, total)
-            transient = simulation.run(stop, run.step, progress, guards=guards)
+            transient = simulation.run(stop, run.step, progress, guards={} if study.start_apart else guards)
             _close(study, name, transient, 0.0, stop, bond, simulation, folder, backend)
     if drive.line is not None:
         report("the same with a rigid shaft", total, total)
@@ -503,7 +523,7 @@ def _rigid(study: Study, files: Mapping[str, Path], stop: float) -> dict[str, xr
     for name in (name for name in study.event if OVERLOADS[name].kind == "start"):
         loaded = scenario_signals(config, drive, name, 0.0)
         with CoSimulation(system, {**loaded, **reference}) as simulation:
-            runs[name] = simulation.run(stop, step, guards=guards)
+            runs[name] = simulation.run(stop, step, guards={} if study.start_apart else guards)
     return runs
 
 
@@ -519,6 +539,38 @@ def _shaft(study: Study, rigid: Mapping[str, xr.Dataset]) -> None:
             study.drive, elastic, rigid[run].sel(time=since), study.config.driveline.exponent, per_turn
         )
         per_turn = damage if per_turn is None else per_turn
+
+
+def _on_coupling(drive: Drive, run: xr.Dataset) -> float:
+    """Peak torque on a coupling on the motor shaft in a run, at the crank [N m]."""
+    return float(np.max(np.abs(run["motor.tau"].values))) * drive.ratio
+
+
+def _peaks(study: Study) -> dict[str, float]:
+    """Peak on the coupling in each overload, at the crank [N m]; a start direct on line is judged apart."""
+    return {
+        name: _on_coupling(study.drive, study.runs[name].sel(time=slice(event, None)))
+        for name, event in study.event.items()
+        if name in study.runs and not (study.start_apart and OVERLOADS[name].kind == "start")
+    }
+
+
+def _setting(study: Study) -> protection.Setting:
+    """The safety coupling that the sized drive should have, tried in the overloads of the study."""
+    assert study.sizing is not None
+    best, drive = study.sizing.best, study.drive
+    peaks = _peaks(study)
+    # feed on one side lasts: it is no shock that a coupling is for
+    lasting = [name for name in peaks if OVERLOADS[name].kind in ("empties", "feed")]
+    normal = [_on_coupling(drive, study.steady), best.duty_torque, *(peaks.pop(name) for name in lasting)]
+    if not study.start_apart:
+        normal.append(_on_coupling(drive, study.runs["start_up"]))
+    return protection.Setting(
+        normal=max(normal),
+        motor=best.shaft_torque * drive.ratio,
+        gear=study.config.gear.torque_limit,
+        overloads=peaks,
+    )
 
 
 def _guards(study: Study) -> dict[str, float]:
@@ -896,6 +948,8 @@ def _note(study: Study) -> None:
         study.notes.extend(study.sizing.notes)
         if study.insufficient:
             warn(f"{study.sizing.answer}. All runs are with it.")
+    if config.coupling is not None and steady is not None:
+        _warn_of_coupling(study, config.coupling.trip_torque)
     _warn_of_runs(study)
     if study.ripple_without is not None and steady is not None:
         note(
@@ -1009,6 +1063,73 @@ def motor_verdict(study: Study) -> dict[str, Any] | None:
         "least_reserve": entry(reserve, "1", "percent"),
         "run": run,
     }
+
+
+def _torque(value: float) -> str:
+    return number(value, "N.m")
+
+
+def coupling_sentence(study: Study) -> str:
+    """Which safety coupling the sized drive should have and what it does in the overloads, or why none protects
+    it."""
+    found = study.setting
+    assert found is not None
+    above = f"{_torque(found.least)}, {protection.MARGIN:g} times the {_torque(found.normal)} of normal duty"
+
+    def listed(names: Mapping[str, float]) -> str:
+        return ", ".join(f"{SCENARIOS[name]} ({_torque(peak)})" for name, peak in names.items())
+
+    if found.obstacle is protection.Obstacle.MOTOR:
+        return (
+            f"No safety coupling protects this drive: it has to open above {above}, and the motor gives at most "
+            f"{_torque(found.motor)} at the crank."
+        )
+    if found.obstacle is protection.Obstacle.GEAR:
+        return (
+            f"No safety coupling protects this drive: it has to open above {above}, and the gear may carry "
+            f"{_torque(found.gear)}."
+        )
+    if found.obstacle is protection.Obstacle.OVERLOADS:
+        most = max(found.overloads.values(), default=0.0)
+        return (
+            f"No safety coupling is recommended: it has to open above {above}, and the overloads of this study put "
+            f"{_torque(most)} on it at most."
+        )
+    shut = {name: peak for name, peak in found.overloads.items() if name not in found.opens}
+    said = (
+        f"Recommended safety coupling: {above}, below the {_torque(found.motor)} that the motor gives at the crank. "
+        f"It opens where {listed(found.opens)}"
+    )
+    said += f"; it stays shut where {listed(shut)}." if shut else "."
+    if study.start_torque is not None and study.start_torque > found.least:
+        said += (
+            f" A start direct on line puts {_torque(study.start_torque)} on it: it has to be held shut in the start, "
+            "or the motor started softly."
+        )
+    return said
+
+
+def _warn_of_coupling(study: Study, trip: float) -> None:
+    """Where the coupling that is given does not do its work."""
+    drive, warn = study.drive, study.warnings.append
+    most = drive.largest_torque() * drive.ratio if study.setting is None else study.setting.motor
+    peaks = _peaks(study)
+    if study.start_torque is not None and study.start_torque > trip:
+        warn(
+            f"A start direct on line puts {_torque(study.start_torque)} on the safety coupling, which opens at "
+            f"{_torque(trip)}: it is taken to be held shut in the start."
+        )
+    if peaks and all(study.answers[name].coupling_trip_time is None for name in peaks):
+        warn(
+            f"The safety coupling opens in no overload of this study: it is set to {_torque(trip)}, they put "
+            f"{_torque(max(peaks.values(), default=0.0))} on it at most, steady running "
+            f"{_torque(_on_coupling(drive, study.steady))}; the motor gives {_torque(most)} at most."
+        )
+    elif trip > most:
+        warn(
+            f"The safety coupling is set to {_torque(trip)} and the motor gives {_torque(most)} at most: what brakes "
+            "the machine slowly stalls the motor and does not open it."
+        )
 
 
 def _note_chain(study: Study, chain: Chain) -> None:
@@ -1126,7 +1247,7 @@ def as_dict(study: Study) -> dict[str, Any]:
         "feed": entries(config.feed),
         "run": entries(config.run),
         "overload": entries(config.overload),
-        **({"sizing": study.sizing.as_dict()} if study.sizing else {}),
+        **({"sizing": study.sizing.as_dict() | {"protection": _protection(study)}} if study.sizing else {}),
         **({"monte_carlo": study.monte_carlo.as_dict()} if study.monte_carlo else {}),
         "coupling": entries(config.coupling) if config.coupling else None,
         **(_driveline(study) if study.torsion is not None else {}),
@@ -1136,6 +1257,38 @@ def as_dict(study: Study) -> dict[str, Any]:
             else {}
         ),
         "sides_over_speed": study.sides.as_dict() if study.sides else None,
+    }
+
+
+def _protection(study: Study) -> dict[str, Any]:
+    """Settings of the protection of the drive that sizing chose."""
+    assert study.sizing is not None
+    relay = {
+        "value": study.sizing.best.motor.nameplate.rated_current,
+        "unit": "A",
+        "title": "thermal relay, setting",
+    }
+    found = study.setting
+    if found is None:
+        return {"relay_current": relay}
+
+    def torque(value: float | None, title: str) -> dict[str, Any]:
+        return entry(value, "N.m") | {"title": title}
+
+    return {
+        "trip_torque": torque(found.torque, "safety coupling, trip torque at the crank"),
+        "relay_current": relay,
+        "coupling": coupling_sentence(study),
+        "obstacle": found.obstacle,
+        "normal_torque": torque(found.normal, "largest torque of normal duty on the coupling, at the crank"),
+        "breakdown_torque": torque(found.motor, "most that the motor gives at the crank"),
+        "start_torque": torque(study.start_torque, "torque of a start direct on line on the coupling"),
+        "overloads": {
+            name: torque(
+                peak, f"{SCENARIOS[name]}: {'opens it' if name in found.opens else 'leaves it shut'}"
+            )
+            for name, peak in found.overloads.items()
+        },
     }
 
 

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -45,6 +48,58 @@ def relay_trip(time: Any, current: Any, setting: float, before: float, holds: fl
     if final <= 1.0:
         return None
     return float(time[-1]) + relay_time_constant() * math.log((final - image[-1]) / (final - 1.0))
+
+
+MARGIN = 1.25
+"""Setting of a safety coupling over the largest torque of normal duty."""
+
+
+class Obstacle(StrEnum):
+    """Why no setting of a safety coupling protects a drive."""
+
+    MOTOR = "the motor"
+    """it cannot give the setting"""
+    GEAR = "the gear"
+    """it may not carry the setting"""
+    OVERLOADS = "the overloads"
+    """none of them gives the setting"""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A safety coupling between motor and gear, judged by the torques in a study; all at the crank [N m].
+
+    The setting is `MARGIN` times the largest torque of `normal` duty: below what the `motor` gives at most in steady
+    running, so that it opens before the motor stalls, below what the `gear` may carry, and below what at least one of
+    the `overloads` gives, by name their peaks. Otherwise `obstacle` says why there is none.
+    """
+
+    normal: float
+    motor: float
+    gear: float
+    overloads: Mapping[str, float]
+
+    @property
+    def least(self) -> float:
+        """The least torque at which a coupling may open."""
+        return MARGIN * self.normal
+
+    @property
+    def obstacle(self) -> Obstacle | None:
+        """Why there is no setting."""
+        if self.least >= min(self.motor, self.gear):
+            return Obstacle.MOTOR if self.motor <= self.gear else Obstacle.GEAR
+        return None if self.opens else Obstacle.OVERLOADS
+
+    @property
+    def torque(self) -> float | None:
+        """The setting, if there is one."""
+        return self.least if self.obstacle is None else None
+
+    @property
+    def opens(self) -> dict[str, float]:
+        """The overloads in which a coupling of the least setting opens, with their peaks."""
+        return {name: peak for name, peak in self.overloads.items() if peak > self.least}
 
 
 def stall(time: Any, speed: Any, asked: float, share: float = 0.1) -> float | None:

@@ -93,15 +93,6 @@ class Flywheel:
     fluctuation: Value = quantity("1", "fluctuation of the crank speed in the run", kind="percent")
 
 
-@declaration
-class Protection:
-    """Settings that follow from the runs of the chosen motor."""
-
-    trip_torque: Value = quantity("N.m", "safety coupling, trip torque at the crank")
-    relay_current: Value = quantity("A", "thermal relay, setting")
-    breakdown_torque: Value = quantity("N.m", "breakdown torque of the motor at the crank")
-
-
 @dataclass(frozen=True)
 class Check:
     """What is used of what is permitted, in one unit."""
@@ -157,11 +148,15 @@ class Candidate:
     flywheel: float
     """[kg m2], on the motor shaft"""
     checks: dict[str, Check]
-    peak_torque: float
+    peak_torque: float = math.nan
     """of the crank, over start and steady running with either load [N m]"""
-    breakdown_torque: float
+    breakdown_torque: float = math.nan
     """of the motor [N m]"""
-    fluctuation: float
+    shaft_torque: float = math.nan
+    """what it gives at its shaft at most, behind friction, fan and the gear's losses [N m]"""
+    duty_torque: float = math.nan
+    """peak at the crank in steady running, with all feed on one side only where that is part of the duty [N m]"""
+    fluctuation: float = math.nan
     verdict: Verdict | None = None
     """None until it is judged or ranked"""
     reason: str = ""
@@ -222,7 +217,6 @@ class SizingResult:
             "one_sided": heavier_side(self.config),
             "cycle": _entries(self.cycle),
             "flywheel": _entries(Flywheel(J=best.flywheel, fluctuation=best.fluctuation)),
-            "protection": _entries(recommended(self.config, best)),
             "tried": {"value": len(self.candidates), "unit": "1"},
             "motors": {"value": self.motors, "unit": "1"},
             "candidates": [
@@ -452,7 +446,7 @@ def proposed(config: Config, motor: CatalogueMotor, numbers: CycleNumbers, both:
     )
     machine = config.machine.replace({"ratio": ratio})
     drive = Drive(InductionMotor, p, machine, follows, rated_current=plate.rated_current, chain=config.chain)
-    return Candidate(motor, drive, 0.0, {}, math.nan, math.nan, math.nan)
+    return Candidate(motor, drive, 0.0, {})
 
 
 def judge(config: Config, c: Candidate, numbers: CycleNumbers, files: Mapping[str, Path]) -> None:
@@ -484,6 +478,9 @@ def judge(config: Config, c: Candidate, numbers: CycleNumbers, files: Mapping[st
     started = start_time(times, speed) if float(np.mean(steady["motor.w"])) > 0.5 * expected else None
     torque = max(float(np.max(np.abs(r["machine.tau"]))) for r in (start, steady, one_sided))
     c.peak_torque = torque * drive.ratio
+    assert config.sizing is not None
+    duty = [steady, one_sided] if config.sizing.one_sided_share else [steady]
+    c.duty_torque = max(float(np.max(np.abs(r["machine.tau"]))) for r in duty) * drive.ratio
     c.checks = _checks(config, c, start, steady, one_sided, started)
 
 
@@ -550,7 +547,8 @@ def _checks(
         voltage = float(volts_per_hertz(MATH, p, frequency))
         longest = 1.0 + 1.2 * config.run.ramp
     # warm, and at the frequency at which it runs: above the corner an inverter has no more voltage to give
-    c.breakdown_torque = float(breakdown(p, voltage, frequency, T=asked.temperature).air_gap_tau)
+    at_breakdown = breakdown(p, voltage, frequency, T=asked.temperature)
+    c.breakdown_torque, c.shaft_torque = float(at_breakdown.air_gap_tau), float(at_breakdown.tau)
     weaker = min(1.0, plate.frequency / frequency)
     cooled = min(1.0, cooling / motor.cooling(MATH, p, plate.speed))
     checks = {
@@ -609,7 +607,7 @@ def rank(candidates: list[Candidate]) -> None:
         else:
             c.verdict, c.reason = Verdict.REJECTED, ", ".join(check.passed for check in over)
         if c.flywheel:
-            c.reason += f", with the flywheel of {c.flywheel:.3g} kg m2 that the speed needs"
+            c.reason += f", with a flywheel of {c.flywheel:.3g} kg m2"
     candidates.sort(
         key=lambda c: (
             not c.fits,
@@ -627,14 +625,3 @@ def rank(candidates: list[Candidate]) -> None:
         if c.fits:
             larger = c.motor.nameplate.power > best.motor.nameplate.power
             c.reason = f"{'larger than needed' if larger else 'more used than the chosen one'}; {c.reason}"
-
-
-def recommended(config: Config, c: Candidate) -> Protection:
-    """Settings of the protection: the coupling trips a quarter above the largest torque of normal duty, at most at
-    what the gear may carry; the relay is set to the rated current."""
-    trip = 1.25 * c.peak_torque
-    return Protection(
-        trip_torque=min(trip, config.gear.torque_limit),
-        relay_current=c.motor.nameplate.rated_current,
-        breakdown_torque=c.breakdown_torque * c.drive.ratio,
-    )
