@@ -42,6 +42,23 @@ def error(run, reference, name):
     return float(np.max(np.abs(run[name].values[::every] - reference[name].values)))
 
 
+def test_a_reference_goes_on_from_another(reference):
+    """From the states at 0.4 s to the same end, at times of its own; a stretch between corners may hold none."""
+    models = {
+        "machine": (ChamberForces, ChainUnit(ratio=RATIO).p),
+        "motor": (DcMotor, DcMotor.parameter_layout.from_names({})),
+    }
+    at = reference.sel(time=0.4, method="nearest")
+    start = {name: float(at[name]) for name in map(str, reference.data_vars)}
+    times = np.array([float(at["time"]), 0.5, 0.6])
+    connections = port_connections("machine", "motor", slopes=False)
+    signals = {"motor.w_ref": RATIO * SPEED / 2.0}
+    again = monolithic(models, connections, signals, times, corners=(0.41, 0.42), start=start)
+    for name in ("motor.w", "motor.phi", "machine.tau"):
+        wanted = float(reference[name].sel(time=0.6, method="nearest"))
+        assert float(again[name][-1]) == pytest.approx(wanted, rel=1e-8)
+
+
 def test_second_order_with_slopes_first_without(fmus, reference):
     orders = {}
     for slopes in (True, False):

@@ -74,7 +74,7 @@ def study(
     ] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path("results"),
     check: Annotated[
-        bool, typer.Option("--check", help="Also compare with the monolithic solution.")
+        bool, typer.Option("--check", help="Also compare every run with the monolithic solution.")
     ] = False,
     backend: Annotated[
         Backend | None, typer.Option("--backend", help="Of the FMUs; native where a C compiler is found.")

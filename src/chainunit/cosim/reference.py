@@ -27,6 +27,7 @@ def monolithic(
     *,
     rtol: float = 1e-10,
     corners: Sequence[float] = (),
+    start: Mapping[str, float] | None = None,
 ) -> xr.Dataset:
     """Solve a system of models.
 
@@ -41,6 +42,8 @@ def monolithic(
     rtol : relative tolerance of the solver (DOP853); the absolute one is its thousandth of each
         state's nominal size, and at least 1e-12
     corners : times at which a signal starts or ends to change; the solver stops there
+    start : every state by full name at the first of the times, to go on from another solution; by default the
+        models' own start
 
     Returns
     -------
@@ -55,15 +58,15 @@ def monolithic(
 
     models = {name: (model, model.prepared(MATH, p)) for name, (model, p) in models.items()}
     offsets, n = {}, 0
-    start: list[float] = []
+    begin: list[float] = []
     tolerances: list[float] = []
     for name, (model, p) in models.items():
         if model.state_layout:
             offsets[name] = n
-            start += model.state_layout.values(model.start(MATH, p, model.input_layout.from_names({})))
+            begin += model.state_layout.values(model.start(MATH, p, model.input_layout.from_names({})))
             sizes = [v.quantity.nominal or 1.0 for v in model.state_layout.variables]
             tolerances += [max(1e-12, rtol * 1e-3 * size) for size in sizes]
-            n = len(start)
+            n = len(begin)
 
     def pass_through(engine: Any, given: Mapping[str, Any], x: Any, rounds: int) -> dict[str, Any]:
         """Every value by full name: states, then outputs in the models' order; `rounds` passes carry a
@@ -126,18 +129,25 @@ def monolithic(
 
     # where the start depends on an input that is another one's state, a pass for each on the way
     for _ in models:
-        values = pass_through(MATH, at(0.0), start, 1)
+        values = pass_through(MATH, at(0.0), begin, 1)
         begun: list[float] = []
         for name, (model, p) in models.items():
             if model.state_layout:
                 begun += model.state_layout.values(model.start(MATH, p, inputs(name, model, at(0.0), values)))
-        if begun == start:
+        if begun == begin:
             break
-        start = begun
+        begin = begun
+    if start is not None:
+        begin = [
+            start[f"{name}.{state}"]
+            for name, (model, _) in models.items()
+            if model.state_layout
+            for state in model.state_layout.names
+        ]
     times = np.asarray(times, float)
     inner = [c for c in sorted(set(corners)) if times[0] < c < times[-1]]
     stops = [times[0], *inner, times[-1]]
-    x = np.asarray(start)
+    x = np.asarray(begin)
     found = np.empty((n, len(times)))
     for low, high in pairwise(stops):
         chosen = (times >= low) & (times <= high)
@@ -152,7 +162,8 @@ def monolithic(
         )
         if not solution.success:
             raise RunError(f"monolithic reference: {solution.message}")
-        found[:, chosen] = solution.sol(times[chosen])
+        if chosen.any():
+            found[:, chosen] = solution.sol(times[chosen])
         x = solution.y[:, -1]
     values = pass_through(numpy_(), at(times), found, len(models) + 1)
     described = {

@@ -802,6 +802,14 @@ def _figures(t: Traced, drawn: list[Plot]) -> str:
                     f" The speed dips by {t.number(f'answers.{plot.run}.speed_dip')}; recovery: "
                     f"{t.number(f'answers.{plot.run}.recovery_time', none='not reached')}."
                 )
+            if plot.run == "blocked" and "block_peaks" in t.result:
+                peaks, stiffness = (
+                    " to ".join(t.number(f"block_peaks.{name}_{end}") for end in ("low", "high"))
+                    for name in ("crank_torque", "stiffness")
+                )
+                caption += (
+                    f" The stop is assumed: the crank torque peaks at {peaks} for a stiffness of {stiffness}."
+                )
         height = plot.figure.layout.height
         half = " half" if plot.run else ""
         html.append(

@@ -14,7 +14,16 @@ from ..quantities import Layout, Variable
 from ..studies.chain import HIGH, ChainResult, SpeedNumbers
 from ..studies.cycle import FACTOR_FOR, OverloadFactors
 from ..studies.monte_carlo import QUANTILES, MonteCarloResult, Sample
-from ..studies.overload import Answers, Limits, Study, coupling_sentence, motor_verdict, reached
+from ..studies.overload import (
+    DIFFERENCE,
+    Answers,
+    Limits,
+    Study,
+    called,
+    coupling_sentence,
+    motor_verdict,
+    reached,
+)
 from ..studies.quantiles import CONFIDENCE, Estimate
 from ..studies.shaft import ShaftAnswers
 from ..text import number, plain, shown
@@ -165,12 +174,18 @@ def show(study: Study, console: Console) -> None:
         console.print(
             f"Energy residual of the shaft: at most {number(worst_share, '1')} of the energy moved."
         )
-    for name, value in study.certificate.get("start_up", {}).items():
-        if name.endswith("_difference_to_monolithic"):
-            quantity = name.removesuffix("_difference_to_monolithic")
-            console.print(
-                f"Difference of {quantity} to the monolithic solution: {number(value, '1')} of its peak."
-            )
+    compared: dict[str, dict[str, float]] = {}
+    for run, certificate in study.certificate.items():
+        for name, value in certificate.items():
+            if name.endswith(DIFFERENCE):
+                compared.setdefault(name.removesuffix(DIFFERENCE), {})[run] = value
+    for name, differences in compared.items():
+        worst = max(differences, key=lambda run: differences[run])
+        console.print(
+            f"Difference of {name} to the monolithic solution, in parts of its peak: at most "
+            f"{number(differences[worst], '1')} ({called(worst)}), {len(differences)} runs compared.",
+            soft_wrap=True,
+        )
     for warning in study.warnings:
         console.print(f"Warning: {warning}", soft_wrap=True)
     for note in study.notes:

@@ -136,6 +136,25 @@ _PATIENCE = 20.0
 _CLOSED = 0.01
 """Gap between the ends of the steady turns up to which they count as closed."""
 
+_DECADE = math.sqrt(10.0)
+"""From and to this part of the stop's stiffness its peaks are given: over a decade."""
+
+
+@declaration
+class BlockPeaks:
+    """Peaks with the rocker blocked over a decade of stiffness about that of `overload.block_stiffness`, the damping
+    with its root, as it is in a swing with the same damping ratio."""
+
+    stiffness_low: Value = quantity("N.m/rad", "stiffness of the stop, from")
+    stiffness_high: Value = quantity("N.m/rad", "stiffness of the stop, to")
+    crank_torque_low: Value = quantity("N.m", "crank torque, peak, from")
+    crank_torque_high: Value = quantity("N.m", "crank torque, peak, to")
+    motor_torque_low: Value = quantity("N.m", "motor torque, peak, from")
+    motor_torque_high: Value = quantity("N.m", "motor torque, peak, to")
+    rocker_torque_low: Value = quantity("N.m", "rocker torque, peak, from")
+    rocker_torque_high: Value = quantity("N.m", "rocker torque, peak, to")
+
+
 Report = Callable[[str, float, float], None]
 """Called with what is running, the time done and the time to do [s]."""
 
@@ -181,6 +200,8 @@ class Study:
     """what each run asks of the driveline, where there is one"""
     cycles_of: dict[str, Cycles] = field(default_factory=dict)
     """rainflow cycles of the torque in shaft 2 by run"""
+    block_peaks: BlockPeaks | None = None
+    """what the assumed stiffness of the stop makes of the peaks, where the rocker was blocked"""
     chain: ChainResult | None = None
     """the organs as chains at constant speed, where the study has them"""
     coasting: Path | None = None
@@ -226,7 +247,7 @@ def run_study(
 ) -> Study:
     """Run the study; FMUs are written to ``folder/fmu``, by `backend` (see `chainunit.fmu.backends`).
 
-    With `check`, the start-up and steady running are also compared with the monolithic solution.
+    With `check`, every run is also compared with the monolithic solution.
     A run that fails ends the study early: what was computed is in it, and `failure` says why.
     """
     report = report or (lambda what, done, todo: None)
@@ -438,9 +459,16 @@ def _simulate(
             transient = _event(config, simulation, name, event, event + follow, progress, guards)
             done += lead + follow
             _close(study, name, transient, event, event + follow, bond, simulation, folder, backend)
-        if check:
-            report("monolithic reference", total, total)
-            _compare(study, start_up, signals)
+        if "blocked" in study.answers:
+            report("the rocker is blocked, over a decade of stiffness", done - start, total)
+            study.block_peaks = _block_peaks(study, simulation, event)
+    if check:
+        report("monolithic reference of the start-up", total, total)
+        states = _compare(study, "start_up", signals)
+        for name in events:
+            report(f"monolithic reference: {SCENARIOS[name]}", total, total)
+            given = {**scenario_signals(config, drive, name, event), **drive.reference(run.crank_speed)}
+            _compare(study, name, given, states)
     if drive.feed_forward:
         plain = replace(drive, feed_forward=False)
         without = {**plain.loads(config.feed), **plain.reference(run.crank_speed, run.ramp)}
@@ -458,6 +486,9 @@ def _simulate(
             progress = partial(_progress, report, SCENARIOS[name], before, total)
             transient = simulation.run(stop, run.step, progress, guards={} if study.start_apart else guards)
             _close(study, name, transient, 0.0, stop, bond, simulation, folder, backend)
+        if check:
+            report(f"monolithic reference: {SCENARIOS[name]}", total, total)
+            _compare(study, name, loaded)
     if drive.line is not None:
         report("the same with a rigid shaft", total, total)
         try:
@@ -576,6 +607,42 @@ def _setting(study: Study) -> protection.Setting:
 def _guards(study: Study) -> dict[str, float]:
     coupling = study.config.coupling
     return {"motor.tau": coupling.trip_torque / study.drive.ratio} if coupling else {}
+
+
+def _block_peaks(study: Study, simulation: CoSimulation, event: float) -> BlockPeaks:
+    """The peaks with the rocker blocked by softer and stiffer stops, from the steady state that was saved."""
+    config, drive = study.config, study.drive
+    o, answers = config.overload, study.answers["blocked"]
+    peaks = {
+        name: [getattr(answers, f"{name}_peak")] for name in ("crank_torque", "motor_torque", "rocker_torque")
+    }
+    for factor in (1.0 / _DECADE, _DECADE):
+        stop = replace(
+            o, block_stiffness=factor * o.block_stiffness, block_damping=math.sqrt(factor) * o.block_damping
+        )
+        other = replace(config, overload=stop)
+        simulation.restore()
+        simulation.signals = {
+            **scenario_signals(other, drive, "blocked", event),
+            **drive.reference(config.run.crank_speed),
+        }
+        until = event + follow_time(other, "blocked")
+        run = _event(other, simulation, "blocked", event, until, guards=_guards(study))
+        run = run.sel(time=slice(event, None))
+        for name, torque in (
+            ("crank_torque", drive.crank_torque(run)),
+            ("motor_torque", run["motor.air_gap_tau"].values),
+            ("rocker_torque", run["machine.rocker.tau"].values),
+        ):
+            peaks[name].append(float(np.max(np.abs(torque))))
+    ends = {
+        f"{name}_{end}": of(sizes)
+        for name, sizes in peaks.items()
+        for end, of in (("low", min), ("high", max))
+    }
+    return BlockPeaks(
+        stiffness_low=o.block_stiffness / _DECADE, stiffness_high=o.block_stiffness * _DECADE, **ends
+    )
 
 
 def _event(
@@ -699,24 +766,42 @@ def _certify(study: Study, name: str, run: xr.Dataset, bond: Bond) -> None:
     study.runs[name] = run
 
 
-def _compare(study: Study, run: xr.Dataset, signals: Mapping[str, Any]) -> None:
-    times = run["time"].values[::10]
+def _compare(
+    study: Study, name: str, signals: Mapping[str, Any], start: Mapping[str, float] | None = None
+) -> dict[str, float]:
+    """Compare the run `name` with the monolithic solution of the same `signals`, from the states `start` on; returns
+    the states at its end."""
+    run, drive = study.runs[name], study.drive
+    rows = np.unique(np.append(np.arange(0, run.sizes["time"], 10), run.sizes["time"] - 1))
     corners = [c for signal in signals.values() if isinstance(signal, Profile) for c in signal.corners]
-    models = study.drive.models()
-    if study.drive.feed_forward:
-        models = {"model": (ChamberForces, study.drive.machine.p), **models}
+    if name in OVERLOADS and OVERLOADS[name].kind == "blocked":
+        # what blocks the rocker is there from one instant on
+        event = study.event[name]
+        corners.append(event)
+        block = {full: float(run[full][-1]) for full in _block(study.config, 0.0)}
+        signals = {**signals, **{full: partial(_from, event, value) for full, value in block.items()}}
+    models = drive.models()
+    if drive.feed_forward:
+        models = {"model": (ChamberForces, drive.machine.p), **models}
     reference = monolithic(
         models,
-        study.drive.connections(slopes=False),
+        drive.connections(slopes=False),
         signals,
-        times,
+        run["time"].values[rows],
         corners=corners,
+        start=start,
     )
-    for name in ("machine.tau", "motor.w"):
-        difference = np.abs(run[name].values[::10] - reference[name].values)
-        study.certificate["start_up"][f"{name}_difference_to_monolithic"] = float(
-            np.max(difference) / np.max(np.abs(reference[name].values))
+    for of in ("machine.tau", "motor.w"):
+        difference = np.abs(run[of].values[rows] - reference[of].values)
+        study.certificate[name][of + DIFFERENCE] = float(
+            np.max(difference) / np.max(np.abs(reference[of].values))
         )
+    return {full: float(reference[full][-1]) for full in map(str, reference.data_vars)}
+
+
+def _from(begin: float, value: float, t: Any) -> Any:
+    """A signal that is 0 up to the time `begin` [s] and `value` after it."""
+    return np.where(np.asarray(t) > begin, value, 0.0)
 
 
 def _turns(drive: Drive, run: xr.Dataset, most: float = math.inf) -> xr.Dataset:
@@ -964,8 +1049,27 @@ def _note(study: Study) -> None:
             f"overloads at random: {random.left_out} lines of {random.file.name} were no rows of this study and are "
             "left out; runs that they may have stood for were computed anew."
         )
+    if study.block_peaks is not None:
+        b, o = study.block_peaks, config.overload
+        low, high = (number(getattr(b, f"stiffness_{end}"), "N.m/rad") for end in ("low", "high"))
+        crank = " to ".join(number(getattr(b, f"crank_torque_{end}"), "N.m") for end in ("low", "high"))
+        note(
+            "the rocker is blocked: the stop's stiffness and damping are assumed and decide the peaks; crank torque "
+            f"{crank} for {low} to {high}, damping with the root of it. Take the stiffness of what is jammed (N/m) "
+            "times the square of its distance from the pivot C (m): overload.block_stiffness, now "
+            f"{number(o.block_stiffness, 'N.m/rad')}, and block_damping, now {number(o.block_damping, 'N.m.s/rad')}."
+        )
     if study.torsion is not None:
         _note_shaft(study)
+
+
+DIFFERENCE = "_difference_to_monolithic"
+"""Ends the name of a variable's largest difference to the monolithic solution, over its peak."""
+
+
+def called(run: str) -> str:
+    """What sentences call a run."""
+    return _CALLED.get(run, run.replace("_", " "))
 
 
 _CALLED = {STEADY: "steady running", "constant": "chains at constant speed", **SCENARIOS}
@@ -1247,6 +1351,7 @@ def as_dict(study: Study) -> dict[str, Any]:
         "feed": entries(config.feed),
         "run": entries(config.run),
         "overload": entries(config.overload),
+        **({"block_peaks": entries(study.block_peaks)} if study.block_peaks else {}),
         **({"sizing": study.sizing.as_dict() | {"protection": _protection(study)}} if study.sizing else {}),
         **({"monte_carlo": study.monte_carlo.as_dict()} if study.monte_carlo else {}),
         "coupling": entries(config.coupling) if config.coupling else None,
