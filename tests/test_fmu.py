@@ -89,6 +89,17 @@ def test_variables_are_those_of_the_design(fmus):
         assert v.unit and v.description, v.name
 
 
+def test_start_values_of_a_motion_agree(fmus):
+    """An input that nobody connects keeps its start value: a machine stands, phi = 0 with w = 0, and says so."""
+    for name in ("ChamberForces", "ChainUnitFlexible", "KnifeDrive", "CardanDriveline"):
+        variables = {v.name: v for v in fmpy.read_model_description(str(fmus[name])).modelVariables}
+        assert [float(variables[n].start) for n in ("phi", "w", "a")] == [0.0, 0.0, 0.0]
+        text = zipfile.ZipFile(fmus[name]).read("documentation/index.html").decode()
+        assert "An input that is not connected keeps its start value" in text
+        result = fmpy.simulate_fmu(str(fmus[name]), stop_time=0.1, output=["phi0", "w0", "power"])
+        assert not any(result[n].any() for n in ("phi0", "w0", "power"))
+
+
 def test_dependencies_are_true(fmus):
     """A dependency that is missing would be a wrong loop analysis; one too many, a loop that is none."""
     rng = np.random.default_rng(1)
@@ -236,7 +247,7 @@ def test_geometry_that_cannot_turn_gives_nan_and_a_reason(chamber):
 
 def test_bad_input_gives_nan_not_stale_numbers(chamber):
     with Running(chamber) as unit:
-        unit.set(["phi"], [0.5])
+        unit.set(["phi", "w"], [0.5, 3.0])
         good = unit.get(["tau"])
         unit.set(["w"], [math.nan])
         assert math.isnan(unit.get(["tau"])[0])
@@ -405,7 +416,7 @@ def test_reset(chamber):
         unit.initialize({"r": 0.14}, 0.0)
         unit.finish_initialization()
         loads = {f"{side}.material_mass": 30.0 for side in ("left", "right")}
-        want = ChainUnit(r=0.14).evaluate({"w": 3.0, **loads})["tau"]
+        want = ChainUnit(r=0.14).evaluate(loads)["tau"]
         assert unit.get(["r", "tau"]) == pytest.approx([0.14, float(want)], rel=1e-12)
 
 

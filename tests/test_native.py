@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 import math
+import re
 import shutil
 import subprocess
 import zipfile
@@ -21,11 +23,12 @@ from lxml import etree
 from test_fmu import Running
 from test_reference import POINTS, deviation
 
-from chainunit import ChainUnit, GeometryError, RunError
+from chainunit import ChainUnit, GeometryError, InputError, RunError
 from chainunit.cosim.instance import Fmu, Instance
 from chainunit.engines import MATH
-from chainunit.fmu.accompany import REFERENCE
+from chainunit.fmu.accompany import INPUTS, READ, REFERENCE, STANDARD, STEPPED
 from chainunit.fmu.description import Interface
+from chainunit.fmu.export import export as export_python
 from chainunit.fmu.native.export import export
 from chainunit.fmu.native.platforms import compiler
 from chainunit.machines.chain_unit import ChamberForces
@@ -139,8 +142,6 @@ def test_directional_derivatives_are_exact(native, name):
     rng = np.random.default_rng(8)
     unit.setReal(list(range(first, first + n_u)), list(rng.uniform(0.5, 2.0, n_u)))
     if n_x:
-        import ctypes
-
         x = (ctypes.c_double * n_x)(*rng.uniform(0.5, 2.0, n_x))
         unit.setContinuousStates(x, n_x)
     known, unknown = list(range(first, first + n_u + n_x)), list(range(first + n_u, last))
@@ -170,6 +171,138 @@ def test_directional_derivatives_are_exact(native, name):
     unit.terminate()
     unit.freeInstance()
     fmu.close()
+
+
+class Exchange:
+    """An FMI 2.0 Model Exchange instance in initialization mode, by variable name; `known` and `unknown` are what a
+    linearisation differentiates by, and what it differentiates."""
+
+    def __init__(self, native, name):
+        fmu = self.fmu = Fmu(native[name, 2][0])
+        self.interface = interface = Interface(MODELS[name], {})
+        self.unit = FMU2Model(
+            guid=fmu.description.guid, unzipDirectory=fmu.folder, modelIdentifier=name, instanceName="unit"
+        )
+        self.unit.instantiate()
+        self.unit.setupExperiment()
+        self.unit.enterInitializationMode()
+        self.references = {n: v.valueReference for n, v in fmu.variables.items()}
+        self.inputs = [s.reference for s in interface.of("input")]
+        self.n = len(interface.states)
+        outputs = [s.reference for s in interface.of("output")]
+        self.states, last = outputs[: self.n], outputs[-1]
+        self.derivatives = list(range(last + 1, last + 1 + self.n))
+        self.unknown = [*self.states, *self.derivatives, *outputs[self.n :]]
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.unit.freeInstance()
+        self.fmu.close()
+
+    def excited(self, t):
+        """Inputs at the time `t`, as in the reference results."""
+        model = self.interface.model
+        return model.input_layout.from_names(dict(model.excitation(t)))
+
+    def run(self):
+        self.unit.exitInitializationMode()
+        self.unit.enterContinuousTimeMode()
+
+    def x(self):
+        x = (ctypes.c_double * self.n)()
+        self.unit.getContinuousStates(x, self.n)
+        return np.array(x)
+
+    def move_to(self, x):
+        if self.n:
+            self.unit.setContinuousStates((ctypes.c_double * self.n)(*x), self.n)
+
+    def jacobian(self, known):
+        """By directional derivatives, one of `known` a column."""
+        get = self.unit.getDirectionalDerivative
+        return np.array([get(self.unknown, [k], [1.0]) for k in known]).T
+
+    def quotients(self, known):
+        """Difference quotients to the right and to the left; of an input at its least value to the right twice, the
+        second with half the step."""
+        low = {s.reference: s.variable.quantity.low for s in self.interface.of("input")}
+        here, x, middle = self.unit.getReal(self.inputs), self.x(), np.array(self.unit.getReal(self.unknown))
+        right, left = np.empty((2, len(self.unknown), len(known)))
+        for column, k in enumerate(known):
+            at = here[self.inputs.index(k)] if k in self.inputs else x[self.states.index(k)]
+            h = 2e-6 * max(1.0, abs(at))
+            for side, step in ((right, h), (left, -h if at - h >= low.get(k, -math.inf) else 0.5 * h)):
+                if k in self.inputs:
+                    self.unit.setReal([k], [at + step])
+                else:
+                    moved = x.copy()
+                    moved[self.states.index(k)] += step
+                    self.move_to(moved)
+                side[:, column] = (np.array(self.unit.getReal(self.unknown)) - middle) / step
+                if k in self.inputs:
+                    self.unit.setReal([k], [at])
+                else:
+                    self.move_to(x)
+        return right, left
+
+
+def assert_a_derivative(found, right, left):
+    """Finite, and where both quotients agree theirs, at a kink between them."""
+    assert np.isfinite(found).all()
+    size = np.maximum(1.0, np.maximum(np.abs(right), np.abs(left)))
+    # rounding of outputs up to 1e4 over steps of 2e-6
+    slack = 1e-5 * size + 1e-5 * np.maximum(1.0, np.abs(found)).max(axis=1, keepdims=True)
+    assert (found > np.minimum(right, left) - slack).all()
+    assert (found < np.maximum(right, left) + slack).all()
+
+
+@pytest.mark.parametrize("name", list(MODELS))
+def test_linearisation_at_the_start_and_in_a_run(native, name):
+    """A, B, C and D as PyFMI takes them, one directional derivative a column; in initialization mode the states
+    follow the inputs."""
+    model = MODELS[name]
+    with Exchange(native, name) as unit:
+        assert_a_derivative(unit.jacobian(unit.inputs), *unit.quotients(unit.inputs))
+        unit.run()
+        known = [*unit.states, *unit.inputs]
+        assert_a_derivative(unit.jacobian(known), *unit.quotients(known))
+        t, h = 0.0, 1e-4
+        while t < 0.05:
+            unit.unit.setTime(t)
+            unit.unit.setReal(unit.inputs, model.input_layout.values(unit.excited(t)))
+            if unit.n:
+                dx = (ctypes.c_double * unit.n)()
+                unit.unit.getDerivatives(dx, unit.n)
+                unit.move_to(unit.x() + h * np.array(dx))
+            t += h
+        assert_a_derivative(unit.jacobian(known), *unit.quotients(known))
+
+
+@pytest.mark.parametrize("name", list(MODELS))
+def test_derivatives_are_finite_wherever_a_model_may_be(native, name):
+    """Nothing on, nothing loaded, each alone at zero, and random states between."""
+    rng = np.random.default_rng(21)
+    with Exchange(native, name) as unit:
+        unit.run()
+        inputs = [s.variable.quantity for s in unit.interface.of("input")]
+        given, x = np.array([q.start for q in inputs]), unit.x()
+        # a chain at rest along one line is no state that it may be in
+        still = x if name == "ChainUnitFlexible" else 0.0 * x
+        zero = np.zeros(len(given))
+        tried = [(given, x), (zero, x), (given, still), (zero, still)]
+        tried += [(np.where(np.arange(len(given)) == k, 0.0, given), x) for k in range(len(given))]
+        tried += [(given, np.where(np.arange(unit.n) == k, still, x)) for k in range(unit.n)]
+        for _ in range(20):
+            values = [rng.uniform(max(q.low, -3.0), min(q.high, 3.0)) for q in inputs]
+            kept, off = rng.random((2, 1)) < 0.5
+            tried.append((np.where(kept, values, zero), x + off * rng.uniform(-0.1, 0.1, unit.n)))
+        known = [*unit.states, *unit.inputs]
+        for u, at in tried:
+            unit.unit.setReal(unit.inputs, list(u))
+            unit.move_to(at)
+            assert np.isfinite(unit.jacobian(known)).all()
 
 
 def test_output_derivatives_and_input_interpolation(native):
@@ -376,33 +509,161 @@ def test_threads_do_not_see_each_other(native):
     fmu.close()
 
 
-@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
-@pytest.mark.parametrize("fmi", [2, 3])
+def reference_results(folder, name):
+    """What an FMU carries: inputs, outputs at the end of each step, outputs at its beginning, by the manifest."""
+    root = etree.parse(Path(folder) / REFERENCE / "fmi-ls-manifest.xml").getroot()
+    assert root.tag == "fmiReferences"
+    space = "{http://fmi-standard.org/fmi-ls-manifest}fmi-ls-"
+    assert root.get(f"{space}name") == STANDARD == REFERENCE.split("/")[1]
+    assert root.get(f"{space}version") == "1.0.0-alpha.1"
+    files = {x.get("source"): x.get("role") for x in root.iter("Related")}
+    assert files == {
+        f"{name}_{INPUTS}.csv": "testcase",
+        f"{name}_{STEPPED}.csv": "result",
+        f"{name}_{READ}.csv": "result",
+    }
+    return tuple(fmpy.util.read_csv(Path(folder) / REFERENCE / file) for file in files)
+
+
+def assert_met(name, got, wanted):
+    nominal = {s.name: s.variable.quantity.nominal or 1.0 for s in Interface(MODELS[name], {}).signals}
+    tolerance = 1e-5 if MODELS[name].state_layout else 1e-12
+    for n in wanted.dtype.names[1:]:
+        # what is zero is not so to the last digit
+        size = max(np.abs(wanted[n]).max(), 1e-3 * nominal[n])
+        np.testing.assert_allclose(got[n], wanted[n], rtol=0.0, atol=tolerance * size + 1e-12, err_msg=n)
+
+
 @pytest.mark.parametrize("name", list(MODELS))
-def test_the_reference_results_inside_are_met(native, name, fmi, kind):
-    """As an importer would check its own work: inputs from the one file, outputs against the other."""
-    folder = Path(native[name, fmi][1])
-    given, wanted = (fmpy.util.read_csv(folder / REFERENCE / f"{name}_{end}.csv") for end in ("in", "ref"))
-    outputs = [n for n in wanted.dtype.names if n != "time"]
+def test_a_master_meets_both_reference_results(native, fmus, tmp_path, name):
+    """Set, read, step, read: by native code and by pythonfmu; every input that matters moves."""
+    for file in (native[name, 2][0], fmus[name]):
+        fmu = Fmu(file)
+        given, stepped, read = reference_results(fmu.folder, name)
+        moving = [n for n in given.dtype.names[1:] if np.ptp(given[n]) > 0.0]
+        assert moving, name
+        inputs, outputs = list(given.dtype.names[1:]), list(read.dtype.names[1:])
+        rows = []
+        with Running(fmu, dict(zip(inputs, list(given[0])[1:], strict=True))) as unit:
+            for k, row in enumerate(given):
+                rows.append([unit.get(outputs)])
+                unit.set(inputs, list(row)[1:])
+                rows[-1].append(unit.get(outputs))
+                if k + 1 < len(given):
+                    unit.step(row["time"], given["time"][k + 1] - row["time"])
+        for at, wanted in enumerate((stepped, read)):
+            got = np.rec.fromarrays(np.array([row[at] for row in rows]).T, names=outputs)
+            assert_met(name, got, wanted)
+        fmu.close()
+
+
+@pytest.mark.parametrize(
+    ("name", "fmi", "kind"),
+    [
+        (name, fmi, kind)
+        for name, model in MODELS.items()
+        for fmi in (2, 3)
+        for kind in ("CoSimulation", "ModelExchange")
+        # fmpy holds its inputs in Model Exchange, which do not run there by themselves
+        if kind == "CoSimulation" or not model.input_rates
+    ],
+)
+def test_fmpy_meets_the_reference_results(native, name, fmi, kind):
+    """Its Co-Simulation reads at the end of each step, its Model Exchange once the inputs are set: these jump at each
+    time, which is an event."""
+    folder = native[name, fmi][1]
+    given, stepped, read = reference_results(folder, name)
+    wanted = stepped
+    if kind == "ModelExchange":
+        times, given = given["time"], np.repeat(given, 2)[:-1]
+        given["time"][1::2] = times[1:]
+        wanted = read
     got = fmpy.simulate_fmu(
         str(folder),
         fmi_type=kind,
         input=given,
         stop_time=wanted["time"][-1],
         output_interval=wanted["time"][1],
-        relative_tolerance=1e-10,
-        output=outputs,
+        relative_tolerance=1e-9,
+        output=list(wanted.dtype.names[1:]),
+        record_events=False,
     )
     assert len(got) == len(wanted)
+    assert_met(name, got, wanted)
+
+
+@pytest.mark.parametrize("name", [name for name, model in MODELS.items() if model.state_layout])
+def test_euler_is_stable_in_the_default_experiment(native, name):
+    """From the start values, in the step that the description suggests: to the states of an accurate integrator."""
+    wanted = MODELS[name].experiment
+    for fmi in (2, 3):
+        default = fmpy.read_model_description(str(native[name, fmi][0])).defaultExperiment
+        given = (default.stepSize, default.stopTime, default.tolerance)
+        assert [float(x) for x in given] == [wanted.step, wanted.stop, wanted.tolerance]
+    states = list(MODELS[name].state_layout.names)
+
+    def states_of(kind, interval, **options):
+        folder = str(native[name, 2][1])
+        # fmpy's Euler takes the output interval for its step
+        options |= {"fmi_type": kind, "stop_time": 1.0, "output_interval": interval, "output": states}
+        return fmpy.simulate_fmu(folder, **options)
+
+    accurate = states_of("CoSimulation", 0.05)
+    euler = states_of("ModelExchange", wanted.step, solver="Euler", step_size=wanted.step)[
+        :: round(0.05 / wanted.step)
+    ]
     nominal = {s.name: s.variable.quantity.nominal or 1.0 for s in Interface(MODELS[name], {}).signals}
-    tolerance = 1e-5 if MODELS[name].state_layout else 1e-12
-    if kind == "CoSimulation" and not MODELS[name].state_layout:
-        # fmpy sets the inputs of t before the step from t: what it reads at the end belongs to them
-        got, wanted = got[1:], wanted[:-1]
-    for n in outputs:
-        # what is zero is not so to the last digit
-        size = max(np.abs(wanted[n]).max(), 1e-3 * nominal[n])
-        np.testing.assert_allclose(got[n], wanted[n], rtol=0.0, atol=tolerance * size + 1e-12)
+    for state in states:
+        size = max(np.abs(accurate[state]).max(), 0.1 * nominal[state])
+        np.testing.assert_allclose(euler[state], accurate[state], atol=0.2 * size, err_msg=state)
+
+
+def test_descriptions_say_who_and_when(native, fmus, tmp_path, monkeypatch):
+    """The same day for the same version, and that of SOURCE_DATE_EPOCH where it is set."""
+    cited = re.search(r"date-released: (\S+)", (HERE.parent / "CITATION.cff").read_text())[1]
+
+    def of(file):
+        return etree.fromstring(zipfile.ZipFile(file).read("modelDescription.xml"))
+
+    for file in (native["DcMotor", 2][0], native["DcMotor", 3][0], fmus["DcMotor"]):
+        root = of(file)
+        assert root.get("author") == "The chainunit makers"
+        assert root.get("copyright").startswith("Copyright (c) 20")
+        assert root.get("generationDateAndTime") == f"{cited}T00:00:00Z"
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
+    other = of(export_python(MODELS["DcMotor"], tmp_path / "other.fmu"))
+    assert other.get("generationDateAndTime") == "2023-11-14T22:13:20Z"
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "yesterday")
+    with pytest.raises(
+        InputError, match=r"SOURCE_DATE_EPOCH = 'yesterday': must be a whole number of seconds"
+    ):
+        export_python(MODELS["DcMotor"], tmp_path / "other.fmu")
+
+
+@pytest.mark.parametrize("name", ["DcMotor", "InductionMotor"])
+def test_a_stiff_motor_is_exported_and_runs(tmp_path, name):
+    """A brake of 10 kN m s/rad on a small rotor: it stands within a microsecond."""
+    stiff = {"rotor.J": 0.0035, "rotor.d": 1e4}
+    fmu = Fmu(export(MODELS[name], tmp_path / "stiff.fmu", stiff))
+    given, stepped, _ = reference_results(fmu.folder, name)
+    inputs, outputs = list(given.dtype.names[1:]), list(stepped.dtype.names[1:])
+    with Running(fmu, dict(zip(inputs, list(given[0])[1:], strict=True))) as unit:
+        rows = [unit.get(outputs)]
+        for k in range(4):
+            unit.set(inputs, list(given[k])[1:])
+            unit.step(given["time"][k], given["time"][k + 1] - given["time"][k])
+            rows.append(unit.get(outputs))
+    got = np.rec.fromarrays(np.array(rows).T, names=outputs)
+    assert_met(name, got, stepped[:5])
+    fmu.close()
+
+
+def test_an_export_does_not_follow_states_without_end(tmp_path, caplog, monkeypatch):
+    """Shafts that nothing made is as stiff as: the FMU comes without reference results, and the log says why."""
+    monkeypatch.setattr("chainunit.fmu.accompany._MOST_CALLS", 3000)
+    file = export_python(MODELS["CardanDriveline"], tmp_path / "x.fmu", {"c2": 1e12, "c3": 1e12})
+    assert not [n for n in zipfile.ZipFile(file).namelist() if n.startswith("extra/")]
+    assert "CardanDriveline: no reference results inside: the states are too fast" in caplog.text
 
 
 def test_what_an_fmu_carries(native, fmus):
@@ -412,7 +673,8 @@ def test_what_an_fmu_carries(native, fmus):
     for name, model in MODELS.items():
         names = set(zipfile.ZipFile(native[name, 2][0]).namelist())
         common = {"documentation/index.html", "documentation/licenses/license.txt"}
-        common |= {f"{REFERENCE}/{name}_{end}.csv" for end in ("in", "ref")}
+        common |= {f"{REFERENCE}/{name}_{end}.csv" for end in (INPUTS, STEPPED, READ)}
+        common.add(f"{REFERENCE}/fmi-ls-manifest.xml")
         assert {*common, "model.png"} <= names
         assert {*common, "model.png"} <= set(zipfile.ZipFile(fmus[name]).namelist())
         with zipfile.ZipFile(native[name, 3][0]) as archive:
@@ -429,6 +691,10 @@ def test_what_an_fmu_carries(native, fmus):
             for t in root.iter("Terminal")
         }
         assert set(members["flange"]) == {"phi", "w", "a", "tau"}
+        assert members["flange_a"] == {"phi": "phi", "tau": "tau"}
+        kinds = {t.get("name"): t.get("terminalKind") for t in root.iter("Terminal")}
+        assert kinds.pop("flange_a") == "Modelica.Mechanics.Rotational.Interfaces.Flange_a"
+        assert all(kind.startswith("org.chainunit.") for kind in kinds.values())
         assert all(set(found.values()) <= known for found in members.values())
         if model.name != "ChainUnit":
             assert len(members["load"]) == 7

@@ -273,29 +273,34 @@ static Status check(Instance *c) {
     return status;
 }
 
+/* The states at the start with the inputs `u`; `work` has room for twice what they are found from. */
+static void solve_start(const Instance *c, const double *u, double *work, double *x) {
+    double *z = work, *next = z + model.n_z;
+    const double *arg[3] = {c->p, u, z};
+    double *res[1] = {z};
+    if (model.n_z) kernels.guess(arg, res, NULL, NULL, 0);
+    for (int round = 0; round < model.start_rounds; ++round) {
+        res[0] = next;
+        kernels.improved(arg, res, NULL, NULL, 0);
+        memcpy(z, next, (size_t)model.n_z * sizeof(double));
+    }
+    res[0] = x;
+    kernels.initial(arg, res, NULL, NULL, 0);
+}
+
 static Status start(Instance *c) {
     if (!c->changed) return OK;
     Status status = check(c);
     if (status) return status;
     if (model.n_x) {
-        double *z = c->work, *next = z + model.n_z;
-        const double *arg[3] = {c->p, c->u, z};
-        double *res[1] = {z};
-        if (model.n_z) kernels.guess(arg, res, NULL, NULL, 0);
-        for (int round = 0; round < model.start_rounds; ++round) {
-            res[0] = next;
-            kernels.improved(arg, res, NULL, NULL, 0);
-            memcpy(z, next, (size_t)model.n_z * sizeof(double));
-        }
-        res[0] = c->x;
-        kernels.initial(arg, res, NULL, NULL, 0);
+        solve_start(c, c->u, c->work, c->x);
         if (!all_finite(c->x, model.n_x)) {
             memset(c->x, 0, (size_t)model.n_x * sizeof(double));
             return complain(c, ERROR, "a state at the start is not a finite number");
         }
         if (model.n_start_required) {
             const double *of[4] = {c->p, c->u, c->x, c->k};
-            res[0] = c->work;
+            double *res[1] = {c->work};
             kernels.start_limits(of, res, NULL, NULL, 0);
             status = meets(c, model.required + model.n_required, model.n_start_required, c->work);
             if (status) return status;
@@ -422,18 +427,23 @@ static Status states_get(Instance *c, const double *from, double *to, size_t n, 
 
 /* -- derivatives of outputs */
 
-/* The directional derivative of a group without a kernel for it, of relative error 1e-9 or so: outputs on both sides
- * at a distance that is small against inputs and states of the size of 1 and more. */
+/* How far to go along a direction for a difference: little against inputs and states of the size of 1 and more. */
+static double reach(const Instance *c, const double *du, const double *dx) {
+    double steepest = 0.0;
+    for (int i = 0; i < model.n_u + model.n_x; ++i) {
+        const double at = i < model.n_u ? c->u[i] : c->x[i - model.n_u];
+        const double share = fabs(i < model.n_u ? du[i] : dx[i - model.n_u]) / (fabs(at) > 1.0 ? fabs(at) : 1.0);
+        if (share > steepest) steepest = share;
+    }
+    return steepest > 0.0 ? 1e-5 / steepest : 1.0;
+}
+
+/* The directional derivative of a group without a kernel for it, of relative error 1e-9 or so: outputs on both sides. */
 static void differences(Instance *c, int group, const double *du, const double *dx, double *dy) {
     const int n_u = model.n_u, n_x = model.n_x;
     const Group *g = &model.groups[group];
-    double *u = dy + model.n_y + n_x, *x = u + n_u, *other = x + n_x, steepest = 0.0;
-    for (int i = 0; i < n_u + n_x; ++i) {
-        const double at = i < n_u ? c->u[i] : c->x[i - n_u], seed = i < n_u ? du[i] : dx[i - n_u];
-        const double share = fabs(seed) / (fabs(at) > 1.0 ? fabs(at) : 1.0);
-        if (share > steepest) steepest = share;
-    }
-    const double distance = steepest > 0.0 ? 1e-5 / steepest : 1.0;
+    double *u = dy + model.n_y + n_x, *x = u + n_u, *other = x + n_x;
+    const double distance = reach(c, du, dx);
     const double *arg[4] = {c->p, u, x, c->k};
     double *res[1];
     for (int sense = 1; sense >= -1; sense -= 2) {
@@ -443,6 +453,19 @@ static void differences(Instance *c, int group, const double *du, const double *
         kernels.values[group](arg, res, NULL, NULL, 0);
     }
     for (int i = 0; i < g->count; ++i) dy[g->first + i] = (dy[g->first + i] - other[i]) / (2.0 * distance);
+}
+
+/* In initialization the states move with the inputs: what they move by, added to the seeds `dx` of their own. */
+static void start_moves(const Instance *c, const double *du, double *dx, double *work) {
+    const int n_u = model.n_u, n_x = model.n_x;
+    double *u = work, *far = u + n_u, *near = far + n_x, *more = near + n_x, distance;
+    memset(far, 0, (size_t)n_x * sizeof(double));
+    distance = reach(c, du, far);
+    for (int sense = 1; sense >= -1; sense -= 2) {
+        for (int i = 0; i < n_u; ++i) u[i] = c->u[i] + sense * distance * du[i];
+        solve_start(c, u, more, sense > 0 ? far : near);
+    }
+    for (int i = 0; i < n_x; ++i) dx[i] += (far[i] - near[i]) / (2.0 * distance);
 }
 
 /* The derivatives of unknowns along the directions of inputs and states that lie at the begin of `work`. */
@@ -497,6 +520,8 @@ static Status forward(Instance *c, const unsigned *unknown, size_t n_unknown, co
             return complain(c, ERROR, "directional derivative: value reference %u is neither input nor state", known[k]);
         c->work[i] += seed[k]; /* inputs and states follow each other in both */
     }
+    if (c->mode == INITIALIZATION && model.n_x)
+        start_moves(c, c->work, c->work + model.n_u, c->work + n);
     return along(c, unknown, n_unknown, sensitivity);
 }
 

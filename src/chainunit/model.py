@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -51,6 +51,16 @@ class Terminal:
     description: str
     members: Mapping[str, str]
     flows: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A run for a tool that was told nothing else: to `stop` [s], in steps of `step` [s], at a relative `tolerance`.
+    The explicit Euler method is stable at that step, from the start values on."""
+
+    step: float = 1e-3
+    stop: float = 10.0
+    tolerance: float = 1e-6
 
 
 class Part:
@@ -111,6 +121,7 @@ class Model:
     `closed` after each of its steps; else in equal steps."""
     built_by: ClassVar[str] = ""
     """The call that gives this class, for one that a function of its module makes."""
+    experiment: ClassVar[Experiment] = Experiment()
     icon: ClassVar[str]
     """Name of its icon in `data/icons`, an SVG and a PNG."""
 
@@ -180,9 +191,22 @@ class Model:
 
     @staticmethod
     def excitation(t: float) -> dict[str, float]:
-        """Inputs at the time `t` [s] of the reference results that an FMU carries; others keep their start values.
-        Models with states keep theirs constant, so that no importer's interpolation matters."""
+        """Inputs at the time `t` [s] of the reference results that an FMU carries; others keep their start values."""
         return {}
+
+    @classmethod
+    def course(cls, values: Sequence[Any]) -> list[tuple[int, Any, Any]]:
+        """Place, rate and half of the rate's rate of each input that runs along another one, from the values of all:
+        `since` later it has gone on by since (rate + since half)."""
+
+        def rate(name: str | None) -> Any:
+            other = cls.input_rates.get(name or "")
+            return values[names.index(other)] if other else 0.0
+
+        names = cls.input_layout.names
+        return [
+            (names.index(name), rate(name), 0.5 * rate(cls.input_rates[name])) for name in cls.input_rates
+        ]
 
     @staticmethod
     def initial_states(xp: Any, p: Any) -> Any:

@@ -53,6 +53,13 @@ class Vec2:
         """Squared length."""
         return self.x * self.x + self.y * self.y
 
+    def length(self, xp: Any) -> Any:
+        """Length, of no less than 1e-30, with which it has a slope at zero, too: none in any direction."""
+        return xp.sqrt(self.squared() + _NO_LENGTH * _NO_LENGTH)
+
+
+_NO_LENGTH = 1e-30
+
 
 ZERO = Vec2(0.0, 0.0)
 

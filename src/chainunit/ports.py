@@ -52,14 +52,24 @@ def load_inertia(load: LoadPort, phi: Any) -> Any:
     return load.J + load.dJ_dphi * (phi - load.phi0)
 
 
-def flange(flow: str) -> Terminal:
-    """The terminal of a shaft whose torque flows into the model or out of it ("inflow", "outflow")."""
-    names = ("phi", "w", "a", "tau")
-    members = {name: name for name in names}
-    return Terminal("flange", "chainunit.flange", "the shaft and its torque", members, {"tau": flow})
+OWN = "org.chainunit"
+"""Before the names of kinds of terminals that are ours."""
+
+
+def flanges(flow: str) -> tuple[Terminal, Terminal]:
+    """The terminals of a shaft whose torque flows into the model or out of it ("inflow", "outflow"): our own, and the
+    one that tools with Modelica's library know."""
+    words, flows = "the shaft and its torque", {"tau": flow}
+    modelica = "Modelica.Mechanics.Rotational.Interfaces.Flange_a"
+    return (
+        Terminal("flange", f"{OWN}.flange", words, {name: name for name in ("phi", "w", "a", "tau")}, flows),
+        Terminal(
+            "flange_a", modelica, f"{words}, as Modelica's", {name: name for name in ("phi", "tau")}, flows
+        ),
+    )
 
 
 def load_terminal(prefix: str = "", name: str = "load") -> Terminal:
     """The terminal, called `name`, of a load port whose variables carry `prefix`."""
     members = {member: prefix + member for member in Layout(LoadPort).names}
-    return Terminal(name, "chainunit.load", "the load port: a load as the shaft sees it", members)
+    return Terminal(name, f"{OWN}.load", "the load port: a load as the shaft sees it", members)

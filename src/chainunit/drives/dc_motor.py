@@ -22,9 +22,9 @@ from typing import Any
 
 from ..integrate import Solver
 from ..model import Part, Requirement
-from ..ports import NO_LOAD, LoadPort, flange, load_inertia, load_terminal, load_torque
+from ..ports import NO_LOAD, LoadPort, flanges, load_inertia, load_terminal, load_torque
 from ..quantities import Value, declaration, group, quantity
-from .motor import T_RATED, Ambient, Motor
+from .motor import T_RATED, Ambient, Motor, braked
 
 
 @declaration
@@ -188,7 +188,7 @@ class DcMotor(Motor):
     Inputs = Inputs
     States = States
     files = ("drives/__init__.py", "drives/motor.py", "drives/dc_motor.py")
-    terminals = (flange("outflow"), load_terminal("load."))
+    terminals = (*flanges("outflow"), load_terminal("load."))
     icon = "motor"
     current, temperature, winding = "armature.i", "armature.T", "armature"
     required = (
@@ -202,8 +202,14 @@ class DcMotor(Motor):
 
     @staticmethod
     def excitation(t: float) -> dict[str, float]:
-        """A run-up to 100 rad/s against a steady load."""
-        return {"w_ref": 100.0, "load.tau_bias": 1.0}
+        """A run-up to a reference that moves, against a load that swings, of which half is known beforehand."""
+        swing = 0.4 * math.sin(10.0 * t)
+        return {
+            "w_ref": 60.0 * (1.0 - math.cos(4.0 * t)),
+            "tau_ff": 0.5 * swing,
+            "load.tau_bias": 1.0 + swing,
+            "load.J": 0.002,
+        }
 
     @staticmethod
     def limit(xp: Any, p: Any, w: Any) -> Any:
@@ -223,9 +229,11 @@ class DcMotor(Motor):
 
     @staticmethod
     def internal_step(xp: Any, p: Any) -> Any:
-        """A quarter of the time constant of the closed current loop, its fastest part, and at most 0.25 ms: the
-        Runge-Kutta method is stable up to 2.8 of it, which leaves room for a winding that heats up."""
-        return xp.minimum(2.5e-4, 0.25 * p.armature.L / (p.armature.R + p.current_control.kp))
+        """A quarter of the time constant of the closed current loop, as a rule its fastest part, that of the rotor
+        alone that friction brakes, and at most 0.25 ms: the Runge-Kutta method is stable up to 2.8 of a time constant,
+        which leaves room for a winding that heats up."""
+        by_current = 0.25 * p.armature.L / (p.armature.R + p.current_control.kp)
+        return xp.minimum(xp.minimum(2.5e-4, by_current), braked(xp, p.rotor))
 
     @staticmethod
     def initial_states(xp: Any, p: Any) -> Any:

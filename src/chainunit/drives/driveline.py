@@ -22,13 +22,13 @@ from typing import Any
 
 from ..engines import Dual, dual, slope
 from ..integrate import Solver
-from ..model import Model, Part, Requirement
+from ..model import Experiment, Model, Part, Requirement
 from ..ports import (
     NO_LOAD,
     LoadPort,
     PortSlopes,
     PortValues,
-    flange,
+    flanges,
     load_inertia,
     load_terminal,
     load_torque,
@@ -208,8 +208,10 @@ class CardanDriveline(Model):
     Inputs = Inputs
     States = States
     files = ("drives/__init__.py", "drives/cardan.py", "drives/driveline.py")
-    terminals = (flange("inflow"), load_terminal(), load_terminal("load.", "machine"))
+    terminals = (*flanges("inflow"), load_terminal(), load_terminal("load.", "machine"))
     icon = "cardan"
+    # without damping the explicit Euler method is stable at rest alone; this step raises a swing by half in a second
+    experiment = Experiment(step=1e-4, stop=2.0)
     input_rates = MappingProxyType({"phi": "w", "w": "a"})
     required = tuple(
         Requirement(name, "rad", "a Hooke joint turns only with a bend below 90 deg") for name in BENDS
@@ -217,8 +219,15 @@ class CardanDriveline(Model):
 
     @staticmethod
     def excitation(t: float) -> dict[str, float]:
-        """A motor held fast, a load that twists the line and lets it swing."""
-        return {"load.tau_bias": 100.0}
+        """A motor that runs up from rest, a load that swings and twists the line."""
+        w = 10.0
+        return {
+            "phi": w * (t - 0.5 * math.sin(2.0 * t)),
+            "w": w * (1.0 - math.cos(2.0 * t)),
+            "a": 2.0 * w * math.sin(2.0 * t),
+            "load.tau_bias": 100.0 + 40.0 * math.sin(9.0 * t),
+            "load.J": 0.5,
+        }
 
     @staticmethod
     def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:

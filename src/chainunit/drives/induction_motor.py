@@ -25,10 +25,11 @@ from typing import Any, NamedTuple
 
 from ..engines import MATH
 from ..integrate import Solver
-from ..model import Part, Requirement
-from ..ports import NO_LOAD, LoadPort, flange, load_inertia, load_terminal, load_torque
+from ..model import Experiment, Part, Requirement
+from ..planar import Vec2
+from ..ports import NO_LOAD, LoadPort, flanges, load_inertia, load_terminal, load_torque
 from ..quantities import Value, declaration, group, quantity
-from .motor import T_RATED, Ambient, Motor
+from .motor import T_RATED, Ambient, Motor, braked
 
 _TURN = 2.0 * math.pi
 
@@ -295,7 +296,7 @@ def steady(xp: Any, p: Any, w: Any, voltage_share: Any = 1.0, f: Any = None, T: 
     psi = Flux(d=u * phase / impedance, q=-u * quadrature / impedance)
     ir_d, ir_q = psi.q * b - psi.d * g, -psi.q * g - psi.d * b
     i_d, i_q = psi.d * main - ir_d, psi.q * main - ir_q
-    current = xp.sqrt(i_d * i_d + i_q * i_q)
+    current = Vec2(i_d, i_q).length(xp)
     air_gap = 1.5 * p.pole_pairs * squared * b
     return Steady(
         air_gap_tau=air_gap,
@@ -393,7 +394,7 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, s: _Point) -> Outputs:
         a=s.a,
         tau=s.tau,
         air_gap_tau=s.air_gap,
-        i=xp.sqrt(0.5 * (s.i_d * s.i_d + s.i_q * s.i_q)),
+        i=math.sqrt(0.5) * Vec2(s.i_d, s.i_q).length(xp),
         v=math.sqrt(1.5) * s.u,
         slip=s.slip_speed / xp.maximum(s.w_s, 1e-3 * _TURN * p.supply.f),
         supply_power=1.5 * s.u * s.i_d,
@@ -420,8 +421,10 @@ class InductionMotor(Motor):
     Inputs = Inputs
     States = States
     files = ("drives/__init__.py", "drives/motor.py", "drives/induction_motor.py")
-    terminals = (flange("outflow"), load_terminal("load."))
+    terminals = (*flanges("outflow"), load_terminal("load."))
     icon = "motor"
+    # the flux at switching on turns at the supply's frequency and hardly decays
+    experiment = Experiment(step=5e-5, stop=2.0)
     current, temperature, winding = "i", "stator.T", "stator"
     required = (
         Requirement(
@@ -434,8 +437,13 @@ class InductionMotor(Motor):
 
     @staticmethod
     def excitation(t: float) -> dict[str, float]:
-        """A start direct on line against a steady load."""
-        return {"load.tau_bias": 5.0, "load.J": 0.02}
+        """A start direct on line against a load that swings, at a voltage that does, too."""
+        return {
+            "load.tau_bias": 5.0 + 2.0 * math.sin(10.0 * t),
+            "load.J": 0.02,
+            "voltage": 0.95 + 0.05 * math.cos(8.0 * t),
+            "w_ref": 100.0 + 20.0 * math.sin(4.0 * t),
+        }
 
     @staticmethod
     def limit(xp: Any, p: Any, w: Any) -> Any:
@@ -465,10 +473,11 @@ class InductionMotor(Motor):
 
     @staticmethod
     def internal_step(xp: Any, p: Any) -> Any:
-        """A quarter of the shortest time constant of the fluxes, a twelfth of a radian of the supply, and at most
-        0.25 ms."""
+        """A quarter of the shortest time constant of the fluxes, a twelfth of a radian of the supply, the time
+        constant of the rotor alone that friction brakes, and at most 0.25 ms."""
         by_flux = 0.25 * p.cage.L * (1.0 - p.cage.skin_L) / _resistance(p)
-        return xp.minimum(xp.minimum(2.5e-4, 1.0 / (12.0 * _TURN * p.supply.f)), by_flux)
+        longest = xp.minimum(xp.minimum(2.5e-4, 1.0 / (12.0 * _TURN * p.supply.f)), by_flux)
+        return xp.minimum(longest, braked(xp, p.rotor))
 
     @staticmethod
     def initial_states(xp: Any, p: Any) -> Any:

@@ -65,3 +65,8 @@ class Motor(Model):
     def largest_torque(p: Any) -> float:
         """Largest steady air-gap torque at any speed [N m]."""
         raise NotImplementedError
+
+
+def braked(xp: Any, rotor: Any) -> Any:
+    """The time constant of the rotor that its own friction `d` brakes, without any load [s]; at most a second."""
+    return 1.0 / xp.maximum(rotor.d / rotor.J, 1.0)

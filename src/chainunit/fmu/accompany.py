@@ -1,23 +1,38 @@
-"""What an FMU carries beside its model: documentation, licences, icon and terminals, reference results."""
+"""What an FMU carries beside its model: documentation, licences, icon and terminals, reference results.
+
+Reference results are those of a Co-Simulation master that holds its inputs over a step, from the Python kernels; and
+they are written twice, as masters differ in when they read. They lie in the folder of the layered standard FMI-LS-REF
+(1.0.0-alpha.1), whose manifest says what each file is.
+"""
 
 from __future__ import annotations
 
 import csv
 import io
+import logging
 from collections.abc import Sequence
-from importlib import metadata, resources
+from importlib import resources
 from typing import Any
+from xml.etree.ElementTree import Element, SubElement, register_namespace
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from ..engines import MATH
-from .description import Interface, terminals
+from .description import Interface, licence_text, terminals
 from .documentation import page
 from .pack import written
 
-REFERENCE = "extra/chainunit/reference"
-_STOP, _ROWS = 1.0, 41
+STANDARD = "org.fmi-standard.fmi-ls-ref"
+REFERENCE = f"extra/{STANDARD}"
+INPUTS, STEPPED, READ = "in", "co_simulation", "set_then_read"
+"""Endings of the names of the files: inputs; outputs at the end of each step; outputs at its beginning."""
+STEP, ROWS = 0.04, 26  # s
+_MANIFEST = "http://fmi-standard.org/fmi-ls-manifest"
+_MOST_CALLS = 200_000
+"""of the derivatives, for one reference result: some ten times what the models take at their start values"""
+
+log = logging.getLogger("chainunit.fmu")
 
 
 def accompanying(
@@ -44,48 +59,124 @@ def accompanying(
 
 def licence(*packages: str) -> str:
     """Licences of installed packages, one after the other."""
-    texts = [f"{name}\n\n{metadata.distribution(name).read_text('licenses/LICENSE')}" for name in packages]
-    return "\n\n".join(texts)
+    return "\n\n".join(f"{name}\n\n{licence_text(name)}" for name in packages)
+
+
+class _TooManyError(ArithmeticError):
+    """A reference result would take more than its budget."""
 
 
 def _reference(interface: Interface) -> dict[str, bytes]:
-    """Inputs and outputs over a second, from the Python kernels: outputs at points, or along an accurate integration
-    of the states. Nothing where the start values let the states run away."""
+    """The files of reference results; none, and a warning, where the start values let the states run away, or so
+    fast that following them would take too long."""
+    name = interface.model.name
+    try:
+        tables = _tables(interface)
+    except ArithmeticError as reason:
+        log.warning("%s: no reference results inside: %s", name, reason)
+        return {}
+    words = {
+        INPUTS: f"inputs, set at each time and held for {STEP * 1e3:g} ms",
+        STEPPED: "outputs at the end of each step, before the inputs of that time are set",
+        READ: "outputs after the inputs of the time are set, before the step from it",
+    }
+    files = {f"{REFERENCE}/{name}_{end}.csv": _csv(*table) for end, table in tables.items()}
+    register_namespace("fmi-ls", _MANIFEST)
+    root = Element("fmiReferences")
+    root.set(f"{{{_MANIFEST}}}fmi-ls-name", STANDARD)
+    root.set(f"{{{_MANIFEST}}}fmi-ls-version", "1.0.0-alpha.1")
+    root.set(
+        f"{{{_MANIFEST}}}fmi-ls-description",
+        "Layered Standard providing information on related files included in an FMU.",
+    )
+    for end in tables:
+        role = "testcase" if end == INPUTS else "result"
+        SubElement(
+            root, "Related", type="text/csv", source=f"{name}_{end}.csv", role=role, description=words[end]
+        )
+    return files | {f"{REFERENCE}/fmi-ls-manifest.xml": written(root)}
+
+
+def _tables(interface: Interface) -> dict[str, tuple[list[str], list[list[float]]]]:
+    """Head and rows of each file.
+
+    Raises
+    ------
+    ArithmeticError
+        where a value is no finite number, or the states take more than `_MOST_CALLS` of their derivatives.
+    """
     model = interface.model
     p = model.prepared(MATH, model.parameter_layout.instance([s.start for s in interface.of("parameter")]))
     start = {s.name: s.start for s in interface.of("input")}
-    times = np.linspace(0.0, _STOP, _ROWS)
+    layout = model.state_layout
+    tables: dict[str, list[list[float]]] = {INPUTS: [], STEPPED: [], READ: []}
 
-    def inputs(t: float) -> Any:
-        return model.input_layout.from_names(start | model.excitation(t))
+    def outputs(t: float, u: Sequence[float], x: Sequence[float]) -> list[float]:
+        states = layout.instance(list(x)) if layout else None
+        parts = model.evaluate(MATH, p, model.input_layout.instance(list(u)), states)
+        values = [v for part, out in zip(model.parts, parts, strict=True) for v in part.layout.values(out)]
+        if not np.isfinite(values).all():
+            raise ArithmeticError(f"an output is no finite number at t = {t:g} s")
+        return [t, *x, *values]
 
-    states: list[Any] = [None] * _ROWS
-    if layout := model.state_layout:
-        first = layout.values(model.begin(p, inputs(0.0)))
-        solved = solve_ivp(
-            lambda t, x: model.derivatives(MATH, p, inputs(t), layout.instance(x.tolist())),
-            (0.0, _STOP),
-            first,
-            method="DOP853",
-            t_eval=times,
-            rtol=1e-10,
-            atol=1e-10,
-        )
+    march = _march(interface, p) if layout else None
+    u: list[float] = []
+    x: list[float] = []
+    for k in range(ROWS):
+        t = k * STEP
+        given = model.input_layout.values(model.input_layout.from_names(start | model.excitation(t)))
+        if k == 0:
+            u = given
+            x = layout.values(model.begin(p, model.input_layout.instance(given))) if layout else []
+        tables[INPUTS].append([t, *given])
+        tables[STEPPED].append(outputs(t, u, x))
+        tables[READ].append(outputs(t, given, x))
+        if march:
+            x = march(t, given, x)
+        u = list(given)
+        for place, rate, half in model.course(given):
+            u[place] += STEP * (rate + STEP * half)
+    heads = {kind: ["time", *(s.name for s in interface.of(kind))] for kind in ("input", "output")}
+    return {end: (heads["input" if end == INPUTS else "output"], rows) for end, rows in tables.items()}
+
+
+def _march(interface: Interface, p: Any) -> Any:
+    """A function of time, inputs and states that gives the states a step later, by an integrator for stiff and other
+    equations that is accurate to 1e-9 or so."""
+    import casadi
+
+    model = interface.model
+    layout = model.state_layout
+    assert layout is not None
+    symbols, *_, derivatives = interface.traced
+    function = casadi.Function("rates", symbols, [casadi.cse(casadi.vertcat(*derivatives))])
+    fixed, derived = model.parameter_layout.values(p), getattr(p, "derived", [])
+    nominal = np.array([v.quantity.nominal or 1.0 for v in layout.variables])
+    calls = 0
+
+    def march(t: float, given: Sequence[float], x: Sequence[float]) -> list[float]:
+        course = model.course(given)
+
+        def rates(since: float, states: Any) -> Any:
+            nonlocal calls
+            calls += 1
+            if calls > _MOST_CALLS:
+                raise _TooManyError(f"the states are too fast to be followed from t = {t:g} s on")
+            u = np.array(given)
+            for place, rate, half in course:
+                u[place] += since * (rate + since * half)
+            return function(fixed, u, states, derived).full().ravel()
+
+        if model.controlled:
+            for _ in range(2):
+                inputs, states = model.input_layout.instance(list(given)), layout.instance(list(x))
+                x = model.closed(MATH, p, inputs, states)
+        solved = solve_ivp(rates, (0.0, STEP), x, method="LSODA", rtol=1e-10, atol=1e-10 * nominal)
         if not solved.success or not np.isfinite(solved.y).all():
-            return {}
-        states = [layout.instance(x) for x in solved.y.T.tolist()]
-    given, found = [], []
-    for t, x in zip(times.tolist(), states, strict=True):
-        u = inputs(t)
-        parts = model.evaluate(MATH, p, u, x)
-        given.append([t, *model.input_layout.values(u)])
-        outputs = [v for part, out in zip(model.parts, parts, strict=True) for v in part.layout.values(out)]
-        found.append([t, *(layout.values(x) if layout else []), *outputs])
-    heads = [["time", *(s.name for s in interface.of(kind))] for kind in ("input", "output")]
-    return {
-        f"{REFERENCE}/{model.name}_{end}.csv": _csv(head, rows)
-        for end, head, rows in zip(("in", "ref"), heads, (given, found), strict=True)
-    }
+            raise ArithmeticError(f"the states run away behind t = {t:g} s")
+        return [float(v) for v in solved.y[:, -1]]
+
+    return march
 
 
 def _csv(head: Sequence[str], rows: Sequence[Sequence[float]]) -> bytes:

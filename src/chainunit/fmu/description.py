@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from functools import cached_property
+from importlib import metadata
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
 from ..engines import casadi_
+from ..errors import InputError
 from ..model import Model
 from ..quantities import DISPLAY_UNITS, TYPES, Variable, base_units
+
+RELEASED = "2026-11-21"
+"""The day of this version's release, as CITATION.cff has it."""
 
 
 @dataclass(frozen=True)
@@ -185,7 +192,7 @@ def model_description(
         lambda types, name, of: SubElement(SubElement(types, "SimpleType", name=name), "Real", of),
     )
     _log_categories(root)
-    SubElement(root, "DefaultExperiment", startTime="0", stopTime="10", stepSize="0.001")
+    _experiment(root, model)
     variables = SubElement(root, "ModelVariables")
     for signal in interface.signals:
         _scalar(variables, signal)
@@ -231,7 +238,7 @@ def model_description_3(
         lambda types, name, of: SubElement(types, "Float64Type", {"name": name, **of}),
     )
     _log_categories(root)
-    SubElement(root, "DefaultExperiment", startTime="0", stopTime="10", stepSize="0.001")
+    _experiment(root, model)
     variables = SubElement(root, "ModelVariables")
     for signal in interface.signals:
         SubElement(variables, "Float64", {**_attributes(signal), **_real(signal)})
@@ -281,13 +288,52 @@ def _root(model: type[Model], version: str, own: Mapping[str, str]) -> Element:
                 ("modelName", model.name),
                 identifier,
                 ("description", model.description),
+                ("author", metadata.metadata("chainunit")["Author"]),
                 ("version", version),
+                ("copyright", _copyright()),
                 ("license", "MIT"),
                 ("generationTool", f"chainunit {version}"),
+                ("generationDateAndTime", generated()),
                 ("variableNamingConvention", "structured"),
             ]
         ),
     )
+
+
+def _copyright() -> str:
+    (line,) = (x for x in licence_text("chainunit").splitlines() if x.startswith("Copyright"))
+    return line
+
+
+def licence_text(package: str) -> str:
+    """The licence of an installed package."""
+    return metadata.distribution(package).read_text("licenses/LICENSE") or ""
+
+
+def generated() -> str:
+    """When the FMU was made, in UTC: SOURCE_DATE_EPOCH [s], else the day of this version's release, so that the same
+    model gives the same file.
+
+    Raises
+    ------
+    InputError
+        where SOURCE_DATE_EPOCH is no number of seconds.
+    """
+    given = os.environ.get("SOURCE_DATE_EPOCH", "")
+    if not given:
+        return f"{RELEASED}T00:00:00Z"
+    try:
+        return datetime.fromtimestamp(int(given), UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+    except (ValueError, OverflowError, OSError) as error:
+        raise InputError(
+            f"SOURCE_DATE_EPOCH = {given[:40]!r}: must be a whole number of seconds since 1970, or not set"
+        ) from error
+
+
+def _experiment(root: Element, model: type[Model]) -> None:
+    e = model.experiment
+    attributes = {"startTime": 0.0, "stopTime": e.stop, "tolerance": e.tolerance, "stepSize": e.step}
+    SubElement(root, "DefaultExperiment", {name: f"{value:g}" for name, value in attributes.items()})
 
 
 def _per_second(unit: str) -> str:

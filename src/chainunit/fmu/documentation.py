@@ -15,6 +15,11 @@ td.number { text-align: right; font-variant-numeric: tabular-nums; white-space: 
 code { font-family: ui-monospace, monospace; }
 """
 
+_NOT_CONNECTED = (
+    "<p>An input that is not connected keeps its start value. Inputs phi, w and a belong together: give all of "
+    "them. As declared, the shaft stands at phi = 0.</p>\n"
+)
+
 
 def page(interface: Interface, version: str) -> str:
     """A self-contained page: what the model is, and a table of its parameters, inputs and outputs."""
@@ -27,7 +32,7 @@ def page(interface: Interface, version: str) -> str:
     return (
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{model.name}</title>'
         f"<style>{_STYLE}</style></head>\n<body><h1>{model.name}</h1>\n<p>{escape(model.description)}</p>\n"
-        f"<p>{text}</p>\n{tables}<p>Made by chainunit {version}, MIT licence.</p></body></html>\n"
+        f"<p>{text}</p>\n{_NOT_CONNECTED}{tables}<p>Made by chainunit {version}, MIT licence.</p></body></html>\n"
     )
 
 

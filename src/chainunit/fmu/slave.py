@@ -326,13 +326,8 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
 
     def _running(self) -> list[tuple[int, float, float]]:
         """Place, rate and half of the rate's rate of each input that runs along another one."""
-        along, names = self.model.input_rates, self.model.input_layout.names
-
-        def rate(name: str | None) -> float:
-            other = along.get(name or "")
-            return self._set[self._n_p + names.index(other)] if other else 0.0
-
-        return [(self._n_p + names.index(name), rate(name), 0.5 * rate(along[name])) for name in along]
+        course = self.model.course(self._set[self._n_p :])
+        return [(self._n_p + place, rate, half) for place, rate, half in course]
 
     def _bad_input(self) -> str:
         if self._doubtful:

@@ -7,9 +7,6 @@ from typing import Any
 
 from ..planar import Vec2
 
-# A pin that carries nothing has no direction: without a floor the slope of |R| is 0/0 there.
-_NO_FORCE = 1e-60  # N2
-
 
 def pin_losses(xp: Any, pin: Any, damping: Any, w: Any, pins: Iterable[tuple[Vec2, Any]]) -> Any:
     """Torque at the coordinate that overcomes the losses of all `pins` [N m].
@@ -30,6 +27,5 @@ def pin_losses(xp: Any, pin: Any, damping: Any, w: Any, pins: Iterable[tuple[Vec
     lost = 0.0
     for force, turn in pins:
         k2 = turn * turn
-        size = xp.sqrt(force.squared() + _NO_FORCE)
-        lost = lost + k2 * (per_newton * size / xp.sqrt(k2 * w2 + smooth2) + damping)
+        lost = lost + k2 * (per_newton * force.length(xp) / xp.sqrt(k2 * w2 + smooth2) + damping)
     return lost * w

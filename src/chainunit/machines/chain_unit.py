@@ -26,7 +26,7 @@ from ..groups.friction import pin_losses
 from ..integrate import Solver
 from ..model import Model, Part, Requirement
 from ..planar import ZERO, Link, Motion, Vec2
-from ..ports import PortSlopes, PortValues, flange, load_terminal
+from ..ports import PortSlopes, PortValues, flanges, load_terminal
 from ..quantities import Value, declaration, group, quantity
 from .crank_rocker import TURNS, angle_at_pivot, longest_crank, pressure_angle
 from .driven import DrivenState, slopes
@@ -134,7 +134,7 @@ class Inputs:
     phi: Value = quantity(
         "rad", "motor angle; crank angle is phi/ratio, from the upward vertical, clockwise", default=0.0
     )
-    w: Value = quantity("rad/s", "motor speed", default=3.0)
+    w: Value = quantity("rad/s", "motor speed", default=0.0)
     a: Value = quantity("rad/s2", "motor acceleration", default=0.0)
     left: SideLoads = group(SideLoads, "left organ", default=SideLoads())
     right: SideLoads = group(SideLoads, "right organ", default=SideLoads())
@@ -663,7 +663,7 @@ class ChamberForces(Model):
         "machines/parts.py",
         "groups",
     )
-    terminals = (flange("inflow"), load_terminal())
+    terminals = (*flanges("inflow"), load_terminal())
     icon = "chain_unit"
 
     required = (
@@ -740,7 +740,7 @@ class DirectChainUnit(Model):
     Inputs = DirectInputs
     States = DirectStates
     files = ChamberForces.files
-    terminals = (flange("inflow"),)
+    terminals = flanges("inflow")
     icon = ChamberForces.icon
     required = (
         *ChamberForces.required,
@@ -753,8 +753,13 @@ class DirectChainUnit(Model):
 
     @staticmethod
     def excitation(t: float) -> dict[str, float]:
-        """A steady torque sets the machine, empty, in motion."""
-        return {"tau": 20.0}
+        """A torque that swings sets the machine in motion, its organs unevenly loaded and the load moving."""
+        return {
+            "tau": 120.0 + 40.0 * math.sin(5.0 * t),
+            "left.material_mass": 30.0 + 10.0 * math.sin(3.0 * t),
+            "right.material_mass": 5.0,
+            "left.processing_force": 50.0,
+        }
 
     @staticmethod
     def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:

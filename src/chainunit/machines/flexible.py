@@ -138,7 +138,9 @@ class ChainSide(chain_unit.Side):
         "J", "potential energy, of weights zero at the level of C, and of folded rods", nominal=100.0
     )
     energy_residual: Value = quantity(
-        "J", "energy that is there beyond that at the start and what came and went since"
+        "J",
+        "energy that is there beyond that at the start and what came and went since",
+        nominal=1000.0,
     )
     energy_per_kg: Value = quantity("J/kg", "energy of a kilogram of material on its place")
 
@@ -369,7 +371,7 @@ def _side(
         "wall_pull": functools.reduce(xp.minimum, least[:walls]),
         "slack_share": sum(slack) * (1.0 / N),
         "fold_largest": _largest_fold(xp, theta),
-        "drift": _size(xp, h.missing),
+        "drift": h.missing.length(xp),
         "kinetic_energy": kinetic,
         "potential_energy": potential,
         "energy_residual": kinetic + potential - given,
@@ -377,11 +379,6 @@ def _side(
         **{f"pull_{k + 1}": pull for k, pull in enumerate(pulls)},
         **{f"fold_{k + 1}": fold for k, fold in enumerate(folds)},
     }
-
-
-def _size(xp: Any, v: Vec2) -> Any:
-    # 0 has no slope without the small term
-    return xp.sqrt(v.squared() + 1e-60)
 
 
 def _largest_fold(xp: Any, theta: Sequence[Any]) -> Any:
@@ -618,9 +615,8 @@ def _flexible(walls: int, webs: int) -> type[Model]:
 
         @staticmethod
         def excitation(t: float) -> dict[str, float]:
-            """At rest, unevenly loaded: to an importer that holds its inputs for a step a crank that turns would come
-            in jerks."""
-            return {"phi": 0.5 * math.pi, "w": 0.0, "left.material_mass": 45.0, "right.material_mass": 5.0}
+            """A crank that runs unevenly, the organs unevenly loaded."""
+            return ChamberForces.excitation(t) | {"left.material_mass": 45.0, "right.material_mass": 5.0}
 
         @staticmethod
         def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
@@ -635,7 +631,7 @@ def _flexible(walls: int, webs: int) -> type[Model]:
             """Of each side: the chain ends at A2, and no stop between rods is met."""
             m = CrankRocker(xp, p, u.phi / p.ratio)
             for h in _organs(xp, p, u, rods(p, u), walls, split(x), m, 0.0):
-                yield _size(xp, h.missing), -math.inf, _CLOSED
+                yield h.missing.length(xp), -math.inf, _CLOSED
                 yield _largest_fold(xp, h.state[0]), -math.inf, p.organ.fold_limit
 
         @staticmethod

@@ -25,7 +25,7 @@ from ..groups.friction import pin_losses
 from ..groups.triad import Pose, Triad, assembly_modes, corrected
 from ..model import Model, Part, Requirement
 from ..planar import Motion, Vec2
-from ..ports import PortSlopes, PortValues, flange, load_terminal
+from ..ports import PortSlopes, PortValues, flanges, load_terminal
 from ..quantities import Value, declaration, group, quantity
 from .crank_rocker import TURNS, longest_crank
 from .driven import DrivenState, slopes
@@ -136,7 +136,7 @@ class Inputs:
     phi: Value = quantity(
         "rad", "motor angle; crank angle is phi/ratio, from the upward vertical, clockwise", default=0.0
     )
-    w: Value = quantity("rad/s", "motor speed", default=3.0)
+    w: Value = quantity("rad/s", "motor speed", default=0.0)
     a: Value = quantity("rad/s2", "motor acceleration", default=0.0)
     cut_force: Value = quantity(
         "N", "resistance of the stack to the blade on its way down", default=0.0, min=0.0, nominal=1e4
@@ -369,7 +369,7 @@ class KnifeDrive(Model):
         "machines/crank_rocker.py",
         "groups",
     )
-    terminals = (flange("inflow"), load_terminal())
+    terminals = (*flanges("inflow"), load_terminal())
     icon = "knife_drive"
     derived = 3 * (2 * HARMONICS + 1) + 2
 
