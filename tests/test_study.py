@@ -427,6 +427,24 @@ def test_a_slow_motor_still_makes_its_turns(tmp_path):
     assert np.trapezoid(speed, time) == pytest.approx(4.0 * math.pi * study.drive.ratio, rel=1e-6)
 
 
+def test_whole_turns_of_whole_turns_are_the_same():
+    from chainunit.studies.drive import Drive
+
+    drive = Drive(None, None, ChainUnit(ratio=100.0))
+    for start in np.linspace(0.0, 700.0, 200):
+        time = np.linspace(0.0, 5.0, 1235)
+        angle = start + 1.6 * time + 0.01 * np.sin(time)
+        run = xr.Dataset(
+            {"machine.phi0": ("time", 100.0 * angle), "machine.w0": ("time", np.gradient(angle, time))},
+            {"time": time},
+        )
+        turns = drive.whole_turns(run)
+        assert drive.turns(turns) == pytest.approx(1.0, abs=1e-8)
+        again = drive.whole_turns(turns)
+        assert again is not None and again.sizes == turns.sizes
+        assert float(again["time"][-1]) == pytest.approx(float(turns["time"][-1]), abs=1e-6)
+
+
 LOW_VOLTAGE = "[motor]\nlimit = { v = 60 }\n[machine]\nratio = 25\n"
 
 

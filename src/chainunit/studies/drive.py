@@ -131,10 +131,12 @@ class Drive:
         """
         angle, _ = self.crank_motion(run)
         turned = (angle - angle[0]) / (2.0 * math.pi)
-        turns = min(math.floor(float(np.max(turned))), most)
+        # a run that ends on a whole turn may miss it by rounding
+        rounding = 1e-9
+        turns = min(math.floor(float(np.max(turned)) + rounding), most)
         if turns < 1:
             return None
-        last = int(np.argmax(turned >= turns))
+        last = int(np.argmax(turned >= turns - rounding))
         pair = run.isel(time=slice(last - 1, last + 1))
         end = float(np.interp(turns, turned[last - 1 : last + 1], pair["time"].values))
         return xr.concat([run.isel(time=slice(0, last)), pair.interp(time=[end])], "time", data_vars="all")
