@@ -263,3 +263,101 @@ def test_profile():
     assert profile(1.25) == 2.0 and profile.corners == [1.0, 1.5, 2.0, 3.0]
     with pytest.raises(ValueError, match=r"change at t = 1.2 s"):
         Profile(0.0, ((1.0, 0.5, 3.0), (1.2, 1.0, 0.0)))
+
+
+# -- what is kept of a run
+
+
+def kept(fmus, stop=0.03, **options):
+    signals = {"motor.w_ref": 150.0, "machine.left.material_mass": Profile(30.0, ((0.01, 0.01, 60.0),))}
+    with CoSimulation(system(fmus), signals) as simulation:
+        return simulation.run(stop, 0.001, **options)
+
+
+def test_each_nth_row_and_the_last_are_those_of_the_whole_run(fmus):
+    whole = kept(fmus)
+    some = kept(fmus, every=4)
+    assert np.array_equal(some["time"], [*whole["time"][:-1:4], whole["time"][-1]])
+    xr.testing.assert_identical(some, whole.sel(time=some["time"]))
+    xr.testing.assert_identical(kept(fmus, every=1000), whole.isel(time=[0, -1]))
+    with pytest.raises(InputError, match="every = 0: must be a whole number >= 1"):
+        kept(fmus, every=0)
+
+
+def test_chosen_variables_are_those_of_the_whole_run(fmus):
+    names = ["motor.w", "machine.left.material_mass", "machine.tau"]
+    xr.testing.assert_identical(kept(fmus, names=names), kept(fmus)[sorted(names)])
+    for name in ("motor.rotor.J", "machine.phi", "motor.speed"):
+        with pytest.raises(InputError, match=f"{name}: cannot be kept; must be an output or an input with"):
+            kept(fmus, names=[name])
+
+
+def test_a_guard_acts_in_rows_that_are_not_kept(fmus):
+    whole = kept(fmus, guards={"motor.phi": 1.0})
+    assert 2 < whole.sizes["time"] < 30 and abs(whole["motor.phi"][-1]) > 1.0 > abs(whole["motor.phi"][-2])
+    some = kept(fmus, guards={"motor.phi": 1.0}, every=1000, names=["machine.tau"])
+    xr.testing.assert_identical(some, whole[["machine.tau"]].isel(time=[0, -1]))
+
+
+def test_a_file_has_what_memory_has(fmus, tmp_path, monkeypatch):
+    """Several blocks of rows, a step that fails, and a run that goes on."""
+    from chainunit.cosim import master
+    from chainunit.cosim.instance import Instance
+
+    monkeypatch.setattr(master, "_BLOCK", 7)
+    whole = kept(fmus)
+    file = tmp_path / "run.nc"
+    for options in ({}, {"every": 4}, {"names": ["motor.w"]}):
+        with kept(fmus, file=file, **options) as written:
+            xr.testing.assert_identical(written.load(), kept(fmus, **options))
+    assert [p.name for p in tmp_path.iterdir()] == ["run.nc"]
+
+    step = Instance.step
+
+    def fails_late(self, time, h):
+        if time > 0.0195:
+            raise RunError("motor: it broke")
+        step(self, time, h)
+
+    monkeypatch.setattr(Instance, "step", fails_late)
+    with pytest.raises(RunError, match="it broke") as failed:
+        kept(fmus, file=file)
+    with failed.value.partial as partial:
+        xr.testing.assert_identical(partial.load(), whole.isel(time=slice(0, 21)))
+    assert [p.name for p in tmp_path.iterdir()] == ["run.nc"]
+
+
+@pytest.mark.skipif(compiler() is None, reason="no C compiler")
+def test_memory_does_not_grow_with_a_run_that_is_written_to_a_file(tmp_path):
+    """By what Python allocates: 48,000 steps of a motor against 24,000."""
+    import tracemalloc
+
+    motor = export_native(MODELS["DcMotor"], tmp_path / "motor.fmu")
+
+    def peak(steps, **options):
+        with CoSimulation(System({"motor": motor}, []), {"motor.w_ref": 100.0}) as simulation:
+            tracemalloc.start()
+            try:
+                simulation.run(1e-3 * steps, 1e-3, **options).close()
+                return tracemalloc.get_traced_memory()[1]
+            finally:
+                tracemalloc.stop()
+
+    peak(100, file=tmp_path / "run.nc")
+    short, long = (peak(steps, file=tmp_path / "run.nc") for steps in (24_000, 48_000))
+    # xarray holds the time, as an index
+    assert long - short < 24_000 * 2 * 8
+    in_memory, tenth, chosen = peak(24_000), peak(24_000, every=10), peak(24_000, names=["motor.w"])
+    row = 8 * (len(kept_names(motor)) + 1)
+    assert row > 5 * 2 * 8
+    # each row once, not twice
+    assert 24_000 * row < in_memory < 24_000 * row + long
+    assert tenth < 2_400 * row + long and chosen < 24_000 * 2 * 8 + long
+
+
+def kept_names(file):
+    from chainunit.cosim.instance import Fmu
+
+    fmu = Fmu(file)
+    fmu.close()
+    return [*fmu.outputs(), "w_ref"]

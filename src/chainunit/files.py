@@ -58,6 +58,15 @@ def writing(file: Path) -> Iterator[None]:
         raise WriteError(f"{file}: cannot be written ({error.strerror or error})") from error
 
 
+@contextmanager
+def netcdf() -> Iterator[None]:
+    """An OSError in place of the error of the NetCDF library, which says no more of a disk that is full."""
+    try:
+        yield
+    except RuntimeError as error:
+        raise OSError(errno.EIO, f"{error}; is the disk full?") from error
+
+
 def full(error: OSError) -> bool:
     """Whether the place for what was to be written is at fault, and not the name that was given."""
     return error.errno in _FULL

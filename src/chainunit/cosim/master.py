@@ -12,8 +12,9 @@ from __future__ import annotations
 import math
 import signal
 import threading
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
 from types import TracebackType
 from typing import Any
 
@@ -21,6 +22,7 @@ import numpy as np
 import xarray as xr
 
 from ..errors import InputError, InterruptedRunError, RunError
+from ..files import netcdf, whole
 from .instance import Fmu, Instance
 from .signals import Profile
 from .system import System
@@ -53,6 +55,99 @@ def stoppable() -> Iterator[Callable[[], bool]]:
     finally:
         for number, handler in previous.items():
             signal.signal(number, handler)
+
+
+_Recorder = tuple[Instance, Any, list[str]]
+"""An instance, the handle of what is kept of it, and the full names of that."""
+_BLOCK = 4096
+"""Rows that are written to a file at a time, and steps whose signals are computed at a time."""
+
+
+class _Rows:
+    """The rows of a run: in memory, or in a NetCDF file that takes a block of them at a time."""
+
+    def __init__(self, recorders: Sequence[_Recorder], room: int, file: Path | None) -> None:
+        self._recorders = recorders
+        self._names = [name for _, _, names in recorders for name in names]
+        self._values = np.empty((1 + len(self._names), room))
+        self._filled = self._written = 0
+        self._file = None if file is None else self._create(file)
+
+    def __enter__(self) -> _Rows:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._file is not None:
+            try:
+                if kind is None:
+                    self._flush()
+            finally:
+                with netcdf():
+                    self._file.close()
+
+    def add(self, time: float) -> None:
+        """Keep the present values as the row of the instant `time`."""
+        if self._filled == self._values.shape[1]:
+            self._flush()
+        row = self._values[:, self._filled]
+        row[0] = time
+        at = 1
+        for instance, handle, names in self._recorders:
+            row[at : at + len(names)] = instance.read(handle)
+            at += len(names)
+        self._filled += 1
+
+    def _attributes(self) -> dict[str, dict[str, str]]:
+        """Units and descriptions, of the time first."""
+        found = {"time": {"units": "s", "long_name": "time"}}
+        for instance, _, names in self._recorders:
+            for full in names:
+                declared = instance.fmu.variables[full.partition(".")[2]]
+                found[full] = {"units": declared.unit or "1", "long_name": declared.description or full}
+        return found
+
+    def _create(self, file: Path) -> Any:
+        import netCDF4
+
+        with netcdf():
+            out = netCDF4.Dataset(file, "w")
+            out.createDimension("time", None)
+            for name, attributes in self._attributes().items():
+                variable = out.createVariable(name, "f8", ("time",), chunksizes=(_BLOCK,))
+                variable.setncatts(attributes)
+                # by itself the library keeps megabytes of each variable
+                variable.set_var_chunk_cache(size=8 * _BLOCK, nelems=3, preemption=1.0)
+        return out
+
+    def _flush(self) -> None:
+        assert self._file is not None
+        end = self._written + self._filled
+        with netcdf():
+            for values, variable in zip(self._values, self._file.variables.values(), strict=True):
+                variable[self._written : end] = values[: self._filled]
+            self._file.sync()
+        self._written, self._filled = end, 0
+
+    def dataset(self) -> xr.Dataset:
+        """What is in memory. Its variables share it."""
+        rows = {
+            name: ("time", values[: self._filled], attributes)
+            for values, (name, attributes) in zip(self._values, self._attributes().items(), strict=True)
+        }
+        time = rows.pop("time")
+        return xr.Dataset(rows, {"time": time})
+
+
+def _moves(points: Any, middles: Any, n: int) -> tuple[list[bool], list[bool]]:
+    """In which of the `n` steps a signal moves, whose value at the middle then acts; in which it is another one at
+    the end."""
+    inside, over = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+    for (_, _, at), (_, _, between) in zip(points, middles, strict=True):
+        inside |= ((between != at[:-1]) | (between != at[1:])).any(axis=1)
+        over |= (at[1:] != at[:-1]).any(axis=1)
+    return inside.tolist(), (inside | over).tolist()
 
 
 class CoSimulation:
@@ -230,110 +325,150 @@ class CoSimulation:
         progress: Progress | None = None,
         *,
         guards: Mapping[str, float] | None = None,
+        every: int = 1,
+        names: Iterable[str] | None = None,
+        file: Path | None = None,
     ) -> xr.Dataset:
         """Simulate to the time `stop` [s] with the communication step `step` [s].
 
-        `guards` are limits by full name of an output: where its size passes the limit, the run ends with that row.
+        Parameters
+        ----------
+        stop, step : [s]
+        progress : is called with the simulated time now and then
+        guards : limits by full name of an output: where its size passes the limit at the end of a step, the run ends
+            with that row
+        every : each so many rows one is kept, beside the first and the last
+        names : full names of the outputs and driven inputs that are kept; all by default
+        file : a NetCDF file that the rows are written to as they come; then of a row no more than its time stays in
+            memory
 
         Returns
         -------
-        every output and connected or driven input, over the dimension ``time``, with units and descriptions.
-        A further call goes on from where this one ended.
+        every output and connected or driven input, or those of `names`, over the dimension ``time``, with units and
+        descriptions; of a `file` a Dataset that reads from it when asked (close it at the end). A further call goes
+        on from where this one ended.
 
         Raises
         ------
+        InputError
+            for a run that does not go forward, and for a name that cannot be watched or kept.
         RunError
             where an FMU fails; its attribute ``partial`` holds the Dataset up to there.
+        WriteError
+            where the `file` cannot be written.
         """
         start = self.time
         if not (0.0 < step < math.inf) or not start < stop < math.inf:
             raise InputError(
                 f"a run from t = {start:g} to {stop:g} s in steps of {step:g} s: must go forward"
             )
+        if every < 1 or every != int(every):
+            raise InputError(f"every = {every:g}: must be a whole number >= 1")
         n = max(1, math.ceil((stop - start) / step - 1e-9))
-        # the last step is shorter where the end is no multiple of the step
-        times = np.minimum(start + step * np.arange(n + 1), stop)
-        recorders = [
-            (instance, instance.handle(names), [f"{name}.{v}" for v in names])
-            for name, instance in self._instances.items()
-            if (names := self._recorded(name))
-        ]
-        table = np.full((n + 1, sum(len(r[2]) for r in recorders)), np.nan)
-
-        def record(row: int) -> None:
-            at = 0
-            for instance, handle, names in recorders:
-                table[row, at : at + len(names)] = instance.read(handle)
-                at += len(names)
-
-        places = {name: at for at, name in enumerate(name for r in recorders for name in r[2])}
-        watched = [(places[name], limit) for name, limit in (guards or {}).items()]
-        points = self._signal_values(times)
-        middles = self._signal_values(0.5 * (times[:-1] + times[1:]))
-        # a signal that moves inside a step acts with its value at the middle
-        inside, over = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
-        for (_, _, at), (_, _, between) in zip(points, middles, strict=True):
-            inside |= ((between != at[:-1]) | (between != at[1:])).any(axis=1)
-            over |= (at[1:] != at[:-1]).any(axis=1)
+        recorders = self._recorders(names)
+        watched = self._watched(guards or {})
+        room = n // every + 2 if file is None else _BLOCK
+        told = max(1, n // 200)
+        failure: RunError | None = None
+        done = said = before = 0
 
         def apply(signals: Any, row: int) -> None:
             for instance, handle, values in signals:
                 instance.write(handle, values[row].tolist())
 
-        moves_inside, moves_over = inside.tolist(), (inside | over).tolist()
-        every = max(1, n // 200)
-        done = said = before = 0
-        with stoppable() as stopped:
+        with (
+            nullcontext() if file is None else whole(file) as part,
+            _Rows(recorders, room, part) as rows,
+            stoppable() as stopped,
+        ):
             try:
-                apply(points, 0)
-                self._transfer()
-                record(0)
-                for k in range(n):
-                    # what leads to a failure may have been said while the values for this step were set
-                    said, before = before, len(self._journal)
-                    t, after = float(times[k]), float(times[k + 1])
-                    if moves_inside[k]:
-                        apply(middles, k)
+                for first in range(0, n, _BLOCK):
+                    # the last step is shorter where the end is no multiple of the step
+                    times = np.minimum(start + step * np.arange(first, min(first + _BLOCK, n) + 1), stop)
+                    points = self._signal_values(times)
+                    middles = self._signal_values(0.5 * (times[:-1] + times[1:]))
+                    moves_inside, moves_over = _moves(points, middles, len(times) - 1)
+                    if first == 0:
+                        apply(points, 0)
                         self._transfer()
-                    for instance in self._instances.values():
-                        instance.step(t, after - t)
-                    self.time = after
-                    if moves_over[k]:
-                        apply(points, k + 1)
-                    self._transfer()
-                    record(k + 1)
-                    done = k + 1
-                    if any(abs(table[done, place]) > limit for place, limit in watched):
+                        rows.add(start)
+                    for k, after in enumerate(times[1:].tolist()):
+                        # what leads to a failure may have been said while the values for this step were set
+                        said, before = before, len(self._journal)
+                        t = float(times[k])
+                        if moves_inside[k]:
+                            apply(middles, k)
+                            self._transfer()
+                        for instance in self._instances.values():
+                            instance.step(t, after - t)
+                        self.time = after
+                        if moves_over[k]:
+                            apply(points, k + 1)
+                        self._transfer()
+                        done = first + k + 1
+                        passed = any(
+                            abs(value) > limit
+                            for instance, handle, limits in watched
+                            for value, limit in zip(instance.read(handle), limits, strict=True)
+                        )
+                        interrupted = stopped()
+                        ended = passed or interrupted or done == n
+                        if ended or done % every == 0:
+                            rows.add(after)
+                        if progress and done % told == 0:
+                            progress(after)
+                        if ended:
+                            break
+                    if ended:
                         break
-                    if progress and done % every == 0:
-                        progress(self.time)
-                    if stopped():
-                        raise InterruptedRunError(f"interrupted at t = {self.time:g} s")
+                if interrupted:
+                    raise InterruptedRunError(f"interrupted at t = {self.time:g} s")
             except RunError as error:
                 # the call that fails may only pass on what another FMU complained of before
-                first = f" (before: {self._journal[said]})" if len(self._journal) > said + 1 else ""
-                failed = type(error)(f"{error}{first}")
-                failed.partial = self._dataset(times[: done + 1], table[: done + 1], recorders)
-                raise failed from error
+                hint = f" (before: {self._journal[said]})" if len(self._journal) > said + 1 else ""
+                failure = type(error)(f"{error}{hint}")
+                failure.__cause__ = error
+        found = rows.dataset() if file is None else xr.open_dataset(file)
+        if failure is not None:
+            failure.partial = found
+            raise failure
         if progress:
             progress(self.time)
-        return self._dataset(times[: done + 1], table[: done + 1], recorders)
+        return found
+
+    def _recorders(self, names: Iterable[str] | None) -> list[_Recorder]:
+        """What is kept of each instance, in declared order."""
+        there = {name: self._recorded(name) for name in self._instances}
+        if names is not None:
+            wanted = set(names)
+            for full in sorted(wanted - {f"{name}.{v}" for name, vs in there.items() for v in vs}):
+                raise InputError(f"{full}: cannot be kept; must be an output or an input with a signal")
+            there = {name: [v for v in vs if f"{name}.{v}" in wanted] for name, vs in there.items()}
+        return [
+            (self._instances[name], self._instances[name].handle(vs), [f"{name}.{v}" for v in vs])
+            for name, vs in there.items()
+            if vs
+        ]
+
+    def _watched(self, guards: Mapping[str, float]) -> list[tuple[Instance, Any, list[float]]]:
+        """Handles and limits of what is watched, by instance."""
+        split: dict[str, list[tuple[str, float]]] = {}
+        for full, limit in guards.items():
+            instance, variable = self._split(full, "output")
+            split.setdefault(instance, []).append((variable, limit))
+        return [
+            (
+                self._instances[name],
+                self._instances[name].handle([v for v, _ in pairs]),
+                [x for _, x in pairs],
+            )
+            for name, pairs in split.items()
+        ]
 
     def _recorded(self, name: str) -> list[str]:
         fmu = self._fmus[name]
         driven = {full.partition(".")[2] for full in self.signals if full.startswith(name + ".")}
         return [*fmu.outputs(), *sorted(driven)]
-
-    def _dataset(self, times: Any, table: Any, recorders: Any) -> xr.Dataset:
-        variables = {}
-        at = 0
-        for instance, _, names in recorders:
-            for full in names:
-                declared = instance.fmu.variables[full.partition(".")[2]]
-                attributes = {"units": declared.unit or "1", "long_name": declared.description or full}
-                variables[full] = ("time", table[:, at].copy(), attributes)
-                at += 1
-        return xr.Dataset(variables, {"time": ("time", times, {"units": "s", "long_name": "time"})})
 
     # -- branching
 

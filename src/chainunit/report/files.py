@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import csv
-import errno
 import json
 from pathlib import Path
 
 import xarray as xr
 
 from .. import __version__
-from ..files import whole
+from ..files import netcdf, whole
 from ..studies.overload import LOAD_CYCLE, SCENARIOS, Study, as_dict
 
 
@@ -55,11 +54,7 @@ def write(study: Study, folder: Path) -> list[Path]:
             }
         )
         tree.attrs.update(title=study.config.title, source=f"chainunit {__version__}")
-        with whole(series) as part:
-            try:
-                tree.to_netcdf(part, engine="netcdf4")
-            except RuntimeError as error:
-                # the library says no more of a disk that is full
-                raise OSError(errno.EIO, f"{error}; is the disk full?") from error
+        with whole(series) as part, netcdf():
+            tree.to_netcdf(part, engine="netcdf4")
         written.append(series)
     return written

@@ -1,0 +1,68 @@
+# %% [markdown]
+# Memory of a long co-simulation
+#
+# The packaged machine with its motor, native FMUs, for 600 s at 1 ms: the largest memory of the process (its resident
+# set), each way of keeping rows in a process of its own. The libraries alone take what "a second" takes.
+
+# %%
+from __future__ import annotations
+
+import argparse
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from chainunit.config import load
+from chainunit.cosim import CoSimulation
+from chainunit.studies.choice import choose
+
+CHOSEN = ("motor.w", "motor.tau", "machine.tau")
+WAYS = {
+    "a second": {},
+    "all rows, in memory": {},
+    "each 10th row": {"every": 10},
+    "three variables": {"names": CHOSEN},
+    "all rows, to a file": {"file": Path("run.nc")},
+}
+
+
+def one(way: str, folder: Path, seconds: float) -> None:
+    config = load()
+    drive = choose(config, folder, lambda *_: None).drive
+    files = {name: folder / f"{model.name}.fmu" for name, (model, _) in drive.models().items()}
+    options = dict(WAYS[way])
+    if "file" in options:
+        options["file"] = folder / options["file"]
+    signals = {**drive.loads(config.feed), **drive.reference(config.run.crank_speed, config.run.ramp)}
+    began = time.perf_counter()
+    with CoSimulation(drive.system(files), signals) as simulation:
+        run = simulation.run(1.0 if way == "a second" else seconds, 1e-3, **options)
+    rows, variables = run.sizes["time"], len(run.data_vars)
+    run.close()
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    spent = time.perf_counter() - began
+    print(f"{way:22} {rows:7} rows of {variables:3} variables, {peak:5.0f} MB, {spent:4.0f} s", flush=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--seconds", type=float, default=600.0)
+    parser.add_argument("--way", choices=list(WAYS))
+    parser.add_argument("--folder", type=Path)
+    given = parser.parse_args()
+    if given.way:
+        one(given.way, given.folder, given.seconds)
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        config = load()
+        choose(config, Path(folder), lambda *_: None).drive.export(Path(folder))
+        for way in WAYS:
+            command = [sys.executable, __file__, "--way", way, "--folder", folder]
+            subprocess.run([*command, "--seconds", str(given.seconds)], check=True)
+
+
+if __name__ == "__main__":
+    main()
