@@ -142,7 +142,7 @@ def test_what_blocks_the_rocker_decides_the_peak(tmp_path):
         peak = getattr(other.answers["blocked"], f"{name}_peak")
         assert peak == pytest.approx(getattr(found, f"{name}_high"), rel=1e-6)
     (note,) = (note for note in study.notes if "block_stiffness" in note)
-    assert "are assumed and decide the peaks" in note and "distance from the pivot C" in note
+    assert "are assumed and decide the peak" in note and "distance from the pivot C" in note
     assert as_dict(study)["block_peaks"]["crank_torque_low"]["unit"] == "N.m"
     certificate = study.certificate["blocked"]
     assert 0.0 < certificate["motor.w_difference_to_monolithic"] < 1e-3

@@ -268,7 +268,7 @@ def _answer(t: Traced, study: Study) -> str:
             for family, members in _families(answers[reference]).items()
             if members[0][1].name in _KEY
         ]
-        large = f"Large: {called(reference)} at {_speed(t, reference)} of the crank."
+        large = f"Large: {called(reference)}, the crank at {_speed(t, reference)}."
         worst = " Below: the overload that asks most." if any(run in SCENARIOS for run in answers) else ""
         parts.append(f'<p class="lead">{large}{worst}</p>')
     elif t.result["status"] == "complete":
@@ -314,7 +314,7 @@ def _speed(t: Traced, run: str) -> str:
         return asked
     return (
         f'<strong class="missed"><span aria-hidden="true">▲</span> {t.number(f"answers.{run}.speed_mean")}</strong>, '
-        f"not the {asked} asked for,"
+        f"not the {asked} asked for"
     )
 
 

@@ -139,6 +139,9 @@ _CLOSED = 0.01
 _DECADE = math.sqrt(10.0)
 """From and to this part of the stop's stiffness its peaks are given: over a decade."""
 
+_FLAT = 1.05
+"""Largest over least of these peaks up to which the stop is said to matter little."""
+
 
 @declaration
 class BlockPeaks:
@@ -1052,11 +1055,14 @@ def _note(study: Study) -> None:
     if study.block_peaks is not None:
         b, o = study.block_peaks, config.overload
         low, high = (number(getattr(b, f"stiffness_{end}"), "N.m/rad") for end in ("low", "high"))
-        crank = " to ".join(number(getattr(b, f"crank_torque_{end}"), "N.m") for end in ("low", "high"))
+        ends = (number(getattr(b, f"crank_torque_{end}"), "N.m") for end in ("low", "high"))
+        flat = b.crank_torque_high < _FLAT * b.crank_torque_low
+        peaks = "but hardly change the peak here, {} to {}" if flat else "and decide the peak, {} to {}"
         note(
-            "the rocker is blocked: the stop's stiffness and damping are assumed and decide the peaks; crank torque "
-            f"{crank} for {low} to {high}, damping with the root of it. Take the stiffness of what is jammed (N/m) "
-            "times the square of its distance from the pivot C (m): overload.block_stiffness, now "
+            "the rocker is blocked: the stop's stiffness and damping are assumed "
+            f"{peaks.format(*ends)} of crank torque for {low} to {high}, damping with the root of it. Take the "
+            "stiffness of what is jammed (N/m) times the "
+            "square of its distance from the pivot C (m): overload.block_stiffness, now "
             f"{number(o.block_stiffness, 'N.m/rad')}, and block_damping, now {number(o.block_damping, 'N.m.s/rad')}."
         )
     if study.torsion is not None:
@@ -1157,7 +1163,11 @@ def motor_verdict(study: Study) -> dict[str, Any] | None:
         text = f"The motor keeps the crank at {speed}"
     else:
         text = f"The motor does NOT reach the speed: {speed} in place of {number(asked, 'rad/s', full=False)}"
-    left = f"least reserve of torque {number(reserve, '1', 'percent')} ({_CALLED[run]})"
+    if reserve >= 0.0:
+        left = f"least reserve of torque {number(reserve, '1', 'percent')} ({_CALLED[run]})"
+    else:
+        over = number(-reserve, "1", "percent")
+        left = f"no reserve of torque: a peak passes the largest steady torque by {over} ({_CALLED[run]})"
     holds: Holds = "false" if not reaches else "true" if reserve > 0.0 else "in part"
     return {
         "holds": holds,

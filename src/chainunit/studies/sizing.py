@@ -605,7 +605,7 @@ def rank(candidates: list[Candidate]) -> None:
         elif math.isinf(c.violation):
             c.verdict, c.reason = Verdict.REJECTED, "it does not bring the machine up to speed"
         else:
-            c.verdict, c.reason = Verdict.REJECTED, ", ".join(check.passed for check in over)
+            c.verdict, c.reason = Verdict.REJECTED, "; ".join(check.passed for check in over)
         if c.flywheel:
             c.reason += f", with a flywheel of {c.flywheel:.3g} kg m2"
     candidates.sort(
