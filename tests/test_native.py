@@ -476,7 +476,8 @@ def test_a_million_random_calls_under_sanitizers(native, name, fmi, share, tmp_p
         "-Wl,--wrap=malloc,--wrap=calloc", "-lm",
     ]  # fmt: skip
     # what CasADi wrote is compiled apart, once for both versions of FMI: its warnings are not ours
-    shutil.copy(sources / "kernels.c", tmp_path)
+    for file in ("kernels.c", "model.h"):
+        shutil.copy(sources / file, tmp_path)
     subprocess.run(
         [shutil.which("cc"), "-O1", "-c", "kernels.c", "-o", "kernels.o"], check=True, cwd=tmp_path
     )

@@ -698,7 +698,9 @@ static Status step(Instance *c, double time, double size) {
     for (int i = 0; i < n_u; ++i) {
         rate[i] = input_rate(c, i);
         half[i] = 0.5 * input_curvature(c, i);
-        u[i] = c->u[i] + size * (rate[i] + size * half[i]);
+        u[i] = c->u[i];
+        if (rate[i] == 0.0 && half[i] == 0.0) continue;
+        u[i] += size * (rate[i] + size * half[i]);
         if (!admitted(&model.declared[model.n_p + i], u[i])) {
             char where[96] = "";
             append(where, sizeof where, "at the end of the step from t = %g s, ", time);

@@ -23,7 +23,7 @@ class Solver:
     max_steps: Value = quantity(
         "1",
         "most steps of its own that a communication step may take; the step is discarded where it takes more",
-        default=2e5,
+        default=5e5,
         min=1.0,
         max=1e9,
     )

@@ -230,8 +230,8 @@ class DcMotor(Motor):
     @staticmethod
     def internal_step(xp: Any, p: Any) -> Any:
         """A quarter of the time constant of the closed current loop, as a rule its fastest part, that of the rotor
-        alone that friction brakes, and at most 0.25 ms: the Runge-Kutta method is stable up to 2.8 of a time constant,
-        which leaves room for a winding that heats up."""
+        alone that friction brakes, and at most 0.25 ms: the Runge-Kutta method is stable up to 2.8 of a time
+        constant, which leaves room for a winding that heats up."""
         by_current = 0.25 * p.armature.L / (p.armature.R + p.current_control.kp)
         return xp.minimum(xp.minimum(2.5e-4, by_current), braked(xp, p.rotor))
 

@@ -120,7 +120,7 @@ class Parameters(chain_unit.Parameters):
         max=1e-2,
         tunable=True,
     )
-    solver: Solver = group(Solver, "internal integrator", default=Solver(max_steps=5e4))
+    solver: Solver = group(Solver, "internal integrator", default=Solver(max_steps=1e5))
 
 
 @declaration
