@@ -52,6 +52,14 @@ def test_what_has_a_lower_bound_has_an_upper_one(name):
             "[machine]\ncrank = { s = 1e200 }",
             "machine.crank.s = 1e+200 m: must be >= -10000 m and <= 10000 m",
         ),
+        (
+            "[feed]\nleft = { material_mass = 1e6 }",
+            "feed: material_mass of both sides = 1.00003e+06 kg: must be <= 1e+06",
+        ),
+        (
+            "[overload]\njam_force = 1e8",
+            "feed: processing_force of both sides and the hardest lump = 1e+08 N: must be",
+        ),
         ("[machine]\ng = 1e30", "machine.g = 1e+30 m/s2: must be >= 0 m/s2 and <= 10000 m/s2"),
     ],
 )
@@ -102,6 +110,7 @@ def test_the_example_and_random_machines_give_no_remark():
         ('[machine]\npin = { diameter = "60 m" }', "machine.pin.diameter", "60 mm"),
         ('[feed]\nleft = { material_mass = "30 t" }', "feed.left.material_mass", "30 kg"),
         ("[feed]\nleft = { material_mass = 30000 }", "feed.left.material_mass", "30000 g"),
+        ("[machine]\ncrank = { m = 1e6 }", "machine.crank.m", "1000000 g"),
         ("[machine]\ncrank = { s = 50 }", "machine.crank.s", "50 mm"),
         ("[machine]\nrocker = { s = -120 }", "machine.rocker.s", "-120 mm"),
         ('[overload]\njam_force = "2000 kN"', "overload.jam_force", "2000 N"),

@@ -537,6 +537,17 @@ def _consistent(data: Mapping[str, Any], checked: Any) -> None:
     ):
         if high < low:
             raise InputError(f"{what} = {high:g}: must be >= {low:g}, the least")
+    feed, jam = instance(Feed, given_values(checked.feed)), instance(Overload, given_values(checked.overload))
+    added = {"material_mass": 0.0, "processing_force": max(jam.jam_force, random.force_high)}
+    for v in Layout(SideLoads).variables:
+        most = getattr(feed.left, v.name) + getattr(feed.right, v.name) + added[v.name]
+        if not v.quantity.admits(most):
+            # overloads lay all on one side
+            jams = " and the hardest lump" if added[v.name] else ""
+            raise InputError(
+                f"feed: {v.name} of both sides{jams} = {most:g} {v.unit}: must be <= {v.quantity.high:g} {v.unit} "
+                "together, as an overload may lay all of it on one side"
+            )
     if "chain" in data and checked.organ != "chain":
         raise InputError('chain: is of organs that are chains; add organ = "chain", or leave it out')
     chain = instance(Chain, given_values(checked.chain))

@@ -165,7 +165,7 @@ def _meant(variable: Variable, given: Any) -> str:
     if match is None or not math.isfinite(float(match[1])):
         return ""
     for unit in _TAKEN_FOR.get(variable.unit, ()):
-        text = f"{float(match[1]):g} {unit}"
+        text = f"{float(match[1]):.15g} {unit}"
         value = _converted(variable, text)
         if variable.quantity.admits(value) and variable.quantity.is_usual(value):
             return text
