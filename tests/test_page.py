@@ -317,6 +317,13 @@ def test_the_verdict_comes_first_everywhere(study, written):
     assert 'class="judged false"' in answer
 
 
+def test_a_motor_that_sizing_found_insufficient_is_not_praised(study, monkeypatch):
+    assert as_dict(study)["verdict"]["motor"]["holds"] == "true"
+    monkeypatch.setattr(type(study), "insufficient", True)
+    motor = as_dict(study)["verdict"]["motor"]
+    assert motor["holds"] == "in part" and "insufficient" in motor["text"]
+
+
 def test_a_speed_that_is_not_reached_does_not_head_the_table(study):
     answers = dict(study.answers)
     answers["steady"] = dataclasses.replace(answers["steady"], speed_mean=3.74)

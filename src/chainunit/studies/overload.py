@@ -1152,7 +1152,7 @@ def model_verdict(study: Study) -> Verdict:
 
 def motor_verdict(study: Study) -> dict[str, Any] | None:
     """Whether the motor reaches the speed ("false" where not), and its least reserve of torque with the run of it
-    ("in part" where none is left), ready for JSON; None without steady running."""
+    ("in part" where none is left, or sizing found it insufficient), ready for JSON; None without steady running."""
     steady, asked = study.answers.get(STEADY), study.config.run.crank_speed
     if steady is None:
         return None
@@ -1168,7 +1168,10 @@ def motor_verdict(study: Study) -> dict[str, Any] | None:
     else:
         over = number(-reserve, "1", "percent")
         left = f"no reserve of torque: a peak passes the largest steady torque by {over} ({_CALLED[run]})"
-    holds: Holds = "false" if not reaches else "true" if reserve > 0.0 else "in part"
+    if study.insufficient:
+        text += ", but it is insufficient by the limits of the sizing"
+    enough = reserve > 0.0 and not study.insufficient
+    holds: Holds = "false" if not reaches else "true" if enough else "in part"
     return {
         "holds": holds,
         "text": f"{text}; {left}.",
