@@ -174,8 +174,9 @@ def _header(t: Traced, study: Study, title: str, sections: list[tuple[str, str, 
     )
     if study.answers:
         ramp = f" in {n('run.ramp')}" if study.drive.follows else ""
+        turns = "turn" if study.config.run.turns == 1.0 else "turns"
         asked += (
-            f" The machine starts from rest{ramp} and is evaluated over {n('run.turns')} turns when steady."
+            f" The machine starts from rest{ramp} and is evaluated over {n('run.turns')} {turns} when steady."
         )
     if overloads:
         asked += (
