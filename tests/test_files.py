@@ -214,3 +214,14 @@ def test_sigterm_ends_in_order(tmp_path):
     assert "Traceback" not in err
     assert list(scratch.glob("chainunit*")) == []
     assert (tmp_path / "out" / "result.json").exists() and not (tmp_path / "out" / LOCK).exists()
+
+
+def test_the_command_leaves_the_signals_as_they_were(monkeypatch, capsys):
+    from chainunit.cli import main
+
+    before = signal.getsignal(signal.SIGTERM)
+    monkeypatch.setattr(sys, "argv", ["chainunit", "--version"])
+    with pytest.raises(SystemExit):
+        main()
+    assert signal.getsignal(signal.SIGTERM) is before
+    capsys.readouterr()

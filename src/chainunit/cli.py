@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import StrEnum
@@ -405,6 +406,19 @@ def _end_in_order(number: int, frame: Any) -> None:
     raise KeyboardInterrupt
 
 
+@contextmanager
+def _ending_in_order() -> Iterator[None]:
+    """SIGTERM ends in order within the context, where a thread may say so."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, _end_in_order)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
 def _status(error: BaseException) -> int:
     """Exit status of a run that failed with `error`."""
     if _told_to_end:
@@ -417,9 +431,9 @@ def _status(error: BaseException) -> int:
 def main() -> None:
     """Run the command line: exit status 2 for bad input, in one line; 1 for a run that failed or a file that could
     not be written, 130 for Ctrl-C, 143 for SIGTERM."""
-    signal.signal(signal.SIGTERM, _end_in_order)
     try:
-        sys.exit(app(sys.argv[1:] or ["--help"], standalone_mode=False))
+        with _ending_in_order():
+            sys.exit(app(sys.argv[1:] or ["--help"], standalone_mode=False))
     except (InputError, RunError) as error:
         _end(str(error), _status(error))
     except (typer.Abort, KeyboardInterrupt) as error:
