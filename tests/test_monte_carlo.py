@@ -112,7 +112,8 @@ def test_a_row_is_what_its_number_says(killed):
         simulation.save()
         for number in (7, 3, 20):
             got = monte_carlo.Layout(monte_carlo.Sample).named(monte_carlo.one(task, number, simulation))
-            assert {"run": number, "failed": None, **got} == before[number]
+            side = monte_carlo.draw(config, number).side
+            assert {"run": number, "side": side, "failed": None, **got} == before[number]
 
 
 def test_answers_hang_together(killed):
@@ -121,7 +122,10 @@ def test_answers_hang_together(killed):
     for row in rows:
         assert (row["crank_torque_peak"] > row["trip_torque"]) == bool(row["trips"])
         assert 4000.0 <= row["force"] <= 9000.0
+    assert {row["side"] for row in rows} == {"left", "right"}
     result = monte_carlo.MonteCarloResult(rows, killed[0], 0)
+    sides = {side: runs["value"] for side, runs in result.as_dict()["sides"].items()}
+    assert sides == {side: sum(row["side"] == side for row in rows) for side in ("left", "right")}
     found = result.as_dict()["quantiles"]
     share = found["trips"]["share"]
     assert share["unit"] == "1" and share["low"]["value"] < share["value"] < share["high"]["value"]
@@ -149,6 +153,51 @@ def test_quantiles_have_intervals_or_are_left_out(killed):
         "30 runs are too few" in (monte_carlo.MonteCarloResult(few[:25] + few[:5], killed[0], 0).remark)
         and "the 99 % quantile takes 368" in monte_carlo.MonteCarloResult(few, killed[0], 0).remark
     )
+
+
+class Still:
+    """Stands for a simulation; remembers what it is given and ends."""
+
+    time = 1.0
+
+    def restore(self):
+        pass
+
+    def run(self, stop, step, guards=None):
+        raise RunError("seen")
+
+
+@pytest.mark.parametrize("number", range(6))
+def test_the_lump_comes_on_the_side_of_its_number(number):
+    """By the number alone; the other side keeps its feed, and the lump lies on top of what its side has."""
+    config = parse(
+        STUDY.format(runs=10)
+        + "[feed]\nleft = { processing_force = 100 }\nright = { processing_force = 700 }\n"
+    )
+    task = monte_carlo.Task(config, Drive(DcMotor, config.motor, config.machine), {}, 1.0)
+    drawn, simulation = monte_carlo.draw(config, number), Still()
+    assert drawn == monte_carlo.draw(parse(STUDY.format(runs=99)), number)
+    with pytest.raises(RunError, match="seen"):
+        monte_carlo.one(task, number, simulation)
+    feed, middle = {"left": 100.0, "right": 700.0}, config.overload.jam_rise + 0.05
+    for side, normal in feed.items():
+        force = simulation.signals[f"machine.{side}.processing_force"]
+        if side == drawn.side:
+            assert force(0.0) == normal
+            assert force(1.0 + drawn.offset + middle) == pytest.approx(normal + drawn.force)
+        else:
+            assert force == normal
+
+
+def test_lumps_come_on_both_sides_alike_often_and_by_the_seed():
+    config = parse(STUDY.format(runs=10))
+    drawn = [monte_carlo.draw(config, k) for k in range(2000)]
+    left = [d for d in drawn if d.side == "left"]
+    assert abs(len(left) - 1000) < 4.0 * math.sqrt(500.0)
+    # the side does not depend on how hard the lump is
+    assert abs(sum(d.force for d in left) / len(left) - 6500.0) < 4.0 * 5000.0 / math.sqrt(12.0 * len(left))
+    other = parse(STUDY.format(runs=10).replace("[monte_carlo]", "[monte_carlo]\nseed = 2"))
+    assert [d.side for d in drawn[:50]] != [monte_carlo.draw(other, k).side for k in range(50)]
 
 
 def test_lumps_come_anywhere_in_a_turn(killed):
@@ -193,7 +242,7 @@ def test_a_run_that_fails_is_a_row(killed, monkeypatch):
 
 def line(number, **changed):
     good = dict.fromkeys(monte_carlo.Layout(monte_carlo.Sample).names, 1.0)
-    return json.dumps({"run": number, "failed": None, **good, **changed}).encode()
+    return json.dumps({"run": number, "side": "left", "failed": None, **good, **changed}).encode()
 
 
 BAD = {
@@ -212,6 +261,8 @@ BAD = {
     "a value missing": line(3).replace(b'"force": 1.0, ', b""),
     "null in a run that did not fail": line(3, force=None),
     "text": line(3, force="1.0"),
+    "no side": line(3, side="middle"),
+    "the side missing": line(3).replace(b'"side": "left", ', b""),
     "unknown key": line(3, what=1.0),
     "failed, and numbers": line(3, failed="it broke"),
     "nested": b"[" * 100_000,

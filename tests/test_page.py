@@ -26,6 +26,7 @@ from chainunit.studies.chain import rest_forces
 from chainunit.studies.cycle import cycle
 from chainunit.studies.overload import as_dict, run_study
 from chainunit.text import digits_text, shown, unit_text
+from chainunit.text import number as told_as
 
 SHORT = """
 title = "A mill <b>& more</b> </script><!--"
@@ -345,16 +346,30 @@ def test_a_speed_that_is_not_reached_does_not_head_the_table(study):
 
 def test_each_overload_factor_says_its_use(study, written):
     """On the terminal, on the page, in the data: which question each answers, and which one sizes the drive."""
-    factors = as_dict(study)["overload_factors"]
+    sides = as_dict(study)["overload_factors"]
+    assert list(sides) == ["left", "right"]
+    told, page_text = said_of(study), written.read_text("utf-8")
+    for side, of in sides.items():
+        assert f"{side} alone" in told
+        for name, factor in of.items():
+            size = told_as(factor["value"], "1")
+            assert (
+                size in told
+                and f'data-path="overload_factors.{side}.{name}" value="{factor["value"]!r}"' in page_text
+            )
+    factors = sides["left"]
+    assert {name: factor["for"] for name, factor in factors.items()} == {
+        name: factor["for"] for name, factor in sides["right"].items()
+    }
     assert list(factors) == ["crank_torque", "rocker_torque", "static_at_extreme"]
     assert [name for name, factor in factors.items() if "sizes the drive" in factor["for"]] == [
         "crank_torque"
     ]
     assert "bearings" in factors["rocker_torque"]["for"] and "papers" in factors["static_at_extreme"]["for"]
-    told, page_text = said_of(study), written.read_text("utf-8")
     for name, factor in factors.items():
         assert (
-            factor["for"] in told and f'data-path="overload_factors.{name}.for">{factor["for"]}<' in page_text
+            factor["for"] in told
+            and f'data-path="overload_factors.left.{name}.for">{factor["for"]}<' in page_text
         )
 
 

@@ -16,7 +16,7 @@ from fmpy.validation import validate_fmu
 
 from chainunit import EMPTY, ChainUnit, SideLoads
 from chainunit.report import plots
-from chainunit.studies.cycle import cycle, overload_factors, without_right
+from chainunit.studies.cycle import alone, cycle, overload_factors, sides_over_speed
 
 SHORT = """
 [run]
@@ -278,7 +278,8 @@ left = { material_mass = 0, processing_force = 0 }
 right = { material_mass = 0, processing_force = 0 }
 """
     _, numbers = study_of(empty, tmp_path)
-    assert numbers["overload_factors"]["rocker_torque"]["value"] is None
+    for side in ("left", "right"):
+        assert numbers["overload_factors"][side]["rocker_torque"]["value"] is None
     assert numbers["limits"]["slack_speed"]["value"] is None
     (tmp_path / "title.toml").write_text('title = "[/foo] mill"\n' + SHORT)
     named = chainunit("study", "title.toml", "-o", "[red]out", cwd=tmp_path)
@@ -362,8 +363,75 @@ def test_cycle_and_the_side_that_is_gone():
     c = cycle(machine, 3.0, loads, EMPTY)
     out = machine.forces(7.0 * c.angle[100], 21.0, 0.0, loads, EMPTY)
     assert c.crank_torque[100] == pytest.approx(7.0 * float(out.tau))
-    alone = cycle(without_right(machine), 3.0, loads, EMPTY)
-    assert np.all(alone.outputs.right.tangential_load == 0.0)
+    left = cycle(alone(machine, "left"), 3.0, loads, EMPTY)
+    assert np.all(left.outputs.right.tangential_load == 0.0)
+
+
+FED = (
+    SideLoads(material_mass=30.0, processing_force=300.0),
+    SideLoads(material_mass=20.0, processing_force=100.0),
+)
+
+
+def peaks(machine, speed, left, right, points):
+    """Largest crank and rocker torque of a turn, straight from the machine."""
+    phi = np.linspace(0.0, 2.0 * np.pi, points, endpoint=False) * machine.p.ratio
+    out = machine.forces(phi, speed * machine.p.ratio, 0.0, left, right)
+    return {
+        "crank": np.max(np.abs(out.tau)) * machine.p.ratio,
+        "rocker": np.max(np.abs(out.rocker.tau)),
+    }
+
+
+def test_each_side_alone_has_its_overload_factors():
+    """Against the machine without the masses and the load of the other side."""
+    machine = ChainUnit(ratio=7.0)
+    both = peaks(machine, 4.0, *FED, 720)
+    found = {side: overload_factors(machine, 4.0, *FED, side) for side in ("left", "right")}
+    for side, gone, loads in (("left", "right", (FED[0], EMPTY)), ("right", "left", (EMPTY, FED[1]))):
+        bare = machine.replace({f"{gone}.wall_mass": 0.0, f"{gone}.web_mass": 0.0})
+        one = peaks(bare, 4.0, *loads, 720)
+        assert found[side].crank_torque == pytest.approx(one["crank"] / both["crank"], rel=1e-12)
+        assert found[side].rocker_torque == pytest.approx(one["rocker"] / both["rocker"], rel=1e-12)
+    assert found["left"] == overload_factors(machine, 4.0, *FED)
+    assert abs(found["left"].rocker_torque / found["right"].rocker_torque - 1.0) > 0.05
+
+
+def test_the_static_factor_of_the_right_organ_belongs_to_the_left_extreme():
+    """The organs mirror each other: the right one at -psi is the left one at psi, with the loads exchanged."""
+    machine = ChainUnit()
+    (right, _), (left, _) = machine.rocker_extremes()
+    assert abs(left) < 0.95 * right
+    for extreme, side, loads in ((right, "left", FED), (-left, "right", FED[::-1])):
+        mirrored = machine.chamber(extreme, 0.0, 0.0, *loads)
+        wanted = mirrored.left.tangential_load / (
+            mirrored.left.tangential_load - mirrored.right.tangential_load
+        )
+        found = overload_factors(machine, 1.0, *FED, side).static_at_extreme
+        assert found == pytest.approx(float(wanted), rel=1e-12)
+        assert found > 1.0
+
+
+def test_each_side_alone_over_the_speed():
+    machine = ChainUnit()
+    sides = sides_over_speed(machine, *FED, highest=12.0, points=12)
+    both, crossed = [peaks(machine, w, *FED, 360) for w in sides.speed], 0
+    for side, gone, loads in (("left", "right", (FED[0], EMPTY)), ("right", "left", (EMPTY, FED[1]))):
+        bare = machine.replace({f"{gone}.wall_mass": 0.0, f"{gone}.web_mass": 0.0})
+        one = [peaks(bare, w, *loads, 360) for w in sides.speed]
+        for torque in ("rocker", "crank"):
+            wanted = np.array([p[torque] for p in one])
+            assert getattr(sides, f"{torque}_{side}") == pytest.approx(wanted, rel=1e-12)
+            excess = wanted - [p[torque] for p in both]
+            before = np.flatnonzero(excess[1:] * excess[:-1] < 0.0)
+            at = sides.crossings()[torque][side]
+            crossed += len(at)
+            assert len(at) == len(before)
+            assert np.all(sides.speed[before] < at) and np.all(at < sides.speed[before + 1])
+            assert np.interp(at, sides.speed, excess) == pytest.approx(0.0, abs=1e-9)
+            told = sides.as_dict()["crossings"][torque][side]
+            assert told == [{"value": speed, "unit": "rad/s"} for speed in at]
+    assert crossed
 
 
 LIGHT = "events = []\n[run]\nstep = 0.002\n"

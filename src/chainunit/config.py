@@ -18,7 +18,7 @@ from .drives.induction_motor import Inverter, SoftStart
 from .drives.line_table import form, given_line
 from .errors import InputError
 from .machines.api import ChainUnit, ratios
-from .machines.chain_unit import ChamberForces, SideLoads
+from .machines.chain_unit import SIDES, ChamberForces, SideLoads, SideName, other
 from .machines.flexible import LEAST, MOST, OrganLaw
 from .quantities import Layout, Value, declaration, group, quantity
 from .reading import (
@@ -143,16 +143,16 @@ class Scenario:
     """An overload: what happens, and to which side."""
 
     kind: Literal["empties", "feed", "jam", "lumps", "blocked", "dip", "start"]
-    side: Literal["left", "right", ""]
+    side: SideName | Literal[""]
     """the side that has to carry it; none where both do"""
     title: str
     short: str
 
 
-def _of_side(side: Literal["left", "right"], other: str) -> dict[str, Scenario]:
-    suffix = "" if side == "left" else "_right"
+def _of_side(side: SideName) -> dict[str, Scenario]:
+    gone, suffix = other(side), "" if side == "left" else "_right"
     return {
-        f"{other}_empties": Scenario("empties", side, f"the {other} side empties", f"{other} empties"),
+        f"{gone}_empties": Scenario("empties", side, f"the {gone} side empties", f"{gone} empties"),
         f"feed_{side}": Scenario("feed", side, f"all feed moves to the {side}", f"feed to {side}"),
         f"jam_{side}": Scenario("jam", side, f"a lump jams the {side} side", f"jam {side}"),
         f"lumps{suffix}": Scenario(
@@ -165,8 +165,8 @@ def _of_side(side: Literal["left", "right"], other: str) -> dict[str, Scenario]:
 
 
 OVERLOADS: Mapping[str, Scenario] = {
-    **_of_side("left", "right"),
-    **_of_side("right", "left"),
+    **_of_side("left"),
+    **_of_side("right"),
     "blocked": Scenario("blocked", "", "the rocker is blocked", "blocked"),
     "dip": Scenario("dip", "", "the voltage dips", "dip"),
 }
@@ -182,7 +182,7 @@ def by_side(names: Collection[str]) -> list[list[str]]:
     """The overloads among `names`: what the left side has to carry, the right side, both; without empty groups."""
     groups = [
         [name for name in OVERLOADS if name in names and OVERLOADS[name].side == side]
-        for side in ("left", "right", "")
+        for side in (*SIDES, "")
     ]
     return [group for group in groups if group]
 

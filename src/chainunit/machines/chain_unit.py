@@ -17,7 +17,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Literal
 
 from ..groups.body import Body, point_load, reflected, total
 from ..groups.driver import crank, driving_torque
@@ -31,6 +31,14 @@ from ..quantities import Value, declaration, group, quantity
 from .crank_rocker import TURNS, angle_at_pivot, longest_crank, pressure_angle
 from .driven import DrivenState, slopes
 from .parts import Force, Pin, Rod, force
+
+SideName = Literal["left", "right"]
+SIDES: tuple[SideName, ...] = ("left", "right")
+
+
+def other(side: SideName) -> SideName:
+    """The side across."""
+    return "right" if side == "left" else "left"
 
 
 @declaration

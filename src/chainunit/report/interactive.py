@@ -13,7 +13,7 @@ from plotly.subplots import make_subplots  # type: ignore[import-untyped]
 
 from ..drives.dc_motor import DcMotor
 from ..engines import numpy_
-from ..machines.chain_unit import ChamberForces
+from ..machines.chain_unit import SIDES, ChamberForces
 from ..studies.chain import HIGH
 from ..studies.overload import PINS, SCENARIOS, Study
 from ..studies.shaft import RIGID
@@ -248,11 +248,14 @@ def _turn(study: Study) -> Plot:
     )
 
 
+_WHICH = {"both": "both sides"} | {str(side): f"{side} side alone" for side in SIDES}
+
+
 def _sides(study: Study) -> Plot:
     assert study.sides is not None
     figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.07)
     for row, what in ((1, "crank"), (2, "rocker")):
-        for i, (which, words) in enumerate((("both", "both sides"), ("alone", "left side alone"))):
+        for i, (which, words) in enumerate(_WHICH.items()):
             figure.add_scatter(
                 x=_small(study.sides.speed),
                 y=_small(getattr(study.sides, f"{what}_{which}")),
@@ -272,7 +275,7 @@ def _sides(study: Study) -> Plot:
     return Plot(
         "sides",
         "One side against both, over the speed",
-        "Largest crank torque and rocker torque in a turn over the crank speed, with both sides and with the left "
+        "Largest crank torque and rocker torque in a turn over the crank speed, with both sides and with each "
         "side alone; the speed of normal running is marked.",
         figure,
     )

@@ -528,7 +528,9 @@ def _random(t: Traced) -> str:
     ]
     heads = ("", *(f"{k[1:]} % of runs below" if k.startswith("q") else "Share of runs" for k in columns))
     runs, certain = (t.number(f"monte_carlo.{name}", given=True) for name in ("runs", "confidence"))
-    caption = f"Overloads at random angles and of random hardness, {runs} runs"
+    sides = t.result["monte_carlo"]["sides"]
+    of = ", ".join(f"{t.number(f'monte_carlo.sides.{side}', given=True)} {side}" for side in sides)
+    caption = f"Overloads on a random side, at random angles and of random hardness, {runs} runs ({of})"
     return _table(heads, rows, caption=f"{caption}; small: interval of {certain} confidence")
 
 
@@ -606,15 +608,20 @@ def _answer_number(t: Traced, run: str, v: Variable) -> str:
 
 def _factor_card(t: Traced) -> str:
     described = {v.name: v.description for v in Layout(OverloadFactors).variables}
-    rows = "".join(
-        f'<div class="factor"><span class="large">{t.number(f"overload_factors.{name}", none="none")}</span>'
-        f'<span class="which">{escape(described[name])}<br>{t.text(f"overload_factors.{name}.for")}</span></div>'
-        for name in t.result["overload_factors"]
-    )
+    sides = t.result["overload_factors"]
+    rows = ""
+    for name in next(iter(sides.values())):
+        of = "".join(
+            f'<span class="figure"><span class="large">{t.number(f"overload_factors.{side}.{name}", none="none")}'
+            f'</span><span class="which">{side} alone</span></span>'
+            for side in sides
+        )
+        use = t.text(f"overload_factors.{next(iter(sides))}.{name}.for")
+        rows += f'<div class="factor">{of}<span class="which">{escape(described[name])}<br>{use}</span></div>'
     speed = t.number("run.crank_speed", given=True)
     return (
         '<article class="card"><h3>Overload factor</h3>'
-        f'{rows}<p class="also">left organ alone against both, at {speed}</p></article>'
+        f'{rows}<p class="also">one organ alone against both, at {speed}</p></article>'
     )
 
 
@@ -782,13 +789,30 @@ def _check(t: Traced, check: Any, path: str) -> str:
     return f'<td class="check{" over" if over else ""}">{label}{bar}{of}</td>'
 
 
+def _crossings(t: Traced) -> str:
+    """Where one side alone asks as much as both, in words; empty where nothing crosses."""
+    sides = t.result["sides_over_speed"]
+    text = ""
+    for torque, of in (sides["crossings"] if sides else {}).items():
+        found = [
+            f"{side} alone at "
+            + " and ".join(
+                t.number(f"sides_over_speed.crossings.{torque}.{side}.{k}") for k in range(len(speeds))
+            )
+            for side, speeds in of.items()
+            if speeds
+        ]
+        text += f"; {torque} torque: {', '.join(found)}" if found else ""
+    return text
+
+
 def _figures(t: Traced, drawn: list[Plot]) -> str:
     captions = {
         "torque-speed": "Steady running is a closed loop; overloads are drawn from the event on. Grey: "
         "the most that the drive gives in steady running.",
         "turn": f"Inverse dynamics at {t.number('run.crank_speed', given=True)} of the crank, without a motor.",
         "sides": "Largest torques of a turn by inverse dynamics. Where the lines cross, one side alone asks as much "
-        "as both.",
+        f"as both{_crossings(t)}.",
         "chains": "The crank held at constant speed. Shaded: speeds to avoid; dash-dotted: the speed of normal "
         "running; thin: critical speeds. Two bars do not go slack: of them, the time in which one pushes.",
         "reactions": "Peak and RMS of the force in each pin, frame x right, y up; means over whole crank turns.",

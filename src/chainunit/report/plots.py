@@ -13,6 +13,7 @@ import numpy as np
 from ..config import by_side
 from ..drives.dc_motor import DcMotor
 from ..engines import numpy_
+from ..machines.chain_unit import SIDES
 from ..studies.chain import HIGH
 from ..studies.overload import PINS, SCENARIOS, Study
 from ..studies.shaft import RIGID
@@ -72,13 +73,19 @@ def _sides_over_speed(study: Study) -> Any:
     assert sides is not None
     figure, axes = plt.subplots(1, 2, figsize=(10, 4.2), sharex=True)
     for axis, name in zip(axes, ("rocker", "crank"), strict=True):
-        for line, (which, title) in zip(
-            LINES, (("both", "both organs"), ("alone", "left organ alone")), strict=False
-        ):
+        titles = {"both": "both organs"} | {str(side): f"{side} organ alone" for side in SIDES}
+        for line, (which, title) in zip(LINES, titles.items(), strict=False):
             axis.plot(sides.speed, getattr(sides, f"{name}_{which}"), label=title, **line)
-        for at in sides.crossings()[name]:
-            axis.axvline(at, color="#777777", linewidth=0.8)
-            axis.annotate(f" {at:.1f} rad/s", (at, 0.02), xycoords=("data", "axes fraction"), fontsize=9)
+        for k, side in enumerate(SIDES):
+            for at in sides.crossings()[name][side]:
+                axis.axvline(at, color=LINES[1 + k]["color"], linewidth=0.8)
+                axis.annotate(
+                    f" {side} {at:.2f} rad/s",
+                    (at, 0.02 + 0.05 * k),
+                    xycoords=("data", "axes fraction"),
+                    fontsize=9,
+                    color=LINES[1 + k]["color"],
+                )
         axis.set_xlabel("crank speed [rad/s]")
         axis.set_ylabel(f"{name} torque, largest of the turn [N m]")
         axis.set_xlim(0.0, sides.speed[-1])

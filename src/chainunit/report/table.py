@@ -115,13 +115,15 @@ def show(study: Study, console: Console) -> None:
     if study.factors:
         asked = number(config.run.crank_speed, "rad/s", full=False)
         table = Table(
-            title=f"Overload factor, left organ alone against both, at {asked}", title_justify="left"
+            title=f"Overload factor, one organ alone against both, at {asked}", title_justify="left"
         )
-        for column in ("way", "factor", "is for"):
-            table.add_column(column, justify="right" if column == "factor" else "left")
+        table.add_column("way")
+        for side in study.factors:
+            table.add_column(f"{side} alone", justify="right")
+        table.add_column("is for")
         for v in Layout(OverloadFactors).variables:
-            factor = number(getattr(study.factors, v.name), v.unit, v.kind)
-            table.add_row(v.description, factor, FACTOR_FOR[v.name])
+            sizes = (number(getattr(factors, v.name), v.unit, v.kind) for factors in study.factors.values())
+            table.add_row(v.description, *sizes, FACTOR_FOR[v.name])
         console.print(table)
     if study.pins:
         heaviest = {pin: max(t[pin]["peak"] for t in study.pins.values()) for pin in study.pins["steady"]}
@@ -326,7 +328,8 @@ def _show_monte_carlo(found: MonteCarloResult, console: Console) -> None:
     columns = [f"q{100 * q:.0f}" for q in QUANTILES]
     columns = [c for c in columns if any(c in sizes for sizes in found_of.values())]
     certain = f"{100 * CONFIDENCE:g} % interval"
-    table = Table(title=f"Overloads at random, {len(found.rows)} runs", title_justify="left")
+    sides = ", ".join(f"{runs} {side}" for side, runs in found.sides.items())
+    table = Table(title=f"Overloads at random, {len(found.rows)} runs ({sides})", title_justify="left")
     table.add_column("quantile")
     for column in columns:
         table.add_column(f"{column[1:]} % ({certain})", justify="right")

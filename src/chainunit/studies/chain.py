@@ -25,7 +25,7 @@ from ..cosim.master import stoppable
 from ..engines import numpy_
 from ..errors import InterruptedRunError, RunError
 from ..machines.api import ChainUnit
-from ..machines.chain_unit import ChamberForces, SideLoads
+from ..machines.chain_unit import SIDES, ChamberForces, SideLoads
 from ..machines.flexible import flexible
 from ..quantities import Layout, Value, declaration, quantity
 from ..text import entry
@@ -45,7 +45,6 @@ be avoided. At rest, too: the torque of two bars passes a minimum where weight a
 follow it there ask no more of the machine than at lower speeds."""
 AVOID_SLACK = 0.01
 """Where a rod is slack for that share of the time, too."""
-_SIDES = ("left", "right")
 
 
 @declaration
@@ -231,13 +230,13 @@ def run_turns(
         where it was stopped, or a run fails.
     """
     model, p = drive.load_model()
-    rods = [f"{side}.pull_{k + 1}" for side in _SIDES for k in range(sum(drive.rods))]
+    rods = [f"{side}.pull_{k + 1}" for side in SIDES for k in range(sum(drive.rods))]
     names = [*outputs, *rods]
     ratio = drive.driven.p.ratio
     step = 2.0 * math.pi / crank_speed / points
     given = model.parameter_layout.named(p) | {
         f"{side}.{name}": value
-        for side, loads in zip(_SIDES, (left, right), strict=True)
+        for side, loads in zip(SIDES, (left, right), strict=True)
         for name, value in Layout(SideLoads).named(loads).items()
     }
     done = [0]
@@ -273,7 +272,7 @@ def run_turns(
     return Turns(
         2.0 * math.pi * np.arange(1, points + 1) / points,
         {name: found[..., k] for k, name in enumerate(outputs)},
-        {side: found[..., first + each * k : first + each * (k + 1)] for k, side in enumerate(_SIDES)},
+        {side: found[..., first + each * k : first + each * (k + 1)] for k, side in enumerate(SIDES)},
     )
 
 
@@ -301,7 +300,7 @@ def two_bar_pulls(
     ratio = machine.p.ratio
     u = model.Inputs(phi=angle * ratio, w=crank_speed * ratio, a=0.0, left=left, right=right)
     sides = model.evaluate(xp, p, u, model.start(xp, p, u))[0]
-    pulls = [getattr(getattr(sides, side), f"pull_{k}") for side in _SIDES for k in (1, 2)]
+    pulls = [getattr(getattr(sides, side), f"pull_{k}") for side in SIDES for k in (1, 2)]
     return np.array([np.broadcast_to(pull, np.shape(angle)) for pull in pulls])
 
 
@@ -316,8 +315,8 @@ def numbers_at(
     """The numbers at one speed with the study's feed, and by side the share of time in which each rod is slack."""
     chain, feed = config.chain, config.feed
     assert chain is not None
-    forces = [f"{side}.rocker_joint.{x}" for side in _SIDES for x in ("fx", "fy")]
-    others = [f"{side}.{name}" for side in _SIDES for name in ("fold_largest", "energy_residual")]
+    forces = [f"{side}.rocker_joint.{x}" for side in SIDES for x in ("fx", "fy")]
+    others = [f"{side}.{name}" for side in SIDES for name in ("fold_largest", "energy_residual")]
     outputs = ("tau", "power", "rocker.tau", *others, *forces)
     starts, turns = int(chain.starts), int(chain.turns)
     found = run_turns(
@@ -339,7 +338,7 @@ def numbers_at(
 
     two = cycle(drive.machine, crank_speed, feed.left, feed.right)
     snatch, two_bar_snatch = [], []
-    for side in _SIDES:
+    for side in SIDES:
         bars = getattr(two.outputs, side).rocker_joint
         size = np.hypot(*(values[f"{side}.rocker_joint.{x}"] for x in ("fx", "fy")))
         rest, two_bar_rest = rest_forces(drive.machine, side, feed, sum(drive.rods))
@@ -349,9 +348,9 @@ def numbers_at(
     pushed = two_bar_pulls(drive.machine, two.angle, crank_speed, feed.left, feed.right) < 0.0
     duration = 2.0 * math.pi / crank_speed * turns
     moved = float(np.min(np.mean(np.abs(values["power"]), axis=(1, 2)))) * duration
-    missing = max(float(np.max(np.ptp(values[f"{side}.energy_residual"], axis=(1, 2)))) for side in _SIDES)
-    slack = {side: found.pulls[side] < 0.0 for side in _SIDES}
-    all_rods = np.concatenate([slack[side] for side in _SIDES], axis=-1)
+    missing = max(float(np.max(np.ptp(values[f"{side}.energy_residual"], axis=(1, 2)))) for side in SIDES)
+    slack = {side: found.pulls[side] < 0.0 for side in SIDES}
+    all_rods = np.concatenate([slack[side] for side in SIDES], axis=-1)
     crank, rocker = values["tau"] * ratio, values["rocker.tau"]
     medians = np.median(snatched, axis=1)
     of_turns = {"crank_torque": peaks(crank), "rocker_torque": peaks(rocker), "snatch": snatched}
@@ -373,7 +372,7 @@ def numbers_at(
             snatch_spread=float(np.max(medians) / np.min(medians)),
             slack_time=float(np.mean(np.any(all_rods, axis=-1))),
             slack_rods=float(np.mean(all_rods)),
-            fold_largest=float(max(np.max(values[f"{side}.fold_largest"]) for side in _SIDES)),
+            fold_largest=float(max(np.max(values[f"{side}.fold_largest"]) for side in SIDES)),
             two_bar_crank_torque=float(np.max(np.abs(two.crank_torque))),
             two_bar_crank_torque_rms=float(np.sqrt(np.mean(two.crank_torque**2))),
             two_bar_rocker_torque=float(np.max(np.abs(two.outputs.rocker.tau))),
@@ -383,7 +382,7 @@ def numbers_at(
             independent_turns=float(min(counted(sizes, HIGH) for sizes in of_turns.values())),
             **ends,
         ),
-        {side: np.mean(slack[side], axis=(0, 1, 2)) for side in _SIDES},
+        {side: np.mean(slack[side], axis=(0, 1, 2)) for side in SIDES},
     )
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from ..machines.api import EMPTY, ChainUnit
-from ..machines.chain_unit import SideLoads
+from ..machines.chain_unit import SIDES, SideLoads, SideName, other
 from ..quantities import Value, declaration, quantity
 
 
@@ -34,9 +34,7 @@ def cycle(
     return Cycle(angle, out.tau * ratio, out)
 
 
-def all_on_one(
-    side: Literal["left", "right"], left: SideLoads, right: SideLoads
-) -> tuple[SideLoads, SideLoads]:
+def all_on_one(side: SideName, left: SideLoads, right: SideLoads) -> tuple[SideLoads, SideLoads]:
     """Loads of the left and of the right organ where that of `side` has what both carry."""
     whole = SideLoads(
         material_mass=left.material_mass + right.material_mass,
@@ -45,9 +43,23 @@ def all_on_one(
     return (whole, EMPTY) if side == "left" else (EMPTY, whole)
 
 
-def without_right(machine: ChainUnit) -> ChainUnit:
-    """The machine with its left organ alone: the papers' one-sided loading."""
-    return machine.replace({"right.wall_mass": 0.0, "right.web_mass": 0.0})
+def alone(machine: ChainUnit, side: SideName) -> ChainUnit:
+    """The machine with its organ of that side alone: the papers' one-sided loading."""
+    gone = other(side)
+    return machine.replace({f"{gone}.wall_mass": 0.0, f"{gone}.web_mass": 0.0})
+
+
+def _cycle_alone(
+    machine: ChainUnit,
+    side: SideName,
+    crank_speed: float,
+    left: SideLoads,
+    right: SideLoads,
+    points: int = 720,
+) -> Cycle:
+    """A turn with the organ of that side alone, which keeps its load."""
+    loads = (left, EMPTY) if side == "left" else (EMPTY, right)
+    return cycle(alone(machine, side), crank_speed, *loads, points)
 
 
 @declaration
@@ -57,7 +69,9 @@ class OverloadFactors:
 
     crank_torque: Value = quantity("1", "crank torque, ratio of cycle maxima")
     rocker_torque: Value = quantity("1", "rocker torque, ratio of cycle maxima")
-    static_at_extreme: Value = quantity("1", "R_left/(R_left - R_right) at the right extreme, at rest")
+    static_at_extreme: Value = quantity(
+        "1", "R/(R - R of the other organ), at rest at the extreme where it is least"
+    )
 
 
 FACTOR_FOR = {
@@ -69,64 +83,78 @@ FACTOR_FOR = {
 
 
 def overload_factors(
-    machine: ChainUnit, crank_speed: float, left: SideLoads, right: SideLoads
+    machine: ChainUnit, crank_speed: float, left: SideLoads, right: SideLoads, side: SideName = "left"
 ) -> OverloadFactors:
-    """The overload factor of a one-sided machine.
+    """The overload factors of the machine with its organ of `side` alone against both.
 
-    `static_at_extreme` is the papers' R_left/(R_left - R_right) at the right extreme of the rocker, at rest:
-    it diverges as the swing shrinks, and its value at the extreme is its minimum, so that it is no design
-    factor (docs/physics.md). The other two are ratios of cycle maxima at `crank_speed`, left organ alone to
+    `static_at_extreme` is, of the left organ, the papers' R_left/(R_left - R_right) at the right extreme of the
+    rocker, at rest; of the right organ R_right/(R_right - R_left) at the left extreme, which is not as far out.
+    It diverges as the swing shrinks, and its value at the extreme is its minimum, so that it is no design
+    factor (docs/physics.md). The other two are ratios of cycle maxima at `crank_speed`, one organ alone to
     both, of the rocker torque and of the crank torque: gravity and inertia cancel or add up there, and above
     a certain speed both sides together are the heavier case.
     """
-    (psi, _), _ = machine.rocker_extremes()
+    extremes = machine.rocker_extremes()
+    # each organ pulls hardest at the rocker where this is farthest from it
+    psi = extremes[0 if side == "left" else 1][0]
     static = machine.chamber(psi, 0.0, 0.0, left, right)
     both = cycle(machine, crank_speed, left, right)
-    alone = cycle(without_right(machine), crank_speed, left, EMPTY)
+    one = _cycle_alone(machine, side, crank_speed, left, right)
 
     def ratio(x: Any, y: Any) -> float:
         whole = float(np.max(np.abs(y)))
         return float(np.max(np.abs(x))) / whole if whole > 0.0 else math.nan
 
     return OverloadFactors(
-        crank_torque=ratio(alone.crank_torque, both.crank_torque),
-        rocker_torque=ratio(alone.outputs.rocker.tau, both.outputs.rocker.tau),
-        static_at_extreme=ratio(static.left.tangential_load, static.rocker.tangential_load),
+        crank_torque=ratio(one.crank_torque, both.crank_torque),
+        rocker_torque=ratio(one.outputs.rocker.tau, both.outputs.rocker.tau),
+        static_at_extreme=ratio(getattr(static, side).tangential_load, static.rocker.tangential_load),
     )
 
 
 @dataclass(frozen=True)
 class Sides:
-    """Cycle maxima of the torques with both organs and with the left one alone over crank speed [rad/s], each of
-    shape (speeds,), and where the two are alike."""
+    """Cycle maxima of the torques [N m] over crank speed [rad/s], each of shape (speeds,): with both organs, with the
+    left one alone, with the right one alone; and where one alone and both are alike."""
 
     speed: Any
     rocker_both: Any
-    rocker_alone: Any
+    rocker_left: Any
+    rocker_right: Any
     crank_both: Any
-    crank_alone: Any
+    crank_left: Any
+    crank_right: Any
 
-    def crossings(self) -> dict[str, list[float]]:
-        """Crank speeds at which one side alone and both ask the same [rad/s], linear between the points."""
-        found = {}
-        for name in ("rocker", "crank"):
-            excess = getattr(self, f"{name}_alone") - getattr(self, f"{name}_both")
-            at = np.flatnonzero(np.diff(np.sign(excess)) != 0)
-            slope = np.diff(excess)[at]
-            found[name] = [
-                float(self.speed[k] - excess[k] * (self.speed[k + 1] - self.speed[k]) / d)
-                for k, d in zip(at, slope, strict=True)
-            ]
+    def crossings(self) -> dict[str, dict[SideName, list[float]]]:
+        """Crank speeds at which one side alone and both ask the same [rad/s], linear between the points, by torque
+        ("rocker", "crank") and side."""
+        found: dict[str, dict[SideName, list[float]]] = {}
+        for torque in _TORQUES:
+            found[torque] = {}
+            for side in SIDES:
+                excess = getattr(self, f"{torque}_{side}") - getattr(self, f"{torque}_both")
+                at = np.flatnonzero(np.diff(np.sign(excess)) != 0)
+                slope = np.diff(excess)[at]
+                found[torque][side] = [
+                    float(self.speed[k] - excess[k] * (self.speed[k + 1] - self.speed[k]) / d)
+                    for k, d in zip(at, slope, strict=True)
+                ]
         return found
 
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON, with units."""
-        torques = ("rocker_both", "rocker_alone", "crank_both", "crank_alone")
         return {
             "speed": {"value": self.speed.tolist(), "unit": "rad/s"},
-            **{name: {"value": getattr(self, name).tolist(), "unit": "N.m"} for name in torques},
-            "crossings": {n: {"value": v, "unit": "rad/s"} for n, v in self.crossings().items()},
+            **{name: {"value": getattr(self, name).tolist(), "unit": "N.m"} for name in _MAXIMA},
+            "crossings": {
+                torque: {side: [{"value": w, "unit": "rad/s"} for w in speeds] for side, speeds in of.items()}
+                for torque, of in self.crossings().items()
+            },
         }
+
+
+_TORQUES = ("rocker", "crank")
+_MAXIMA = tuple(f"{torque}_{which}" for torque in _TORQUES for which in ("both", *SIDES))
 
 
 def sides_over_speed(
@@ -135,16 +163,12 @@ def sides_over_speed(
     """Two-sided against one-sided over crank speeds up to `highest` [rad/s]: at low speed one side alone is the
     heavier case, since nothing balances its weight; at high speed both are, since inertia adds up."""
     speed = np.linspace(highest / points, highest, points)
-    alone_machine = without_right(machine)
-    peaks: dict[str, list[float]] = {name: [] for name in ("rb", "ra", "cb", "ca")}
+    peaks: dict[str, list[float]] = {name: [] for name in _MAXIMA}
     for w in speed:
-        both = cycle(machine, float(w), left, right, 360)
-        alone = cycle(alone_machine, float(w), left, EMPTY, 360)
-        for name, torque in (
-            ("rb", both.outputs.rocker.tau),
-            ("ra", alone.outputs.rocker.tau),
-            ("cb", both.crank_torque),
-            ("ca", alone.crank_torque),
-        ):
-            peaks[name].append(float(np.max(np.abs(torque))))
-    return Sides(speed, *(np.array(peaks[name]) for name in ("rb", "ra", "cb", "ca")))
+        turns = {"both": cycle(machine, float(w), left, right, 360)} | {
+            side: _cycle_alone(machine, side, float(w), left, right, 360) for side in SIDES
+        }
+        for which, turn in turns.items():
+            peaks[f"rocker_{which}"].append(float(np.max(np.abs(turn.outputs.rocker.tau))))
+            peaks[f"crank_{which}"].append(float(np.max(np.abs(turn.crank_torque))))
+    return Sides(speed, **{name: np.array(found) for name, found in peaks.items()})

@@ -1,4 +1,4 @@
-"""Overloads at random crank angles, times and sizes, in local processes.
+"""Overloads at random sides, crank angles, times and sizes, in local processes.
 
 Each run branches from the same steady state and is determined by the study and its own number alone. Its row is
 appended, when it ends, to ``monte_carlo_<study>.jsonl``, where <study> is a digest of all that the rows depend on: a
@@ -31,6 +31,7 @@ from ..cosim import CoSimulation, Profile
 from ..cosim.instance import remove_unpacked
 from ..errors import InterruptedRunError, RunError
 from ..files import whole, writing
+from ..machines.chain_unit import SIDES, SideName
 from ..quantities import Layout, Value, declaration, quantity
 from ..text import entry
 from . import protection
@@ -64,6 +65,7 @@ def _row_form() -> type[BaseModel]:
         "Row",
         __config__=ConfigDict(extra="forbid", strict=True),
         run=(int, Field(ge=0)),
+        side=(SideName, Field()),
         failed=(str | None, Field()),
         **fields,
     )
@@ -95,6 +97,7 @@ class Task:
             "monte_carlo": {k: v for k, v in asdict(config.monte_carlo).items() if k != "runs"},
             "coupling": asdict(config.coupling) if config.coupling else None,
             "steady": self.steady,
+            "row": list(_Row.model_fields),
         }
         content = hashlib.sha256(json.dumps(relevant, sort_keys=True).encode())
         for name in sorted(self.files):
@@ -137,12 +140,25 @@ def _prepared(task: Task, digest: str) -> CoSimulation:
     return _worker[digest]
 
 
-def one(task: Task, number: int, simulation: CoSimulation) -> Sample:
-    """Run the overload of that number from the steady state that `simulation` has saved."""
-    config, drive = task.config, task.drive
-    mc, o, run = config.monte_carlo, config.overload, config.run
+@dataclass(frozen=True)
+class Draw:
+    """What is left to chance in one run."""
+
+    side: SideName
+    """on which the lump comes"""
+    offset: float
+    """time from the saved state to the lump [s]"""
+    force: float
+    """[N]"""
+    trip_torque: float
+    """[N m] at the crank; infinite without a coupling"""
+
+
+def draw(config: Config, number: int) -> Draw:
+    """The lump of the run of that number: the same whoever draws it, and in whatever order."""
+    mc = config.monte_carlo
     random = np.random.default_rng([int(mc.seed), number])
-    offset = random.uniform(0.0, 2.0 * math.pi / run.crank_speed)
+    offset = random.uniform(0.0, 2.0 * math.pi / config.run.crank_speed)
     force = random.uniform(mc.force_low, mc.force_high)
     spread = random.standard_normal()
     trip = (
@@ -150,17 +166,24 @@ def one(task: Task, number: int, simulation: CoSimulation) -> Sample:
         if config.coupling
         else math.inf
     )
+    return Draw(SIDES[random.integers(len(SIDES))], offset, force, trip)
+
+
+def one(task: Task, number: int, simulation: CoSimulation) -> Sample:
+    """Run the overload of that number from the steady state that `simulation` has saved."""
+    config, drive, drawn = task.config, task.drive, draw(task.config, number)
+    o, run, trip = config.overload, config.run, drawn.trip_torque
 
     simulation.restore()
-    event, normal = task.steady + offset, config.feed.left.processing_force
+    event, normal = task.steady + drawn.offset, getattr(config.feed, drawn.side).processing_force
     rise, hold = o.jam_rise, o.jam_duration
-    lump = Profile(normal, ((event, rise, normal + force), (event + rise + hold, rise, normal)))
+    lump = Profile(normal, ((event, rise, normal + drawn.force), (event + rise + hold, rise, normal)))
     simulation.signals = {
         **drive.loads(config.feed),
         **drive.reference(run.crank_speed),
-        "machine.left.processing_force": lump,
+        f"machine.{drawn.side}.processing_force": lump,
     }
-    stop = event + mc.duration
+    stop = event + config.monte_carlo.duration
     guards = {"motor.tau": trip / drive.ratio} if config.coupling else None
     done = simulation.run(stop, run.step, guards=guards)
     time = done["time"].values
@@ -174,7 +197,7 @@ def one(task: Task, number: int, simulation: CoSimulation) -> Sample:
     return Sample(
         crank_angle=angle % (2.0 * math.pi),
         event=event,
-        force=force,
+        force=drawn.force,
         trip_torque=trip if config.coupling else None,
         crank_torque_peak=float(np.max(np.abs(drive.crank_torque(done)))),
         motor_torque_peak=peak("motor.air_gap_tau"),
@@ -190,13 +213,14 @@ def row_of(task: Task, digest: str, number: int) -> dict[str, Any]:
     """The result of the run of that number, as a row of the file."""
     simulation = _prepared(task, digest)
     layout = Layout(Sample)
+    named = {"run": number, "side": draw(task.config, number).side}
     try:
-        return {"run": number, "failed": None, **layout.named(one(task, number, simulation))}
+        return {**named, "failed": None, **layout.named(one(task, number, simulation))}
     except InterruptedRunError:
         raise
     except RunError as error:
         # one run that fails is an answer, too; the next starts from the saved state again
-        return {"run": number, "failed": str(error), **dict.fromkeys(layout.names)}
+        return {**named, "failed": str(error), **dict.fromkeys(layout.names)}
 
 
 def read(file: Path) -> tuple[dict[int, dict[str, Any]], int]:
@@ -272,6 +296,11 @@ class MonteCarloResult:
         return f"{done} runs are too few for some quantiles: {each} (monte_carlo.runs)."
 
     @property
+    def sides(self) -> dict[SideName, int]:
+        """Number of runs by the side on which the lump came."""
+        return {side: sum(row["side"] == side for row in self.rows) for side in SIDES}
+
+    @property
     def failed(self) -> int:
         """Number of runs in which an FMU failed."""
         return sum(row["failed"] is not None for row in self.rows)
@@ -281,6 +310,7 @@ class MonteCarloResult:
         units, kinds = {v.name: v.unit for v in Layout(Sample).variables}, {"share": ("1", "percent")}
         return {
             "runs": entry(len(self.rows), "1"),
+            "sides": {side: entry(runs, "1") for side, runs in self.sides.items()},
             "failed": entry(self.failed, "1"),
             "left_out": entry(self.left_out, "1"),
             "file": self.file.name,

@@ -27,7 +27,7 @@ from ..engines import numpy_
 from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
 from ..machines.api import EMPTY
-from ..machines.chain_unit import ChamberForces
+from ..machines.chain_unit import SIDES, ChamberForces, SideName
 from ..quantities import Layout, Value, declaration, quantity
 from ..text import entry, number
 from . import protection, verdict
@@ -176,7 +176,8 @@ class Study:
     ripple_without: float | None = None
     """fluctuation of the speed in steady running without the feed-forward that the study has"""
     cycles: Any = None
-    factors: OverloadFactors | None = None
+    factors: dict[SideName, OverloadFactors] = field(default_factory=dict)
+    """of the organ of that side alone"""
     sides: Sides | None = None
     limits: Limits | None = None
     runs: dict[str, xr.Dataset] = field(default_factory=dict)
@@ -331,7 +332,7 @@ def _statics(study: Study) -> None:
         "all feed on the left": cycle(machine, w, *all_on_one("left", feed.left, feed.right)),
         "all feed on the right": cycle(machine, w, *all_on_one("right", feed.left, feed.right)),
     }
-    study.factors = overload_factors(machine, w, feed.left, feed.right)
+    study.factors = {side: overload_factors(machine, w, feed.left, feed.right, side) for side in SIDES}
     study.sides = sides_over_speed(machine, feed.left, feed.right)
     (right, _), (left, _) = machine.rocker_extremes()
     modes = machine.chain_modes(feed.left, feed.right)
@@ -1320,10 +1321,10 @@ def as_dict(study: Study) -> dict[str, Any]:
         "status": f"failed: {study.failure}" if study.failure else "complete",
         "answers": {name: entries(answers) for name, answers in study.answers.items()},
         "overload_factors": {
-            name: factor | {"for": FACTOR_FOR[name]} for name, factor in entries(study.factors).items()
+            side: {name: factor | {"for": FACTOR_FOR[name]} for name, factor in entries(factors).items()}
+            for side, factors in study.factors.items()
         }
-        if study.factors
-        else None,
+        or None,
         "limits": entries(study.limits) if study.limits else None,
         "events": {name: {"value": at, "unit": "s"} for name, at in study.event.items()},
         "pins": {

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -28,6 +28,7 @@ from ..drives.motor import T_RATED
 from ..engines import MATH, numpy_
 from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
+from ..machines.chain_unit import SIDES, SideName
 from ..quantities import Layout, Value, declaration, quantity
 from ..text import entry, number
 from .chain import HIGH, duty
@@ -243,12 +244,12 @@ def _entries(declared: Any) -> dict[str, Any]:
     }
 
 
-def heavier_side(config: Config) -> Literal["left", "right"]:
+def heavier_side(config: Config) -> SideName:
     """The side on which all feed asks the larger RMS torque of the crank, with two bars at constant speed: the rocker
     swings farther to one side than to the other."""
     feed, w = config.feed, config.run.crank_speed
 
-    def asked(side: Literal["left", "right"]) -> float:
+    def asked(side: SideName) -> float:
         return rms((1.0, cycle(config.machine, w, *all_on_one(side, feed.left, feed.right)).crank_torque))
 
     return "left" if asked("left") >= asked("right") else "right"
@@ -484,12 +485,10 @@ def judge(config: Config, c: Candidate, numbers: CycleNumbers, files: Mapping[st
     c.checks = _checks(config, c, start, steady, one_sided, started)
 
 
-def feed_signals(
-    config: Config, shift_at: float | None, side: Literal["left", "right"] = "left"
-) -> dict[str, Any]:
+def feed_signals(config: Config, shift_at: float | None, side: SideName = "left") -> dict[str, Any]:
     """Loads of both sides; from `shift_at` [s] on all feed moves to `side`."""
     signals: dict[str, Any] = {}
-    shifted = dict(zip(("left", "right"), all_on_one(side, config.feed.left, config.feed.right), strict=True))
+    shifted = dict(zip(SIDES, all_on_one(side, config.feed.left, config.feed.right), strict=True))
     for name, target in shifted.items():
         for load in ("material_mass", "processing_force"):
             begin = getattr(getattr(config.feed, name), load)
