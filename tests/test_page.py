@@ -88,7 +88,11 @@ SIZING = {
     "asked": {"service_factor": number(1.25, "1", title="service factor")},
     "cycle": {"torque_rms": number(28.7, "N.m")},
     "flywheel": {"inertia": number(0.0, "kg.m2", title="inertia on the motor shaft")},
-    "protection": {"setting": number(1.6, "A"), "trip_torque": number(210.0, "N.m")},
+    "protection": {
+        "setting": number(1.6, "A"),
+        "trip_torque": number(210.0, "N.m"),
+        "coupling": "Recommended safety coupling: 210 N m.",
+    },
     "candidates": [
         candidate("0.25 kW", "rejected", "too weak by 31 %", pull_out=1.31, heat=0.83),
         candidate("0.55 kW", "fits", "larger than it must be", pull_out=0.61, heat=None),
@@ -185,8 +189,9 @@ def test_every_number_is_traced_to_result_json(study, written):
     paths = {n["data-path"] for n in reader.numbers}
     for run, answers in result["answers"].items():
         assert {f"answers.{run}.{a}" for a, entry in answers.items() if entry["value"] is not None} <= paths
-    for section in ("machine", "motor", "feed", "run", "overload", "limits", "overload_factors"):
-        wanted = {f"{section}.{n}" for n, e in result[section].items() if isinstance(e, dict)}
+    factors = (f"overload_factors.{side}" for side in result["overload_factors"])
+    for section in ("machine", "motor", "feed", "run", "overload", "limits", *factors):
+        wanted = {f"{section}.{n}" for n, e in at(result, section).items() if isinstance(e, dict)}
         assert wanted <= paths, section
     for path in ("answers.steady.crank_torque_peak", "certificate.jam_left.energy_residual_share"):
         assert path in paths
@@ -418,6 +423,8 @@ def test_sizing_is_shown_after_the_answer(study):
     over = re.findall(r"<strong><data[^>]*>([^<]*)", text[text.index('class="candidates"') :])
     assert over == ["▲ 131\u00a0"]
     assert "service factor" in text.lower() and "Typical values." in text
+    # a sentence is no cell of a table of numbers, which it would make wider than the page
+    assert text.count('data-path="sizing.protection.coupling"') == 1
 
 
 def test_no_candidate_fits(study):

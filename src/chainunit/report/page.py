@@ -672,8 +672,17 @@ def _sizing(t: Traced) -> str:
             counts = t.number("sizing.tried", given=True), t.number("sizing.motors", given=True)
             parts.append(f'<p class="note">Tried: {" of ".join(counts)} motors of the catalogue.</p>')
         parts.append(_candidates(t, candidates, best_one))
+    # the sentence on the coupling stands above, and is no cell of a narrow table
     groups = [
-        (_capital(_words(name)), list(_leaves(sizing[name], f"sizing.{name}")))
+        (
+            _capital(_words(name)),
+            [
+                found
+                for key, below in sizing[name].items()
+                if not isinstance(below, str)
+                for found in _leaves(below, f"sizing.{name}.{key}", _words(key))
+            ],
+        )
         for name in ("asked", "cycle", "flywheel", "protection")
         if sizing.get(name)
     ]
