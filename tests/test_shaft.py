@@ -215,10 +215,13 @@ def test_the_rigid_drive_has_the_same_coupling(tmp_path):
     assert 140.0 < blocked.tau2_rigid < 300.0 and 0.6 < blocked.amplification < 1.5
 
 
-def test_without_a_motor_there_is_nothing_to_say_of_the_shaft(tmp_path):
-    text = f"{LINE}[sizing]\ncandidates = 1\ninertia_ratio = 1e-6\n[run]\nstep = 0.002\n"
+def test_without_a_motor_that_fits_the_shaft_is_that_of_the_nearest(tmp_path):
+    sizing = "[sizing]\ncandidates = 1\ninertia_ratio = 1e-6\npoles_least = 2\npoles_most = 2\n"
+    text = f"{LINE}{sizing}[run]\nstep = 0.002\n"
     study = run_study(config.parse(text), tmp_path)
-    assert study.sizing.chosen is None and "shaft" not in as_dict(study)
+    assert study.sizing.chosen is None and study.insufficient
+    assert study.drive.ratio == study.sizing.best.drive.ratio
+    assert set(as_dict(study)["shaft"]) == set(study.answers) and "steady" in study.shaft
     files.write(study, tmp_path)
     page.write(study, tmp_path)
 

@@ -218,20 +218,38 @@ def test_a_run_that_fails_keeps_what_it_computed(tmp_path, monkeypatch):
         assert {"start_up", "unfinished"} <= set(tree.children)
 
 
+# the command, which tells when it is in the middle of the start-up
+TELLING = """
+from pathlib import Path
+from chainunit import cli
+from chainunit.cosim.instance import Instance
+
+step = Instance.step
+
+def telling(self, time, h):
+    step(self, time, h)
+    if time > 0.5:
+        Path("running").touch()
+        Instance.step = step
+
+Instance.step = telling
+cli.main()
+"""
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_ctrl_c_keeps_what_was_computed(tmp_path):
     import signal
     import time
 
     (tmp_path / "long.toml").write_text("[run]\nturns = 200")
-    command = [sys.executable, "-m", "chainunit.cli", "study", "long.toml", "-o", "out"]
+    command = [sys.executable, "-c", TELLING, "study", "long.toml", "-o", "out"]
     running = subprocess.Popen(
         command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
-    while not (tmp_path / "out" / "fmu" / "DcMotor.fmu").exists():
+    while not (tmp_path / "running").exists():
         assert running.poll() is None
-        time.sleep(0.1)
-    time.sleep(2.0)
+        time.sleep(0.02)
     running.send_signal(signal.SIGINT)
     _, err = running.communicate(timeout=60)
     assert running.returncode == 130, err

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from itertools import cycle
 from pathlib import Path
@@ -13,7 +14,6 @@ import numpy as np
 from ..config import by_side
 from ..drives.dc_motor import DcMotor
 from ..engines import numpy_
-from ..machines.chain_unit import SIDES
 from ..studies.chain import HIGH
 from ..studies.overload import PINS, SCENARIOS, Study
 from ..studies.shaft import RIGID
@@ -71,26 +71,20 @@ def _torque_angle(study: Study) -> Any:
 def _sides_over_speed(study: Study) -> Any:
     sides = study.sides
     assert sides is not None
-    figure, axes = plt.subplots(1, 2, figsize=(10, 4.2), sharex=True)
-    for axis, name in zip(axes, ("rocker", "crank"), strict=True):
-        titles = {"both": "both organs"} | {str(side): f"{side} organ alone" for side in SIDES}
-        for line, (which, title) in zip(LINES, titles.items(), strict=False):
-            axis.plot(sides.speed, getattr(sides, f"{name}_{which}"), label=title, **line)
-        for k, side in enumerate(SIDES):
-            for at in sides.crossings()[name][side]:
-                axis.axvline(at, color=LINES[1 + k]["color"], linewidth=0.8)
-                axis.annotate(
-                    f" {side} {at:.2f} rad/s",
-                    (at, 0.02 + 0.05 * k),
-                    xycoords=("data", "axes fraction"),
-                    fontsize=9,
-                    color=LINES[1 + k]["color"],
-                )
+    figure, axes = plt.subplots(1, 2, figsize=(10, 5), sharex=True)
+    for axis, (torque, crossings) in zip(axes, sides.crossings().items(), strict=True):
+        axis.plot(sides.speed, getattr(sides, f"{torque}_both"), label="both organs", **LINES[0])
+        for line, (side, speeds) in zip(LINES[1:], crossings.items(), strict=False):
+            alike = " and ".join(f"{at:.2f}" for at in speeds)
+            label = f"{side} organ alone" + (f", as both at {alike} rad/s" if alike else "")
+            axis.plot(sides.speed, getattr(sides, f"{torque}_{side}"), label=label, **line)
+            for at in speeds:
+                axis.axvline(at, color=line["color"], linewidth=0.8)
         axis.set_xlabel("crank speed [rad/s]")
-        axis.set_ylabel(f"{name} torque, largest of the turn [N m]")
+        axis.set_ylabel(f"{torque} torque, largest of the turn [N m]")
         axis.set_xlim(0.0, sides.speed[-1])
         axis.set_ylim(bottom=0.0)
-    axes[0].legend(loc="upper left")
+        axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), fontsize=9)
     figure.suptitle("One side alone against both")
     return figure
 
@@ -294,23 +288,27 @@ def _chain_sweep(study: Study) -> Any:
 
 
 def _torque_speed(study: Study) -> Any:
-    figure, axis = plt.subplots(figsize=(7.5, 5.5))
-    names = ["start_up", *(n for n in SCENARIOS if n in study.runs)]
-    fastest = 0.0
-    for line, name in zip(cycle(LINES), names, strict=False):
-        run = study.runs[name]
-        axis.plot(
-            run["motor.w"], run["motor.air_gap_tau"], label=SCENARIOS.get(name, "start-up and steady"), **line
-        )
-        fastest = max(fastest, float(run["motor.w"].max()))
-    w = np.linspace(0.0, 1.15 * fastest, 200)
-    limit = study.drive.motor.limit(numpy_(), study.motor, w)
-    axis.plot(w, limit, color="#777777", linewidth=3.0, alpha=0.6, label="limit of the drive")
-    axis.set_xlabel("motor speed [rad/s]")
-    axis.set_ylabel("air-gap torque [N m]")
-    axis.set_title("Torque-speed trajectory")
-    axis.set_xlim(left=0.0)
-    axis.legend(loc="center left")
+    """The start, and beside it, near the speed of running, the overloads of each side."""
+    groups = [["start_up"], *by_side(study.runs)]
+    figure, axes = plt.subplots(1, len(groups), figsize=(1.0 + 4.6 * len(groups), 5.5))
+    for axis, names in zip(axes, groups, strict=True):
+        slowest, fastest = math.inf, 0.0
+        for line, name in zip(cycle(LINES), names, strict=False):
+            # an overload from its event on; what was before is the steady running of the first panel
+            run = study.runs[name].sel(time=slice(study.event.get(name), None))
+            title = SCENARIOS.get(name, "start-up and steady")
+            axis.plot(run["motor.w"], run["motor.air_gap_tau"], label=title, **line)
+            slowest = min(slowest, float(run["motor.w"].min()))
+            fastest = max(fastest, float(run["motor.w"].max()))
+        room = 0.15 * (fastest - slowest)
+        w = np.linspace(slowest - room if slowest < 0.0 else max(0.0, slowest - room), fastest + room, 200)
+        limit = study.drive.motor.limit(numpy_(), study.motor, w)
+        axis.plot(w, limit, color="#777777", linewidth=3.0, alpha=0.6, label="limit of the drive")
+        axis.set_xlim(w[0], w[-1])
+        axis.set_xlabel("motor speed [rad/s]")
+        axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), fontsize=9)
+    axes[0].set_ylabel("air-gap torque [N m]")
+    figure.suptitle("Torque-speed trajectories: the start, and the overloads near the speed of running")
     return figure
 
 

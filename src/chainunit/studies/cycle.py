@@ -75,7 +75,7 @@ class OverloadFactors:
 
 
 FACTOR_FOR = {
-    "crank_torque": "sizes the drive: gear, motor, crank pin",
+    "crank_torque": "the larger sizes the drive: gear, motor, crank pin",
     "rocker_torque": "strength of rocker, pivot, organ bearings",
     "static_at_extreme": "comparison with the papers; no design factor",
 }
