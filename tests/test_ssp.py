@@ -21,6 +21,7 @@ from fmpy.ssp.ssd import read_ssd, read_ssv
 from chainunit import InputError, RunError, cli, config
 from chainunit.cosim import CoSimulation, System, port_connections
 from chainunit.drives.catalogue import catalogue
+from chainunit.errors import WriteError
 from chainunit.fmu import ssp
 from chainunit.models import MODELS
 from chainunit.studies import sizing
@@ -375,7 +376,7 @@ def test_whole_or_not_at_all(tmp_path, monkeypatch):
         raise OSError("disk full")
 
     monkeypatch.setattr(ssp, "pack", breaks)
-    with pytest.raises(OSError, match="disk full"):
+    with pytest.raises(WriteError, match=r"x\.ssp: cannot be written \(disk full\)"):
         export_study(config.load(), file, backend="python")
     assert [p.name for p in tmp_path.iterdir()] == ["x.ssp"] and file.read_text() == "before"
 
