@@ -20,7 +20,9 @@ from chainunit.drives.motor import T_RATED
 from chainunit.engines import MATH
 from chainunit.errors import InputError, InterruptedRunError
 from chainunit.fmu.backends import export
+from chainunit.machines.chain_unit import SideLoads
 from chainunit.studies import sizing
+from chainunit.studies.cycle import cycle
 from chainunit.studies.sizing import Check, Verdict, flywheel, permitted_starts, rms, start_time
 
 ANGLE = np.linspace(0.0, 2.0 * math.pi, 7200, endpoint=False)
@@ -134,6 +136,32 @@ def test_the_smallest_that_fits_is_chosen_and_the_others_are_told_why(sized):
         if c.verdict is Verdict.FITS:
             assert c.motor.nameplate.power >= chosen.motor.nameplate.power
     assert {c.verdict for c in sized.candidates} >= {Verdict.CHOSEN, Verdict.FITS}
+
+
+def test_peaks_are_of_both_sides(sized, tmp_path):
+    """The side that asks the larger RMS torque is not the one with the larger peak."""
+    config = parse(HEAVY)
+    turns = {}
+    for side in ("left", "right"):
+        loads = [
+            SideLoads(material_mass=600.0 * (side == one), processing_force=240.0 * (side == one))
+            for one in ("left", "right")
+        ]
+        turns[side] = cycle(config.machine, config.run.crank_speed, *loads).crank_torque
+    peaks = {side: float(np.max(np.abs(torque))) for side, torque in turns.items()}
+    assert sizing.heavier_side(config) == "left" and peaks["right"] > 1.2 * peaks["left"]
+    assert sized.cycle.torque_peak_one_sided == pytest.approx(peaks["right"], rel=1e-9)
+    assert np.mean(turns["left"] ** 2) > np.mean(turns["right"] ** 2)
+
+    best = sized.chosen
+    files, _ = best.drive.export(tmp_path)
+    signals = sizing.feed_signals(config, 2.0, "right")
+    with CoSimulation(best.drive.system(files), signals) as simulation:
+        simulation.run(6.0, config.run.step)
+        loaded = simulation.run(6.0 + 2.0 * math.pi / config.run.crank_speed, config.run.step)
+    peak = float(np.max(np.abs(loaded["motor.air_gap_tau"])))
+    assert best.checks["peak_torque"].value == pytest.approx(peak, rel=0.01)
+    assert best.duty_torque > 1.1 * peaks["left"]
 
 
 def test_the_crank_turns_as_asked(sized, tmp_path):
@@ -275,14 +303,17 @@ def test_a_motor_at_its_rated_load_is_as_warm_as_its_nameplate_says():
     assert warm(p, 1e6, T_RATED, plate.speed) == math.inf
 
 
-def test_above_the_corner_an_inverter_has_less_torque(tmp_path):
+def test_above_the_corner_an_inverter_has_less_torque(tmp_path, monkeypatch):
     """Twice the rated frequency: the breakdown torque of the check is a quarter, roughly, of that at 50 Hz."""
+    monkeypatch.setattr(sizing, "catalogue", lambda extra: small(1))
     config = dataclasses.replace(one_candidate("[gear]\nratio = 104\n", fluctuation=0.9), start="inverter")
     (c,) = sizing.size(config, tmp_path, lambda *said: None).candidates
     at_50_hz = float(breakdown(c.drive.parameters, T=config.sizing.temperature).air_gap_tau)
     assert 0.15 * at_50_hz < c.breakdown_torque < 0.4 * at_50_hz
     rated = c.motor.nameplate.torque
     assert c.checks["rms_torque"].limit == pytest.approx(0.5 * rated, rel=0.1)
+    # all feed on the right asks more than it has left, all on the left does not
+    assert c.verdict is Verdict.INSUFFICIENT and "peak torque" in c.reason
 
 
 def test_the_shift_of_the_feed_keeps_its_mass():

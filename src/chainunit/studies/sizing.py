@@ -76,7 +76,7 @@ class CycleNumbers:
     power_mean: Value = quantity("W", "mean power")
     torque_mean: Value = quantity("N.m", "mean torque, both sides loaded")
     torque_peak: Value = quantity("N.m", "peak torque, both sides loaded")
-    torque_peak_one_sided: Value = quantity("N.m", "peak torque, all feed on one side")
+    torque_peak_one_sided: Value = quantity("N.m", "peak torque, all feed on one side, the larger of both")
     torque_rms: Value = quantity("N.m", "RMS torque of the duty, both cases in their shares of time")
     inertia_least: Value = quantity("kg.m2", "reflected inertia, least")
     inertia_mean: Value = quantity("kg.m2", "reflected inertia, mean")
@@ -255,25 +255,29 @@ def heavier_side(config: Config) -> SideName:
     return "left" if asked("left") >= asked("right") else "right"
 
 
-def duty_cycles(config: Config, folder: Path, backend: Backend | None) -> tuple[Cycle, Cycle]:
-    """The turn with both sides loaded, and with all feed on the heavier side; with chains many turns, by their FMU,
+def duty_cycles(config: Config, folder: Path, backend: Backend | None) -> tuple[Cycle, dict[SideName, Cycle]]:
+    """The turn with both sides loaded, and those with all feed on one side; with chains many turns, by their FMU,
     which is written to `folder`."""
     feed, w = config.feed, config.run.crank_speed
-    cases = (feed.left, feed.right), all_on_one(heavier_side(config), feed.left, feed.right)
+    cases = {side: all_on_one(side, feed.left, feed.right) for side in SIDES}
     if config.chain is None:
-        both, one_sided = (cycle(config.machine, w, *case) for case in cases)
-        return both, one_sided
+        machine = config.machine
+        return cycle(machine, w, feed.left, feed.right), {
+            side: cycle(machine, w, *case) for side, case in cases.items()
+        }
     drive = Drive(InductionMotor, None, config.machine, chain=config.chain)
     fmu = Fmu(drive.export_machine(folder, backend)[0])
     try:
-        both, one_sided = (duty(fmu, drive, w, *case) for case in cases)
+        both = duty(fmu, drive, w, feed.left, feed.right)
+        one_sided = {side: duty(fmu, drive, w, *case) for side, case in cases.items()}
     finally:
         fmu.close()
     return both, one_sided
 
 
-def cycle_numbers(config: Config, both: Cycle, one_sided: Cycle) -> CycleNumbers:
-    """What the machine asks of any drive, at constant speed of the crank."""
+def cycle_numbers(config: Config, both: Cycle, one_sided: Mapping[SideName, Cycle]) -> CycleNumbers:
+    """What the machine asks of any drive, at constant speed of the crank: with all feed on one side the RMS torque of
+    the heavier, and the larger of both peaks, which may be that of the other side."""
     assert config.sizing is not None
     machine = config.machine
 
@@ -289,8 +293,10 @@ def cycle_numbers(config: Config, both: Cycle, one_sided: Cycle) -> CycleNumbers
         power_mean=mean * w,
         torque_mean=mean,
         torque_peak=peak(both),
-        torque_peak_one_sided=peak(one_sided),
-        torque_rms=rms((1.0 - share, both.crank_torque), (share, one_sided.crank_torque)),
+        torque_peak_one_sided=max(peak(turn) for turn in one_sided.values()),
+        torque_rms=rms(
+            (1.0 - share, both.crank_torque), (share, one_sided[heavier_side(config)].crank_torque)
+        ),
         inertia_least=float(np.min(inertia)),
         inertia_mean=float(np.mean(inertia)),
         inertia_largest=float(np.max(inertia)),
@@ -464,10 +470,12 @@ def judge(config: Config, c: Candidate, numbers: CycleNumbers, files: Mapping[st
         with CoSimulation(drive.system(files), signals) as simulation:
             start = simulation.run(window, config.run.step)
             steady = simulation.run(window + 2.0 * turn, config.run.step)
-            event = simulation.time
-            simulation.signals = {**feed_signals(config, event, heavier_side(config)), **drive.reference(w)}
-            simulation.run(event + config.overload.shift + turn, config.run.step)
-            one_sided = simulation.run(simulation.time + turn, config.run.step)
+            event, one_sided = simulation.save(), {}
+            for side in SIDES:
+                simulation.restore()
+                simulation.signals = {**feed_signals(config, event, side), **drive.reference(w)}
+                simulation.run(event + config.overload.shift + turn, config.run.step)
+                one_sided[side] = simulation.run(simulation.time + turn, config.run.step)
     except InterruptedRunError:
         raise
     except RunError as error:
@@ -477,10 +485,10 @@ def judge(config: Config, c: Candidate, numbers: CycleNumbers, files: Mapping[st
     times = np.concatenate([start["time"].values, steady["time"].values])
     expected = w * drive.ratio
     started = start_time(times, speed) if float(np.mean(steady["motor.w"])) > 0.5 * expected else None
-    torque = max(float(np.max(np.abs(r["machine.tau"]))) for r in (start, steady, one_sided))
+    torque = max(float(np.max(np.abs(r["machine.tau"]))) for r in (start, steady, *one_sided.values()))
     c.peak_torque = torque * drive.ratio
     assert config.sizing is not None
-    duty = [steady, one_sided] if config.sizing.one_sided_share else [steady]
+    duty = [steady, *one_sided.values()] if config.sizing.one_sided_share else [steady]
     c.duty_torque = max(float(np.max(np.abs(r["machine.tau"]))) for r in duty) * drive.ratio
     c.checks = _checks(config, c, start, steady, one_sided, started)
 
@@ -504,12 +512,12 @@ def _checks(
     c: Candidate,
     start: xr.Dataset,
     steady: xr.Dataset,
-    one_sided: xr.Dataset,
+    one_sided: Mapping[SideName, xr.Dataset],
     started: float | None,
 ) -> dict[str, Check]:
     asked, gear, plate, p = config.sizing, config.gear, c.motor.nameplate, c.drive.parameters
     assert asked is not None
-    share = asked.one_sided_share
+    share, heavier = asked.one_sided_share, one_sided[heavier_side(config)]
     gap = "motor.air_gap_tau"
     running = steady["motor.w"].values
     mean_speed = float(np.mean(running))
@@ -523,16 +531,16 @@ def _checks(
     # heat of a start beyond that of running, as if spread over the hour
     time, heat = start["time"].values, start["motor.heat"].values
     steady_heat = (1.0 - share) * float(np.mean(steady["motor.heat"])) + share * float(
-        np.mean(one_sided["motor.heat"])
+        np.mean(heavier["motor.heat"])
     )
     extra = max(0.0, float(np.trapezoid(heat - steady_heat, time)))
     mean_heat = steady_heat + asked.starts_per_hour * extra / 3600.0
     # the runs are short and the winding in them as cold as the surroundings: as warm as it becomes, it heats more
     ran_at = float(np.mean(steady[f"motor.{motor.temperature}"]))
     temperature = min(_BURNT, motor.settled_temperature(p, mean_heat, ran_at, mean_speed))
-    peak = max(float(np.max(np.abs(r[gap]))) for r in (steady, one_sided))
+    peak = max(float(np.max(np.abs(r[gap]))) for r in (steady, *one_sided.values()))
     reflected = float(np.max(steady["machine.J"]))
-    torque = rms((1.0 - share, steady[gap].values), (share, one_sided[gap].values))
+    torque = rms((1.0 - share, steady[gap].values), (share, heavier[gap].values))
     hot = (1.0 + p.stator.alpha * (asked.temperature - T_RATED)) / (1.0 + p.stator.alpha * (ran_at - T_RATED))
     permitted = permitted_starts(p, hot * steady_heat, hot * extra, cooling, asked.temperature)
     if plate.starts and config.start == "direct":
