@@ -288,7 +288,7 @@ def _chain_sweep(study: Study) -> Any:
 
 
 def _torque_speed(study: Study) -> Any:
-    """The start, and beside it, near the speed of running, the overloads of each side."""
+    """The start, and beside it the overloads of each side, at a scale of their own."""
     groups = [["start_up"], *by_side(study.runs)]
     figure, axes = plt.subplots(1, len(groups), figsize=(1.0 + 4.6 * len(groups), 5.5))
     for axis, names in zip(axes, groups, strict=True):
@@ -308,7 +308,7 @@ def _torque_speed(study: Study) -> Any:
         axis.set_xlabel("motor speed [rad/s]")
         axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), fontsize=9)
     axes[0].set_ylabel("air-gap torque [N m]")
-    figure.suptitle("Torque-speed trajectories: the start, and the overloads near the speed of running")
+    figure.suptitle("Torque-speed trajectories: the start, and the overloads from their event on")
     return figure
 
 
