@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import xarray as xr
 
 from chainunit import ChainUnit, InputError, RunError, SideLoads
 from chainunit.cosim import Bond, CoSimulation, Profile, System, energy_residual, monolithic, port_connections
+from chainunit.cosim.instance import Fmu
+from chainunit.cosim.master import stoppable
 from chainunit.drives.dc_motor import DcMotor
+from chainunit.errors import InterruptedRunError
 from chainunit.fmu.native.export import export as export_native
 from chainunit.fmu.native.platforms import compiler
 from chainunit.machines.chain_unit import ChamberForces
@@ -361,3 +369,49 @@ def kept_names(file):
     fmu = Fmu(file)
     fmu.close()
     return [*fmu.outputs(), "w_ref"]
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError])
+def test_unpacking_that_ends_early_leaves_no_folder(error, fmus, tmp_path, monkeypatch):
+    """Neither where it is interrupted."""
+
+    def extract(file, unzipdir):
+        (tmp_path / "was here").touch()
+        raise error
+
+    monkeypatch.setattr("fmpy.extract", extract)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    with pytest.raises(KeyboardInterrupt if error is KeyboardInterrupt else InputError):
+        Fmu(fmus["DcMotor"])
+    assert [p.name for p in tmp_path.iterdir()] == ["was here"]
+
+
+def test_a_process_that_closes_no_fmu_leaves_no_folder(fmus, tmp_path):
+    script = "import sys; from chainunit.cosim.instance import Fmu; print(Fmu(sys.argv[1]).folder)"
+    command = [sys.executable, "-c", script, str(fmus["DcMotor"])]
+    ran = subprocess.run(
+        command, capture_output=True, text=True, check=True, env=os.environ | {"TMPDIR": str(tmp_path)}
+    )
+    assert str(tmp_path) in ran.stdout and list(tmp_path.iterdir()) == []
+
+
+def test_an_interrupt_of_which_nobody_asked_any_more_comes_at_the_end():
+    with pytest.raises(KeyboardInterrupt), stoppable() as stopped:
+        assert not stopped()
+        signal.raise_signal(signal.SIGINT)
+    with stoppable() as stopped:
+        signal.raise_signal(signal.SIGINT)
+        assert stopped()
+
+
+def test_an_interrupt_after_the_last_step_keeps_the_rows(fmus):
+    """It comes while the last row is told, behind the last question whether to stop."""
+
+    def told(time):
+        if time > 0.0399:
+            signal.raise_signal(signal.SIGINT)
+
+    with CoSimulation(system(fmus), {"motor.w_ref": RATIO * SPEED / 2.0}) as simulation:
+        with pytest.raises(InterruptedRunError) as stopped:
+            simulation.run(0.04, 0.004, told)
+    assert len(stopped.value.partial["time"]) == 11

@@ -508,7 +508,7 @@ def test_interrupted_it_leaves_nothing(monkeypatch, capsys, tmp_path):
     (tmp_path / "driveline.json").write_text("of an earlier run")
     monkeypatch.setattr(driveline, "run_driveline", stop)
     status, _, err = run(monkeypatch, capsys, "-o", tmp_path)
-    assert status == 130 and err.endswith("chainunit: interrupted before anything was written\n")
+    assert status == 130 and err.endswith("chainunit: interrupted before all was written\n")
     assert list(tmp_path.iterdir()) == []
 
 

@@ -225,3 +225,38 @@ def test_the_command_leaves_the_signals_as_they_were(monkeypatch, capsys):
         main()
     assert signal.getsignal(signal.SIGTERM) is before
     capsys.readouterr()
+
+
+@posix
+@pytest.mark.parametrize(("sent", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize("command", ["study", "export"])
+@pytest.mark.parametrize("at", ["chainunit.config.load", "chainunit.fmu.export._build"])
+def test_an_early_end_is_told_and_leaves_nothing(sent, status, command, at, tmp_path, monkeypatch, capsys):
+    """While the file is read, and while an FMU is made, into folders that were not there."""
+    from chainunit import cli
+
+    (tmp_path / "mine.toml").write_text(SHORT)
+    folder, where = tmp_path / "out", tmp_path / "mine.toml"
+    words = {
+        "study": [str(where), "-o", str(folder)],
+        "export": ["DcMotor", "--config", str(where), "-o", str(tmp_path / "x.fmu")],
+    }
+    monkeypatch.setattr(at, lambda *_, **__: signal.raise_signal(sent))
+    monkeypatch.setattr(sys, "argv", ["chainunit", command, *words[command], "--backend", "python"])
+    with pytest.raises(SystemExit) as left:
+        cli.main()
+    assert left.value.code == status
+    assert capsys.readouterr().err.endswith("chainunit: interrupted before all was written\n")
+    assert list(tmp_path.iterdir()) == [where]
+
+
+def test_a_folder_that_was_there_or_holds_a_file_stays(tmp_path):
+    for name, there in (("old", True), ("full", False), ("new", False)):
+        if there:
+            (tmp_path / name).mkdir()
+        with pytest.raises(KeyboardInterrupt), claimed(tmp_path / name) as path:
+            (path / "fmu").mkdir()
+            if name == "full":
+                (path / "result").touch()
+            raise KeyboardInterrupt
+    assert sorted(p.name for p in tmp_path.rglob("*")) == ["fmu", "full", "old", "result"]

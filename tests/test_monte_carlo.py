@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import errno
 import json
 import math
 import os
@@ -12,13 +13,14 @@ import subprocess
 import sys
 import textwrap
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
 from chainunit.config import parse
 from chainunit.cosim import CoSimulation
 from chainunit.drives.dc_motor import DcMotor
-from chainunit.errors import RunError
+from chainunit.errors import RunError, WriteError
 from chainunit.studies import monte_carlo, quantiles
 from chainunit.studies.drive import Drive
 
@@ -326,3 +328,24 @@ def test_processes_leave_nothing_behind(end, tmp_path):
             os.killpg(running.pid, 0)
             time.sleep(0.02)
     assert list(scratch.glob("chainunit*")) == []
+
+
+def test_an_error_in_a_process_is_not_the_files(tmp_path, monkeypatch):
+    """The second run fails for want of file handles: the first stays, and the file is not blamed."""
+    config = parse(STUDY.format(runs=3))
+    drive = Drive(DcMotor, config.motor, config.machine)
+    task = monte_carlo.Task(config, drive, {}, 1.0)
+
+    def row(_task, _digest, number):
+        if number:
+            raise OSError(errno.EMFILE, "Too many open files")
+        return {"run": number}
+
+    monkeypatch.setattr(monte_carlo.Task, "digest", lambda self: "0")
+    monkeypatch.setattr(
+        monte_carlo, "ProcessPoolExecutor", lambda workers, **_: ThreadPoolExecutor(max_workers=workers)
+    )
+    monkeypatch.setattr(monte_carlo, "row_of", row)
+    with pytest.raises(RunError, match=r"a process .* failed .*\(Too many open files\)") as failed:
+        monte_carlo.run(task, tmp_path, lambda *said: None, workers=1)
+    assert not isinstance(failed.value, WriteError) and "jsonl" not in str(failed.value)

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+import typer.core
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
@@ -27,7 +28,19 @@ class Backend(StrEnum):
     python = "python"
 
 
+class _Commands(typer.core.TyperGroup):
+    """The commands. Ctrl-C and SIGTERM leave them as an error of this package: typer would make a bare exit status of
+    a KeyboardInterrupt."""
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            raise InterruptedRunError("interrupted before all was written") from None
+
+
 app = typer.Typer(
+    cls=_Commands,
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -186,11 +199,8 @@ def driveline(
 
         _clear(output, *page.NAMES)
         console, errors = _console(), _console(stderr=True)
-        try:
-            with _progress("steady motion", errors) as report:
-                result = lines.run_driveline(loaded, report)
-        except KeyboardInterrupt:
-            raise InterruptedRunError("interrupted before anything was written") from None
+        with _progress("steady motion", errors) as report:
+            result = lines.run_driveline(loaded, report)
         written = page.write(result, output)
         page.show(result, console)
         _show_written(written, console)
@@ -225,11 +235,8 @@ def knife(
 
         _clear(output, *page.NAMES)
         console, errors = _console(), _console(stderr=True)
-        try:
-            with _progress("the turn at constant speed", errors) as report:
-                result = knives.run_knife(loaded, output, report, backend.value if backend else None)
-        except KeyboardInterrupt:
-            raise InterruptedRunError("interrupted before anything was written") from None
+        with _progress("the turn at constant speed", errors) as report:
+            result = knives.run_knife(loaded, output, report, backend.value if backend else None)
         written = page.write(result, output)
         page.show(result, console)
         _show_written(written, console)
@@ -412,6 +419,7 @@ def _ending_in_order() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
+    _told_to_end.clear()
     before = signal.signal(signal.SIGTERM, _end_in_order)
     try:
         yield

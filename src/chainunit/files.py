@@ -102,13 +102,15 @@ def claimed(path: Path) -> Iterator[Path]:
     """The `folder` at `path`, for this process alone as long as the context lasts.
 
     A lock of the operating system guards it, on a file that vanishes at the end; the lock ends with the process,
-    however that ends. Where the file system has no locks, there is none.
+    however that ends. Where the file system has no locks, there is none. A folder that was made here goes again where
+    an error leaves nothing in it.
 
     Raises
     ------
     InputError
         where another process writes there; see `folder`, too.
     """
+    ours, left_empty = not path.exists(), False
     lock = folder(path) / LOCK
     while True:
         handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
@@ -128,6 +130,9 @@ def claimed(path: Path) -> Iterator[Path]:
         os.close(handle)
     try:
         yield path
+    except BaseException:
+        left_empty = ours
+        raise
     finally:
         if sys.platform == "win32":  # an open file cannot be taken away there
             os.close(handle)
@@ -137,6 +142,16 @@ def claimed(path: Path) -> Iterator[Path]:
                 lock.unlink()
         if sys.platform != "win32":
             os.close(handle)
+        if left_empty:
+            _remove_empty(path)
+
+
+def _remove_empty(path: Path) -> None:
+    """Remove the folder with those in it, as far as they hold no file."""
+    for inner in (inner for inner in path.iterdir() if inner.is_dir() and not inner.is_symlink()):
+        _remove_empty(inner)
+    with contextlib.suppress(OSError):
+        path.rmdir()
 
 
 def _locked(handle: int) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import ctypes
 import logging
@@ -21,8 +22,9 @@ _unpacked: set[str] = set()
 """Folders of the FMUs that this process has unpacked."""
 
 
+@atexit.register
 def remove_unpacked() -> None:
-    """Remove the files of every FMU, for a process that ends at once and closes none."""
+    """Remove the files of every FMU that nobody closed, for a process that ends."""
     while _unpacked:
         shutil.rmtree(_unpacked.pop(), ignore_errors=True)
 
@@ -41,14 +43,12 @@ class Fmu:
         try:
             extract(str(file), unzipdir=self.folder)
             self.description = read_model_description(self.folder, validate=False)
-        except Exception as error:
-            self.close()
-            raise InputError(f"{file}: is no FMU ({printable(str(error))})") from error
-        try:
             self.identifier = self._checked()
-        except InputError:
+        except BaseException as error:
             self.close()
-            raise
+            if isinstance(error, InputError) or not isinstance(error, Exception):
+                raise
+            raise InputError(f"{file}: is no FMU ({printable(str(error))})") from error
         self.variables = {v.name: v for v in self.description.modelVariables}
 
     def _checked(self) -> str:

@@ -34,8 +34,10 @@ Progress = Callable[[float], None]
 @contextmanager
 def stoppable() -> Iterator[Callable[[], bool]]:
     """Whether Ctrl-C was pressed, asked between steps: a KeyboardInterrupt inside an FMU would be a fatal error. So
-    it is with SIGTERM, where somebody handles it by a KeyboardInterrupt."""
+    it is with SIGTERM, where somebody handles it by a KeyboardInterrupt. The KeyboardInterrupt of which nobody was
+    told, since nobody asked any more, comes at the end."""
     caught: list[KeyboardInterrupt] = []
+    told: list[bool] = []
     if threading.current_thread() is not threading.main_thread():
         yield lambda: False
         return
@@ -46,15 +48,21 @@ def stoppable() -> Iterator[Callable[[], bool]]:
         except KeyboardInterrupt as error:
             caught.append(error)
 
+    def stopped() -> bool:
+        told.extend([True] * len(caught))
+        return bool(told)
+
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     previous: dict[int, Any] = {number: handler for number, handler in handlers.items() if callable(handler)}
     for number in previous:
         signal.signal(number, later)
     try:
-        yield lambda: bool(caught)
+        yield stopped
     finally:
         for number, handler in previous.items():
             signal.signal(number, handler)
+        if caught and not told:
+            raise caught[0]
 
 
 _Recorder = tuple[Instance, Any, list[str]]
@@ -376,58 +384,64 @@ class CoSimulation:
             for instance, handle, values in signals:
                 instance.write(handle, values[row].tolist())
 
-        with (
-            nullcontext() if file is None else whole(file) as part,
-            _Rows(recorders, room, part) as rows,
-            stoppable() as stopped,
-        ):
-            try:
-                for first in range(0, n, _BLOCK):
-                    # the last step is shorter where the end is no multiple of the step
-                    times = np.minimum(start + step * np.arange(first, min(first + _BLOCK, n) + 1), stop)
-                    points = self._signal_values(times)
-                    middles = self._signal_values(0.5 * (times[:-1] + times[1:]))
-                    moves_inside, moves_over = _moves(points, middles, len(times) - 1)
-                    if first == 0:
-                        apply(points, 0)
-                        self._transfer()
-                        rows.add(start)
-                    for k, after in enumerate(times[1:].tolist()):
-                        # what leads to a failure may have been said while the values for this step were set
-                        said, before = before, len(self._journal)
-                        t = float(times[k])
-                        if moves_inside[k]:
-                            apply(middles, k)
+        try:
+            with (
+                stoppable() as stopped,
+                nullcontext() if file is None else whole(file) as part,
+                _Rows(recorders, room, part) as rows,
+            ):
+                try:
+                    for first in range(0, n, _BLOCK):
+                        # the last step is shorter where the end is no multiple of the step
+                        times = np.minimum(start + step * np.arange(first, min(first + _BLOCK, n) + 1), stop)
+                        points = self._signal_values(times)
+                        middles = self._signal_values(0.5 * (times[:-1] + times[1:]))
+                        moves_inside, moves_over = _moves(points, middles, len(times) - 1)
+                        if first == 0:
+                            apply(points, 0)
                             self._transfer()
-                        for instance in self._instances.values():
-                            instance.step(t, after - t)
-                        self.time = after
-                        if moves_over[k]:
-                            apply(points, k + 1)
-                        self._transfer()
-                        done = first + k + 1
-                        passed = any(
-                            abs(value) > limit
-                            for instance, handle, limits in watched
-                            for value, limit in zip(instance.read(handle), limits, strict=True)
-                        )
-                        interrupted = stopped()
-                        ended = passed or interrupted or done == n
-                        if ended or done % every == 0:
-                            rows.add(after)
-                        if progress and done % told == 0:
-                            progress(after)
+                            rows.add(start)
+                        for k, after in enumerate(times[1:].tolist()):
+                            # what leads to a failure may have been said while the values for this step were set
+                            said, before = before, len(self._journal)
+                            t = float(times[k])
+                            if moves_inside[k]:
+                                apply(middles, k)
+                                self._transfer()
+                            for instance in self._instances.values():
+                                instance.step(t, after - t)
+                            self.time = after
+                            if moves_over[k]:
+                                apply(points, k + 1)
+                            self._transfer()
+                            done = first + k + 1
+                            passed = any(
+                                abs(value) > limit
+                                for instance, handle, limits in watched
+                                for value, limit in zip(instance.read(handle), limits, strict=True)
+                            )
+                            interrupted = stopped()
+                            ended = passed or interrupted or done == n
+                            if ended or done % every == 0:
+                                rows.add(after)
+                            if progress and done % told == 0:
+                                progress(after)
+                            if ended:
+                                break
                         if ended:
                             break
-                    if ended:
-                        break
-                if interrupted:
-                    raise InterruptedRunError(f"interrupted at t = {self.time:g} s")
-            except RunError as error:
-                # the call that fails may only pass on what another FMU complained of before
-                hint = f" (before: {self._journal[said]})" if len(self._journal) > said + 1 else ""
-                failure = type(error)(f"{error}{hint}")
-                failure.__cause__ = error
+                    if interrupted:
+                        raise self._interrupted()
+                except RunError as error:
+                    # the call that fails may only pass on what another FMU complained of before
+                    hint = f" (before: {self._journal[said]})" if len(self._journal) > said + 1 else ""
+                    failure = type(error)(f"{error}{hint}")
+                    failure.__cause__ = error
+        except KeyboardInterrupt:
+            # after the last step: the rows are there
+            if done == 0:
+                raise
+            failure = self._interrupted()
         found = rows.dataset() if file is None else xr.open_dataset(file)
         if failure is not None:
             failure.partial = found
@@ -435,6 +449,9 @@ class CoSimulation:
         if progress:
             progress(self.time)
         return found
+
+    def _interrupted(self) -> InterruptedRunError:
+        return InterruptedRunError(f"interrupted at t = {self.time:g} s")
 
     def _recorders(self, names: Iterable[str] | None) -> list[_Recorder]:
         """What is kept of each instance, in declared order."""

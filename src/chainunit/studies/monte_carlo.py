@@ -349,11 +349,9 @@ def run(
         # what is no row, or was cut off by a kill, must not run into the next line
         with whole(file) as part:
             part.write_text("".join(_line(row) for row in rows.values()), "utf-8")
-    with (
-        ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_begin) as pool,
-        writing(file),
-        file.open("a", encoding="utf-8") as out,
-    ):
+    with writing(file):
+        out = file.open("a", encoding="utf-8")
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_begin) as pool, out:
         waiting: set[Future[dict[str, Any]]] = set()
         numbers = iter(missing)
         try:
@@ -364,16 +362,22 @@ def run(
                 if not waiting:
                     break
                 ended, waiting = wait(waiting, return_when=FIRST_COMPLETED)
-                for found in sorted((future.result() for future in ended), key=lambda row: row["run"]):
-                    rows[found["run"]] = found
-                    out.write(_line(found))
-                out.flush()
+                new = sorted((future.result() for future in ended), key=lambda row: row["run"])
+                rows |= {row["run"]: row for row in new}
+                with writing(file):
+                    out.writelines(_line(row) for row in new)
+                    out.flush()
                 done += len(ended)
                 report(what, done, wanted)
         except BrokenProcessPool as error:
             raise RunError(
                 f"a process of the random overloads was ended from outside after {len(rows)} of {wanted} runs; "
                 "run the study again to go on"
+            ) from error
+        except OSError as error:
+            raise RunError(
+                f"a process of the random overloads failed after {len(rows)} of {wanted} runs "
+                f"({error.strerror or error}); run the study again to go on"
             ) from error
         except KeyboardInterrupt as error:
             pool.shutdown(wait=False, cancel_futures=True)

@@ -291,6 +291,8 @@ def _chains(study: Study, file: Path, report: Report) -> None:
         study.chain, ended = study_chain(study.config, study.drive, file, report)
     except RunError as error:
         ended = error
+    except KeyboardInterrupt:
+        ended = InterruptedRunError("interrupted")
     study.failure = study.failure or ended
 
 
