@@ -5,6 +5,7 @@ from __future__ import annotations
 import binascii
 import json
 import math
+import re
 import subprocess
 import sys
 import textwrap
@@ -52,6 +53,21 @@ def motor(fmus):
     fmu = Fmu(fmus["DcMotor"])
     yield fmu
     fmu.close()
+
+
+@pytest.fixture(scope="module")
+def unpacked(fmus):
+    """``unpacked(name)``: the FMU of that model."""
+    there = {}
+
+    def get(name):
+        if name not in there:
+            there[name] = Fmu(fmus[name])
+        return there[name]
+
+    yield get
+    for fmu in there.values():
+        fmu.close()
 
 
 @pytest.mark.parametrize("point", POINTS, ids=lambda p: p["name"])
@@ -311,19 +327,142 @@ def test_inputs_beyond_any_machine_give_nan_and_a_reason(chamber, name, value):
         assert len(unit.messages) == 1
 
 
-@pytest.mark.parametrize("early", [True, False])
-def test_an_input_out_of_its_bounds_is_refused_until_it_is_good(chamber, early):
-    """Set before the initialization, it used to be computed with."""
+@pytest.mark.parametrize("order", ["in the run", "before initialisation", "tuned", "saved"])
+@pytest.mark.parametrize("name", ["ChamberForces", "ChainUnit", "ChainUnitFlexible"])
+def test_an_input_out_of_its_bounds_is_refused_until_it_is_good(unpacked, name, order):
+    """Set before the initialization, it used to be computed with; and the flexible unit stayed refused for good."""
+    fmu = unpacked(name)
     bad = {"left.material_mass": -50.0}
-    with Running(chamber, bad if early else {}) as unit:
+    output = "left.normal_load"
+    with Running(fmu, bad if order == "before initialisation" else {}) as unit:
         unit.set([*bad], [*bad.values()])
-        assert math.isnan(unit.get(["tau"])[0])
+        if order == "tuned":
+            unit.set(["crank.m"], [20.0])
+        elif order == "saved":
+            unit.restore(unit.state())
+        assert math.isnan(unit.get([output])[0])
         with pytest.raises(RunError, match=r"left\.material_mass = -50 kg: must be >= 0 kg"):
-            unit.step(0.0, 0.1)
+            unit.step(0.0, 0.001)
         unit.set(["left.material_mass"], [-1e-12])  # zero but for rounding
-        unit.step(0.0, 0.1)
+        if order == "before initialisation":
+            with Running(fmu, {"left.material_mass": 0.0}) as other:
+                assert unit.get(fmu.outputs()) == other.get(fmu.outputs())
+        unit.step(0.0, 0.001)
         assert unit.get(["left.material_mass"]) == [0.0]
-        assert math.isfinite(unit.get(["tau"])[0])
+        assert math.isfinite(unit.get([output])[0])
+
+
+@pytest.mark.parametrize("saved", [False, True])
+@pytest.mark.parametrize(
+    ("name", "parameter", "good"),
+    [
+        ("ChainUnit", "crank.m", 30.0),
+        ("ChainUnitFlexible", "crank.m", 30.0),
+        ("DcMotor", "armature.R", 0.5),
+        ("InductionMotor", "stator.R", 0.5),
+    ],
+)
+def test_a_refused_parameter_that_is_tuned_later_starts_the_states(unpacked, name, parameter, good, saved):
+    """The states were never started, and reading them was fatal for the host."""
+    fmu = unpacked(name)
+    read = [n for n, v in fmu.variables.items() if v.causality in ("local", "output")]
+    with Running(fmu, {parameter: good}) as unit:
+        want = unit.get(read)
+    with Running(fmu, {parameter: -1.0}) as unit:
+        assert all(map(math.isnan, unit.get(read)))
+        with pytest.raises(RunError, match=rf"{re.escape(parameter)} = -1 "):
+            unit.step(0.0, 0.001)
+        if saved:
+            state = unit._fmi.serializeFMUstate(unit.state())
+            unit._fmi.reset()
+            unit.restore(unit._fmi.deSerializeFMUstate(state))
+        unit.set([parameter], [good])
+        assert unit.get(read) == want and all(map(math.isfinite, want))
+        unit.step(0.0, 0.001)
+
+
+def test_a_fixed_parameter_that_is_refused_needs_a_reset(unpacked):
+    fmu = unpacked("CardanDriveline")
+    with Running(fmu, {"solver.max_steps": -1.0}) as unit:
+        unit.set(["solver.max_steps"], [100.0])
+        assert all(map(math.isnan, unit.get(fmu.outputs())))
+        unit._fmi.reset()
+        unit.initialize({}, 0.0)
+        unit.finish_initialization()
+        assert all(map(math.isfinite, unit.get(fmu.outputs())))
+
+
+def test_fixed_parameters_that_come_with_a_refused_one_count(unpacked):
+    """What is derived from the fixed ones, is not kept from before."""
+    fmu = unpacked("KnifeDrive")
+    read, given = ["J", "blade.vy"], {"r": 0.9 * float(fmu.variables["r"].start)}
+    with Running(fmu, given) as unit:
+        want = unit.get(read)
+    instance = Instance(fmu, "unit")
+    assert instance.get(read) != want
+    instance.initialize(given | {"crank.m": -1.0}, 0.0)
+    instance.finish_initialization()
+    assert all(map(math.isnan, instance.get(read)))
+    instance.set(["crank.m"], [float(fmu.variables["crank.m"].start)])
+    assert instance.get(read) == want
+    instance.close()
+
+
+@pytest.mark.parametrize(
+    ("start", "stop", "message"),
+    [
+        (2.0, 1.0, r"stop time = 1 s: must be >= 2 s, the start time"),
+        (1e9, 1e9 - 0.01, r"stop time = 1e\+09 s: must be >= 1e\+09 s, the start time"),
+        (math.nan, 1.0, r"start time = nan s: must be a finite number"),
+        (math.inf, None, r"start time = inf s: must be a finite number"),
+        (0.0, math.nan, r"stop time = nan s: must be >= 0 s, the start time"),
+    ],
+)
+def test_times_that_make_no_experiment_end_in_a_refused_initialisation(motor, start, stop, message):
+    unit = Instance(motor, "unit")
+
+    def initialise(start, stop):
+        unit._fmi.setupExperiment(None, start, stop)
+        unit._fmi.enterInitializationMode()
+        unit._fmi.exitInitializationMode()
+
+    initialise(start, stop)
+    for t in (start, 0.0):
+        with pytest.raises(RunError, match=message):
+            unit.step(t, 0.001)
+    assert all(map(math.isnan, unit.get(motor.outputs())))
+    unit._fmi.reset()
+    initialise(0.0, 0.0)
+    assert all(map(math.isfinite, unit.get(motor.outputs())))
+    unit.close()
+
+
+def test_what_a_time_may_be_off_does_not_grow_with_it(motor):
+    start = 1e6
+    unit = Instance(motor, "unit")
+    unit._fmi.setupExperiment(None, start, start + 1.0)
+    unit._fmi.enterInitializationMode()
+    unit._fmi.exitInitializationMode()
+    with pytest.raises(RunError, match="the FMU is at"):
+        unit.step(start + 5e-4, 1e-3)
+    h = 1.0 / 30.0
+    for k in range(29):
+        unit.step(start + k * h, h)
+    t = start + 29 * h
+    with pytest.raises(RunError, match="the stop time, or before"):
+        unit.step(t, h + 5e-4)
+    unit.step(t, h)
+    unit.close()
+
+
+def test_a_step_from_a_wrong_time_changes_nothing(unpacked):
+    with Running(unpacked("ChainUnitFlexible")) as unit:
+        unit.step(0.0, 0.001)
+        before = unit._fmi.serializeFMUstate(unit.state())
+        assert b'"closed": true' in before
+        with pytest.raises(RunError, match="the FMU is at"):
+            unit.step(0.5, 0.001)
+        assert unit._fmi.serializeFMUstate(unit.state()) == before
 
 
 def test_the_communication_point_and_the_stop_time_are_honoured(motor):
@@ -356,22 +495,39 @@ def test_a_step_that_takes_too_long_is_discarded(motor):
 
 
 def test_a_damaged_state_is_refused(motor):
+    """It leaves the instance without a state: neither numbers from before, nor a step."""
     with Running(motor, {"w_ref": 50.0}) as unit:
+
+        def refused(raw):
+            unit.restore(unit._fmi.deSerializeFMUstate(raw))
+            return all(map(math.isnan, unit.get(["w", "phi", "tau"])))
+
         unit.step(0.0, 0.01)
         raw = unit._fmi.serializeFMUstate(unit.state())
-        kept = unit.get(["w", "phi"])
+        kept = unit.get(["w", "phi", "tau"])
         unit.step(0.01, 0.01)
-        after = unit.get(["w", "phi"])
         for bit in range(0, 8 * len(raw), 7):
             flipped = bytearray(raw)
             flipped[bit // 8] ^= 1 << bit % 8
-            unit.restore(unit._fmi.deSerializeFMUstate(bytes(flipped)))
-            assert unit.get(["w", "phi"]) == after
-        text = raw[8:].replace(b'"set": [', b'"set": [-')  # the first parameter, armature.R
-        unit.restore(unit._fmi.deSerializeFMUstate(b"%08x" % binascii.crc32(text) + text))
-        assert "armature.R = -" in unit.messages[-1] and unit.get(["w", "phi"]) == after
+            assert refused(bytes(flipped))
+        with pytest.raises(RunError, match="saved state: it is damaged; not restored"):
+            unit.step(0.02, 0.01)
+        assert refused(unit._fmi.serializeFMUstate(unit.state()))
+        for old, new, message in (
+            (b'"set": [', b'"set": [-', "armature.R = -"),  # the first parameter
+            (b'"x": [', b'"x": [], "y": [', "not a saved state of this model"),
+        ):
+            text = raw[8:].replace(old, new)
+            assert refused(b"%08x" % binascii.crc32(text) + text)
+            assert message in unit.messages[-1]
         unit.restore(unit._fmi.deSerializeFMUstate(raw))
-        assert unit.get(["w", "phi"]) == kept
+        assert unit.get(["w", "phi", "tau"]) == kept
+        unit.step(0.01, 0.01)
+        assert refused(b"")
+        unit._fmi.reset()
+        unit.initialize({}, 0.0)
+        unit.finish_initialization()
+        assert all(map(math.isfinite, unit.get(["w", "phi", "tau"])))
 
 
 def test_calls_of_other_types_and_unknown_references_are_not_fatal(motor):

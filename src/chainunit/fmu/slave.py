@@ -32,8 +32,9 @@ from ..quantities import complaint
 
 _NAN = float("nan")
 _Slave = TypeVar("_Slave")
-_SAME_TIME = 1e-9
-"""in parts of a time, as in the native runtime: what rounding makes of it where a host adds up a million steps"""
+_SAME_TIME, _ROUNDED, _ADDED_UP = 1e-9, 4.0 * 2.0**-52, 1e6 * 2.0**-53
+"""what a time may be off, as in the native runtime: in parts of the step or the experiment, and by rounding in parts
+of the time itself, at a communication point and where a host adds up a million steps to the stop time"""
 _LIBRARIES: set[Path] = set()
 
 
@@ -87,7 +88,7 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         model = self.model
-        _release_at_exit(Path(self.resources).parent / "binaries" / "linux64" / f"{model.name}.so")
+        _release_at_exit(Path(self.resources).parent / "binaries" / "linux64" / f"{type(self).__name__}.so")
         self._variables = (*model.parameter_layout.variables, *model.input_layout.variables)
         self._set: list[float] = [
             float(self.start.get(v.name, v.quantity.start or 0.0)) for v in self._variables
@@ -107,14 +108,16 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         self._p: Any = None
         self._derived: Any = None  # from fixed parameters, which stay as they are from initialization on
         self._u: Any = None
-        self._x: list[float] = []
+        self._x: list[float] = []  # empty until they are started
         self._pace = 0.0  # next substep of an integrator that controls its error
         self._closed = False
         self._initialized = False
         self._doubtful = True  # an input may be out of its bounds
         self._time = 0.0
         self._stop = math.inf  # the last time that is allowed, with what rounding adds to it
-        self._refused = ""  # why the parameters or the times make no model
+        self._refused = ""  # why the parameters make no model
+        self._unstarted = ""  # why the states could not be started
+        self._unrestored = ""  # why the last saved state could not be taken
         self._told = ""
 
     # -- life cycle
@@ -122,11 +125,13 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
     def setup_experiment(
         self, start_time: float, stop_time: float | None = None, tolerance: float | None = None
     ) -> None:
-        """Time at the start, and the last one, if it is known."""
+        """Time at the start, and the last one, if it is known; `_bad_experiment` judges them."""
         self._time = start_time
-        self._stop = math.inf
-        if stop_time is not None:
-            self._stop = stop_time + _SAME_TIME * max(abs(stop_time), abs(start_time))
+        self._stop = math.inf if stop_time is None else stop_time
+        if start_time <= self._stop < math.inf:
+            rounding = _ADDED_UP * max(abs(self._stop), abs(start_time))
+            self._stop += _SAME_TIME * (self._stop - start_time) + rounding
+        self._touch()
 
     def enter_initialization_mode(self) -> None:
         """Parameters are settled: check them and start the states."""
@@ -140,9 +145,8 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
     def do_step(self, current_time: float, step_size: float) -> bool:
         """One communication step; False (discard) where the model, its inputs or the step are not usable."""
         try:
-            bad = self._bad_step(current_time, step_size) or self._prepare() or self._bad_input()
+            bad = self._prepare() or self._bad_step(current_time, step_size) or self._bad_input()
             if bad:
-                self._touch()
                 self._tell(bad)
                 return False
             if self._n_x and step_size and not self._integrate(current_time, step_size):
@@ -162,7 +166,7 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
     def _bad_step(self, time: float, size: float) -> str:
         if not (math.isfinite(time) and 0.0 <= size < math.inf):
             return f"step of {size:g} s from t = {time:g} s: must be finite and not negative"
-        if abs(time - self._time) > _SAME_TIME * max(abs(self._time), size):
+        if abs(time - self._time) > _SAME_TIME * size + _ROUNDED * abs(self._time):
             return f"step from t = {time:g} s: the FMU is at t = {self._time:g} s"
         if not time + size <= self._stop:
             stop = f"must end at {self._stop:g} s, the stop time, or before"
@@ -228,15 +232,24 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
                 self._set[vr] = value
                 self._u = None
                 self._doubtful = True
-                if not self._initialized and self.model.start_unknowns:
-                    self._p = None  # the start depends on the inputs, too
+                if self.model.start_unknowns:
+                    self._start_anew()
                 self._touch()
             elif not self._initialized:
-                self._set[vr] = value
-                self._p = None
-                self._touch()
+                self._take(vr, value)
             else:
                 self._tune(vr, value)
+
+    def _take(self, vr: int, value: float) -> None:
+        self._set[vr] = value
+        self._p = None
+        self._start_anew()
+        self._touch()
+
+    def _start_anew(self) -> None:
+        """Have the states started at the next need, where the initialisation has not yet given them a good start."""
+        if not self._initialized or self._unstarted:
+            self._x, self._unstarted = [], ""
 
     def _tune(self, vr: int, value: float) -> None:
         variable = self._variables[vr]
@@ -245,12 +258,17 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         elif not variable.quantity.admits(value):
             self._tell(complaint(variable, value) + "; not changed")
         else:
-            self._set[vr] = value
-            self._p = None
-            self._touch()
+            self._take(vr, value)
 
     def get_real(self, vrs: list[int]) -> list[float]:
         """Values by reference; outputs are evaluated at most once per state and part."""
+        try:
+            return self._values(vrs)
+        except BaseException as reason:
+            self._tell(f"values cannot be read: {reason!r}")
+            return [_NAN] * len(vrs)
+
+    def _values(self, vrs: list[int]) -> list[float]:
         first, states = self._first, self._first + self._n_x
         out: list[float] = []
         for vr in vrs:
@@ -296,22 +314,43 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         self._fresh = [False] * len(self._fresh)
 
     def _prepare(self) -> str:
-        """Parameters checked and states started, after a change of parameters; why not, where they make no model."""
+        """Parameters checked and states started, after a change of them; why not, where they make no model."""
+        if bad := self._unrestored or self._bad_experiment():
+            self._tell(bad)
+            return bad
         if self._p is None:
             self._refused = ""
+            derived, self._derived = self._derived if self._initialized else None, None
             try:
                 p = self._p = self.model.parameter_layout.instance(self._set[: self._n_p])
-                p = self._p = self.model.check(p, self._derived if self._initialized else None)
+                p = self._p = self.model.check(p, derived)
                 self._derived = getattr(p, "derived", None)
-                if self.model.start_unknowns and (bad := self._bad_input()):
-                    raise InputError(bad)
-                if self.model.state_layout and not self._initialized:
-                    self._x = self.model.state_layout.values(self.model.begin(p, self._inputs()))
-                    self._pace = 0.0
             except BaseException as reason:
                 self._refused = str(reason) or repr(reason)
                 self._tell(self._refused)
-        return self._refused
+        if self._n_x and not (self._x or self._refused or self._unstarted):
+            self._start()
+        return self._refused or self._unstarted
+
+    def _start(self) -> None:
+        """The states at the start, or why they cannot be found; an input is judged only where they depend on it."""
+        layout = self.model.state_layout
+        assert layout is not None
+        try:
+            if self.model.start_unknowns and (bad := self._bad_input()):
+                raise InputError(bad)
+            self._x = layout.values(self.model.begin(self._p, self._inputs()))
+            self._pace = 0.0
+        except BaseException as reason:
+            self._unstarted = str(reason) or repr(reason)
+            self._tell(self._unstarted)
+
+    def _bad_experiment(self) -> str:
+        if not math.isfinite(self._time):
+            return f"start time = {self._time:g} s: must be a finite number"
+        if not self._time <= self._stop:
+            return f"stop time = {self._stop:g} s: must be >= {self._time:g} s, the start time"
+        return ""
 
     def _inputs(self, run: list[tuple[int, float, float]] | None = None, since: float = 0.0) -> Any:
         """The inputs, those that run on `since` [s] after they were set."""
@@ -373,6 +412,8 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
     # -- states of the FMU, and its description
 
     def _get_fmu_state(self) -> dict[str, Any]:
+        if self._unrestored:
+            return {"damaged": "it was taken after one that was refused"}
         return {
             "of": _IDENTITY,
             "set": list(self._set),
@@ -380,6 +421,7 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
             "time": self._time,
             "stop": self._stop,
             "initialized": self._initialized,
+            "started": bool(self._x),
             "pace": self._pace,
             "closed": self._closed,
         }
@@ -388,9 +430,11 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         try:
             refused = self._bad_state(state)
         except (KeyError, TypeError, ValueError, AttributeError):
-            refused = "it is none of this model"
+            refused = "it is not a saved state of this model"
+        self._touch()
+        self._unrestored = f"saved state: {refused}; not restored" if refused else ""
         if refused:
-            self._tell(f"saved state: {refused}; not restored")
+            self._tell(self._unrestored)
             return
         self._set, self._x = list(state["set"]), list(state["x"])
         self._time, self._stop, self._pace = state["time"], state["stop"], state["pace"]
@@ -398,7 +442,7 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         self._doubtful = True
         # the state may be that of another geometry
         self._p = self._u = self._derived = None
-        self._touch()
+        self._unstarted = ""
         self._closed = state["closed"]
 
     def _bad_state(self, state: dict[str, Any]) -> str:
@@ -408,13 +452,16 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         if state["of"] != _IDENTITY:
             return "it belongs to another model, or another version of it"
         values, x = state["set"], state["x"]
-        if len(values) != self._first or len(x) not in (0, self._n_x):
-            return "it is none of this model"
-        if not all(map(math.isfinite, (*values, *x, state["time"]))) or math.isnan(state["stop"]):
+        flags = [state[name] for name in ("initialized", "started", "closed")]
+        if {type(v) for v in (*values, *x, state["time"], state["stop"], state["pace"])} - {float, int}:
+            return "it is not a saved state of this model"
+        if len(values) != self._first or len(x) != (self._n_x if state["started"] else 0):
+            return "it is not a saved state of this model"
+        if not all(map(math.isfinite, x)):
             return "a value in it is not finite"
-        if not state["pace"] >= 0.0 or {type(state["initialized"]), type(state["closed"])} != {bool}:
-            return "it is none of this model"
-        if state["initialized"]:  # before, `_prepare` judges them
+        if not state["pace"] >= 0.0 or {type(flag) for flag in flags} != {bool}:
+            return "it is not a saved state of this model"
+        if state["started"] and state["initialized"]:  # else `_prepare` judges them
             for variable, value in zip(self._variables[: self._n_p], values, strict=False):
                 if not variable.quantity.admits(value):
                     return complaint(variable, value)
