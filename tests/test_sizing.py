@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -208,6 +209,30 @@ def test_without_a_fit_the_whole_catalogue_is_tried_and_the_nearest_is_named(tmp
     result = found.as_dict()
     assert (result["chosen"], result["nearest"]) == (None, 0)
     assert result["tried"]["value"] == result["motors"]["value"] == 4
+
+
+def test_motors_that_are_too_weak_by_the_nameplate_are_counted(tmp_path, monkeypatch):
+    """Of five motors the two with less than 0.7 times the power of the cycle are not run, and the answer says so."""
+    one = small(1)[0]
+    weak = [
+        dataclasses.replace(one, nameplate=dataclasses.replace(one.nameplate, power=power))
+        for power in (20.0, 40.0)
+    ]
+    monkeypatch.setattr(sizing, "catalogue", lambda extra: [*weak, *small(3)])
+    found = sizing.size(one_candidate("[gear]\ntorque_limit = 150\n"), tmp_path, lambda *said: None)
+    assert (len(found.candidates), found.motors, found.weak) == (3, 5, 2)
+    assert "3 of 5 were tried, 2 are too weak by the nameplate" in found.answer
+    assert found.as_dict()["weak"]["value"] == 2
+
+
+def test_the_remedy_of_the_rejected_example_works(tmp_path):
+    """Its comment says that a soft starter makes a motor fit."""
+    text = (Path(__file__).parents[1] / "examples/motor_rejected.toml").read_text("utf-8")
+    assert 'start = "direct"' in text and 'with start = "soft" a motor of 0.55 kW fits' in text
+    soft = parse(text.replace('start = "direct"', 'start = "soft"'))
+    found = sizing.size(soft, tmp_path, lambda *said: None)
+    assert found.chosen is not None and found.chosen.motor.nameplate.power == 550.0
+    assert all(u <= 1.0 for u in found.chosen.sizes.values())
 
 
 def test_sizing_climbs_until_one_fits(tmp_path, monkeypatch):

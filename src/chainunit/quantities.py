@@ -130,6 +130,7 @@ MOST: dict[str, float] = {
     "1/Wb": 1e6,
     "Hz": 1e6,
     "Hz/s": 1e9,
+    "Hz/(N.m)": 1e6,
     "s": 1e6,
     "A.s/rad": 1e12,
     "A/rad": 1e15,

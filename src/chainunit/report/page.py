@@ -670,7 +670,11 @@ def _sizing(t: Traced) -> str:
     if candidates:
         if "tried" in sizing:
             counts = t.number("sizing.tried", given=True), t.number("sizing.motors", given=True)
-            parts.append(f'<p class="note">Tried: {" of ".join(counts)} motors of the catalogue.</p>')
+            weak = f"; too weak by the nameplate: {t.number('sizing.weak', given=True)}"
+            parts.append(
+                f'<p class="note">Tried: {" of ".join(counts)} motors of the catalogue'
+                f"{weak if t.result['sizing']['weak']['value'] else ''}.</p>"
+            )
         parts.append(_candidates(t, candidates, best_one))
     # the sentence on the coupling stands above, and is no cell of a narrow table
     groups = [

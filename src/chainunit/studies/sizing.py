@@ -82,7 +82,8 @@ class CycleNumbers:
     inertia_mean: Value = quantity("kg.m2", "reflected inertia, mean")
     inertia_largest: Value = quantity("kg.m2", "reflected inertia, largest")
     inertia_wanted: Value = quantity(
-        "kg.m2", "inertia that the wanted fluctuation takes (rotor, gear and flywheel)"
+        "kg.m2",
+        "inertia at the crank that the wanted fluctuation takes by the hand formula: rotor, gear and flywheel",
     )
 
 
@@ -156,7 +157,7 @@ class Candidate:
     shaft_torque: float = math.nan
     """what it gives at its shaft at most, behind friction, fan and the gear's losses [N m]"""
     duty_torque: float = math.nan
-    """peak at the crank in steady running, with all feed on one side only where that is part of the duty [N m]"""
+    """peak at the crank in steady running, and while all feed moves to either side and runs there [N m]"""
     fluctuation: float = math.nan
     verdict: Verdict | None = None
     """None until it is judged or ranked"""
@@ -188,6 +189,8 @@ class SizingResult:
     notes: list[str]
     motors: int
     """motors of the catalogue with a permitted number of poles; `candidates` are those of them that were tried"""
+    weak: int = 0
+    """those that were left out, since their nameplate has not 0.7 times the power that the cycle needs"""
 
     @property
     def chosen(self) -> Candidate | None:
@@ -203,6 +206,8 @@ class SizingResult:
     def answer(self) -> str:
         """What sizing found, in a sentence; with the words of `rank`."""
         tried = f"{len(self.candidates)} of {self.motors} were tried"
+        if self.weak:
+            tried += f", {self.weak} {'is' if self.weak == 1 else 'are'} too weak by the nameplate"
         if self.chosen:
             return f"{self.best.motor.designation} is {self.best.reason} ({tried})"
         return (
@@ -220,6 +225,7 @@ class SizingResult:
             "flywheel": _entries(Flywheel(J=best.flywheel, fluctuation=best.fluctuation)),
             "tried": {"value": len(self.candidates), "unit": "1"},
             "motors": {"value": self.motors, "unit": "1"},
+            "weak": {"value": self.weak, "unit": "1"},
             "candidates": [
                 {
                     "motor": c.motor.designation,
@@ -372,7 +378,7 @@ def size(
             files, _ = candidate.drive.export(folder, backend)
         found.append(with_flywheel(config, candidate, numbers, files))
     rank(found)
-    return SizingResult(config, numbers, found, notes, len(motors))
+    return SizingResult(config, numbers, found, notes, len(motors), len(motors) - len(strong))
 
 
 def with_flywheel(
@@ -470,11 +476,11 @@ def judge(config: Config, c: Candidate, numbers: CycleNumbers, files: Mapping[st
         with CoSimulation(drive.system(files), signals) as simulation:
             start = simulation.run(window, config.run.step)
             steady = simulation.run(window + 2.0 * turn, config.run.step)
-            event, one_sided = simulation.save(), {}
+            event, shifts, one_sided = simulation.save(), [], {}
             for side in SIDES:
                 simulation.restore()
                 simulation.signals = {**feed_signals(config, event, side), **drive.reference(w)}
-                simulation.run(event + config.overload.shift + turn, config.run.step)
+                shifts.append(simulation.run(event + config.overload.shift + turn, config.run.step))
                 one_sided[side] = simulation.run(simulation.time + turn, config.run.step)
     except InterruptedRunError:
         raise
@@ -485,11 +491,9 @@ def judge(config: Config, c: Candidate, numbers: CycleNumbers, files: Mapping[st
     times = np.concatenate([start["time"].values, steady["time"].values])
     expected = w * drive.ratio
     started = start_time(times, speed) if float(np.mean(steady["motor.w"])) > 0.5 * expected else None
-    torque = max(float(np.max(np.abs(r["machine.tau"]))) for r in (start, steady, *one_sided.values()))
-    c.peak_torque = torque * drive.ratio
-    assert config.sizing is not None
-    duty = [steady, *one_sided.values()] if config.sizing.one_sided_share else [steady]
+    duty = (steady, *shifts, *one_sided.values())
     c.duty_torque = max(float(np.max(np.abs(r["machine.tau"]))) for r in duty) * drive.ratio
+    c.peak_torque = max(c.duty_torque, float(np.max(np.abs(start["machine.tau"]))) * drive.ratio)
     c.checks = _checks(config, c, start, steady, one_sided, started)
 
 
