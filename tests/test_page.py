@@ -310,7 +310,8 @@ def test_the_verdict_comes_first_everywhere(study, written):
     pushed = [r for r in verdict["model"]["reasons"] if r["topic"] == "pushed"]
     for reason in pushed:
         name = f"{reason['quantity']}_least"
-        assert reason["value"]["value"] == getattr(study.answers[reason["run"]], name) < 0.0
+        run = study.start if reason["run"] == "start_up" else study.answers[reason["run"]]
+        assert reason["value"]["value"] == getattr(run, name) < 0.0
     lines = said_of(study).splitlines()
     assert lines[:2] == [verdict["model"]["text"], verdict["motor"]["text"]]
     assert sum("pushed" in line for line in study.warnings) == 1
@@ -321,6 +322,59 @@ def test_the_verdict_comes_first_everywhere(study, written):
         answer.index("verdict.model.text") < answer.index("verdict.motor.text") < answer.index('class="lead"')
     )
     assert 'class="judged false"' in answer
+
+
+def test_the_start_up_stands_beside_the_runs(study, written):
+    """Its crank torque and pulls are told, and it is a run of the pins."""
+    said, text = said_of(study), written.read_text("utf-8")
+    peak = told_as(study.start.crank_torque_peak, "N.m")
+    assert f"Start-up: crank torque, peak {peak};" in said and "start_up.crank_torque_peak" in text
+    pin = "O1 crank bearing"
+    pins = {
+        **study.pins,
+        "start_up": {**study.pins["start_up"], pin: {**study.pins["start_up"][pin], "peak": 1e7}},
+    }
+    worst = dataclasses.replace(study, pins=pins)
+    assert re.search(rf"{pin} .* {re.escape(told_as(1e7, 'N'))} .* start-up", said_of(worst))
+    row = page.render(worst, as_dict(worst))
+    row = row[row.index(f"pins.start_up.{pin}.peak") :].partition("</tr>")[0]
+    assert "<td>start-up</td>" in row
+
+
+def test_a_run_whose_energy_balance_is_not_kept_is_no_verdict_on_the_motor(study):
+    before = as_dict(study)["verdict"]["motor"]
+    assert before["left_out"] == [] and before["run"] == "jam_left"
+    certificate = study.certificate | {"jam_left": {"energy_residual_share": 1.36}}
+    answers = study.answers | {
+        "jam_left": dataclasses.replace(study.answers["jam_left"], torque_reserve=-12.0)
+    }
+    broken = dataclasses.replace(study, answers=answers, certificate=certificate)
+    motor = as_dict(broken)["verdict"]["motor"]
+    assert motor["left_out"] == ["jam_left"] and motor["run"] != "jam_left"
+    others = [a.torque_reserve for name, a in answers.items() if name != "jam_left"]
+    assert motor["least_reserve"]["value"] == min(others)
+    assert motor["text"].endswith(
+        "runs whose energy balance is not kept are left out (a lump jams the left side)."
+    )
+    # with none left nothing is known of the reserve
+    nothing = {name: {"energy_residual_share": math.nan} for name in certificate}
+    motor = as_dict(dataclasses.replace(study, certificate=nothing))["verdict"]["motor"]
+    assert motor["holds"] == "in part" and motor["run"] is None and motor["least_reserve"]["value"] is None
+    assert "its reserve of torque is not known" in motor["text"]
+
+
+def test_the_speed_after_the_event_is_a_sentence(study):
+    def caption(**answers):
+        runs = study.answers | {"jam_left": dataclasses.replace(study.answers["jam_left"], **answers)}
+        text = page.render(study, as_dict(dataclasses.replace(study, answers=runs)))
+        place = text.rindex("answers.jam_left.speed_dip")
+        text = text[text.rindex("<figcaption>", 0, place) :]
+        return re.sub(r"<[^>]*>", "", text.partition("</figcaption>")[0]).replace("\u202f", " ")
+
+    stays = "; it does not return to its steady band within the time followed."
+    assert caption(speed_dip=1.5, recovery_time=None).endswith(f" The crank turns back{stays}")
+    assert caption(speed_dip=1.0, recovery_time=None).endswith(f" The crank stands{stays}")
+    assert "The speed dips by 10.0" in caption(speed_dip=0.1, recovery_time=0.0)
 
 
 def test_a_motor_that_sizing_found_insufficient_is_not_praised(study, monkeypatch):

@@ -93,6 +93,20 @@ def test_study_numbers_are_those_of_the_series(done):
             pivot = float(np.max(np.hypot(after["machine.pivot.fx"], after["machine.pivot.fy"])))
             assert numbers["pins"][name]["C rocker pivot"]["peak"]["value"] == pytest.approx(pivot)
             assert run["machine.tau"].attrs["units"] == "N.m"
+        # the start-up, to the begin of steady running
+        run = tree["start_up"].to_dataset()
+        steady = run["time"].values[np.searchsorted(run["time"].values, 0.3 + 2.0 * math.pi / 6.0 - 1e-9)]
+        start, found = run.sel(time=slice(None, steady)), numbers["start_up"]
+        assert found["crank_torque_peak"]["value"] == pytest.approx(
+            25.0 * float(np.abs(start["machine.tau"]).max())
+        )
+        for rod in ("web", "wall"):
+            least = min(float(start[f"machine.{side}.{rod}_pull"].min()) for side in ("left", "right"))
+            assert found[f"{rod}_pull_least"]["value"] == pytest.approx(least)
+        bearing = np.hypot(start["machine.crank_bearing.fx"], start["machine.crank_bearing.fy"])
+        assert numbers["pins"]["start_up"]["O1 crank bearing"]["peak"]["value"] == pytest.approx(
+            float(bearing.max())
+        )
         right = tree["right_empties"]["machine.right.material_mass"].values
         assert right[0] == 30.0 and right[-1] == 0.0
         assert tree["feed_left"]["machine.left.material_mass"].values[-1] == 60.0

@@ -44,6 +44,47 @@ def test_a_pull_below_zero_spoils_its_run(rod):
             assert told == ([] if pull == 0.0 else [("pushed", quantity, run, pull, 0.0)])
 
 
+def test_a_pull_below_zero_in_the_start_up_is_told_by_name():
+    started = PULLED | {"start_up": (-1304.0, -433.0)}
+    verdict = bars(pulls=started)
+    assert verdict.holds == "in part" and "would go slack and snatch, in the start-up; take" in verdict.text
+    assert verdict.details(CALLED | {"start_up": "start-up"}) == [
+        "Bars that are pushed, where a chain would go slack and snatch: start-up (web -1304 N, wall -433 N)."
+    ]
+    both = bars(pulls=started | {"jam_left": (-1.0, 1.0)})
+    assert ", in the start-up and in overloads; " in both.text
+
+
+def test_the_speed_is_the_one_that_the_crank_has():
+    """Judged at the larger one that is asked for, which is named as such."""
+    slow = bars(30.0, 50.0, 4.58, reached=1.57)
+    assert "two bars, the crank at 1.57 rad/s, judged at the 30.0 rad/s asked for; " in slow.text
+    assert slow.details(CALLED)[0] == (
+        "Crank speed at or above that at which a web goes slack, as it is asked for; the crank turns at 1.57 rad/s: "
+        "30.0 rad/s, limit 4.58 rad/s."
+    )
+    data = slow.as_dict()
+    assert (data["speed"]["value"], data["reached"]["value"]) == (30.0, 1.57)
+    assert "asked" not in bars(3.0, reached=2.999).text
+    rest = bars(1.57, 50.0, 0.0).details(CALLED)[0]
+    assert rest.endswith("a web goes slack: 1.57 rad/s, and it is slack at rest already.")
+
+
+def test_each_reason_has_its_own_remedy():
+    stiff = bars(residuals=KEPT | {"jam_left": 2e-3})
+    assert stiff.text.endswith("the energy balance is not kept, in overloads; shorten run.step.")
+    both = bars(3.0, residuals=KEPT | {"jam_left": 2e-3})
+    assert both.text.endswith('; take organ = "chain"; shorten run.step.')
+    assert of_chains(independent=71.0).text.endswith("; raise chain.starts.")
+
+
+def test_what_rests_on_a_model_that_does_not_hold_carries_a_caveat():
+    spoiled = bars(pulls=PULLED | {"steady": (-1.0, 1.0)})
+    assert spoiled.caveat == spoiled.as_dict()["caveat"] == "for two bars, which do not hold here"
+    assert bars().caveat == "" and bars().as_dict()["caveat"] is None
+    assert bars(pulls=PULLED | {"jam_left": (-1.0, 1.0)}).caveat == ""
+
+
 def test_the_speed_against_modes_and_slack():
     mode = 5.0
     for share, topic, holds in (
@@ -98,7 +139,7 @@ def test_words_and_data():
     assert verdict.text == (
         "The model of the organs holds in part: two bars, the crank at 3.00 rad/s; bars are pushed, where a chain "
         "would go slack and snatch, in overloads; the rocker torque may be off by more than 10 %, as a chain "
-        'resonates; organ = "chain" has chains.'
+        'resonates; take organ = "chain".'
     )
     # once, with all runs, webs and walls
     assert verdict.details(CALLED | {"feed_left": "feed to left"}) == [

@@ -16,6 +16,7 @@ from ..engines import numpy_
 from ..machines.chain_unit import SIDES, ChamberForces
 from ..studies.chain import HIGH
 from ..studies.overload import PINS, SCENARIOS, Study
+from ..studies.overload import called as in_sentences
 from ..studies.shaft import RIGID
 from .style import LINES, WIDE
 
@@ -529,7 +530,7 @@ def _reactions(study: Study) -> Plot:
     runs, pins = list(study.pins), list(PINS)
     height = 0.84 / len(runs)
     for i, name in enumerate(runs):
-        bar, top = _BARS[i % len(_BARS)], -0.42 + i * height
+        bar, top, words = _BARS[i % len(_BARS)], -0.42 + i * height, in_sentences(name)
         for size, width, offset in (("peak", 0.92 * height, 0.0), ("rms", 0.34 * height, 0.29 * height)):
             peak = size == "peak"
             figure.add_bar(
@@ -538,7 +539,7 @@ def _reactions(study: Study) -> Plot:
                 orientation="h",
                 width=width,
                 offset=top + offset,
-                name=f"{called(name)}: peak" if peak else "dark inner bar: RMS",
+                name=f"{words}: peak" if peak else "dark inner bar: RMS",
                 showlegend=peak or i == 0,
                 legendrank=100 + i if peak else 200,
                 marker={
@@ -546,7 +547,7 @@ def _reactions(study: Study) -> Plot:
                     "line": {"color": _INK, "width": 0.8},
                     "pattern": {"shape": bar["shape"], "fgcolor": "#666666", "size": 6} if peak else {},
                 },
-                hovertemplate=f"%{{y}}, {called(name)}: {'peak' if peak else 'RMS'} %{{x:.4g}} N<extra></extra>",
+                hovertemplate=f"%{{y}}, {words}: {'peak' if peak else 'RMS'} %{{x:.4g}} N<extra></extra>",
             )
     figure.update_layout(
         template=_TEMPLATE,

@@ -25,9 +25,11 @@ from ..files import whole
 from ..quantities import Layout, Variable
 from ..studies.cycle import OverloadFactors
 from ..studies.monte_carlo import Sample
-from ..studies.overload import SCENARIOS, Answers, Limits, Study, as_dict
+from ..studies.overload import SCENARIOS, Answers, Limits, StartUp, Study, as_dict
+from ..studies.overload import called as in_sentences
 from ..studies.shaft import ShaftAnswers, Torsion
 from ..studies.sizing import Verdict
+from ..text import shown
 from .interactive import Plot, called, plots
 from .motion import motion
 from .trace import Traced
@@ -272,8 +274,6 @@ def _answer(t: Traced, study: Study) -> str:
         large = f"Large: {called(reference)}, the crank at {_speed(t, reference)}."
         worst = " Below: the overload that asks most." if any(run in SCENARIOS for run in answers) else ""
         parts.append(f'<p class="lead">{large}{worst}</p>')
-    elif t.result["status"] == "complete":
-        parts.append('<p class="lead">No motor was found to run the machine with; the reason is below.</p>')
     else:
         parts.append('<p class="lead">The study ended before any run could be evaluated.</p>')
     if t.result["overload_factors"]:
@@ -333,6 +333,13 @@ def _runs(t: Traced) -> str:
             rows.append((escape(_capital(v.description)), *cells))
         heads = [escape(_capital(called(run))) for run in answers]
         parts.append(_table(("", *heads), rows, caption="What each run asks of the drive"))
+    if t.result.get("start_up"):
+        rows = [
+            (escape(_capital(v.description)), t.number(f"start_up.{v.name}"))
+            for v in Layout(StartUp).variables
+            if t.result["start_up"][v.name]["value"] is not None
+        ]
+        parts.append(_table((), rows, caption="What the start-up asks of the drive"))
     if t.result["pins"]:
         parts.append(_pins(t))
     if t.result.get("shaft"):
@@ -547,7 +554,7 @@ def _pins(t: Traced) -> str:
                 escape(pin),
                 *(t.number(f"pins.{reference}.{pin}.{size}") for size in sizes),
                 t.number(f"pins.{worst}.{pin}.peak"),
-                escape(called(worst)),
+                escape(in_sentences(worst)),
             )
         )
     named = (f"{_capital(called(reference))}, {'RMS' if size == 'rms' else _words(size)}" for size in sizes)
@@ -661,7 +668,8 @@ def _sizing(t: Traced) -> str:
                 )
         parts.append(f'<div class="cards four">{"".join(cards)}</div>')
         why = "Chosen because" if chosen is not None else "Insufficient, and shown because"
-        parts.append(f'<p class="reason">{why}: {t.text(f"{best}.reason")}</p>')
+        caveat = f" ({t.text('verdict.model.caveat')})" if _caveat(t) else ""
+        parts.append(f'<p class="reason">{why}: {t.text(f"{best}.reason")}{caveat}</p>')
     if "coupling" in sizing.get("protection", {}):
         parts.append(f'<p class="reason">{t.text("sizing.protection.coupling")}</p>')
     parts.extend(
@@ -696,6 +704,12 @@ def _sizing(t: Traced) -> str:
         if rows
     )
     return "\n".join(parts) + f'\n<div class="given whole">{tables}</div>'
+
+
+def _caveat(t: Traced) -> bool:
+    """Whether the model that a recommendation rests on does not hold."""
+    model = t.result["verdict"]["model"]
+    return model is not None and model["caveat"] is not None
 
 
 def _large(title: str, shown: str, which: str, css: str = "") -> str:
@@ -836,10 +850,7 @@ def _figures(t: Traced, drawn: list[Plot]) -> str:
         if plot.marked:
             caption = "Upright, dashed: the event. Shaded: what the machine is given changes."
             if plot.run in t.result["answers"]:
-                caption += (
-                    f" The speed dips by {t.number(f'answers.{plot.run}.speed_dip')}; recovery: "
-                    f"{t.number(f'answers.{plot.run}.recovery_time', none='not reached')}."
-                )
+                caption += _speed_after(t, plot.run)
             if plot.run == "blocked" and "block_peaks" in t.result:
                 peaks, stiffness = (
                     " to ".join(t.number(f"block_peaks.{name}_{end}") for end in ("low", "high"))
@@ -864,6 +875,25 @@ def _figures(t: Traced, drawn: list[Plot]) -> str:
         '<p class="hint">Drag to zoom, double-click to zoom out, click a name in a legend to hide its line. Every '
         "sample is in result.nc.</p>"
     )
+
+
+def _speed_after(t: Traced, run: str) -> str:
+    """What the speed does after the event, in sentences."""
+    least, dip, back = (f"answers.{run}.{name}" for name in ("speed_least", "speed_dip", "recovery_time"))
+    share = t.value(dip)
+    if share is None or share <= 0.0:
+        text = f" The least speed is {t.number(least)}"
+    elif not shown(share, "1", "dip")[1]:
+        # words stand in the number's place
+        text = f" The crank {t.number(dip)}"
+    else:
+        text = f" The speed dips by {t.number(dip)}"
+    recovered = t.value(back)
+    if recovered is None:
+        return f"{text}; it does not return to its steady band within the time followed."
+    if recovered == 0.0:
+        return f"{text}; it does not leave its steady band."
+    return f"{text}; it is back in its steady band after {t.number(back)}."
 
 
 def _motion() -> str:

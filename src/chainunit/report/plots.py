@@ -15,7 +15,7 @@ from ..config import by_side
 from ..drives.dc_motor import DcMotor
 from ..engines import numpy_
 from ..studies.chain import HIGH
-from ..studies.overload import PINS, SCENARIOS, Study
+from ..studies.overload import PINS, SCENARIOS, Study, called
 from ..studies.shaft import RIGID
 from .style import LINES, WIDE, draw
 
@@ -325,7 +325,7 @@ def _reactions(study: Study) -> Any:
             rows + i * height,
             peaks,
             height,
-            label=SCENARIOS.get(name, "steady"),
+            label=called(name),
             color=shades[i % len(shades)],
             hatch=hatches[(i + i // len(shades)) % len(hatches)],
             edgecolor="#1b1b1b",

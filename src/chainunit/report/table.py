@@ -18,6 +18,7 @@ from ..studies.overload import (
     DIFFERENCE,
     Answers,
     Limits,
+    StartUp,
     Study,
     called,
     coupling_sentence,
@@ -67,7 +68,7 @@ def _head(study: Study) -> str:
 
 def _short(run: str) -> str:
     """Heading of the column of a run."""
-    return OVERLOADS[run].short if run in OVERLOADS else run
+    return OVERLOADS[run].short if run in OVERLOADS else run.replace("_", "-")
 
 
 def _print_runs(console: Console, table: Callable[[list[str]], Table], runs: Collection[str]) -> None:
@@ -108,6 +109,10 @@ def show(study: Study, console: Console) -> None:
 
     if study.answers:
         _print_runs(console, answers, study.answers)
+    if study.start is not None:
+        asks = ((v, getattr(study.start, v.name)) for v in Layout(StartUp).variables)
+        said = (f"{v.description} {number(x, v.unit, v.kind)}" for v, x in asks if x is not None)
+        console.print(f"Start-up: {'; '.join(said)}.", soft_wrap=True)
     if study.chain is not None:
         _show_chain(study.chain, console)
     if study.monte_carlo is not None:
@@ -294,16 +299,22 @@ def _show_shaft(study: Study, console: Console) -> None:
     )
 
 
+def _caveat(study: Study) -> str:
+    """What a recommendation adds where the model that it rests on does not hold."""
+    found = study.verdict.caveat if study.verdict else ""
+    return f" ({found})" if found else ""
+
+
 def _show_sizing(study: Study, console: Console) -> None:
     """The candidates in their order, with how much of each limit they use."""
     sized = study.sizing
     assert sized is not None
-    best = sized.best
+    best, caveat = sized.best, _caveat(study)
     wheel = f"flywheel {best.flywheel:.3g} kg m2" if best.flywheel else "no flywheel"
     console.print(f"{sized.answer[:1].upper()}{sized.answer[1:]}.", soft_wrap=True)
     console.print(
         f"{'Insufficient motor' if study.insufficient else 'Motor'}: {best.motor.designation}, ratio "
-        f"{best.drive.ratio:.2f}, {wheel}; relay at {best.motor.nameplate.rated_current:.2f} A.",
+        f"{best.drive.ratio:.2f}, {wheel}; relay at {best.motor.nameplate.rated_current:.2f} A{caveat}.",
         soft_wrap=True,
     )
     if study.setting is not None:

@@ -109,6 +109,20 @@ class Answers:
 
 
 @declaration
+class StartUp:
+    """What the start from rest asks, up to the begin of the steady turns; pulls as in `Answers`."""
+
+    crank_torque_peak: Value = quantity("N.m", "crank torque, peak")
+    motor_torque_peak: Value = quantity("N.m", "motor torque, peak")
+    current_peak: Value = quantity("A", "motor current, peak")
+    rocker_torque_peak: Value = quantity("N.m", "rocker torque, peak")
+    web_pull_least: Value = quantity("N", "least pull in a web")
+    wall_pull_least: Value = quantity("N", "least pull in a wall")
+    slack_time: Value = quantity("1", "share of the time with a slack rod", kind="percent")
+    fold_largest: Value = quantity("rad", "largest angle between two rods")
+
+
+@declaration
 class Limits:
     """Where the model ends."""
 
@@ -189,6 +203,8 @@ class Study:
     """when running became steady [s], where that was later than `config.settled`"""
     event: dict[str, float] = field(default_factory=dict)
     answers: dict[str, Answers] = field(default_factory=dict)
+    start: StartUp | None = None
+    """what the start-up asks, once the machine ran steadily"""
     pins: dict[str, dict[str, dict[str, float]]] = field(default_factory=dict)
     """By run and pin: peak, RMS and equivalent (ISO 281) load."""
     certificate: dict[str, dict[str, float]] = field(default_factory=dict)
@@ -441,6 +457,7 @@ def _simulate(
         steady = study.steady
         study.answers["steady"] = _answers(study, steady, None, steady)
         study.pins["steady"] = _pins(study, steady)
+        study.start = _start(study, start_up.sel(time=slice(None, steady["time"].values[0])))
         if study.start_apart:
             study.start_torque = _on_coupling(drive, start_up.sel(time=slice(None, study.settled)))
         asked = _on_coupling(drive, steady)
@@ -913,6 +930,13 @@ def _answers(study: Study, run: xr.Dataset, event: float | None, steady: xr.Data
     )
 
 
+def _start(study: Study, run: xr.Dataset) -> StartUp:
+    """The numbers of the start-up, and what the pins carry in it."""
+    answers = _answers(study, run, None, study.steady)
+    study.pins[verdict.START] = _pins(study, run)
+    return StartUp(**{name: getattr(answers, name) for name in Layout(StartUp).names})
+
+
 def _series(name: str) -> Callable[[xr.Dataset], Any]:
     """Reads a variable of a run, shape (time,)."""
     return lambda run: run[name].values
@@ -1081,7 +1105,12 @@ def called(run: str) -> str:
     return _CALLED.get(run, run.replace("_", " "))
 
 
-_CALLED = {STEADY: "steady running", "constant": "chains at constant speed", **SCENARIOS}
+_CALLED = {
+    STEADY: "steady running",
+    verdict.START: "start-up",
+    "constant": "chains at constant speed",
+    **SCENARIOS,
+}
 """Runs by name, as sentences call them."""
 _EMPTYING = ("empties", "feed", "start")
 """Kinds of overloads in which a side carries no material."""
@@ -1125,13 +1154,11 @@ def model_verdict(study: Study) -> Verdict:
     config, limits, answers = study.config, study.limits, study.answers
     assert limits is not None
     steady = answers.get(STEADY)
-    speed = max(config.run.crank_speed, steady.speed_mean if steady else 0.0)
-    residuals = {
-        STEADY if name == "start_up" else name: max(
-            x for kind, x in shares.items() if kind.endswith("energy_residual_share")
-        )
-        for name, shares in study.certificate.items()
-    }
+    mean = steady.speed_mean if steady else config.run.crank_speed
+    speed, residuals = max(config.run.crank_speed, mean), _residuals(study)
+    runs: dict[str, StartUp | Answers] = {**answers}
+    if study.start is not None:
+        runs[verdict.START] = study.start
     if config.chain is None:
         emptied = {name for name in answers if name in OVERLOADS and OVERLOADS[name].kind in _EMPTYING}
         always = 0.0 in (config.feed.left.material_mass, config.feed.right.material_mass)
@@ -1139,49 +1166,75 @@ def model_verdict(study: Study) -> Verdict:
             speed,
             limits.chain_resonance,
             limits.slack_speed,
-            {name: (a.web_pull_least, a.wall_pull_least) for name, a in answers.items()},
+            {name: (a.web_pull_least, a.wall_pull_least) for name, a in runs.items()},
             residuals,
             empty={""} if always else emptied,
+            reached=mean,
         )
-    folds = {name: a.fold_largest for name, a in answers.items()}
-    slack = {name: a.slack_time for name, a in answers.items()}
+    folds = {name: a.fold_largest for name, a in runs.items()}
+    slack = {name: a.slack_time for name, a in runs.items()}
     needed, turns = runs_needed(HIGH), math.inf
     if study.chain is not None:
         own = study.chain.own
         folds["constant"], slack["constant"] = own.fold_largest, own.slack_time
         residuals["constant"], turns = own.energy_residual, own.independent_turns
-    return verdict.chains(speed, residuals, folds, config.chain.fold_limit, slack, turns, needed)
+    return verdict.chains(
+        speed, residuals, folds, config.chain.fold_limit, slack, turns, needed, reached=mean
+    )
+
+
+def _residuals(study: Study) -> dict[str, float]:
+    """By run, the largest energy residual over the energy moved; the start-up and steady running are one."""
+    return {
+        STEADY if name == verdict.START else name: max(
+            x for kind, x in shares.items() if kind.endswith("energy_residual_share")
+        )
+        for name, shares in study.certificate.items()
+    }
 
 
 def motor_verdict(study: Study) -> dict[str, Any] | None:
     """Whether the motor reaches the speed ("false" where not), and its least reserve of torque with the run of it
-    ("in part" where none is left, or sizing found it insufficient), ready for JSON; None without steady running."""
+    ("in part" where none is left or known, or sizing found it insufficient), ready for JSON; None without steady
+    running. Runs whose energy balance is not kept say nothing of the motor: they are left out."""
     steady, asked = study.answers.get(STEADY), study.config.run.crank_speed
     if steady is None:
         return None
-    run = min(study.answers, key=lambda name: float(study.answers[name].torque_reserve))
-    reserve, reaches = study.answers[run].torque_reserve, reached(steady, asked)
-    speed = number(steady.speed_mean, "rad/s")
+    residuals, reaches = _residuals(study), reached(steady, asked)
+    # NaN, too, is no balance
+    left_out = [name for name in study.answers if not residuals.get(name, 0.0) < RESIDUAL]
+    reserves = {name: a.torque_reserve for name, a in study.answers.items() if name not in left_out}
+    run = min(reserves, key=lambda name: float(reserves[name]), default=None)
+    reserve = None if run is None else reserves[run]
+    speed, wanted = number(steady.speed_mean, "rad/s"), number(asked, "rad/s", full=False)
     if reaches:
         text = f"The motor keeps the crank at {speed}"
+    elif steady.speed_mean > asked:
+        text = f"The motor does NOT keep the speed: the crank turns at {speed}, faster than the {wanted} asked for"
     else:
-        text = f"The motor does NOT reach the speed: {speed} in place of {number(asked, 'rad/s', full=False)}"
-    if reserve >= 0.0:
-        left = f"least reserve of torque {number(reserve, '1', 'percent')} ({_CALLED[run]})"
-    else:
-        over = number(-reserve, "1", "percent")
-        left = f"no reserve of torque: a peak passes the largest steady torque by {over} ({_CALLED[run]})"
+        text = f"The motor does NOT reach the speed: {speed} in place of {wanted}"
     if study.insufficient:
-        text += ", but it is insufficient by the limits of the sizing"
-    enough = reserve > 0.0 and not study.insufficient
+        text += f"{', but it' if reaches else '; it'} is insufficient by the limits of the sizing"
+    if run is None:
+        text += "; its reserve of torque is not known"
+    elif reserve is not None and reserve >= 0.0:
+        text += f"; least reserve of torque {number(reserve, '1', 'percent')} ({_CALLED[run]})"
+    else:
+        over = number(-reserves[run], "1", "percent")
+        text += f"; no reserve of torque: a peak passes the largest steady torque by {over} ({_CALLED[run]})"
+    if left_out:
+        names = ", ".join(_CALLED[name] for name in left_out)
+        text += f"; runs whose energy balance is not kept are left out ({names})"
+    enough = reserve is not None and reserve > 0.0 and not study.insufficient
     holds: Holds = "false" if not reaches else "true" if enough else "in part"
     return {
         "holds": holds,
-        "text": f"{text}; {left}.",
+        "text": f"{text}.",
         "speed": entry(steady.speed_mean, "rad/s"),
         "asked": entry(asked, "rad/s"),
         "least_reserve": entry(reserve, "1", "percent"),
         "run": run,
+        "left_out": left_out,
     }
 
 
@@ -1194,6 +1247,7 @@ def coupling_sentence(study: Study) -> str:
     it."""
     found = study.setting
     assert found is not None
+    caveat = f" ({study.verdict.caveat})" if study.verdict and study.verdict.caveat else ""
     above = f"{_torque(found.least)}, {protection.MARGIN:g} times the {_torque(found.normal)} of normal duty"
 
     def listed(names: Mapping[str, float]) -> str:
@@ -1217,8 +1271,8 @@ def coupling_sentence(study: Study) -> str:
         )
     shut = {name: peak for name, peak in found.overloads.items() if name not in found.opens}
     said = (
-        f"Recommended safety coupling: {above}, below the {_torque(found.motor)} that the motor gives at the crank. "
-        f"It opens where {listed(found.opens)}"
+        f"Recommended safety coupling{caveat}: {above}, below the {_torque(found.motor)} that the motor gives at the "
+        f"crank. It opens where {listed(found.opens)}"
     )
     said += f"; it stays shut where {listed(shut)}." if shut else "."
     if study.start_torque is not None and study.start_torque > found.least:
@@ -1322,6 +1376,7 @@ def as_dict(study: Study) -> dict[str, Any]:
         "source": config.source,
         "status": f"failed: {study.failure}" if study.failure else "complete",
         "answers": {name: entries(answers) for name, answers in study.answers.items()},
+        "start_up": entries(study.start) if study.start else None,
         "overload_factors": {
             side: {name: factor | {"for": FACTOR_FOR[name]} for name, factor in entries(factors).items()}
             for side, factors in study.factors.items()

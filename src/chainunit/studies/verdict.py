@@ -22,8 +22,11 @@ RESIDUAL = 1e-3
 """Energy residual, in parts of the energy moved, up to which a run is taken for right."""
 STEADY = "steady"
 """Run of normal running; what spoils it leaves nothing that the model is good for."""
+START = "start_up"
+"""Run from rest to normal running."""
 
 TWO_BARS = "two bars"
+_CHAINS = 'take organ = "chain"'
 
 Holds = Literal["true", "in part", "false"]
 
@@ -31,42 +34,51 @@ _TOPICS = {
     "pushed": (
         "bars are pushed, where a chain would go slack and snatch",
         "Bars that are pushed, where a chain would go slack and snatch",
+        _CHAINS,
     ),
     "slack speed": (
         "the crank turns faster than the speed at which a web goes slack",
-        "Crank speed at which a web is slack",
+        "Crank speed at or above that at which a web goes slack",
+        _CHAINS,
     ),
     "crank torque": (
         "the torques of rocker and crank may be off by more than 10 %, as a chain resonates",
-        "Crank speed above that up to which two bars give the crank torque to 10 %, and the rocker torque not even "
-        "there",
+        "Crank speed above that up to which two bars give the crank torque to 10 %; they give the rocker torque to "
+        "10 % up to a lower speed alone",
+        _CHAINS,
     ),
     "rocker torque": (
         "the rocker torque may be off by more than 10 %, as a chain resonates",
         "Crank speed above that up to which two bars give the rocker torque to 10 %",
+        _CHAINS,
     ),
     "energy": (
         "the energy balance is not kept",
-        "Energy residual over the energy moved, so large that run.step is too long",
+        "Energy residual over the energy moved, above which a run is not taken for right",
+        "shorten run.step",
     ),
     "folded through": (
         "rods fold through their stop",
-        "Rods that fold through their stop; raise chain.fold_stiffness, or take it for a machine that breaks",
+        "Rods that fold through their stop",
+        "raise chain.fold_stiffness, or take it for a machine that breaks",
     ),
     "folded": (
         "rods meet the stop between them, whose stiffness is assumed",
         "Rods that fold and meet the stop between them",
+        "",
     ),
     "slack": (
         "rods go slack and snatch: a single peak is no prediction",
         "Share of the time with a slack rod; what snatches has no single peak that is a prediction",
+        "",
     ),
     "starts": (
-        "starts differ: the quantile of peaks is not told",
-        "Turns that count as independent are too few for the quantile, as starts differ; raise chain.starts",
+        "the starts differ by so much that they do not tell the quantile of peaks",
+        "Turns that count as independent, too few for the quantile, as the starts differ",
+        "raise chain.starts",
     ),
 }
-"""What may be wrong: in short for the verdict, and as the begin of a line with the numbers."""
+"""What may be wrong: in short for the verdict, as the begin of a line with the numbers, and what helps against it."""
 
 
 @dataclass(frozen=True)
@@ -90,6 +102,8 @@ class Reason:
         rod = {"web_pull": "web ", "wall_pull": "wall "}.get(self.quantity, "")
         said = self.topic in ("pushed", "slack")
         limit = "" if said else f", limit {number(self.limit, self.unit, self.kind)}"
+        if self.topic == "slack speed" and self.limit == 0.0:
+            limit = ", and it is slack at rest already"
         return f"{rod}{number(self.value, self.unit, self.kind)}{limit}"
 
 
@@ -100,8 +114,10 @@ class Verdict:
     organ: str
     """the model of the organs in words"""
     speed: float
-    """of the crank [rad/s]"""
+    """of the crank, at which the model is judged [rad/s]"""
     reasons: tuple[Reason, ...] = ()
+    reached: float | None = None
+    """speed that the crank has, where it is judged at the one that is asked for [rad/s]"""
 
     @property
     def holds(self) -> Holds:
@@ -111,25 +127,42 @@ class Verdict:
         return "false" if any(reason.grave for reason in self.reasons) else "in part"
 
     @property
+    def _judged(self) -> str:
+        return number(self.speed, "rad/s")
+
+    @property
+    def _turns(self) -> str:
+        return number(self.speed if self.reached is None else self.reached, "rad/s")
+
+    @property
+    def _asked(self) -> bool:
+        """Whether it is judged at a speed that the crank does not have."""
+        return self._turns != self._judged
+
+    @property
+    def caveat(self) -> str:
+        """To be said beside what rests on a model that does not hold; empty where it does, or fails in part alone."""
+        return f"for {self.organ}, which do not hold here" if self.holds == "false" else ""
+
+    @property
     def text(self) -> str:
         """The verdict in a line."""
         holds = {"true": "holds", "in part": "holds in part", "false": "does not hold"}[self.holds]
-        line = f"The model of the organs {holds}: {self.organ}, the crank at {number(self.speed, 'rad/s')}"
-        why = []
-        for topic, (short, _) in _TOPICS.items():
+        line = f"The model of the organs {holds}: {self.organ}, the crank at "
+        line += f"{self._turns}, judged at the {self._judged} asked for" if self._asked else self._judged
+        why, remedies = [], []
+        for topic, (short, _, remedy) in _TOPICS.items():
             runs = {reason.run for reason in self.reasons if reason.topic == topic}
             if runs:
-                where = (
-                    "" if "" in runs else ", in steady running, too" if STEADY in runs else ", in overloads"
-                )
-                why.append(short + where)
-        remedy = ['organ = "chain" has chains'] if why and self.organ == TWO_BARS else []
-        return "; ".join((line, *why, *remedy)) + "."
+                why.append(short + _where(runs))
+                remedies.append(remedy)
+        # what helps against several is said once
+        return "; ".join((line, *why, *dict.fromkeys(filter(None, remedies)))) + "."
 
     def details(self, called: Mapping[str, str]) -> list[str]:
         """A line for each topic: the runs, by what they are `called`, with their numbers."""
         lines = []
-        for topic, (_, begin) in _TOPICS.items():
+        for topic, (_, begin, _) in _TOPICS.items():
             runs: dict[str, list[str]] = {}
             for reason in self.reasons:
                 if reason.topic == topic:
@@ -138,6 +171,12 @@ class Verdict:
                 f"{called.get(run, run)} ({', '.join(sizes)})" if run else ", ".join(sizes)
                 for run, sizes in runs.items()
             ]
+            if (
+                each
+                and self._asked
+                and any(r.quantity == "crank_speed" for r in self.reasons if r.topic == topic)
+            ):
+                begin = f"{begin}, as it is asked for; the crank turns at {self._turns}"
             if each:
                 lines.append(f"{begin}: {'; '.join(each)}.")
         return lines
@@ -147,8 +186,10 @@ class Verdict:
         return {
             "organ": self.organ,
             "holds": self.holds,
+            "caveat": self.caveat or None,
             "text": self.text,
             "speed": entry(self.speed, "rad/s"),
+            "reached": entry(self.speed if self.reached is None else self.reached, "rad/s"),
             "reasons": [
                 {
                     "topic": r.topic,
@@ -162,6 +203,17 @@ class Verdict:
         }
 
 
+def _where(runs: Collection[str]) -> str:
+    """In which of the runs, in words; empty where the machine itself is meant."""
+    if "" in runs:
+        return ""
+    if STEADY in runs:
+        return ", in steady running, too"
+    places = ["the start-up"] if START in runs else []
+    places += ["overloads"] if set(runs) - {START} else []
+    return f", in {' and in '.join(places)}"
+
+
 def two_bars(
     speed: float,
     mode: float,
@@ -170,17 +222,19 @@ def two_bars(
     residuals: Mapping[str, float],
     *,
     empty: Collection[str] = (),
+    reached: float | None = None,
 ) -> Verdict:
     """The verdict on two bars an organ.
 
     Parameters
     ----------
-    speed : of the crank [rad/s]
+    speed : of the crank, at which it is judged [rad/s]
     mode : lowest natural frequency of an organ as a chain [rad/s], infinite where there is none
     slack_speed : crank speed at which a web first goes slack [rad/s], infinite where none does
     pulls : by run, the least pull in a web and in a wall [N], negative where it is pushed
     residuals : by run, the energy residual over the energy moved
     empty : runs in which a side carries no material, "" where it is so in all
+    reached : speed that the crank has, where that is another [rad/s]
     """
     reasons = [
         Reason("pushed", name, pull, 0.0, "N", run, grave=run == STEADY)
@@ -198,7 +252,7 @@ def two_bars(
         limit = ROCKER_GOOD_EMPTY * mode
         runs = [""] if "" in empty else sorted(empty)
         reasons += [Reason("rocker torque", "crank_speed", speed, limit, "rad/s", run) for run in runs]
-    return Verdict(TWO_BARS, speed, (*reasons, *_unbalanced(residuals)))
+    return Verdict(TWO_BARS, speed, (*reasons, *_unbalanced(residuals)), reached)
 
 
 def chains(
@@ -209,16 +263,19 @@ def chains(
     slack: Mapping[str, float],
     independent: float,
     needed: float,
+    *,
+    reached: float | None = None,
 ) -> Verdict:
     """The verdict on organs as chains.
 
     Parameters
     ----------
-    speed : of the crank [rad/s]
+    speed : of the crank, at which it is judged [rad/s]
     residuals, folds, slack : by run, the energy residual over the energy moved, the largest angle between two rods
         [rad], the share of the time with a slack rod
     fold_limit : angle from which two rods meet the stop between them [rad]
     independent, needed : turns at constant speed that count as independent, and how many the quantile takes
+    reached : speed that the crank has, where that is another [rad/s]
     """
     reasons: list[Reason] = []
     for run, fold in folds.items():
@@ -233,7 +290,7 @@ def chains(
             reasons.append(Reason("slack", "slack_time", share, 0.0, "1", run, "percent"))
     if independent < needed:
         reasons.append(Reason("starts", "independent_turns", independent, needed, "1"))
-    return Verdict("chains", speed, (*reasons, *_unbalanced(residuals)))
+    return Verdict("chains", speed, (*reasons, *_unbalanced(residuals)), reached)
 
 
 def _unbalanced(residuals: Mapping[str, float]) -> list[Reason]:
