@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy.stats import beta, quantile_test
+from scipy.stats import beta, norm, quantile_test
 
 from chainunit.studies.quantiles import Estimate, counted, quantile, runs_needed, share
 
@@ -57,6 +57,28 @@ def test_values_of_one_run_count_together():
         plain.append(quantile(runs.ravel(), 0.5))
     inside = [np.mean([e.low <= 10.0 <= e.high for e in each]) for each in (hits, plain)]
     assert inside[0] > 0.92 and inside[1] < 0.5
+
+
+@pytest.mark.parametrize("common", [0.0, 0.3, 0.5, 0.8])
+@pytest.mark.parametrize("q", [0.5, 0.95])
+def test_what_few_starts_tell_is_so(common, q):
+    """Ten starts of 30 turns, whose values have the share `common` of their variance by the start: an interval that
+    is given holds the quantile, also where it is seldom given."""
+    rng = np.random.default_rng(23)
+    levels, turns = rng.normal(size=(300, 10, 1)), rng.normal(size=(300, 10, 30))
+    true = norm.ppf(q)
+    found = [quantile(x, q) for x in math.sqrt(common) * levels + math.sqrt(1.0 - common) * turns]
+    held = [e.low <= true <= e.high for e in found if e is not None]
+    assert sum(held) >= 0.93 * len(held)
+    if q == 0.5 or common == 0.0:
+        assert len(held) >= 270
+    elif common >= 0.5:
+        assert len(held) <= 3
+
+
+def test_one_run_is_one():
+    values = np.random.default_rng(2).normal(size=(1, 300))
+    assert counted(values, 0.5) == 1 and counted(values.T, 0.5) == 300
 
 
 def test_a_motion_that_repeats_itself_needs_no_number_of_runs():

@@ -5,7 +5,8 @@ values holds the quantile with a known confidence. Where too few runs are there,
 below it, and the interval has no end: such a quantile is left out.
 
 Several values of one run (the turns of a start) are not independent. They count for as many as the differences
-between the runs' shares above the quantile say (Kish's design effect; Woodruff's interval).
+between the runs say (Kish's design effect; Woodruff's interval). Few runs say little of these differences, so that
+the most counts which they may be.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ import numpy as np
 
 from ..text import entry
 
+LESS_ALIKE = 0.9
+"""Confidence with which the values of one run are no more alike than they are taken for."""
 CONFIDENCE = 0.95
 """Confidence of all intervals: each end is missed with half of the rest."""
 ALIKE = 0.05
@@ -60,16 +63,33 @@ def quantile(values: Any, q: float) -> Estimate | None:
 
 def counted(values: Any, q: float) -> int:
     """For how many independent ones the values count at the quantile `q`: all of them, but of several runs, shape
-    (runs, n), which are not alike, divided by the variance of the runs' shares above it in parts of that of
-    independent values, where that is more than 1."""
+    (runs, n), which are not alike, divided by the larger of two design effects: that of the runs' shares above the
+    quantile, as it is found, and that of the ranks of all values, as large as it may be. The shares alone would be
+    too few numbers: what makes them look independent by chance would be told, and nothing else."""
     values = np.asarray(values, float)
-    if values.ndim == 1 or _alike(values):
+    if values.ndim == 1 or values.shape[1] == 1 or _alike(values):
         return int(values.size)
+    runs, n = values.shape
+    if runs == 1:
+        return 1
     limit = np.quantile(values, q)
     # where many values are the same, the quantile is one of them
     shares = [np.mean(above, axis=1) for above in (values > limit, values >= limit)]
-    effect = float(np.max(np.var(shares, axis=1, ddof=1))) * values.shape[1] / (q * (1.0 - q))
-    return int(values.size / max(1.0, effect))
+    effect = float(np.max(np.var(shares, axis=1, ddof=1))) * n / (q * (1.0 - q))
+    return int(values.size / max(1.0, effect, 1.0 + (n - 1) * _alikeness(values)))
+
+
+def _alikeness(values: Any) -> float:
+    """How much the values of one run have in common: the upper confidence limit of the intraclass correlation of
+    their ranks, from the analysis of variance in one way; values of shape (runs, n)."""
+    from scipy.stats import f, rankdata
+
+    runs, n = values.shape
+    ranks = rankdata(values).reshape(runs, n)
+    between = n * np.var(np.mean(ranks, axis=1), ddof=1)
+    within = np.mean(np.var(ranks, axis=1, ddof=1))
+    most = between / f.ppf(1.0 - LESS_ALIKE, runs - 1, runs * (n - 1))
+    return float(max(0.0, (most - within) / (most + (n - 1) * within)))
 
 
 def _alike(values: Any) -> bool:
