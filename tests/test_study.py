@@ -16,7 +16,7 @@ from fmpy.validation import validate_fmu
 
 from chainunit import EMPTY, ChainUnit, SideLoads
 from chainunit.report import plots
-from chainunit.studies.cycle import alone, cycle, overload_factors, sides_over_speed
+from chainunit.studies.cycle import alone, cycle, factors_for, overload_factors, sides_over_speed
 
 SHORT = """
 [run]
@@ -427,6 +427,32 @@ def test_each_side_alone_has_its_overload_factors():
         assert found[side].rocker_torque == pytest.approx(one["rocker"] / both["rocker"], rel=1e-12)
     assert found["left"] == overload_factors(machine, 4.0, *FED)
     assert abs(found["left"].rocker_torque / found["right"].rocker_torque - 1.0) > 0.05
+
+
+def test_what_sizes_the_drive_is_the_feed_on_one_side_with_both_organs():
+    """Against a second route to the crank torque, by the reactions and the pins' friction."""
+    machine, speed = ChainUnit(), 4.0
+    loads = {
+        "both": FED,
+        "left": (SideLoads(material_mass=50.0, processing_force=400.0), EMPTY),
+        "right": (EMPTY, SideLoads(material_mass=50.0, processing_force=400.0)),
+    }
+    phi = np.linspace(0.0, 2.0 * np.pi, 720, endpoint=False) * machine.p.ratio
+    rocker = {name: peaks(machine, speed, *of, 720)["rocker"] for name, of in loads.items()}
+    crank = {}
+    for name, of in loads.items():
+        turning = (phi, speed * machine.p.ratio)
+        free = machine.torque_by_reactions(*turning, 0.0, *of)
+        crank[name] = np.max(np.abs(free + machine.friction_torque(*turning, *of)))
+    found = {side: overload_factors(machine, speed, *FED, side) for side in ("left", "right")}
+    for side, of in found.items():
+        assert of.feed_crank_torque == pytest.approx(crank[side] / crank["both"], rel=1e-9)
+        assert of.feed_rocker_torque == pytest.approx(rocker[side] / rocker["both"], rel=1e-12)
+    larger = max(found, key=lambda side: found[side].feed_crank_torque)
+    assert factors_for(found)["feed_crank_torque"].startswith(f"feed all on the {larger} sizes the drive")
+    none = {side: overload_factors(machine, speed, EMPTY, EMPTY, side) for side in found}
+    assert [f.feed_crank_torque for f in none.values()] == [1.0, 1.0]
+    assert factors_for(none)["feed_crank_torque"].startswith("feed on both sides sizes the drive")
 
 
 def test_the_static_factor_of_the_right_organ_belongs_to_the_left_extreme():

@@ -620,7 +620,7 @@ def _factor_card(t: Traced) -> str:
     for name in next(iter(sides.values())):
         of = "".join(
             f'<span class="figure"><span class="large">{t.number(f"overload_factors.{side}.{name}", none="none")}'
-            f'</span><span class="which">{side} alone</span></span>'
+            f'</span><span class="which">{side}</span></span>'
             for side in sides
         )
         use = t.text(f"overload_factors.{next(iter(sides))}.{name}.for")
@@ -628,7 +628,7 @@ def _factor_card(t: Traced) -> str:
     speed = t.number("run.crank_speed", given=True)
     return (
         '<article class="card"><h3>Overload factor</h3>'
-        f'{rows}<p class="also">one organ alone against both, at {speed}</p></article>'
+        f'{rows}<p class="also">one side against both, at {speed}</p></article>'
     )
 
 

@@ -12,7 +12,7 @@ from rich.text import Text
 from ..config import OVERLOADS, by_side
 from ..quantities import Layout, Variable
 from ..studies.chain import HIGH, ChainResult, SpeedNumbers
-from ..studies.cycle import FACTOR_FOR, OverloadFactors
+from ..studies.cycle import OverloadFactors, factors_for
 from ..studies.monte_carlo import QUANTILES, MonteCarloResult, Sample
 from ..studies.overload import (
     DIFFERENCE,
@@ -119,16 +119,15 @@ def show(study: Study, console: Console) -> None:
         _show_monte_carlo(study.monte_carlo, console)
     if study.factors:
         asked = number(config.run.crank_speed, "rad/s", full=False)
-        table = Table(
-            title=f"Overload factor, one organ alone against both, at {asked}", title_justify="left"
-        )
+        table = Table(title=f"Overload factor, one side against both, at {asked}", title_justify="left")
         table.add_column("way")
         for side in study.factors:
-            table.add_column(f"{side} alone", justify="right")
+            table.add_column(side, justify="right")
         table.add_column("is for")
+        uses = factors_for(study.factors)
         for v in Layout(OverloadFactors).variables:
             sizes = (number(getattr(factors, v.name), v.unit, v.kind) for factors in study.factors.values())
-            table.add_row(v.description, *sizes, FACTOR_FOR[v.name])
+            table.add_row(v.description, *sizes, uses[v.name])
         console.print(table)
     if study.pins:
         heaviest = {pin: max(t[pin]["peak"] for t in study.pins.values()) for pin in study.pins["steady"]}

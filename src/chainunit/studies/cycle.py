@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -64,41 +65,51 @@ def _cycle_alone(
 
 @declaration
 class OverloadFactors:
-    """How much more one side alone asks than both, three ways for three questions; see `overload_factors`. The first
-    is the one that sizes the drive."""
+    """How much more one side asks than both, five ways for as many questions; see `overload_factors`. The first is
+    the one that sizes the drive."""
 
-    crank_torque: Value = quantity("1", "crank torque, ratio of cycle maxima")
-    rocker_torque: Value = quantity("1", "rocker torque, ratio of cycle maxima")
+    feed_crank_torque: Value = quantity("1", "crank torque, all feed on the side, ratio of cycle maxima")
+    feed_rocker_torque: Value = quantity("1", "rocker torque, all feed on the side, ratio of cycle maxima")
+    crank_torque: Value = quantity("1", "crank torque, organ alone, ratio of cycle maxima")
+    rocker_torque: Value = quantity("1", "rocker torque, organ alone, ratio of cycle maxima")
     static_at_extreme: Value = quantity(
         "1", "R/(R - R of the other organ), at rest at the extreme where it is least"
     )
 
 
-FACTOR_FOR = {
-    "crank_torque": "the larger sizes the drive: gear, motor, crank pin",
-    "rocker_torque": "strength of rocker, pivot, organ bearings",
-    "static_at_extreme": "comparison with the papers; no design factor",
-}
-"""What each overload factor is for."""
+def factors_for(factors: Mapping[SideName, OverloadFactors]) -> dict[str, str]:
+    """What each overload factor is for, by its name; of the first, which feed sizes the drive."""
+    side = max(factors, key=lambda name: factors[name].feed_crank_torque)
+    feed = f"all on the {side}" if factors[side].feed_crank_torque > 1.0 else "on both sides"
+    return {
+        "feed_crank_torque": f"feed {feed} sizes the drive: gear, motor, crank pin",
+        "feed_rocker_torque": "strength of rocker, pivot, organ bearings",
+        "crank_torque": "drive of a machine with one organ",
+        "rocker_torque": "rocker of a machine with one organ",
+        "static_at_extreme": "comparison with the papers; no design factor",
+    }
 
 
 def overload_factors(
     machine: ChainUnit, crank_speed: float, left: SideLoads, right: SideLoads, side: SideName = "left"
 ) -> OverloadFactors:
-    """The overload factors of the machine with its organ of `side` alone against both.
+    """The overload factors of the machine on its `side` against both.
+
+    What one-sided feed asks are the first two: ratios of cycle maxima at `crank_speed`, all feed on that side to feed
+    on both, with both organs in place. The others are of a machine with its organ of `side` alone, as the papers'.
 
     `static_at_extreme` is, of the left organ, the papers' R_left/(R_left - R_right) at the right extreme of the
     rocker, at rest; of the right organ R_right/(R_right - R_left) at the left extreme, which is not as far out.
     It diverges as the swing shrinks, and its value at the extreme is its minimum, so that it is no design
-    factor (docs/physics.md). The other two are ratios of cycle maxima at `crank_speed`, one organ alone to
-    both, of the rocker torque and of the crank torque: gravity and inertia cancel or add up there, and above
-    a certain speed both sides together are the heavier case.
+    factor (docs/physics.md). In the ratios of one organ alone to both, gravity and inertia cancel or add up, and
+    above a certain speed both sides together are the heavier case.
     """
     extremes = machine.rocker_extremes()
     # each organ pulls hardest at the rocker where this is farthest from it
     psi = extremes[0 if side == "left" else 1][0]
     static = machine.chamber(psi, 0.0, 0.0, left, right)
     both = cycle(machine, crank_speed, left, right)
+    fed = cycle(machine, crank_speed, *all_on_one(side, left, right))
     one = _cycle_alone(machine, side, crank_speed, left, right)
 
     def ratio(x: Any, y: Any) -> float:
@@ -106,6 +117,8 @@ def overload_factors(
         return float(np.max(np.abs(x))) / whole if whole > 0.0 else math.nan
 
     return OverloadFactors(
+        feed_crank_torque=ratio(fed.crank_torque, both.crank_torque),
+        feed_rocker_torque=ratio(fed.outputs.rocker.tau, both.outputs.rocker.tau),
         crank_torque=ratio(one.crank_torque, both.crank_torque),
         rocker_torque=ratio(one.outputs.rocker.tau, both.outputs.rocker.tau),
         static_at_extreme=ratio(getattr(static, side).tangential_load, static.rocker.tangential_load),

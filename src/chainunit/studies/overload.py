@@ -33,7 +33,7 @@ from ..text import entry, number
 from . import protection, verdict
 from .chain import HIGH, ChainResult, study_chain
 from .choice import choose
-from .cycle import FACTOR_FOR, OverloadFactors, Sides, all_on_one, cycle, overload_factors, sides_over_speed
+from .cycle import OverloadFactors, Sides, all_on_one, cycle, factors_for, overload_factors, sides_over_speed
 from .drive import Drive
 from .monte_carlo import MonteCarloResult, Task
 from .monte_carlo import run as run_monte_carlo
@@ -1369,6 +1369,7 @@ def _note_shaft(study: Study) -> None:
 def as_dict(study: Study) -> dict[str, Any]:
     """Everything but the time series, ready for JSON: each number with its unit."""
     config = study.config
+    uses = factors_for(study.factors) if study.factors else {}
 
     return {
         "chainunit": __version__,
@@ -1378,7 +1379,7 @@ def as_dict(study: Study) -> dict[str, Any]:
         "answers": {name: entries(answers) for name, answers in study.answers.items()},
         "start_up": entries(study.start) if study.start else None,
         "overload_factors": {
-            side: {name: factor | {"for": FACTOR_FOR[name]} for name, factor in entries(factors).items()}
+            side: {name: factor | {"for": uses[name]} for name, factor in entries(factors).items()}
             for side, factors in study.factors.items()
         }
         or None,
