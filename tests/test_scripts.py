@@ -127,6 +127,50 @@ def test_start_values_of_a_script(name, tmp_path):
     assert one.tolist() == first.tolist() and two.tolist() == again.tolist() and one.tolist() != two.tolist()
 
 
+def test_a_script_with_a_class_and_imports_of_its_own(tmp_path):
+    """Both were built without a word, and no host could instantiate the FMU."""
+    text = (FOLDER / "ChamberForces.py").read_text()
+    script = tmp_path / "MyChamber.py"
+    script.write_text(
+        text.replace("class ChamberForces", "class MyChamber").replace(
+            "from chainunit.machines import chain_unit",
+            "import chainunit.integrate as steps\nfrom chainunit.drives import cardan, dc_motor, driveline\n"
+            "from chainunit.machines import chain_unit",
+        )
+        + '    start = {"crank.m": len(driveline.CardanDriveline.name) + float(steps.Solver is not None)}\n'
+    )
+    file = build(script, tmp_path)
+    assert validate_fmu(str(file)) == []
+    description = fmpy.read_model_description(str(file))
+    assert description.coSimulation.modelIdentifier == "MyChamber"
+    assert {v.name: v.start for v in description.modelVariables}["crank.m"] == "16.0"
+    plain = tmp_path / "plain"
+    plain.mkdir()
+    other = build(FOLDER / "ChamberForces.py", plain)
+    # side by side: the first that is loaded must not hide modules from the second
+    for files in ((other, file), (file, other)):
+        rows = simulated(*files)
+        assert rows[0].dtype == rows[1].dtype and rows[0].tolist() != rows[1].tolist()
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "from chainunit import ChainUnit",
+        "import chainunit.drives.cardan",
+        "from chainunit.machines.chain_unit import ChamberForces; import chainunit",
+    ],
+)
+def test_an_import_that_no_fmu_can_carry_is_refused(line, tmp_path):
+    script = tmp_path / "ChamberForces.py"
+    script.write_text((FOLDER / "ChamberForces.py").read_text().replace("\n\n\n", f"\n{line}\n\n\n", 1))
+    with pytest.raises(
+        AssertionError, match="InputError: the script imports chainunit: must be a module of chainunit"
+    ):
+        build(script, tmp_path)
+    assert not list(tmp_path.glob("*.fmu"))
+
+
 @pytest.mark.skipif(host() != "linux64" or shutil.which("cc") is None, reason="a C compiler on 64-bit Linux")
 def test_the_commands_of_the_readme(native_fmus, tmp_path):
     """What the README prints compiles a native FMU from its own sources, with the same results."""

@@ -167,17 +167,19 @@ def model_description(
     kinds: Mapping[str, Mapping[str, str]],
     version: str,
     sources: Sequence[str] = (),
+    identifier: str = "",
 ) -> Element:
     """The XML tree of an FMI 2.0 FMU.
 
     `kinds` maps "ModelExchange" and "CoSimulation" to the attributes of their elements; with Model Exchange the
     derivatives of the states are variables, too. `sources` are the files that the FMU can be compiled from.
+    `identifier` is the name of its library, where that is not the model's.
     """
     model = interface.model
     root = _root(model, version, {"fmiVersion": "2.0", "guid": guid})
     root.set("numberOfEventIndicators", "0")
     for kind, options in kinds.items():
-        element = SubElement(root, kind, {"modelIdentifier": model.name, **options})
+        element = SubElement(root, kind, {"modelIdentifier": identifier or model.name, **options})
         if sources:
             files = SubElement(element, "SourceFiles")
             for name in sources:

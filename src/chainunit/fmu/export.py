@@ -6,13 +6,14 @@ of: two FMUs in one process never share code by accident, and the same model giv
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import re
 import sys
 import tempfile
 import uuid
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from importlib import metadata
 from pathlib import Path
 from xml.etree.ElementTree import Element, tostring
@@ -20,6 +21,7 @@ from xml.etree.ElementTree import Element, tostring
 # now, not at need: a Python FMU that has run in this process brings a pythonfmu of its own, without binaries
 from pythonfmu import FmuBuilder
 
+from ..errors import InputError
 from ..files import folder, whole
 from ..model import Model
 from .accompany import accompanying
@@ -71,7 +73,7 @@ def export(model: type[Model], file: Path, start: dict[str, float] | None = None
     folder(file.parent)
     with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
         work = Path(scratch)
-        script = work / f"{model.name}_{_hash(interface)}.py"
+        script = work / f"{model.name}_{_hash(interface, dict(_shipped(model)), model.name)}.py"
         script.write_text(_script(model, start or {}))
         raw = _build(script, work / "raw.fmu")
         version = metadata.version("chainunit")
@@ -92,30 +94,36 @@ def complete(slave: type[ModelSlave], resources: Path) -> Element:
     Raises
     ------
     KeyError, InputError
-        see `export`.
+        see `export`; also for an import of the script that cannot be carried.
     """
     interface = checked(slave.model, slave.start)
-    version, hashed = metadata.version("chainunit"), _hash(interface)
+    script = resources / f"{slave.__module__}.py"
+    text = script.read_text("utf-8")
+    shipped = _imported(text) | dict(_shipped(slave.model))
+    version, hashed = metadata.version("chainunit"), _hash(interface, shipped, slave.__name__)
     package = resources / f"chainunit_{hashed[:12]}"
-    for name, content in _shipped(slave.model):
+    for name, content in shipped.items():
         target = package / name
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_bytes(content)
     (package / "__init__.py").write_text(
         f'"""chainunit {version}, the part that {interface.model.name} needs."""\n'
     )
-    script = resources / f"{slave.__module__}.py"
-    script.write_text(re.sub(r"(?m)^(from|import) chainunit\b", rf"\1 {package.name}", script.read_text()))
-    return model_description(interface, f"{{{uuid.UUID(hashed)}}}", _KINDS, version)
+    script.write_text(re.sub(r"(?m)^( *(?:from|import)) chainunit\b", rf"\1 {package.name}", text), "utf-8")
+    # pythonfmu names the binaries by the class
+    return model_description(
+        interface, f"{{{uuid.UUID(hashed)}}}", _KINDS, version, identifier=slave.__name__
+    )
 
 
-def _hash(interface: Interface) -> str:
+def _hash(interface: Interface, shipped: Mapping[str, bytes], identifier: str) -> str:
     """Of all that the FMU is made of, 32 digits."""
     digest = hashlib.sha256()
-    for name, content in sorted(_shipped(interface.model)):
+    for name, content in sorted(shipped.items()):
         digest.update(name.encode() + b"\0" + content + b"\0")
     digest.update(metadata.version("pythonfmu").encode())
-    digest.update(tostring(model_description(interface, "", _KINDS, metadata.version("chainunit"))))
+    version = metadata.version("chainunit")
+    digest.update(tostring(model_description(interface, "", _KINDS, version, identifier=identifier)))
     return digest.hexdigest()[:32]
 
 
@@ -125,6 +133,74 @@ def _shipped(model: type[Model]) -> Iterator[tuple[str, bytes]]:
         path = _PACKAGE / name
         for source in sorted(path.glob("*.py")) if path.is_dir() else [path]:
             yield source.relative_to(_PACKAGE).as_posix(), source.read_bytes()
+
+
+def _imported(script: str) -> dict[str, bytes]:
+    """Files of this package that a script imports, and what those import when they are imported, by their path.
+
+    Raises
+    ------
+    InputError
+        for an import that is none of a module.
+    """
+    found: dict[str, bytes] = {}
+    waiting = list(_imports(ast.walk(ast.parse(script)), ()))
+    for module in waiting:
+        if not module or not _file(module):
+            raise InputError(
+                f"the script imports {'.'.join(('chainunit', *module))}: must be a module of chainunit, "
+                "such as `from chainunit.machines import chain_unit`"
+            )
+    while waiting:
+        module = waiting.pop()
+        for depth in range(1, len(module) + 1):
+            path = _file(module[:depth])
+            name = path.relative_to(_PACKAGE).as_posix() if path else ""
+            if path is None or name in found:
+                continue
+            found[name] = path.read_bytes()
+            place = module[:depth] if path.name == "__init__.py" else module[: depth - 1]
+            waiting += _imports(_at_import(ast.parse(found[name])), place)
+    return found
+
+
+def _imports(nodes: Iterable[ast.AST], package: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
+    """Modules of chainunit that code in `package` of it imports, by the parts of their names behind "chainunit"; no
+    parts for chainunit itself."""
+    for node in nodes:
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                first, *parts = alias.name.split(".")
+                if first == "chainunit":
+                    yield tuple(parts if alias.asname else ())
+        elif isinstance(node, ast.ImportFrom):
+            parts = node.module.split(".") if node.module else []
+            if node.level:
+                parts = [*package[: len(package) - node.level + 1], *parts]
+            elif parts.pop(0) != "chainunit":
+                continue
+            for alias in node.names:
+                inner = (*parts, alias.name)
+                yield inner if _file(inner) else tuple(parts)
+
+
+def _at_import(tree: ast.Module) -> Iterator[ast.AST]:
+    """What runs when a module is imported."""
+    waiting: list[ast.AST] = [tree]
+    while waiting:
+        for node in ast.iter_child_nodes(waiting.pop()):
+            if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)) or (
+                isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+            ):
+                continue
+            yield node
+            waiting.append(node)
+
+
+def _file(module: tuple[str, ...]) -> Path | None:
+    """The file of a module or package inside this one."""
+    place = _PACKAGE.joinpath(*module)
+    return next((p for p in (place / "__init__.py", place.with_suffix(".py")) if p.is_file()), None)
 
 
 def _script(model: type[Model], start: dict[str, float]) -> str:
