@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import io
 import math
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from chainunit import config
+from chainunit.config import SCENARIOS
+from chainunit.report import table
 from chainunit.studies import overload, sizing
 from chainunit.studies.protection import Obstacle, Setting, mean_load, relay_trip, stall
 
@@ -46,7 +50,7 @@ def test_mean_load_by_hand():
 
 def test_a_setting_lies_between_normal_duty_and_what_opens_it():
     jam, blocked = {"jam_left": 400.0}, {"blocked": 900.0}
-    found = Setting(normal=200.0, motor=600.0, gear=1000.0, overloads=jam | blocked | {"dip": 230.0})
+    found = Setting(normal=200.0, motor=600.0, gear=1000.0, overloads=jam | blocked | {"lumps": 230.0})
     assert found.torque == 250.0 and found.obstacle is None and found.opens == jam | blocked
     # what the motor cannot give, what the gear may not carry, and what no overload reaches
     for least, obstacle in (
@@ -56,6 +60,9 @@ def test_a_setting_lies_between_normal_duty_and_what_opens_it():
         (Setting(350.0, 600.0, 1000.0, {}), Obstacle.OVERLOADS),
     ):
         assert least.torque is None and least.obstacle is obstacle
+    # a dip of the voltage that opens it is no protection
+    dip = Setting(200.0, 600.0, 1000.0, {"jam_left": 240.0}, {"dip": 300.0})
+    assert dip.obstacle is Obstacle.OVERLOADS and dip.opens == {} and dip.nuisances == {"dip": 300.0}
 
 
 HEAVY = """
@@ -94,12 +101,23 @@ def test_the_recommended_coupling_is_tried_in_its_own_study(tmp_path, monkeypatc
     assert found.torque is not None and not study.insufficient
     steady = study.answers["steady"].crank_torque_peak
     assert 1.2 * steady < found.torque < found.motor < study.start_torque
-    assert "held shut in the start" in overload.coupling_sentence(study)
+    said = overload.coupling_sentence(study)
+    assert "held shut in the start" in said
+    # all feed on the right is normal duty, and its torque the larger
+    assert found.normal > 1.15 * max(study.sizing.cycle.torque_peak, 208.0)
     monkeypatch.undo()
     tried = ran(HEAVY % 6000.0 + f"[coupling]\ntrip_torque = {found.torque}\n", tmp_path, monkeypatch)
     assert tried.failure is None
     opened = {n for n, a in tried.answers.items() if a.coupling_trip_time is not None}
-    assert opened == set(found.opens) == {"jam_left", "jam_right", "blocked", "dip"}
+    assert set(found.opens) == {"jam_left", "jam_right", "blocked"} and set(found.nuisances) == {"dip"}
+    assert opened == {*found.opens, *found.nuisances}
+    assert "nuisance trip, which protects nothing: it opens, too, where the voltage" in said
+    assert any("nuisance trip that protects nothing: the voltage dips." in note for note in tried.warnings)
+    # it cuts off the peaks that would set it: no advice, and the stiffer stops without it
+    assert tried.setting is None and set(overload.as_dict(tried)["sizing"]["protection"]) == {"relay_current"}
+    for name, peak in vars(study.block_peaks).items():
+        assert getattr(tried.block_peaks, name) == pytest.approx(peak, rel=1e-6), name
+    assert any("These peaks are without the safety coupling" in note for note in tried.notes)
     assert any("held shut in the start" in note for note in tried.warnings)
 
 
@@ -111,14 +129,43 @@ def test_without_a_shock_no_coupling_is_recommended(tmp_path, monkeypatch):
     assert numbers["trip_torque"]["value"] is None and numbers["coupling"].startswith("No safety coupling")
 
 
+def test_one_sided_feed_and_a_loaded_soft_start_are_normal_duty(tmp_path, monkeypatch):
+    """Sizing has the torque of all feed on the right as the study has it, whatever side is the heavier. A start under
+    load is no shock; what passes the gear is told."""
+    text = 'start = "soft"\n' + HEAVY.replace(
+        '"feed_left", "feed_right", "jam_left", "jam_right", "blocked", "dip"',
+        '"feed_right", "start_loaded", "jam_right"',
+    )
+    study = ran(text % 6000.0 + "[gear]\ntorque_limit = 450\n", tmp_path, monkeypatch)
+    assert study.failure is None and not study.insufficient
+    found = study.setting
+    assert set(found.overloads) == {"jam_right"} and not found.disturbances
+    start = float(abs(study.runs["start_loaded"]["motor.tau"]).max()) * study.drive.ratio
+    assert found.normal == pytest.approx(max(start, study.sizing.best.peak_torque), rel=1e-3)
+    fed = float(abs(study.runs["feed_right"]["motor.tau"]).max()) * study.drive.ratio
+    assert study.sizing.best.duty_torque == pytest.approx(fed, rel=0.01)
+    (warning,) = [said for said in study.warnings if "the gear's permitted 450 N m" in said]
+    assert SCENARIOS["jam_right"] in warning and SCENARIOS["start_loaded"] not in warning
+
+
+def test_an_insufficient_motor_gets_no_advice(tmp_path, monkeypatch):
+    text = HEAVY.replace('"feed_left", "feed_right", ', "").replace(', "jam_right", "blocked", "dip"', "")
+    study = ran(text % 6000.0 + "[gear]\ntorque_limit = 250\n", tmp_path, monkeypatch)
+    assert study.insufficient and study.setting is None
+    assert overload.as_dict(study)["sizing"]["protection"] == {}
+    out = io.StringIO()
+    table.show(study, Console(file=out, markup=False, width=200))
+    assert "Insufficient motor:" in out.getvalue() and "relay at" not in out.getvalue()
+
+
 def test_a_coupling_that_never_opens_gets_a_remark(tmp_path):
     light = 'events = ["jam_left"]\n[run]\nstep = 0.002\n[overload]\nturns = 1\njam_force = %g\n'
     study = overload.run_study(config.parse(light % 2000 + "[coupling]\ntrip_torque = 5000\n"), tmp_path)
-    (remark,) = [note for note in study.warnings if "opens in no overload" in note]
+    (remark,) = [note for note in study.warnings if "opens in no jam, lump or block" in note]
     # what the jam asks, and the motor's current limit times its torque constant through the gear
     assert f"{study.answers['jam_left'].crank_torque_peak:.0f} N m on it at most" in remark
     assert f"motor gives {4.4 * 1.27 * 50:.0f} N m at most" in remark
     study = overload.run_study(config.parse(light % 9000 + "[coupling]\ntrip_torque = 320\n"), tmp_path)
     assert study.answers["jam_left"].coupling_trip_time is not None
     assert any("stalls the motor" in note for note in study.warnings)
-    assert not any("opens in no overload" in note for note in study.warnings)
+    assert not any("opens in no jam, lump or block" in note for note in study.warnings)

@@ -310,10 +310,11 @@ def _show_sizing(study: Study, console: Console) -> None:
     assert sized is not None
     best, caveat = sized.best, _caveat(study)
     wheel = f"flywheel {best.flywheel:.3g} kg m2" if best.flywheel else "no flywheel"
+    relay = f"; relay at {best.motor.nameplate.rated_current:.2f} A" if study.advised else ""
     console.print(f"{sized.answer[:1].upper()}{sized.answer[1:]}.", soft_wrap=True)
     console.print(
         f"{'Insufficient motor' if study.insufficient else 'Motor'}: {best.motor.designation}, ratio "
-        f"{best.drive.ratio:.2f}, {wheel}; relay at {best.motor.nameplate.rated_current:.2f} A{caveat}.",
+        f"{best.drive.ratio:.2f}, {wheel}{relay}{caveat}.",
         soft_wrap=True,
     )
     if study.setting is not None:

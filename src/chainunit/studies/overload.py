@@ -196,7 +196,8 @@ class Study:
     limits: Limits | None = None
     runs: dict[str, xr.Dataset] = field(default_factory=dict)
     setting: protection.Setting | None = None
-    """the safety coupling that a sized drive should have"""
+    """the safety coupling that a sized drive should have, where none is given: one that is given cuts off the peaks
+    which would set it"""
     start_torque: float | None = None
     """peak on the coupling in a start direct on line, at the crank [N m]: judged apart"""
     steady_from: float | None = None
@@ -237,6 +238,11 @@ class Study:
     def insufficient(self) -> bool:
         """Whether sizing found no motor that fits, so that all is run with the nearest."""
         return self.sizing is not None and self.sizing.chosen is None
+
+    @property
+    def advised(self) -> bool:
+        """Whether sizing found a motor, for which a relay and a coupling can be advised."""
+        return self.sizing is not None and not self.insufficient
 
     @property
     def start_apart(self) -> bool:
@@ -288,7 +294,7 @@ def run_study(
     except KeyboardInterrupt:
         # between two runs, or in one that is not a co-simulation
         study.failure = InterruptedRunError("interrupted")
-    if study.sizing is not None and "steady" in study.answers:
+    if study.advised and config.coupling is None and "steady" in study.answers:
         study.setting = _setting(study)
     if study.drive.chain is not None and not isinstance(study.failure, InterruptedRunError):
         _chains(study, files["machine"], report)
@@ -614,16 +620,16 @@ def _setting(study: Study) -> protection.Setting:
     assert study.sizing is not None
     best, drive = study.sizing.best, study.drive
     peaks = _peaks(study)
-    # feed on one side lasts: it is no shock that a coupling is for
-    lasting = [name for name in peaks if OVERLOADS[name].kind in ("empties", "feed")]
-    normal = [_on_coupling(drive, study.steady), best.duty_torque, *(peaks.pop(name) for name in lasting)]
+    lasting = [peak for name, peak in peaks.items() if OVERLOADS[name].kind in _EMPTYING]
+    normal = [_on_coupling(drive, study.steady), best.duty_torque, *lasting]
     if not study.start_apart:
         normal.append(_on_coupling(drive, study.runs["start_up"]))
     return protection.Setting(
         normal=max(normal),
         motor=best.shaft_torque * drive.ratio,
         gear=study.config.gear.torque_limit,
-        overloads=peaks,
+        overloads={name: peak for name, peak in peaks.items() if OVERLOADS[name].kind in _SHOCKS},
+        disturbances={name: peak for name, peak in peaks.items() if OVERLOADS[name].kind == "dip"},
     )
 
 
@@ -633,13 +639,18 @@ def _guards(study: Study) -> dict[str, float]:
 
 
 def _block_peaks(study: Study, simulation: CoSimulation, event: float) -> BlockPeaks:
-    """The peaks with the rocker blocked by softer and stiffer stops, from the steady state that was saved."""
+    """The peaks with the rocker blocked by softer and stiffer stops and by the one that is given, from the steady
+    state that was saved; all without a safety coupling, which would cut them off."""
     config, drive = study.config, study.drive
     o, answers = config.overload, study.answers["blocked"]
-    peaks = {
-        name: [getattr(answers, f"{name}_peak")] for name in ("crank_torque", "motor_torque", "rocker_torque")
-    }
-    for factor in (1.0 / _DECADE, _DECADE):
+    peaks: dict[str, list[float]] = {"crank_torque": [], "motor_torque": [], "rocker_torque": []}
+    factors = [1.0 / _DECADE, _DECADE]
+    if config.coupling is None:
+        for name, sizes in peaks.items():
+            sizes.append(getattr(answers, f"{name}_peak"))
+    else:
+        factors.append(1.0)
+    for factor in factors:
         stop = replace(
             o, block_stiffness=factor * o.block_stiffness, block_damping=math.sqrt(factor) * o.block_damping
         )
@@ -650,7 +661,7 @@ def _block_peaks(study: Study, simulation: CoSimulation, event: float) -> BlockP
             **drive.reference(config.run.crank_speed),
         }
         until = event + follow_time(other, "blocked")
-        run = _event(other, simulation, "blocked", event, until, guards=_guards(study))
+        run = _event(other, simulation, "blocked", event, until)
         run = run.sel(time=slice(event, None))
         for name, torque in (
             ("crank_torque", drive.crank_torque(run)),
@@ -1091,6 +1102,12 @@ def _note(study: Study) -> None:
             "stiffness of what is jammed (N/m) times the "
             "square of its distance from the pivot C (m): overload.block_stiffness, now "
             f"{number(o.block_stiffness, 'N.m/rad')}, and block_damping, now {number(o.block_damping, 'N.m.s/rad')}."
+            + (
+                " These peaks are without the safety coupling, which opens at "
+                f"{_torque(config.coupling.trip_torque)}."
+                if config.coupling
+                else ""
+            )
         )
     if study.torsion is not None:
         _note_shaft(study)
@@ -1113,12 +1130,16 @@ _CALLED = {
 }
 """Runs by name, as sentences call them."""
 _EMPTYING = ("empties", "feed", "start")
-"""Kinds of overloads in which a side carries no material."""
+"""Kinds of overloads in which a side carries no material; they last, or are a start: duty that a safety coupling
+has to carry."""
+_SHOCKS = ("jam", "lumps", "blocked")
+"""Kinds of overloads that a safety coupling is for."""
 
 
 def _warn_of_runs(study: Study) -> None:
     """What happened in the runs, a line for each kind of event with all runs in which it did."""
     happened: dict[str, list[str]] = {}
+    peaks = _peaks(study)
 
     def tell(what: str, run: str, size: str = "") -> None:
         happened.setdefault(what, []).append(f"{_CALLED[run]}{f' ({size})' if size else ''}")
@@ -1134,6 +1155,13 @@ def _warn_of_runs(study: Study) -> None:
             tell(
                 f"The motor runs into its current limit of {number(study.motor.limit.i, 'A', full=False)}",
                 name,
+            )
+        limit = study.config.gear.torque_limit
+        if "torque_limit" in study.config.gear_given and name in peaks and peaks[name] > limit:
+            tell(
+                f"The torque passes the gear's permitted {number(limit, 'N.m', full=False)}",
+                name,
+                _torque(peaks[name]),
             )
         if answers.stall_time is not None:
             late = answers.stall_time > 10.0 * study.config.run.step
@@ -1265,9 +1293,10 @@ def coupling_sentence(study: Study) -> str:
         )
     if found.obstacle is protection.Obstacle.OVERLOADS:
         most = max(found.overloads.values(), default=0.0)
-        return (
-            f"No safety coupling is recommended: it has to open above {above}, and the overloads of this study put "
-            f"{_torque(most)} on it at most."
+        return f"No safety coupling is recommended: it has to open above {above}, and " + (
+            f"the jams, lumps and blocks of this study put {_torque(most)} on it at most."
+            if found.overloads
+            else "this study has no jam, lump or block that would open it."
         )
     shut = {name: peak for name, peak in found.overloads.items() if name not in found.opens}
     said = (
@@ -1275,6 +1304,8 @@ def coupling_sentence(study: Study) -> str:
         f"crank. It opens where {listed(found.opens)}"
     )
     said += f"; it stays shut where {listed(shut)}." if shut else "."
+    if found.nuisances:
+        said += f" A nuisance trip, which protects nothing: it opens, too, where {listed(found.nuisances)}."
     if study.start_torque is not None and study.start_torque > found.least:
         said += (
             f" A start direct on line puts {_torque(study.start_torque)} on it: it has to be held shut in the start, "
@@ -1293,10 +1324,17 @@ def _warn_of_coupling(study: Study, trip: float) -> None:
             f"A start direct on line puts {_torque(study.start_torque)} on the safety coupling, which opens at "
             f"{_torque(trip)}: it is taken to be held shut in the start."
         )
-    if peaks and all(study.answers[name].coupling_trip_time is None for name in peaks):
+    opened = {name for name in peaks if study.answers[name].coupling_trip_time is not None}
+    shocks = {name: peak for name, peak in peaks.items() if OVERLOADS[name].kind in _SHOCKS}
+    if nuisances := [_CALLED[name] for name in peaks if name in opened and name not in shocks]:
         warn(
-            f"The safety coupling opens in no overload of this study: it is set to {_torque(trip)}, they put "
-            f"{_torque(max(peaks.values(), default=0.0))} on it at most, steady running "
+            f"The safety coupling, set to {_torque(trip)}, opens where no shock asks for it, a nuisance trip that "
+            f"protects nothing: {'; '.join(nuisances)}."
+        )
+    if shocks and not opened.intersection(shocks):
+        warn(
+            f"The safety coupling opens in no jam, lump or block of this study: it is set to {_torque(trip)}, they "
+            f"put {_torque(max(shocks.values()))} on it at most, steady running "
             f"{_torque(_on_coupling(drive, study.steady))}; the motor gives {_torque(most)} at most."
         )
     elif trip > most:
@@ -1438,8 +1476,10 @@ def as_dict(study: Study) -> dict[str, Any]:
 
 
 def _protection(study: Study) -> dict[str, Any]:
-    """Settings of the protection of the drive that sizing chose."""
+    """Settings of the protection of the drive that sizing chose; none for a motor that is insufficient."""
     assert study.sizing is not None
+    if not study.advised:
+        return {}
     relay = {
         "value": study.sizing.best.motor.nameplate.rated_current,
         "unit": "A",
@@ -1465,6 +1505,13 @@ def _protection(study: Study) -> dict[str, Any]:
                 peak, f"{SCENARIOS[name]}: {'opens it' if name in found.opens else 'leaves it shut'}"
             )
             for name, peak in found.overloads.items()
+        },
+        "disturbances": {
+            name: torque(
+                peak,
+                f"{SCENARIOS[name]}: {'a nuisance trip' if name in found.nuisances else 'leaves it shut'}",
+            )
+            for name, peak in found.disturbances.items()
         },
     }
 

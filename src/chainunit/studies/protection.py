@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
@@ -71,13 +71,15 @@ class Setting:
 
     The setting is `MARGIN` times the largest torque of `normal` duty: below what the `motor` gives at most in steady
     running, so that it opens before the motor stalls, below what the `gear` may carry, and below what at least one of
-    the `overloads` gives, by name their peaks. Otherwise `obstacle` says why there is none.
+    the `overloads` gives, by name their peaks: the shocks that a coupling is for. Otherwise `obstacle` says why there
+    is none. `disturbances` are the peaks of what it has to ride out, by name, such as a dip of the voltage.
     """
 
     normal: float
     motor: float
     gear: float
     overloads: Mapping[str, float]
+    disturbances: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def least(self) -> float:
@@ -100,6 +102,11 @@ class Setting:
     def opens(self) -> dict[str, float]:
         """The overloads in which a coupling of the least setting opens, with their peaks."""
         return {name: peak for name, peak in self.overloads.items() if peak > self.least}
+
+    @property
+    def nuisances(self) -> dict[str, float]:
+        """The disturbances in which it opens, too, with their peaks: it protects nothing there."""
+        return {name: peak for name, peak in self.disturbances.items() if peak > self.least}
 
 
 def stall(time: Any, speed: Any, asked: float, share: float = 0.1) -> float | None:
