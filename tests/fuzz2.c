@@ -1,5 +1,6 @@
 /* Random calls of every FMI 2.0 function, good and bad, against the sources of an FMU; built with AddressSanitizer and
  * UndefinedBehaviorSanitizer. Ends with 0 where nothing was touched that must not be. */
+#define FAILED fmi2Error
 #include "fuzz.h"
 
 #include "fmi2Functions.h"
@@ -13,6 +14,7 @@ static void logger(fmi2ComponentEnvironment e, fmi2String n, fmi2Status s, fmi2S
 int main(int argc, char **argv) {
     const long calls = argc > 1 ? atol(argv[1]) : 1000000;
     enum { N = 4, MOST = 128 };
+    int hears[N] = {0}; /* has a logger */
     fmi2Component instance[N] = {0};
     fmi2FMUstate state[N] = {0};
     const int references = model.n_p + model.n_u + 2 * model.n_x + model.n_y + 3;
@@ -46,7 +48,8 @@ int main(int argc, char **argv) {
             if (!alive) {
                 const int wrong = !random_below(20);
                 /* gone after the call: the FMU must not keep its address */
-                fmi2CallbackFunctions lent = {random_below(10) ? logger : NULL, calloc, free, NULL, NULL};
+                hears[i] = random_below(10) > 0;
+                fmi2CallbackFunctions lent = {hears[i] ? logger : NULL, calloc, free, NULL, NULL};
                 instance[i] = fmi2Instantiate(random_below(20) ? "unit" : random_below(2) ? "" : NULL,
                                               random_below(2) ? fmi2CoSimulation : fmi2ModelExchange,
                                               wrong ? random_below(2) ? "no" : NULL : model.guid, NULL,
@@ -60,68 +63,68 @@ int main(int argc, char **argv) {
                 instance[i] = NULL;
             }
             break;
-        case 1: s = fmi2SetupExperiment(c, 0, 0.0, random_below(4) ? 0.0 : random_value(), random_below(2), random_value()); break;
-        case 2: case 3: s = fmi2EnterInitializationMode(c); break;
-        case 4: case 5: s = fmi2ExitInitializationMode(c); break;
-        case 6: if (!random_below(10)) s = fmi2Terminate(c); break;
-        case 7: if (!random_below(5)) s = fmi2Reset(c); break;
-        case 8: case 9: case 10: s = fmi2SetReal(c, MAYBE(vr), n, MAYBE(value)); break;
+        case 1: TRY(fmi2SetupExperiment(c, 0, 0.0, random_below(4) ? 0.0 : random_value(), random_below(2), random_value())); break;
+        case 2: case 3: TRY(fmi2EnterInitializationMode(c)); break;
+        case 4: case 5: TRY(fmi2ExitInitializationMode(c)); break;
+        case 6: if (!random_below(10)) TRY(fmi2Terminate(c)); break;
+        case 7: if (!random_below(5)) TRY(fmi2Reset(c)); break;
+        case 8: case 9: case 10: TRY(fmi2SetReal(c, MAYBE(vr), n, MAYBE(value))); break;
         case 11: case 12: case 13:
             memset(x, 0, sizeof x);
-            s = fmi2GetReal(c, MAYBE(vr), n, MAYBE(x));
+            TRY(fmi2GetReal(c, MAYBE(vr), n, MAYBE(x)));
             if (s == fmi2OK)
                 for (size_t j = 0; j < n; ++j)
                     if (!isfinite(x[j])) return printf("reference %u: %g with status OK\n", vr[j], x[j]), 1;
             break;
         case 14: case 15:
             fmi2GetRealStatus(alive, fmi2LastSuccessfulTime, &time);
-            s = fmi2DoStep(c, random_below(20) ? time : random_value(), random_below(10) ? 1e-3 : random_value(), 1);
+            TRY(fmi2DoStep(c, random_below(20) ? time : random_value(), random_below(10) ? 1e-3 : random_value(), 1));
             break;
-        case 16: s = fmi2GetFMUstate(c, MAYBE(&state[i])); break;
-        case 17: s = fmi2SetFMUstate(c, state[random_below(N)]); break;
+        case 16: TRY(fmi2GetFMUstate(c, MAYBE(&state[i]))); break;
+        case 17: TRY(fmi2SetFMUstate(c, state[random_below(N)])); break;
         case 18:
             if (state[i] && fmi2SerializedFMUstateSize(alive, state[i], &size) == fmi2OK) {
                 bytes = realloc(bytes, size);
                 memset(bytes, 0, size);
-                s = fmi2SerializeFMUstate(c, MAYBE(state[i]), MAYBE(bytes), random_below(50) ? size : size - 1);
+                TRY(fmi2SerializeFMUstate(c, MAYBE(state[i]), MAYBE(bytes), random_below(50) ? size : size - 1));
             }
             break;
         case 19:
             if (bytes) {
                 const int damaged = !random_below(10) && flipped((unsigned char *)bytes, size);
-                s = fmi2DeSerializeFMUstate(c, MAYBE(bytes), random_below(20) ? size : random_below((unsigned)size),
-                                            MAYBE(&state[i]));
+                TRY(fmi2DeSerializeFMUstate(c, MAYBE(bytes), random_below(20) ? size : random_below((unsigned)size),
+                                            MAYBE(&state[i])));
                 if (damaged && s == fmi2OK) return puts("a damaged state was taken"), 1;
                 if (damaged) free(bytes), bytes = NULL;
             }
             break;
-        case 20: s = fmi2FreeFMUstate(c, MAYBE(&state[i])); break;
-        case 21: case 22: s = fmi2GetDirectionalDerivative(c, MAYBE(vr), n, MAYBE(known), n, MAYBE(value), MAYBE(sense)); break;
-        case 23: s = fmi2EnterEventMode(c); break;
-        case 24: s = fmi2NewDiscreteStates(c, MAYBE(&info)); break;
-        case 25: s = fmi2EnterContinuousTimeMode(c); break;
-        case 26: s = fmi2CompletedIntegratorStep(c, 1, MAYBE(&a), MAYBE(&b)); break;
-        case 27: s = fmi2SetTime(c, random_value()); break;
+        case 20: TRY(fmi2FreeFMUstate(c, MAYBE(&state[i]))); break;
+        case 21: case 22: TRY(fmi2GetDirectionalDerivative(c, MAYBE(vr), n, MAYBE(known), n, MAYBE(value), MAYBE(sense))); break;
+        case 23: TRY(fmi2EnterEventMode(c)); break;
+        case 24: TRY(fmi2NewDiscreteStates(c, MAYBE(&info))); break;
+        case 25: TRY(fmi2EnterContinuousTimeMode(c)); break;
+        case 26: TRY(fmi2CompletedIntegratorStep(c, 1, MAYBE(&a), MAYBE(&b))); break;
+        case 27: TRY(fmi2SetTime(c, random_value())); break;
         case 28:
             for (int j = 0; j < MOST; ++j) x[j] = random_below(50) ? 1.0 : random_value();
-            s = fmi2SetContinuousStates(c, MAYBE(x), random_below(20) ? (size_t)model.n_x : n);
+            TRY(fmi2SetContinuousStates(c, MAYBE(x), random_below(20) ? (size_t)model.n_x : n));
             break;
-        case 29: s = fmi2GetDerivatives(c, MAYBE(x), random_below(20) ? (size_t)model.n_x : n); break;
-        case 30: s = fmi2GetContinuousStates(c, MAYBE(x), random_below(20) ? (size_t)model.n_x : n); break;
-        case 31: s = fmi2SetRealInputDerivatives(c, MAYBE(known), n, MAYBE(order), MAYBE(value)); break;
-        case 32: s = fmi2GetRealOutputDerivatives(c, MAYBE(vr), n, MAYBE(order), MAYBE(x)); break;
-        case 33: s = fmi2CancelStep(c); break;
-        case 34: s = fmi2GetStatus(c, asked, &kind); break;
-        case 35: s = fmi2GetRealStatus(c, asked, MAYBE(x)); break;
-        case 36: s = fmi2GetIntegerStatus(c, asked, number); break;
-        case 37: s = fmi2GetBooleanStatus(c, asked, MAYBE(&a)); break;
-        case 38: s = fmi2GetStringStatus(c, asked, &said); break;
-        case 39: s = fmi2SetDebugLogging(c, random_below(2), random_below(2), category); break;
-        case 40: s = random_below(2) ? fmi2GetInteger(c, vr, n, number) : fmi2SetInteger(c, vr, n, number); break;
-        case 41: s = random_below(2) ? fmi2GetBoolean(c, vr, n, number) : fmi2SetBoolean(c, vr, n, number); break;
-        case 42: s = random_below(2) ? fmi2GetString(c, vr, n, text) : fmi2SetString(c, vr, n, text); break;
+        case 29: TRY(fmi2GetDerivatives(c, MAYBE(x), random_below(20) ? (size_t)model.n_x : n)); break;
+        case 30: TRY(fmi2GetContinuousStates(c, MAYBE(x), random_below(20) ? (size_t)model.n_x : n)); break;
+        case 31: TRY(fmi2SetRealInputDerivatives(c, MAYBE(known), n, MAYBE(order), MAYBE(value))); break;
+        case 32: TRY(fmi2GetRealOutputDerivatives(c, MAYBE(vr), n, MAYBE(order), MAYBE(x))); break;
+        case 33: TRY(fmi2CancelStep(c)); break;
+        case 34: TRY(fmi2GetStatus(c, asked, &kind)); break;
+        case 35: TRY(fmi2GetRealStatus(c, asked, MAYBE(x))); break;
+        case 36: TRY(fmi2GetIntegerStatus(c, asked, number)); break;
+        case 37: TRY(fmi2GetBooleanStatus(c, asked, MAYBE(&a))); break;
+        case 38: TRY(fmi2GetStringStatus(c, asked, &said)); break;
+        case 39: TRY(fmi2SetDebugLogging(c, random_below(2), random_below(2), category)); break;
+        case 40: TRY(random_below(2) ? fmi2GetInteger(c, vr, n, number) : fmi2SetInteger(c, vr, n, number)); break;
+        case 41: TRY(random_below(2) ? fmi2GetBoolean(c, vr, n, number) : fmi2SetBoolean(c, vr, n, number)); break;
+        case 42: TRY(random_below(2) ? fmi2GetString(c, vr, n, text) : fmi2SetString(c, vr, n, text)); break;
         default:
-            s = random_below(2) ? fmi2GetReal(c, NULL, n, NULL) : fmi2SetReal(c, NULL, n, NULL);
+            TRY(random_below(2) ? fmi2GetReal(c, NULL, n, NULL) : fmi2SetReal(c, NULL, n, NULL));
             fmi2GetNominalsOfContinuousStates(c, x, (size_t)model.n_x);
             fmi2GetEventIndicators(c, x, random_below(2));
             fmi2SerializedFMUstateSize(c, MAYBE(state[i]), MAYBE(&size));

@@ -1,4 +1,5 @@
 /* Random calls of the FMI 3.0 functions, good and bad, as fuzz2.c does it for FMI 2.0. */
+#define FAILED fmi3Error
 #include "fuzz.h"
 
 #include "fmi3Functions.h"
@@ -12,6 +13,7 @@ static void logger(fmi3InstanceEnvironment e, fmi3Status s, fmi3String c, fmi3St
 int main(int argc, char **argv) {
     const long calls = argc > 1 ? atol(argv[1]) : 1000000;
     enum { N = 4, MOST = 128 };
+    int hears[N] = {0}; /* has a logger */
     fmi3Instance instance[N] = {0};
     fmi3FMUState state[N] = {0};
     const unsigned references = (unsigned)(model.n_p + model.n_u + 2 * model.n_x + model.n_y + 3);
@@ -53,7 +55,8 @@ int main(int argc, char **argv) {
                 const int wrong = !random_below(20);
                 const char *token = wrong ? random_below(2) ? "no" : NULL : model.token;
                 const char *name = random_below(20) ? "unit" : random_below(2) ? "" : NULL;
-                const fmi3LogMessageCallback log = random_below(10) ? logger : NULL;
+                hears[i] = random_below(10) > 0;
+                const fmi3LogMessageCallback log = hears[i] ? logger : NULL;
                 instance[i] = random_below(2) ? fmi3InstantiateModelExchange(name, token, NULL, 0, 1, NULL, log)
                                               : fmi3InstantiateCoSimulation(name, token, NULL, 0, 1, 0, 0, NULL, 0, NULL,
                                                                             log, NULL);
@@ -67,62 +70,62 @@ int main(int argc, char **argv) {
             }
             break;
         case 1: case 2: case 3:
-            s = fmi3EnterInitializationMode(c, 0, 0.0, random_below(4) ? 0.0 : random_value(), random_below(2), random_value());
+            TRY(fmi3EnterInitializationMode(c, 0, 0.0, random_below(4) ? 0.0 : random_value(), random_below(2), random_value()));
             break;
-        case 4: case 5: s = fmi3ExitInitializationMode(c); break;
-        case 6: if (!random_below(10)) s = fmi3Terminate(c); break;
-        case 7: if (!random_below(5)) s = fmi3Reset(c); break;
-        case 8: case 9: case 10: s = fmi3SetFloat64(c, MAYBE(vr), n, MAYBE(value), m); break;
+        case 4: case 5: TRY(fmi3ExitInitializationMode(c)); break;
+        case 6: if (!random_below(10)) TRY(fmi3Terminate(c)); break;
+        case 7: if (!random_below(5)) TRY(fmi3Reset(c)); break;
+        case 8: case 9: case 10: TRY(fmi3SetFloat64(c, MAYBE(vr), n, MAYBE(value), m)); break;
         case 11: case 12: case 13:
             memset(x, 0, sizeof x);
-            s = fmi3GetFloat64(c, MAYBE(vr), n, MAYBE(x), m);
+            TRY(fmi3GetFloat64(c, MAYBE(vr), n, MAYBE(x), m));
             if (s == fmi3OK)
                 for (size_t j = 0; j < n; ++j)
                     if (!isfinite(x[j])) return printf("reference %u: %g with status OK\n", vr[j], x[j]), 1;
             break;
         case 14: case 15: case 16:
             fmi3GetFloat64(alive, &clock, 1, &time, 1);
-            s = fmi3DoStep(c, random_below(20) ? time : random_value(), random_below(10) ? 1e-3 : random_value(), 1, MAYBE(&a), MAYBE(&b),
-                           MAYBE(&d), MAYBE(&last));
+            TRY(fmi3DoStep(c, random_below(20) ? time : random_value(), random_below(10) ? 1e-3 : random_value(), 1, MAYBE(&a), MAYBE(&b),
+                           MAYBE(&d), MAYBE(&last)));
             break;
-        case 17: s = fmi3GetFMUState(c, MAYBE(&state[i])); break;
-        case 18: s = fmi3SetFMUState(c, state[random_below(N)]); break;
+        case 17: TRY(fmi3GetFMUState(c, MAYBE(&state[i]))); break;
+        case 18: TRY(fmi3SetFMUState(c, state[random_below(N)])); break;
         case 19:
             if (state[i] && fmi3SerializedFMUStateSize(alive, state[i], &size) == fmi3OK) {
                 bytes = realloc(bytes, size);
                 memset(bytes, 0, size);
-                s = fmi3SerializeFMUState(c, MAYBE(state[i]), MAYBE(bytes), random_below(50) ? size : size - 1);
+                TRY(fmi3SerializeFMUState(c, MAYBE(state[i]), MAYBE(bytes), random_below(50) ? size : size - 1));
             }
             break;
         case 20:
             if (bytes) {
                 const int damaged = !random_below(10) && flipped(bytes, size);
-                s = fmi3DeserializeFMUState(c, MAYBE(bytes), random_below(20) ? size : random_below((unsigned)size),
-                                            MAYBE(&state[i]));
+                TRY(fmi3DeserializeFMUState(c, MAYBE(bytes), random_below(20) ? size : random_below((unsigned)size),
+                                            MAYBE(&state[i])));
                 if (damaged && s == fmi3OK) return puts("a damaged state was taken"), 1;
                 if (damaged) free(bytes), bytes = NULL;
             }
             break;
-        case 21: s = fmi3FreeFMUState(c, MAYBE(&state[i])); break;
-        case 22: case 23: s = fmi3GetDirectionalDerivative(c, MAYBE(vr), n, MAYBE(known), n, MAYBE(value), m, MAYBE(x), random_below(20) ? n : m); break;
-        case 24: s = fmi3EnterEventMode(c); break;
-        case 25: s = fmi3UpdateDiscreteStates(c, MAYBE(&a), MAYBE(&b), MAYBE(&d), MAYBE(&e), MAYBE(&f), MAYBE(&last)); break;
-        case 26: s = fmi3EnterContinuousTimeMode(c); break;
-        case 27: s = fmi3CompletedIntegratorStep(c, 1, MAYBE(&a), MAYBE(&b)); break;
-        case 28: s = fmi3SetTime(c, random_value()); break;
+        case 21: TRY(fmi3FreeFMUState(c, MAYBE(&state[i]))); break;
+        case 22: case 23: TRY(fmi3GetDirectionalDerivative(c, MAYBE(vr), n, MAYBE(known), n, MAYBE(value), m, MAYBE(x), random_below(20) ? n : m)); break;
+        case 24: TRY(fmi3EnterEventMode(c)); break;
+        case 25: TRY(fmi3UpdateDiscreteStates(c, MAYBE(&a), MAYBE(&b), MAYBE(&d), MAYBE(&e), MAYBE(&f), MAYBE(&last))); break;
+        case 26: TRY(fmi3EnterContinuousTimeMode(c)); break;
+        case 27: TRY(fmi3CompletedIntegratorStep(c, 1, MAYBE(&a), MAYBE(&b))); break;
+        case 28: TRY(fmi3SetTime(c, random_value())); break;
         case 29:
             for (int j = 0; j < MOST; ++j) x[j] = random_below(50) ? 1.0 : random_value();
-            s = fmi3SetContinuousStates(c, MAYBE(x), n_x);
+            TRY(fmi3SetContinuousStates(c, MAYBE(x), n_x));
             break;
-        case 30: s = fmi3GetContinuousStateDerivatives(c, MAYBE(x), n_x); break;
-        case 31: s = fmi3GetContinuousStates(c, MAYBE(x), n_x); break;
-        case 32: s = fmi3GetOutputDerivatives(c, MAYBE(vr), n, MAYBE(order), MAYBE(x), m); break;
-        case 33: s = random_below(2) ? fmi3EnterStepMode(c) : fmi3EvaluateDiscreteStates(c); break;
+        case 30: TRY(fmi3GetContinuousStateDerivatives(c, MAYBE(x), n_x)); break;
+        case 31: TRY(fmi3GetContinuousStates(c, MAYBE(x), n_x)); break;
+        case 32: TRY(fmi3GetOutputDerivatives(c, MAYBE(vr), n, MAYBE(order), MAYBE(x), m)); break;
+        case 33: TRY(random_below(2) ? fmi3EnterStepMode(c) : fmi3EvaluateDiscreteStates(c)); break;
         case 34:
-            s = random_below(2) ? fmi3GetNominalsOfContinuousStates(c, x, n_x) : fmi3GetEventIndicators(c, x, n);
+            TRY(random_below(2) ? fmi3GetNominalsOfContinuousStates(c, x, n_x) : fmi3GetEventIndicators(c, x, n));
             break;
 #define TYPE(number, type) \
-    case number: s = random_below(2) ? fmi3Get##type(c, vr, n, (void *)room, n) : fmi3Set##type(c, vr, n, (void *)room, n); break
+    case number: TRY(random_below(2) ? fmi3Get##type(c, vr, n, (void *)room, n) : fmi3Set##type(c, vr, n, (void *)room, n)); break
         TYPE(35, Float32);
         TYPE(36, Int8);
         TYPE(37, UInt8);
@@ -131,14 +134,14 @@ int main(int argc, char **argv) {
         TYPE(40, Int32);
         TYPE(41, UInt32);
         case 42:
-            s = random_below(2) ? fmi3GetInt64(c, vr, n, (void *)room, n) : fmi3SetInt64(c, vr, n, (void *)room, n);
+            TRY(random_below(2) ? fmi3GetInt64(c, vr, n, (void *)room, n) : fmi3SetInt64(c, vr, n, (void *)room, n));
             fmi3GetUInt64(c, vr, n, counter, n), fmi3SetUInt64(c, vr, n, counter, n);
             fmi3GetBoolean(c, vr, n, (void *)room, n), fmi3SetBoolean(c, vr, n, (void *)room, n);
             fmi3GetString(c, vr, n, text, n), fmi3SetString(c, vr, n, text, n);
             fmi3GetBinary(c, vr, n, sizes, binary, n), fmi3SetBinary(c, vr, n, sizes, binary, n);
             break;
         case 43:
-            s = random_below(2) ? fmi3GetClock(c, vr, n, ticks) : fmi3SetClock(c, vr, n, ticks);
+            TRY(random_below(2) ? fmi3GetClock(c, vr, n, ticks) : fmi3SetClock(c, vr, n, ticks));
             fmi3GetIntervalDecimal(c, vr, n, x, qualifier), fmi3SetIntervalDecimal(c, vr, n, x);
             fmi3GetIntervalFraction(c, vr, n, counter, resolution, qualifier);
             fmi3SetIntervalFraction(c, vr, n, counter, resolution);
@@ -147,14 +150,14 @@ int main(int argc, char **argv) {
             fmi3ActivateModelPartition(c, vr[0], 0.0);
             break;
         case 44:
-            s = fmi3SetDebugLogging(c, random_below(2), random_below(2), category);
+            TRY(fmi3SetDebugLogging(c, random_below(2), random_below(2), category));
             fmi3GetAdjointDerivative(c, vr, n, known, n, value, n, x, n);
             fmi3GetNumberOfVariableDependencies(c, 0, sizes);
             fmi3GetVariableDependencies(c, 0, sizes, vr, sizes, dependency, n);
             fmi3EnterConfigurationMode(c), fmi3ExitConfigurationMode(c);
             break;
         default:
-            s = random_below(2) ? fmi3GetFloat64(c, NULL, n, NULL, n) : fmi3SetFloat64(c, NULL, n, NULL, n);
+            TRY(random_below(2) ? fmi3GetFloat64(c, NULL, n, NULL, n) : fmi3SetFloat64(c, NULL, n, NULL, n));
             fmi3GetNumberOfContinuousStates(c, MAYBE(sizes));
             fmi3SerializedFMUStateSize(c, MAYBE(state[i]), MAYBE(&size));
             fmi3GetNumberOfEventIndicators(c, MAYBE(sizes));

@@ -19,6 +19,8 @@ def test_units_are_parsed():
     assert base_units("Ohm") == base_units("V/A") and base_units("H") == base_units("V.s/A")
     assert base_units("Hz/(N.m)") == {"kg": -1, "m": -2, "s": 1}
     assert base_units("kg.m2/(s3.A)") == base_units("V")
+    with pytest.raises(ValueError, match="'N/m/s': must have one stroke at most"):
+        base_units("N/m/s")
     for wrong in ("Nm", "(N.m", "kg m", "rpm", ""):
         with pytest.raises(ValueError, match="unknown unit"):
             base_units(wrong)

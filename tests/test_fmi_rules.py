@@ -175,9 +175,72 @@ def test_a_million_steps_added_up_are_no_other_time(unit, fmi):
     for t in (*added[:3], *added[-1000:-1]):
         one.restore(moved_to(one, t))
         one.step(t + 2e-16 * t, h)
-    one.restore(moved_to(one, n * h - h))
+    one.restore(moved_to(one, added[-2]))
     one.step(added[-2], h)
     assert "the stop time" in one.refused(one.step, added[-1], h)
+
+
+@both
+def test_a_late_clock_allows_no_other_times(unit, fmi):
+    """Seconds since 1970: rounding is 2.4e-7 s there, and no step begins or ends seconds off."""
+    begin = 1.7e9
+    one = unit("ChamberForces", fmi).start(begin, begin + 100.0)
+    assert "the FMU is at t = 1.7e+09 s" in one.refused(one.step, begin + 1.5, 0.1)
+    assert "the FMU is at t = 1.7e+09 s" in one.refused(one.step, begin + 1e-3, 0.1)
+    assert "the stop time" in one.refused(one.step, begin, 100.5)
+    for k in range(10):
+        one.step(begin + 10.0 * k, 10.0)
+    # the worst that a million additions err by, half a unit of the last place each
+    fresh = unit("ChamberForces", fmi).start(begin, begin + 100.0)
+    fresh.step(begin, 100.0 + 1e6 * np.spacing(begin) / 4)
+    # a small step is no step from anywhere within 1e-9 of a large time
+    small = unit("ChamberForces", fmi).start(100.0, 101.0)
+    assert "the FMU is at t = 100 s" in small.refused(small.step, 100.0 + 1e-8, 1e-4)
+
+
+@both
+def test_a_step_of_no_length(unit, fmi):
+    """FMI 3.0 forbids it; hosts of FMI 2.0 take it to evaluate outputs anew."""
+    one = unit("DcMotor", fmi).start(w_ref=50.0)
+    if fmi == 3:
+        assert (
+            one.refused(one.step, 0.0, 0.0) == "fmi3DoStep: a step must be longer than 0 s"
+            and one.status == 3
+        )
+    else:
+        one.step(0.0, 0.0)
+    one.step(0.0, 0.01)
+
+
+def test_the_order_of_an_input_and_its_derivative_does_not_matter(unit):
+    """They are of one step: before the next they are set anew, or the input stays."""
+    ends = []
+    for derivative_first in (True, False):
+        one = unit("DcMotor", 2).start()
+        w_ref = one.reference["w_ref"]
+        calls = [
+            lambda: one.api.setRealInputDerivatives([w_ref], [1], [500.0]),
+            lambda: one.set({"w_ref": 2.0}),
+        ]
+        for call in calls if derivative_first else reversed(calls):
+            call()
+        one.step(0.0, 0.05)
+        assert one.get("w_ref") == [27.0]
+        one.step(0.05, 0.05)
+        assert one.get("w_ref") == [27.0]
+        ends.append(one.get("w", "armature.i"))
+    assert ends[0] == ends[1]
+    # a saved state knows which step they are of
+    one.api.setRealInputDerivatives([w_ref], [1], [500.0])
+    raw = one.serialized()
+    one.step(0.1, 0.01)
+    spent = one.serialized()
+    one.restore(raw)
+    one.step(0.1, 0.01)
+    assert one.get("w_ref") == [32.0]
+    one.restore(spent)
+    one.step(0.11, 0.01)
+    assert one.get("w_ref") == [32.0]
 
 
 def sealed(body):
@@ -200,9 +263,35 @@ def test_a_step_that_model_exchange_takes_past_the_stop_time_is_an_error(unit, f
     one = unit("DcMotor", fmi, exchange=True).start(0.0, 1.0)
     one.api.enterContinuousTimeMode()
     one.api.setTime(1.01)  # to look ahead is an integrator's right
-    line = one.refused(one.api.completedIntegratorStep)
-    assert line == "time = 1.01 s: must be <= 1 s, the stop time"
+    n_x = len(MODELS["DcMotor"].state_layout.names)
+    rates = (ctypes.c_double * n_x)()
+    (one.api.getDerivatives if fmi == 2 else one.api.getContinuousStateDerivatives)(rates, n_x)
+    line = "time = 1.01 s: must be <= 1 s, the stop time"
+    assert one.refused(one.api.completedIntegratorStep) == line
+    assert one.refused(one.api.enterEventMode) == line
     one.api.setTime(1.0)
+    one.api.completedIntegratorStep()
+    one.api.enterEventMode()
+    one.api.setTime(1.01)
+    assert one.refused(one.api.newDiscreteStates if fmi == 2 else one.api.updateDiscreteStates) == line
+    one.api.setTime(1.0)
+    (one.api.newDiscreteStates if fmi == 2 else one.api.updateDiscreteStates)()
+
+
+@pytest.mark.parametrize("name", [name for name, model in MODELS.items() if model.state_layout])
+def test_importers_are_asked_to_tell_each_step(native_fmus, name):
+    """Else FMI 3.0 lets them leave the call out that finds a step past the stop time."""
+    assert fmpy.read_model_description(native_fmus[name, 3][1]).modelExchange.needsCompletedIntegratorStep
+
+
+@both
+def test_a_completed_step_does_not_compute_with_a_refused_input(unit, fmi):
+    one = unit("ChamberForces", fmi, exchange=True).start()
+    one.api.enterContinuousTimeMode()
+    one.set({"left.material_mass": -50.0})
+    line = "left.material_mass = -50 kg: " + allowed("ChamberForces", "left.material_mass")
+    assert one.refused(one.api.completedIntegratorStep) == line and one.status == 3
+    one.set({"left.material_mass": 0.0})
     one.api.completedIntegratorStep()
 
 
@@ -214,7 +303,9 @@ def test_a_step_beyond_the_budget_is_discarded_and_leaves_all_as_it_was(unit, na
     one.step(0.0, 1e-3)
     before = one.get(*states)
     line = one.refused(one.step, 1e-3, 10.0)
-    wanted = "takes more than solver.max_steps = 20 steps of its own; shorten it, or raise that"
+    wanted = (
+        "takes more than solver.max_steps = 20 steps of its own; shorten the step, or raise solver.max_steps"
+    )
     assert line == f"step of 10 s from t = 0.001 s: {wanted}" and one.status == 2
     assert one.get(*states) == before
     if fmi == 2:
@@ -265,7 +356,20 @@ def test_a_serialized_state_out_of_bounds_is_refused(unit, fmi):
     assert line == "saved state: armature.R = -1 Ohm: " + allowed("DcMotor", "armature.R")
     struct.pack_into("<d", negative, first, float("nan"))
     line = one.refused(one.restore, sealed(bytes(negative[8:])))
-    assert line == "saved state: a value in it is not one of a state"
+    assert line == "saved state: a number in it is not finite, or its internal step is negative"
+    mode = bytearray(raw)
+    struct.pack_into("<i", mode, 16, 5)
+    line = one.refused(one.restore, sealed(bytes(mode[8:])))
+    assert line == "saved state: the mode in it, 5, does not exist"
+
+
+@both
+def test_a_number_that_is_none_is_refused_in_plain_words(unit, fmi):
+    one = unit("ChamberForces", fmi)
+    assert one.refused(one.set, {"phi": float("nan")}) == "phi = nan rad: must be a finite number"
+    bounded = "left.material_mass = inf kg: must be finite, "
+    bounded += allowed("ChamberForces", "left.material_mass").removeprefix("must be ")
+    assert one.refused(one.set, {"left.material_mass": float("inf")}) == bounded
 
 
 @both
@@ -385,3 +489,17 @@ def test_several_fmus_are_linked_into_one_program(native_fmus, tmp_path):
         ).stdout.split()
     assert len(alone) == 40
     np.testing.assert_allclose([float(x) for x in together], [float(x) for x in alone], rtol=1e-12)
+
+
+def test_sources_are_of_one_version(native_fmus, tmp_path):
+    """With the prefixes of both, two FMUs would share a name."""
+    sources = Path(native_fmus["ChamberForces", 2][1], "sources")
+    flags = [
+        "-DFMI2_FUNCTION_PREFIX=A_",
+        "-DFMI3_FUNCTION_PREFIX=A_",
+        "-fsyntax-only",
+        str(sources / "model.c"),
+    ]
+    done = subprocess.run([shutil.which("cc"), *flags], capture_output=True, text=True)
+    assert done.returncode and "define the one of this FMU's version of FMI" in done.stderr
+    assert not subprocess.run([shutil.which("cc"), flags[0], *flags[2:]]).returncode

@@ -464,8 +464,8 @@ def test_a_plain_c_host(native, fmi, tmp_path):
 @pytest.mark.parametrize("share", [0.03, pytest.param(1.0, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize("name", list(MODELS))
-def test_a_million_random_calls_under_sanitizers(native, name, fmi, share, tmp_path):
-    """All of them by .ci/full, some of them each time."""
+def test_random_calls_under_sanitizers(native, name, fmi, share, tmp_path):
+    """A million by .ci/full, a share of them each time."""
     sources = Path(native[name, fmi][1]) / "sources"
     fuzz = tmp_path / "fuzz"
     command = [

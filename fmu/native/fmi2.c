@@ -184,6 +184,7 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
 
 fmi2Status fmi2EnterEventMode(fmi2Component c) {
     NEED(EVENT | CONTINUOUS);
+    if (step_taken(INSTANCE)) return fmi2Error;
     INSTANCE->mode = EVENT;
     return fmi2OK;
 }
@@ -206,9 +207,11 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_set, fmi2
     (void)no_set;
     NEED(CONTINUOUS);
     NOT_NULL(enter_event && terminate);
-    *enter_event = drifted(INSTANCE);
+    int wanted;
+    const Status status = completed(INSTANCE, &wanted);
+    *enter_event = wanted;
     *terminate = fmi2False;
-    return (fmi2Status)step_taken(INSTANCE);
+    return (fmi2Status)status;
 }
 
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {
@@ -250,6 +253,7 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
                                        const fmi2Integer order[], const fmi2Real value[]) {
     NEED(INITIALIZATION | STEP);
     NOT_NULL(!n || (vr && order && value));
+    begin_inputs(INSTANCE);
     for (size_t i = 0; i < n; ++i) {
         CHECK(order[i] == 1, "only the first derivative");
         const unsigned k = vr[i] - (unsigned)model.n_p;

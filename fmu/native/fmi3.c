@@ -89,6 +89,7 @@ fmi3Status fmi3ExitInitializationMode(fmi3Instance c) {
 
 fmi3Status fmi3EnterEventMode(fmi3Instance c) {
     NEED(EVENT | CONTINUOUS);
+    if (step_taken(INSTANCE)) return fmi3Error;
     INSTANCE->mode = EVENT;
     return fmi3OK;
 }
@@ -274,9 +275,11 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean no_set, fmi3B
     (void)no_set;
     NEED(CONTINUOUS);
     NOT_NULL(enter_event && terminate);
-    *enter_event = drifted(INSTANCE);
+    int wanted;
+    const Status status = completed(INSTANCE, &wanted);
+    *enter_event = wanted;
     *terminate = fmi3False;
-    return (fmi3Status)step_taken(INSTANCE);
+    return (fmi3Status)status;
 }
 
 fmi3Status fmi3SetTime(fmi3Instance c, fmi3Float64 time) {
@@ -354,6 +357,8 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 size, fmi3Bo
     NEED(STEP);
     NOT_NULL(event && terminate && early && last);
     *event = *terminate = *early = fmi3False;
+    *last = INSTANCE->time;
+    CHECK(size != 0.0, "a step must be longer than 0 s");
     const Status status = step(INSTANCE, time, size);
     *last = INSTANCE->time;
     return (fmi3Status)status;

@@ -12,7 +12,9 @@
  * static. */
 #define CHAINUNIT_PASTE(a, b) a##b
 #define CHAINUNIT_JOIN(a, b) CHAINUNIT_PASTE(a, b)
-#if defined FMI3_FUNCTION_PREFIX
+#if defined FMI2_FUNCTION_PREFIX && defined FMI3_FUNCTION_PREFIX
+#error "FMI2_FUNCTION_PREFIX and FMI3_FUNCTION_PREFIX are both defined: define the one of this FMU's version of FMI"
+#elif defined FMI3_FUNCTION_PREFIX
 #define CHAINUNIT_NAME(name) CHAINUNIT_JOIN(FMI3_FUNCTION_PREFIX, CHAINUNIT_PASTE(fmi3_, name))
 #elif defined FMI2_FUNCTION_PREFIX
 #define CHAINUNIT_NAME(name) CHAINUNIT_JOIN(FMI2_FUNCTION_PREFIX, CHAINUNIT_PASTE(fmi2_, name))

@@ -37,6 +37,7 @@ struct Instance {
     int changed;    /* parameters or inputs set since the states were started */
     int doubtful;   /* an input was set to a value out of its bounds */
     int closed;     /* the states meet the constraints at the present inputs, as the last step left them */
+    int spent;      /* the derivatives of the inputs were those of the last step: the next one has its own */
     double pace;    /* what the integrator that controls its error would step next [s]; 0 not known */
     char *name;
     Report report;
@@ -65,6 +66,7 @@ static void instance_reset(Instance *c) {
     c->changed = 1;
     c->doubtful = 0;
     c->closed = 0;
+    c->spent = 0;
     c->pace = 0.0;
 }
 
@@ -174,8 +176,12 @@ static Status expect(Instance *c, int modes, const char *call) {
 
 /* -- time */
 
-/* In parts of a time: what rounding makes of it where a host adds up a million steps, 1e6 * 2^-53 at worst, and more. */
+/* What a time may be off, in parts of the step or of the experiment. Rounding comes to that, in parts of the time itself:
+ * a few units of its last place at a communication point, which the FMU takes over from the host, and half a unit for each
+ * of a million steps where a host adds up its steps to the stop time. */
 #define SAME_TIME 1e-9
+#define ROUNDED (4.0 * 0x1p-52)
+#define ADDED_UP (1e6 * 0x1p-53)
 
 static double larger(double a, double b) { return fabs(a) > fabs(b) ? fabs(a) : fabs(b); }
 
@@ -194,7 +200,7 @@ static Status step_taken(Instance *c) {
 static Status set_experiment(Instance *c, double time, int has_stop, double stop) {
     if (has_stop && !(stop >= time))
         return complain(c, ERROR, "stop time = %g s: must be >= %g s, the start time", stop, time);
-    c->stop = has_stop ? stop + SAME_TIME * larger(stop, time) : INFINITY;
+    c->stop = has_stop ? stop + SAME_TIME * (stop - time) + ADDED_UP * fabs(larger(stop, time)) : INFINITY;
     return set_time(c, time);
 }
 
@@ -218,8 +224,9 @@ static double bounded(const Quantity *q, double v) { return v < q->low ? q->low 
 
 static Status refuse(Instance *c, Status status, const char *where, int i, double v) {
     const Quantity *q = &model.declared[i];
+    const int free = isinf(q->low) && isinf(q->high);
     return complain(c, status, "%s%s = %g%s%s: must be %s%s", where, q->name, v, q->unit[0] ? " " : "", q->unit,
-                    isfinite(v) ? "" : "finite, ", q->allowed);
+                    isfinite(v) ? "" : free ? "a finite number" : "finite, ", isfinite(v) || !free ? q->allowed : "");
 }
 
 /* Inputs may be set one by one: they are judged by the first call that computes with them. */
@@ -375,6 +382,12 @@ static Status get(Instance *c, const unsigned *reference, size_t n, double *valu
     return OK;
 }
 
+/* Outputs at the end of a step go on along its inputs; what is set after it begins the next step, in any order. */
+static void begin_inputs(Instance *c) {
+    if (c->spent) memset(c->du, 0, (size_t)model.n_u * sizeof(double));
+    c->spent = 0;
+}
+
 static Status set(Instance *c, unsigned reference, double value) {
     if (reference >= c->n_references) return unknown_reference(c, reference);
     const int i = (int)reference;
@@ -398,7 +411,7 @@ static Status set(Instance *c, unsigned reference, double value) {
         c->closed = 0;
         if (before) c->changed = 1;
     }
-    if (i >= model.n_p) c->du[i - model.n_p] = 0.0;
+    if (i >= model.n_p) begin_inputs(c);
     return OK;
 }
 
@@ -578,8 +591,10 @@ static Status astray(Instance *c, double time) {
 static double most_steps(const Instance *c) { return c->p[model.max_steps]; }
 
 static Status over_budget(Instance *c, double time, double size) {
-    return complain(c, DISCARD, "step of %g s from t = %g s: takes more than %s = %g steps of its own; shorten it, or raise that",
-                    size, time, model.declared[model.max_steps].name, most_steps(c));
+    const char *name = model.declared[model.max_steps].name;
+    return complain(c, DISCARD,
+                    "step of %g s from t = %g s: takes more than %s = %g steps of its own; shorten the step, or raise %s", size,
+                    time, name, most_steps(c), name);
 }
 
 /* The classical Runge-Kutta method with equal steps, its cost known beforehand. */
@@ -687,12 +702,13 @@ static Status controlled_steps(Instance *c, double time, double size, const Cour
 static Status step(Instance *c, double time, double size) {
     if (!isfinite(time) || !isfinite(size) || size < 0.0)
         return complain(c, ERROR, "step of %g s from t = %g s: must be finite and not negative", size, time);
-    if (fabs(time - c->time) > SAME_TIME * larger(c->time, size))
+    if (fabs(time - c->time) > SAME_TIME * size + ROUNDED * fabs(c->time))
         return complain(c, ERROR, "step from t = %g s: the FMU is at t = %g s", time, c->time);
     if (time + size > c->stop)
         return complain(c, ERROR, "step of %g s from t = %g s: must end at %g s, the stop time, or before", size, time,
                         c->stop);
     if (judge_inputs(c)) return ERROR;
+    begin_inputs(c);
     const int n_x = model.n_x, n_u = model.n_u;
     double *u = c->work, *rate = u + n_u, *half = rate + n_u;
     for (int i = 0; i < n_u; ++i) {
@@ -719,6 +735,7 @@ static Status step(Instance *c, double time, double size) {
             c->fresh = 0;
         }
     c->time = time + size;
+    c->spent = 1;
     return OK;
 }
 
@@ -746,9 +763,18 @@ static double off(Instance *c) {
 /* Whether the states have drifted off the constraints, and an event is to correct them. */
 static int drifted(Instance *c) { return kernels.closed && off(c) > OFF_MOST; }
 
+/* At the end of a step of the importer's integrator. */
+static Status completed(Instance *c, int *enter_event) {
+    *enter_event = 0;
+    if (step_taken(c) || judge_inputs(c)) return ERROR;
+    *enter_event = drifted(c);
+    return OK;
+}
+
 /* Correct them, and say whether that moved a state. */
 static Status project(Instance *c, int *moved) {
     *moved = 0;
+    if (step_taken(c)) return ERROR;
     if (!kernels.closed || !c->model_exchange) return OK;
     if (judge_inputs(c)) return ERROR;
     for (int round = 0; round < 4; ++round) {
@@ -768,7 +794,7 @@ static Status project(Instance *c, int *moved) {
 typedef struct {
     uint64_t sum;   /* of all that follows: any flipped bit changes it */
     uint64_t guard; /* of the model in its version: a state of another one is refused */
-    int mode, model_exchange, closed, spare;
+    int mode, model_exchange, closed, spent;
     double time, stop, pace;
 } Saved;
 
@@ -803,9 +829,10 @@ static Status state_check(Instance *c, const void *memory) {
     double *values = c->work;
     memcpy(values, (const char *)memory + sizeof saved, kept(c) * sizeof(double));
     const int mode = saved.mode;
-    if (mode < INSTANTIATED || mode > TERMINATED || (mode & (mode - 1)) || !isfinite(saved.time) || isnan(saved.stop) ||
-        !(saved.pace >= 0.0) || !all_finite(values, (int)kept(c)))
-        return complain(c, ERROR, "saved state: a value in it is not one of a state");
+    if (mode < INSTANTIATED || mode > TERMINATED || (mode & (mode - 1)))
+        return complain(c, ERROR, "saved state: the mode in it, %d, does not exist", mode);
+    if (!isfinite(saved.time) || isnan(saved.stop) || !(saved.pace >= 0.0) || !all_finite(values, (int)kept(c)))
+        return complain(c, ERROR, "saved state: a number in it is not finite, or its internal step is negative");
     /* before the run, `start` judges them */
     for (int i = 0; i < model.n_p && mode > INITIALIZATION; ++i)
         if (!admitted(&model.declared[i], values[i])) return refuse(c, ERROR, "saved state: ", i, values[i]);
@@ -825,6 +852,7 @@ static Status state_get(Instance *c, void **state) {
     saved.mode = (int)c->mode;
     saved.model_exchange = c->model_exchange;
     saved.closed = c->closed;
+    saved.spent = c->spent;
     saved.time = c->time;
     saved.stop = c->stop;
     saved.pace = c->pace;
@@ -845,6 +873,7 @@ static Status state_set(Instance *c, const void *state) {
     c->stop = saved.stop;
     c->pace = saved.pace;
     c->closed = saved.closed;
+    c->spent = saved.spent;
     c->fresh = 0;
     c->doubtful = 1;
     c->changed = c->mode == INSTANTIATED || c->mode == INITIALIZATION;

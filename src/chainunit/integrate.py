@@ -38,7 +38,7 @@ class BudgetError(ArithmeticError):
 
     def __init__(self, most: float) -> None:
         super().__init__(
-            f"takes more than {MAX_STEPS} = {most:g} steps of its own; shorten it, or raise that"
+            f"takes more than {MAX_STEPS} = {most:g} steps of its own; shorten the step, or raise {MAX_STEPS}"
         )
 
 

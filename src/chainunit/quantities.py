@@ -92,10 +92,13 @@ def base_units(unit: str) -> dict[str, int]:
     Raises
     ------
     ValueError
-        for a unit name that is not known here.
+        for a unit name that is not known here, or more than one stroke.
     """
     exponents: dict[str, int] = {}
-    for sign, part in zip((1, -1), unit.split("/"), strict=False):
+    parts = unit.split("/")
+    if len(parts) > 2:
+        raise ValueError(f"unit {unit!r}: must have one stroke at most, as in 'N/(m.s)'")
+    for sign, part in zip((1, -1), parts, strict=False):
         for factor in (part[1:-1] if part[:1] + part[-1:] == "()" else part).split("."):
             match = re.fullmatch(r"([A-Za-z]+|1)(-?\d+)?", factor)
             if match is None or match[1] not in _NAMED:
@@ -373,5 +376,6 @@ def complaint(variable: Variable, x: Any) -> str:
     """The line that says what is wrong with the value `x` of `variable`."""
     q = variable.quantity
     unit = "" if q.unit == "1" else f" {q.unit}"
-    allowed = q.allowed if math.isfinite(x) else f"finite, {q.allowed}"
+    free = math.isinf(q.low) and math.isinf(q.high)
+    allowed = q.allowed if math.isfinite(x) else "a finite number" if free else f"finite, {q.allowed}"
     return f"{variable.name} = {x:g}{unit}: must be {allowed} ({variable.description})"

@@ -96,7 +96,7 @@ def export(
     compiled = ("kernels.c", "model.c", wanted.layer)
 
     kinds = dict(wanted.kinds)
-    if fmi == 3 and model.controlled:
+    if fmi == 3 and model.state_layout:
         # FMI 2.0 expects the call from every importer
         kinds["ModelExchange"] = {**kinds["ModelExchange"], "needsCompletedIntegratorStep": "true"}
 
