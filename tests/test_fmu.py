@@ -267,7 +267,7 @@ def test_bad_input_gives_nan_not_stale_numbers(chamber):
         good = unit.get(["tau"])
         unit.set(["w"], [math.nan])
         assert math.isnan(unit.get(["tau"])[0])
-        with pytest.raises(RunError, match=r"input w = nan rad/s: must be finite"):
+        with pytest.raises(RunError, match=r"input w = nan rad/s: must be a finite number"):
             unit.step(0.0, 0.1)
         unit.set(["w"], [3.0])
         assert unit.get(["tau"]) == good

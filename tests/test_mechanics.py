@@ -306,7 +306,7 @@ def test_motion_that_is_not_finite_is_refused_by_name(bad):
     machine = ChainUnit()
     for name in ("phi", "w", "a"):
         state = {"phi": 0.5, "w": 3.0, "a": 0.0, name: bad}
-        with pytest.raises(InputError, match=rf"^{name} = (nan|inf|-inf) .*must be finite"):
+        with pytest.raises(InputError, match=rf"^{name} = (nan|inf|-inf) .*must be a finite number"):
             machine.forces(**state)
         with pytest.raises(InputError, match=rf"^{name} = "):
             machine.evaluate(state)
