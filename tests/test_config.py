@@ -177,3 +177,18 @@ def test_every_refusal_names_the_file(tmp_path):
 def test_the_example_can_be_copied(tmp_path):
     (tmp_path / "mine.toml").write_text(example())
     assert load(tmp_path / "mine.toml").machine.p == load().machine.p
+
+
+def test_a_refused_geometry_names_the_lengths_that_are_the_examples():
+    """Twice some of the lengths: c and hy, which the file does not give, are why they do not fit."""
+    twice = {"r": 0.3, "l": 3.0, "h": 2.0, "l1": 2.7, "l2": 1.08, "e": 1.62, "z": 1.70763}
+    text = "[machine]\n" + "\n".join(f"{name} = {value}" for name, value in twice.items())
+    taken = "; not in the file, so taken from the packaged example: c = 1.49248, hy = 1"
+    with pytest.raises(InputError) as refused:
+        parse(text)
+    assert str(refused.value).endswith(taken)
+    # with all given, nothing is taken over
+    parse(f"{text}\nc = 2.98496\nhy = 2.0")
+    with pytest.raises(InputError) as refused:
+        parse(f"{text}\nc = 1.49248\nhy = 1.0")
+    assert "no value fits" in str(refused.value) and "packaged" not in str(refused.value)

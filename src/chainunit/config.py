@@ -16,7 +16,7 @@ from .drives.driveline import Mounted
 from .drives.gearing import KINDS, Transmission
 from .drives.induction_motor import Inverter, SoftStart
 from .drives.line_table import form, given_line
-from .errors import InputError
+from .errors import GeometryError, InputError
 from .machines.api import ChainUnit, ratios
 from .machines.chain_unit import SIDES, ChamberForces, SideLoads, SideName, other
 from .machines.flexible import LEAST, MOST, OrganLaw
@@ -428,6 +428,14 @@ def parse(text: str, source: str = "config") -> Config:
         raise type(error)("; ".join([str(error), *hints])) from error
 
 
+def _taken_over(error: InputError, given: Mapping[str, float]) -> str:
+    """The lengths behind a refusal that the file does not give, as words to follow it."""
+    names = error.names if isinstance(error, GeometryError) else ()
+    example = Layout(type(ChainUnit().p)).named(ChainUnit().p)
+    taken = [f"{name} = {example[name]:g}" for name in names if name in example and name not in given]
+    return f"; not in the file, so taken from the packaged example: {', '.join(taken)}" if taken else ""
+
+
 def _config(data: Mapping[str, Any], checked: Any, source: str, remarks: tuple[Slip, ...]) -> Config:
     """The study of a file whose values are each allowed."""
     _consistent(data, checked)
@@ -446,7 +454,7 @@ def _config(data: Mapping[str, Any], checked: Any, source: str, remarks: tuple[S
     try:
         machine = ChainUnit(machine_given)
     except InputError as error:
-        raise InputError(f"machine: {error}") from error
+        raise InputError(f"machine: {error}{_taken_over(error, machine_given)}") from error
     motor_given = given_values(checked.motor)
     motor = DcMotor.parameter_layout.from_names(motor_given)
     try:

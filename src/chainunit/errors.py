@@ -13,7 +13,9 @@ class InputError(ValueError):
 
 
 class GeometryError(InputError):
-    """The lengths do not make a machine that turns a full crank revolution."""
+    """The lengths do not make a machine that turns a full crank revolution; `names` are the parameters behind it."""
+
+    names: tuple[str, ...] = ()
 
 
 class RunError(RuntimeError):

@@ -21,8 +21,9 @@ class Requirement:
     """What the parameters must meet beyond their own bounds: `subject` in `unit` lies strictly between two
     limits that depend on the others.
 
-    `why` says what fails otherwise, with the parameters `given` named beside it; `remedy` what to do where
-    no value fits. The words are declared once; the limits come from the model's `requirements`.
+    `why` says what fails otherwise, with the parameters `given` named beside it; `depends` are further ones that the
+    limits come from; `remedy` what to do where no value fits. The words are declared once; the limits come from the
+    model's `requirements`.
     """
 
     subject: str
@@ -30,6 +31,7 @@ class Requirement:
     why: str
     given: tuple[str, ...] = ()
     remedy: str = ""
+    depends: tuple[str, ...] = ()
 
     def refusal(self, value: float, low: float, high: float, given: Mapping[str, float]) -> str:
         """The line that refuses `value`."""
@@ -187,7 +189,9 @@ class Model:
     ) -> None:
         for each, (value, low, high) in zip(required, limits, strict=True):
             if not low < value < high:
-                raise GeometryError(each.refusal(value, low, high, cls.parameter_layout.named(p)))
+                refused = GeometryError(each.refusal(value, low, high, cls.parameter_layout.named(p)))
+                refused.names = (each.subject, *each.given, *each.depends)
+                raise refused
 
     @staticmethod
     def excitation(t: float) -> dict[str, float]:

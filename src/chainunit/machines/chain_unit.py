@@ -675,7 +675,7 @@ class ChamberForces(Model):
     icon = "chain_unit"
 
     required = (
-        Requirement("c", "m", "the crank circle must stay left of the pivot C"),
+        Requirement("c", "m", "the crank circle must stay left of the pivot C", depends=("r",)),
         dataclasses.replace(TURNS, given=("l", "h", "c", "hy")),
         Requirement(
             "largest rocker angle",
@@ -689,6 +689,7 @@ class ChamberForces(Model):
             "the organs cannot follow the rocker over its swing",
             ("l1", "l2", "e"),
             "lengthen l1 + l2, or lessen the swing by a shorter r or a longer h",
+            ("r", "l", "h", "c", "hy"),
         ),
     )
 
