@@ -58,7 +58,8 @@ class Terminal:
 @dataclass(frozen=True)
 class Experiment:
     """A run for a tool that was told nothing else: to `stop` [s], in steps of `step` [s], at a relative `tolerance`.
-    The explicit Euler method is stable at that step, from the start values on."""
+    In a second of the model's `excitation` the explicit Euler method errs, at that step, by less than a fifth of any
+    state's size."""
 
     step: float = 1e-3
     stop: float = 10.0

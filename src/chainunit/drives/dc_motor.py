@@ -22,7 +22,15 @@ from typing import Any
 
 from ..integrate import Solver
 from ..model import Part, Requirement
-from ..ports import NO_LOAD, LoadPort, flanges, load_inertia, load_terminal, load_torque
+from ..ports import (
+    NO_LOAD,
+    LoadPort,
+    flanges,
+    load_inertia,
+    load_terminal,
+    load_torque,
+    moving_load,
+)
 from ..quantities import Value, declaration, group, quantity
 from .motor import T_RATED, Ambient, Motor, braked
 
@@ -203,13 +211,9 @@ class DcMotor(Motor):
     @staticmethod
     def excitation(t: float) -> dict[str, float]:
         """A run-up to a reference that moves, against a load that swings, of which half is known beforehand."""
-        swing = 0.4 * math.sin(10.0 * t)
-        return {
-            "w_ref": 60.0 * (1.0 - math.cos(4.0 * t)),
-            "tau_ff": 0.5 * swing,
-            "load.tau_bias": 1.0 + swing,
-            "load.J": 0.002,
-        }
+        w = 60.0 * (1.0 - math.cos(4.0 * t))
+        load = moving_load(t, 1.0, 0.002, 60.0 * (t - 0.25 * math.sin(4.0 * t)), w)
+        return load | {"w_ref": w, "tau_ff": 0.2 * math.sin(10.0 * t)}
 
     @staticmethod
     def limit(xp: Any, p: Any, w: Any) -> Any:

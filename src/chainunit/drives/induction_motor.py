@@ -27,7 +27,15 @@ from ..engines import MATH
 from ..integrate import Solver
 from ..model import Experiment, Part, Requirement
 from ..planar import Vec2
-from ..ports import NO_LOAD, LoadPort, flanges, load_inertia, load_terminal, load_torque
+from ..ports import (
+    NO_LOAD,
+    LoadPort,
+    flanges,
+    load_inertia,
+    load_terminal,
+    load_torque,
+    moving_load,
+)
 from ..quantities import Value, declaration, group, quantity
 from .motor import T_RATED, Ambient, Motor, braked
 
@@ -438,9 +446,8 @@ class InductionMotor(Motor):
     @staticmethod
     def excitation(t: float) -> dict[str, float]:
         """A start direct on line against a load that swings, at a voltage that does, too."""
-        return {
-            "load.tau_bias": 5.0 + 2.0 * math.sin(10.0 * t),
-            "load.J": 0.02,
+        w = 150.0 * (1.0 - math.exp(-10.0 * t))
+        return moving_load(t, 5.0, 0.02, 150.0 * t - 0.1 * w, w) | {
             "voltage": 0.95 + 0.05 * math.cos(8.0 * t),
             "w_ref": 100.0 + 20.0 * math.sin(4.0 * t),
         }

@@ -78,7 +78,8 @@ def _reference(interface: Interface) -> dict[str, bytes]:
     words = {
         INPUTS: f"inputs, set at each time and held for {STEP * 1e3:g} ms",
         STEPPED: "outputs at the end of each step, before the inputs of that time are set",
-        READ: "outputs after the inputs of the time are set, before the step from it",
+        READ: "outputs after the inputs of the time are set, before an event there and the step from it: of "
+        "Model Exchange, and of Co-Simulation masters that read there, which the FMI standard does not allow",
     }
     files = {f"{REFERENCE}/{name}_{end}.csv": _csv(*table) for end, table in tables.items()}
     register_namespace("fmi-ls", _MANIFEST)

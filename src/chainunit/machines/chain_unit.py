@@ -251,6 +251,19 @@ class DirectParameters(Parameters):
     solver: Solver = group(Solver, "internal integrator", default=Solver())
 
 
+def moving_loads(t: float, left: float, right: float) -> dict[str, float]:
+    """Loads of both organs about these masses of material [kg], and a soft stop, for reference results: all move."""
+    return {
+        "left.material_mass": left * (1.0 + 0.3 * math.sin(3.0 * t)),
+        "right.material_mass": right * (1.0 + 0.3 * math.cos(4.0 * t)),
+        "left.processing_force": 50.0 + 20.0 * math.sin(6.0 * t),
+        "right.processing_force": 40.0 + 20.0 * math.cos(5.0 * t),
+        "stop.stiffness": 100.0 + 50.0 * math.sin(4.0 * t),
+        "stop.damping": 5.0 + 2.0 * math.cos(3.0 * t),
+        "stop.psi": 0.05 * math.sin(2.0 * t),
+    }
+
+
 @declaration
 class DirectInputs:
     """Torque of the motor and loads of the organs."""
@@ -696,9 +709,8 @@ class ChamberForces(Model):
     @staticmethod
     def excitation(t: float) -> dict[str, float]:
         """A crank that runs unevenly, both organs loaded."""
-        loads = {f"{side}.material_mass": 30.0 for side in ("left", "right")}
         w, ripple = 6.0, 0.5
-        return loads | {
+        return moving_loads(t, 30.0, 25.0) | {
             "phi": w * t - ripple * math.cos(w * t) / w,
             "w": w + ripple * math.sin(w * t),
             "a": ripple * w * math.cos(w * t),
@@ -763,12 +775,7 @@ class DirectChainUnit(Model):
     @staticmethod
     def excitation(t: float) -> dict[str, float]:
         """A torque that swings sets the machine in motion, its organs unevenly loaded and the load moving."""
-        return {
-            "tau": 120.0 + 40.0 * math.sin(5.0 * t),
-            "left.material_mass": 30.0 + 10.0 * math.sin(3.0 * t),
-            "right.material_mass": 5.0,
-            "left.processing_force": 50.0,
-        }
+        return moving_loads(t, 30.0, 5.0) | {"tau": 120.0 + 40.0 * math.sin(5.0 * t)}
 
     @staticmethod
     def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:

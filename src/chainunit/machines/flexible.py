@@ -56,6 +56,7 @@ from .chain_unit import (
     Outputs,
     StopLoad,
     drive_loads,
+    moving_loads,
     supports,
 )
 
@@ -616,7 +617,7 @@ def _flexible(walls: int, webs: int) -> type[Model]:
         @staticmethod
         def excitation(t: float) -> dict[str, float]:
             """A crank that runs unevenly, the organs unevenly loaded."""
-            return ChamberForces.excitation(t) | {"left.material_mass": 45.0, "right.material_mass": 5.0}
+            return ChamberForces.excitation(t) | moving_loads(t, 45.0, 5.0)
 
         @staticmethod
         def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:

@@ -443,13 +443,15 @@ class KnifeDrive(Model):
 
     @staticmethod
     def excitation(t: float) -> dict[str, float]:
-        """A crank that runs unevenly and cuts."""
+        """A crank that runs unevenly and cuts, forces on the blade."""
         w, ripple = 4.0, 0.5
         return {
             "phi": w * t - ripple * math.cos(w * t) / w,
             "w": w + ripple * math.sin(w * t),
             "a": ripple * w * math.cos(w * t),
-            "cut_force": 5000.0,
+            "cut_force": 5000.0 + 2000.0 * math.sin(3.0 * t),
+            "blade.fx": 300.0 * math.sin(5.0 * t),
+            "blade.fy": 200.0 * math.cos(4.0 * t),
         }
 
     @staticmethod
