@@ -265,7 +265,7 @@ def test_breakdown_is_the_largest_torque(given):
     k = int(np.argmax(torques.tau))
     assert b.tau == pytest.approx(torques.tau[k], rel=1e-7) and b.tau >= torques.tau[k]
     assert b.slip == pytest.approx(torques.slip[k], rel=2e-3)
-    assert InductionMotor.largest_torque(p) == b.air_gap_tau
+    assert InductionMotor.largest_torque(p, T_RATED, p.supply.V, p.supply.f) == b.air_gap_tau
     np.testing.assert_array_equal(InductionMotor.limit(engines.numpy_(), p, w), torques.air_gap_tau)
 
 

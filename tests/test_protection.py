@@ -7,12 +7,17 @@ import math
 
 import numpy as np
 import pytest
+import xarray as xr
 from rich.console import Console
 
 from chainunit import config
 from chainunit.config import SCENARIOS
+from chainunit.drives.induction_motor import InductionMotor, steady
+from chainunit.drives.motor import T_RATED
+from chainunit.engines import MATH
 from chainunit.report import table
 from chainunit.studies import overload, sizing
+from chainunit.studies.drive import Drive
 from chainunit.studies.protection import Obstacle, Setting, mean_load, relay_trip, stall
 
 
@@ -169,3 +174,46 @@ def test_a_coupling_that_never_opens_gets_a_remark(tmp_path):
     assert study.answers["jam_left"].coupling_trip_time is not None
     assert any("stalls the motor" in note for note in study.warnings)
     assert not any("opens in no jam, lump or block" in note for note in study.warnings)
+
+
+def test_a_motor_at_its_voltage_limit_has_no_reserve(tmp_path):
+    """Asked for 30 rad/s, the DC motor turns the crank at an eighth of it: the voltage leaves no more torque."""
+    text = "events = []\n[run]\ncrank_speed = 30\nstep = 0.002\nsettle_turns = 3\n"
+    study = overload.run_study(config.parse(text), tmp_path)
+    found, p = study.answers["steady"], study.motor
+    assert found.speed_mean < 5.0 and found.torque_reserve == 0.0
+    verdict = overload.motor_verdict(study)
+    assert verdict["holds"] == "false" and "least reserve of torque 0 %" in verdict["text"]
+    run = study.steady
+    warm = p.armature.R * (1.0 + p.armature.alpha * (found.winding_temperature - T_RATED))
+    left = p.armature.k * (p.limit.v - p.armature.k * run["motor.w"].values) / warm
+    limit = np.minimum(left, p.armature.k * p.limit.i)
+    driving = run["motor.air_gap_tau"].values * run["motor.w"].values > 0.0
+    limits = study.drive.largest_torque(run, found.winding_temperature)
+    assert limits[driving] == pytest.approx(limit[driving], rel=1e-6, abs=1e-6)
+    assert np.min(limits) < 0.5 * p.armature.k * p.limit.i
+
+
+def test_the_largest_torque_is_that_of_voltage_frequency_and_a_warm_winding():
+    """On the line, in a dip and above the corner, against the largest of the torques over a thousand speeds."""
+    p = InductionMotor.Parameters()
+    T, volts, hertz = 380.0, np.array([400.0, 200.0, 400.0, 0.0]), np.array([50.0, 50.0, 90.0, 50.0])
+    run = xr.Dataset(
+        {
+            "motor.v": ("time", volts),
+            "motor.supply.frequency": ("time", hertz),
+            "motor.w": ("time", np.full(4, 150.0)),
+            "motor.air_gap_tau": ("time", np.full(4, 5.0)),
+        },
+        {"time": np.arange(4.0)},
+    )
+    drive = Drive(InductionMotor, p, config.load().machine)
+    found = drive.largest_torque(run, T)
+    for k in range(3):
+        w = 2.0 * math.pi * hertz[k] / p.pole_pairs * np.linspace(0.0, 1.0, 1001)
+        torques = [steady(MATH, p, float(x), volts[k] / 400.0, float(hertz[k]), T).air_gap_tau for x in w]
+        assert found[k] == pytest.approx(max(torques), rel=3e-3)
+    assert found[3] == 0.0 and found[1] < 0.3 * found[0] and found[2] < 0.5 * found[0]
+    # warm less than cold, and behind friction less than at the air gap
+    assert found[0] < drive.largest_torque(run, T_RATED)[0]
+    assert drive.pull_out(run.isel(time=[0]), T) < found[0] * drive.ratio

@@ -58,3 +58,6 @@ def test_the_reserve_is_what_the_limit_leaves():
     """At the current limit nothing is left; half the torque leaves half; a transient may pass the steady limit."""
     assert [torque_reserve(5.588, peak) for peak in (5.588, 2.794, 0.0)] == [0.0, 0.5, 1.0]
     assert torque_reserve(20.0, 22.0) == pytest.approx(-0.1)
+    # the least over a run, of the limit that holds at the instant; -1 where there is none, or twice it is passed
+    assert torque_reserve([20.0, 5.0, 8.0], [10.0, -4.0, 4.0]) == pytest.approx(0.2)
+    assert [torque_reserve(limit, 3.0) for limit in (1.0, 0.0, -2.0)] == [-1.0, -1.0, -1.0]

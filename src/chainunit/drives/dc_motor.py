@@ -17,9 +17,10 @@ cut at the supply. A cut-off integrator is led back (back-calculation), so that 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Mapping
+from typing import Any, ClassVar
 
+from ..engines import MATH
 from ..integrate import Solver
 from ..model import Part, Requirement
 from ..ports import (
@@ -199,6 +200,7 @@ class DcMotor(Motor):
     terminals = (*flanges("outflow"), load_terminal("load."))
     icon = "motor"
     current, temperature, winding = "armature.i", "armature.T", "armature"
+    limited_by: ClassVar[Mapping[str, float]] = {"w": 1e-9}
     required = (
         Requirement(
             "armature.L",
@@ -216,15 +218,22 @@ class DcMotor(Motor):
         return load | {"w_ref": w, "tau_ff": 0.2 * math.sin(10.0 * t)}
 
     @staticmethod
-    def limit(xp: Any, p: Any, w: Any) -> Any:
-        """By the current limit, or what the voltage leaves at a cold winding."""
+    def limit(xp: Any, p: Any, w: Any, T: float = T_RATED) -> Any:
+        """By the current limit, or what the voltage leaves with the winding at `T` [K], cold where left out."""
         arm = p.armature
-        return arm.k * xp.minimum(p.limit.i, (p.limit.v - arm.k * w) / arm.R)
+        R = arm.R * (1.0 + arm.alpha * (T - T_RATED))
+        return arm.k * xp.minimum(p.limit.i, (p.limit.v - arm.k * w) / R)
 
     @staticmethod
-    def largest_torque(p: Any) -> float:
-        """By the current limit, or what the voltage drives through the standing armature."""
-        return float(p.armature.k * min(p.limit.i, p.limit.v / p.armature.R))
+    def largest_torque(p: Any, T: float, *at: float) -> float:
+        """By the current limit, or what the voltage leaves at this speed."""
+        (w,) = at
+        return float(DcMotor.limit(MATH, p, w, T))
+
+    @staticmethod
+    def pull_out(p: Any, T: float, *at: float) -> float:
+        """At standstill, where no friction takes a part and the voltage leaves most."""
+        return float(DcMotor.limit(MATH, p, 0.0, T))
 
     @staticmethod
     def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:

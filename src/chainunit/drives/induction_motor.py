@@ -20,8 +20,8 @@ open-source package motulator, which the tests compare with.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Mapping
+from typing import Any, ClassVar, NamedTuple
 
 from ..engines import MATH
 from ..integrate import Solver
@@ -434,6 +434,7 @@ class InductionMotor(Motor):
     # the flux at switching on turns at the supply's frequency and hardly decays
     experiment = Experiment(step=5e-5, stop=2.0)
     current, temperature, winding = "i", "stator.T", "stator"
+    limited_by: ClassVar[Mapping[str, float]] = {"v": 1e-3, "supply.frequency": 1e-3}
     required = (
         Requirement(
             "cage.L",
@@ -469,9 +470,16 @@ class InductionMotor(Motor):
         return _cooling(xp, p, w)
 
     @staticmethod
-    def largest_torque(p: Any) -> float:
-        """The breakdown torque of a cold motor at the supply's whole voltage and frequency."""
-        return float(breakdown(p).air_gap_tau)
+    def largest_torque(p: Any, T: float, *at: float) -> float:
+        """The breakdown torque at the voltage [V] and the frequency [Hz] that the motor has."""
+        V, f = at
+        return float(breakdown(p, V / p.supply.V, f, T).air_gap_tau) if min(V, f) > 0.0 else 0.0
+
+    @staticmethod
+    def pull_out(p: Any, T: float, *at: float) -> float:
+        """The breakdown torque behind friction and windage."""
+        V, f = at
+        return float(breakdown(p, V / p.supply.V, f, T).tau) if min(V, f) > 0.0 else 0.0
 
     @staticmethod
     def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from ..engines import MATH
@@ -61,9 +62,20 @@ class Motor(Model):
         """Largest air-gap torque at the speed `w` [rad/s] that the supply allows in steady running [N m]."""
         raise NotImplementedError
 
+    limited_by: ClassVar[Mapping[str, float]]
+    """Outputs that set the largest torque at an instant, each with its resolution in parts of its largest value."""
+
     @staticmethod
-    def largest_torque(p: Any) -> float:
-        """Largest steady air-gap torque at any speed [N m]."""
+    def largest_torque(p: Any, T: float, *at: float) -> float:
+        """Largest air-gap torque [N m] that the motor can give at an instant with the winding at `T` [K]; `at` are
+        the values of `limited_by`. A speed among them is positive along the torque, negative where the torque brakes.
+        Not positive where it can give none."""
+        raise NotImplementedError
+
+    @staticmethod
+    def pull_out(p: Any, T: float, *at: float) -> float:
+        """Largest torque at the shaft [N m] that a load meets which slows the motor down from there until it stalls;
+        arguments as in `largest_torque`."""
         raise NotImplementedError
 
 

@@ -200,9 +200,26 @@ class Drive:
         """Parameters of the machine by name."""
         return ChamberForces.parameter_layout.named(self.machine.p)
 
-    def largest_torque(self) -> float:
-        """Largest steady air-gap torque of the motor at any speed [N m]."""
-        return self.motor.largest_torque(self.parameters)
+    def largest_torque(self, run: xr.Dataset, T: float) -> Any:
+        """Largest air-gap torque that the motor can give at each instant of a run [N m], shape (time,), with its
+        winding at `T` [K]; see `Motor.largest_torque`."""
+        braking = run["motor.air_gap_tau"].values * run["motor.w"].values < 0.0
+        columns = []
+        for name, resolution in self.motor.limited_by.items():
+            x = run[f"motor.{name}"].values
+            if name == "w":
+                x = np.where(braking, -np.abs(x), np.abs(x))
+            unit = resolution * max(float(np.max(np.abs(x))), 1e-9)
+            columns.append(np.round(x / unit) * unit)
+        instants, which = np.unique(np.stack(columns), axis=1, return_inverse=True)
+        limits = [self.motor.largest_torque(self.parameters, T, *map(float, at)) for at in instants.T]
+        return np.array(limits)[np.reshape(which, -1)]
+
+    def pull_out(self, run: xr.Dataset, T: float) -> float:
+        """Largest torque at the crank [N m] that a load meets which slows the motor down from the mean of a run until
+        it stalls, with the winding at `T` [K]; see `Motor.pull_out`."""
+        at = (float(np.mean(run[f"motor.{name}"].values)) for name in self.motor.limited_by)
+        return self.motor.pull_out(self.parameters, T, *at) * self.ratio
 
     def coasting(self, folder: Path, backend: Backend | None = None) -> Path:
         """Write the FMU of the machine that turns by itself, and with it what is on its shaft."""

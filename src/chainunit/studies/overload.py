@@ -39,7 +39,7 @@ from .monte_carlo import MonteCarloResult, Task
 from .monte_carlo import run as run_monte_carlo
 from .quantiles import runs_needed
 from .shaft import AMPLIFIED, NEAR, Cycles, ShaftAnswers, Torsion, shaft_answers, torsion, with_rigid
-from .sizing import SizingResult
+from .sizing import BURNT, SizingResult
 from .verdict import RESIDUAL, STEADY, Holds, Verdict
 
 PINS = {
@@ -67,8 +67,9 @@ class Answers:
 
     The ripple is (largest - least)/mean of the speed; `shaft_share` the peak torque on the machine's shaft over
     that of the motor (the rest is the rotor's inertia); `shaking_*` the largest deviation of the frame's load
-    from its mean, the moment about C; `torque_reserve` the part of the largest steady torque of the
-    motor that the peak leaves: 0 at the limit, less where a transient passes it;
+    from its mean, the moment about C; `torque_reserve` the least part that is left over of the torque that the warm
+    motor can give at an instant, at its speed, voltage and frequency: 0 at the limit, less where a transient passes
+    it, None in a start;
     `winding_temperature` is where the winding comes to rest if the steady turns go on for ever;
     `cycle_gap` is the difference between the ends of the steady turns, of speed or torque, over the largest value;
     times count from the event; `energy_after_trip` passes the safety coupling while it opens, `energy_behind`
@@ -256,6 +257,11 @@ class Study:
         run since it should be steady."""
         run = self.runs["start_up"].sel(time=slice(self.settled, None))
         return _turns(self.drive, run, self.config.run.turns)
+
+    @property
+    def warm(self) -> float:
+        """Temperature at which the winding comes to rest in steady running [K]; see `sizing.BURNT`."""
+        return min(BURNT, self.answers[STEADY].winding_temperature)
 
     @property
     def motor(self) -> Any:
@@ -626,7 +632,7 @@ def _setting(study: Study) -> protection.Setting:
         normal.append(_on_coupling(drive, study.runs["start_up"]))
     return protection.Setting(
         normal=max(normal),
-        motor=best.shaft_torque * drive.ratio,
+        motor=drive.pull_out(study.steady, study.warm),
         gear=study.config.gear.torque_limit,
         overloads={name: peak for name, peak in peaks.items() if OVERLOADS[name].kind in _SHOCKS},
         disturbances={name: peak for name, peak in peaks.items() if OVERLOADS[name].kind == "dip"},
@@ -893,6 +899,21 @@ def _answers(study: Study, run: xr.Dataset, event: float | None, steady: xr.Data
     recovery = None
     if event is not None and (not drive.follows or reached(study.answers["steady"], w_ref)):
         recovery = _recovery(since, speed, drive.crank_motion(steady)[1], asked)
+    settled, reserve = math.nan, None
+    if event is None:
+        settled = drive.motor.settled_temperature(
+            drive.parameters,
+            mean(_series("motor.heat")),
+            mean(_series(f"motor.{drive.motor.temperature}")),
+            mean(_series("motor.w")),
+        )
+    if event != 0.0:
+        warm = min(BURNT, settled) if event is None else study.warm
+        reserve = torque_reserve(drive.largest_torque(run, warm), motor_torque)
+        kept = speed_mean if event is None else study.answers[STEADY].speed_mean
+        if drive.follows and kept < 0.99 * w_ref:
+            # a controlled motor that falls behind gives all that it can
+            reserve = 0.0
     return Answers(
         crank_torque_peak=peak(crank_torque),
         crank_torque_rms=rms(drive.crank_torque),
@@ -904,14 +925,7 @@ def _answers(study: Study, run: xr.Dataset, event: float | None, steady: xr.Data
         supply_power_mean=mean(_series("motor.supply_power")),
         current_peak=peak(value(current)),
         current_rms=rms(_series(current)),
-        winding_temperature=drive.motor.settled_temperature(
-            drive.parameters,
-            mean(_series("motor.heat")),
-            mean(_series(f"motor.{drive.motor.temperature}")),
-            mean(_series("motor.w")),
-        )
-        if event is None
-        else None,
+        winding_temperature=settled if event is None else None,
         rocker_torque_peak=peak(value("machine.rocker.tau")),
         speed_mean=speed_mean,
         speed_least=float(np.min(speed)),
@@ -931,7 +945,7 @@ def _answers(study: Study, run: xr.Dataset, event: float | None, steady: xr.Data
         shaft_share=peak(value("motor.tau")) / peak(motor_torque),
         shaking_force=swing("fx", "fy"),
         shaking_moment=swing("moment"),
-        torque_reserve=torque_reserve(drive.largest_torque(), peak(motor_torque)),
+        torque_reserve=reserve,
         stall_time=None if event is None else protection.stall(since, speed, asked),
         thermal_trip_time=_relay(study, since, value(current)) if event is not None else None,
         coupling_trip_time=None,
@@ -953,9 +967,17 @@ def _series(name: str) -> Callable[[xr.Dataset], Any]:
     return lambda run: run[name].values
 
 
-def torque_reserve(limit: float, peak: float) -> float:
-    """What is left of the largest steady torque above the peak, over that torque; both of the motor [N m]."""
-    return (limit - peak) / limit
+def torque_reserve(limit: Any, torque: Any) -> float:
+    """Least part of the largest torque that a motor can give which is left over in a run: (limit - |torque|)/limit at
+    the instant at which that is least; both of the motor [N m], shape (time,).
+
+    0 where the motor gives all it can, less where a transient passes that, and -1 where one is twice as large or
+    more, as where it can give none at all.
+    """
+    limit, torque = np.asarray(limit), np.abs(torque)
+    free = limit - torque
+    whole = np.maximum(np.maximum(limit, -free), 1e-12)
+    return float(np.min(free / whole))
 
 
 def _any_slack(run: xr.Dataset, sides: list[str]) -> Any:
@@ -1231,7 +1253,11 @@ def motor_verdict(study: Study) -> dict[str, Any] | None:
     residuals, reaches = _residuals(study), reached(steady, asked)
     # NaN, too, is no balance
     left_out = [name for name in study.answers if not residuals.get(name, 0.0) < RESIDUAL]
-    reserves = {name: a.torque_reserve for name, a in study.answers.items() if name not in left_out}
+    reserves = {
+        name: a.torque_reserve
+        for name, a in study.answers.items()
+        if name not in left_out and a.torque_reserve is not None
+    }
     run = min(reserves, key=lambda name: float(reserves[name]), default=None)
     reserve = None if run is None else reserves[run]
     speed, wanted = number(steady.speed_mean, "rad/s"), number(asked, "rad/s", full=False)
@@ -1248,8 +1274,8 @@ def motor_verdict(study: Study) -> dict[str, Any] | None:
     elif reserve is not None and reserve >= 0.0:
         text += f"; least reserve of torque {number(reserve, '1', 'percent')} ({_CALLED[run]})"
     else:
-        over = number(-reserves[run], "1", "percent")
-        text += f"; no reserve of torque: a peak passes the largest steady torque by {over} ({_CALLED[run]})"
+        over = number(-reserves[run], "1", "percent") + (" or more" if reserves[run] <= -1.0 else "")
+        text += f"; no reserve of torque: the torque passes the largest steady one by {over} ({_CALLED[run]})"
     if left_out:
         names = ", ".join(_CALLED[name] for name in left_out)
         text += f"; runs whose energy balance is not kept are left out ({names})"
@@ -1317,7 +1343,7 @@ def coupling_sentence(study: Study) -> str:
 def _warn_of_coupling(study: Study, trip: float) -> None:
     """Where the coupling that is given does not do its work."""
     drive, warn = study.drive, study.warnings.append
-    most = drive.largest_torque() * drive.ratio if study.setting is None else study.setting.motor
+    most = drive.pull_out(study.steady, study.warm)
     peaks = _peaks(study)
     if study.start_torque is not None and study.start_torque > trip:
         warn(

@@ -23,7 +23,7 @@ from ..cosim import CoSimulation, Profile
 from ..cosim.instance import Fmu
 from ..drives.catalogue import CatalogueMotor, catalogue
 from ..drives.gearing import motor_side
-from ..drives.induction_motor import InductionMotor, breakdown, volts_per_hertz
+from ..drives.induction_motor import InductionMotor, volts_per_hertz
 from ..drives.motor import T_RATED
 from ..engines import MATH, numpy_
 from ..errors import InputError, InterruptedRunError, RunError
@@ -64,7 +64,7 @@ def start_time(time: Any, speed: Any, share: float = 0.95) -> float | None:
     return float(time[int(np.argmax(speed >= share * final))])
 
 
-_BURNT = 2000.0
+BURNT = 2000.0
 """Temperature that stands for a winding without a thermal steady state [K]."""
 _SPEED_DEVIATION = 0.03  # of the crank speed that is asked for
 
@@ -154,8 +154,6 @@ class Candidate:
     """of the crank, over start and steady running with either load [N m]"""
     breakdown_torque: float = math.nan
     """of the motor [N m]"""
-    shaft_torque: float = math.nan
-    """what it gives at its shaft at most, behind friction, fan and the gear's losses [N m]"""
     duty_torque: float = math.nan
     """peak at the crank in steady running, and while all feed moves to either side and runs there [N m]"""
     fluctuation: float = math.nan
@@ -541,7 +539,7 @@ def _checks(
     mean_heat = steady_heat + asked.starts_per_hour * extra / 3600.0
     # the runs are short and the winding in them as cold as the surroundings: as warm as it becomes, it heats more
     ran_at = float(np.mean(steady[f"motor.{motor.temperature}"]))
-    temperature = min(_BURNT, motor.settled_temperature(p, mean_heat, ran_at, mean_speed))
+    temperature = min(BURNT, motor.settled_temperature(p, mean_heat, ran_at, mean_speed))
     peak = max(float(np.max(np.abs(r[gap]))) for r in (steady, *one_sided.values()))
     reflected = float(np.max(steady["machine.J"]))
     torque = rms((1.0 - share, steady[gap].values), (share, heavier[gap].values))
@@ -557,9 +555,8 @@ def _checks(
         frequency = max(mean_speed * plate.poles / (4.0 * math.pi), 1.0)
         voltage = float(volts_per_hertz(MATH, p, frequency))
         longest = 1.0 + 1.2 * config.run.ramp
-    # warm, and at the frequency at which it runs: above the corner an inverter has no more voltage to give
-    at_breakdown = breakdown(p, voltage, frequency, T=asked.temperature)
-    c.breakdown_torque, c.shaft_torque = float(at_breakdown.air_gap_tau), float(at_breakdown.tau)
+    # as warm as it may become, at the frequency at which it runs: above the corner an inverter has no more voltage
+    c.breakdown_torque = motor.largest_torque(p, asked.temperature, voltage * p.supply.V, frequency)
     weaker = min(1.0, plate.frequency / frequency)
     cooled = min(1.0, cooling / motor.cooling(MATH, p, plate.speed))
     checks = {
