@@ -372,6 +372,75 @@ def test_a_number_that_is_none_is_refused_in_plain_words(unit, fmi):
 
 
 @both
+@pytest.mark.parametrize("name", [name for name, model in MODELS.items() if model.state_layout])
+def test_every_declared_initial_dependency_has_a_derivative(unit, native_fmus, name, fmi):
+    """Parameters, too, as the start follows from them: as setting them and asking again gives it."""
+    description = fmpy.read_model_description(native_fmus[name, fmi][1])
+    one = unit(name, fmi)
+    if fmi == 2:
+        one.api.setupExperiment(startTime=0.0)
+        one.api.enterInitializationMode()
+    else:
+        one.api.enterInitializationMode(startTime=0.0)
+    by = {}
+    for declared in description.initialUnknowns:
+        for known in declared.dependencies:
+            by.setdefault(known.valueReference, []).append(declared.variable.valueReference)
+    parameters = {v.valueReference for v in description.modelVariables if v.causality == "parameter"}
+    assert parameters & by.keys()
+    set_values, read = (
+        (one.api.setReal, one.api.getReal) if fmi == 2 else (one.api.setFloat64, one.api.getFloat64)
+    )
+    slopes = one.api.getDirectionalDerivative
+    moved = 0
+    for known, unknown in by.items():
+        found = np.array(slopes(unknown, [known], [1.0]))
+        assert np.isfinite(found).all()
+        (at,) = read([known])
+        # another step than the FMU's own
+        h = 1e-4 * (abs(at) if at and known in parameters else max(1.0, abs(at)))
+        sides = []
+        try:
+            for x in (at + h, at - h):
+                set_values([known], [x])
+                sides.append(np.array(read(unknown)))
+        except FMICallException:
+            continue  # on a bound, or a length that the machine needs: no difference of both sides
+        finally:
+            set_values([known], [at])
+        # what a kink, or the rounding of the states at the start, gives both
+        size = np.maximum(np.abs(found), np.abs(sides[0]) / max(1.0, abs(at))) + 1.0
+        np.testing.assert_allclose(found / size, (sides[0] - sides[1]) / (2.0 * h) / size, atol=1e-3)
+        moved += known in parameters and bool(found.any())
+    assert moved >= 3
+    # two at once, and none in a run
+    first, second = [k for k in by if k in parameters][:2]
+    every = [*{u for unknown in by.values() for u in unknown}]
+    alone = [np.array(slopes(every, [k], [1.0])) for k in (first, second)]
+    np.testing.assert_allclose(
+        slopes(every, [first, second], [2.0, 3.0]), 2 * alone[0] + 3 * alone[1], rtol=1e-4, atol=1e-4
+    )
+    one.api.exitInitializationMode()
+    line = one.refused(slopes, every, [first], [1.0])
+    assert line.endswith("is neither input nor state, and parameters are known in initialization only")
+
+
+@both
+def test_a_number_out_of_reach_is_discarded(unit, fmi):
+    """The host may try a smaller step or another input; by the standard nothing is lost."""
+    one = unit("ChamberForces", fmi).start()
+    one.set({"w": 1e200})
+    assert "is not a finite number" in one.refused(one.get, "tau") and one.status == 2
+    one = unit("DcMotor", fmi, exchange=True).start()
+    one.api.enterContinuousTimeMode()
+    n_x = len(MODELS["DcMotor"].state_layout.names)
+    far, rates = (ctypes.c_double * n_x)(*[1e308] * n_x), (ctypes.c_double * n_x)()
+    one.api.setContinuousStates(far, n_x)
+    call = one.api.getDerivatives if fmi == 2 else one.api.getContinuousStateDerivatives
+    assert "a derivative is not a finite number" in one.refused(call, rates, n_x) and one.status == 2
+
+
+@both
 @pytest.mark.parametrize("reference", [2**31, 2**31 + 5, 2**32 - 1])
 def test_references_beyond_all_are_refused(unit, fmi, reference):
     one = unit("DcMotor", fmi).start()

@@ -76,6 +76,8 @@ static Instance *instance_new(const char *name, Report report) {
     if (kernels.closed && work < 3 * model.n_u + 10 * model.n_x) work = 3 * model.n_u + 10 * model.n_x;
     const int saved = model.n_p + n_in + model.n_u + model.n_k;
     if (work < saved) work = saved;
+    const int moved = 2 * model.n_p + model.n_u + n_in + model.n_k + 2 * (2 * model.n_x + model.n_y) + 2 * model.n_z;
+    if (work < moved) work = moved;
     const size_t n = (size_t)(model.n_p + 2 * model.n_u + 2 * model.n_x + model.n_k + model.n_y + work + 1);
     Instance *c = calloc(1, sizeof *c);
     if (!c) return NULL;
@@ -280,10 +282,10 @@ static Status check(Instance *c) {
     return status;
 }
 
-/* The states at the start with the inputs `u`; `work` has room for twice what they are found from. */
-static void solve_start(const Instance *c, const double *u, double *work, double *x) {
+/* The states at the start with the parameters `p` and inputs `u`; `work` has room for twice what they are found from. */
+static void solve_start(const double *p, const double *u, double *work, double *x) {
     double *z = work, *next = z + model.n_z;
-    const double *arg[3] = {c->p, u, z};
+    const double *arg[3] = {p, u, z};
     double *res[1] = {z};
     if (model.n_z) kernels.guess(arg, res, NULL, NULL, 0);
     for (int round = 0; round < model.start_rounds; ++round) {
@@ -300,7 +302,7 @@ static Status start(Instance *c) {
     Status status = check(c);
     if (status) return status;
     if (model.n_x) {
-        solve_start(c, c->u, c->work, c->x);
+        solve_start(c->p, c->u, c->work, c->x);
         if (!all_finite(c->x, model.n_x)) {
             memset(c->x, 0, (size_t)model.n_x * sizeof(double));
             return complain(c, ERROR, "a state at the start is not a finite number");
@@ -345,7 +347,7 @@ static Status evaluate(Instance *c, unsigned wanted) {
     }
     for (int g = 0; g < model.n_groups; ++g)
         if ((wanted >> g & 1u) && !all_finite(c->y + model.groups[g].first, model.groups[g].count))
-            return complain(c, ERROR, "an output of %s is not a finite number at t = %g s", model.name, c->time);
+            return complain(c, DISCARD, "an output of %s is not a finite number at t = %g s", model.name, c->time);
     c->fresh |= wanted;
     return OK;
 }
@@ -358,7 +360,8 @@ static Status derivatives(Instance *c) {
     const double *arg[4] = {c->p, c->u, c->x, c->k};
     double *res[1] = {c->dx};
     kernels.derivatives(arg, res, NULL, NULL, 0);
-    if (!all_finite(c->dx, model.n_x)) return complain(c, ERROR, "a derivative is not a finite number at t = %g s", c->time);
+    if (!all_finite(c->dx, model.n_x))
+        return complain(c, DISCARD, "a derivative is not a finite number at t = %g s", c->time);
     c->fresh |= 1u << DERIVATIVES_BIT;
     return OK;
 }
@@ -476,9 +479,54 @@ static void start_moves(const Instance *c, const double *du, double *dx, double 
     distance = reach(c, du, far);
     for (int sense = 1; sense >= -1; sense -= 2) {
         for (int i = 0; i < n_u; ++i) u[i] = c->u[i] + sense * distance * du[i];
-        solve_start(c, u, more, sense > 0 ? far : near);
+        solve_start(c->p, u, more, sense > 0 ? far : near);
     }
     for (int i = 0; i < n_x; ++i) dx[i] += (far[i] - near[i]) / (2.0 * distance);
+}
+
+static Status no_output(Instance *c, unsigned reference) {
+    return complain(c, ERROR, "directional derivative: value reference %u is no output", reference);
+}
+
+static Status no_derivative(Instance *c) {
+    return complain(c, ERROR, "directional derivative is not a finite number at t = %g s", c->time);
+}
+
+/* In initialization all follows from the parameters, too: the derivatives of unknowns along the directions of
+ * parameters, inputs and states at the begin of `work`, by differences of the whole model. */
+static Status along_start(Instance *c, const unsigned *unknown, size_t n_unknown, double *sensitivity) {
+    const int n_p = model.n_p, n = n_p + model.n_u, n_x = model.n_x, n_y = model.n_y;
+    const double *dp = c->work, *du = dp + n_p, *dx = du + model.n_u;
+    double *p = c->work + n + n_x, *u = p + n_p, *k = p + n, *far = k + model.n_k, *near = far + 2 * n_x + n_y;
+    double *more = near + 2 * n_x + n_y, distance = reach(c, du, dx);
+    /* parameters are of any size */
+    for (int i = 0; i < n_p; ++i) {
+        const double most = 1e-5 * (c->p[i] == 0.0 ? 1.0 : fabs(c->p[i]));
+        if (fabs(dp[i]) * distance > most) distance = most / fabs(dp[i]);
+    }
+    for (int sense = 1; sense >= -1; sense -= 2) {
+        double *x = sense > 0 ? far : near, *y = x + n_x, *rates = y + n_y;
+        const double *arg[4] = {p, u, x, k};
+        double *res[1] = {k};
+        for (int i = 0; i < n; ++i) p[i] = c->p[i] + sense * distance * dp[i];
+        if (model.n_k) kernels.derive(arg, res, NULL, NULL, 0);
+        if (n_x) {
+            solve_start(p, u, more, x);
+            for (int i = 0; i < n_x; ++i) x[i] += sense * distance * dx[i];
+            res[0] = rates;
+            kernels.derivatives(arg, res, NULL, NULL, 0);
+        }
+        res[0] = y;
+        kernels.all(arg, res, NULL, NULL, 0);
+    }
+    for (size_t j = 0; j < n_unknown; ++j) {
+        const unsigned place = unknown[j] - (unsigned)n;
+        if (place >= (unsigned)(2 * n_x + n_y)) return no_output(c, unknown[j]);
+        const int i = (int)place - n_x, at = i >= 0 && i < n_y ? n_x + model.place[i] : (int)place;
+        sensitivity[j] = (far[at] - near[at]) / (2.0 * distance);
+        if (!isfinite(sensitivity[j])) return no_derivative(c);
+    }
+    return OK;
 }
 
 /* The derivatives of unknowns along the directions of inputs and states that lie at the begin of `work`. */
@@ -490,7 +538,7 @@ static Status along(Instance *c, const unsigned *unknown, size_t n_unknown, doub
         /* below the first, the difference of the unsigned numbers is a large one */
         const unsigned place = unknown[k] - (unsigned)(model.n_p + model.n_u);
         if (place >= (unsigned)(2 * model.n_x + model.n_y))
-            return complain(c, ERROR, "directional derivative: value reference %u is no output", unknown[k]);
+            return no_output(c, unknown[k]);
         const int i = (int)place - model.n_x;
         if (i < 0) {
             sensitivity[k] = dx[place];
@@ -515,8 +563,7 @@ static Status along(Instance *c, const unsigned *unknown, size_t n_unknown, doub
             }
             sensitivity[k] = ddx[i - model.n_y];
         }
-        if (!isfinite(sensitivity[k]))
-            return complain(c, ERROR, "directional derivative is not a finite number at t = %g s", c->time);
+        if (!isfinite(sensitivity[k])) return no_derivative(c);
     }
     return OK;
 }
@@ -525,14 +572,19 @@ static Status forward(Instance *c, const unsigned *unknown, size_t n_unknown, co
                const double *seed, double *sensitivity) {
     Status status = c->mode == INITIALIZATION ? start(c) : judge_inputs(c);
     if (status) return status;
-    const unsigned n = (unsigned)(model.n_u + model.n_x);
-    memset(c->work, 0, n * sizeof(double));
+    const unsigned n_p = (unsigned)model.n_p, n = (unsigned)(model.n_u + model.n_x);
+    int parameters = 0;
+    memset(c->work, 0, (n_p + n) * sizeof(double));
     for (size_t k = 0; k < n_known; ++k) {
-        const unsigned i = known[k] - (unsigned)model.n_p;
-        if (i >= n)
-            return complain(c, ERROR, "directional derivative: value reference %u is neither input nor state", known[k]);
-        c->work[i] += seed[k]; /* inputs and states follow each other in both */
+        const int parameter = known[k] < n_p;
+        if (known[k] >= n_p + n || (parameter && c->mode != INITIALIZATION))
+            return complain(c, ERROR, "directional derivative: value reference %u is neither input nor state%s", known[k],
+                            parameter ? ", and parameters are known in initialization only" : "");
+        parameters |= parameter;
+        c->work[known[k]] += seed[k]; /* parameters, inputs and states follow each other in both */
     }
+    if (parameters) return along_start(c, unknown, n_unknown, sensitivity);
+    memmove(c->work, c->work + n_p, n * sizeof(double));
     if (c->mode == INITIALIZATION && model.n_x)
         start_moves(c, c->work, c->work + model.n_u, c->work + n);
     return along(c, unknown, n_unknown, sensitivity);
