@@ -10,6 +10,7 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
+from machines import random_machine
 
 from chainunit import ChainUnit, InputError, RunError, SideLoads
 from chainunit.cosim import Bond, CoSimulation, Profile, System, energy_residual, monolithic, port_connections
@@ -415,3 +416,21 @@ def test_an_interrupt_after_the_last_step_keeps_the_rows(fmus):
         with pytest.raises(InterruptedRunError) as stopped:
             simulation.run(0.04, 0.004, told)
     assert len(stopped.value.partial["time"]) == 11
+
+
+@pytest.mark.parametrize("name", ["DcMotor", "InductionMotor", "CardanDriveline"])
+def test_a_load_of_negative_inertia_is_refused(name, fmus):
+    """No machine has one: the reflected inertia is a sum of squares."""
+    with pytest.raises(RunError, match=r"load\.J = -0\.01 kg\.m2: must be >= 0 kg\.m2"):
+        with CoSimulation(System({"unit": fmus[name]}, []), {"unit.load.J": -0.01}) as simulation:
+            simulation.run(0.01, 0.001)
+
+
+def test_no_machine_shows_a_negative_inertia():
+    rng = np.random.default_rng(4)
+    phi = np.linspace(0.0, 2.0 * np.pi, 361)
+    for _ in range(20):
+        machine = random_machine(rng)
+        bodies = [v.name for v in ChamberForces.parameter_layout.variables if v.unit in ("kg", "kg.m2")]
+        for each in (machine, machine.replace(dict.fromkeys(bodies, 0.0))):
+            assert np.min(each.forces(phi * each.p.ratio, 3.0, 0.0).J) >= 0.0

@@ -178,3 +178,8 @@ def test_the_remark_stands_on_terminal_page_and_in_json():
     assert said in out.getvalue()
     html = page.render(study, result)
     assert 'data-path="remarks.0.said"' in html and "Is this what was meant?" in html
+
+
+def test_a_gear_ratio_that_no_drive_has_is_remarked():
+    (told,) = map(str, config.parse("[machine]\nratio = 5000").remarks)
+    assert told.startswith("machine.ratio = 5000: is unusual") and "usual: 1 to 500" in told

@@ -19,7 +19,7 @@ class PortValues:
     """The load at the point (phi0, w0)."""
 
     tau_bias: Value = quantity("N.m", "torque needed at constant speed of the shaft", nominal=100.0)
-    J: Value = quantity("kg.m2", "inertia reflected to the shaft")
+    J: Value = quantity("kg.m2", "inertia reflected to the shaft", min=0.0)
     dJ_dphi: Value = quantity("kg.m2/rad", "derivative of J by the angle of the shaft")
     phi0: Value = quantity("rad", "angle of the shaft at which the load was evaluated")
     w0: Value = quantity("rad/s", "speed of the shaft at which the load was evaluated")

@@ -87,7 +87,9 @@ class Parameters:
         max=1e4,
     )
     g: Value = quantity("m/s2", "gravity", default=9.81, min=0.0, tunable=True)
-    ratio: Value = quantity("1", "gear ratio, motor turns per crank turn", default=1.0, above=0.0, max=1e6)
+    ratio: Value = quantity(
+        "1", "gear ratio, motor turns per crank turn", default=1.0, above=0.0, max=1e6, usual=(1.0, 500.0)
+    )
     crank: Rod = group(Rod, "crank", default=Rod(m=40.0, s=0.05, I=0.6))
     coupler: Rod = group(Rod, "coupler", default=Rod(m=25.0, s=0.7, I=5.0))
     rocker: Rod = group(Rod, "rocker", default=Rod(m=60.0, s=0.5, I=8.0))
