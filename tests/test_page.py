@@ -377,6 +377,23 @@ def test_the_speed_after_the_event_is_a_sentence(study):
     assert "The speed dips by 10.0" in caption(speed_dip=0.1, recovery_time=0.0)
 
 
+def test_what_does_not_act_is_not_given(study):
+    """A motor on the line follows no reference, so that no ramp of one is shown."""
+    given = page.render(study, as_dict(study))
+    assert 'data-path="run.ramp"' in given[given.index('<section id="given"') :]
+    line = dataclasses.replace(study, drive=dataclasses.replace(study.drive, follows=False))
+    given = page.render(line, as_dict(line))
+    assert 'data-path="run.ramp"' not in given and 'data-path="run.crank_speed"' in given
+
+
+def test_the_speeds_at_which_a_web_goes_slack_are_a_sentence(study):
+    limits = dataclasses.replace(study.limits, slack_speed=0.0, slack_speed_empty=4.64, chain_resonance=5.0)
+    assert (
+        "With this feed, a web is slack at rest; empty, a web first goes slack at 4.64 rad/s of the crank; the "
+        "lowest mode of a chain lies near 5.00 rad/s."
+    ) in said_of(dataclasses.replace(study, limits=limits))
+
+
 def test_a_motor_that_sizing_found_insufficient_is_not_praised(study, monkeypatch):
     assert as_dict(study)["verdict"]["motor"]["holds"] == "true"
     monkeypatch.setattr(type(study), "insufficient", True)
@@ -504,7 +521,8 @@ def test_a_run_that_stopped_early_has_a_page(study, tmp_path):
     stopped.runs = {"unfinished": study.runs["start_up"].isel(time=slice(0, 1))}
     stopped.answers, stopped.pins, stopped.event, stopped.certificate = {}, {}, {}, {}
     text = page.write(stopped, tmp_path).read_text("utf-8")
-    assert "The run stopped early" in text and "it &lt;broke&gt;" in text
+    assert "The run stopped early:" in text and "it &lt;broke&gt;" in text
+    assert not any(words["data-path"] == "status" for words in Reader(text).words)
     stopped.runs = {}
     assert json.loads(Reader(page.render(stopped, as_dict(stopped))).scripts["pictures"]) is None
 
@@ -572,7 +590,7 @@ def test_chains_stand_beside_two_bars(chains, tmp_path):
         f"{bar} {k}" for bar in ("wall", "web") for k in range(9)
     }
     assert any(
-        note.startswith("chains: the crank speed lies among those to avoid") for note in result["warnings"]
+        note.startswith("Chains: the crank speed lies among those to avoid") for note in result["warnings"]
     )
 
     text = page.render(chains, result)

@@ -175,7 +175,7 @@ def test_the_remark_stands_on_terminal_page_and_in_json():
     json.dumps(result, allow_nan=False)
     out = io.StringIO()
     table.show(study, Console(file=out, markup=False, width=200))
-    assert said in out.getvalue()
+    assert f"Remark: {said}\n" in out.getvalue() and "?." not in out.getvalue()
     html = page.render(study, result)
     assert 'data-path="remarks.0.said"' in html and "Is this what was meant?" in html
 

@@ -77,7 +77,7 @@ def _study_file(file: Path | None) -> Any:
 
     loaded = configuration.load(file)
     for remark in loaded.remarks:
-        _console(stderr=True).print(f"Remark: {remark}.", soft_wrap=True)
+        _console(stderr=True).print(f"Remark: {remark.sentence}", soft_wrap=True)
     return loaded
 
 

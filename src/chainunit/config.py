@@ -101,7 +101,7 @@ class Overload:
         "rad",
         "crank angle at which the event begins; at 0 the rocker is at its fastest",
         default=0.0,
-        usual=(1e-6, 6.3),
+        usual=(0.0, 6.3),
     )
     shift: Value = quantity(
         "s",

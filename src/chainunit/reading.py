@@ -138,6 +138,12 @@ class Slip:
             "said": str(self),
         }
 
+    @property
+    def sentence(self) -> str:
+        """The remark with its stop."""
+        said = str(self)
+        return said if said.endswith("?") else f"{said}."
+
     def __str__(self) -> str:
         v, (low, high) = self.variable, self.variable.quantity.usual or (0.0, 0.0)
         unit = "" if v.unit == "1" else f" {v.unit}"

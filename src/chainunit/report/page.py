@@ -12,7 +12,7 @@ from __future__ import annotations
 import json
 import math
 import platform
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from html import escape
 from importlib import metadata, resources
 from pathlib import Path
@@ -148,11 +148,12 @@ def _table(
     )
 
 
-def _given(t: Traced, section: str, declared: Any, caption: str) -> str:
+def _given(t: Traced, section: str, declared: Any, caption: str, leave_out: Collection[str] = ()) -> str:
     """The table of what was given for a declaration."""
     rows = [
         (escape(_capital(v.description)), t.number(f"{section}.{v.name}", given=True))
         for v in _variables(declared, t.result[section])
+        if v.name not in leave_out
     ]
     return _table((), rows, caption=caption)
 
@@ -181,15 +182,16 @@ def _header(t: Traced, study: Study, title: str, sections: list[tuple[str, str, 
             f" The machine starts from rest{ramp} and is evaluated over {n('run.turns')} {turns} when steady."
         )
     if overloads:
+        ahead = "turn" if study.config.overload.turns == 1.0 else "turns"
         asked += (
             " Then come overloads, each by itself, which begin at a crank angle of "
-            f"{n('overload.crank_angle')} and are followed for {n('overload.turns')} turns or longer: "
+            f"{n('overload.crank_angle')} and are followed for {n('overload.turns')} {ahead} or longer: "
             f"{escape('; '.join(overloads))}."
         )
     status = ""
     if t.result["status"] != "complete":
         status = (
-            f'<p class="alarm"><strong>The run stopped early.</strong> {t.text("status")}. What was computed '
+            f'<p class="alarm"><strong>The run stopped early:</strong> {t.text("failure")}. What was computed '
             "before is shown.</p>"
         )
     links = "".join(f'<a href="#{name}">{heading}</a>' for name, heading, _ in sections)
@@ -206,8 +208,10 @@ def _header(t: Traced, study: Study, title: str, sections: list[tuple[str, str, 
 
 def _all_given(t: Traced, study: Study) -> str:
     config = study.config
+    # a motor on the line follows no reference
+    unused = () if study.drive.follows else ("ramp",)
     tables = "".join(
-        _given(t, section, declared, caption)
+        _given(t, section, declared, caption, leave_out=unused if section == "run" else ())
         for section, declared, caption in (
             ("run", config.run, "Run"),
             ("feed", config.feed, "Feed in normal running"),

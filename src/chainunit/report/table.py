@@ -90,7 +90,7 @@ def show(study: Study, console: Console) -> None:
         if line:
             console.print(line, soft_wrap=True)
     for remark in config.remarks:
-        console.print(f"Remark: {remark}.", soft_wrap=True)
+        console.print(f"Remark: {remark.sentence}", soft_wrap=True)
     if study.sizing is not None:
         _show_sizing(study, console)
     warning = "the motor is insufficient" if study.insufficient else ""
@@ -152,15 +152,19 @@ def show(study: Study, console: Console) -> None:
         console.print(
             f"Rocker swings from {of['rocker_extreme_left']} to {of['rocker_extreme_right']}; margin {of['margin']}."
         )
-        first = "A web" if study.drive.chain is None else "With two bars a web"
-        slack = (
-            f"first goes slack at {of['slack_speed']} of the crank"
-            if limits.slack_speed
-            else "is slack at rest"
+        web = "a web" if study.drive.chain is None else "with two bars a web"
+        cases = {"with this feed": "slack_speed", "empty": "slack_speed_empty"}
+        slack = "; ".join(
+            f"{case}, {web} "
+            + (
+                f"first goes slack at {of[name]} of the crank"
+                if getattr(limits, name)
+                else "is slack at rest"
+            )
+            for case, name in cases.items()
         )
         console.print(
-            f"{first} {slack} with this feed ({of['slack_speed_empty']} empty); lowest chain mode near "
-            f"{of['chain_resonance']}.",
+            f"{slack[:1].upper()}{slack[1:]}; the lowest mode of a chain lies near {of['chain_resonance']}.",
             soft_wrap=True,
         )
     for name, found in study.loops.items():

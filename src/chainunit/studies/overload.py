@@ -64,6 +64,7 @@ LOAD_CYCLE = "load_cycle.csv"
 class Answers:
     """What a run asks of the drive; torques and speeds are the crank's unless they are called the motor's. Means
     and RMS are over the time of whole turns of the crank; steady running is the turns that `load_cycle.csv` holds.
+    `power_peak` is the most that the motor gives, 0 where it only brakes.
 
     The ripple is (largest - least)/mean of the speed; `shaft_share` the peak torque on the machine's shaft over
     that of the motor (the rest is the rotor's inertia); `shaking_*` the largest deviation of the frame's load
@@ -920,7 +921,7 @@ def _answers(study: Study, run: xr.Dataset, event: float | None, steady: xr.Data
         crank_torque_mean=mean(drive.crank_torque),
         motor_torque_peak=peak(motor_torque),
         motor_torque_rms=rms(_series("motor.air_gap_tau")),
-        power_peak=float(np.max(value(power))),
+        power_peak=max(0.0, float(np.max(value(power)))),
         power_mean=mean(_series(power)),
         supply_power_mean=mean(_series("motor.supply_power")),
         current_peak=peak(value(current)),
@@ -1114,7 +1115,10 @@ def _note(study: Study) -> None:
         )
     if study.block_peaks is not None:
         b, o = study.block_peaks, config.overload
-        low, high = (number(getattr(b, f"stiffness_{end}"), "N.m/rad") for end in ("low", "high"))
+        # what is assumed is not known to more
+        low, high = (
+            number(float(f"{getattr(b, f'stiffness_{end}'):.1g}"), "N.m/rad") for end in ("low", "high")
+        )
         ends = (number(getattr(b, f"crank_torque_{end}"), "N.m") for end in ("low", "high"))
         flat = b.crank_torque_high < _FLAT * b.crank_torque_low
         peaks = "but hardly change the peak here, {} to {}" if flat else "and decide the peak, {} to {}"
@@ -1133,6 +1137,13 @@ def _note(study: Study) -> None:
         )
     if study.torsion is not None:
         _note_shaft(study)
+    study.notes[:] = map(_sentence, study.notes)
+    study.warnings[:] = map(_sentence, study.warnings)
+
+
+def _sentence(text: str) -> str:
+    """The text with a capital at its begin."""
+    return text[:1].upper() + text[1:]
 
 
 DIFFERENCE = "_difference_to_monolithic"
@@ -1187,7 +1198,7 @@ def _warn_of_runs(study: Study) -> None:
             )
         if answers.stall_time is not None:
             late = answers.stall_time > 10.0 * study.config.run.step
-            after = f"after {number(answers.stall_time, 's')}" if late else "as before it"
+            after = f"after {number(answers.stall_time, 's')}{'' if late else ', as it hardly turned before'}"
             tell("The crank stands after the event", name, after)
         if answers.coupling_trip_time is not None:
             after = number(answers.coupling_trip_time, "s")
@@ -1440,6 +1451,7 @@ def as_dict(study: Study) -> dict[str, Any]:
         "title": config.title,
         "source": config.source,
         "status": f"failed: {study.failure}" if study.failure else "complete",
+        "failure": str(study.failure) if study.failure else None,
         "answers": {name: entries(answers) for name, answers in study.answers.items()},
         "start_up": entries(study.start) if study.start else None,
         "overload_factors": {
@@ -1462,7 +1474,9 @@ def as_dict(study: Study) -> dict[str, Any]:
             "current_crossover": {"value": study.tuning.current_crossover, "unit": "rad/s"},
         }
         if study.tuning
-        else "all gains given",
+        else "all gains are given"
+        if study.drive.motor is DcMotor
+        else "none: the motor takes the speed that its supply and the load give",
         "speed_loop": {
             name: {
                 "inertia": {"value": found.inertia, "unit": "kg.m2"},
