@@ -78,6 +78,8 @@ def test_the_jam_trips_the_coupling(result):
     assert random["runs"]["value"] == 50 and 0.0 < random["quantiles"]["trips"]["share"]["value"] < 1.0
     assert (folder / random["file"]).exists()
     assert len((folder / "load_cycle.csv").read_text().splitlines()) > 1000
+    # its own step is short enough
+    assert all(reason["topic"] != "energy" for reason in numbers["verdict"]["model"]["reasons"])
 
 
 def test_a_lump_swings_the_cardan_shaft(result):
