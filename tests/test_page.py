@@ -461,9 +461,9 @@ def test_one_number_of_the_reserve_everywhere(study, written):
     for run in answers:
         rows = study.steady if run == "steady" else study.runs[run].sel(time=slice(study.event[run], None))
         torque, speed = rows["motor.air_gap_tau"].values, rows["motor.w"].values
-        along = np.where(torque * speed < 0.0, -np.abs(speed), np.abs(speed))
-        current = np.minimum(p.limit.i, (p.limit.v - p.armature.k * along) / (p.armature.R * warm))
-        wanted = float(np.min(1.0 - np.abs(torque) / (p.armature.k * current)))
+        current = np.minimum(p.limit.i, (p.limit.v - p.armature.k * speed) / (p.armature.R * warm))
+        driving = (torque > 0.0) & (speed > 0.0)
+        wanted = float(np.min(1.0 - torque[driving] / (p.armature.k * current[driving])))
         assert result["answers"][run]["torque_reserve"]["value"] == pytest.approx(wanted, abs=1e-6)
     shown_there = {
         n["data-path"].split(".")[1]: n["text"].replace("\u00a0", " ").replace("−", "-")

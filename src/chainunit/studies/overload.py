@@ -68,7 +68,7 @@ class Answers:
 
     The ripple is (largest - least)/mean of the speed; `shaft_share` the peak torque on the machine's shaft over
     that of the motor (the rest is the rotor's inertia); `shaking_*` the largest deviation of the frame's load
-    from its mean, the moment about C; `torque_reserve` the least part that is left over of the torque that the warm
+    from its mean, the moment about C; `torque_reserve` least part that is left of the driving torque that the warm
     motor can give at an instant, at its speed, voltage and frequency: 0 at the limit, less where a transient passes
     it, None in a start;
     `winding_temperature` is where the winding comes to rest if the steady turns go on for ever;
@@ -910,7 +910,9 @@ def _answers(study: Study, run: xr.Dataset, event: float | None, steady: xr.Data
         )
     if event != 0.0:
         warm = min(BURNT, settled) if event is None else study.warm
-        reserve = torque_reserve(drive.largest_torque(run, warm), motor_torque)
+        # the field that is left in a dip brakes for a moment, which is no lack of torque
+        driving = np.maximum(motor_torque * np.sign(value("motor.w")), 0.0)
+        reserve = torque_reserve(drive.largest_torque(run, warm), driving)
         kept = speed_mean if event is None else study.answers[STEADY].speed_mean
         if drive.follows and kept < 0.99 * w_ref:
             # a controlled motor that falls behind gives all that it can
