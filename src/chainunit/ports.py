@@ -55,11 +55,12 @@ def load_inertia(load: LoadPort, phi: Any) -> Any:
 
 def moving_load(t: float, tau: float, J: float, phi: float, w: float) -> dict[str, float]:
     """The port `load` of a machine near the angle `phi` [rad] and speed `w` [rad/s], of about this torque [N m] and
-    inertia [kg m2], for reference results: every signal moves."""
+    inertia [kg m2], for reference results: every signal moves. The slope of the inertia is so small that the inertia
+    stays positive for a motor that a brake holds 150 rad behind."""
     return {
         "load.tau_bias": tau * (1.0 + 0.4 * math.sin(10.0 * t)),
         "load.J": J * (1.0 + 0.3 * math.sin(6.0 * t)),
-        "load.dJ_dphi": 0.01 * J * math.cos(6.0 * t),
+        "load.dJ_dphi": 0.001 * J * math.cos(6.0 * t),
         "load.phi0": phi,
         "load.w0": w,
         "load.tau_bias_dphi": 0.01 * tau * math.cos(4.0 * t),
