@@ -132,8 +132,9 @@ class Instance:
                 instanceName=name,
             )
         except Exception as error:  # fmpy knows no class of its own for this
-            os.chdir(here)  # it goes to the library and stays there
             raise InputError(f"{fmu.file}: {_unloadable(fmu, error)}") from error
+        finally:
+            os.chdir(here)  # fmpy goes to the library, and stays there on an error or an interrupt
         try:
             self._fmi.instantiate(callbacks=self._callbacks, loggingOn=True)
         except Exception as error:
