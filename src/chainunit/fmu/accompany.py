@@ -172,7 +172,7 @@ def _march(interface: Interface, p: Any) -> Any:
             for _ in range(2):
                 inputs, states = model.input_layout.instance(list(given)), layout.instance(list(x))
                 x = model.closed(MATH, p, inputs, states)
-        solved = solve_ivp(rates, (0.0, STEP), x, method="LSODA", rtol=1e-10, atol=1e-10 * nominal)
+        solved = solve_ivp(rates, (0.0, STEP), x, method="LSODA", rtol=1e-10, atol=1e-12 * nominal)
         if not solved.success or not np.isfinite(solved.y).all():
             raise ArithmeticError(f"the states run away behind t = {t:g} s")
         return [float(v) for v in solved.y[:, -1]]
