@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from command import chainunit
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 RUNS = {}
@@ -20,16 +19,7 @@ def result(tmp_path_factory):
     def run(name):
         if name not in RUNS:
             folder = tmp_path_factory.mktemp(name)
-            command = [
-                sys.executable,
-                "-m",
-                "chainunit.cli",
-                "study",
-                str(EXAMPLES / f"{name}.toml"),
-                "-o",
-                "out",
-            ]
-            done = subprocess.run(command, capture_output=True, text=True, cwd=folder)
+            done = chainunit("study", EXAMPLES / f"{name}.toml", "-o", "out", cwd=folder)
             # a motor that is insufficient is a run that failed
             assert done.returncode == (1 if name == "motor_rejected" else 0), done.stderr
             RUNS[name] = json.loads((folder / "out" / "result.json").read_text()), done.stdout, folder / "out"

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from command import chainunit
 
 from chainunit.report.reproduction import markdown
 from chainunit.studies.reproduction import PAPERS, paper000, paper003, reproduce
@@ -160,8 +159,7 @@ def test_hinge_loading_is_the_limit_of_the_model():
 
 
 def test_command_line(tmp_path):
-    command = [sys.executable, "-m", "chainunit.cli", "reproduce", "-o", str(tmp_path / "out")]
-    done = subprocess.run(command, capture_output=True, text=True)
+    done = chainunit("reproduce", "-o", "out", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     rows = json.loads((tmp_path / "out" / "reproduction.json").read_text())["rows"]
     assert len(rows) == len(ROWS)

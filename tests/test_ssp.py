@@ -16,6 +16,7 @@ from xml.etree import ElementTree
 import fmpy
 import numpy as np
 import pytest
+from command import chainunit
 from fmpy.ssp.ssd import read_ssd, read_ssv
 
 from chainunit import InputError, RunError, cli, config
@@ -55,8 +56,7 @@ def package(tmp_path_factory):
     """A package by the command line, in a folder whose name has spaces."""
     folder = tmp_path_factory.mktemp("ssp")
     (folder / "mine.toml").write_text(MINE)
-    command = [sys.executable, "-m", "chainunit.cli", "export-ssp", "mine.toml", "-o", "out dir/mine.ssp"]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=folder)
+    done = chainunit("export-ssp", "mine.toml", "-o", "out dir/mine.ssp", cwd=folder)
     assert (done.returncode, done.stderr) == (0, "")
     assert re.fullmatch(
         r"out dir/mine\.ssp: SSP 1\.0, machine \(ChamberForces\), motor \(DcMotor\), 10 connections; FMI 2\.0.*\n",
@@ -338,13 +338,12 @@ def test_feed_forward_and_sizing(tmp_path, monkeypatch):
         export_study(
             config.parse("[sizing]\ncandidates = 1\ninertia_ratio = 1e-6"),
             tmp_path / "y.ssp",
-            backend="python",
         )
 
 
 def test_the_motor_that_sizing_chooses_is_packaged(tmp_path):
     sizing = "[run]\nstep = 0.002\n[sizing]\ncandidates = 1\npoles_least = 4\npoles_most = 4"
-    said = export_study(config.parse(sizing), tmp_path / "z.ssp", backend="python")
+    said = export_study(config.parse(sizing), tmp_path / "z.ssp")
     assert "motor (InductionMotor)" in said
     elements = read_ssd(str(tmp_path / "z.ssp")).system.elements
     assert [e.source for e in elements] == ["resources/ChamberForces.fmu", "resources/InductionMotor.fmu"]

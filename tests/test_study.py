@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import re
 import subprocess
 import sys
@@ -12,6 +11,7 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
+from command import chainunit
 from fmpy.validation import validate_fmu
 
 from chainunit import EMPTY, ChainUnit, SideLoads
@@ -30,16 +30,6 @@ turns = 1
 [machine]
 ratio = 25
 """
-
-
-def chainunit(*arguments, cwd):
-    return subprocess.run(
-        [sys.executable, "-m", "chainunit.cli", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        cwd=cwd,
-        env=os.environ | {"COLUMNS": "120"},
-    )
 
 
 @pytest.fixture(scope="module")

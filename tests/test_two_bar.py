@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import json
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
+from command import chainunit
 
 from chainunit import ChainUnit
 from chainunit.studies.two_bar import TwoBarError, loads, statement, two_bar_error
@@ -58,8 +57,7 @@ def test_the_statement_is_that_of_the_table(found):
 
 
 def test_command(tmp_path):
-    command = [sys.executable, "-m", "chainunit.cli", "two-bar-error", "-o", "out"]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+    done = chainunit("two-bar-error", "-o", "out", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert {f.name for f in (tmp_path / "out").iterdir()} == {
         "two_bar_error.json", "two_bar_error.md", "two_bar_error.png"
@@ -68,5 +66,5 @@ def test_command(tmp_path):
     assert numbers["error_t"]["unit"] == "1" and numbers["psi"]["unit"] == "rad"
     assert all(line in " ".join(done.stdout.split()) for line in numbers["statement"])
     (tmp_path / "file").write_text("")
-    wrong = subprocess.run([*command[:-1], "file"], capture_output=True, text=True, cwd=tmp_path)
+    wrong = chainunit("two-bar-error", "-o", "file", cwd=tmp_path)
     assert wrong.returncode == 2 and len(wrong.stderr.strip().splitlines()) == 1

@@ -137,9 +137,16 @@ class Drive:
         if turns < 1:
             return None
         last = int(np.argmax(turned >= turns - rounding))
-        pair = run.isel(time=slice(last - 1, last + 1))
-        end = float(np.interp(turns, turned[last - 1 : last + 1], pair["time"].values))
-        return xr.concat([run.isel(time=slice(0, last)), pair.interp(time=[end])], "time", data_vars="all")
+        share = min(1.0, (turns - turned[last - 1]) / (turned[last] - turned[last - 1]))
+
+        def closed(x: Any) -> Any:
+            return np.append(x[:last], x[last - 1] + share * (x[last] - x[last - 1]))
+
+        return xr.Dataset(
+            {name: ("time", closed(x.values), x.attrs) for name, x in run.data_vars.items()},
+            {"time": ("time", closed(run["time"].values), run["time"].attrs)},
+            run.attrs,
+        )
 
     def start(self) -> dict[str, float]:
         """Parameters of the whole system by full name."""

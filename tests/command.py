@@ -1,0 +1,38 @@
+"""The command line, run in this process: a tenth of the time that a process of its own takes to begin."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+from dataclasses import dataclass
+from unittest import mock
+
+from chainunit.cli import main
+
+
+@dataclass(frozen=True)
+class Done:
+    """A command that ended."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+def chainunit(*arguments, cwd):
+    """``chainunit arguments`` in the folder `cwd`, on a terminal of 120 columns that is a file."""
+    out, err = io.StringIO(), io.StringIO()
+    status = 0
+    with (
+        contextlib.chdir(cwd),
+        mock.patch.dict(os.environ, COLUMNS="120"),
+        mock.patch("sys.argv", ["chainunit", *map(str, arguments)]),
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+    ):
+        try:
+            main()
+        except SystemExit as end:
+            status = end.code or 0
+    return Done(status, out.getvalue(), err.getvalue())
