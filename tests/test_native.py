@@ -783,7 +783,7 @@ def test_a_stiff_motor_is_exported_and_runs(tmp_path, name):
 
 def test_an_export_does_not_follow_states_without_end(tmp_path, caplog, monkeypatch):
     """Shafts that nothing made is as stiff as: the FMU comes without reference results, and the log says why."""
-    monkeypatch.setattr("chainunit.fmu.accompany._MOST_CALLS", 3000)
+    monkeypatch.setattr("chainunit.fmu.accompany._MOST_STEPS", 300)
     file = export_python(MODELS["CardanDriveline"], tmp_path / "x.fmu", {"c2": 1e12, "c3": 1e12})
     assert not [n for n in zipfile.ZipFile(file).namelist() if n.startswith("extra/")]
     assert "CardanDriveline: no reference results inside: the states are too fast" in caplog.text
@@ -791,7 +791,7 @@ def test_an_export_does_not_follow_states_without_end(tmp_path, caplog, monkeypa
 
 def test_the_command_says_where_an_fmu_comes_without_reference_results(tmp_path):
     """With a budget that nothing meets, as states without end would take minutes."""
-    small = "import chainunit.fmu.accompany as a, chainunit.cli as c; a._MOST_CALLS = 10; c.main()"
+    small = "import chainunit.fmu.accompany as a, chainunit.cli as c; a._MOST_STEPS = 1; c.main()"
     command = [sys.executable, "-c", small, "export", "DcMotor", "--backend", "python"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
