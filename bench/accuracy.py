@@ -17,11 +17,11 @@ from rich.console import Console
 from rich.table import Table
 
 from chainunit import ChainUnit, SideLoads
-from chainunit.cosim import Bond, CoSimulation, System, energy_residual, monolithic, port_connections
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.speed_control import tune
 from chainunit.fmu.backends import export
 from chainunit.machines.chain_unit import ChamberForces
+from chainunit.system import Bond, CoSimulation, System, energy_residual, monolithic, port_connections
 
 SPEED = 6.0  # rad/s of the crank
 STEPS = (0.004, 0.002, 0.001)

@@ -31,9 +31,9 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from chainunit.cosim.instance import Fmu, Instance
 from chainunit.fmu.native.export import export
 from chainunit.machines.flexible import flexible
+from chainunit.system.instance import Fmu, Instance
 
 HERE = Path(__file__).parent
 W = 10.0  # rad/s of the crank

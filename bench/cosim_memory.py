@@ -16,8 +16,8 @@ import time
 from pathlib import Path
 
 from chainunit.config import load
-from chainunit.cosim import CoSimulation
 from chainunit.studies.choice import choose
+from chainunit.system import CoSimulation
 
 CHOSEN = ("motor.w", "motor.tau", "machine.tau")
 WAYS = {

@@ -12,10 +12,10 @@ import time
 from pathlib import Path
 
 from chainunit.config import parse
-from chainunit.cosim.instance import Fmu, Instance
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.studies import monte_carlo
 from chainunit.studies.drive import Drive
+from chainunit.system.instance import Fmu, Instance
 
 STUDY = "[monte_carlo]\nruns = 1000\nduration = 2\n[coupling]\ntrip_torque = 1000\n"
 

@@ -21,7 +21,6 @@ from rich.console import Console
 from rich.table import Table
 
 from chainunit import ChainUnit, engines
-from chainunit.cosim.instance import Fmu, Instance
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.fmu.backends import export
 from chainunit.fmu.native import export as native
@@ -29,6 +28,7 @@ from chainunit.integrate import rk4
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.model import Model, Part
 from chainunit.quantities import Value, declaration, quantity
+from chainunit.system.instance import Fmu, Instance
 
 
 @declaration

@@ -9,9 +9,9 @@ import tempfile
 from pathlib import Path
 
 from chainunit import ChainUnit
-from chainunit.cosim import Bond, CoSimulation, Profile, System, energy_residual, port_connections
 from chainunit.fmu.export import export
 from chainunit.models import MODELS
+from chainunit.system import Bond, CoSimulation, Profile, System, energy_residual, port_connections
 
 RATIO = 50.0
 folder = tempfile.TemporaryDirectory()

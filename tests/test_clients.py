@@ -19,12 +19,12 @@ import fmpy
 import numpy as np
 import pytest
 
-from chainunit.cosim import CoSimulation, System, port_connections
-from chainunit.cosim.instance import Fmu, Instance
 from chainunit.engines import MATH, numpy_
 from chainunit.fmu.native.export import export
 from chainunit.fmu.native.platforms import compiler
 from chainunit.models import MODELS
+from chainunit.system import CoSimulation, System, port_connections
+from chainunit.system.instance import Fmu, Instance
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 

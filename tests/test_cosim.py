@@ -13,15 +13,23 @@ import xarray as xr
 from machines import random_machine
 
 from chainunit import ChainUnit, InputError, RunError, SideLoads
-from chainunit.cosim import Bond, CoSimulation, Profile, System, energy_residual, monolithic, port_connections
-from chainunit.cosim.instance import Fmu
-from chainunit.cosim.master import stoppable
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.errors import InterruptedRunError
 from chainunit.fmu.native.export import export as export_native
 from chainunit.fmu.native.platforms import compiler
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.models import MODELS
+from chainunit.system import (
+    Bond,
+    CoSimulation,
+    Profile,
+    System,
+    energy_residual,
+    monolithic,
+    port_connections,
+)
+from chainunit.system.instance import Fmu
+from chainunit.system.master import stoppable
 
 RATIO, SPEED = 50.0, 6.0
 FEED = SideLoads()
@@ -310,8 +318,8 @@ def test_a_guard_acts_in_rows_that_are_not_kept(fmus):
 
 def test_a_file_has_what_memory_has(fmus, tmp_path, monkeypatch):
     """Several blocks of rows, a step that fails, and a run that goes on."""
-    from chainunit.cosim import master
-    from chainunit.cosim.instance import Instance
+    from chainunit.system import master
+    from chainunit.system.instance import Instance
 
     monkeypatch.setattr(master, "_BLOCK", 7)
     whole = kept(fmus)
@@ -365,7 +373,7 @@ def test_memory_does_not_grow_with_a_run_that_is_written_to_a_file(tmp_path):
 
 
 def kept_names(file):
-    from chainunit.cosim.instance import Fmu
+    from chainunit.system.instance import Fmu
 
     fmu = Fmu(file)
     fmu.close()
@@ -388,7 +396,7 @@ def test_unpacking_that_ends_early_leaves_no_folder(error, fmus, tmp_path, monke
 
 
 def test_a_process_that_closes_no_fmu_leaves_no_folder(fmus, tmp_path):
-    script = "import sys; from chainunit.cosim.instance import Fmu; print(Fmu(sys.argv[1]).folder)"
+    script = "import sys; from chainunit.system.instance import Fmu; print(Fmu(sys.argv[1]).folder)"
     command = [sys.executable, "-c", script, str(fmus["DcMotor"])]
     ran = subprocess.run(
         command, capture_output=True, text=True, check=True, env=os.environ | {"TMPDIR": str(tmp_path)}

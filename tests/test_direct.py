@@ -11,10 +11,10 @@ from machines import random_loads, random_machine, random_state
 from scipy.integrate import solve_ivp
 
 from chainunit import EMPTY, ChainUnit, GeometryError, engines
-from chainunit.cosim.instance import Fmu, Instance
 from chainunit.fmu.native.export import export
 from chainunit.fmu.native.platforms import compiler
 from chainunit.machines.chain_unit import ChamberForces, DirectChainUnit
+from chainunit.system.instance import Fmu, Instance
 
 MODEL = DirectChainUnit
 

@@ -9,13 +9,21 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from chainunit import InputError, engines
-from chainunit.cosim import Bond, CoSimulation, Profile, System, energy_residual, monolithic, port_connections
 from chainunit.drives import cardan
 from chainunit.drives.cardan import Line, Twist
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.driveline import CardanDriveline
 from chainunit.errors import GeometryError
 from chainunit.machines.chain_unit import ChamberForces
+from chainunit.system import (
+    Bond,
+    CoSimulation,
+    Profile,
+    System,
+    energy_residual,
+    monolithic,
+    port_connections,
+)
 
 LAYOUT = CardanDriveline.state_layout
 BENT = {"alpha1": 0.5, "alpha2": 0.2, "delta_yokes": 0.7, "beta_planes": 0.2, "gamma1": 0.3}

@@ -19,8 +19,6 @@ from scipy.integrate import cumulative_simpson, solve_ivp
 from test_chain import DATA, M
 
 from chainunit import ChainUnit, GeometryError, InputError, RunError, config
-from chainunit.cosim import CoSimulation, System, monolithic, port_connections
-from chainunit.cosim.instance import Fmu, Instance
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.engines import MATH
 from chainunit.errors import InterruptedRunError
@@ -41,6 +39,8 @@ from chainunit.machines.flexible import OrganLaw, flexible
 from chainunit.machines.parts import Pin
 from chainunit.studies.chain import numbers_at, study_chain
 from chainunit.studies.drive import Drive
+from chainunit.system import CoSimulation, System, monolithic, port_connections
+from chainunit.system.instance import Fmu, Instance
 
 FREE = OrganLaw(eta=0.0, end_damping=0.0, fold_stiffness=0.0)
 LOOSE = {"organ.eta": 0.048, "organ.end_damping": 0.2}

@@ -19,11 +19,11 @@ from fmpy.validation import validate_fmu
 from test_reference import POINTS, deviation
 
 from chainunit import ChainUnit, GeometryError, InputError, RunError
-from chainunit.cosim.instance import Fmu, Instance
 from chainunit.fmu.description import Interface
 from chainunit.fmu.export import export
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.models import MODELS
+from chainunit.system.instance import Fmu, Instance
 
 
 class Running:

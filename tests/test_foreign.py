@@ -12,11 +12,11 @@ import pytest
 from rich.console import Console
 
 from chainunit import config
-from chainunit.cosim.instance import Fmu, Instance
 from chainunit.errors import InputError, RunError, printable, shown
 from chainunit.fmu.native.export import export
 from chainunit.fmu.native.platforms import compiler
 from chainunit.models import MODELS
+from chainunit.system.instance import Fmu, Instance
 
 ESCAPE, RIGHT_TO_LEFT, ISOLATE = "\x1b[31m", "\u202e", "\u2067"
 EVIL = f"a{ESCAPE}b{RIGHT_TO_LEFT}c{ISOLATE}d\x07\u2028<script>alert(1)</script> | [x](javascript:y) \\ `"

@@ -315,7 +315,7 @@ def test_refusals(values, line, tmp_path):
 def test_the_native_fmu_refuses_what_python_refuses(tmp_path):
     """Derived values are computed anew from what is set before initialisation, and refused in the same words."""
     from chainunit import RunError
-    from chainunit.cosim import CoSimulation, System
+    from chainunit.system import CoSimulation, System
 
     file = export(KnifeDrive, tmp_path / "k.fmu")
     with pytest.raises(

@@ -12,7 +12,6 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from chainunit import InputError, RunError, cli
-from chainunit.cosim import CoSimulation, energy_residual, monolithic, port_connections
 from chainunit.drives.induction_motor import steady
 from chainunit.engines import MATH
 from chainunit.fmu.backends import export
@@ -21,6 +20,7 @@ from chainunit.quantities import Layout
 from chainunit.report import knife as page
 from chainunit.studies import knife
 from chainunit.studies.knife import Answers, KnifeStudy, example, load, parse, run_knife, statics
+from chainunit.system import CoSimulation, energy_residual, monolithic, port_connections
 
 
 def bare(text=""):

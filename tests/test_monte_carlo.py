@@ -18,11 +18,11 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from chainunit.config import parse
-from chainunit.cosim import CoSimulation
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.errors import RunError, WriteError
 from chainunit.studies import monte_carlo, quantiles
 from chainunit.studies.drive import Drive
+from chainunit.system import CoSimulation
 
 STUDY = """
 [run]

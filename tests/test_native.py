@@ -28,7 +28,6 @@ from test_fmu import Running
 from test_reference import POINTS, deviation
 
 from chainunit import ChainUnit, GeometryError, InputError, RunError
-from chainunit.cosim.instance import Fmu, Instance
 from chainunit.engines import MATH
 from chainunit.fmu.accompany import INPUTS, READ, REFERENCE, STANDARD, STEPPED
 from chainunit.fmu.description import Interface
@@ -38,6 +37,7 @@ from chainunit.fmu.native.platforms import compiler
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.models import MODELS
 from chainunit.quantities import TYPES
+from chainunit.system.instance import Fmu, Instance
 
 HERE = Path(__file__).parent
 LARGE = ("KnifeDrive", "ChainUnitFlexible")  # whose kernels take a compiler ten seconds

@@ -13,7 +13,6 @@ import pytest
 from typer.testing import CliRunner
 
 from chainunit.config import parse
-from chainunit.cosim import CoSimulation, Profile, System
 from chainunit.drives.catalogue import catalogue
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor, breakdown, steady
@@ -25,6 +24,7 @@ from chainunit.machines.chain_unit import SideLoads
 from chainunit.studies import sizing
 from chainunit.studies.cycle import cycle
 from chainunit.studies.sizing import Check, Verdict, flywheel, permitted_starts, rms, start_time
+from chainunit.system import CoSimulation, Profile, System
 
 ANGLE = np.linspace(0.0, 2.0 * math.pi, 7200, endpoint=False)
 

@@ -20,14 +20,13 @@ from command import chainunit
 from fmpy.ssp.ssd import read_ssd, read_ssv
 
 from chainunit import InputError, RunError, cli, config
-from chainunit.cosim import CoSimulation, System, port_connections
 from chainunit.drives.catalogue import catalogue
 from chainunit.errors import WriteError
-from chainunit.fmu import ssp
 from chainunit.models import MODELS
 from chainunit.studies import sizing
 from chainunit.studies.choice import choose
 from chainunit.studies.package import export_study, start_of
+from chainunit.system import CoSimulation, System, port_connections, ssp
 
 MINE = """
 title = "Mine, with \\u0001 and <marks>"

@@ -199,9 +199,9 @@ def test_what_chains_are_refused(text, told):
 
 def test_a_run_that_fails_keeps_what_it_computed(tmp_path, monkeypatch):
     from chainunit import config
-    from chainunit.cosim.instance import Instance
     from chainunit.report import files, plots
     from chainunit.studies.overload import run_study
+    from chainunit.system.instance import Instance
 
     step = Instance.step
 
@@ -226,7 +226,7 @@ def test_a_run_that_fails_keeps_what_it_computed(tmp_path, monkeypatch):
 TELLING = """
 from pathlib import Path
 from chainunit import cli
-from chainunit.cosim.instance import Instance
+from chainunit.system.instance import Instance
 
 step = Instance.step
 

@@ -20,14 +20,14 @@ from typing import Any
 import numpy as np
 
 from ..config import Config
-from ..cosim.instance import Fmu, Instance
-from ..cosim.master import stoppable
 from ..engines import numpy_
 from ..errors import InterruptedRunError, RunError
 from ..machines.api import ChainUnit
 from ..machines.chain_unit import SIDES, ChamberForces, SideLoads
 from ..machines.flexible import flexible
 from ..quantities import Layout, Value, declaration, quantity
+from ..system.instance import Fmu, Instance
+from ..system.master import stoppable
 from ..text import entry
 from .cycle import Cycle, cycle
 from .drive import Drive

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..cosim import Profile, System, port_connections
 from ..drives.driveline import CardanDriveline
 from ..drives.motor import Motor
 from ..fmu.backends import Backend, export
@@ -22,6 +21,7 @@ from ..machines.flexible import OrganLaw, flexible
 from ..machines.hanging import split
 from ..model import Model
 from ..quantities import Layout
+from ..system import Profile, System, port_connections
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,6 @@ import xarray as xr
 from pydantic import BeforeValidator, ConfigDict, Field, ValidationError, create_model
 
 from .. import __version__
-from ..cosim import Bond, CoSimulation, System, energy_residual, port_connections
 from ..drives.catalogue import CatalogueMotor, catalogue
 from ..drives.induction_motor import InductionMotor
 from ..engines import numpy_
@@ -28,6 +27,7 @@ from ..machines.knife_drive import KnifeDrive, Parameters
 from ..model import Model
 from ..quantities import Layout, Value, declaration, quantity, variables
 from ..reading import Title, first_line, given_values, instance, packaged, read, schema, to_number, toml
+from ..system import Bond, CoSimulation, System, energy_residual, port_connections
 from .overload import entries
 from .sizing import flywheel
 

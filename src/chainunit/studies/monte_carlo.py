@@ -27,12 +27,12 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from .. import __version__
 from ..config import Config
-from ..cosim import CoSimulation, Profile
-from ..cosim.instance import remove_unpacked
 from ..errors import InterruptedRunError, RunError
 from ..files import whole, writing
 from ..machines.chain_unit import SIDES, SideName
 from ..quantities import Layout, Value, declaration, quantity
+from ..system import CoSimulation, Profile
+from ..system.instance import remove_unpacked
 from ..text import entry
 from . import protection
 from .drive import Drive

@@ -19,7 +19,6 @@ import xarray as xr
 from .. import __version__
 from ..config import OVERLOADS, Chain, Config
 from ..config import SCENARIOS as SCENARIOS
-from ..cosim import Bond, CoSimulation, Profile, System, energy_residual, monolithic
 from ..drives.cardan import ORDERS, two_joints
 from ..drives.dc_motor import DcMotor
 from ..drives.speed_control import Loop, Tuning, loop
@@ -29,6 +28,7 @@ from ..fmu.backends import Backend
 from ..machines.api import EMPTY
 from ..machines.chain_unit import SIDES, ChamberForces, SideName
 from ..quantities import Layout, Value, declaration, quantity
+from ..system import Bond, CoSimulation, Profile, System, energy_residual, monolithic
 from ..text import entry, number
 from . import protection, verdict
 from .chain import HIGH, ChainResult, study_chain

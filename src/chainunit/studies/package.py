@@ -12,13 +12,13 @@ from ..drives.driveline import CardanDriveline
 from ..drives.motor import Motor
 from ..errors import InputError, RunError
 from ..fmu.backends import Backend
-from ..fmu.ssp import ModelSystem, export
 from ..machines.api import ChainUnit
 from ..machines.chain_unit import ChamberForces, DirectChainUnit
 from ..machines.flexible import LEAST, MOST, flexible
 from ..machines.hanging import split
 from ..model import Model
 from ..quantities import Layout
+from ..system.ssp import ModelSystem, export
 from .choice import choose
 from .drive import Drive
 
@@ -120,7 +120,7 @@ def export_study(
     Raises
     ------
     InputError, RunError
-        see `chainunit.fmu.ssp.export`; also where sizing finds no motor.
+        see `chainunit.system.ssp.export`; also where sizing finds no motor.
     """
     drive = _drive(config, backend, report)
     run = config.run

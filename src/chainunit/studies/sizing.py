@@ -19,8 +19,6 @@ import numpy as np
 import xarray as xr
 
 from ..config import Config
-from ..cosim import CoSimulation, Profile
-from ..cosim.instance import Fmu
 from ..drives.catalogue import CatalogueMotor, catalogue
 from ..drives.gearing import motor_side
 from ..drives.induction_motor import InductionMotor, volts_per_hertz
@@ -30,6 +28,8 @@ from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
 from ..machines.chain_unit import SIDES, SideName
 from ..quantities import Layout, Value, declaration, quantity
+from ..system import CoSimulation, Profile
+from ..system.instance import Fmu
 from ..text import entry, number
 from .chain import HIGH, duty
 from .cycle import Cycle, all_on_one, cycle

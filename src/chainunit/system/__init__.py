@@ -4,11 +4,11 @@
 as one ODE under an error-controlled solver; `energy_residual` is the certificate of a run.
 """
 
-from .energy import Bond, energy_residual
+from .certificate import Bond, energy_residual
+from .graph import System, port_connections
 from .master import CoSimulation
 from .reference import monolithic
 from .signals import Profile
-from .system import System, port_connections
 
 __all__ = [
     "Bond",

@@ -19,12 +19,12 @@ from xml.etree.ElementTree import Element, SubElement
 
 from ..errors import InputError
 from ..files import folder, whole
+from ..fmu.backends import Backend
+from ..fmu.backends import export as export_fmu
+from ..fmu.description import Interface, Signal
+from ..fmu.pack import checked, pack, written
 from ..model import Model
 from ..quantities import base_units
-from .backends import Backend
-from .backends import export as export_fmu
-from .description import Interface, Signal
-from .pack import checked, pack, written
 
 PARAMETER_SET = "start"
 """Name of every component's parameter set: tools that choose sets by name apply all that share one."""
@@ -41,7 +41,7 @@ _NAMESPACES = {
 
 @dataclass(frozen=True)
 class ModelSystem:
-    """What is packaged: a `chainunit.cosim.System` of models in place of files.
+    """What is packaged: a `chainunit.system.System` of models in place of files.
 
     `models` maps instance names to models, `connections` are pairs (output, input) of full names such as
     ``("motor.phi", "machine.phi")``, `start` holds start values of parameters and inputs by full name, in the

@@ -23,9 +23,9 @@ import xarray as xr
 
 from ..errors import InputError, InterruptedRunError, RunError
 from ..files import netcdf, whole
+from .graph import System
 from .instance import Fmu, Instance
 from .signals import Profile
-from .system import System
 
 Progress = Callable[[float], None]
 """Called with the simulated time [s] now and then."""
