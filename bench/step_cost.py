@@ -52,7 +52,6 @@ class Empty(Model):
     name = "Empty"
     description = "one input, its multiple as the output"
     Parameters, Inputs = Gain, One
-    icon = "motor"
     parts = (Part(Same, lambda xp, p, u, x, shared: Same(y=p.k * u.u)),)
 
 

@@ -7,3 +7,4 @@ from chainunit.machines import chain_unit
 @hold(globals())
 class ChainUnit(ModelSlave):
     model = chain_unit.DirectChainUnit
+    sizes = {"stop.stiffness": 100.0, "stop.damping": 5.0}  # a stop that blocks nothing

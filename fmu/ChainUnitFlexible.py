@@ -7,3 +7,4 @@ from chainunit.machines import flexible
 @hold(globals())
 class ChainUnitFlexible(ModelSlave):
     model = flexible.flexible(6, 2)  # rods of each wall, of each web
+    sizes = {"stop.stiffness": 100.0, "stop.damping": 5.0}  # a stop that blocks nothing

@@ -159,18 +159,18 @@ def test_two_versions_in_one_process_do_not_share_code(fmus, tmp_path, monkeypat
     other mechanics: every torque doubled."""
     from chainunit.fmu import export as module
 
-    shipped = module._shipped
+    imported = module._imported
 
-    def changed(model):
-        for name, content in shipped(model):
-            if name == "machines/driven.py":
-                assert b"return self.J * a + self.bias.total" in content
-                content = content.replace(
-                    b"return self.J * a + self.bias.total", b"return 2.0 * (self.J * a + self.bias.total)"
-                )
-            yield name, content
+    def changed(script):
+        files = imported(script)
+        torque = b"return self.J * a + self.bias.total"
+        assert torque in files["machines/driven.py"]
+        doubled = files["machines/driven.py"].replace(
+            torque, torque.replace(b"return ", b"return 2.0 * (") + b")"
+        )
+        return files | {"machines/driven.py": doubled}
 
-    monkeypatch.setattr(module, "_shipped", changed)
+    monkeypatch.setattr(module, "_imported", changed)
     other = Fmu(export(ChamberForces, tmp_path / "other.fmu"))
     monkeypatch.undo()
     one = Fmu(fmus["ChamberForces"])

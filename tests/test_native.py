@@ -34,6 +34,7 @@ from chainunit.fmu.description import Interface
 from chainunit.fmu.export import export as export_python
 from chainunit.fmu.native.export import export
 from chainunit.fmu.native.platforms import compiler
+from chainunit.fmu.recipe import excitation, experiment
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.models import MODELS
 from chainunit.quantities import TYPES
@@ -207,8 +208,7 @@ class Exchange:
 
     def excited(self, t):
         """Inputs at the time `t`, as in the reference results."""
-        model = self.interface.model
-        return model.input_layout.from_names(dict(model.excitation(t)))
+        return self.interface.model.input_layout.from_names(excitation(self.interface)(t))
 
     def run(self):
         self.unit.exitInitializationMode()
@@ -702,18 +702,18 @@ def test_inputs_that_run_meet_the_reference_results_in_model_exchange(native, na
 
 @pytest.mark.parametrize("name", [name for name, model in MODELS.items() if model.state_layout])
 def test_euler_keeps_near_at_the_declared_step(native, name):
-    """In a second of the excitation it errs by less than a fifth of a state's size; at 100 times the step by
+    """In a second of the reference inputs it errs by less than a fifth of a state's size; at 100 times the step by
     more than half of one: the models need a step, and the declared one is short enough."""
-    model, wanted = MODELS[name], MODELS[name].experiment
+    model, wanted = MODELS[name], experiment(MODELS[name])
     for fmi in (2, 3):
         default = fmpy.read_model_description(str(native[name, fmi][0])).defaultExperiment
         given = (default.stepSize, default.stopTime, default.tolerance)
         assert [float(x) for x in given] == [wanted.step, wanted.stop, wanted.tolerance]
-    start = {s.name: s.start for s in Interface(model, {}).of("input")}
+    moving = excitation(Interface(model, {}))
     marks = np.linspace(0.0, 1.0, 11)
 
     def inputs(t):
-        return model.input_layout.values(model.input_layout.from_names(start | model.excitation(t)))
+        return model.input_layout.values(model.input_layout.from_names(moving(t)))
 
     with Equations(native, name, 2, inputs(0.0)) as unit:
         begin = unit.x()

@@ -55,17 +55,6 @@ class Terminal:
     flows: Mapping[str, str] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Experiment:
-    """A run for a tool that was told nothing else: to `stop` [s], in steps of `step` [s], at a relative `tolerance`.
-    In a second of the model's `excitation` the explicit Euler method errs, at that step, by less than a fifth of any
-    state's size."""
-
-    step: float = 1e-3
-    stop: float = 10.0
-    tolerance: float = 1e-6
-
-
 class Part:
     """Outputs that are evaluated together, when one of them is asked for.
 
@@ -78,17 +67,14 @@ class Part:
         declared: type,
         equations: Callable[..., Any],
         *,
-        often: frozenset[str] = frozenset(),
         by_differences: frozenset[str] = frozenset(),
         derivatives: Mapping[str, tuple[str, str]] | None = None,
     ) -> None:
-        """`often` names the outputs that a driver asks for at every step: a native FMU evaluates them apart from the
-        rest. `by_differences` names outputs that are derivatives themselves and whose own derivatives it takes by
+        """`by_differences` names outputs that are derivatives themselves and whose own derivatives it takes by
         central differences: exact ones would be the largest part of its code. `derivatives` says which output by
         which input each of this part's is the derivative of, for an engine that differentiates by itself."""
         self.layout = Layout(declared)
         self.equations = equations
-        self.often = often
         self.by_differences = by_differences
         self.derivatives = dict(derivatives or {})
 
@@ -124,15 +110,10 @@ class Model:
     `closed` after each of its steps; else in equal steps."""
     built_by: ClassVar[str] = ""
     """The call that gives this class, for one that a function of its module makes."""
-    experiment: ClassVar[Experiment] = Experiment()
-    icon: ClassVar[str]
-    """Name of its icon in `data/icons`, an SVG and a PNG."""
 
     parameter_layout: ClassVar[Layout]
     input_layout: ClassVar[Layout]
     state_layout: ClassVar[Layout | None]
-    files: ClassVar[tuple[str, ...]]
-    """Files and folders of the package, beside the common ones, that an FMU of this model needs."""
 
     def __init_subclass__(cls) -> None:
         if not hasattr(cls, "Parameters"):  # what several models share
@@ -193,11 +174,6 @@ class Model:
                 refused = GeometryError(each.refusal(value, low, high, cls.parameter_layout.named(p)))
                 refused.names = (each.subject, *each.given, *each.depends)
                 raise refused
-
-    @staticmethod
-    def excitation(t: float) -> dict[str, float]:
-        """Inputs at the time `t` [s] of the reference results that an FMU carries; others keep their start values."""
-        return {}
 
     @classmethod
     def course(cls, values: Sequence[Any]) -> list[tuple[int, Any, Any]]:

@@ -7,7 +7,6 @@ loop, and the coupling is second order in the communication step. Seven plain si
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from .model import Terminal
@@ -51,21 +50,6 @@ def load_torque(load: LoadPort, phi: Any, w: Any) -> Any:
 def load_inertia(load: LoadPort, phi: Any) -> Any:
     """Inertia of the load [kg m2], linearised about the port's point."""
     return load.J + load.dJ_dphi * (phi - load.phi0)
-
-
-def moving_load(t: float, tau: float, J: float, phi: float, w: float) -> dict[str, float]:
-    """The port `load` of a machine near the angle `phi` [rad] and speed `w` [rad/s], of about this torque [N m] and
-    inertia [kg m2], for reference results: every signal moves. The slope of the inertia is so small that the inertia
-    stays positive for a motor that a brake holds 150 rad behind."""
-    return {
-        "load.tau_bias": tau * (1.0 + 0.4 * math.sin(10.0 * t)),
-        "load.J": J * (1.0 + 0.3 * math.sin(6.0 * t)),
-        "load.dJ_dphi": 0.001 * J * math.cos(6.0 * t),
-        "load.phi0": phi,
-        "load.w0": w,
-        "load.tau_bias_dphi": 0.01 * tau * math.cos(4.0 * t),
-        "load.tau_bias_dw": 0.002 * tau * (1.0 + 0.5 * math.sin(5.0 * t)),
-    }
 
 
 OWN = "org.chainunit"

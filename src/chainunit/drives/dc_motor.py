@@ -30,7 +30,6 @@ from ..ports import (
     load_inertia,
     load_terminal,
     load_torque,
-    moving_load,
 )
 from ..quantities import Value, declaration, group, quantity
 from .motor import T_RATED, Ambient, Motor, braked
@@ -196,9 +195,7 @@ class DcMotor(Motor):
     Parameters = Parameters
     Inputs = Inputs
     States = States
-    files = ("drives/__init__.py", "drives/motor.py", "drives/dc_motor.py")
     terminals = (*flanges("outflow"), load_terminal("load."))
-    icon = "motor"
     current, temperature, winding = "armature.i", "armature.T", "armature"
     limited_by: ClassVar[Mapping[str, float]] = {"w": 1e-9}
     required = (
@@ -209,13 +206,6 @@ class DcMotor(Motor):
             ("armature.R", "current_control.kp"),
         ),
     )
-
-    @staticmethod
-    def excitation(t: float) -> dict[str, float]:
-        """A run-up to a reference that moves, against a load that swings, of which half is known beforehand."""
-        w = 60.0 * (1.0 - math.cos(4.0 * t))
-        load = moving_load(t, 1.0, 0.002, 60.0 * (t - 0.25 * math.sin(4.0 * t)), w)
-        return load | {"w_ref": w, "tau_ff": 0.2 * math.sin(10.0 * t)}
 
     @staticmethod
     def limit(xp: Any, p: Any, w: Any, T: float = T_RATED) -> Any:

@@ -22,7 +22,7 @@ from typing import Any
 
 from ..engines import Dual, dual, slope
 from ..integrate import Solver
-from ..model import Experiment, Model, Part, Requirement
+from ..model import Model, Part, Requirement
 from ..ports import (
     NO_LOAD,
     LoadPort,
@@ -32,7 +32,6 @@ from ..ports import (
     load_inertia,
     load_terminal,
     load_torque,
-    moving_load,
 )
 from ..quantities import Value, declaration, group, quantity
 from .cardan import BENDS, RIGHT, Line, Twist, two_joints
@@ -208,21 +207,11 @@ class CardanDriveline(Model):
     Parameters = Parameters
     Inputs = Inputs
     States = States
-    files = ("drives/__init__.py", "drives/cardan.py", "drives/driveline.py")
     terminals = (*flanges("inflow"), load_terminal(), load_terminal("load.", "machine"))
-    icon = "cardan"
-    # without damping the explicit Euler method raises any swing: this step by a tenth at most until the stop
-    experiment = Experiment(step=2e-5, stop=1.0)
     input_rates = MappingProxyType({"phi": "w", "w": "a"})
     required = tuple(
         Requirement(name, "rad", "a Hooke joint turns only with a bend below 90 deg") for name in BENDS
     )
-
-    @staticmethod
-    def excitation(t: float) -> dict[str, float]:
-        """A motor that runs up from rest, a load that swings and twists the line."""
-        phi, w = 10.0 * (t - 0.5 * math.sin(2.0 * t)), 10.0 * (1.0 - math.cos(2.0 * t))
-        return moving_load(t, 100.0, 0.5, phi, w) | {"phi": phi, "w": w, "a": 20.0 * math.sin(2.0 * t)}
 
     @staticmethod
     def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:

@@ -25,7 +25,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from ..engines import MATH
 from ..integrate import Solver
-from ..model import Experiment, Part, Requirement
+from ..model import Part, Requirement
 from ..planar import Vec2
 from ..ports import (
     NO_LOAD,
@@ -34,7 +34,6 @@ from ..ports import (
     load_inertia,
     load_terminal,
     load_torque,
-    moving_load,
 )
 from ..quantities import Value, declaration, group, quantity
 from .motor import T_RATED, Ambient, Motor, braked
@@ -428,11 +427,7 @@ class InductionMotor(Motor):
     Parameters = Parameters
     Inputs = Inputs
     States = States
-    files = ("drives/__init__.py", "drives/motor.py", "drives/induction_motor.py")
     terminals = (*flanges("outflow"), load_terminal("load."))
-    icon = "motor"
-    # the flux at switching on turns at the supply's frequency and hardly decays
-    experiment = Experiment(step=5e-5, stop=2.0)
     current, temperature, winding = "i", "stator.T", "stator"
     limited_by: ClassVar[Mapping[str, float]] = {"v": 1e-3, "supply.frequency": 1e-3}
     required = (
@@ -443,15 +438,6 @@ class InductionMotor(Motor):
             ("stator.R", "cage.R", "cage.skin_R", "cage.skin_L"),
         ),
     )
-
-    @staticmethod
-    def excitation(t: float) -> dict[str, float]:
-        """A start direct on line against a load that swings, at a voltage that does, too."""
-        w = 150.0 * (1.0 - math.exp(-10.0 * t))
-        return moving_load(t, 5.0, 0.02, 150.0 * t - 0.1 * w, w) | {
-            "voltage": 0.95 + 0.05 * math.cos(8.0 * t),
-            "w_ref": 100.0 + 20.0 * math.sin(4.0 * t),
-        }
 
     @staticmethod
     def limit(xp: Any, p: Any, w: Any) -> Any:

@@ -11,7 +11,6 @@ import csv
 import io
 import logging
 from collections.abc import Sequence
-from importlib import resources
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, register_namespace
 
@@ -21,6 +20,7 @@ from ..engines import MATH
 from .description import Interface, licence_text, terminals
 from .documentation import page
 from .pack import written
+from .recipe import excitation, icon
 
 STANDARD = "org.fmi-standard.fmi-ls-ref"
 REFERENCE = f"extra/{STANDARD}"
@@ -39,8 +39,7 @@ def accompanying(
 ) -> dict[str, bytes]:
     """Files by their path inside the FMU; `libraries` are packages whose code it holds, under their own licences."""
     model = interface.model
-    icons = resources.files("chainunit") / "data" / "icons"
-    png, svg = ((icons / f"{model.icon}.{kind}").read_bytes() for kind in ("png", "svg"))
+    png, svg = (icon(model, kind).read_bytes() for kind in ("png", "svg"))
     files = {
         "documentation/index.html": page(interface, version).encode(),
         "documentation/licenses/license.txt": licence("chainunit", *libraries).encode(),
@@ -103,7 +102,7 @@ def _tables(interface: Interface) -> dict[str, tuple[list[str], list[list[float]
     """
     model = interface.model
     p = model.prepared(MATH, model.parameter_layout.instance([s.start for s in interface.of("parameter")]))
-    start = {s.name: s.start for s in interface.of("input")}
+    inputs = excitation(interface)
     layout = model.state_layout
     tables: dict[str, list[list[float]]] = {INPUTS: [], STEPPED: [], READ: []}
 
@@ -120,7 +119,7 @@ def _tables(interface: Interface) -> dict[str, tuple[list[str], list[list[float]
     x: list[float] = []
     for k in range(ROWS):
         t = k * STEP
-        given = model.input_layout.values(model.input_layout.from_names(start | model.excitation(t)))
+        given = model.input_layout.values(model.input_layout.from_names(inputs(t)))
         if k == 0:
             u = given
             x = layout.values(model.begin(p, model.input_layout.instance(given))) if layout else []

@@ -15,6 +15,7 @@ from ..engines import casadi_
 from ..errors import InputError
 from ..model import Model
 from ..quantities import DISPLAY_UNITS, TYPES, Variable, base_units
+from .recipe import experiment
 
 RELEASED = "2026-11-21"
 """The day of this version's release, as CITATION.cff has it."""
@@ -333,7 +334,7 @@ def generated() -> str:
 
 
 def _experiment(root: Element, model: type[Model]) -> None:
-    e = model.experiment
+    e = experiment(model)
     attributes = {"startTime": 0.0, "stopTime": e.stop, "tolerance": e.tolerance, "stepSize": e.step}
     SubElement(root, "DefaultExperiment", {name: f"{value:g}" for name, value in attributes.items()})
 

@@ -26,21 +26,11 @@ from ..files import folder, whole
 from ..model import Model
 from .accompany import accompanying
 from .description import Interface, model_description
-from .pack import checked, pack, recipes
+from .pack import checked, pack
+from .recipe import recipes
 from .slave import ModelSlave
 
 _PACKAGE = Path(__file__).parents[1]
-_COMMON = (
-    "engines.py",
-    "errors.py",
-    "integrate.py",
-    "model.py",
-    "planar.py",
-    "ports.py",
-    "quantities.py",
-    "fmu/__init__.py",
-    "fmu/slave.py",
-)
 _KINDS = {
     "CoSimulation": {
         "needsExecutionTool": "true",
@@ -73,8 +63,9 @@ def export(model: type[Model], file: Path, start: dict[str, float] | None = None
     folder(file.parent)
     with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
         work = Path(scratch)
-        script = work / f"{model.name}_{_hash(interface, dict(_shipped(model)), model.name)}.py"
-        script.write_text(_script(model, start or {}))
+        text = _script(model, start or {})
+        script = work / f"{model.name}_{_hash(interface, _imported(text), model.name)}.py"
+        script.write_text(text)
         raw = _build(script, work / "raw.fmu")
         version = metadata.version("chainunit")
         with whole(file) as part:
@@ -99,7 +90,7 @@ def complete(slave: type[ModelSlave], resources: Path) -> Element:
     interface = checked(slave.model, slave.start)
     script = resources / f"{slave.__module__}.py"
     text = script.read_text("utf-8")
-    shipped = _imported(text) | dict(_shipped(slave.model))
+    shipped = _imported(text)
     version, hashed = metadata.version("chainunit"), _hash(interface, shipped, slave.__name__)
     package = resources / f"chainunit_{hashed[:12]}"
     for name, content in shipped.items():
@@ -125,14 +116,6 @@ def _hash(interface: Interface, shipped: Mapping[str, bytes], identifier: str) -
     version = metadata.version("chainunit")
     digest.update(tostring(model_description(interface, "", _KINDS, version, identifier=identifier)))
     return digest.hexdigest()[:32]
-
-
-def _shipped(model: type[Model]) -> Iterator[tuple[str, bytes]]:
-    """Files of this package that the FMU carries, by their path inside it."""
-    for name in (*_COMMON, *model.files):
-        path = _PACKAGE / name
-        for source in sorted(path.glob("*.py")) if path.is_dir() else [path]:
-            yield source.relative_to(_PACKAGE).as_posix(), source.read_bytes()
 
 
 def _imported(script: str) -> dict[str, bytes]:
@@ -203,10 +186,25 @@ def _file(module: tuple[str, ...]) -> Path | None:
     return next((p for p in (place / "__init__.py", place.with_suffix(".py")) if p.is_file()), None)
 
 
+_SCRIPT = """\
+from {package} import {module}
+from chainunit.fmu.slave import ModelSlave, hold
+
+
+@hold(globals())
+class {name}(ModelSlave):
+    model = {module}.{made}
+"""
+
+
 def _script(model: type[Model], start: dict[str, float]) -> str:
-    """The model's script in `fmu/`, with those start values and, for a class that a function makes, that function's
-    arguments."""
-    text = (recipes() / f"{model.name}.py").read_text()
+    """The model's script in `fmu/`, or one like it, with those start values and, for a class that a function makes,
+    that function's arguments."""
+    file = recipes() / f"{model.name}.py"
+    *package, module = model.__module__.split(".")
+    made = model.built_by or model.__qualname__
+    plain = _SCRIPT.format(name=model.name, package=".".join(package), module=module, made=made)
+    text = file.read_text() if file.is_file() else plain
     if model.built_by:
         text = re.sub(r"(?m)^(    model = \w+\.)\w+\([\d, ]*\)", rf"\g<1>{model.built_by}", text)
     given = {name: float(start[name]) for name in sorted(start)}

@@ -15,13 +15,6 @@ from .description import Interface
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the oldest time that a zip entry can bear
 
 
-def recipes() -> Path:
-    """The project's folder `fmu`: a script for each Python FMU, and in `native` the C layer. An installed package has
-    it beside this file."""
-    here = Path(__file__).parent
-    return carried if (carried := here / "recipes").exists() else here.parents[2] / "fmu"
-
-
 def checked(model: type[Model], start: Mapping[str, float] | None) -> Interface:
     """The interface of `model` with its start values, which must make a model.
 

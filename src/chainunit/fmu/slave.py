@@ -84,6 +84,10 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
     model: ClassVar[type[Model]]
     start: ClassVar[dict[str, float]] = {}
     """Start values of parameters and inputs, by name, that replace the declared ones."""
+    experiment: ClassVar[dict[str, float]] = {}
+    """``step``, ``stop`` [s] or ``tolerance`` of the default experiment, where the usual do not suit the model."""
+    sizes: ClassVar[dict[str, float]] = {}
+    """Sizes of inputs in the reference results, by name, where the usual ones do not suit the model."""
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)

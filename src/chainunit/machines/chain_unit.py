@@ -253,19 +253,6 @@ class DirectParameters(Parameters):
     solver: Solver = group(Solver, "internal integrator", default=Solver())
 
 
-def moving_loads(t: float, left: float, right: float) -> dict[str, float]:
-    """Loads of both organs about these masses of material [kg], and a soft stop, for reference results: all move."""
-    return {
-        "left.material_mass": left * (1.0 + 0.3 * math.sin(3.0 * t)),
-        "right.material_mass": right * (1.0 + 0.3 * math.cos(4.0 * t)),
-        "left.processing_force": 50.0 + 20.0 * math.sin(6.0 * t),
-        "right.processing_force": 40.0 + 20.0 * math.cos(5.0 * t),
-        "stop.stiffness": 100.0 + 50.0 * math.sin(4.0 * t),
-        "stop.damping": 5.0 + 2.0 * math.cos(3.0 * t),
-        "stop.psi": 0.05 * math.sin(2.0 * t),
-    }
-
-
 @declaration
 class DirectInputs:
     """Torque of the motor and loads of the organs."""
@@ -678,16 +665,7 @@ class ChamberForces(Model):
     )
     Parameters = Parameters
     Inputs = Inputs
-    files = (
-        "machines/__init__.py",
-        "machines/chain_unit.py",
-        "machines/crank_rocker.py",
-        "machines/driven.py",
-        "machines/parts.py",
-        "groups",
-    )
     terminals = (*flanges("inflow"), load_terminal())
-    icon = "chain_unit"
 
     required = (
         Requirement("c", "m", "the crank circle must stay left of the pivot C", depends=("r",)),
@@ -709,16 +687,6 @@ class ChamberForces(Model):
     )
 
     @staticmethod
-    def excitation(t: float) -> dict[str, float]:
-        """A crank that runs unevenly, both organs loaded."""
-        w, ripple = 6.0, 0.5
-        return moving_loads(t, 30.0, 25.0) | {
-            "phi": w * t - ripple * math.cos(w * t) / w,
-            "w": w + ripple * math.sin(w * t),
-            "a": ripple * w * math.cos(w * t),
-        }
-
-    @staticmethod
     def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
         """The crank turns, and both organs close at both extremes of the rocker."""
         yield p.c, p.r, math.inf
@@ -738,10 +706,6 @@ class ChamberForces(Model):
         Part(
             Outputs,
             _outputs,
-            often=frozenset(
-                "tau tau_bias J dJ_dphi phi0 w0 rocker.psi rocker.w rocker.a power kinetic_energy potential_energy "
-                "dissipated_power margin pressure_angle".split()
-            ),
         ),
         Part(
             PortSlopes,
@@ -762,9 +726,7 @@ class DirectChainUnit(Model):
     Parameters = DirectParameters
     Inputs = DirectInputs
     States = DirectStates
-    files = ChamberForces.files
     terminals = flanges("inflow")
-    icon = ChamberForces.icon
     required = (
         *ChamberForces.required,
         Requirement(
@@ -773,11 +735,6 @@ class DirectChainUnit(Model):
             "at the dead points of the rocker nothing else carries the torque; give crank.I, crank.m or J_added",
         ),
     )
-
-    @staticmethod
-    def excitation(t: float) -> dict[str, float]:
-        """A torque that swings sets the machine in motion, its organs unevenly loaded and the load moving."""
-        return moving_loads(t, 30.0, 5.0) | {"tau": 120.0 + 40.0 * math.sin(5.0 * t)}
 
     @staticmethod
     def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
@@ -806,4 +763,4 @@ class DirectChainUnit(Model):
         """Time derivatives of the states, in declared order."""
         return [x.w, _acceleration(p, u, DirectChainUnit.shared(xp, p, u, x))]
 
-    parts = (Part(DirectOutputs, _direct_outputs, often=frozenset(("a", "tau_bias", "J"))),)
+    parts = (Part(DirectOutputs, _direct_outputs),)

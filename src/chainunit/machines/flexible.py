@@ -56,7 +56,6 @@ from .chain_unit import (
     Outputs,
     StopLoad,
     drive_loads,
-    moving_loads,
     supports,
 )
 
@@ -577,9 +576,7 @@ def _flexible(walls: int, webs: int) -> type[Model]:
         Parameters = Parameters
         Inputs = Inputs
         States = states
-        files = (*ChamberForces.files, "machines/flexible.py")
         terminals = ChamberForces.terminals
-        icon = ChamberForces.icon
         input_rates = MappingProxyType({"phi": "w", "w": "a"})
         controlled = True
         # two rods stand where the dyad does
@@ -613,11 +610,6 @@ def _flexible(walls: int, webs: int) -> type[Model]:
                 for part in ("wall", "web")
             ),
         )  # fmt: skip
-
-        @staticmethod
-        def excitation(t: float) -> dict[str, float]:
-            """A crank that runs unevenly, the organs unevenly loaded."""
-            return ChamberForces.excitation(t) | moving_loads(t, 45.0, 5.0)
 
         @staticmethod
         def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
@@ -717,9 +709,7 @@ def _flexible(walls: int, webs: int) -> type[Model]:
             return rates
 
         parts = (
-            Part(
-                outputs, results, often=ChamberForces.parts[0].often, by_differences=frozenset(("dJ_dphi",))
-            ),
+            Part(outputs, results, by_differences=frozenset(("dJ_dphi",))),
             Part(PortSlopes, port_slopes, by_differences=frozenset(Layout(PortSlopes).names)),
         )
 

@@ -361,16 +361,7 @@ class KnifeDrive(Model):
     )
     Parameters = Parameters
     Inputs = Inputs
-    files = (
-        "machines/__init__.py",
-        "machines/knife_drive.py",
-        "machines/driven.py",
-        "machines/parts.py",
-        "machines/crank_rocker.py",
-        "groups",
-    )
     terminals = (*flanges("inflow"), load_terminal())
-    icon = "knife_drive"
     derived = 3 * (2 * HARMONICS + 1) + 2
 
     required = (
@@ -442,19 +433,6 @@ class KnifeDrive(Model):
         yield least, 1e-3, math.inf
 
     @staticmethod
-    def excitation(t: float) -> dict[str, float]:
-        """A crank that runs unevenly and cuts, forces on the blade."""
-        w, ripple = 4.0, 0.5
-        return {
-            "phi": w * t - ripple * math.cos(w * t) / w,
-            "w": w + ripple * math.sin(w * t),
-            "a": ripple * w * math.cos(w * t),
-            "cut_force": 5000.0 + 2000.0 * math.sin(3.0 * t),
-            "blade.fx": 300.0 * math.sin(5.0 * t),
-            "blade.fy": 200.0 * math.cos(4.0 * t),
-        }
-
-    @staticmethod
     def shared(xp: Any, p: Any, u: Any, x: Any) -> State:
         """The machine at the crank angle and speed that belong to the motor's."""
         return State(xp, p, u, u.phi / p.ratio, u.w / p.ratio)
@@ -463,9 +441,6 @@ class KnifeDrive(Model):
         Part(
             Outputs,
             _outputs,
-            often=frozenset(
-                "tau tau_bias J dJ_dphi phi0 w0 power kinetic_energy potential_energy dissipated_power margin".split()
-            ),
         ),
         Part(
             PortSlopes,

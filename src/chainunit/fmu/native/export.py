@@ -17,7 +17,8 @@ from ...files import folder, whole
 from ...model import Model
 from ..accompany import accompanying
 from ..description import model_description, model_description_3
-from ..pack import checked, pack, recipes, written
+from ..pack import checked, pack, written
+from ..recipe import recipes
 from .generate import kernels, tables
 from .platforms import build, chosen
 

@@ -15,17 +15,18 @@ from typing import Any
 from ...engines import casadi_
 from ...integrate import MAX_STEPS
 from ...quantities import Variable
+from .. import recipe
 from ..description import Interface
 
 
 def groups(interface: Interface) -> list[list[int]]:
     """Outputs that are evaluated together, as places among the declared outputs."""
     found: list[list[int]] = []
-    at = 0
+    connected, at = recipe.often(interface.model), 0
     for part in interface.model.parts:
         places = {name: at + i for i, name in enumerate(part.layout.names)}
         at += len(places)
-        often = [i for name, i in places.items() if name in part.often - part.by_differences]
+        often = [i for name, i in places.items() if name in connected - part.by_differences]
         apart = [i for name, i in places.items() if name in part.by_differences]
         rest = [i for i in places.values() if i not in often and i not in apart]
         found += [group for group in (often, rest, apart) if group]

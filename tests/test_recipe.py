@@ -1,0 +1,118 @@
+"""What only an FMU needs of a model follows from its declarations and terminals."""
+
+from __future__ import annotations
+
+import math
+
+import fmpy
+import numpy as np
+import pytest
+
+from chainunit.fmu import export as python
+from chainunit.fmu.description import Interface
+from chainunit.fmu.recipe import Experiment, excitation, experiment, icon, often, script
+from chainunit.fmu.slave import ModelSlave
+from chainunit.model import Model, Part, Terminal
+from chainunit.models import MODELS
+from chainunit.ports import NO_LOAD, LoadPort, PortSlopes, PortValues, flanges, load_terminal
+from chainunit.quantities import Value, declaration, group, quantity
+
+
+@declaration
+class GearParameters:
+    ratio: Value = quantity("1", "ratio", default=2.0, above=0.0)
+
+
+@declaration
+class GearInputs:
+    load: LoadPort = group(LoadPort, "load", default=NO_LOAD)
+    share: Value = quantity("1", "a share that starts on its bound", default=1.0, min=0.0, max=1.0)
+
+
+@declaration
+class GearOutputs(PortSlopes, PortValues):
+    pass
+
+
+class Gear(Model):
+    """No states; takes a port and shows one."""
+
+    name = "Gear"
+    description = "a gear"
+    Parameters, Inputs = GearParameters, GearInputs
+    terminals = (load_terminal(), load_terminal("load.", "machine"))
+    parts = (
+        Part(
+            GearOutputs,
+            lambda xp, p, u, x, shared: GearOutputs(
+                tau_bias=u.load.tau_bias / p.ratio, J=u.load.J / p.ratio**2, dJ_dphi=0.0 * u.share,
+                phi0=u.load.phi0, w0=u.load.w0, tau_bias_dphi=u.load.tau_bias_dphi, tau_bias_dw=u.load.tau_bias_dw,
+            ),
+        ),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("model", [*MODELS.values(), Gear], ids=[*MODELS, "Gear"])
+def test_every_input_moves_smoothly_within_its_bounds(model):
+    interface = Interface(model, {})
+    inputs = excitation(interface)
+    t = np.linspace(0.0, 1.0, 1001)
+    table = {name: np.array([inputs(x)[name] for x in t]) for name in model.input_layout.names}
+    for v in model.input_layout.variables:
+        values = table[v.name]
+        assert all(v.quantity.admits(x) for x in values), v.name
+        moved = np.ptp(values)
+        assert moved > 1e-4 * np.abs(values).max() > 0.0, v.name
+        assert np.abs(np.diff(values, 2)).max() < 1e-3 * moved, v.name
+    if {"phi", "w", "a"} <= table.keys():
+        for of, by in (("phi", "w"), ("w", "a")):
+            np.testing.assert_allclose(np.gradient(table[of], t)[1:-1], table[by][1:-1], atol=1e-4)
+
+
+def test_a_load_suits_the_shaft_that_takes_it():
+    """A rotor ten times as heavy has ten times the load: both run up alike."""
+    light, heavy = (excitation(Interface(MODELS["DcMotor"], {"rotor.J": J}))(0.1) for J in (0.0035, 0.035))
+    for name in ("load.tau_bias", "load.J", "load.dJ_dphi", "load.tau_bias_dphi", "load.tau_bias_dw"):
+        assert heavy[name] == pytest.approx(10.0 * light[name])
+    assert light["load.J"] == pytest.approx(0.0035 * (1.0 + 0.3 * math.sin(0.6)))
+
+
+def test_outputs_that_connect_are_often_asked_for():
+    flange = {"phi", "w", "a", "tau"}
+    port = {"tau_bias", "tau_bias_dphi", "tau_bias_dw", "J", "dJ_dphi", "phi0", "w0"}
+    assert often(MODELS["ChamberForces"]) == flange | port
+    assert often(MODELS["DcMotor"]) == flange | {f"load.{name}" for name in port}
+    assert often(MODELS["ChainUnit"]) == flange
+
+
+def test_icons_follow_from_the_terminals():
+    def shown(model):
+        return {kind: icon(model, kind).name for kind in ("svg", "png")}
+
+    for name, wanted in {
+        "ChamberForces": "machine", "ChainUnit": "machine", "ChainUnitFlexible": "machine",
+        "DcMotor": "motor", "InductionMotor": "motor", "CardanDriveline": "line", "KnifeDrive": "KnifeDrive",
+    }.items():  # fmt: skip
+        assert shown(MODELS[name]) == {"svg": f"{wanted}.svg", "png": f"{wanted}.png"}
+        assert all(icon(MODELS[name], kind).is_file() for kind in ("svg", "png"))
+    assert shown(Gear)["svg"] == "line.svg"
+    other = type(
+        "Other", (Gear,), {"name": "Other", "terminals": (Terminal("x", "other", "", {}), *flanges("inflow"))}
+    )
+    assert shown(other)["svg"] == "machine.svg"
+
+
+def test_values_that_do_not_follow_stand_in_the_script():
+    assert script(Gear) is ModelSlave and experiment(Gear) == Experiment()
+    assert experiment(MODELS["InductionMotor"]) == Experiment(step=5e-5, stop=2.0)
+    assert script(MODELS["InductionMotor"]).model is MODELS["InductionMotor"]
+    for name in MODELS:
+        assert set(script(MODELS[name]).sizes) <= set(MODELS[name].input_layout.names)
+
+
+@pytest.mark.parametrize("name", ["DcMotor", "ChainUnitFlexible"])
+def test_a_model_without_a_script_becomes_a_python_fmu(name, fmus, tmp_path, monkeypatch):
+    monkeypatch.setattr(python, "recipes", lambda: tmp_path)
+    file = python.export(MODELS[name], tmp_path / "a.fmu")
+    rows = [fmpy.simulate_fmu(str(f), stop_time=0.01, output_interval=0.005) for f in (file, fmus[name])]
+    assert rows[0].dtype == rows[1].dtype and rows[0].tolist() == rows[1].tolist()
