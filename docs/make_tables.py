@@ -3,8 +3,8 @@
 import re
 from pathlib import Path
 
-from chainunit.report.reproduction import markdown
-from chainunit.studies.reproduction import PAPERS, reproduce
+from chainunit.papers import PAPERS, reproduce
+from chainunit.papers.output import markdown
 
 PAGE = Path(__file__).parent / "papers.md"
 

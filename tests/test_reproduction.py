@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import json
 import re
+import types
 from pathlib import Path
 
 import numpy as np
 import pytest
 from command import chainunit
 
-from chainunit.report.reproduction import markdown
-from chainunit.studies.reproduction import PAPERS, paper000, paper003, reproduce
+from chainunit.papers import PAPERS, paper000, paper003, reproduce
+from chainunit.papers.output import markdown
+from chainunit.papers.table import _row
+from chainunit.reading import packaged, toml
 
 ROWS = reproduce()
 
@@ -102,6 +105,31 @@ KNOWN = [
 @pytest.mark.parametrize(("paper", "item", "quantity", "text"), KNOWN, ids=lambda x: x)
 def test_known_numbers(paper, item, quantity, text):
     assert shown(paper, item, quantity) == text
+
+
+def test_a_table_has_only_keys_that_are_read():
+    """A slip in a key would change a verdict without a word."""
+    for paper in PAPERS:
+        for item in toml(packaged(f"papers/{paper}.toml"))["item"]:
+            assert set(item) == {"number", "where", "why", "rows"}
+            for entry in item["rows"]:
+                needed, known = {"quantity", "computed", "digits"}, {"printed", "rebuilt", "unit", "why"}
+                assert needed <= set(entry) <= needed | known | {"below", "above", "agrees"}
+
+
+def test_the_verdict_follows_from_the_print():
+    def verdict(computed, **entry):
+        functions = types.SimpleNamespace(value=lambda: computed)
+        entry = {"quantity": "x", "computed": ["value"], "digits": 3} | entry
+        return _row("000", {"number": "1", "where": "here", "why": "so"}, entry, functions).verdict
+
+    assert verdict(0.136) == "not stated"
+    assert verdict(0.136, printed="0.14") == "agrees" and verdict(0.136, printed="0.13") == "corrected"
+    assert verdict(12.0, printed="12") == "agrees" and verdict(12.0, printed="substantially") == "corrected"
+    assert verdict(3.0, printed="small", below=4.0) == "agrees"
+    assert verdict(5.0, printed="small", below=4.0) == "corrected"
+    assert verdict(0.5, printed="rises", above=1.0) == "corrected"
+    assert verdict(0.14, printed="0.14", agrees=False) == "corrected"
 
 
 def test_what_the_authors_computed_explains_the_print():

@@ -299,14 +299,14 @@ right = { wall_mass = 0, web_mass = 0 }
 left = { material_mass = 0, processing_force = 0 }
 right = { material_mass = 0, processing_force = 0 }
 """
-    _, numbers = study_of(empty, tmp_path)
+    (tmp_path / "empty.toml").write_text('title = "[/foo] mill"\n' + SHORT + empty)
+    done = chainunit("study", "empty.toml", "-o", "[red]out", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "[/foo] mill" in done.stdout and "[red]out/result.json" in done.stdout
+    numbers = json.loads((tmp_path / "[red]out" / "result.json").read_text())
     for side in ("left", "right"):
         assert numbers["overload_factors"][side]["rocker_torque"]["value"] is None
     assert numbers["limits"]["slack_speed"]["value"] is None
-    (tmp_path / "title.toml").write_text('title = "[/foo] mill"\n' + SHORT)
-    named = chainunit("study", "title.toml", "-o", "[red]out", cwd=tmp_path)
-    assert named.returncode == 0, named.stderr
-    assert "[/foo] mill" in named.stdout and "[red]out/result.json" in named.stdout
 
 
 def test_every_number_has_its_unit(done):

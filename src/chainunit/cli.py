@@ -261,14 +261,14 @@ def reproduce(
     Writes reproduction.json, reproduction.md and the figures into the output folder.
     """
     with claimed(output):
-        from .report import reproduction
-        from .studies.reproduction import reproduce as compute
+        from .papers import output as page
+        from .papers import reproduce as compute
 
         console = _console()
         with _console(stderr=True).status("computing"):
             rows = compute()
-            written = reproduction.write(rows, output)
-        reproduction.show(rows, console)
+            written = page.write(rows, output)
+        page.show(rows, console)
         _show_written(written, console)
 
 
@@ -276,20 +276,19 @@ def reproduce(
 def two_bar_error(
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path("two-bar"),
 ) -> None:
-    """What two rigid bars get wrong about a hanging chain, over zeta, mu and psi, and where they are good enough.
+    """The error of two rigid bars in place of a hanging chain, over zeta, mu and psi, and where they are good enough.
 
     Writes two_bar_error.json, two_bar_error.md and two_bar_error.png into the output folder.
     """
-    from .report import two_bar as page
-    from .studies.two_bar import two_bar_error as compute
+    from .papers import two_bar
 
     with claimed(output):
-        _clear(output, *page.NAMES)
+        _clear(output, *two_bar.NAMES)
         console, errors = _console(), _console(stderr=True)
         with _progress("bars and catenaries", errors) as report:
-            found = compute(report=lambda done: report("bars and catenaries", done, 1.0))
-        written = page.write(found, output)
-        page.show(found, console)
+            comparison = two_bar.two_bar_error(report=lambda done: report("bars and catenaries", done, 1.0))
+        written = two_bar.write(comparison, output)
+        two_bar.show(comparison, console)
         _show_written(written, console)
 
 

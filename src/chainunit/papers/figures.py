@@ -1,4 +1,4 @@
-"""What ``chainunit reproduce`` leaves behind: reproduction.json, a table, and the papers' figures in their own axes.
+"""The papers' figures in their own axes, and five that the papers lack.
 
 Left organ: full lines, right organ: dashed, as in paper 000. Corrected curves are black; what the printed
 formulas or the authors' own calculation give is orange and thin.
@@ -6,94 +6,23 @@ formulas or the authors' own calculation give is orange and thin.
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
-from .. import __version__
 from ..engines import numpy_
-from ..files import whole
-from ..machines.api import EMPTY, ChainUnit
 from ..machines.crank_rocker import longest_crank, parallel_frame, pressure_angle_extremes, swing
-from ..studies.cycle import overload_factors
-from ..studies.reproduction import PAPERS, Row
-from ..studies.reproduction import paper000 as p0
-from ..studies.reproduction import paper001 as p1
-from .style import LINES, draw
+from ..report.style import LINES
+from . import paper000 as p0
+from . import paper001 as p1
 
 LEFT = {"color": "#1b1b1b", "linestyle": "-", "linewidth": 1.8}
 RIGHT = {"color": "#1b1b1b", "linestyle": "--", "linewidth": 1.8}
 PRINTED_LEFT = {"color": "#c1440e", "linestyle": "-", "linewidth": 0.9}
 PRINTED_RIGHT = {"color": "#c1440e", "linestyle": "--", "linewidth": 0.9}
 _TEXT = {"X": "$X_{A2}$", "Y_A2": "$Y_{A2}$", "Y_A1": "$Y_{A1}$", "R_n": "$R^n$", "R_t": "$R^t$"}
-
-
-def markdown(rows: Sequence[Row]) -> str:
-    """The table of a paper's rows for the documentation."""
-    lines = [
-        "| item | where | quantity | printed | computed | verdict | why |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    for row in rows:
-        unit = "" if row.unit == "1" else f" {row.unit}"
-        shown = row.shown + unit
-        rebuilt = row.as_dict()["rebuilt"]
-        if rebuilt is not None:
-            shown += f" (as the authors: {rebuilt})"
-        printed = "-" if row.printed is None else row.printed
-        cells = (row.item, row.where, row.quantity, printed, shown, row.verdict, row.reason)
-        lines.append("| " + " | ".join(c.replace("|", "\\|") for c in cells) + " |")
-    return "\n".join(lines) + "\n"
-
-
-def write(rows: Sequence[Row], folder: Path) -> list[Path]:
-    """Write reproduction.json, reproduction.md and every figure; returns the files."""
-    folder.mkdir(parents=True, exist_ok=True)
-    numbers = folder / "reproduction.json"
-    content = {"chainunit": __version__, "rows": [row.as_dict() for row in rows]}
-    with whole(numbers) as part:
-        part.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", "utf-8")
-    table = folder / "reproduction.md"
-    with whole(table) as part:
-        part.write_text(
-            "\n".join(
-                f"## Paper {paper}\n\n{markdown([r for r in rows if r.paper == paper])}" for paper in PAPERS
-            ),
-            "utf-8",
-        )
-    return [numbers, table, *draw(FIGURES, folder)]
-
-
-def show(rows: Sequence[Row], console: Console) -> None:
-    """Print the rows that a paper prints, and count the rest."""
-    for paper in PAPERS:
-        table = Table(title=f"Paper {paper}: what it prints", title_justify="left")
-        for column, side in (
-            ("item", "left"),
-            ("quantity", "left"),
-            ("printed", "right"),
-            ("computed", "right"),
-        ):
-            table.add_column(column, justify=side)  # type: ignore[arg-type]
-        table.add_column("verdict")
-        for row in rows:
-            if row.paper == paper and row.printed is not None:
-                unit = "" if row.unit == "1" else f" {row.unit}"
-                mark = "bold" if row.verdict == "corrected" else ""
-                table.add_row(row.item, row.quantity, row.printed, row.shown + unit, row.verdict, style=mark)
-        console.print(table)
-    verdicts = [row.verdict for row in rows]
-    console.print(
-        f"{verdicts.count('agrees')} agree, {verdicts.count('corrected')} corrected, "
-        f"{verdicts.count('not stated')} that the papers should state."
-    )
 
 
 def _fig_17_22() -> Any:
@@ -216,9 +145,9 @@ def _overload() -> Any:
     one.set_title("The papers' overload factor diverges at psi = 0")
     one.legend()
     speeds = np.concatenate([np.linspace(0.05, 15.0, 90), np.linspace(15.5, 50.0, 30)])
-    factors = [overload_factors(p0.machine(1.0), float(w), EMPTY, EMPTY) for w in speeds]
-    two.plot(speeds, [f.rocker_torque for f in factors], label="rocker torque", **LEFT)
-    two.plot(speeds, [f.crank_torque for f in factors], label="crank torque", **LINES[1])
+    for torque, line in (("rocker_torque", LEFT), ("crank_torque", LINES[1])):
+        factors = [p0.cycle_factor(torque, float(w)) for w in speeds]
+        two.plot(speeds, factors, label=torque.replace("_", " "), **line)
     two.axhline(1.0, color="#777777", linewidth=1.0)
     two.set_xlabel("crank speed [rad/s]")
     two.set_ylabel("left organ alone / both, cycle maxima")
@@ -233,13 +162,13 @@ def _fig_7() -> Any:
     for line, rho in zip(LINES, (0.1, 0.3, 0.5), strict=False):
         axis.plot(
             degrees,
-            np.degrees(p1.pressure(rho, np.radians(degrees), tracking=False)),
+            np.degrees(p1.pressure(rho, np.radians(degrees), p1.FROZEN)),
             label=f"rho = {rho}",
             **line,
         )
     axis.plot(
         degrees,
-        np.degrees(p1.pressure(0.5, np.radians(degrees), tracking=True)),
+        np.degrees(p1.pressure(0.5, np.radians(degrees), p1.frame(0.5, "tracking"))),
         label="rho = 0.5, frame follows rho",
         **LINES[3],
     )
@@ -261,7 +190,7 @@ def _fig_9() -> Any:
     figure, axis = plt.subplots(figsize=(7.5, 5))
     rho = np.linspace(0.05, 0.5, 400)
     axis.plot(rho, p1.K(rho), label="frame frozen at rho0 = 0.3 (Fig 9)", **LEFT)
-    axis.plot(rho, p1.K(rho, tracking=True), label="frame follows rho: K = 1", **LINES[1])
+    axis.plot(rho, p1.K(rho, "tracking"), label="frame follows rho: K = 1", **LINES[1])
     axis.plot([0.1, 0.5], [0.99, 1.26], "o", color="#c1440e", label="printed")
     axis.set_xlabel("rho = r/l")
     axis.set_ylabel("speed-change coefficient K")
@@ -356,8 +285,7 @@ def _slack() -> Any:
 
 
 def _slack_speed(zeta: float, mu: float) -> float:
-    unit: ChainUnit = p0.machine(1.0, zeta, mu)
-    return unit.slack_speed() / math.sqrt(p0.G / p0.L1)
+    return p0.machine(1.0, zeta, mu).slack_speed() / math.sqrt(p0.G / p0.L1)
 
 
 FIGURES = {

@@ -1,0 +1,18 @@
+"""The papers, reproduced and corrected: a row for each printed number, and the curves of each figure.
+
+The tables are in ``data/papers``, one for each paper; the functions that compute their values are in the module of
+the paper. An error of a paper stands here and nowhere else, for comparison; the model has the corrected physics.
+"""
+
+from . import paper000, paper001, paper002, paper003
+from .table import Row, rows
+
+__all__ = ["PAPERS", "Row", "reproduce"]
+
+PAPERS = {"000": paper000, "001": paper001, "002": paper002, "003": paper003}
+"""The module of each paper."""
+
+
+def reproduce() -> list[Row]:
+    """Every row, by paper and item."""
+    return [row for paper, functions in PAPERS.items() for row in rows(paper, functions)]

@@ -1,0 +1,52 @@
+"""Paper 002: the cardan drive of a crusher's accelerator as a system of two masses.
+
+The paper prints formulas and conclusions, no numbers but the special case; the numbers here follow from its
+conclusions with J4 = 1000 J1, its own "several orders", and equal shafts.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from ..drives.cardan import Cardan, frequency_band, frozen_frequency, ratio_of_paper, two_joints
+from ..engines import MATH, numpy_
+from .table import PICK
+
+HEAVY = Cardan(J1=1.0, J4=1000.0, c2=1e4, c3=1e4, alpha1=0.0, alpha2=0.0)
+
+
+def special_case() -> float:
+    """Item 1: k^2 J/c in the special case i = 1/3."""
+    i = 1.0 / 3.0
+    line = Cardan(c2=1.0, c3=1.0 / i, J1=1.0, J4=1.0 / (i * i))
+    return float(frozen_frequency(MATH, line, i)) ** 2
+
+
+def bound(ratio: str) -> float:
+    """Item 3: the natural frequency with i23 "at_zero" or "at_infinity", J1/J4 = 2 and c2 = c3 [rad/s]."""
+    band = frequency_band(Cardan(J1=80.0, J4=40.0, c2=8000.0, c3=8000.0, alpha1=1.2, alpha2=0.2))
+    return float(getattr(band, ratio))
+
+
+def bent(alpha1: float, alpha2: float, gamma: float) -> float:
+    """Item 4: the natural frequency [rad/s] with bends and both yokes at these angles [deg]."""
+    p = dataclasses.replace(HEAVY, alpha1=math.radians(alpha1), alpha2=math.radians(alpha2))
+    at = math.radians(gamma)
+    return float(frozen_frequency(MATH, p, ratio_of_paper(MATH, p, at, at)))
+
+
+def gain(name: str, value: float) -> float:
+    """Item 5: the rise of the natural frequency with this value [%]."""
+    changed = dataclasses.replace(HEAVY, **{name: value})
+    return 100.0 * float(frozen_frequency(MATH, changed, 1.0) / frozen_frequency(MATH, HEAVY, 1.0) - 1.0)
+
+
+def ratio_in_turn(pick: str) -> float:
+    """Item 6: mean, least or largest i23 over a turn, both bends 30 deg, yokes at 90 deg."""
+    bend = math.radians(30.0)
+    p = dataclasses.replace(HEAVY, alpha1=bend, alpha2=bend, delta_yokes=0.5 * math.pi)
+    _, ratio, _ = two_joints(numpy_(), p, np.linspace(0.0, 2.0 * math.pi, 7200, endpoint=False))
+    return float(PICK[pick](ratio))

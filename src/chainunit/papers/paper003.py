@@ -1,0 +1,140 @@
+"""Paper 003: the forces in the class III group of the knife drive, as the paper solves it and as it must be.
+
+The paper prints equations, no dimensions and no results; the numbers here are those of its equations on the packaged
+machine, whose dimensions are ours.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from ..engines import MATH
+from ..groups.body import point_load, total
+from ..groups.triad import LEGS
+from ..machines.knife_drive import KnifeDrive, Reactions, State
+from ..planar import Vec2
+from .table import PICK
+
+W = 4.0
+CUT = 5000.0
+_ANGLES = np.radians(np.arange(0.0, 360.0, 5.0))
+
+
+@cache
+def machine(**values: float) -> Any:
+    """Parameters of the packaged machine, some of them changed."""
+    return KnifeDrive.prepared(MATH, KnifeDrive.parameter_layout.from_names(values))
+
+
+def state(p: Any, angle: float, cut: float = 0.0) -> State:
+    """The machine at the crank angle [rad], with the resistance of the stack [N]."""
+    u = KnifeDrive.input_layout.from_names({"phi": angle, "w": W, "cut_force": cut})
+    shared: State = KnifeDrive.shared(MATH, p, u, None)
+    return shared
+
+
+def as_the_paper(p: Any, s: State, line: float, *, cut: bool = True) -> Any:
+    """Forces at C, D, E on the legs [N], shape (3, 2), by the paper's scheme.
+
+    The part across each leg comes from the moment about its outer pin, the parts along the legs from three moments
+    about C, D and E on the ternary link and a line equation for each direction. The constant of that equation is
+    multiplied by `line`: 0 as it must be, 1 as printed with lengths in m, 1000 as printed with lengths in mm. Without
+    `cut` the force of the stack is left out, as in the print.
+    """
+    m, w2 = s.m, s.w * s.w
+    legs = [body.applied(w2, 0.0, p.g) for body in m.bodies[3:6]]
+    knife = m.bodies[6].applied(w2, 0.0, p.g)
+    if cut:
+        knife = total(knife, point_load(m.blade, m.triad.link.pin, s.bias.on_blade))
+    inner = [pin.p for pin in m.triad.pins]
+    outer = [leg.pin.p for leg in m.triad.legs]
+    across = [
+        (k - o).turned() * (-moment / (k - o).squared())
+        for k, o, (_, moment) in zip(inner, outer, legs, strict=True)
+    ]
+    matrix, right = np.zeros((6, 6)), np.zeros(6)
+    force, moment = knife
+    origin = m.triad.link.pin.p
+    for i, about in enumerate(inner):
+        right[i] = moment + (origin - about).cross(force)
+        for k, at in enumerate(inner):
+            arm = at - about
+            right[i] -= arm.cross(across[k])
+            matrix[i, 2 * k : 2 * k + 2] = -arm.y, arm.x
+    for k, (at, from_) in enumerate(zip(inner, outer, strict=True)):
+        matrix[3 + k, 2 * k : 2 * k + 2] = at.y - from_.y, from_.x - at.x
+        right[3 + k] = -line * (at.x * from_.y - from_.x * at.y)
+    along = np.linalg.solve(matrix, right).reshape(LEGS, 2)
+    return along + np.array([[t.x, t.y] for t in across])
+
+
+def ours(p: Any, s: State) -> Any:
+    """The same forces as the model has them."""
+    inner = Reactions(s.m, p, s.w * s.w, 0.0, s.bias.on_blade).inner
+    return np.array([[f.x, f.y] for f in inner])
+
+
+def error(angle: float, line: float) -> float:
+    """Largest error of the forces at C, D, E by the printed line equation, over the largest of them [%]."""
+    p = machine()
+    s = state(p, angle)
+    right = ours(p, s)
+    size = np.max(np.hypot(*right.T))
+    return float(100.0 * np.max(np.hypot(*(as_the_paper(p, s, line) - right).T)) / size)
+
+
+@cache
+def _errors(line: float) -> Any:
+    return np.array([error(angle, line) for angle in _ANGLES])
+
+
+def error_in_turn(line: float, end: str) -> float:
+    """Item 1: "least" or "largest" error over a turn [%]; for `line` see `as_the_paper`."""
+    return float(PICK[end](_errors(line)))
+
+
+def across_at_e(arm_from: str) -> float:
+    """Item 2: the force across O4E at E [N] at crank angle 0, by the moment about O4; as printed, the weight has the
+    arm "O3"-cM in place of "O4"-cM."""
+    p = machine()
+    triad, body = state(p, 0.0).m.triad, state(p, 0.0).m.bodies[5]
+    leg = triad.legs[2]
+    force, moment = body.applied(W * W, 0.0, p.g)
+    if arm_from == "O3":
+        # of the length the paper names, along the leg
+        length = math.sqrt((body.c.p - triad.legs[1].pin.p).squared())
+        moment += (leg.u * length - (body.c.p - leg.pin.p)).cross(force)
+    return float(-moment / p.o4e)
+
+
+def force_in_cut(pin: str, moments: str) -> float:
+    """Item 4: the force at C, D or E [N] where the cutting force is largest, by "all" moments, or by those "printed",
+    without the cut."""
+    p = machine()
+    cutting = max((state(p, angle, CUT) for angle in _ANGLES), key=lambda s: Vec2.squared(s.bias.cut))
+    forces = ours(p, cutting) if moments == "all" else as_the_paper(p, cutting, 0.0, cut=False)
+    return float(np.hypot(*forces["CDE".index(pin)]))
+
+
+def _in_line() -> Any:
+    """The triad with C, D and E on one line."""
+    straight = {"knife.c.y": 0.0, "knife.d.y": 0.0, "knife.e.y": 0.0}
+    near = {"assembly.x": 1.02, "assembly.y": -0.01, "assembly.theta": 0.0}
+    return state(machine(**straight, **near), 0.0).m.triad
+
+
+def rank_in_line() -> float:
+    """Item 6: rank of the three moments with C, D and E on one line."""
+    triad = _in_line()
+    at = [pin.p for pin in triad.pins]
+    moments = [[(at[k] - at[i]).cross(triad.legs[k].u) for k in range(LEGS)] for i in range(LEGS)]
+    return float(np.linalg.matrix_rank(np.array(moments)))
+
+
+def margin_in_line() -> float:
+    """Item 6: the margin of the same triad by two forces and one moment."""
+    return float(abs(_in_line().margin))

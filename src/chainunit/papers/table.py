@@ -1,0 +1,122 @@
+"""The table of a paper: its printed numbers beside the computed ones, read from ``data/papers``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from ..reading import packaged, toml
+
+PICK: dict[str, Callable[[Any], Any]] = {"least": np.min, "largest": np.max, "mean": np.mean}
+"""How a function takes one number of many, by the word in the table."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A number of a paper.
+
+    `printed` is the paper's text, with its digits, or the value of its formula as printed (None: the paper does not
+    state it). `rebuilt` is the value by the paper's own scheme once its slips are put back, where that explains the
+    print. `digits` are decimals; -1 shows the order of magnitude alone.
+    """
+
+    paper: str
+    item: str
+    where: str
+    quantity: str
+    printed: str | None
+    computed: float
+    unit: str
+    digits: int
+    rebuilt: float | None
+    verdict: str
+    """``agrees``, ``corrected`` or ``not stated``"""
+    reason: str
+
+    @property
+    def shown(self) -> str:
+        """The computed value with as many decimals as are worth comparing."""
+        return _text(self.computed, self.digits)
+
+    @property
+    def shown_rebuilt(self) -> str | None:
+        """The rebuilt value with the same decimals."""
+        return None if self.rebuilt is None else _text(self.rebuilt, self.digits)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For reproduction.json."""
+        own = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "digits"}
+        return own | {"shown": self.shown, "rebuilt": self.shown_rebuilt}
+
+
+def rows(paper: str, functions: ModuleType) -> list[Row]:
+    """The rows of a paper, in the order of its items.
+
+    The table has an ``[[item]]`` for each finding: its `number` in the list of errata, `where` in the paper it is,
+    `why` the verdict is given, and its `rows`. A row has
+
+    ``quantity``, ``unit`` (``"1"`` where it is left out) and ``digits``;
+    ``computed``  name of a function of the paper's module, and its arguments;
+    ``printed``   the paper's text; or a function, for a formula that gives this value as it is printed;
+    ``rebuilt``   a function for the value by the paper's own scheme;
+    ``below``, ``above``  the bound that a printed word such as "very small" stands for;
+    ``agrees``    where neither rounding nor a bound decides;
+    ``why``       in place of the item's.
+    """
+    return [
+        _row(paper, item, entry, functions)
+        for item in toml(packaged(f"papers/{paper}.toml"))["item"]
+        for entry in item["rows"]
+    ]
+
+
+def _row(paper: str, item: Mapping[str, Any], entry: Mapping[str, Any], functions: ModuleType) -> Row:
+    def value(call: list[Any]) -> float:
+        function, *arguments = call
+        return float(getattr(functions, function)(*arguments))
+
+    computed, printed, digits = value(entry["computed"]), entry.get("printed"), entry["digits"]
+    if isinstance(printed, list):
+        printed = _text(value(printed), digits)
+    return Row(
+        paper=paper,
+        item=item["number"],
+        where=item["where"],
+        quantity=entry["quantity"],
+        printed=printed,
+        computed=computed,
+        unit=entry.get("unit", "1"),
+        digits=digits,
+        rebuilt=value(entry["rebuilt"]) if "rebuilt" in entry else None,
+        verdict=_verdict(entry, printed, computed),
+        reason=entry.get("why", item["why"]),
+    )
+
+
+def _verdict(entry: Mapping[str, Any], printed: str | None, computed: float) -> str:
+    if printed is None:
+        return "not stated"
+    if "agrees" in entry:
+        agrees = entry["agrees"]
+    elif "below" in entry or "above" in entry:
+        agrees = entry.get("above", computed) <= computed <= entry.get("below", computed)
+    else:
+        agrees = _rounds_to(computed, printed)
+    return "agrees" if agrees else "corrected"
+
+
+def _rounds_to(computed: float, printed: str) -> bool:
+    """Whether the computed value rounds to the printed number; no value rounds to a text."""
+    decimals = len(printed.partition(".")[2])
+    try:
+        return f"{computed:.{decimals}f}" == f"{float(printed):.{decimals}f}"
+    except ValueError:
+        return False
+
+
+def _text(x: float, digits: int) -> str:
+    return f"{x:.{digits}f}" if digits >= 0 else f"{x:.1e}"
