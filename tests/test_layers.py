@@ -1,0 +1,91 @@
+"""The direction of imports, by the imports themselves, and the drawing of the house that is made from them."""
+
+from __future__ import annotations
+
+import importlib.util
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import connected_components
+
+ROOT = Path(__file__).parents[1]
+UPWARD: set[tuple[str, str]] = set()
+"""Imports that run upward: none may be added."""
+CIRCLES = {frozenset({"fmu.export", "fmu.slave"})}
+"""Modules that import each other in a circle: none may be added."""
+
+
+def _script(path):
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+HOUSE = _script(ROOT / "docs" / "draw_architecture.py")
+
+
+def test_imports_run_downward():
+    upward = {(a, b) for a, b in HOUSE.imports() if not HOUSE.admitted(HOUSE.layer(a), HOUSE.layer(b))}
+    assert upward <= UPWARD, f"these imports run upward: {sorted(upward - UPWARD)}"
+    assert upward >= UPWARD, f"these are mended, take them out of UPWARD: {sorted(UPWARD - upward)}"
+
+
+def test_no_modules_import_each_other_in_a_circle():
+    pairs = [(a, b) for a, b in HOUSE.imports() if a != b]
+    names = sorted({name for pair in pairs for name in pair})
+    matrix = np.zeros((len(names), len(names)))
+    for a, b in pairs:
+        matrix[names.index(a), names.index(b)] = 1.0
+    count, part = connected_components(csr_matrix(matrix), connection="strong")
+    circles = {frozenset(np.array(names)[part == k]) for k in range(count) if np.sum(part == k) > 1}
+    assert circles == CIRCLES
+
+
+def test_the_scan_sees_every_way_of_importing(tmp_path, monkeypatch):
+    """Relative and absolute, of a module and from one, inside a function, and from the package itself."""
+    package = tmp_path / "chainunit"
+    for name in ("fmu", "groups"):
+        (package / name).mkdir(parents=True)
+        (package / name / "__init__.py").write_text("")
+    (package / "__init__.py").write_text("from .cli import app")
+    (package / "errors.py").write_text("")
+    (package / "fmu" / "export.py").write_text("")
+    (package / "groups" / "chain.py").write_text(
+        "from .. import __version__, errors\n"
+        "from ..errors import InputError\n"
+        "def f():\n    from chainunit.fmu.export import export\n"
+        "    from chainunit.fmu import export\n    import chainunit.cli\n"
+    )
+    (package / "cli.py").write_text("from .groups import chain\n")
+    monkeypatch.setattr(HOUSE, "PACKAGE", package)
+    assert HOUSE.imports() == {
+        ("groups.chain", "errors"),
+        ("groups.chain", "fmu.export"),
+        ("groups.chain", "cli"),
+        ("cli", "groups.chain"),
+    }
+    assert [HOUSE.layer(m) for m in ("groups.chain", "errors", "fmu.export", "cli")] == [
+        "groups", "core", "fmu", "cli"
+    ]  # fmt: skip
+    assert HOUSE.admitted("cli", "groups") and not HOUSE.admitted("groups", "cli")
+    assert HOUSE.admitted("system", "fmu") and not HOUSE.admitted("machines", "fmu")
+    assert HOUSE.admitted("fmu", "core") and not HOUSE.admitted("fmu", "groups")
+
+
+def test_the_drawing_is_that_of_the_imports():
+    """Its arcs and boxes; else run docs/draw_architecture.py."""
+
+    def shapes(text):
+        return [(e.tag, sorted(e.attrib.items()), e.text) for e in ET.fromstring(text).iter()]
+
+    def arcs(text):
+        width = "stroke-width"  # follows the number of imports: no reason to draw anew
+        return [
+            (tag, [(k, v) for k, v in keys if not (tag.endswith("path") and k == width)], words)
+            for tag, keys, words in shapes(text)
+        ]
+
+    assert arcs(HOUSE.DRAWING.read_text("utf-8")) == arcs(HOUSE.drawing())
