@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import re
+import time
 import zipfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -224,3 +227,25 @@ def test_an_fmu_that_cannot_be_instantiated_is_told(tmp_path):
     with pytest.raises(RunError, match="motor: cannot be instantiated"):
         Instance(fmu, "motor")
     fmu.close()
+
+
+def test_threads_that_load_leave_the_working_directory(motor, fmus, monkeypatch):
+    """fmpy goes to each library's folder and back; two threads at once would take each other's folder for home."""
+    here, files, change = Path.cwd(), (motor, fmus["ChamberForces"]), os.chdir
+
+    def slow(folder):
+        change(folder)
+        time.sleep(0.002)
+
+    monkeypatch.setattr(os, "chdir", slow)
+
+    def load(k):
+        fmu = Fmu(files[k % 2])
+        try:
+            Instance(fmu, "unit").close()
+        finally:
+            fmu.close()
+
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(load, range(64)))
+    assert Path.cwd() == here

@@ -10,6 +10,7 @@ import os
 import re
 import shutil
 import tempfile
+import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,8 @@ from ..errors import InputError, RunError, printable, shown
 
 log = logging.getLogger("chainunit.fmu")
 _WARNING, _FATAL = 1, 4  # of fmi2Status
+_working_directory = threading.Lock()
+"""Held while fmpy loads a library: all threads of the process have one working directory."""
 _unpacked: set[str] = set()
 """Folders of the FMUs that this process has unpacked."""
 
@@ -123,18 +126,19 @@ class Instance:
         self._callbacks.allocateMemory = api.fmi2CallbackAllocateMemoryTYPE(calloc)
         self._callbacks.freeMemory = api.fmi2CallbackFreeMemoryTYPE(free)
         self._alive = False
-        here = Path.cwd()
-        try:
-            self._fmi = api.FMU2Slave(
-                guid=fmu.description.guid,
-                unzipDirectory=fmu.folder,
-                modelIdentifier=fmu.identifier,
-                instanceName=name,
-            )
-        except Exception as error:  # fmpy knows no class of its own for this
-            raise InputError(f"{fmu.file}: {_unloadable(fmu, error)}") from error
-        finally:
-            os.chdir(here)  # fmpy goes to the library, and stays there on an error or an interrupt
+        with _working_directory:
+            here = Path.cwd()
+            try:
+                self._fmi = api.FMU2Slave(
+                    guid=fmu.description.guid,
+                    unzipDirectory=fmu.folder,
+                    modelIdentifier=fmu.identifier,
+                    instanceName=name,
+                )
+            except Exception as error:  # fmpy knows no class of its own for this
+                raise InputError(f"{fmu.file}: {_unloadable(fmu, error)}") from error
+            finally:
+                os.chdir(here)  # fmpy goes to the library, and stays there on an error or an interrupt
         try:
             self._fmi.instantiate(callbacks=self._callbacks, loggingOn=True)
         except Exception as error:
