@@ -51,7 +51,7 @@ ORDERS = (2, 4)
 
 
 def check(p: Line) -> None:
-    """Refuse what cannot turn; `p` may declare more than a `Line`.
+    """Refuse a line that cannot turn; `p` may declare more than a `Line`.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def hooke(xp: Any, bend: Any, angle: Any) -> tuple[Any, Any, Any]:
     s, c, k = xp.sin(angle), xp.cos(angle), xp.cos(bend)
     below = k + (1.0 - k) * s * s  # = s^2 + k c^2
     driven = angle + xp.atan2((1.0 - k) * s * c, below)
-    # 1 - sin^2(bend) cos^2(angle), as a sum of what cannot cancel
+    # 1 - sin^2(bend) cos^2(angle), as a sum of terms that cannot cancel
     spread = s * s + k * k * c * c
     ratio = k / spread
     return driven, ratio, -2.0 * k * s * c * (1.0 - k * k) / (spread * spread)
@@ -108,8 +108,8 @@ def frozen_frequency(xp: Any, p: Cardan, i: Any) -> Any:
     return xp.sqrt(p.c2 * (i * i + p.J1 / p.J4) / (p.J1 * (i * i + p.c2 / p.c3)))
 
 
-class Band(NamedTuple):
-    """The frozen-angle frequency over a turn [rad/s], and what it could be at any ratio."""
+class FrequencyBand(NamedTuple):
+    """The frozen-angle frequency over a turn [rad/s], and its limits at extreme ratios."""
 
     least: float
     largest: float
@@ -121,7 +121,7 @@ class Band(NamedTuple):
     """whether it grows with i23: J1/J4 <= c2/c3, the condition that paper 002 leaves out"""
 
 
-def frequency_band(p: Cardan, points: int = 3600) -> Band:
+def frequency_band(p: Cardan, points: int = 3600) -> FrequencyBand:
     """The range of the natural frequency over a turn.
 
     Raises
@@ -137,7 +137,7 @@ def frequency_band(p: Cardan, points: int = 3600) -> Band:
     xp = numpy_()
     _, i, _ = two_joints(xp, p, np.linspace(0.0, math.pi, points))
     k = frozen_frequency(xp, p, i)
-    return Band(
+    return FrequencyBand(
         float(np.min(k)),
         float(np.max(k)),
         math.sqrt(p.c3 / p.J4),
@@ -153,13 +153,12 @@ def sensitivity(p: Cardan, i: float = 1.0) -> dict[str, float]:
 
     from ..engines import MATH, Dual, dual, slope, value
 
-    found = {}
+    shares = {}
     for name in ("J1", "J4", "c2", "c3"):
-        given = getattr(p, name)
-        moved = dataclasses.replace(p, **{name: Dual(given, given)})
-        k = frozen_frequency(dual(MATH), moved, i)
-        found[name] = float(slope(k) / value(k))
-    return found
+        size = getattr(p, name)
+        k = frozen_frequency(dual(MATH), dataclasses.replace(p, **{name: Dual(size, size)}), i)
+        shares[name] = float(slope(k) / value(k))
+    return shares
 
 
 _NEWTON = 6
@@ -175,8 +174,8 @@ def middle_angle(xp: Any, p: Line, phi1: Any, phi4: Any, near: Any = None, steps
     for _ in range(steps):
         phi3, i, di = two_joints(xp, p, phi2)
         twist = phi3 - phi4
-        wrong = p.c2 * (phi1 - phi2) - i * p.c3 * twist
-        phi2 = phi2 + wrong / (p.c2 + p.c3 * (i * i + di * twist))
+        imbalance = p.c2 * (phi1 - phi2) - i * p.c3 * twist
+        phi2 = phi2 + imbalance / (p.c2 + p.c3 * (i * i + di * twist))
     return phi2
 
 
@@ -185,9 +184,9 @@ class Twist:
 
     The cardan has no mass: phi2 follows from the balance of the two springs, and w2 from its change. Damping is that
     of the twist speeds, v2 = w1 - w2 and v3 = i23 w2 - w4; from its dissipation function (d2 v2^2 + d3 v3^2)/2 come
-    the torques at both ends, so that tau1 w1 - tau4 w4 is the growth of `energy` plus `dissipated`, exactly. What is
-    left out is that damping moves the balance of the cardan: nothing where d2/c2 = d3/c3 and i23 is constant, else a
-    share of second order in d/c, (k d/c)^2 where the two ratios differ.
+    the torques at both ends, so that tau1 w1 - tau4 w4 is the growth of `energy` plus `dissipated`, exactly. One
+    effect is left out: damping moves the balance of the cardan. It is nothing where d2/c2 = d3/c3 and i23 is
+    constant, else a share of second order in d/c, (k d/c)^2 where the two ratios differ.
     """
 
     __slots__ = ("dissipated", "energy", "i", "phi2", "phi3", "tau1", "tau4", "twist2", "twist3")

@@ -2,7 +2,7 @@
 
 The packaged table holds cage motors for 400 V, 50 Hz, 0.55 to 75 kW, with 2, 4 and 6 poles, in the frames of
 EN 50347. Their efficiencies are the limits of class IE3 in IEC 60034-30-1. Everything else is typical of such motors
-and of no maker's: it varies smoothly with size, and stands in for the catalogue of whoever delivers the motor.
+and of no maker's: it varies smoothly with size, and stands in for the catalogue of the supplier.
 
 A user's file has the same columns. In CSV a heading is the name of a value, with its unit in brackets where it
 has one ("power [kW]", "speed [rev/min]"); in TOML each motor is a table ``[[motor]]``, a number is in the
@@ -23,17 +23,17 @@ from typing import Any
 
 from ..errors import InputError, shown
 from ..quantities import DISPLAY_UNITS, Layout, Value, Variable, declaration, quantity
-from .nameplate import Identified, Nameplate, check, identify
+from .nameplate import Identification, Nameplate, check, identify
 
 
 @declaration
 class CatalogueData(Nameplate):
-    """A nameplate, with what else a catalogue says."""
+    """A nameplate, and the other values of a catalogue."""
 
     mass: Value = quantity("kg", "mass; 0: unknown", default=0.0, min=0.0)
     starts: Value = quantity(
         "1",
-        "permitted starts direct on line in an hour, without load; 0: not told",
+        "permitted starts direct on line in an hour, without load; 0: unknown",
         default=0.0,
         min=0.0,
         max=1e5,
@@ -49,14 +49,14 @@ _HEADING = re.compile(r"\s*(\w+)\s*(?:\[\s*(.*?)\s*\])?\s*")
 
 @dataclass(frozen=True)
 class CatalogueMotor:
-    """A motor of the catalogue; `origin` is the file and row it comes from, `source` what its values are."""
+    """A motor of the catalogue; `origin` is the file and row it comes from, `source` that of its values."""
 
     designation: str
     nameplate: CatalogueData
     source: str
     origin: str
 
-    def identify(self) -> Identified:
+    def identify(self) -> Identification:
         """Its equivalent circuit; see `chainunit.drives.nameplate.identify`.
 
         Raises
@@ -77,7 +77,7 @@ def heading(variable: Variable) -> str:
 
 
 def catalogue(extra: Path | None = None) -> list[CatalogueMotor]:
-    """The packaged motors, and behind them those of the file `extra` (CSV; TOML where it is called so).
+    """The packaged motors, and behind them those of the file `extra` (CSV; TOML where its name ends in .toml).
 
     Raises
     ------
@@ -92,8 +92,8 @@ def catalogue(extra: Path | None = None) -> list[CatalogueMotor]:
             raise InputError(f"{extra}: cannot be read ({error.strerror or error})") from error
         except UnicodeDecodeError as error:
             raise InputError(f"{extra}: is not UTF-8 text") from error
-        read = _toml_rows if extra.suffix.lower() == ".toml" else _csv_rows
-        motors += _motors(read(text, str(extra)), {m.designation for m in motors})
+        rows = _toml_rows if extra.suffix.lower() == ".toml" else _csv_rows
+        motors += _motors(rows(text, str(extra)), {m.designation for m in motors})
     return motors
 
 
@@ -116,38 +116,38 @@ def _packaged() -> tuple[CatalogueMotor, ...]:
     return tuple(_motors(_csv_rows(text, name), set()))
 
 
-def _motors(rows: Iterator[tuple[str, Mapping[str, Any]]], taken: set[str]) -> list[CatalogueMotor]:
-    found = []
-    for origin, given in rows:
+def _motors(rows: Iterator[tuple[str, Mapping[str, Any]]], others: set[str]) -> list[CatalogueMotor]:
+    motors = []
+    for origin, row in rows:
         try:
-            found.append(_motor(origin, given, taken))
+            motors.append(_motor(origin, row, others))
         except ValueError as error:
             raise InputError(f"{origin}: {error}") from error
-        taken.add(found[-1].designation)
-    return found
+        others.add(motors[-1].designation)
+    return motors
 
 
-def _motor(origin: str, given: Mapping[str, Any], taken: set[str]) -> CatalogueMotor:
+def _motor(origin: str, row: Mapping[str, Any], others: set[str]) -> CatalogueMotor:
     # of the study files, which may come to import the catalogue
     from ..reading import to_number
 
-    for name in given:
+    for name in row:
         if name not in _VARIABLES and name not in _TEXTS:
             raise InputError(f"{shown(name)}: unknown; known here: {', '.join((*_TEXTS, *_VARIABLES))}")
     texts = {}
     for name in _TEXTS:
-        text = given.get(name, origin if name == "source" else "")
+        text = row.get(name, origin if name == "source" else "")
         if not isinstance(text, str) or not text.strip() or not text.isprintable() or len(text) > _LONGEST:
             raise InputError(
                 f"{name} = {shown(text)}: must be a text of one line, of at most {_LONGEST} characters"
             )
         texts[name] = text.strip()
-    if texts["designation"] in taken:
+    if texts["designation"] in others:
         raise InputError(f"designation = {shown(texts['designation'])}: stands in the catalogue already")
     values = {}
     for name, variable in _VARIABLES.items():
-        if name in given:
-            values[name] = to_number(variable, given[name])
+        if name in row:
+            values[name] = to_number(variable, row[name])
         elif variable.quantity.start is None:
             raise InputError(
                 f"{name}: is missing; must be {variable.quantity.allowed} ({variable.description})"
@@ -187,8 +187,8 @@ def _csv_rows(text: str, file: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
 def _column(cell: str, file: str) -> tuple[str, str]:
     match = _HEADING.fullmatch(cell)
     if match is None or (match[1] not in _VARIABLES and match[1] not in _TEXTS):
-        known = ", ".join((*_TEXTS, *(heading(v) for v in _VARIABLES.values())))
-        raise InputError(f"{file}: heading {shown(cell)}: unknown; known here: {known}")
+        names = ", ".join((*_TEXTS, *(heading(v) for v in _VARIABLES.values())))
+        raise InputError(f"{file}: heading {shown(cell)}: unknown; known here: {names}")
     return match[1], match[2] or ""
 
 

@@ -1,4 +1,4 @@
-"""What stands between the motor and the machine: a gear, a belt, or nothing."""
+"""The transmission between the motor and the machine: a gear, a belt, or a plain coupling."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ KINDS: Mapping[str, Transmission] = MappingProxyType(
 
 def motor_side(xp: Any, t: Transmission, torque: Any, w: Any) -> Any:
     """Torque at the motor's shaft [N m] for the torque `torque` that the machine takes at the output, at the
-    speed `w` of the motor [rad/s], without what speeds up `t.J`.
+    speed `w` of the motor [rad/s], without the torque that speeds up `t.J`.
 
     The teeth or the belt lose a share of the torque, in whatever direction the power flows:
 
@@ -52,5 +52,5 @@ def motor_side(xp: Any, t: Transmission, torque: Any, w: Any) -> Any:
     changes sign, and the transmission locks itself: the motor must help to turn it. At rest there is no loss.
     """
     direction = w / xp.maximum(xp.abs(w), W_REST)
-    lost = (1.0 / t.efficiency - 1.0) * xp.abs(torque) * direction
-    return (torque + lost) / t.ratio + t.d * w
+    loss = (1.0 / t.efficiency - 1.0) * xp.abs(torque) * direction
+    return (torque + loss) / t.ratio + t.d * w

@@ -1,6 +1,6 @@
 """The TOML table of a shaft line: bends, and stiffness and damping either as such or from the shafts' geometry.
 
-`form` is its pydantic model, `values` what it comes to. A study file and a driveline file read it alike::
+`form` is its pydantic model, `values` gives its numbers. A study file and a driveline file read it alike::
 
     [driveline]
     alpha1 = "12 deg"
@@ -42,7 +42,7 @@ def form(declared: type[Line], title: str, prefix: str, **others: Any) -> type[B
     """The pydantic model of the table: the fields of `declared`, tables `shaft2`, `shaft3`, `damping_ratio`,
     `others`.
 
-    `prefix` is what messages put before a name, such as "driveline.".
+    `prefix` stands before a name in messages, such as "driveline.".
     """
     more: dict[str, Any] = {
         v.name.removeprefix(prefix): number(v) for v in variables(Damping, prefix)
@@ -55,7 +55,7 @@ def form(declared: type[Line], title: str, prefix: str, **others: Any) -> type[B
 
 def _shaft(title: str, prefix: str) -> type[BaseModel]:
     corner = Variable(prefix + "outline", "coordinate of a corner", Quantity("m", "", None, -10.0, 10.0))
-    coordinate = Annotated[float, BeforeValidator(lambda given: to_number(corner, given))]
+    coordinate = Annotated[float, BeforeValidator(lambda entry: to_number(corner, entry))]
     outline = list[tuple[coordinate, coordinate]]
     return schema(
         Shaft,
@@ -68,34 +68,34 @@ def _shaft(title: str, prefix: str) -> type[BaseModel]:
 
 
 def given_line(table: BaseModel, prefix: str) -> dict[str, Any]:
-    """What the table gives by name, the stiffness of its shafts worked out; a `damping_ratio` as it is, as it goes
-    with inertias that the table may not have.
+    """The values of the table by name, with the stiffness of its shafts worked out; a `damping_ratio` as it is, as it
+    goes with inertias that the table may not have.
 
     Raises
     ------
     InputError
         in one line: for a stiffness or a damping that is given twice, and see `shafts.stiffness_of`.
     """
-    given = {name: getattr(table, name) for name in table.model_fields_set}
+    numbers = {name: getattr(table, name) for name in table.model_fields_set}
     for shaft, stiffness in SHAFTS.items():
-        described = given.pop(shaft, None)
+        described = numbers.pop(shaft, None)
         if described is None:
             continue
-        if stiffness in given:
+        if stiffness in numbers:
             raise InputError(
                 f"{prefix}{stiffness}: given beside {prefix}{shaft}, which sets it; leave out one of the two"
             )
         keys = {name: getattr(described, name) for name in described.model_fields_set}
         try:
-            given[stiffness] = stiffness_of(keys)
+            numbers[stiffness] = stiffness_of(keys)
         except InputError as error:
             raise InputError(f"{prefix}{shaft}.{error}") from error
     for name in ("d2", "d3"):
-        if name in given and "damping_ratio" in given:
+        if name in numbers and "damping_ratio" in numbers:
             raise InputError(
                 f"{prefix}{name}: given beside {prefix}damping_ratio, which sets it; leave out one of the two"
             )
-    return given
+    return numbers
 
 
 def values(table: BaseModel, prefix: str) -> dict[str, float]:
@@ -106,9 +106,9 @@ def values(table: BaseModel, prefix: str) -> dict[str, float]:
     InputError
         see `given_line`.
     """
-    given = given_line(table, prefix)
-    ratio = given.pop("damping_ratio", None)
+    numbers = given_line(table, prefix)
+    ratio = numbers.pop("damping_ratio", None)
     if ratio is None:
-        return given
-    damped = with_damping_ratio(Cardan(**given), ratio)
-    return {**given, "d2": damped.d2, "d3": damped.d3}
+        return numbers
+    damped = with_damping_ratio(Cardan(**numbers), ratio)
+    return {**numbers, "d2": damped.d2, "d3": damped.d3}

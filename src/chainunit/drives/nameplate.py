@@ -2,14 +2,14 @@
 
 Six values of the catalogue - torque, current and power factor in rated running, breakdown torque, torque and
 current with the rotor locked - give six parameters: resistances, leakage, magnetising inductance, and how much the
-skin effect changes resistance and leakage at standstill. What a catalogue does not tell is assumed, and declared in
+skin effect changes resistance and leakage at standstill. A value that no catalogue tells is assumed, and declared in
 `Assumptions`.
 
 The model has no iron and stray losses: `stator.R` is fitted so that the copper losses make up for them in rated
-running, and is therefore larger than what an ohmmeter shows. In small motors, where that much resistance would not
-leave the breakdown torque, the fit gives up power factor and efficiency first (`_WEIGHTS`). Saturation (`main.beta`)
-stays 0, because no value of a catalogue tells it; the fall of the leakage by saturation of the teeth in the locked
-motor is contained in `cage.skin_L`.
+running, and is therefore larger than the resistance that an ohmmeter shows. In small motors, where that much
+resistance would not leave the breakdown torque, the fit gives up power factor and efficiency first (`_WEIGHTS`).
+Saturation (`main.beta`) stays 0, because no value of a catalogue tells it; the fall of the leakage by saturation of
+the teeth in the locked motor is contained in `cage.skin_L`.
 
 Rated running and breakdown hold for the warm motor, `Assumptions.rise` above the model's ambient temperature; the
 locked rotor for the cold one. A motor in rated running therefore comes to rest thermally at its rated values.
@@ -37,7 +37,7 @@ _TURN = 2.0 * math.pi
 
 @declaration
 class Nameplate:
-    """What the nameplate and the catalogue say of a motor."""
+    """The values of the nameplate and the catalogue of a motor."""
 
     power: Value = quantity("W", "rated power at the shaft", above=0.0)
     voltage: Value = quantity("V", "rated voltage, line to line, RMS", default=400.0, above=0.0)
@@ -77,7 +77,7 @@ class Nameplate:
 
     @property
     def rated_current(self) -> float:
-        """Rated current [A], given or by what follows from the other values."""
+        """Rated current [A], as it is given, or as it follows from the other values."""
         apparent = self.power / (self.efficiency * self.power_factor)
         return float(self.current or apparent / (math.sqrt(3.0) * self.voltage))
 
@@ -89,7 +89,7 @@ class Nameplate:
 
 @declaration
 class Assumptions:
-    """What no nameplate says."""
+    """Values that no nameplate has."""
 
     friction: Value = quantity(
         "1",
@@ -114,7 +114,7 @@ class Assumptions:
 
 
 TYPICAL = Assumptions()
-"""What is assumed of standard motors: temperature rise of class B, totally enclosed and fan-cooled."""
+"""Assumptions for standard motors: temperature rise of class B, totally enclosed and fan-cooled."""
 
 LAYOUT = Layout(Nameplate)
 LARGEST_RESIDUAL = 0.1
@@ -124,7 +124,7 @@ LARGEST_SLIP = 0.2
 """Rated slip above which the speed belongs to another number of poles."""
 
 
-# IEC 60034-1 grants breakdown and locked rotor 10 to 25 %; the power factor takes what iron losses leave over
+# IEC 60034-1 grants breakdown and locked rotor 10 to 25 %; the power factor takes the rest, which iron losses leave
 _WEIGHTS = {
     "power": 3.0,
     "current": 3.0,
@@ -143,7 +143,7 @@ _STARTS = (
 
 
 @dataclass(frozen=True)
-class Identified:
+class Identification:
     """A motor with the parameters that meet its nameplate best.
 
     `residuals` gives by name of the nameplate's value how far the circuit is off, as a share of the value; `power`
@@ -178,17 +178,17 @@ def check(nameplate: Nameplate, assumptions: Assumptions = TYPICAL) -> None:
         raise InputError(f"poles = {n.poles:g}: must be an even number (number of poles)")
     low, high = (1.0 - LARGEST_SLIP) * n.synchronous, n.synchronous
     if not low < n.speed < high:
-        shown = [x * 60.0 / _TURN for x in (n.speed, low, high)]
+        rev = [x * 60.0 / _TURN for x in (n.speed, low, high)]
         raise InputError(
-            f"speed = {n.speed:g} rad/s ({shown[0]:g} rev/min): with poles = {n.poles:g} at {n.frequency:g} Hz it "
-            f"must be > {low:g} and < {high:g} rad/s, the synchronous speed ({shown[1]:g} and {shown[2]:g} rev/min)"
+            f"speed = {n.speed:g} rad/s ({rev[0]:g} rev/min): with poles = {n.poles:g} at {n.frequency:g} Hz it "
+            f"must be > {low:g} and < {high:g} rad/s, the synchronous speed ({rev[1]:g} and {rev[2]:g} rev/min)"
         )
     if n.current:
-        needed = n.power / (n.efficiency * n.power_factor * math.sqrt(3.0) * n.voltage)
-        low, high = (1.0 - LARGEST_RESIDUAL) * needed, (1.0 + LARGEST_RESIDUAL) * needed
+        implied = n.power / (n.efficiency * n.power_factor * math.sqrt(3.0) * n.voltage)
+        low, high = (1.0 - LARGEST_RESIDUAL) * implied, (1.0 + LARGEST_RESIDUAL) * implied
         if not low < n.current < high:
             raise InputError(
-                f"current = {n.current:g} A: power, voltage, efficiency and power factor make it {needed:.4g} A; "
+                f"current = {n.current:g} A: power, voltage, efficiency and power factor make it {implied:.4g} A; "
                 f"must be > {low:.4g} and < {high:.4g} A, or be left out"
             )
     most = _air_gap_efficiency(n, assumptions)
@@ -214,7 +214,7 @@ def _air_gap_efficiency(n: Nameplate, assumptions: Assumptions) -> float:
 @lru_cache(maxsize=1024)
 def identify(
     nameplate: Nameplate, assumptions: Assumptions = TYPICAL, tolerance: float = LARGEST_RESIDUAL
-) -> Identified:
+) -> Identification:
     """The parameters whose circuit meets the nameplate best, and how well it does.
 
     A least-squares fit with bounds of the relative deviations, in the logarithms of the parameters; it is
@@ -237,22 +237,22 @@ def identify(
     best: Any = None
     for shift in _STARTS:
         start = np.clip(fit.start() + np.array(shift), low + margin, high - margin)
-        found = least_squares(
+        fitted = least_squares(
             fit.deviations, start, fit.jacobian, (low, high), xtol=1e-12, ftol=1e-15, gtol=1e-14, max_nfev=100
         )
-        if best is None or found.cost < best.cost:
-            best = found
+        if best is None or fitted.cost < best.cost:
+            best = fitted
         if best.cost < 1e-18:
             break
-    identified = fit.identified(best.x)
-    name, worst = identified.worst
+    identification = fit.identification(best.x)
+    name, worst = identification.worst
     if not abs(worst) <= tolerance:
-        given = nameplate.rated_current if name == "current" else getattr(nameplate, name)
+        plate = nameplate.rated_current if name == "current" else getattr(nameplate, name)
         raise InputError(
-            f"{name} = {given:g}: no circuit meets it together with the rest of the nameplate; the one that comes "
-            f"closest has {given * (1.0 + worst):.4g}; must be within {tolerance:.0%} of that"
+            f"{name} = {plate:g}: no circuit meets it together with the rest of the nameplate; the one that comes "
+            f"closest has {plate * (1.0 + worst):.4g}; must be within {tolerance:.0%} of that"
         )
-    return identified
+    return identification
 
 
 class _Fit:
@@ -313,8 +313,8 @@ class _Fit:
         for _ in range(4):
             # the rotor sees a source behind stator and main path
             share = 1j * w_s / (1j * w_s + R_s * main)
-            behind, seen = R_s * share, phase_v * abs(share)
-            sum_ = 1.5 * seen * seen / most
+            behind, source = R_s * share, phase_v * abs(share)
+            sum_ = 1.5 * source * source / most
             reactance = (
                 math.sqrt(max(sum_ * sum_ - 2.0 * sum_ * behind.real, (0.1 * sum_) ** 2)) - behind.imag
             )
@@ -363,14 +363,14 @@ class _Fit:
         return self._last[1]
 
     def deviations(self, x: Any) -> Any:
-        """What is made small."""
+        """The weighted deviations, which the fit makes small."""
         return np.array([value(r) for r in self._at(x)])
 
     def jacobian(self, x: Any) -> Any:
         """Slopes of `deviations`."""
         return np.array([slope(r) for r in self._at(x)])
 
-    def identified(self, x: Any) -> Identified:
+    def identification(self, x: Any) -> Identification:
         """The motor with these logarithms, its temperature rise met as well."""
         n, bare = self.n, self.parameters([math.exp(v) for v in x])
         rated, most, locked = points = self.points(MATH, bare, self._speed_at_breakdown(bare))
@@ -383,4 +383,4 @@ class _Fit:
         layout = InductionMotor.parameter_layout
         p = layout.from_names(thermal, bare)
         InductionMotor.check(p)
-        return Identified(n, p, MappingProxyType(residuals), rated, most, locked)
+        return Identification(n, p, MappingProxyType(residuals), rated, most, locked)

@@ -17,7 +17,7 @@ STEEL = 8.0e10
 
 @declaration
 class Shaft:
-    """A shaft of one section over its whole length; which dimensions it takes, `SECTIONS` says."""
+    """A shaft of one section over its whole length; `SECTIONS` says which dimensions it takes."""
 
     outer: Value = quantity("m", "outer diameter", default=0.06, above=0.0, max=10.0)
     inner: Value = quantity("m", "inner diameter", default=0.0, min=0.0, max=10.0)
@@ -41,7 +41,7 @@ def hollow(outer: float, inner: float = 0.0) -> float:
     Raises
     ------
     InputError
-        where the wall is not there.
+        where the inner diameter leaves no wall.
     """
     if not 0.0 <= inner < outer:
         raise InputError(f"inner = {inner:g} m: must be >= 0 and < the outer diameter, {outer:g} m")
@@ -113,12 +113,12 @@ def polygon(outline: Sequence[Point], holes: Sequence[Sequence[Point]] = ()) -> 
 
 
 class Section(NamedTuple):
-    """A kind of section: what it takes, in the order of its formula, and its torsion constant."""
+    """A kind of section: its dimensions, in the order of its formula, and its torsion constant."""
 
     takes: tuple[str, ...]
     constant: Callable[..., float]
     also: tuple[str, ...] = ()
-    """what may be left out"""
+    """dimensions that may be left out"""
 
 
 SECTIONS = {
@@ -130,28 +130,28 @@ SECTIONS = {
 }
 
 
-def stiffness_of(given: Mapping[str, Any]) -> float:
+def stiffness_of(keys: Mapping[str, Any]) -> float:
     """Torsional stiffness [N m/rad] from the keys of a shaft's table: `section`, its dimensions, `length`, and
     `shear_modulus` if it is not steel.
 
     Raises
     ------
     InputError
-        in one line, for what is missing, of another section, or impossible.
+        in one line, for a value that is missing, belongs to another section, or is impossible.
     """
-    name = given.get("section")
+    name = keys.get("section")
     if name is None:
         raise InputError(f"section: missing; one of {', '.join(SECTIONS)}")
     section = SECTIONS[name]
-    needed = (*section.takes, "length")
-    for key in needed:
-        if key not in given:
-            raise InputError(f'{key}: missing; section "{name}" needs {", ".join(needed)}')
-    for key in given:
-        if key not in (*needed, *section.also, "section", "shear_modulus"):
+    required = (*section.takes, "length")
+    for key in required:
+        if key not in keys:
+            raise InputError(f'{key}: missing; section "{name}" needs {", ".join(required)}')
+    for key in keys:
+        if key not in (*required, *section.also, "section", "shear_modulus"):
             raise InputError(
-                f'{key}: not of section "{name}", which takes {", ".join((*needed, *section.also))}'
+                f'{key}: not of section "{name}", which takes {", ".join((*required, *section.also))}'
             )
-    constant = section.constant(*(given[key] for key in (*section.takes, *section.also) if key in given))
-    modulus = {"shear_modulus": given["shear_modulus"]} if "shear_modulus" in given else {}
-    return stiffness(constant, given["length"], **modulus)
+    constant = section.constant(*(keys[key] for key in (*section.takes, *section.also) if key in keys))
+    modulus = {"shear_modulus": keys["shear_modulus"]} if "shear_modulus" in keys else {}
+    return stiffness(constant, keys["length"], **modulus)

@@ -14,7 +14,7 @@ from ..errors import InputError
 
 @dataclass(frozen=True)
 class Tuning:
-    """Gains and what they give; `parameters` names the gains as the motor's parameters."""
+    """Gains and their margins; `parameters` names the gains as the motor's parameters."""
 
     parameters: dict[str, float]
     phase_margin: float

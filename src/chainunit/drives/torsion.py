@@ -105,14 +105,14 @@ class _Equations:
             line = Twist(self.plain, self.p, phi1, w1, phi4, w4, near, _NEWTON)
             self.twist = line.twist2
         if time == 0.0:
-            for kept, torque in (
+            for record, torque in (
                 (self.torque2, line.twist2 * self.p.c2),
                 (self.torque3, line.twist3 * self.p.c3),
             ):
-                kept.append(torque.v if lifted else torque)
+                record.append(torque.v if lifted else torque)
         a1, a4 = (self.drive - line.tau1) / self.p.J1, (line.tau4 - self.load) / self.p.J4
         if lifted and self.held is not None:
-            # what holds the common speed pulls both inertias in proportion to themselves
+            # the control of the common speed pulls both inertias in proportion to themselves
             common = (self.p.J1 * a1.d + self.p.J4 * a4.d) / (self.p.J1 + self.p.J4) * self.held
             a1, a4 = Dual(a1.v, a1.d - common), Dual(a4.v, a4.d - common)
         return [rate * self.duration for rate in (w1, a1, w4, a4)]
@@ -124,8 +124,8 @@ class _Equations:
         return x
 
 
-class Steady(NamedTuple):
-    """Steady motions at n points; what was not found is NaN, its `found` False."""
+class SteadyMotion(NamedTuple):
+    """Steady motions at n points; NaN where none was found."""
 
     found: Any
     """bool, (n,)"""
@@ -167,76 +167,79 @@ class Steady(NamedTuple):
 
 def steady(
     p: Cardan, speed: Any, load: Any = 0.0, progress: Progress = _nothing, chunk: int = 1024
-) -> Steady:
+) -> SteadyMotion:
     """The motion that repeats itself after half a turn at the mean `speed` [rad/s], with the torque `load` [N.m] on
     J4, and its stability.
 
     Values of `p` may be numbers or arrays of the shape (n,) of `speed`. Points that need alike numbers of steps are
-    computed together, at most `chunk` at a time. What is not found is tried again from its neighbours: give speeds in
-    order.
+    computed together, at most `chunk` at a time. A point without a result is tried again from its
+    neighbours: give speeds in order.
     """
     speed = np.atleast_1d(np.asarray(speed, dtype=float))
     n = len(speed)
     p, load = expand(p, n), np.broadcast_to(np.asarray(load, dtype=float), (n,))
     phi3, ratio, _ = two_joints(numpy_(), p, np.zeros(n))
     guess = np.stack([np.zeros(n), speed, phi3 - load / p.c3, speed * np.sqrt(ratio), load])
-    found = _all(p, speed, load, guess, chunk, _ITERATIONS, lambda x: progress(0.8 * x))
+    motion = _all(p, speed, load, guess, chunk, _ITERATIONS, lambda x: progress(0.8 * x))
     # near a resonance Newton's method needs a neighbour to start from, and steps of the speed from there
     for walk in _WALKS:
         for side in (-1, 1):
-            missing = np.flatnonzero(~found.found)
-            missing = missing[(missing + side >= 0) & (missing + side < n)]
-            missing = missing[found.found[missing + side]]
-            if not len(missing):
+            gaps = np.flatnonzero(~motion.found)
+            gaps = gaps[(gaps + side >= 0) & (gaps + side < n)]
+            gaps = gaps[motion.found[gaps + side]]
+            if not len(gaps):
                 continue
-            beside, q = missing + side, _pick(p, missing)
-            guess = np.concatenate([found.start[:, beside], found.drive[None, beside]])
+            beside, q = gaps + side, _pick(p, gaps)
+            guess = np.concatenate([motion.start[:, beside], motion.drive[None, beside]])
             for part in range(1, walk + 1):
-                there = speed[beside] + part / walk * (speed[missing] - speed[beside])
-                again = _all(q, there, load[missing], guess, chunk, _AGAIN, _nothing)
+                there = speed[beside] + part / walk * (speed[gaps] - speed[beside])
+                again = _all(q, there, load[gaps], guess, chunk, _AGAIN, _nothing)
                 guess = np.concatenate([again.start, again.drive[None]])
-            for whole, new in zip(found, again, strict=True):
-                whole[..., missing] = new
+            for whole, new in zip(motion, again, strict=True):
+                whole[..., gaps] = new
     progress(1.0)
-    return found
+    return motion
 
 
 def _all(
     p: Cardan, speed: Any, load: Any, guess: Any, chunk: int, iterations: int, progress: Progress
-) -> Steady:
+) -> SteadyMotion:
     counts = half_turn_steps(p, speed)
     order = np.argsort(counts, kind="stable")
-    parts, done = [], 0.0
+    parts, before = [], 0.0
     for first in range(0, len(speed), chunk):
-        chosen = order[first : first + chunk]
-        share = len(chosen) / len(speed)
+        batch = order[first : first + chunk]
+        share = len(batch) / len(speed)
 
-        def report(x: float, done: float = done, share: float = share) -> None:
-            progress(done + share * x)
+        def report(x: float, before: float = before, share: float = share) -> None:
+            progress(before + share * x)
 
-        count = int(max(counts[chosen]))
+        count = int(max(counts[batch]))
         parts.append(
-            _shoot(_pick(p, chosen), speed[chosen], load[chosen], guess[:, chosen], count, iterations, report)
+            _shoot(_pick(p, batch), speed[batch], load[batch], guess[:, batch], count, iterations, report)
         )
-        done += share
+        before += share
     back = np.argsort(order, kind="stable")
-    return Steady(
-        *(np.concatenate([getattr(part, name) for part in parts], -1)[..., back] for name in Steady._fields)
+    return SteadyMotion(
+        *(
+            np.concatenate([getattr(part, name) for part in parts], -1)[..., back]
+            for name in SteadyMotion._fields
+        )
     )
 
 
 def _shoot(
     p: Cardan, speed: Any, load: Any, guess: Any, count: int, iterations: int, progress: Progress
-) -> Steady:
+) -> SteadyMotion:
     n = len(speed)
     period = math.pi / speed
     scale = np.stack([np.ones(n), speed, np.ones(n), speed])
-    # phi1 = 0 is the phase; to be found are the rest and the torque on J1
+    # phi1 = 0 is the phase; unknown are the rest and the torque on J1
     x, drive = guess[:4].copy(), guess[4].copy()
     reference = np.maximum(np.abs(load), p.J1 * speed**2)
     closed = np.zeros(n, dtype=bool)
     active = np.arange(n)
-    keep = {name: np.full(n, np.nan) for name in ("largest2", "least2", "largest3", "least3")}
+    extremes = {name: np.full(n, np.nan) for name in ("largest2", "least2", "largest3", "least3")}
     monodromy, held = np.full((4, 4, n), np.nan), np.full((2, 2, n), np.nan)
     with np.errstate(all="ignore"):
         for iteration in range(iterations):
@@ -244,46 +247,47 @@ def _shoot(
             end, by, equations = _half_turn(
                 q, x[:, active], drive[active], load[active], period[active], count
             )
-            wrong = (end - x[:, active] - HALF_TURN[:, None]) / scale[:, active]
-            good = np.max(np.abs(wrong), axis=0) < _CLOSED
-            done = active[good]
-            closed[done] = True
+            error = (end - x[:, active] - HALF_TURN[:, None]) / scale[:, active]
+            at_goal = np.max(np.abs(error), axis=0) < _CLOSED
+            new = active[at_goal]
+            closed[new] = True
             for number in ("2", "3"):
-                torque = np.array(getattr(equations, f"torque{number}"))[:, good]
-                keep[f"largest{number}"][done], keep[f"least{number}"][done] = torque.max(0), torque.min(0)
-            monodromy[:, :, done] = by[:, :4, good]
-            held[:, :, done] = (by[:2, 5:] - by[2:, 5:])[:, :, good]
+                torque = np.array(getattr(equations, f"torque{number}"))[:, at_goal]
+                extremes[f"largest{number}"][new] = torque.max(0)
+                extremes[f"least{number}"][new] = torque.min(0)
+            monodromy[:, :, new] = by[:, :4, at_goal]
+            held[:, :, new] = (by[:2, 5:] - by[2:, 5:])[:, :, at_goal]
             progress((iteration + 1) / iterations)
-            # what has run away does not come back
-            left = ~good & np.all(np.isfinite(wrong), axis=0) & np.all(np.isfinite(by), axis=(0, 1))
-            if not np.any(left):
+            # a point that has run away does not come back
+            rest = ~at_goal & np.all(np.isfinite(error), axis=0) & np.all(np.isfinite(by), axis=(0, 1))
+            if not np.any(rest):
                 break
-            active, wrong, by = active[left], wrong[:, left], by[:, :5, left]
+            active, error, by = active[rest], error[:, rest], by[:, :5, rest]
             weights = np.concatenate([scale[1:, active], reference[None, active]])
             matrix = by[:, 1:, :] - np.eye(4, 5)[:, 1:, None]
             matrix = np.moveaxis(matrix * weights[None] / scale[:, None, active], 2, 0)
-            change = -(np.linalg.pinv(matrix) @ wrong.T[:, :, None])[:, :, 0].T
+            change = -(np.linalg.pinv(matrix) @ error.T[:, :, None])[:, :, 0].T
             change *= np.minimum(1.0, _LARGEST_STEP / np.max(np.abs(change[:3]), axis=0))
             x[1:, active] += change[:3] * weights[:3]
             drive[active] += change[3] * weights[3]
     progress(1.0)
     x[:, ~closed], drive[~closed] = np.nan, np.nan
-    multiplier, turned, free = np.full(n, np.nan), np.full(n, np.nan), np.full(n, np.nan)
+    multiplier, angle, free = np.full(n, np.nan), np.full(n, np.nan), np.full(n, np.nan)
     if np.any(closed):
         torsional = np.linalg.eigvals(np.moveaxis(held[:, :, closed], 2, 0))
         multiplier[closed] = np.max(np.abs(torsional), axis=1)
-        turned[closed] = np.abs(np.angle(torsional[:, 0]))
+        angle[closed] = np.abs(np.angle(torsional[:, 0]))
         q = _pick(p, closed)
         free[closed] = _free(q, x[:, closed], drive[closed], load[closed], monodromy[:, :, closed])
     k = frozen_frequency(numpy_(), p, 1.0)
-    return Steady(
+    return SteadyMotion(
         found=closed,
         start=x,
         drive=drive,
-        **keep,
+        **extremes,
         multiplier=multiplier,
         growth=np.log(multiplier) / period,
-        frequency=_branch(turned, k * period) / period,
+        frequency=_branch(angle, k * period) / period,
         free_growth=np.log(free) / period,
         monodromy=monodromy,
     )
@@ -325,9 +329,9 @@ def _free(p: Cardan, x: Any, drive: Any, load: Any, monodromy: Any) -> Any:
     along = np.stack(_Equations(p, load, 1.0, drive)(1.0, list(x))) / scale
     basis = np.repeat(np.eye(4)[None], len(k), axis=0)
     basis[:, :, 0] = along.T
-    turned, _ = np.linalg.qr(basis)
+    rotation, _ = np.linalg.qr(basis)
     scaled = np.moveaxis(monodromy * scale[None] / scale[:, None], 2, 0)
-    rest = np.linalg.eigvals((np.swapaxes(turned, 1, 2) @ scaled @ turned)[:, 1:, 1:])
+    rest = np.linalg.eigvals((np.swapaxes(rotation, 1, 2) @ scaled @ rotation)[:, 1:, 1:])
     return np.max(np.abs(rest), axis=1)
 
 
@@ -338,7 +342,7 @@ def with_damping_ratio(p: Cardan, ratio: float) -> Cardan:
     return dataclasses.replace(p, d2=2.0 * ratio * p.c2 / k, d3=2.0 * ratio * p.c3 / k)
 
 
-class Simulated(NamedTuple):
+class SimulatedPeaks(NamedTuple):
     """Peaks of the last half turns of a time simulation at n speeds."""
 
     speed: Any
@@ -374,7 +378,7 @@ def _settled(speed: Any, settle: float) -> Any:
 
 def simulate(
     p: Cardan, speed: Any, load: float, settle: float, half_turns: int = 2, progress: Progress = _nothing
-) -> Simulated:
+) -> SimulatedPeaks:
     """Time simulation at each mean `speed` [rad/s] from an untwisted start; peaks of the last `half_turns`, after
     the time `settle` [s], or 50 half turns where that is longer.
 
@@ -396,10 +400,10 @@ def simulate(
 
     def rates(time: float, x: Sequence[Any]) -> list[Any]:
         common, bias = x[4], x[5]
-        wrong = common - speed
-        equations.drive = load - inertia * (gain * wrong + bias)
+        deviation = common - speed
+        equations.drive = load - inertia * (gain * deviation + bias)
         now = (p.J1 * x[1] + p.J4 * x[3]) / inertia
-        return [*equations(time, x[:4]), (now - common) / slow * h, 0.25 * gain * gain * wrong * h]
+        return [*equations(time, x[:4]), (now - common) / slow * h, 0.25 * gain * gain * deviation * h]
 
     phi3, i, _ = two_joints(numpy_(), q, np.zeros(n))
     w1 = speed * np.sqrt(inertia / (p.J1 + i * i * p.J4))
@@ -418,17 +422,17 @@ def simulate(
         if step % 50 == 0:
             progress(step / whole)
     progress(1.0)
-    return Simulated((end - begin) / (half_turns * period), peak2, peak3)
+    return SimulatedPeaks((end - begin) / (half_turns * period), peak2, peak3)
 
 
-class Rigid(NamedTuple):
+class RigidPeaks(NamedTuple):
     """Largest torques of shafts 2 and 3 of the line without its elasticity [N.m], each (n,)."""
 
     peak2: Any
     peak3: Any
 
 
-def rigid(p: Cardan, speed: Any, load: float, points: int = 720) -> Rigid:
+def rigid(p: Cardan, speed: Any, load: float, points: int = 720) -> RigidPeaks:
     """The same line with rigid shafts, by its energy: (J1 + i23^2 J4) w1^2/2 = E + M4 (phi1 - phi3)."""
     speed = np.atleast_1d(np.asarray(speed, dtype=float))[:, None]
     phi = np.linspace(0.0, math.pi, points, endpoint=False)
@@ -445,4 +449,4 @@ def rigid(p: Cardan, speed: Any, load: float, points: int = 720) -> Rigid:
     square = 2.0 * (excess + work) / inertia
     acceleration = (load * (1.0 - i) - i * slope * p.J4 * square) / inertia
     torque3 = load + p.J4 * (i * acceleration + slope * square)
-    return Rigid(np.max(np.abs(i * torque3), axis=1), np.max(np.abs(torque3), axis=1))
+    return RigidPeaks(np.max(np.abs(i * torque3), axis=1), np.max(np.abs(torque3), axis=1))

@@ -19,8 +19,8 @@ from scipy.signal import find_peaks
 from .. import __version__
 from ..drives.cardan import (
     ORDERS,
-    Band,
     Cardan,
+    FrequencyBand,
     check,
     frequency_band,
     frozen_frequency,
@@ -29,9 +29,9 @@ from ..drives.cardan import (
 )
 from ..drives.line_table import SHAFTS, Damping, form, values
 from ..drives.torsion import (
-    Rigid,
-    Simulated,
-    Steady,
+    RigidPeaks,
+    SimulatedPeaks,
+    SteadyMotion,
     damping_ratio,
     rigid,
     settling_time,
@@ -278,7 +278,7 @@ class DrivelineStudy:
 
     config: Config
     damping_ratio: float
-    band: Band
+    band: FrequencyBand
     at_even: float
     """natural frequency at i23 = 1 [rad/s]"""
     excitation: dict[int, float]
@@ -292,10 +292,10 @@ class DrivelineStudy:
     sensitivity: dict[str, float]
     speed: Any
     """[rad/s], (speeds,), of `steady` and `rigid`"""
-    steady: Steady
-    rigid: Rigid
-    operating: Steady
-    simulated: Simulated | None
+    steady: SteadyMotion
+    rigid: RigidPeaks
+    operating: SteadyMotion
+    simulated: SimulatedPeaks | None
     asked: Any
     """speeds that were asked of the simulation [rad/s]"""
     map: StabilityMap
@@ -346,7 +346,7 @@ def _peaks(curve: Any) -> Any:
     return [int(j) for j in found if known[j]]
 
 
-def _refined(line: Cardan, load: float, speed: Any, curve: Steady) -> tuple[Any, Steady]:
+def _refined(line: Cardan, load: float, speed: Any, curve: SteadyMotion) -> tuple[Any, SteadyMotion]:
     """The resonance curve with more points about each of its peaks, whose heights a coarse grid misses."""
     near = [np.linspace(speed[j - 1], speed[j + 1], 2 * PEAK + 1)[1:-1] for j in _peaks(curve.peak2)]
     if not near:
@@ -355,7 +355,7 @@ def _refined(line: Cardan, load: float, speed: Any, curve: Steady) -> tuple[Any,
     added = steady(line, more, load)
     order = np.argsort(np.concatenate([speed, more]))
     whole = (np.concatenate([a, b], axis=-1)[..., order] for a, b in zip(curve, added, strict=True))
-    return np.concatenate([speed, more])[order], Steady(*whole)
+    return np.concatenate([speed, more])[order], SteadyMotion(*whole)
 
 
 def _ranges(x: Any, inside: Any) -> list[tuple[float, float]]:
@@ -585,7 +585,7 @@ def as_dict(study: DrivelineStudy) -> dict[str, Any]:
             v.name: number(x, v.unit) for v, x in zip(layout.variables, layout.values(instance), strict=True)
         }
 
-    def motion(found: Steady) -> dict[str, Any]:
+    def motion(found: SteadyMotion) -> dict[str, Any]:
         return {
             "found": found.found.tolist(),
             "peak_torque2": number(found.peak2, "N.m"),
