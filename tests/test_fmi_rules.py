@@ -347,7 +347,10 @@ def test_a_serialized_state_out_of_bounds_is_refused(unit, fmi):
     first = len(raw) - 8 * (
         len(MODELS["DcMotor"].parameter_layout.names) + 2 * len(MODELS["DcMotor"].input_layout.names)
     )
-    first -= 8 * len(MODELS["DcMotor"].state_layout.names)
+    first -= 8 * (
+        len(MODELS["DcMotor"].state_layout.names)
+        - MODELS["DcMotor"].parameter_layout.names.index("armature.R")
+    )
     assert struct.unpack_from("<d", raw, first)[0] == one.get("armature.R")[0]
     negative = bytearray(raw)
     struct.pack_into("<d", negative, first, -1.0)

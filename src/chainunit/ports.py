@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from .integrate import Solver
 from .model import Terminal
-from .quantities import Layout, Value, declaration, quantity
+from .quantities import Layout, Value, declaration, group, quantity
 
 
 @declaration
@@ -42,6 +43,29 @@ class LoadPort(PortSlopes, PortValues):
 NO_LOAD = LoadPort(tau_bias=0.0, J=0.0, dJ_dphi=0.0, phi0=0.0, w0=0.0, tau_bias_dphi=0.0, tau_bias_dw=0.0)
 
 
+@declaration
+class Start:
+    """Parameters of a model that has a shaft of its own."""
+
+    phi_start: Value = quantity("rad", "angle of the motor's shaft at the start", default=0.0)
+    w_start: Value = quantity("rad/s", "speed of the motor's shaft at the start", default=0.0)
+    solver: Solver = group(Solver, "internal integrator", default=Solver())
+
+
+@declaration
+class LoadInput:
+    """What loads a shaft."""
+
+    load: LoadPort = group(LoadPort, "load", default=NO_LOAD)
+
+
+@declaration
+class LoadState:
+    """What a shaft has given to its load."""
+
+    load_energy: Value = quantity("J", "energy given to the load since the start", nominal=1000.0)
+
+
 def load_torque(load: LoadPort, phi: Any, w: Any) -> Any:
     """Torque that the load needs at constant speed [N m], linearised about the port's point."""
     return load.tau_bias + load.tau_bias_dphi * (phi - load.phi0) + load.tau_bias_dw * (w - load.w0)
@@ -50,6 +74,14 @@ def load_torque(load: LoadPort, phi: Any, w: Any) -> Any:
 def load_inertia(load: LoadPort, phi: Any) -> Any:
     """Inertia of the load [kg m2], linearised about the port's point."""
     return load.J + load.dJ_dphi * (phi - load.phi0)
+
+
+def carried(load: LoadPort, phi: Any, w: Any, J: Any, tau: Any) -> tuple[Any, Any]:
+    """Acceleration [rad/s2] of a shaft of the inertia `J` [kg m2] that the torque `tau` [N m] speeds up and the load
+    holds back, and the torque [N m] that it gives to the load."""
+    torque, inertia = load_torque(load, phi, w), load_inertia(load, phi)
+    a = (tau - torque) / (J + inertia)
+    return a, inertia * a + torque
 
 
 OWN = "org.chainunit"

@@ -21,18 +21,10 @@ from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar
 
 from ..engines import MATH
-from ..integrate import Solver
 from ..model import Part, Requirement
-from ..ports import (
-    NO_LOAD,
-    LoadPort,
-    flanges,
-    load_inertia,
-    load_terminal,
-    load_torque,
-)
+from ..ports import LoadInput
 from ..quantities import Value, declaration, group, quantity
-from .motor import T_RATED, Ambient, Motor, braked
+from .motor import T_RATED, Motor, MotorOutputs, MotorParameters, MotorPoint, ShaftStates, braked
 
 
 @declaration
@@ -51,14 +43,6 @@ class Armature:
     R_th: Value = quantity(
         "K/W", "thermal resistance to the surroundings", default=0.9, above=0.0, tunable=True
     )
-
-
-@declaration
-class Rotor:
-    """The rotor."""
-
-    J: Value = quantity("kg.m2", "inertia", default=0.0035, above=0.0)
-    d: Value = quantity("N.m.s/rad", "viscous friction and windage", default=0.001, min=0.0, tunable=True)
 
 
 @declaration
@@ -86,25 +70,19 @@ class CurrentControl:
 
 
 @declaration
-class Parameters:
+class Parameters(MotorParameters):
     """Parameters of the motor. The start values are a typical 0.37 kW, 1500 rev/min, 220 V machine."""
 
     armature: Armature = group(Armature, "armature", default=Armature())
-    rotor: Rotor = group(Rotor, "rotor", default=Rotor())
     limit: Limit = group(Limit, "limit", default=Limit())
     speed_control: SpeedControl = group(SpeedControl, "speed control", default=SpeedControl())
     current_control: CurrentControl = group(CurrentControl, "current control", default=CurrentControl())
-    ambient: Ambient = group(Ambient, "surroundings", default=Ambient())
-    phi_start: Value = quantity("rad", "rotor angle at the start", default=0.0)
-    w_start: Value = quantity("rad/s", "rotor speed at the start", default=0.0)
-    solver: Solver = group(Solver, "internal integrator", default=Solver())
 
 
 @declaration
-class Inputs:
+class Inputs(LoadInput):
     """The load and what is asked of the motor."""
 
-    load: LoadPort = group(LoadPort, "load", default=NO_LOAD)
     w_ref: Value = quantity("rad/s", "speed reference", default=0.0)
     tau_ff: Value = quantity("N.m", "torque that the speed control is told of beforehand", default=0.0)
 
@@ -126,33 +104,25 @@ class Integral:
 
 
 @declaration
-class States:
+class States(ShaftStates):
     """States of the motor; each is an output, too."""
 
-    phi: Value = quantity("rad", "rotor angle")
-    w: Value = quantity("rad/s", "rotor speed", nominal=100.0)
     armature: ArmatureState = group(ArmatureState, "armature")
     integral: Integral = group(Integral, "control")
-    load_energy: Value = quantity("J", "energy given to the load since the start", nominal=1000.0)
 
 
 @declaration
-class Outputs:
+class Outputs(MotorOutputs):
     """What follows from the states."""
 
-    a: Value = quantity("rad/s2", "rotor acceleration", nominal=100.0)
-    tau: Value = quantity("N.m", "torque given to the load at the shaft")
-    air_gap_tau: Value = quantity("N.m", "electromagnetic torque")
     i_ref: Value = quantity("A", "current reference after the limit")
     v: Value = quantity("V", "armature voltage", nominal=100.0)
-    supply_power: Value = quantity("W", "electric power taken", nominal=100.0)
-    heat: Value = quantity("W", "copper loss", nominal=100.0)
 
 
-class _Point:
+class Point(MotorPoint):
     """Everything at one state: control, electric circuit, shaft."""
 
-    __slots__ = ("R", "a", "air_gap", "cut_i", "cut_v", "di", "error_i", "error_w", "i_ref", "tau", "v")
+    __slots__ = ("R", "cut_i", "cut_v", "di", "error_i", "error_w", "heat", "i_ref", "v")
 
     def __init__(self, xp: Any, p: Any, u: Any, x: Any) -> None:
         arm, i, w = p.armature, x.armature.i, x.w
@@ -166,23 +136,23 @@ class _Point:
         self.cut_v = self.v - wanted_v
         self.R = arm.R * (1.0 + arm.alpha * (x.armature.T - T_RATED))
         self.di = (self.v - self.R * i - arm.k * w) / arm.L
+        self.heat = self.R * i * i
         self.air_gap = arm.k * i
-        load, inertia = load_torque(u.load, x.phi, w), load_inertia(u.load, x.phi)
-        self.a = (self.air_gap - p.rotor.d * w - load) / (p.rotor.J + inertia)
-        self.tau = inertia * self.a + load
+        self.turn(p, u, x)
+
+    def rates(self, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+        """Time derivatives of the states behind those of the shaft."""
+        arm, speed, current = p.armature, p.speed_control, p.current_control
+        return [
+            self.di,
+            (self.heat - (x.armature.T - p.ambient.T) / arm.R_th) / arm.C,
+            speed.ki * (self.error_w + self.cut_i / speed.kp),
+            current.ki * (self.error_i + self.cut_v / current.kp),
+        ]
 
 
-def _outputs(xp: Any, p: Any, u: Any, x: Any, s: _Point) -> Outputs:
-    i = x.armature.i
-    return Outputs(
-        a=s.a,
-        tau=s.tau,
-        air_gap_tau=s.air_gap,
-        i_ref=s.i_ref,
-        v=s.v,
-        supply_power=s.v * i,
-        heat=s.R * i * i,
-    )
+def _outputs(xp: Any, p: Any, u: Any, x: Any, s: Point) -> Outputs:
+    return Outputs(**s.outputs(), i_ref=s.i_ref, v=s.v, supply_power=s.v * x.armature.i, heat=s.heat)
 
 
 class DcMotor(Motor):
@@ -195,7 +165,7 @@ class DcMotor(Motor):
     Parameters = Parameters
     Inputs = Inputs
     States = States
-    terminals = (*flanges("outflow"), load_terminal("load."))
+    Point = Point
     current, temperature, winding = "armature.i", "armature.T", "armature"
     limited_by: ClassVar[Mapping[str, float]] = {"w": 1e-9}
     required = (
@@ -248,25 +218,5 @@ class DcMotor(Motor):
             integral=Integral(i=0.0, v=0.0),
             load_energy=0.0,
         )
-
-    @staticmethod
-    def shared(xp: Any, p: Any, u: Any, x: Any) -> _Point:
-        """Control, circuit and shaft at one state."""
-        return _Point(xp, p, u, x)
-
-    @staticmethod
-    def derivatives(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
-        """Time derivatives of the states, in declared order."""
-        s = _Point(xp, p, u, x)
-        speed, current, i = p.speed_control, p.current_control, x.armature.i
-        return [
-            x.w,
-            s.a,
-            s.di,
-            (s.R * i * i - (x.armature.T - p.ambient.T) / p.armature.R_th) / p.armature.C,
-            speed.ki * (s.error_w + s.cut_i / speed.kp),
-            current.ki * (s.error_i + s.cut_v / current.kp),
-            s.tau * x.w,
-        ]
 
     parts = (Part(Outputs, _outputs),)

@@ -21,17 +21,16 @@ from types import MappingProxyType
 from typing import Any
 
 from ..engines import Dual, dual, slope
-from ..integrate import Solver
 from ..model import Model, Part, Requirement
 from ..ports import (
-    NO_LOAD,
-    LoadPort,
+    LoadInput,
+    LoadState,
     PortSlopes,
     PortValues,
+    Start,
+    carried,
     flanges,
-    load_inertia,
     load_terminal,
-    load_torque,
 )
 from ..quantities import Value, declaration, group, quantity
 from .cardan import BENDS, RIGHT, Line, Twist, two_joints
@@ -53,27 +52,22 @@ class Mounted(Line):
 
 
 @declaration
-class Parameters(Mounted):
-    """Parameters of the driveline. The start values are ours: the paper prints no dimensions."""
+class Parameters(Start, Mounted):
+    """Parameters of the driveline, which starts untwisted. The start values are ours: the paper prints no
+    dimensions."""
 
     ratio: Value = quantity(
         "1", "gear ratio, motor turns per turn of shaft 2", default=1.0, above=0.0, max=1e6
     )
-    phi_start: Value = quantity(
-        "rad", "angle of the motor at the start, where the line is untwisted", default=0.0
-    )
-    w_start: Value = quantity("rad/s", "speed of the motor at the start", default=0.0)
-    solver: Solver = group(Solver, "internal integrator", default=Solver())
 
 
 @declaration
-class Inputs:
+class Inputs(LoadInput):
     """The motor's shaft, and the load of the machine."""
 
     phi: Value = quantity("rad", "motor angle", default=0.0)
     w: Value = quantity("rad/s", "motor speed", default=0.0)
     a: Value = quantity("rad/s2", "motor acceleration", default=0.0)
-    load: LoadPort = group(LoadPort, "load", default=NO_LOAD)
 
 
 @declaration
@@ -85,11 +79,10 @@ class DrivenState:
 
 
 @declaration
-class States:
+class States(LoadState):
     """States of the driveline; each is an output, too."""
 
     driven: DrivenState = group(DrivenState, "driven shaft")
-    load_energy: Value = quantity("J", "energy given to the load since the start", nominal=1000.0)
 
 
 @declaration
@@ -134,7 +127,7 @@ def _assembled(xp: Any, p: Any) -> Any:
 class _Point:
     """The line between a motor at `phi, w` and the states."""
 
-    __slots__ = ("a4", "ends", "load", "load_inertia", "twist")
+    __slots__ = ("a4", "ends", "tau4", "twist")
 
     def __init__(self, xp: Any, p: Any, u: Any, x: Any) -> None:
         self.ends = (
@@ -144,14 +137,11 @@ class _Point:
             x.driven.w,
         )
         self.twist = Twist(xp, p, *self.ends)
-        self.load = load_torque(u.load, x.driven.phi, x.driven.w)
-        self.load_inertia = load_inertia(u.load, x.driven.phi)
-        self.a4 = (self.twist.tau4 - self.load) / (p.J4 + self.load_inertia)
+        self.a4, self.tau4 = carried(u.load, x.driven.phi, x.driven.w, p.J4, self.twist.tau4)
 
 
 def _outputs(xp: Any, p: Any, u: Any, x: Any, s: _Point) -> Outputs:
     line, tau = s.twist, s.twist.tau1 / p.ratio
-    given = s.load_inertia * s.a4 + s.load
     return Outputs(
         tau_bias=tau,
         J=0.0 * tau,
@@ -164,7 +154,7 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, s: _Point) -> Outputs:
         twist2=line.twist2,
         twist3=line.twist3,
         joint=Joint(phi2=line.phi2, phi3=line.phi3, i23=line.i),
-        driven=Driven(a=s.a4, tau=given),
+        driven=Driven(a=s.a4, tau=s.tau4),
         power=tau * u.w,
         kinetic_energy=0.5 * p.J4 * x.driven.w * x.driven.w,
         potential_energy=line.energy,
@@ -245,6 +235,6 @@ class CardanDriveline(Model):
     def derivatives(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """Time derivatives of the states, in declared order."""
         s = _Point(xp, p, u, x)
-        return [x.driven.w, s.a4, (s.load_inertia * s.a4 + s.load) * x.driven.w]
+        return [s.tau4 * x.driven.w, x.driven.w, s.a4]
 
     parts = (Part(Outputs, _outputs), Part(PortSlopes, _slopes))

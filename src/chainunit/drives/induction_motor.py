@@ -24,19 +24,11 @@ from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar, NamedTuple
 
 from ..engines import MATH
-from ..integrate import Solver
 from ..model import Part, Requirement
 from ..planar import Vec2
-from ..ports import (
-    NO_LOAD,
-    LoadPort,
-    flanges,
-    load_inertia,
-    load_terminal,
-    load_torque,
-)
+from ..ports import LoadInput
 from ..quantities import Value, declaration, group, quantity
-from .motor import T_RATED, Ambient, Motor, braked
+from .motor import T_RATED, Motor, MotorOutputs, MotorParameters, MotorPoint, Rotor, ShaftStates, braked
 
 _TURN = 2.0 * math.pi
 
@@ -84,14 +76,6 @@ class Cage:
 
 
 @declaration
-class Rotor:
-    """The rotor as a body."""
-
-    J: Value = quantity("kg.m2", "inertia", default=0.0081, above=0.0)
-    d: Value = quantity("N.m.s/rad", "viscous friction and windage", default=0.001, min=0.0, tunable=True)
-
-
-@declaration
 class SoftStart:
     """A ramp of the voltage from switching on; with `voltage` = 1 the motor starts direct on line."""
 
@@ -134,7 +118,7 @@ class Cooling:
 
 
 @declaration
-class Parameters:
+class Parameters(MotorParameters):
     """Parameters of the motor. The start values are a typical 2.2 kW, 4-pole, 400 V machine."""
 
     pole_pairs: Value = quantity("1", "pole pairs", default=2.0, min=1.0, max=24.0)
@@ -142,21 +126,16 @@ class Parameters:
     stator: Stator = group(Stator, "stator", default=Stator())
     main: Main = group(Main, "main flux", default=Main())
     cage: Cage = group(Cage, "cage", default=Cage())
-    rotor: Rotor = group(Rotor, "rotor", default=Rotor())
+    rotor: Rotor = group(Rotor, "rotor", default=Rotor(J=0.0081))
     soft_start: SoftStart = group(SoftStart, "soft starter", default=SoftStart())
     inverter: Inverter = group(Inverter, "inverter", default=Inverter())
     cooling: Cooling = group(Cooling, "cooling", default=Cooling())
-    ambient: Ambient = group(Ambient, "surroundings", default=Ambient())
-    phi_start: Value = quantity("rad", "rotor angle at the start", default=0.0)
-    w_start: Value = quantity("rad/s", "rotor speed at the start", default=0.0)
-    solver: Solver = group(Solver, "internal integrator", default=Solver())
 
 
 @declaration
-class Inputs:
+class Inputs(LoadInput):
     """The load, the supply and what is asked of the inverter."""
 
-    load: LoadPort = group(LoadPort, "load", default=NO_LOAD)
     voltage: Value = quantity(
         "1",
         "share of the supply's voltage; at 0 the terminals are short-circuited, as in a deep dip",
@@ -199,29 +178,21 @@ class SupplyState:
 
 
 @declaration
-class States:
+class States(ShaftStates):
     """States of the motor; each is an output, too."""
 
-    phi: Value = quantity("rad", "rotor angle")
-    w: Value = quantity("rad/s", "rotor speed", nominal=100.0)
     stator: StatorState = group(StatorState, "stator")
     cage: CageState = group(CageState, "cage")
     supply: SupplyState = group(SupplyState, "supply")
-    load_energy: Value = quantity("J", "energy given to the load since the start", nominal=1000.0)
 
 
 @declaration
-class Outputs:
+class Outputs(MotorOutputs):
     """What follows from the states."""
 
-    a: Value = quantity("rad/s2", "rotor acceleration", nominal=100.0)
-    tau: Value = quantity("N.m", "torque given to the load at the shaft")
-    air_gap_tau: Value = quantity("N.m", "electromagnetic torque")
     i: Value = quantity("A", "current of a phase, RMS")
     v: Value = quantity("V", "line-to-line voltage, RMS", nominal=100.0)
     slip: Value = quantity("1", "slip against the supply's present frequency; 1 at rest")
-    supply_power: Value = quantity("W", "electric power taken", nominal=1000.0)
-    heat: Value = quantity("W", "copper losses of stator and cage", nominal=100.0)
     magnetic_energy: Value = quantity("J", "energy of the magnetic field")
 
 
@@ -356,12 +327,11 @@ def _cooling(xp: Any, p: Any, w: Any) -> Any:
     return p.cooling.still + (1.0 - p.cooling.still) * turning
 
 
-class _Point:
+class Point(MotorPoint):
     """Everything at one state: supply, circuit, shaft."""
 
     __slots__ = (
-        "R_r", "R_s", "a", "air_gap", "cooling", "df", "di_d", "di_q", "heat", "i_d", "i_q", "ir_d", "ir_q", "leak",
-        "main", "slip_speed", "tau", "u", "w_s",
+        "R_r", "R_s", "cooling", "df", "heat", "i_d", "i_q", "ir_d", "ir_q", "leak", "main", "slip_speed", "u", "w_s",
     )  # fmt: skip
 
     def __init__(self, xp: Any, p: Any, u: Any, x: Any) -> None:
@@ -385,12 +355,26 @@ class _Point:
             + self.R_r * (self.ir_d * self.ir_d + self.ir_q * self.ir_q)
         )
         self.cooling = _cooling(xp, p, x.w)
-        load, inertia = load_torque(u.load, x.phi, x.w), load_inertia(u.load, x.phi)
-        self.a = (self.air_gap - p.rotor.d * x.w - load) / (p.rotor.J + inertia)
-        self.tau = inertia * self.a + load
+        self.turn(p, u, x)
+
+    def rates(self, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+        """Time derivatives of the states behind those of the shaft."""
+        psi, psi_r = x.stator.psi, x.cage.psi
+        # the soft starter runs once the supply is on, and holds at the whole voltage
+        left = (1.0 - x.supply.ramp) / 2e-3
+        rise = xp.minimum((1.0 - p.soft_start.voltage) / p.soft_start.time, left)
+        return [
+            self.u - self.R_s * self.i_d + self.w_s * psi.q,
+            -self.R_s * self.i_q - self.w_s * psi.d,
+            (self.heat - self.cooling * (x.stator.T - p.ambient.T) / p.stator.R_th) / p.stator.C,
+            -self.R_r * self.ir_d + self.slip_speed * psi_r.q,
+            -self.R_r * self.ir_q - self.slip_speed * psi_r.d,
+            p.inverter.on * self.df,
+            rise * xp.minimum(u.voltage * 1e3, 1.0),
+        ]
 
 
-def _outputs(xp: Any, p: Any, u: Any, x: Any, s: _Point) -> Outputs:
+def _outputs(xp: Any, p: Any, u: Any, x: Any, s: Point) -> Outputs:
     psi = x.stator.psi
     squared = psi.d * psi.d + psi.q * psi.q
     b = p.main.beta * p.main.beta * squared
@@ -398,9 +382,7 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, s: _Point) -> Outputs:
     main = 0.5 * squared * (1.0 + 0.25 * b * b * b) / p.main.L
     leakage = 0.5 * s.leak * (s.ir_d * s.ir_d + s.ir_q * s.ir_q)
     return Outputs(
-        a=s.a,
-        tau=s.tau,
-        air_gap_tau=s.air_gap,
+        **s.outputs(),
         i=math.sqrt(0.5) * Vec2(s.i_d, s.i_q).length(xp),
         v=math.sqrt(1.5) * s.u,
         slip=s.slip_speed / xp.maximum(s.w_s, 1e-3 * _TURN * p.supply.f),
@@ -427,7 +409,7 @@ class InductionMotor(Motor):
     Parameters = Parameters
     Inputs = Inputs
     States = States
-    terminals = (*flanges("outflow"), load_terminal("load."))
+    Point = Point
     current, temperature, winding = "i", "stator.T", "stator"
     limited_by: ClassVar[Mapping[str, float]] = {"v": 1e-3, "supply.frequency": 1e-3}
     required = (
@@ -491,32 +473,6 @@ class InductionMotor(Motor):
             supply=SupplyState(frequency=p.supply.f * (1.0 - p.inverter.on), ramp=p.soft_start.voltage),
             load_energy=0.0,
         )
-
-    @staticmethod
-    def shared(xp: Any, p: Any, u: Any, x: Any) -> _Point:
-        """Supply, circuit and shaft at one state."""
-        return _Point(xp, p, u, x)
-
-    @staticmethod
-    def derivatives(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
-        """Time derivatives of the states, in declared order."""
-        s = _Point(xp, p, u, x)
-        psi, psi_r = x.stator.psi, x.cage.psi
-        # the soft starter runs once the supply is on, and holds at the whole voltage
-        left = (1.0 - x.supply.ramp) / 2e-3
-        rise = xp.minimum((1.0 - p.soft_start.voltage) / p.soft_start.time, left)
-        return [
-            x.w,
-            s.a,
-            s.u - s.R_s * s.i_d + s.w_s * psi.q,
-            -s.R_s * s.i_q - s.w_s * psi.d,
-            (s.heat - s.cooling * (x.stator.T - p.ambient.T) / p.stator.R_th) / p.stator.C,
-            -s.R_r * s.ir_d + s.slip_speed * psi_r.q,
-            -s.R_r * s.ir_q - s.slip_speed * psi_r.d,
-            p.inverter.on * s.df,
-            rise * xp.minimum(u.voltage * 1e3, 1.0),
-            s.tau * x.w,
-        ]
 
     parts = (Part(Outputs, _outputs),)
 

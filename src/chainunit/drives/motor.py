@@ -8,7 +8,8 @@ from typing import Any, ClassVar
 
 from ..engines import MATH
 from ..model import Model
-from ..quantities import Value, declaration, quantity
+from ..ports import LoadState, Start, carried, flanges, load_terminal
+from ..quantities import Value, declaration, group, quantity
 
 T_RATED = 293.15
 """Temperature at which resistances are given [K]."""
@@ -23,9 +24,79 @@ class Ambient:
     )
 
 
+@declaration
+class Rotor:
+    """The rotor as a body."""
+
+    J: Value = quantity("kg.m2", "inertia", default=0.0035, above=0.0)
+    d: Value = quantity("N.m.s/rad", "viscous friction and windage", default=0.001, min=0.0, tunable=True)
+
+
+@declaration
+class MotorParameters(Start):
+    """Parameters of every motor."""
+
+    rotor: Rotor = group(Rotor, "rotor", default=Rotor())
+    ambient: Ambient = group(Ambient, "surroundings", default=Ambient())
+
+
+@declaration
+class ShaftStates(LoadState):
+    """States of the shaft, before those of each kind of motor."""
+
+    phi: Value = quantity("rad", "rotor angle")
+    w: Value = quantity("rad/s", "rotor speed", nominal=100.0)
+
+
+@declaration
+class MotorOutputs:
+    """What every motor shows beside its states."""
+
+    a: Value = quantity("rad/s2", "rotor acceleration", nominal=100.0)
+    tau: Value = quantity("N.m", "torque given to the load at the shaft")
+    air_gap_tau: Value = quantity("N.m", "electromagnetic torque")
+    supply_power: Value = quantity("W", "electric power taken", nominal=100.0)
+    heat: Value = quantity("W", "copper losses", nominal=100.0)
+
+
+class MotorPoint:
+    """A motor at one state: each kind finds the air-gap torque, and the shaft moves by it."""
+
+    __slots__ = ("a", "air_gap", "tau")
+    air_gap: Any
+
+    def turn(self, p: Any, u: Any, x: Any) -> None:
+        """Acceleration, and torque given to the load."""
+        driving = self.air_gap - p.rotor.d * x.w
+        self.a, self.tau = carried(u.load, x.phi, x.w, p.rotor.J, driving)
+
+    def outputs(self) -> dict[str, Any]:
+        """The fields of `MotorOutputs` that follow from it."""
+        return {"a": self.a, "tau": self.tau, "air_gap_tau": self.air_gap}
+
+    def rates(self, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+        """Time derivatives of the states behind those of the shaft."""
+        raise NotImplementedError
+
+
 class Motor(Model):
-    """A motor that owns the shaft: outputs `phi`, `w`, `a`, `tau`, `air_gap_tau`, `supply_power`, `heat`,
-    `load_energy`, and the two that each kind calls its own."""
+    """A motor that owns the shaft: states and outputs as in `ShaftStates` and `MotorOutputs`, and the two that each
+    kind calls its own."""
+
+    terminals = (*flanges("outflow"), load_terminal("load."))
+    Point: ClassVar[Any]
+    """The `MotorPoint` of the kind, called with xp, p, u, x."""
+
+    @classmethod
+    def shared(cls, xp: Any, p: Any, u: Any, x: Any) -> Any:
+        """The motor at one state."""
+        return cls.Point(xp, p, u, x)
+
+    @classmethod
+    def derivatives(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+        """Time derivatives of the states, in declared order."""
+        s = cls.shared(xp, p, u, x)
+        return [s.tau * x.w, x.w, s.a, *s.rates(xp, p, u, x)]
 
     current: ClassVar[str]
     """Output that is the current [A]."""

@@ -23,10 +23,9 @@ from ..groups.body import Body, point_load, reflected, total
 from ..groups.driver import crank, driving_torque
 from ..groups.dyad import Dyad
 from ..groups.friction import pin_losses
-from ..integrate import Solver
 from ..model import Model, Part, Requirement
 from ..planar import ZERO, Link, Motion, Vec2
-from ..ports import PortSlopes, PortValues, flanges, load_terminal
+from ..ports import PortSlopes, PortValues, Start, flanges, load_terminal
 from ..quantities import Value, declaration, group, quantity
 from .crank_rocker import TURNS, angle_at_pivot, longest_crank, pressure_angle
 from .driven import DrivenState, slopes
@@ -242,15 +241,12 @@ class Outputs(Loads, PortValues):
 
 
 @declaration
-class DirectParameters(Parameters):
+class DirectParameters(Start, Parameters):
     """Parameters of the machine that turns by itself."""
 
     J_added: Value = quantity(
         "kg.m2", "inertia on the motor shaft beside the machine's", default=0.0, min=0.0, tunable=True
     )
-    phi_start: Value = quantity("rad", "motor angle at the start", default=0.0)
-    w_start: Value = quantity("rad/s", "motor speed at the start", default=0.0)
-    solver: Solver = group(Solver, "internal integrator", default=Solver())
 
 
 @declaration
