@@ -8,7 +8,7 @@
 #
 # Beside it exudyn with the same motion, two turns from the same state, both as accurate: the largest error of the
 # force at A2 of the left organ, in parts of its peak, against our own solution with a tolerance of 1e-12, is the
-# largest below 1e-4. exudyn has one chain and the rocker prescribed, its time is doubled; what it spends in the
+# largest below 1e-4. exudyn has one chain and the rocker prescribed, its time is doubled; its time in the
 # Python function of the rocker's motion is subtracted. Ours has the drive and both chains, and is stepped and read
 # through fmpy. Demanded: 20 times as fast.
 #
@@ -99,7 +99,7 @@ class Ours:
     def run(self, tolerance: float, steps: int, at: int = 1):
         """Forces at every `at`-th of so many steps, the states at the begin, and the time the steps took."""
         unit = Instance(self.fmu, "unit", [])
-        # to the begin exactly alike, whatever the tolerance is: it is tunable
+        # to the begin exactly alike for any tolerance: it is tunable
         unit.initialize(self.start | {"tolerance": 1e-12}, 0.0)
         unit.finish_initialization()
         unit.step(0.0, self.before)

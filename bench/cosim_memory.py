@@ -2,7 +2,7 @@
 # Memory of a long co-simulation
 #
 # The packaged machine with its motor, native FMUs, for 600 s at 1 ms: the largest memory of the process (its resident
-# set), each way of keeping rows in a process of its own. The libraries alone take what "a second" takes.
+# set), each way of keeping rows in a process of its own. "a second" shows the share of the libraries alone.
 
 # %%
 from __future__ import annotations

@@ -53,7 +53,7 @@ def main() -> None:
         spent = time.perf_counter() - began
         floor = 1000 * importer(files) / 2
     print(f"{len(result.rows)} runs of 2 s in {spent:.0f} s on two processes (limit 120 s);")
-    print(f"{spent / floor:.1f} times what fmpy alone takes for the same calls ({floor:.0f} s).")
+    print(f"{spent / floor:.1f} times the time of fmpy alone for the same calls ({floor:.0f} s).")
 
 
 if __name__ == "__main__":

@@ -40,7 +40,7 @@ print(
 )
 
 # %% [markdown]
-# What the motor gave is what the machine stored and dissipated, less what the moving feed brought.
+# The energy from the motor is stored and dissipated by the machine, less the energy that the moving feed brings.
 
 # %%
 machine = ChainUnit(ratio=RATIO)

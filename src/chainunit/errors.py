@@ -1,4 +1,4 @@
-"""Errors that speak to an engineer: the quantity, its value, the allowed range, what to do."""
+"""Errors that speak to an engineer: the quantity, its value, the allowed range, the remedy."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class GeometryError(InputError):
 
 
 class RunError(RuntimeError):
-    """A run stopped half-way; `partial` holds what was computed before, if anything was."""
+    """A run stopped half-way; `partial` holds the results before that, if there are any."""
 
     partial: Any = None
 
@@ -32,17 +32,17 @@ class WriteError(RunError):
     """A file could not be written, such as on a full disk; the message names it."""
 
 
-_JOINERS = "\u200c\u200d"  # which scripts and signs need inside a word
+_JOINERS = "\u200c\u200d"  # some scripts and signs need them inside a word
 
 
 def printable(text: str, most: int = 200) -> str:
-    """A text from outside in one line: what a terminal or a page would obey (control characters, directions of
-    writing) or not show is written as an escape; of more than `most` characters the end is left out."""
-    cut = text if len(text) <= most else text[:most]
-    shown = "".join(
-        x if x.isprintable() or x in _JOINERS or unicodedata.category(x) == "Zs" else _escape(x) for x in cut
+    """A text from outside in one line: characters that a terminal or a page would obey (control characters,
+    directions of writing) or not show are written as escapes; of more than `most` characters the end is left out."""
+    line = "".join(
+        x if x.isprintable() or x in _JOINERS or unicodedata.category(x) == "Zs" else _escape(x)
+        for x in text[:most]
     )
-    return shown if len(text) <= most else f"{shown}... ({len(text) - most} more characters)"
+    return line if len(text) <= most else f"{line}... ({len(text) - most} more characters)"
 
 
 def _escape(character: str) -> str:
@@ -58,7 +58,7 @@ class _Brief(reprlib.Repr):
 
 
 def shown(given: Any) -> str:
-    """What somebody gave, as a refusal cites it: in one short line, a text in quotation marks."""
+    """A value from outside, as a refusal cites it: in one short line, a text in quotation marks."""
     if not isinstance(given, str):
         return printable(_Brief().repr(given), 100)
     most = 60

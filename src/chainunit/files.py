@@ -23,14 +23,14 @@ _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
 def whole(file: Path) -> Iterator[Path]:
     """A path to write to in place of `file`; it becomes `file` at the end, and vanishes on an error.
 
-    Its name is a new one each time: several processes may write the same file, and the last one's stays.
+    Its name is a new one each time: several processes may write the same file, and that of the last one stays.
 
     Raises
     ------
     InputError
-        where `file` is something else than a regular file.
+        where `file` is no regular file.
     WriteError
-        where it cannot be written, such as on a full disk; a `file` that was there before is as it was.
+        where it cannot be written, such as on a full disk; an earlier `file` stays as it was.
     """
     if file.exists() and not file.is_file():
         raise InputError(f"{file}: is not a regular file; name another")
@@ -45,7 +45,7 @@ def whole(file: Path) -> Iterator[Path]:
 
 @contextmanager
 def writing(file: Path) -> Iterator[None]:
-    """Names `file` in the error of an operating system that does not take what is written.
+    """Name `file` in the error of an operating system that cannot write it.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def writing(file: Path) -> Iterator[None]:
 
 @contextmanager
 def netcdf() -> Iterator[None]:
-    """An OSError in place of the error of the NetCDF library, which says no more of a disk that is full."""
+    """An OSError in place of the error of the NetCDF library, which does not name a full disk."""
     try:
         yield
     except RuntimeError as error:
@@ -68,12 +68,12 @@ def netcdf() -> Iterator[None]:
 
 
 def full(error: OSError) -> bool:
-    """Whether the place for what was to be written is at fault, and not the name that was given."""
+    """Whether the disk is at fault, and not the name of the file."""
     return error.errno in _FULL
 
 
 def leftovers(file: Path) -> list[Path]:
-    """What processes that were killed while they wrote `file` left beside it."""
+    """Parts of `file` beside it, from processes that were killed while they wrote it."""
     name = re.compile(re.escape(file.name) + r"\.[0-9a-f]{16}\.part")
     return [path for path in file.parent.iterdir() if name.fullmatch(path.name)]
 
@@ -102,8 +102,8 @@ def claimed(path: Path) -> Iterator[Path]:
     """The `folder` at `path`, for this process alone as long as the context lasts.
 
     A lock of the operating system guards it, on a file that vanishes at the end; the lock ends with the process,
-    however that ends. Where the file system has no locks, there is none. A folder that was made here goes again where
-    an error leaves nothing in it.
+    however that ends. Where the file system has no locks, there is none. A folder that was made here is removed where
+    an error leaves it empty.
 
     Raises
     ------
@@ -120,7 +120,7 @@ def claimed(path: Path) -> Iterator[Path]:
                     f"{path}: another chainunit writes to this folder; wait until it ends, or name another folder "
                     "with -o"
                 )
-            # the one before may have taken its file away between the opening and the locking
+            # the process before may have removed its file between the opening and the locking
             with contextlib.suppress(FileNotFoundError):
                 if os.path.samestat(os.fstat(handle), lock.stat()):
                     break
@@ -134,9 +134,9 @@ def claimed(path: Path) -> Iterator[Path]:
         left_empty = ours
         raise
     finally:
-        if sys.platform == "win32":  # an open file cannot be taken away there
+        if sys.platform == "win32":  # an open file cannot be removed there
             os.close(handle)
-        # one that holds something is not ours
+        # a file with content is not a lock of ours
         with contextlib.suppress(OSError):
             if not lock.stat().st_size:
                 lock.unlink()
