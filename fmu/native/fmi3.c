@@ -2,42 +2,28 @@
 #include "fmi3Functions.h"
 #include "runtime.c"
 
-#define INSTANCE ((Instance *)c)
-#define NEED(modes) \
-    if (expect(INSTANCE, (modes), __func__)) return fmi3Error
-#define CHECK(condition, what) \
-    if (!(condition)) return (fmi3Status)complain(INSTANCE, ERROR, "%s: %s", __func__, what)
-#define NOT_NULL(pointer) CHECK(pointer, "null argument")
-
 static void report(const Instance *c, Status status, const char *message) {
     const fmi3LogMessageCallback log = (fmi3LogMessageCallback)c->log;
     if (log) log(c->environment, (fmi3Status)status, status == DISCARD ? "logStatusDiscard" : "logStatusError", message);
 }
 
-const char *fmi3GetVersion(void) { return fmi3Version; }
+#define OF_VERSION(name) fmi3##name
+#define FMI(name) OF_VERSION(name)
+typedef fmi3Status Result;
+typedef fmi3Instance Handle;
+typedef fmi3Boolean Boolean;
+typedef fmi3FMUState Memory;
+typedef fmi3Byte Byte;
+typedef fmi3String Text;
+#include "fmi.c"
 
-static fmi3Instance instantiate(fmi3String name, fmi3String token, int model_exchange, fmi3InstanceEnvironment environment,
-                                fmi3LogMessageCallback log) {
-    Instance *c = instance_new(name && *name ? name : model.name, report);
-    if (!c) return NULL;
-    c->log = (void (*)(void))log;
-    c->environment = environment;
-    c->model_exchange = model_exchange;
-    if (!name || !*name)
-        complain(c, ERROR, "the instance has no name");
-    else if (!token || strcmp(token, model.token))
-        complain(c, ERROR, "the token %s is not that of this FMU, %s", token ? token : "(null)", model.token);
-    else
-        return c;
-    instance_free(c);
-    return NULL;
-}
+const char *fmi3GetVersion(void) { return fmi3Version; }
 
 fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
                                           fmi3Boolean logging, fmi3InstanceEnvironment environment,
                                           fmi3LogMessageCallback log) {
     (void)resources, (void)visible, (void)logging;
-    return instantiate(name, token, 1, environment, log);
+    return instantiate(name, "token", token, model.token, 1, environment, (void (*)(void))log);
 }
 
 fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
@@ -47,7 +33,7 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
                                          fmi3IntermediateUpdateCallback update) {
     (void)resources, (void)visible, (void)logging, (void)events, (void)early, (void)required, (void)n_required;
     (void)update;
-    return instantiate(name, token, 0, environment, log);
+    return instantiate(name, "token", token, model.token, 0, environment, (void (*)(void))log);
 }
 
 fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token, fmi3String resources,
@@ -60,14 +46,6 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token
     return NULL;
 }
 
-void fmi3FreeInstance(fmi3Instance c) { instance_free(INSTANCE); }
-
-fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t n, const fmi3String categories[]) {
-    (void)on, (void)n, (void)categories;
-    NEED(ANY);
-    return fmi3OK;
-}
-
 fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean has_tolerance, fmi3Float64 tolerance, fmi3Float64 time,
                                        fmi3Boolean has_stop, fmi3Float64 stop) {
     (void)has_tolerance, (void)tolerance;
@@ -76,33 +54,6 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean has_tolerance
     if (!status) status = start(INSTANCE);
     if (status) return (fmi3Status)status;
     INSTANCE->mode = INITIALIZATION;
-    return fmi3OK;
-}
-
-fmi3Status fmi3ExitInitializationMode(fmi3Instance c) {
-    NEED(INITIALIZATION);
-    const Status status = start(INSTANCE);
-    if (status) return (fmi3Status)status;
-    INSTANCE->mode = INSTANCE->model_exchange ? EVENT : STEP;
-    return fmi3OK;
-}
-
-fmi3Status fmi3EnterEventMode(fmi3Instance c) {
-    NEED(EVENT | CONTINUOUS);
-    if (step_taken(INSTANCE)) return fmi3Error;
-    INSTANCE->mode = EVENT;
-    return fmi3OK;
-}
-
-fmi3Status fmi3Terminate(fmi3Instance c) {
-    NEED(RUNNING);
-    INSTANCE->mode = TERMINATED;
-    return fmi3OK;
-}
-
-fmi3Status fmi3Reset(fmi3Instance c) {
-    NEED(ANY);
-    instance_reset(INSTANCE);
     return fmi3OK;
 }
 
@@ -120,11 +71,7 @@ fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t 
     NEED(INSTANTIATED | INITIALIZATION | RUNNING);
     NOT_NULL(!n || (vr && value));
     CHECK(n == n_values, "as many values as references are needed");
-    for (size_t i = 0; i < n; ++i) {
-        const Status status = set(INSTANCE, vr[i], value[i]);
-        if (status) return (fmi3Status)status;
-    }
-    return fmi3OK;
+    return (fmi3Status)set_all(INSTANCE, vr, n, value);
 }
 
 #define NO_SUCH_TYPE(type)                                                                                         \
@@ -132,14 +79,14 @@ fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t 
                              size_t n_values) {                                                                    \
         (void)vr, (void)value, (void)n_values;                                                                     \
         NEED(ANY);                                                                                                 \
-        CHECK(!n, "every variable is a Float64");                                                                  \
+        if (n) return (fmi3Status)complain(INSTANCE, ERROR, OTHER_TYPE, "Float64");                                                                  \
         return fmi3OK;                                                                                             \
     }                                                                                                              \
     fmi3Status fmi3Set##type(fmi3Instance c, const fmi3ValueReference vr[], size_t n, const fmi3##type value[],    \
                              size_t n_values) {                                                                    \
         (void)vr, (void)value, (void)n_values;                                                                     \
         NEED(ANY);                                                                                                 \
-        CHECK(!n, "every variable is a Float64");                                                                  \
+        if (n) return (fmi3Status)complain(INSTANCE, ERROR, OTHER_TYPE, "Float64");                                                                  \
         return fmi3OK;                                                                                             \
     }
 NO_SUCH_TYPE(Float32)
@@ -193,49 +140,6 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unk
 fmi3Status fmi3EnterConfigurationMode(fmi3Instance c) NOT_THERE("there are no structural parameters")
 fmi3Status fmi3ExitConfigurationMode(fmi3Instance c) NOT_THERE("there are no structural parameters")
 
-/* -- saved states */
-
-fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state) {
-    NEED(ANY);
-    NOT_NULL(state);
-    return (fmi3Status)state_get(INSTANCE, state);
-}
-
-fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state) {
-    NEED(ANY);
-    NOT_NULL(state);
-    return (fmi3Status)state_set(INSTANCE, state);
-}
-
-fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState *state) {
-    NEED(ANY);
-    if (!state) return fmi3OK;
-    free(*state);
-    *state = NULL;
-    return fmi3OK;
-}
-
-fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state, size_t *size) {
-    NEED(ANY);
-    NOT_NULL(state && size);
-    *size = state_size(INSTANCE);
-    return fmi3OK;
-}
-
-fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, fmi3Byte bytes[], size_t size) {
-    NEED(ANY);
-    NOT_NULL(state && bytes);
-    CHECK(size >= state_size(INSTANCE), "too little room");
-    memcpy(bytes, state, state_size(INSTANCE));
-    return fmi3OK;
-}
-
-fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size, fmi3FMUState *state) {
-    NEED(ANY);
-    NOT_NULL(bytes && state);
-    return (fmi3Status)state_from(INSTANCE, bytes, size, state);
-}
-
 fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknown[], size_t n_unknown,
                                         const fmi3ValueReference known[], size_t n_known, const fmi3Float64 seed[],
                                         size_t n_seed, fmi3Float64 sensitivity[], size_t n_sensitivity) {
@@ -262,57 +166,6 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *again, fmi3Bool
     const Status status = project(INSTANCE, &moved);
     *values = moved;
     return (fmi3Status)status;
-}
-
-fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance c) {
-    NEED(EVENT);
-    INSTANCE->mode = CONTINUOUS;
-    return fmi3OK;
-}
-
-fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean no_set, fmi3Boolean *enter_event,
-                                       fmi3Boolean *terminate) {
-    (void)no_set;
-    NEED(CONTINUOUS);
-    NOT_NULL(enter_event && terminate);
-    int wanted;
-    const Status status = completed(INSTANCE, &wanted);
-    *enter_event = wanted;
-    *terminate = fmi3False;
-    return (fmi3Status)status;
-}
-
-fmi3Status fmi3SetTime(fmi3Instance c, fmi3Float64 time) {
-    NEED(EVENT | CONTINUOUS);
-    return (fmi3Status)set_time(INSTANCE, time);
-}
-
-fmi3Status fmi3SetContinuousStates(fmi3Instance c, const fmi3Float64 x[], size_t n) {
-    NEED(CONTINUOUS | EVENT);
-    return (fmi3Status)states_set(INSTANCE, x, n, __func__);
-}
-
-fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance c, fmi3Float64 dx[], size_t n) {
-    NEED(INITIALIZATION | EVENT | CONTINUOUS);
-    const Status status = derivatives(INSTANCE);
-    return (fmi3Status)(status ? status : states_get(INSTANCE, INSTANCE->dx, dx, n, __func__));
-}
-
-fmi3Status fmi3GetEventIndicators(fmi3Instance c, fmi3Float64 z[], size_t n) {
-    (void)z;
-    NEED(INITIALIZATION | EVENT | CONTINUOUS);
-    CHECK(!n, "there are none");
-    return fmi3OK;
-}
-
-fmi3Status fmi3GetContinuousStates(fmi3Instance c, fmi3Float64 x[], size_t n) {
-    NEED(INITIALIZATION | EVENT | CONTINUOUS);
-    return (fmi3Status)states_get(INSTANCE, INSTANCE->x, x, n, __func__);
-}
-
-fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance c, fmi3Float64 x[], size_t n) {
-    NEED(ANY);
-    return (fmi3Status)states_get(INSTANCE, model.nominal, x, n, __func__);
 }
 
 fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance c, size_t *n) {
@@ -343,12 +196,7 @@ fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference vr[
     NEED(STEP);
     NOT_NULL(!n || (vr && order && value));
     CHECK(n == n_values, "as many values as references are needed");
-    for (size_t i = 0; i < n; ++i) {
-        CHECK(order[i] == 1, "only the first derivative");
-        const Status status = output_derivative(INSTANCE, vr[i], &value[i]);
-        if (status) return (fmi3Status)status;
-    }
-    return fmi3OK;
+    return (fmi3Status)output_derivatives(INSTANCE, vr, n, order, value);
 }
 
 fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 size, fmi3Boolean no_set, fmi3Boolean *event,

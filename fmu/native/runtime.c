@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "model.h"
+#include "rules.h"
 
 typedef enum { OK = 0, DISCARD = 2, ERROR = 3 } Status;
 
@@ -178,17 +179,10 @@ static Status expect(Instance *c, int modes, const char *call) {
 
 /* -- time */
 
-/* What a time may be off, in parts of the step or of the experiment. Rounding comes to that, in parts of the time itself:
- * a few units of its last place at a communication point, which the FMU takes over from the host, and half a unit for each
- * of a million steps where a host adds up its steps to the stop time. */
-#define SAME_TIME 1e-9
-#define ROUNDED (4.0 * 0x1p-52)
-#define ADDED_UP (1e6 * 0x1p-53)
-
 static double larger(double a, double b) { return fabs(a) > fabs(b) ? fabs(a) : fabs(b); }
 
-static Status set_time(Instance *c, double time) {
-    if (!isfinite(time)) return complain(c, ERROR, "time = %g s: must be a finite number", time);
+static Status set_time(Instance *c, const char *which, double time) {
+    if (!isfinite(time)) return complain(c, ERROR, TIME, which, time);
     c->time = time;
     return OK;
 }
@@ -201,9 +195,9 @@ static Status step_taken(Instance *c) {
 
 static Status set_experiment(Instance *c, double time, int has_stop, double stop) {
     if (has_stop && !(stop >= time))
-        return complain(c, ERROR, "stop time = %g s: must be >= %g s, the start time", stop, time);
+        return complain(c, ERROR, STOP, stop, time);
     c->stop = has_stop ? stop + SAME_TIME * (stop - time) + ADDED_UP * fabs(larger(stop, time)) : INFINITY;
-    return set_time(c, time);
+    return set_time(c, "start time", time);
 }
 
 static int all_finite(const double *v, int n) {
@@ -226,9 +220,9 @@ static double bounded(const Quantity *q, double v) { return v < q->low ? q->low 
 
 static Status refuse(Instance *c, Status status, const char *where, int i, double v) {
     const Quantity *q = &model.declared[i];
-    const int free = isinf(q->low) && isinf(q->high);
-    return complain(c, status, "%s%s = %g%s%s: must be %s%s", where, q->name, v, q->unit[0] ? " " : "", q->unit,
-                    isfinite(v) ? "" : free ? "a finite number" : "finite, ", isfinite(v) || !free ? q->allowed : "");
+    char finite[160] = "";
+    append(finite, sizeof finite, isinf(q->low) && isinf(q->high) ? NUMBER : FINITE, q->allowed);
+    return complain(c, status, "%s" VALUE, where, q->name, v, q->unit, isfinite(v) ? q->allowed : finite);
 }
 
 /* Inputs may be set one by one: they are judged by the first call that computes with them. */
@@ -243,24 +237,22 @@ static Status judge_inputs(Instance *c) {
 /* -- start */
 
 /* Whether each value lies between its limits; refuses the first that does not, in one line. */
-static Status meets(Instance *c, const Requirement *required, int n, const double *limits) {
+static Status meets(Instance *c, const Requirement *required, int n, const double *found) {
     for (int i = 0; i < n; ++i) {
         const Requirement *r = &required[i];
-        const double value = limits[3 * i], low = limits[3 * i + 1], high = limits[3 * i + 2];
+        const double value = found[3 * i], low = found[3 * i + 1], high = found[3 * i + 2];
         if (value > low && value < high) continue;
-        const char *gap = r->unit[0] ? " " : "";
-        char given[256] = "", range[160] = "";
+        char given[256] = "", limits[160] = "";
         for (int k = 0; k < r->n_given; ++k)
-            append(given, sizeof given, "%s%s = %g", k ? ", " : " with ", model.declared[r->given[k]].name,
+            append(given, sizeof given, k ? NEXT_PARAMETER : FIRST_PARAMETER, model.declared[r->given[k]].name,
                    c->p[r->given[k]]);
         if (!(low < high))
-            append(range, sizeof range, "no value fits; %s", r->remedy);
+            append(limits, sizeof limits, NO_VALUE, r->remedy);
         else if (isfinite(low) && isfinite(high))
-            append(range, sizeof range, "must be > %g and < %g%s%s", low, high, gap, r->unit);
+            append(limits, sizeof limits, BETWEEN, low, high, r->unit);
         else
-            append(range, sizeof range, "must be %s %g%s%s", isfinite(low) ? ">" : "<", isfinite(low) ? low : high, gap,
-                   r->unit);
-        return complain(c, ERROR, "%s = %g%s%s: %s%s; %s", r->subject, value, gap, r->unit, r->why, given, range);
+            append(limits, sizeof limits, isfinite(low) ? ABOVE : BELOW, isfinite(low) ? low : high, r->unit);
+        return complain(c, ERROR, REQUIREMENT, r->subject, value, r->unit, r->why, given, limits);
     }
     return OK;
 }
@@ -325,7 +317,7 @@ static Status start(Instance *c) {
 /* -- values */
 
 static Status unknown_reference(Instance *c, unsigned reference) {
-    return complain(c, ERROR, "value reference %u does not exist", reference);
+    return complain(c, ERROR, NO_REFERENCE, reference);
 }
 
 /* Evaluate the groups in the set `wanted`, a bit each, where they are not fresh. */
@@ -347,7 +339,7 @@ static Status evaluate(Instance *c, unsigned wanted) {
     }
     for (int g = 0; g < model.n_groups; ++g)
         if ((wanted >> g & 1u) && !all_finite(c->y + model.groups[g].first, model.groups[g].count))
-            return complain(c, DISCARD, "an output of %s is not a finite number at t = %g s", model.name, c->time);
+            return complain(c, DISCARD, NO_OUTPUT, model.name, c->time);
     c->fresh |= wanted;
     return OK;
 }
@@ -395,13 +387,13 @@ static Status set(Instance *c, unsigned reference, double value) {
     if (reference >= c->n_references) return unknown_reference(c, reference);
     const int i = (int)reference;
     if (i >= model.n_p + model.n_u)
-        return complain(c, ERROR, "value reference %u is an output and cannot be set", reference);
+        return complain(c, ERROR, OUTPUT_SET, reference);
     const Quantity *q = &model.declared[i];
     if (!isfinite(value)) return refuse(c, ERROR, "", i, value);
     const int before = c->mode & (INSTANTIATED | INITIALIZATION), good = admitted(q, value);
     if (i < model.n_p && !before) {
         if (!q->tunable)
-            return complain(c, ERROR, "%s is fixed: set it before initialization or after reset", q->name);
+            return complain(c, ERROR, FIXED, q->name);
         if (!good) return refuse(c, ERROR, "", i, value);
     }
     if (good)
@@ -637,37 +629,34 @@ static double number(Kernel kernel, const Instance *c) {
 }
 
 static Status astray(Instance *c, double time) {
-    return complain(c, DISCARD, "the states left all bounds in the step from t = %g s", time);
+    return complain(c, DISCARD, ASTRAY, time);
 }
 
 static double most_steps(const Instance *c) { return c->p[model.max_steps]; }
 
 static Status over_budget(Instance *c, double time, double size) {
     const char *name = model.declared[model.max_steps].name;
-    return complain(c, DISCARD,
-                    "step of %g s from t = %g s: takes more than %s = %g steps of its own; shorten the step, or raise %s", size,
-                    time, name, most_steps(c), name);
+    return complain(c, DISCARD, OVER_BUDGET, size, time, name, most_steps(c), name);
 }
 
 /* The classical Runge-Kutta method with equal steps, its cost known beforehand. */
 static Status even_steps(Instance *c, double time, double size, const Course *u, double *work) {
     const int n_x = model.n_x;
-    double *x = work, *k = x + n_x, *sum = k + n_x, *at = sum + n_x;
+    double *x = work, *k = x + n_x, *later = k + n_x, *at = later + n_x;
     const double longest = number(kernels.internal_step, c);
     const double wanted = size / longest - 1e-9;
     if (!(wanted <= most_steps(c))) return over_budget(c, time, size);
     const long n = wanted < 1.0 ? 1 : (long)ceil(wanted);
     const double h = size / (double)n;
-    static const double node[4] = {0.0, 0.5, 0.5, 1.0}, weight[4] = {1.0, 2.0, 2.0, 1.0};
     memcpy(x, c->x, (size_t)n_x * sizeof(double));
     for (long s = 0; s < n; ++s) {
-        for (int i = 0; i < n_x; ++i) sum[i] = 0.0;
+        for (int i = 0; i < n_x; ++i) later[i] = x[i];
         for (int stage = 0; stage < 4; ++stage) {
-            for (int i = 0; i < n_x; ++i) at[i] = stage ? x[i] + node[stage] * h * k[i] : x[i];
-            if (!slope(c, u, h * ((double)s + node[stage]), at, k)) return astray(c, time);
-            for (int i = 0; i < n_x; ++i) sum[i] += weight[stage] * k[i];
+            for (int i = 0; i < n_x; ++i) at[i] = stage ? x[i] + RK4_NODES[stage] * h * k[i] : x[i];
+            if (!slope(c, u, ((double)s + RK4_NODES[stage]) * h, at, k)) return astray(c, time);
+            for (int i = 0; i < n_x; ++i) later[i] += RK4_WEIGHTS[stage] * h * k[i];
         }
-        for (int i = 0; i < n_x; ++i) x[i] += h / 6.0 * sum[i];
+        for (int i = 0; i < n_x; ++i) x[i] = later[i];
     }
     memcpy(c->x, x, (size_t)n_x * sizeof(double));
     return OK;
@@ -685,23 +674,8 @@ static int close_states(Instance *c, const Course *u, double since, double *x, d
 }
 
 /* The pair of Dormand and Prince of orders 5 and 4, its error controlled to the model's tolerance, the constraints
- * closed after each step. A step that is as short as SHORTEST of the longest is taken as it is: a snatch must not
- * stop a run. Coefficients: J. Comp. Appl. Math. 6 (1980) 19. */
-#define SHORTEST 1e-6
-
+ * closed after each step. */
 static Status controlled_steps(Instance *c, double time, double size, const Course *u, double *work) {
-    static const double node[6] = {0.0, 1.0 / 5.0, 3.0 / 10.0, 4.0 / 5.0, 8.0 / 9.0, 1.0};
-    static const double a[6][6] = {
-        {0.0},
-        {1.0 / 5.0},
-        {3.0 / 40.0, 9.0 / 40.0},
-        {44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0},
-        {19372.0 / 6561.0, -25360.0 / 2187.0, 64448.0 / 6561.0, -212.0 / 729.0},
-        {9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0},
-    };
-    static const double fifth[6] = {35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0};
-    static const double wrong[7] = {71.0 / 57600.0,      0.0,          -71.0 / 16695.0, 71.0 / 1920.0,
-                                    -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0};
     const int n_x = model.n_x;
     double *x = work, *at = x + n_x, *k = at + n_x;
     const double longest = number(kernels.internal_step, c), tolerance = number(kernels.tolerance, c);
@@ -709,7 +683,7 @@ static Status controlled_steps(Instance *c, double time, double size, const Cour
     for (int round = 0; !c->closed && round < 2; ++round)
         if (!close_states(c, u, 0.0, x, at)) return astray(c, time);
     long taken = 0;
-    double since = 0.0, pace = c->pace > 0.0 ? c->pace : 0.01 * longest;
+    double since = 0.0, pace = c->pace > 0.0 ? c->pace : FIRST * longest;
     while (since < size) {
         if ((double)++taken > most_steps(c)) return over_budget(c, time, size);
         const double left = size - since;
@@ -719,15 +693,15 @@ static Status controlled_steps(Instance *c, double time, double size, const Cour
         for (int s = 0; s < 7 && usable; ++s) {
             for (int i = 0; i < n_x; ++i) {
                 double sum = 0.0;
-                for (int j = 0; j < s && j < 6; ++j) sum += (s < 6 ? a[s][j] : fifth[j]) * k[j * n_x + i];
+                for (int j = 0; j < s; ++j) sum += STAGES[s][j] * k[j * n_x + i];
                 at[i] = x[i] + h * sum;
             }
-            usable = slope(c, u, since + h * (s < 6 ? node[s] : 1.0), at, k + s * n_x);
+            usable = slope(c, u, since + h * NODES[s], at, k + s * n_x);
         }
         double error = 0.0;
         for (int i = 0; i < n_x && usable; ++i) {
             double sum = 0.0;
-            for (int s = 0; s < 7; ++s) sum += wrong[s] * k[s * n_x + i];
+            for (int s = 0; s < 7; ++s) sum += ERRORS[s] * k[s * n_x + i];
             const double big = fabs(x[i]) > fabs(at[i]) ? fabs(x[i]) : fabs(at[i]);
             const double scale = tolerance * (big > model.nominal[i] ? big : model.nominal[i]);
             if (fabs(h * sum) > error * scale) error = fabs(h * sum) / scale;
@@ -739,8 +713,8 @@ static Status controlled_steps(Instance *c, double time, double size, const Cour
             memcpy(x, at, (size_t)n_x * sizeof(double));
             if (!close_states(c, u, since, x, at)) return astray(c, time);
         }
-        const double factor = !usable ? 0.1 : error < 1e-4 ? 5.0 : 0.9 * pow(error, -0.2);
-        double next = h * (factor < 0.2 ? 0.2 : factor > 5.0 ? 5.0 : factor);
+        const double growth = !usable ? LEAST_GROWTH : error < NO_ERROR ? MOST_GROWTH : SAFETY * pow(error, ERROR_POWER);
+        double next = h * (growth < LEAST_GROWTH ? LEAST_GROWTH : growth > MOST_GROWTH ? MOST_GROWTH : growth);
         /* a step that was cut short by the end says nothing against a longer one */
         if (usable && error <= 1.0 && h < pace && next < pace) next = pace;
         pace = next > longest ? longest : next < SHORTEST * longest ? SHORTEST * longest : next;
@@ -753,12 +727,11 @@ static Status controlled_steps(Instance *c, double time, double size, const Cour
 
 static Status step(Instance *c, double time, double size) {
     if (!isfinite(time) || !isfinite(size) || size < 0.0)
-        return complain(c, ERROR, "step of %g s from t = %g s: must be finite and not negative", size, time);
+        return complain(c, ERROR, STEP_SIZE, size, time);
     if (fabs(time - c->time) > SAME_TIME * size + ROUNDED * fabs(c->time))
-        return complain(c, ERROR, "step from t = %g s: the FMU is at t = %g s", time, c->time);
+        return complain(c, ERROR, STEP_BEGIN, time, c->time);
     if (time + size > c->stop)
-        return complain(c, ERROR, "step of %g s from t = %g s: must end at %g s, the stop time, or before", size, time,
-                        c->stop);
+        return complain(c, ERROR, STEP_END, size, time, c->stop);
     if (judge_inputs(c)) return ERROR;
     begin_inputs(c);
     const int n_x = model.n_x, n_u = model.n_u;
@@ -875,8 +848,8 @@ static Status state_check(Instance *c, const void *memory) {
     Saved saved;
     memcpy(&saved, memory, sizeof saved);
     if (saved.guard != guard() || saved.model_exchange != c->model_exchange)
-        return complain(c, ERROR, "saved state: it belongs to another model, another version or kind of simulation");
-    if (saved.sum != sum_of(memory, state_size(c))) return complain(c, ERROR, "saved state: it is damaged");
+        return complain(c, ERROR, STATE, STATE_OF_ANOTHER);
+    if (saved.sum != sum_of(memory, state_size(c))) return complain(c, ERROR, STATE, STATE_DAMAGED);
     /* what a host wrote itself */
     double *values = c->work;
     memcpy(values, (const char *)memory + sizeof saved, kept(c) * sizeof(double));

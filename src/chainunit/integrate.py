@@ -1,4 +1,5 @@
-"""The internal integrators of models with states in a co-simulation FMU, as in its native code.
+"""The internal integrators of models with states in a co-simulation FMU, and what a time may be off there. Native
+code has the same methods; its numbers are generated from these (`chainunit.fmu.native.generate.rules`).
 
 `rk4`, the classical Runge-Kutta method with equal steps: its cost is known beforehand, it needs no error control
 that could give up in the middle of a step, and with steps well below the model's shortest time constant its
@@ -33,13 +34,22 @@ MAX_STEPS = "solver.max_steps"
 """the full name of that parameter"""
 
 
+SAME_TIME, ROUNDED, ADDED_UP = 1e-9, 4.0 * 2.0**-52, 1e6 * 2.0**-53
+"""What a time may be off: in parts of the step or the experiment, and by rounding in parts of the time itself.
+Rounding is some units of its last place at a communication point, which the FMU takes over from the host, and half a unit for
+each of a million steps where a host adds up its steps to the stop time."""
+
+
 class BudgetError(ArithmeticError):
-    """A communication step takes more steps of the integrator than it may."""
+    """A communication step takes more steps of the integrator than it may, `most`."""
 
     def __init__(self, most: float) -> None:
-        super().__init__(
-            f"takes more than {MAX_STEPS} = {most:g} steps of its own; shorten the step, or raise {MAX_STEPS}"
-        )
+        super().__init__(f"takes more than {most:g} steps")
+        self.most = most
+
+
+RK4_NODES = (0.0, 0.5, 0.5, 1.0)
+RK4_WEIGHTS = (1 / 6, 2 / 6, 2 / 6, 1 / 6)
 
 
 def rk4(
@@ -64,19 +74,17 @@ def rk4(
     h = step / n
     now = list(x)
     for s in range(n):
-        begin, middle, end = s * h, (s + 0.5) * h, (s + 1) * h
-        k1 = rates(begin, now)
-        k2 = rates(middle, [v + 0.5 * h * k for v, k in zip(now, k1, strict=True)])
-        k3 = rates(middle, [v + 0.5 * h * k for v, k in zip(now, k2, strict=True)])
-        k4 = rates(end, [v + h * k for v, k in zip(now, k3, strict=True)])
-        now = [
-            v + h / 6.0 * (a + 2.0 * (b + c) + d) for v, a, b, c, d in zip(now, k1, k2, k3, k4, strict=True)
-        ]
+        k: Sequence[float] = [0.0] * len(now)
+        later = now
+        for node, weight in zip(RK4_NODES, RK4_WEIGHTS, strict=True):
+            k = rates((s + node) * h, [v + node * h * r for v, r in zip(now, k, strict=True)])
+            later = [v + weight * h * r for v, r in zip(later, k, strict=True)]
+        now = later
     return now
 
 
-_NODES = (0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0)
-_STAGES = (
+NODES = (0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0)
+STAGES: tuple[tuple[float, ...], ...] = (
     (),
     (1 / 5,),
     (3 / 40, 9 / 40),
@@ -85,9 +93,19 @@ _STAGES = (
     (9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656),
     (35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84),
 )
-_WRONG = (71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40)
-_SHORTEST = 1e-6
+"""Coefficients of Dormand and Prince, J. Comp. Appl. Math. 6 (1980) 19; the last stage is the solution of order 5."""
+ERRORS = (71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40)
+"""of its error, the weights of the stages"""
+SHORTEST = 1e-6
 """of the longest step: one as short is taken as it is, as a snatch must not stop a run"""
+FIRST = 0.01
+"""of the longest step, where nothing is known of the states yet"""
+SAFETY, ERROR_POWER = 0.9, -0.2
+"""the next step is that for which the error would be this share of the permitted one"""
+LEAST_GROWTH, MOST_GROWTH = 0.2, 5.0
+"""of a step against the one before"""
+NO_ERROR = 1e-4
+"""in parts of the permitted error; below it the step grows as much as it may"""
 
 
 def controlled(
@@ -101,14 +119,13 @@ def controlled(
     nominal: Sequence[float],
     most: float = math.inf,
 ) -> tuple[list[float], float]:
-    """The states `step` later, and the next substep that the error allows; see the native runtime, which does the
-    same.
+    """The states `step` later, and the next substep that the error allows.
 
     Parameters
     ----------
     rates : derivatives of the states at a time since the start of the step, and the states there
     close : the states, put where the model's constraints are met at that time; after each substep
-    pace : substep to begin with, and `longest` the longest [s]
+    pace : substep to begin with, 0 where none is known, and `longest` the longest [s]
     tolerance, nominal : permitted error of a substep in parts of each state, or of its nominal size
 
     Raises
@@ -118,7 +135,7 @@ def controlled(
     BudgetError
         where it takes more than `most` steps.
     """
-    now, since, taken = list(x), 0.0, 0
+    now, since, taken, pace = list(x), 0.0, 0, pace or FIRST * longest
     while since < step:
         taken += 1
         if taken > most:
@@ -129,7 +146,7 @@ def controlled(
         at: list[float] = now
         error = 0.0
         try:
-            for node, weights in zip(_NODES, _STAGES, strict=True):
+            for node, weights in zip(NODES, STAGES, strict=True):
                 at = [
                     v + h * sum(a * r[i] for a, r in zip(weights, k, strict=True)) for i, v in enumerate(now)
                 ]
@@ -138,17 +155,17 @@ def controlled(
         except (ArithmeticError, ValueError):
             usable = False
         for i, (v, after, size) in enumerate(zip(now, at, nominal, strict=True) if usable else ()):
-            wrong = abs(h * sum(e * r[i] for e, r in zip(_WRONG, k, strict=True)))
+            wrong = abs(h * sum(e * r[i] for e, r in zip(ERRORS, k, strict=True)))
             error = max(error, wrong / (tolerance * max(abs(v), abs(after), size)))
-        last_resort = h <= _SHORTEST * longest
+        last_resort = h <= SHORTEST * longest
         if not usable and last_resort:
             raise ArithmeticError("the states left all bounds")
         if usable and (error <= 1.0 or last_resort):
             since = step if h >= left else since + h
             now = list(close(since, at))
-        factor = 0.1 if not usable else 5.0 if error < 1e-4 else 0.9 * error**-0.2
-        following = h * min(max(factor, 0.2), 5.0)
+        growth = MOST_GROWTH if error < NO_ERROR else SAFETY * error**ERROR_POWER
+        following = h * (min(max(growth, LEAST_GROWTH), MOST_GROWTH) if usable else LEAST_GROWTH)
         if usable and error <= 1.0 and h < pace:
             following = max(following, pace)
-        pace = min(max(following, _SHORTEST * longest), longest)
+        pace = min(max(following, SHORTEST * longest), longest)
     return now, pace

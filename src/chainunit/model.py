@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
+from . import refusals
 from .engines import MATH
 from .errors import GeometryError, InputError
 from .quantities import Layout, bounded, violations
@@ -35,12 +36,21 @@ class Requirement:
 
     def refusal(self, value: float, low: float, high: float, given: Mapping[str, float]) -> str:
         """The line that refuses `value`."""
-        those = ", ".join(f"{name} = {given[name]:g}" for name in self.given)
-        reason = self.why + (f" with {those}" if those else "")
-        limits = [f"{sign} {limit:g}" for sign, limit in ((">", low), ("<", high)) if math.isfinite(limit)]
-        unit = "" if self.unit == "1" else f" {self.unit}"
-        allowed = f"must be {' and '.join(limits)}{unit}" if low < high else f"no value fits; {self.remedy}"
-        return f"{self.subject} = {value:g}{unit}: {reason}; {allowed}"
+        unit = refusals.unit_behind(self.unit)
+        formats = (refusals.FIRST_PARAMETER, *[refusals.NEXT_PARAMETER] * len(self.given))
+        those = "".join(f.format(name=n, value=given[n]) for f, n in zip(formats, self.given, strict=False))
+        bounded = math.isfinite(low), math.isfinite(high)
+        limits = {(True, False): refusals.ABOVE, (False, True): refusals.BELOW}.get(bounded, refusals.BETWEEN)
+        return refusals.REQUIREMENT.format(
+            subject=self.subject,
+            value=value,
+            unit=unit,
+            why=self.why,
+            parameters=those,
+            limits=(limits if low < high else refusals.NO_VALUE).format(
+                low=low, high=high, unit=unit, remedy=self.remedy
+            ),
+        )
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,8 @@ from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any, TypeAlias, TypeVar, dataclass_transform
 
+from . import refusals
+
 T = TypeVar("T")
 
 SI = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
@@ -175,7 +177,7 @@ class Quantity:
     @property
     def allowed(self) -> str:
         """The allowed range in words, e.g. ``> 0 m``."""
-        unit = "" if self.unit == "1" else f" {self.unit}"
+        unit = refusals.unit_behind(self.unit)
         low = f"{'>' if self.open_low else '>='} {self.low:g}{unit}" if math.isfinite(self.low) else ""
         high = f"<= {self.high:g}{unit}" if math.isfinite(self.high) else ""
         return " and ".join(x for x in (low, high) if x) or "any number"
@@ -375,7 +377,10 @@ def bounded(layout: Layout, instance: Any) -> Any:
 def complaint(variable: Variable, x: Any) -> str:
     """The line that says what is wrong with the value `x` of `variable`."""
     q = variable.quantity
-    unit = "" if q.unit == "1" else f" {q.unit}"
     free = math.isinf(q.low) and math.isinf(q.high)
-    allowed = q.allowed if math.isfinite(x) else "a finite number" if free else f"finite, {q.allowed}"
-    return f"{variable.name} = {x:g}{unit}: must be {allowed} ({variable.description})"
+    finite = refusals.NUMBER if free else refusals.FINITE.format(allowed=q.allowed)
+    allowed = q.allowed if math.isfinite(x) else finite
+    line = refusals.VALUE.format(
+        name=variable.name, value=x, unit=refusals.unit_behind(q.unit), allowed=allowed
+    )
+    return f"{line} ({variable.description})"

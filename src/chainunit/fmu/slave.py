@@ -24,17 +24,15 @@ from xml.etree.ElementTree import Element
 from pythonfmu.enums import Fmi2Status
 from pythonfmu.fmi2slave import Fmi2Slave
 
+from .. import refusals
 from ..engines import MATH
 from ..errors import InputError
-from ..integrate import BudgetError, controlled, rk4
+from ..integrate import ADDED_UP, MAX_STEPS, ROUNDED, SAME_TIME, BudgetError, controlled, rk4
 from ..model import Model
 from ..quantities import complaint
 
 _NAN = float("nan")
 _Slave = TypeVar("_Slave")
-_SAME_TIME, _ROUNDED, _ADDED_UP = 1e-9, 4.0 * 2.0**-52, 1e6 * 2.0**-53
-"""what a time may be off, as in the native runtime: in parts of the step or the experiment, and by rounding in parts
-of the time itself, at a communication point and where a host adds up a million steps to the stop time"""
 _LIBRARIES: set[Path] = set()
 
 
@@ -133,8 +131,8 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         self._time = start_time
         self._stop = math.inf if stop_time is None else stop_time
         if start_time <= self._stop < math.inf:
-            rounding = _ADDED_UP * max(abs(self._stop), abs(start_time))
-            self._stop += _SAME_TIME * (self._stop - start_time) + rounding
+            rounding = ADDED_UP * max(abs(self._stop), abs(start_time))
+            self._stop += SAME_TIME * (self._stop - start_time) + rounding
         self._touch()
 
     def enter_initialization_mode(self) -> None:
@@ -158,10 +156,11 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
             self._time = current_time + step_size
             return True
         except BudgetError as reason:
-            self._tell(f"step of {step_size:g} s from t = {current_time:g} s: {reason}")
+            over = {"size": step_size, "time": current_time, "name": MAX_STEPS, "most": reason.most}
+            self._tell(refusals.OVER_BUDGET.format(**over))
             return False
-        except ArithmeticError as reason:
-            self._tell(f"step from t = {current_time:g} s: {reason}")
+        except ArithmeticError:
+            self._tell(refusals.ASTRAY.format(time=current_time))
             return False
         except BaseException as reason:
             self._tell(f"step from t = {current_time:g} s failed: {reason!r}")
@@ -169,12 +168,11 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
 
     def _bad_step(self, time: float, size: float) -> str:
         if not (math.isfinite(time) and 0.0 <= size < math.inf):
-            return f"step of {size:g} s from t = {time:g} s: must be finite and not negative"
-        if abs(time - self._time) > _SAME_TIME * size + _ROUNDED * abs(self._time):
-            return f"step from t = {time:g} s: the FMU is at t = {self._time:g} s"
+            return refusals.STEP_SIZE.format(size=size, time=time)
+        if abs(time - self._time) > SAME_TIME * size + ROUNDED * abs(self._time):
+            return refusals.STEP_BEGIN.format(time=time, now=self._time)
         if not time + size <= self._stop:
-            stop = f"must end at {self._stop:g} s, the stop time, or before"
-            return f"step of {size:g} s from t = {time:g} s: {stop}"
+            return refusals.STEP_END.format(size=size, time=time, stop=self._stop)
         return ""
 
     def _integrate(self, time: float, step: float) -> bool:
@@ -191,7 +189,7 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         else:
             x = rk4(rates, self._x, step, longest, p.solver.max_steps)
         if not all(map(math.isfinite, x)):
-            self._tell(f"the states left all bounds in the step from t = {time:g} s")
+            self._tell(refusals.ASTRAY.format(time=time))
             return False
         self._x = x
         for at, rate, half in run:
@@ -214,9 +212,8 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         for _ in range(0 if self._closed else 2):
             x = close(0.0, x)
         nominal = [v.quantity.nominal or 1.0 for v in layout.variables]
-        pace, tolerance = self._pace or 0.01 * longest, model.tolerance(MATH, p)
-        most = p.solver.max_steps
-        x, self._pace = controlled(rates, close, x, step, pace, longest, tolerance, nominal, most)
+        tolerance, most = model.tolerance(MATH, p), p.solver.max_steps
+        x, self._pace = controlled(rates, close, x, step, self._pace, longest, tolerance, nominal, most)
         return x
 
     # -- values
@@ -225,7 +222,8 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         """Take parameters and inputs; a fixed parameter only before initialisation."""
         for vr, value in zip(vrs, values, strict=True):
             if not 0 <= vr < self._first:
-                self._tell(f"value reference {vr} is not a parameter or input: not set")
+                known = self._first <= vr < self._end
+                self._tell((refusals.OUTPUT_SET if known else refusals.NO_REFERENCE).format(reference=vr))
                 continue
             quantity = self._variables[vr].quantity
             if quantity.admits(value):
@@ -258,7 +256,7 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
     def _tune(self, vr: int, value: float) -> None:
         variable = self._variables[vr]
         if not variable.quantity.tunable:
-            self._tell(f"{variable.name} is fixed: set it before initialisation or after reset; not changed")
+            self._tell(refusals.FIXED.format(name=variable.name) + "; not changed")
         elif not variable.quantity.admits(value):
             self._tell(complaint(variable, value) + "; not changed")
         else:
@@ -286,7 +284,7 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
                         self._evaluate(i, low, high)
                 out.append(self._out[vr - first])
             else:
-                self._tell(f"value reference {vr} does not exist")
+                self._tell(refusals.NO_REFERENCE.format(reference=vr))
                 out.append(_NAN)
         return out
 
@@ -302,7 +300,7 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
                     self._shared = self.model.shared(MATH, p, u, x)
                 values = part.layout.values(part.equations(MATH, p, u, x, self._shared))
                 if not all(map(math.isfinite, values)):
-                    values, bad = None, "outputs are not finite numbers: the inputs are beyond any machine"
+                    values, bad = None, refusals.NO_OUTPUT.format(model=self.model.name, time=self._time)
             except BaseException as reason:
                 bad = f"outputs cannot be evaluated: {reason!r}"
         if values is None:
@@ -351,9 +349,9 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
 
     def _bad_experiment(self) -> str:
         if not math.isfinite(self._time):
-            return f"start time = {self._time:g} s: must be a finite number"
+            return refusals.TIME.format(which="start time", time=self._time)
         if not self._time <= self._stop:
-            return f"stop time = {self._stop:g} s: must be >= {self._time:g} s, the start time"
+            return refusals.STOP.format(stop=self._stop, start=self._time)
         return ""
 
     def _inputs(self, run: list[tuple[int, float, float]] | None = None, since: float = 0.0) -> Any:
@@ -390,7 +388,7 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
 
     def _no_such_type(self, vrs: list[int]) -> None:
         if vrs:
-            self._tell("every variable is a Real")
+            self._tell(refusals.OTHER_TYPE.format(type="Real"))
 
     def get_integer(self, vrs: list[int]) -> list[int]:
         """None are there: zeros, and a line in the log."""
@@ -436,7 +434,7 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         except (KeyError, TypeError, ValueError, AttributeError):
             refused = "it is not a saved state of this model"
         self._touch()
-        self._unrestored = f"saved state: {refused}; not restored" if refused else ""
+        self._unrestored = refusals.STATE.format(why=f"{refused}; not restored") if refused else ""
         if refused:
             self._tell(self._unrestored)
             return
@@ -454,7 +452,7 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         if "damaged" in state:
             return str(state["damaged"])
         if state["of"] != _IDENTITY:
-            return "it belongs to another model, or another version of it"
+            return refusals.STATE_OF_ANOTHER
         values, x = state["set"], state["x"]
         flags = [state[name] for name in ("initialized", "started", "closed")]
         if {type(v) for v in (*values, *x, state["time"], state["stop"], state["pace"])} - {float, int}:
@@ -480,7 +478,7 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
     def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
         checksum, text = state[:8], state[8:]
         if checksum != b"%08x" % binascii.crc32(text):
-            return {"damaged": "it is damaged"}
+            return {"damaged": refusals.STATE_DAMAGED}
         try:
             read = json.loads(text)
         except ValueError:

@@ -19,10 +19,10 @@ from ..accompany import accompanying
 from ..description import model_description, model_description_3
 from ..pack import checked, pack, written
 from ..recipe import recipes
-from .generate import kernels, tables
+from .generate import kernels, rules, tables
 from .platforms import build, chosen
 
-_LAYER = ("model.h", "runtime.c")
+_LAYER = ("model.h", "runtime.c", "fmi.c")
 
 
 @dataclass(frozen=True)
@@ -110,12 +110,18 @@ def export(
     functions = kernels(interface)
     layer_texts = {name: (recipes() / "native" / name).read_bytes() for name in layer}
     digest = hashlib.sha256(description(""))
-    for text in (functions.encode(), tables(interface, "", "").encode(), *layer_texts.values()):
+    for text in (
+        functions.encode(),
+        tables(interface, "", "").encode(),
+        rules().encode(),
+        *layer_texts.values(),
+    ):
         digest.update(text + b"\0")
     token = f"{{{uuid.UUID(digest.hexdigest()[:32])}}}"
     sources = {
         "kernels.c": functions.encode(),
         "model.c": tables(interface, token, token).encode(),
+        "rules.h": rules().encode(),
         **layer_texts,
         **{name: (_headers() / name).read_bytes() for name in wanted.headers},
     }

@@ -9,9 +9,12 @@ from __future__ import annotations
 import json
 import math
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
+from string import Formatter
 from typing import Any
 
+from ... import integrate, refusals
 from ...engines import casadi_
 from ...integrate import MAX_STEPS
 from ...quantities import Variable
@@ -151,13 +154,45 @@ def _text(s: str) -> str:
 
 
 def _unit(unit: str) -> str:
-    return _text("" if unit == "1" else unit)
+    return _text(refusals.unit_behind(unit))
 
 
 def _array(kind: str, name: str, items: list[str]) -> str:
     # C has no empty arrays
     body = ",\n    ".join(items or ["0"])
     return f"static const {kind} {name}[] = {{\n    {body},\n}};\n"
+
+
+def rules() -> str:
+    """``rules.h``: what native code and Python have in common, the words of `chainunit.refusals` as formats of printf
+    and the numbers of `chainunit.integrate`."""
+    lines = ["/* Words and numbers of an FMU, generated from those of its Python code. */"]
+    for name, value in (*_capitals(refusals), *_capitals(integrate)):
+        if isinstance(value, str):
+            lines.append(f"#define {name} {_text(_printf(value))}")
+        elif isinstance(value, tuple):
+            lines.append(_numbers(name, value))
+        else:
+            lines.append(f"#define {name} {_number(value)}")
+    return "\n".join(lines) + "\n"
+
+
+def _capitals(module: Any) -> Iterator[tuple[str, Any]]:
+    return ((name, value) for name, value in vars(module).items() if name.isupper())
+
+
+def _printf(text: str) -> str:
+    kinds = {"": "%s", "g": "%g", "d": "%u"}
+    pieces = Formatter().parse(text)
+    return "".join(x.replace("%", "%%") + (kinds[kind or ""] if name else "") for x, name, kind, _ in pieces)
+
+
+def _numbers(name: str, values: tuple[Any, ...]) -> str:
+    """A row of numbers, or rows that zeros fill up."""
+    if not isinstance(values[0], tuple):
+        return f"static const double {name}[{len(values)}] = {{{', '.join(map(_number, values))}}};"
+    rows = ",\n".join(f"    {{{', '.join(map(_number, row)) or '0.0'}}}" for row in values)
+    return f"static const double {name}[{len(values)}][{max(map(len, values))}] = {{\n{rows},\n}};"
 
 
 def tables(interface: Interface, guid: str, token: str) -> str:

@@ -1,0 +1,175 @@
+/* What FMI 2.0 and 3.0 have in common, over runtime.c. The file that includes it gives FMI(), the name of a function by
+ * its name in FMI 3.0, and the types Result, Handle, Boolean, Memory, Byte and Text of its version. Names no model. */
+
+#define INSTANCE ((Instance *)c)
+#define NEED(modes) \
+    if (expect(INSTANCE, (modes), __func__)) return (Result)ERROR
+#define CHECK(condition, what) \
+    if (!(condition)) return (Result)complain(INSTANCE, ERROR, "%s: %s", __func__, what)
+#define NOT_NULL(pointer) CHECK(pointer, "null argument")
+
+/* A new instance, or NULL where the host has another FMU in mind: `identifier` is what the host calls it, `own` what it
+ * is, by the word for it. */
+static Instance *instantiate(const char *name, const char *word, const char *identifier, const char *own,
+                             int model_exchange, void *environment, void (*log)(void)) {
+    Instance *c = instance_new(name && *name ? name : model.name, report);
+    if (!c) return NULL;
+    c->log = log;
+    c->environment = environment;
+    c->model_exchange = model_exchange;
+    if (!name || !*name)
+        complain(c, ERROR, "the instance has no name");
+    else if (!identifier || strcmp(identifier, own))
+        complain(c, ERROR, "the %s %s is not that of this FMU, %s", word, identifier ? identifier : "(null)", own);
+    else
+        return c;
+    instance_free(c);
+    return NULL;
+}
+
+void FMI(FreeInstance)(Handle c) { instance_free(INSTANCE); }
+
+Result FMI(SetDebugLogging)(Handle c, Boolean on, size_t n, const Text categories[]) {
+    (void)on, (void)n, (void)categories;
+    NEED(ANY);
+    return (Result)OK;
+}
+
+Result FMI(ExitInitializationMode)(Handle c) {
+    NEED(INITIALIZATION);
+    const Status status = start(INSTANCE);
+    if (status) return (Result)status;
+    INSTANCE->mode = INSTANCE->model_exchange ? EVENT : STEP;
+    return (Result)OK;
+}
+
+Result FMI(EnterEventMode)(Handle c) {
+    NEED(EVENT | CONTINUOUS);
+    if (step_taken(INSTANCE)) return (Result)ERROR;
+    INSTANCE->mode = EVENT;
+    return (Result)OK;
+}
+
+Result FMI(Terminate)(Handle c) {
+    NEED(RUNNING);
+    INSTANCE->mode = TERMINATED;
+    return (Result)OK;
+}
+
+Result FMI(Reset)(Handle c) {
+    NEED(ANY);
+    instance_reset(INSTANCE);
+    return (Result)OK;
+}
+
+/* -- saved states */
+
+Result FMI(GetFMUState)(Handle c, Memory *state) {
+    NEED(ANY);
+    NOT_NULL(state);
+    return (Result)state_get(INSTANCE, state);
+}
+
+Result FMI(SetFMUState)(Handle c, Memory state) {
+    NEED(ANY);
+    NOT_NULL(state);
+    return (Result)state_set(INSTANCE, state);
+}
+
+Result FMI(FreeFMUState)(Handle c, Memory *state) {
+    NEED(ANY);
+    if (!state) return (Result)OK;
+    free(*state);
+    *state = NULL;
+    return (Result)OK;
+}
+
+Result FMI(SerializedFMUStateSize)(Handle c, Memory state, size_t *size) {
+    NEED(ANY);
+    NOT_NULL(state && size);
+    *size = state_size(INSTANCE);
+    return (Result)OK;
+}
+
+Result FMI(SerializeFMUState)(Handle c, Memory state, Byte bytes[], size_t size) {
+    NEED(ANY);
+    NOT_NULL(state && bytes);
+    CHECK(size >= state_size(INSTANCE), "too little room");
+    memcpy(bytes, state, state_size(INSTANCE));
+    return (Result)OK;
+}
+
+Result FMI(DeserializeFMUState)(Handle c, const Byte bytes[], size_t size, Memory *state) {
+    NEED(ANY);
+    NOT_NULL(bytes && state);
+    return (Result)state_from(INSTANCE, bytes, size, state);
+}
+
+/* -- model exchange */
+
+Result FMI(EnterContinuousTimeMode)(Handle c) {
+    NEED(EVENT);
+    INSTANCE->mode = CONTINUOUS;
+    return (Result)OK;
+}
+
+Result FMI(CompletedIntegratorStep)(Handle c, Boolean no_set, Boolean *enter_event, Boolean *terminate) {
+    (void)no_set;
+    NEED(CONTINUOUS);
+    NOT_NULL(enter_event && terminate);
+    int wanted;
+    const Status status = completed(INSTANCE, &wanted);
+    *enter_event = wanted;
+    *terminate = 0;
+    return (Result)status;
+}
+
+Result FMI(SetTime)(Handle c, double time) {
+    NEED(EVENT | CONTINUOUS);
+    return (Result)set_time(INSTANCE, "time", time);
+}
+
+Result FMI(SetContinuousStates)(Handle c, const double x[], size_t n) {
+    NEED(CONTINUOUS | EVENT);
+    return (Result)states_set(INSTANCE, x, n, __func__);
+}
+
+Result FMI(GetContinuousStateDerivatives)(Handle c, double dx[], size_t n) {
+    NEED(INITIALIZATION | EVENT | CONTINUOUS);
+    const Status status = derivatives(INSTANCE);
+    return (Result)(status ? status : states_get(INSTANCE, INSTANCE->dx, dx, n, __func__));
+}
+
+Result FMI(GetEventIndicators)(Handle c, double z[], size_t n) {
+    (void)z;
+    NEED(INITIALIZATION | EVENT | CONTINUOUS);
+    CHECK(!n, "there are none");
+    return (Result)OK;
+}
+
+Result FMI(GetContinuousStates)(Handle c, double x[], size_t n) {
+    NEED(INITIALIZATION | EVENT | CONTINUOUS);
+    return (Result)states_get(INSTANCE, INSTANCE->x, x, n, __func__);
+}
+
+Result FMI(GetNominalsOfContinuousStates)(Handle c, double x[], size_t n) {
+    NEED(ANY);
+    return (Result)states_get(INSTANCE, model.nominal, x, n, __func__);
+}
+
+/* -- values */
+
+static Status set_all(Instance *c, const unsigned vr[], size_t n, const double value[]) {
+    for (size_t i = 0; i < n; ++i)
+        if (set(c, vr[i], value[i])) return ERROR;
+    return OK;
+}
+
+static Status output_derivatives(Instance *c, const unsigned vr[], size_t n, const int order[], double value[]) {
+    for (size_t i = 0; i < n; ++i) {
+        if (order[i] != 1) return complain(c, ERROR, "derivatives of outputs: only the first derivative");
+        const Status status = output_derivative(c, vr[i], &value[i]);
+        if (status) return status;
+    }
+    return OK;
+}
