@@ -1,13 +1,13 @@
 """What the tests share, and how they run: in parallel, a file at a time, when no file is named.
 
-An FMU costs a test little: the C compiler that exports find is `cc.py`, which compiles the same sources once a
-session, whichever worker, test or process asks. Beyond that,
+An FMU costs a test little: what exports compile is kept in a folder of the session, whichever worker, test or
+process asks (see `chainunit.fmu.native.cache`). Beyond that,
 
 - `fmus` has the Python FMU of every model, `native_fmus` the native ones: take them where start values do not matter;
 - `once` fills a folder once a session, for all workers: take it for a study that tests of several files read, or for
   anything else that costs seconds and is only read;
 - a module's own fixtures (`scope="module"`) are made once, as a file is never split between workers;
-- `monkeypatch.setenv("PATH", plain_path)` gives the system's own compiler to a test of the compiler itself.
+- `monkeypatch.setenv(VARIABLE, OFF)` compiles anew in a test of the compiler itself.
 """
 
 from __future__ import annotations
@@ -15,19 +15,15 @@ from __future__ import annotations
 import fcntl
 import os
 import shutil
-import sys
 import tempfile
-from pathlib import Path
 
-import cc
 import fmpy
 import pytest
 
 from chainunit.fmu.export import export
+from chainunit.fmu.native.cache import VARIABLE
 from chainunit.fmu.native.export import export as export_native
 from chainunit.models import MODELS
-
-_PLAIN_PATH = "CHAINUNIT_TESTS_PLAIN_PATH"
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -43,18 +39,11 @@ def pytest_cmdline_main(config):
 
 
 def pytest_configure(config):
-    """The compiler that remembers, for this process and all that it starts, the workers too."""
-    if sys.platform == "linux" and _PLAIN_PATH not in os.environ:
-        os.environ[_PLAIN_PATH] = os.environ["PATH"]
-        store = Path(tempfile.mkdtemp(prefix="chainunit_tests_"))
-        cc.install(store)
+    """Where compiled code is kept, for this process and all that it starts, the workers too."""
+    if not hasattr(config, "workerinput"):
+        store = tempfile.mkdtemp(prefix="chainunit_tests_")
+        os.environ[VARIABLE] = store
         config.add_cleanup(lambda: shutil.rmtree(store, ignore_errors=True))
-
-
-@pytest.fixture(scope="session")
-def plain_path():
-    """PATH without the compiler that remembers."""
-    return os.environ.get(_PLAIN_PATH, os.environ["PATH"])
 
 
 @pytest.fixture(scope="session")

@@ -32,8 +32,9 @@ from chainunit.engines import MATH
 from chainunit.fmu.accompany import INPUTS, READ, REFERENCE, STANDARD, STEPPED
 from chainunit.fmu.description import Interface
 from chainunit.fmu.export import export as export_python
+from chainunit.fmu.native.cache import OFF, VARIABLE
 from chainunit.fmu.native.export import export
-from chainunit.fmu.native.platforms import compiler
+from chainunit.fmu.native.platforms import compiled, compiler
 from chainunit.fmu.recipe import excitation, experiment
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.models import MODELS
@@ -430,8 +431,8 @@ def test_a_wrong_guid_is_refused(native):
 @pytest.mark.parametrize(
     "name", [n if n not in LARGE else pytest.param(n, marks=pytest.mark.slow) for n in MODELS]
 )
-def test_same_model_same_file(native, name, tmp_path, monkeypatch, plain_path):
-    monkeypatch.setenv("PATH", plain_path)
+def test_same_model_same_file(native, name, tmp_path, monkeypatch):
+    monkeypatch.setenv(VARIABLE, OFF)
     for fmi in (2, 3):
         again = export(MODELS[name], tmp_path / "again.fmu", fmi=fmi)
         assert again.read_bytes() == native[name, fmi][0].read_bytes()
@@ -480,11 +481,9 @@ def test_random_calls_under_sanitizers(native, name, fmi, share, tmp_path):
         "-Wl,--wrap=malloc,--wrap=calloc", "-lm",
     ]  # fmt: skip
     # what CasADi wrote is compiled apart, once for both versions of FMI: its warnings are not ours
-    for file in ("kernels.c", "model.h"):
-        shutil.copy(sources / file, tmp_path)
-    subprocess.run(
-        [shutil.which("cc"), "-O1", "-c", "kernels.c", "-o", "kernels.o"], check=True, cwd=tmp_path
-    )
+    files = {file: (sources / file).read_bytes() for file in ("kernels.c", "model.h")}
+    kernels = compiled(compiler(), ("-O1", "-c", "kernels.c", "-o", "kernels.o"), files, "kernels.o")
+    (tmp_path / "kernels.o").write_bytes(kernels)
     subprocess.run([*command, str(tmp_path / "kernels.o")], check=True)
     # whose steps take steps of their own
     calls = 200_000 if name == "ChainUnitFlexible" else 1_000_000

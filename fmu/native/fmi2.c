@@ -38,7 +38,7 @@ typedef fmi2Boolean Boolean;
 typedef fmi2FMUstate Memory;
 typedef fmi2Byte Byte;
 typedef fmi2String Text;
-#include "fmi.c"
+#include "fmi.h"
 
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 const char *fmi2GetVersion(void) { return fmi2Version; }

@@ -15,7 +15,7 @@ typedef fmi3Boolean Boolean;
 typedef fmi3FMUState Memory;
 typedef fmi3Byte Byte;
 typedef fmi3String Text;
-#include "fmi.c"
+#include "fmi.h"
 
 const char *fmi3GetVersion(void) { return fmi3Version; }
 

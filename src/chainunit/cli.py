@@ -62,8 +62,14 @@ def _root(
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and stop.")
     ] = False,
+    no_cache: Annotated[
+        bool, typer.Option("--no-cache", help="Compile FMUs anew, and keep nothing of what was compiled.")
+    ] = False,
 ) -> None:
-    pass
+    if no_cache:
+        from .fmu.native.cache import OFF, VARIABLE
+
+        os.environ[VARIABLE] = OFF
 
 
 def _console(**options: Any) -> Console:

@@ -36,8 +36,8 @@ MAX_STEPS = "solver.max_steps"
 
 SAME_TIME, ROUNDED, ADDED_UP = 1e-9, 4.0 * 2.0**-52, 1e6 * 2.0**-53
 """What a time may be off: in parts of the step or the experiment, and by rounding in parts of the time itself.
-Rounding is some units of its last place at a communication point, which the FMU takes over from the host, and half a unit for
-each of a million steps where a host adds up its steps to the stop time."""
+Rounding is some units of its last place at a communication point, which the FMU takes over from the host, and half a
+unit for each of a million steps where a host adds up its steps to the stop time."""
 
 
 class BudgetError(ArithmeticError):

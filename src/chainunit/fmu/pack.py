@@ -35,12 +35,12 @@ def checked(model: type[Model], start: Mapping[str, float] | None) -> Interface:
 
 def pack(contents: Mapping[str, bytes], file: Path) -> None:
     """Write an archive in one order and with one time stamp."""
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(file, "w") as archive:
         for name in sorted(contents):
             entry = zipfile.ZipInfo(name, _EPOCH)
             entry.compress_type = zipfile.ZIP_DEFLATED
             entry.external_attr = 0o644 << 16
-            archive.writestr(entry, contents[name])
+            archive.writestr(entry, contents[name], compresslevel=9)
 
 
 def written(root: Element) -> bytes:

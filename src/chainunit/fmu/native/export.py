@@ -22,7 +22,7 @@ from ..recipe import recipes
 from .generate import kernels, rules, tables
 from .platforms import build, chosen
 
-_LAYER = ("model.h", "runtime.c", "fmi.c")
+_LAYER = ("model.h", "runtime.c", "fmi.h")
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,9 @@ every platform. Floors: glibc 2.17, by either compiler; macOS 10.15 on x86_64 an
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
+import os
 import platform
 import shutil
 import struct
@@ -15,10 +17,12 @@ import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from ...errors import InputError, RunError
+from .cache import kept
 
 _FLAGS = ("-std=c99", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off")
 _SHARED = ("-shared", "-s")
@@ -63,6 +67,15 @@ class Compiler:
     def name(self) -> str:
         """How it is called in messages."""
         return "zig" if self.zig else self.command[0]
+
+    @cached_property
+    def identity(self) -> tuple[Any, ...]:
+        """What another compiler, or another version of it, has not: its command, its file, and what it says of
+        itself; with the variables that lead it to other headers and libraries."""
+        file = Path(self.command[0]).resolve().stat()
+        version = subprocess.run([*self.command, "--version"], capture_output=True, text=True).stdout
+        paths = [os.environ.get(name) for name in ("CPATH", "C_INCLUDE_PATH", "LIBRARY_PATH")]
+        return self.command, file.st_size, file.st_mtime_ns, version, paths
 
 
 def host() -> str | None:
@@ -134,7 +147,7 @@ def build(
     fmi: int,
     identifier: str,
     sources: Mapping[str, bytes],
-    compiled: Sequence[str],
+    translated: Sequence[str],
 ) -> dict[str, bytes]:
     """Libraries of one platform, by their path inside the FMU.
 
@@ -143,7 +156,7 @@ def build(
     compiler : see `chosen`
     name, fmi : platform and version of FMI
     identifier : model identifier, the library's name
-    sources : files by name; `compiled` names those that the compiler is given
+    sources : files by name; `translated` names those that the compiler is given
 
     Raises
     ------
@@ -153,43 +166,51 @@ def build(
     described = PLATFORMS[name]
     made = {}
     for folder, targets in described.folders[fmi].items():
-        slices = [_compile(compiler, t, identifier + described.suffix, sources, compiled) for t in targets]
+        slices = [_compile(compiler, t, identifier + described.suffix, sources, translated) for t in targets]
         library = slices[0] if len(slices) == 1 else fat(slices)
         made[f"binaries/{folder}/{identifier}{described.suffix}"] = library
     return made
 
 
 def _compile(
-    compiler: Compiler, target: str, library: str, sources: Mapping[str, bytes], compiled: Sequence[str]
+    compiler: Compiler, target: str, library: str, sources: Mapping[str, bytes], files: Sequence[str]
 ) -> bytes:
-    with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
-        work = Path(scratch)
-        for name, content in sources.items():
-            (work / name).write_bytes(content)
-        own = ("-target", target) if compiler.zig else ("-Wl,--build-id=none", "-DCHAINUNIT_OLD_GLIBC")
-        math = () if "windows" in target else ("-lm",)
-        flags = (*own, *_FLAGS)
-        (work / KERNELS_OBJECT).write_bytes(_object(compiler, flags, sources[KERNELS], sources[HEADER]))
-        rest = [name for name in compiled if name != KERNELS]
-        _run(compiler, (*flags, *_SHARED, *rest, KERNELS_OBJECT, "-o", library, *math), work)
-        return (work / library).read_bytes()
+    own = ("-target", target) if compiler.zig else ("-Wl,--build-id=none", "-DCHAINUNIT_OLD_GLIBC")
+    math = () if "windows" in target else ("-lm",)
+    flags = (*own, *_FLAGS)
+    # the kernels take almost all of the time, and are the same for whatever start values
+    kernels = {name: sources[name] for name in (KERNELS, HEADER)}
+    object_code = compiled(compiler, (*flags, "-c", KERNELS, "-o", KERNELS_OBJECT), kernels, KERNELS_OBJECT)
+    rest = {name: text for name, text in sources.items() if name != KERNELS} | {KERNELS_OBJECT: object_code}
+    others = [name for name in files if name != KERNELS]
+    arguments = (*flags, *_SHARED, *others, KERNELS_OBJECT, "-o", library, *math)
+    return compiled(compiler, arguments, rest, library)
 
 
-@lru_cache(maxsize=32)
-def _object(compiler: Compiler, flags: tuple[str, ...], kernels: bytes, header: bytes) -> bytes:
-    """Object code of the kernels, which take almost all of the time and are the same for whatever start values."""
-    with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
-        work = Path(scratch)
-        (work / KERNELS).write_bytes(kernels)
-        (work / HEADER).write_bytes(header)
-        _run(compiler, (*flags, "-c", KERNELS, "-o", KERNELS_OBJECT), work)
-        return (work / KERNELS_OBJECT).read_bytes()
+def compiled(compiler: Compiler, arguments: Sequence[str], files: Mapping[str, bytes], product: str) -> bytes:
+    """The file `product` that the compiler makes by `arguments` of these `files`, by their names, or has made before:
+    see `chainunit.fmu.native.cache`.
 
+    Raises
+    ------
+    RunError
+        where the compiler fails, with what it said.
+    """
 
-def _run(compiler: Compiler, arguments: tuple[str, ...], work: Path) -> None:
-    built = subprocess.run([*compiler.command, *arguments], cwd=work, capture_output=True, text=True)
-    if built.returncode:
-        raise RunError(f"the C compiler {compiler.name} failed: {built.stderr.strip()}")
+    def make() -> bytes:
+        with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
+            work = Path(scratch)
+            for name, content in files.items():
+                (work / name).write_bytes(content)
+            run = subprocess.run([*compiler.command, *arguments], cwd=work, capture_output=True, text=True)
+            if run.returncode:
+                raise RunError(f"the C compiler {compiler.name} failed: {run.stderr.strip()}")
+            return (work / product).read_bytes()
+
+    key = hashlib.sha256(repr((compiler.identity, list(arguments), product)).encode())
+    for name, content in sorted(files.items()):
+        key.update(f"{name} {len(content)} ".encode() + content)
+    return kept(key.digest(), make)
 
 
 def fat(slices: Sequence[bytes]) -> bytes:
