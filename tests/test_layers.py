@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -80,6 +81,15 @@ def test_the_scan_sees_every_way_of_importing(tmp_path, monkeypatch):
     assert HOUSE.admitted("cli", "groups") and not HOUSE.admitted("groups", "cli")
     assert HOUSE.admitted("system", "fmu") and not HOUSE.admitted("machines", "fmu")
     assert HOUSE.admitted("fmu", "core") and not HOUSE.admitted("fmu", "groups")
+
+
+def test_the_page_names_files_that_exist():
+    text = (ROOT / "docs" / "architecture.md").read_text("utf-8")
+    for name in re.findall(r"`([\w/]+\.py)`", text):
+        assert any((base / name).exists() for base in (ROOT, HOUSE.PACKAGE)), name
+    for way, (_, stations) in HOUSE.WAYS.items():
+        section = text.split(f"## The way of {way}")[1].split("\n## ")[0]
+        assert re.findall(r"^\d+\. \*\*(\w+)\*\*", section, re.M) == list(stations), way
 
 
 def test_the_drawing_is_that_of_the_imports():
