@@ -111,7 +111,9 @@ class Link:
         """Motion of the point `r` away from the pin."""
         pin, t1 = self.pin, self.t1
         return Motion(
-            Vec2(pin.p.x + r.x, pin.p.y + r.y), Vec2(pin.p1.x - r.y * t1, pin.p1.y + r.x * t1), self._second(r)
+            Vec2(pin.p.x + r.x, pin.p.y + r.y),
+            Vec2(pin.p1.x - r.y * t1, pin.p1.y + r.x * t1),
+            self._second(r),
         )
 
     def _second(self, r: Vec2) -> Vec2:

@@ -6,20 +6,21 @@ coordinate q itself: the counter-clockwise angle of the crank falls at the rate 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 from ..planar import Link, Motion, Vec2
 from .body import Bar, Load
+from .group import Group, SolvedGroup
 
 
-class Crank(NamedTuple):
+@dataclass
+class Crank(Group):
     """A crank as data: a bar on a ground pin, and the name of the pin at its end."""
 
     bar: Bar
     end: str
-
-    derived = 0
 
     @property
     def bars(self) -> tuple[Bar, ...]:
@@ -28,32 +29,29 @@ class Crank(NamedTuple):
 
     @property
     def pins(self) -> dict[str, str]:
-        """Pins that it adds, each with the link that carries it."""
+        """The pin at its end."""
         return {self.end: self.bar.name}
 
     @property
     def joints(self) -> tuple[tuple[str, str], ...]:
-        """Pin and link of each reaction, as `TurnedCrank.reactions` gives them."""
+        """Its bearing."""
         return ((self.bar.pin, self.bar.name),)
 
-    def solve(self, xp: Any, q: Any, pins: Mapping[str, Motion], derived: Any) -> TurnedCrank:
+    def solve(self, xp: Any, q: Any, pins: Mapping[str, Motion], derived: Sequence[Any]) -> TurnedCrank:
         """The crank at the angle `q` [rad]."""
         link = crank(xp, pins[self.bar.pin].p, q)
-        return TurnedCrank(link, link.at(self.bar.length))
+        return TurnedCrank((link,), (link.at(self.bar.length),))
 
 
-class TurnedCrank:
+class TurnedCrank(SolvedGroup):
     """The crank at one angle: its link, and the pin at its end."""
 
-    __slots__ = ("links", "pins")
-
-    def __init__(self, link: Link, end: Motion) -> None:
-        self.links, self.pins = (link,), (end,)
+    __slots__ = ()
 
     def lifted(self, outer: tuple[Motion, ...]) -> TurnedCrank:
-        """The same with its derivatives by q as dual parts."""
+        """See `SolvedGroup`."""
         link = self.links[0].lifted(outer[0], 0.0)
-        return TurnedCrank(link, link.lifted_point(self.pins[0]))
+        return TurnedCrank((link,), (link.lifted_point(self.pins[0]),))
 
     def reactions(self, loads: tuple[Load, ...]) -> tuple[Vec2, ...]:
         """The force on the crank at its bearing [N]."""

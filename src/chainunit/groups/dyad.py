@@ -9,15 +9,18 @@ angle and vanishes in a dead position.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 from ..engines import Dual, slope
 from ..planar import Link, Motion, Vec2, lifted
 from .body import Bar, Load
+from .group import Group, SolvedGroup
 
 
-class Dyad(NamedTuple):
+@dataclass
+class Dyad(Group):
     """A dyad as data: two bars whose pins move in a known way, and the inner pin at the ends of both. `side` is +1
     where the inner pin lies to the left of the ray from the first bar's pin to the second one's, -1 where to the
     right. Of two links in the inner pin the second one carries what else hangs on it."""
@@ -26,8 +29,6 @@ class Dyad(NamedTuple):
     first: Bar
     second: Bar
     side: float
-
-    derived = 0
 
     @property
     def bars(self) -> tuple[Bar, ...]:
@@ -45,11 +46,7 @@ class Dyad(NamedTuple):
         first, second = self.first, self.second
         return (first.pin, first.name), (self.inner, first.name), (second.pin, second.name)
 
-    def derive(self, xp: Any, pins: Any) -> list[Any]:
-        """Nothing follows from its lengths alone."""
-        return []
-
-    def solve(self, xp: Any, q: Any, pins: Mapping[str, Motion], derived: Any) -> SolvedDyad:
+    def solve(self, xp: Any, q: Any, pins: Mapping[str, Motion], derived: Sequence[Any]) -> SolvedDyad:
         """The dyad where its outer `pins` are."""
         first, second = self.first, self.second
         return SolvedDyad.between(
@@ -57,26 +54,24 @@ class Dyad(NamedTuple):
         )
 
 
-class SolvedDyad:
-    """A solved dyad: its `links` from P and from Q, the inner pin `b`, the arms `r1`, `r2`, and the sine `margin` of
-    the angle between, which vanishes in a dead position."""
+class SolvedDyad(SolvedGroup):
+    """A solved dyad: its links from P and from Q, the inner pin B, the arms `r1`, `r2`; its margin is the sine of the
+    angle between them."""
 
-    __slots__ = ("_minus_per_det", "_rates", "b", "links", "margin", "r1", "r2")
+    __slots__ = ("_minus_per_det", "_rates", "r1", "r2")
 
     def __init__(
-        self, arms: tuple[Vec2, Vec2], minus_per_det: Any, rates: tuple[Any, Any], links: tuple[Link, Link], b: Motion
+        self,
+        arms: tuple[Vec2, Vec2],
+        minus_per_det: Any,
+        rates: tuple[Any, Any],
+        links: tuple[Link, Link],
+        pin: Motion,
+        margin: Any = 1.0,
     ) -> None:
+        super().__init__(links, (pin,), margin)
         self.r1, self.r2 = arms
-        self._minus_per_det = minus_per_det
-        self._rates = rates
-        self.links = links
-        self.b = b
-        self.margin: Any = 1.0
-
-    @property
-    def pins(self) -> tuple[Motion, ...]:
-        """The inner pin."""
-        return (self.b,)
+        self._minus_per_det, self._rates = minus_per_det, rates
 
     @classmethod
     def between(cls, xp: Any, p: Motion, q: Motion, a: Any, b: Any, side: float) -> SolvedDyad:
@@ -101,16 +96,12 @@ class SolvedDyad:
         rates = g.dot(r2) * minus_per_det, g.dot(r1) * minus_per_det
         x, y = _second(p, q, r1, r2, rates, minus_per_det)
         first, second = Link(p, r1 * (1.0 / a), rates[0], x), Link(q, r2 * (1.0 / b), rates[1], y)
-        solved = cls((r1, r2), minus_per_det, rates, (first, second), first.carried(r1))
-        solved.margin = det / (a * b)
-        return solved
+        return cls((r1, r2), minus_per_det, rates, (first, second), first.carried(r1), det / (a * b))
 
     def lifted(self, outer: tuple[Motion, ...]) -> SolvedDyad:
-        """The same with its derivatives by q as dual parts; the outer pins have them."""
+        """See `SolvedGroup`."""
         (p, q), (first, second) = outer, self.links
-        r1, r2 = (
-            lifted(r, r.turned() * s) for r, s in zip((self.r1, self.r2), self._rates, strict=True)
-        )
+        r1, r2 = (lifted(r, r.turned() * s) for r, s in zip((self.r1, self.r2), self._rates, strict=True))
         rates = Dual(first.t1, first.t2), Dual(second.t1, second.t2)
         per = self._minus_per_det
         minus_per_det = Dual(per, per * per * slope(r1.cross(r2)))
@@ -120,7 +111,7 @@ class SolvedDyad:
             first.lifted(p, Dual(first.t2, slope(x))),
             second.lifted(q, Dual(second.t2, slope(y))),
         )
-        return SolvedDyad((r1, r2), minus_per_det, rates, links, links[0].lifted_point(self.b))
+        return SolvedDyad((r1, r2), minus_per_det, rates, links, links[0].lifted_point(self.pins[0]))
 
     def reactions(self, loads: tuple[Load, ...]) -> tuple[Vec2, Vec2, Vec2]:
         """Forces at P (on the first link), at B (on the first link, from the second) and at Q

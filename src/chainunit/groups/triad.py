@@ -14,8 +14,8 @@ three moment equations about them that paper 003 solves are singular there.
 There is no closed form for the pose: up to six assembly modes are the real roots of a polynomial (`assembly_modes`),
 and a mode is followed from one position to the next by `corrected`.
 
-In a linkage with one crank the pose is a smooth periodic function of the crank angle: it is followed once around, from
-the mode that `Triad.assembly` leads to at q = 0, and kept as a Fourier series (`Triad.derive`). At any angle the
+In a linkage with one crank the pose is a smooth periodic function of the crank angle: it is followed once around,
+from the mode that `Triad.assembly` leads to at q = 0, and kept as a Fourier series (`Triad.derive`). At any angle the
 series gives a pose that is nearly right, and Newton's method makes it exact. So the pose depends on the crank angle
 alone, whatever the step or the history; the branch cannot jump, and parameters with which it ends within the turn
 are refused (`requirements`).
@@ -25,12 +25,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
 
 from ..engines import Dual, slope
 from ..model import Requirement
 from ..planar import Link, Motion, Vec2, lifted
 from .body import Bar, Load, Mass
+from .group import Group, SolvedGroup
 
 LEGS = 3
 SAMPLES = 20
@@ -112,10 +114,11 @@ def corrected(
     return pose
 
 
-class Triad(NamedTuple):
+@dataclass
+class Triad(Group):
     """A triad as data: the ternary link with its body, three legs whose pins move in a known way, the pins of the
-    ternary link in its own frame [m], each with its leg, further points on it, and the pose from which Newton's method
-    leads to the mode of assembly at crank angle 0."""
+    ternary link in its own frame [m], each with its leg, further points on it, and the pose from which Newton's
+    method leads to the mode of assembly at crank angle 0."""
 
     name: str
     mass: Mass
@@ -124,7 +127,7 @@ class Triad(NamedTuple):
     points: Mapping[str, tuple[Any, Any]]
     assembly: Pose
 
-    derived = 3 * (2 * HARMONICS + 1) + 2
+    derived: ClassVar[int] = 3 * (2 * HARMONICS + 1) + 2
     """Numbers that follow from the lengths: the series of the pose, the largest misfit, the least margin."""
 
     @property
@@ -150,7 +153,7 @@ class Triad(NamedTuple):
         """Motion of the outer pins of the legs."""
         return tuple(pins[leg.pin] for leg in self.legs)
 
-    def solve(self, xp: Any, q: Any, pins: Mapping[str, Motion], derived: Any) -> SolvedTriad:
+    def solve(self, xp: Any, q: Any, pins: Mapping[str, Motion], derived: Sequence[Any]) -> SolvedTriad:
         """The triad where its outer `pins` are, on the branch that the series `derived` gives."""
         outer, arms = self.outer(pins), tuple(self.arms.values())
         near = pose_of_series(derived, xp.cos(q), xp.sin(q))
@@ -241,19 +244,23 @@ def limits(derived: Sequence[Any]) -> Iterator[tuple[Any, Any, Any]]:
     yield least, 1e-3, math.inf
 
 
-class SolvedTriad:
-    """A solved triad: its `links`, the legs from their outer pins and then the ternary link (origin and x axis of its
-    frame), its `pins` in the order of the legs, and its `margin`, the determinant over the lengths of the legs and the
-    size of the ternary link: 0 is a dead position."""
+class SolvedTriad(SolvedGroup):
+    """A solved triad: its `links`, the legs from their outer pins and then the ternary link (origin and x axis of
+    its frame), its `pins` in the order of the legs, and its `margin`, the determinant over the lengths of the legs
+    and the size of the ternary link: 0 is a dead position."""
 
-    __slots__ = ("_per_square", "_rows", "links", "margin", "pins")
+    __slots__ = ("_per_square", "_rows")
 
     def __init__(
-        self, rows: _Rows, per_square: tuple[Any, ...], links: tuple[Link, ...], pins: tuple[Motion, ...]
+        self,
+        rows: _Rows,
+        per_square: tuple[Any, ...],
+        links: tuple[Link, ...],
+        pins: tuple[Motion, ...],
+        margin: Any = 1.0,
     ) -> None:
+        super().__init__(links, pins, margin)
         self._rows, self._per_square = rows, per_square
-        self.links, self.pins = links, pins
-        self.margin: Any = 1.0
 
     @classmethod
     def at(
@@ -289,21 +296,19 @@ class SolvedTriad:
             Link(p, r * (1.0 / l), r.cross(k.p1 - p.p1) * per, r.cross(k.p2 - p.p2) * per)
             for p, r, l, k, per in zip(outer, rows.r, lengths, pins, per_square, strict=True)
         )
-        solved = cls(rows, per_square, (*legs, ternary), pins)
         size = xp.sqrt(sum((arms[i] - arms[i - 1]).squared() for i in range(LEGS)))
-        solved.margin = rows.det / (lengths[0] * lengths[1] * lengths[2] * size)
-        return solved
+        margin = rows.det / (lengths[0] * lengths[1] * lengths[2] * size)
+        return cls(rows, per_square, (*legs, ternary), pins, margin)
 
-    def lifted(self, outer: Sequence[Motion]) -> SolvedTriad:
-        """The same with its derivatives by q as dual parts; the outer pins have them."""
+    def lifted(self, outer: tuple[Motion, ...]) -> SolvedTriad:
+        """See `SolvedGroup`."""
         *legs, ternary = self.links
         t1 = Dual(ternary.t1, ternary.t2)
         arms = tuple(lifted(a, a.turned() * ternary.t1) for a in self._rows.arms)
         rows = _Rows(
             arms,
             tuple(
-                lifted(r, k.p1 - leg.pin.p1)
-                for r, k, leg in zip(self._rows.r, self.pins, legs, strict=True)
+                lifted(r, k.p1 - leg.pin.p1) for r, k, leg in zip(self._rows.r, self.pins, legs, strict=True)
             ),
         )
         pins1 = tuple(lifted(k.p1, k.p2) for k in self.pins)

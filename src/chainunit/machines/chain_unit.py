@@ -302,8 +302,8 @@ def _pull(xp: Any, axis: Vec2, begin: Vec2, end: Vec2) -> Any:
 
 
 def on_side(rocker: Link, hand: float, forces: tuple[Vec2, Vec2, Vec2]) -> dict[str, Any]:
-    """The fields of `Side` but the pulls, from the forces at A1 and B on the wall and at A2 on the web; `hand` is +1 on
-    the left and -1 on the right."""
+    """The fields of `Side` but the pulls, from the forces at A1 and B on the wall and at A2 on the web; `hand` is +1
+    on the left and -1 on the right."""
     at_a1, at_b, at_a2 = forces
     return {
         # X cos s + Y sin s with s = +-psi: the force across the arm, along the arm
@@ -356,7 +356,9 @@ PINS = (
 """All joints: O1, A, Bd, C, then A2, B, A1 of each side."""
 
 
-def on_drive(xp: Any, p: Any, s: Any, a: Any, reactions: Mapping[Any, Vec2], at_a1: Any = 0.0) -> dict[str, Any]:
+def on_drive(
+    xp: Any, p: Any, s: Any, a: Any, reactions: Mapping[Any, Vec2], at_a1: Any = 0.0
+) -> dict[str, Any]:
     """The fields of `Loads` that do not depend on the kind of organ, at crank acceleration `a`; `at_a1` is the moment
     on both organs at their walls, from the frame [N m]."""
     at_frame, moment = ZERO, at_a1
@@ -370,9 +372,7 @@ def on_drive(xp: Any, p: Any, s: Any, a: Any, reactions: Mapping[Any, Vec2], at_
     return {
         **{name: force(reactions[joint]) for name, joint in JOINTS.items()},
         "pressure_angle": pressure_angle(xp, p.l, p.h, a_to_c.squared()),
-        "frame": Frame(
-            fx=-at_frame.x, fy=-at_frame.y, moment=s.torque(a) - friction - moment - stop.moment
-        ),
+        "frame": Frame(fx=-at_frame.x, fy=-at_frame.y, moment=s.torque(a) - friction - moment - stop.moment),
     }
 
 
@@ -475,7 +475,6 @@ class ChamberForces(InverseMachine):
         ),
     )
 
-
     @staticmethod
     def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
         """The crank turns, and both organs close at both extremes of the rocker."""
@@ -507,6 +506,5 @@ class DirectChainUnit(DirectMachine):
     Inputs = DirectInputs
     inverse = ChamberForces
     required = (*ChamberForces.required, DirectMachine.carried)
-
 
     parts = direct_parts(DirectOutputs, _probes)

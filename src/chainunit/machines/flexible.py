@@ -502,8 +502,7 @@ def _flexible(walls: int, webs: int) -> type[Model]:
         for side, each in zip(SIDES, forces, strict=True):
             reactions[f"A1 {side}", f"{side} wall"] = -each[0]
         at_a2, at_a1 = (
-            sum(getattr(h.chain, moment) for h in s.organs)
-            for moment in ("moment_at_end", "moment_at_start")
+            sum(getattr(h.chain, moment) for h in s.organs) for moment in ("moment_at_end", "moment_at_start")
         )
         return outputs(
             tau=s.torque(a) / p.ratio,
@@ -591,7 +590,6 @@ def _flexible(walls: int, webs: int) -> type[Model]:
                 for part in ("wall", "web")
             ),
         )  # fmt: skip
-
 
         @staticmethod
         def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:

@@ -8,7 +8,6 @@ part. The crank angle q is counted from the upward vertical, clockwise; B lies t
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -241,11 +240,12 @@ class KnifeDrive(InverseMachine):
         yield p.r, 0.0, longest_crank(xp, p.ab, p.bo2, xp.sqrt(between.squared()))
         yield from triad.limits(p.derived)
 
-
     parts = inverse_parts(Outputs, _probes)
 
 
 def modes(p: Any, q: float = 0.0) -> list[Pose]:
     """All poses in which the triad can be assembled at crank angle `q` [rad]; one of them, at 0, is `assembly`."""
     linkage = KnifeDrive.linkage(p, Inputs())
-    return linkage.groups[1].modes(Mechanism(MATH, linkage.before(1), q).pins)
+    _, group = linkage.groups
+    assert isinstance(group, Triad)
+    return group.modes(Mechanism(MATH, linkage.before(1), q).pins)

@@ -7,58 +7,15 @@ follow from the description.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
-from ..groups.body import Bar, Load
+from ..groups.body import Bar
 from ..groups.driver import Crank
-from ..groups.loads import Acting, Joint
-from ..planar import Link, Motion, Vec2
-
-
-class Solved(Protocol):
-    """A group at one position."""
-
-    @property
-    def links(self) -> Sequence[Link]:
-        """Its links, in the order of the group's bars."""
-
-    @property
-    def pins(self) -> Sequence[Motion]:
-        """The pins that it adds."""
-
-    def lifted(self, outer: tuple[Motion, ...]) -> Solved:
-        """The same with its derivatives by q as dual parts; the outer pins have them."""
-
-    def reactions(self, loads: tuple[Load, ...]) -> Sequence[Vec2]:
-        """Forces in the group's joints, in their order [N], from what acts on each link."""
-
-
-class Group(Protocol):
-    """A group as data."""
-
-    @property
-    def bars(self) -> tuple[Bar, ...]:
-        """Its links; each with a pin that is there before hangs on it."""
-
-    @property
-    def pins(self) -> Mapping[str, str]:
-        """Pins that it adds, each with the link that carries what else hangs on it."""
-
-    @property
-    def joints(self) -> tuple[Joint, ...]:
-        """Pin and link of each reaction."""
-
-    @property
-    def derived(self) -> int:
-        """How many numbers follow from its lengths once, before a run (`derive`)."""
-
-    def derive(self, xp: Any, pins: Callable[[float], Mapping[str, Motion]]) -> list[Any]:
-        """Those numbers; `pins` gives the pins before it at a crank angle [rad]."""
-
-    def solve(self, xp: Any, q: Any, pins: Mapping[str, Motion], derived: Any) -> Solved:
-        """The group where the `pins` are."""
+from ..groups.group import Group
+from ..groups.loads import Joint
+from ..planar import Vec2
 
 
 @dataclass(frozen=True)
@@ -68,7 +25,8 @@ class Linkage:
     ground: Mapping[str, Vec2]
     crank: Crank
     groups: tuple[Group, ...]
-    loads: Mapping[str, Acting]
+    loads: Mapping[str, Any]
+    """See `chainunit.groups.loads.Acting`."""
 
     @property
     def bars(self) -> Iterator[Bar]:

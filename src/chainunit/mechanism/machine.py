@@ -13,20 +13,22 @@ are new.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 from ..engines import Dual, dual, slope
 from ..groups.body import UNLOADED, Bar, Body, Load, reflected
+from ..groups.group import Group, SolvedGroup
 from ..groups.loads import Acting, Effect, Joint, Wrench
 from ..planar import Link, Motion, Vec2, growth, lifted
-from .linkage import Linkage, Solved
+from .linkage import Linkage
 
 
 class _Place(NamedTuple):
     """A group at one position: names of its links, and each joint with the link before the group that it loads."""
 
-    group: Any
-    solved: Solved
+    group: Group
+    solved: SolvedGroup
     links: tuple[str, ...]
     joints: tuple[tuple[Joint, str | None], ...]
 
@@ -60,12 +62,12 @@ class Mechanism:
         self._solved: list[_Place] = []
         self._carriers: dict[str, str] = {}
 
-    def _add(self, group: Any, solved: Solved) -> tuple[Bar, ...]:
-        bars: tuple[Bar, ...] = group.bars
+    def _add(self, group: Group, solved: SolvedGroup) -> tuple[Bar, ...]:
+        bars = group.bars
         links, carriers = self.links, self._carriers
         for bar, link in zip(bars, solved.links, strict=True):
             links[bar.name] = link
-        inner: dict[str, str] = group.pins
+        inner = group.pins
         self.pins.update(zip(inner, solved.pins, strict=True))
         carriers |= inner
         joints = []
@@ -130,19 +132,21 @@ class Mechanism:
         return loads
 
 
+def _pins(xp: Any, linkage: Linkage, derived: Sequence[Any], q: float) -> dict[str, Motion]:
+    return Mechanism(xp, linkage, q, derived).pins
+
+
 def derived_numbers(xp: Any, linkage: Linkage) -> list[Any]:
     """What the groups derive from the lengths, once before a run."""
     numbers: list[Any] = []
     for k, group in enumerate(linkage.groups):
-        if group.derived:
-            before, known = linkage.before(k), list(numbers)
-            numbers += group.derive(xp, lambda q, b=before, n=known: Mechanism(xp, b, q, n).pins)
+        numbers += group.derive(xp, partial(_pins, xp, linkage.before(k), tuple(numbers)))
     return numbers
 
 
 class Steadiness:
-    """A mechanism at constant crank speed `w`: the `effects` of the loads on links by name, what the joints carry, the
-    `torque` at the crank from these forces [N m], and the `losses` that the reactions set."""
+    """A mechanism at constant crank speed `w`: the `effects` of the loads on links by name, the `reactions` in the
+    joints [N], the `torque` at the crank from these forces [N m], and the `losses` that the reactions set."""
 
     __slots__ = ("effects", "losses", "reactions", "torque")
 
@@ -164,7 +168,9 @@ def _effects(
     """Effects of the loads that act on links; or, with the reactions, of those that follow from them."""
     late = reactions is not None
     return {
-        name: load.effect(xp, m, w, reactions or {}) for name, load in loads.items() if load.by_reactions == late
+        name: load.effect(xp, m, w, reactions or {})
+        for name, load in loads.items()
+        if load.by_reactions == late
     }
 
 

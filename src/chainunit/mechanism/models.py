@@ -1,5 +1,5 @@
-"""The two models of a linkage: the inverse one takes the motion of the motor shaft and gives torque and load port, the
-direct one takes the torque and gives the motion.
+"""The two models of a linkage: the inverse one takes the motion of the motor shaft and gives torque and load port,
+the direct one takes the torque and gives the motion.
 
 q is the crank angle, `w`, `a` its derivatives; at the shaft `phi w a tau J` are the motor's, ``p.ratio`` turns for
 one of the crank.
@@ -18,7 +18,7 @@ from .linkage import Linkage
 from .machine import MachineState, Mechanism, derived_numbers
 
 Probes = Callable[[Any, Any, Any, MachineState, Any], dict[str, Any]]
-"""Called with engine, parameters, inputs, state and crank acceleration; gives the outputs that are the machine's own."""
+"""Called with engine, parameters, inputs, state and crank acceleration; gives the machine's own outputs."""
 
 
 @declaration
