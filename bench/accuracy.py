@@ -19,9 +19,17 @@ from rich.table import Table
 from chainunit import ChainUnit, SideLoads
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.speed_control import tune
-from chainunit.fmu.backends import export
 from chainunit.machines.chain_unit import ChamberForces
-from chainunit.system import Bond, CoSimulation, System, energy_residual, monolithic, port_connections
+from chainunit.system import (
+    CoSimulation,
+    ModelComponent,
+    System,
+    certify,
+    export,
+    held,
+    monolithic,
+    shaft_joints,
+)
 
 SPEED = 6.0  # rad/s of the crank
 STEPS = (0.004, 0.002, 0.001)
@@ -50,9 +58,10 @@ def motors():
 def main() -> None:
     console = Console(width=110)
     with tempfile.TemporaryDirectory() as folder:
-        files = {"machine": Path(folder) / "ChamberForces.fmu", "motor": Path(folder) / "DcMotor.fmu"}
-        for model, file in zip((ChamberForces, DcMotor), files.values(), strict=True):
-            console.print(f"{model.name}: {export(model, file)}")
+        models = {"machine": ChamberForces, "motor": DcMotor}
+        components = {name: ModelComponent(model, model.Parameters()) for name, model in models.items()}
+        packaged, made = export(System(components, shaft_joints("motor", "machine")), Path(folder))
+        console.print(*(f"{name}: {how}" for name, how in made.items()), sep="\n")
         for force in (0.0, 100.0):
             for title, (ratio, motor) in motors().items():
                 table = Table(title=f"{title}; processing force {force:g} N a side", title_justify="left")
@@ -71,20 +80,16 @@ def main() -> None:
                 signals = {"motor.w_ref": w} | {
                     f"machine.{side}.processing_force": force for side in ("left", "right")
                 }
-                models = {
-                    "machine": (ChamberForces, ChainUnit(ratio=ratio).p),
-                    "motor": (DcMotor, DcMotor.parameter_layout.from_names(own)),
-                }
-                times = np.arange(0.0, STOP + 1e-9, STEPS[0])
-                exact = monolithic(models, port_connections("machine", "motor", slopes=False), signals, times)
                 start = {"machine.ratio": ratio} | {f"motor.{n}": v for n, v in own.items()}
+                linear = packaged.with_values(start)
+                exact = monolithic(linear, signals, np.arange(0.0, STOP + 1e-9, STEPS[0]))
                 for slopes in (True, False):
                     before = None
                     for step in STEPS:
-                        system = System(files, port_connections("machine", "motor", slopes=slopes), start)
+                        system = linear if slopes else held(linear)
                         with CoSimulation(system, signals) as simulation:
                             run = simulation.run(STOP, step)
-                        _, energy = energy_residual(run, Bond("motor", "machine"))
+                        _, energy = certify(run, system)["machine"]
                         every = round(STEPS[0] / step)
                         errors = [
                             float(np.max(np.abs(run[n].values[::every] - exact[n].values)))

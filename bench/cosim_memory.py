@@ -32,7 +32,7 @@ WAYS = {
 def one(way: str, folder: Path, seconds: float) -> None:
     config = load()
     drive = choose(config, folder, lambda *_: None).drive
-    files = {name: folder / f"{model.name}.fmu" for name, (model, _) in drive.models().items()}
+    files = {name: folder / f"{part.model.name}.fmu" for name, part in drive.graph.components.items()}
     options = dict(WAYS[way])
     if "file" in options:
         options["file"] = folder / options["file"]

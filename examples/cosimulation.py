@@ -9,21 +9,17 @@ import tempfile
 from pathlib import Path
 
 from chainunit import ChainUnit
-from chainunit.fmu.export import export
 from chainunit.models import MODELS
-from chainunit.system import Bond, CoSimulation, Profile, System, energy_residual, port_connections
+from chainunit.system import CoSimulation, ModelComponent, Profile, System, certify, export, shaft_joints
 
 RATIO = 50.0
 folder = tempfile.TemporaryDirectory()
-files = {
-    "machine": export(MODELS["ChamberForces"], Path(folder.name) / "ChamberForces.fmu"),
-    "motor": export(MODELS["DcMotor"], Path(folder.name) / "DcMotor.fmu"),
+ChamberForces, DcMotor = MODELS["ChamberForces"], MODELS["DcMotor"]
+components = {
+    "machine": ModelComponent(ChamberForces, ChamberForces.Parameters(ratio=RATIO)),
+    "motor": ModelComponent(DcMotor, DcMotor.Parameters(w_start=150.0)),
 }
-system = System(
-    files,
-    port_connections("machine", "motor"),
-    start={"machine.ratio": RATIO, "motor.w_start": 150.0},
-)
+system, _ = export(System(components, shaft_joints("motor", "machine")), Path(folder.name), backend="python")
 signals = {
     "motor.w_ref": 150.0,
     "machine.left.material_mass": Profile(30.0, ((0.5, 0.3, 60.0),)),
@@ -45,11 +41,11 @@ print(
 # %%
 machine = ChainUnit(ratio=RATIO)
 feed = {
-    f"{side}.material_mass": lambda run, side=side: machine.energy_per_kg(
+    f"machine.{side}.material_mass": lambda run, side=side: machine.energy_per_kg(
         side, run["machine.phi0"].values, run["machine.w0"].values
     )
     for side in ("left", "right")
 }
-_, share = energy_residual(run, Bond("motor", "machine", feed))
+_, share = certify(run, system, feed)["machine"]
 print(f"energy residual {share:.1e} of the energy moved")
 folder.cleanup()

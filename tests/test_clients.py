@@ -18,12 +18,13 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
+from systems import pair as pair_of
 
 from chainunit.engines import MATH, numpy_
 from chainunit.fmu.native.export import export
 from chainunit.fmu.native.platforms import compiler
 from chainunit.models import MODELS
-from chainunit.system import CoSimulation, System, port_connections
+from chainunit.system import CoSimulation
 from chainunit.system.instance import Fmu, Instance
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
@@ -44,7 +45,7 @@ ALONE = {
 STEP, STEPS = 2.0**-10, 256
 PARAMETERS = {"motor.w_start": 100.0, "machine.ratio": 20.0}
 INPUTS = {"motor.w_ref": 150.0}
-CONNECTIONS = port_connections("machine", "motor")
+CONNECTIONS = pair_of("ChamberForces", "DcMotor").connections
 FROM_STATES = (  # what follows from the motor's states alone
     "motor.phi motor.w motor.armature.i motor.load_energy machine.tau_bias machine.J machine.kinetic_energy".split()
 )
@@ -92,9 +93,9 @@ def pair(kind, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def master(pair, outputs):
+def master(kind, pair, outputs):
     """The pair under this package's master, every row consistent."""
-    with CoSimulation(System(pair[2], CONNECTIONS, PARAMETERS), INPUTS) as simulation:
+    with CoSimulation(pair_of(kind, "DcMotor", pair[2], PARAMETERS), INPUTS) as simulation:
         run = simulation.run(STEPS * STEP, STEP)
     run = {name: run[name].values for name in outputs}
     assert np.ptp(run["motor.w"]) > 40.0 and np.ptp(run["machine.tau"]) > 1.0

@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from systems import component
 
 from chainunit import InputError, engines
 from chainunit.drives import cardan
@@ -15,15 +16,9 @@ from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.driveline import CardanDriveline
 from chainunit.errors import GeometryError
 from chainunit.machines.chain_unit import ChamberForces
-from chainunit.system import (
-    Bond,
-    CoSimulation,
-    Profile,
-    System,
-    energy_residual,
-    monolithic,
-    port_connections,
-)
+from chainunit.ports import LoadPort
+from chainunit.quantities import Layout
+from chainunit.system import CoSimulation, Profile, System, certify, export, monolithic, rigid, shaft_joints
 
 LAYOUT = CardanDriveline.state_layout
 BENT = {"alpha1": 0.5, "alpha2": 0.2, "delta_yokes": 0.7, "beta_planes": 0.2, "gamma1": 0.3}
@@ -160,34 +155,24 @@ def test_damping_is_that_of_a_cardan_without_mass():
     assert 1e-4 < other < 1e-2 and 3.0 < other / half < 5.0, differences
 
 
+def driven(**line):
+    """Motor, a line on its fast shaft, and the machine behind a gear."""
+    components = {
+        "machine": component(ChamberForces, values={"ratio": 50.0}),
+        "driveline": component(CardanDriveline, values=line),
+        "motor": component(DcMotor),
+    }
+    joints = [
+        *shaft_joints("motor", "driveline"),
+        *shaft_joints("driveline", "machine", flange="driven", load="machine"),
+    ]
+    return System(components, joints)
+
+
 @pytest.fixture(scope="module")
 def system(tmp_path_factory):
-    """Motor, a line on its fast shaft, and the machine behind a gear; as FMUs, models and connections."""
-    from chainunit.fmu.native.export import export
-
-    machine = ChamberForces.parameter_layout.from_names({"ratio": 50.0})
-    line = parameters(c2=60.0, c3=60.0, d2=0.02, d3=0.02, J4=0.002, **BENT)
-    motor = DcMotor.parameter_layout.from_names({})
-    models = {
-        "machine": (ChamberForces, machine),
-        "driveline": (CardanDriveline, line),
-        "motor": (DcMotor, motor),
-    }
-    folder = tmp_path_factory.mktemp("system")
-    files = {name: export(model, folder / f"{name}.fmu") for name, (model, _) in models.items()}
-    start = {
-        f"{name}.{variable}": value
-        for name, (model, p) in models.items()
-        for variable, value in model.parameter_layout.named(p).items()
-    }
-    return models, files, start
-
-
-def connections(slopes=True):
-    return [
-        *port_connections("machine", "driveline", slopes=slopes, shaft="driven."),
-        *port_connections("driveline", "motor", slopes=slopes),
-    ]
+    line = {"c2": 60.0, "c3": 60.0, "d2": 0.02, "d3": 0.02, "J4": 0.002, **BENT}
+    return export(driven(**line), tmp_path_factory.mktemp("system"), "native")[0]
 
 
 RISE = Profile(0.0, ((0.0, 0.4, 150.0),))
@@ -196,12 +181,10 @@ SIGNALS = {"motor.w_ref": RISE}
 
 def test_the_coupling_converges_to_the_monolithic_solution(system):
     """Of second order, through both ports, with the shafts turning and bent joints at 150 rad/s."""
-    models, files, start = system
-    times = np.linspace(0.0, 0.8, 401)
-    exact = monolithic(models, connections(False), SIGNALS, times, rtol=1e-9, corners=RISE.corners)
+    exact = monolithic(system, SIGNALS, np.linspace(0.0, 0.8, 401), rtol=1e-9)
     errors = []
     for step in (1e-3, 5e-4, 2.5e-4):
-        with CoSimulation(System(files, connections(), start), SIGNALS) as simulation:
+        with CoSimulation(system, SIGNALS) as simulation:
             run = simulation.run(0.8, step)
         every = round(2e-3 / step)
         errors.append(
@@ -225,44 +208,29 @@ def test_the_coupling_converges_to_the_monolithic_solution(system):
 
 
 def test_energy_of_both_bonds(system):
-    _, files, start = system
-    with CoSimulation(System(files, connections(), start), SIGNALS) as simulation:
+    with CoSimulation(system, SIGNALS) as simulation:
         run = simulation.run(0.8, 2.5e-4)
-    for bond in (Bond("motor", "driveline"), Bond("driveline", "machine")):
-        _, share = energy_residual(run, bond)
-        assert share < 2e-4, bond
+    assert [(b.driver, b.machine) for b in system.bonds] == [("motor", "driveline"), ("driveline", "machine")]
+    for driven, (_, share) in certify(run, system).items():
+        assert share < 2e-4, driven
     assert float(np.max(np.abs(run["driveline.load_energy"]))) > 10.0
 
 
-def test_a_stiff_line_is_a_rigid_shaft(system):
+def test_a_stiff_line_is_a_rigid_shaft():
     """With straight joints and a stiff line the machine's torque tends to that without a line, J4 beside."""
-    models, _, _ = system
-    machine, motor = models["machine"], models["motor"]
-    line = parameters(alpha1=0.0, alpha2=0.0, c2=4e4, c3=4e4, d2=2.0, d3=2.0, J4=1e-4)
+    elastic = driven(alpha1=0.0, alpha2=0.0, c2=4e4, c3=4e4, d2=2.0, d3=2.0, J4=1e-4)
+    straight = rigid(elastic, "driveline")
+    assert straight.connections == [
+        *((f"motor.{x}", f"machine.{x}") for x in ("phi", "w", "a")),
+        *((f"machine.{x}", f"motor.load.{x}") for x in Layout(LoadPort).names),
+    ]
+    assert straight.values["motor.rotor.J"] == elastic.values["motor.rotor.J"] + 1e-4
+    assert straight.values["machine.ratio"] == 50.0
     times = np.linspace(0.0, 0.8, 401)
-    signals = {"motor.w_ref": Profile(0.0, ((0.0, 0.4, 150.0),))}
-    elastic = monolithic(
-        {"machine": machine, "driveline": (CardanDriveline, line), "motor": motor},
-        connections(False),
-        signals,
-        times,
-        rtol=1e-8,
-        corners=[0.4],
-    )
-    heavier = dataclasses.replace(
-        motor[1], rotor=dataclasses.replace(motor[1].rotor, J=motor[1].rotor.J + 1e-4)
-    )
-    rigid = monolithic(
-        {"machine": machine, "motor": (DcMotor, heavier)},
-        port_connections("machine", "motor", slopes=False),
-        signals,
-        times,
-        rtol=1e-8,
-        corners=[0.4],
-    )
+    one, other = (monolithic(each, SIGNALS, times, rtol=1e-8) for each in (elastic, straight))
     for name in ("machine.tau", "machine.w0"):
-        difference = np.max(np.abs(elastic[name].values - rigid[name].values))
-        assert difference < 2e-3 * np.max(np.abs(rigid[name].values)), name
+        difference = np.max(np.abs(one[name].values - other[name].values))
+        assert difference < 2e-3 * np.max(np.abs(other[name].values)), name
 
 
 def test_both_backends_agree_also_in_a_turning_step(tmp_path):
@@ -276,7 +244,7 @@ def test_both_backends_agree_also_in_a_turning_step(tmp_path):
     for name, make in (("n", native), ("p", python)):
         file = make(CardanDriveline, tmp_path / f"{name}.fmu", start)
         # the signals are set once: between, phi and w run by themselves
-        with CoSimulation(System({"line": file}, [], {}), {}) as simulation:
+        with CoSimulation(System({"line": component(CardanDriveline, file, start)})) as simulation:
             simulation.signals = signals
             simulation.run(0.001, 0.001)
             simulation.signals = {}

@@ -16,6 +16,7 @@ from fmpy.fmi3 import FMU3Model
 from fmpy.sundials import CVodeSolver
 from machines import random_loads, random_machine
 from scipy.integrate import cumulative_simpson, solve_ivp
+from systems import pair
 from test_chain import DATA, M
 
 from chainunit import ChainUnit, GeometryError, InputError, RunError, config
@@ -39,7 +40,7 @@ from chainunit.machines.flexible import OrganLaw, flexible
 from chainunit.mechanism.machine import MachineState, Mechanism
 from chainunit.studies.chain import numbers_at, study_chain
 from chainunit.studies.drive import Drive
-from chainunit.system import CoSimulation, System, monolithic, port_connections
+from chainunit.system import CoSimulation, held, monolithic
 from chainunit.system.instance import Fmu, Instance
 
 FREE = OrganLaw(eta=0.0, end_damping=0.0, fold_stiffness=0.0)
@@ -470,17 +471,15 @@ def test_coupling_is_of_second_order_with_slopes_of_first_without(files, tmp_pat
     that has yet to follow."""
     ratio, stop, model = 50.0, 0.2, flexible(3, 1)
     speed = {"motor.w_ref": ratio * 6.0}
-    motor = DcMotor.parameter_layout.from_names({"w_start": ratio * 6.0})
-    models = {"machine": (model, model.Parameters(ratio=ratio)), "motor": (DcMotor, motor)}
-    times = np.arange(0.0, stop + 1e-9, 0.004)
-    exact = monolithic(models, port_connections("machine", "motor", slopes=False), speed, times, rtol=1e-9)
+    values = {"machine.ratio": ratio, "motor.w_start": ratio * 6.0, "machine.tolerance": 1e-9}
     fmus = {"machine": files(3, 1).archive, "motor": export_python(DcMotor, tmp_path / "motor.fmu")}
-    start = {"machine.ratio": ratio, "motor.w_start": ratio * 6.0, "machine.tolerance": 1e-9}
+    linear = pair(model, "DcMotor", fmus, values)
+    times = np.arange(0.0, stop + 1e-9, 0.004)
+    exact = monolithic(linear, speed, times, rtol=1e-9)
     found = {}
     for slopes in (True, False):
         for step in (0.004, 0.002, 0.001):
-            system = System(fmus, port_connections("machine", "motor", slopes=slopes), start)
-            with CoSimulation(system, speed) as simulation:
+            with CoSimulation(linear if slopes else held(linear), speed) as simulation:
                 run = simulation.run(stop, step)
             for name in ("machine.tau", "machine.left.tangential_load", "motor.w"):
                 wanted = exact[name].values

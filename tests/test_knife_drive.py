@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from systems import component
 
 from chainunit import GeometryError, InputError
 from chainunit.engines import MATH, Dual, dual, numpy_, slope
@@ -329,11 +330,9 @@ def test_the_native_fmu_refuses_what_python_refuses(tmp_path):
         RunError,
         match=r"misfit of a leg over the turn of the crank, in parts of its length = .*the triad does not close",
     ):
-        CoSimulation(System({"k": file}, [], {"k.knife.e.x": 0.1}), {})
+        CoSimulation(System({"k": component(KnifeDrive, file, {"knife.e.x": 0.1})}))
     start = {"bc": 0.6, "assembly.x": 1.02}
-    with CoSimulation(
-        System({"k": file}, [], {f"k.{n}": v for n, v in start.items()}), {"k.phi": 0.7, "k.w": 2.0}
-    ) as one:
+    with CoSimulation(System({"k": component(KnifeDrive, file, start)}), {"k.phi": 0.7, "k.w": 2.0}) as one:
         run = one.run(0.01, 0.01)
     p = KnifeDrive.prepared(MATH, KnifeDrive.parameter_layout.from_names(start))
     for name, x in evaluate(p, {"phi": 0.7, "w": 2.0}).items():

@@ -20,7 +20,7 @@ from chainunit.quantities import Layout
 from chainunit.report import knife as page
 from chainunit.studies import knife
 from chainunit.studies.knife import Answers, KnifeStudy, example, load, parse, run_knife, statics
-from chainunit.system import CoSimulation, energy_residual, monolithic, port_connections
+from chainunit.system import CoSimulation, energy_residual, monolithic
 
 
 def bare(text=""):
@@ -32,9 +32,9 @@ def bare(text=""):
 def files(tmp_path_factory):
     folder = tmp_path_factory.mktemp("fmus")
     made = {}
-    for name, (model, _) in knife.models(bare(), 0.0).items():
-        made[name] = folder / f"{model.name}.fmu"
-        export(model, made[name])
+    for name, part in knife.graph(bare(), 0.0).components.items():
+        made[name] = folder / f"{part.model.name}.fmu"
+        export(part.model, made[name])
     return made
 
 
@@ -42,9 +42,14 @@ def files(tmp_path_factory):
 def exported(files, monkeypatch):
     """The study takes these FMUs: every run sets all parameters itself."""
 
-    def copied(model, file, start=None, *, backend=None):
-        file.write_bytes(next(f for f in files.values() if f.name == file.name).read_bytes())
-        return "as before"
+    def copied(graph, folder, backend=None):
+        folder.mkdir(parents=True, exist_ok=True)
+        components = {}
+        for name, part in graph.components.items():
+            file = folder / files[name].name
+            file.write_bytes(files[name].read_bytes())
+            components[name] = dataclasses.replace(part, file=file)
+        return dataclasses.replace(graph, components=components), dict.fromkeys(components, "as before")
 
     monkeypatch.setattr(knife, "export", copied)
 
@@ -175,21 +180,16 @@ def test_the_coupling_converges_to_the_monolithic_solution(files):
     p = study.config.machine
     start = {"w_start": 150.0, "phi_start": (study.statics.top + 0.6) * p.ratio}
     signals, stop = {knife.CUT: 2e4}, 0.4
-    reference = monolithic(
-        knife.models(study, 0.15, **start),
-        port_connections("machine", "motor", slopes=False),
-        signals,
-        np.linspace(0.0, stop, 41),
-        rtol=1e-8,
-    )
+    graph = knife.graph(study, 0.15, files, **start)
+    reference = monolithic(graph, signals, np.linspace(0.0, stop, 41), rtol=1e-8)
     errors = []
     for step in (2e-3, 1e-3):
-        with CoSimulation(knife.system(study, files, 0.15, **start), signals) as simulation:
+        with CoSimulation(graph, signals) as simulation:
             run = simulation.run(stop, step)
         every = round(0.01 / step)
         off = run["motor.w"].values[::every] - reference["motor.w"].values
         errors.append(np.max(np.abs(off)))
-        assert energy_residual(run, knife._BOND)[1] < 1e-3
+        assert energy_residual(run, *graph.bonds)[1] < 1e-3
     assert errors[1] < 0.02 and errors[0] / errors[1] > 3.0
 
 

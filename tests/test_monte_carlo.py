@@ -106,7 +106,7 @@ def test_a_row_is_what_its_number_says(killed):
     file, before, _ = killed
     config = parse(STUDY.format(runs=10))
     drive = Drive(DcMotor, config.motor, config.machine)
-    files = {name: file.parent / f"{model.name}.fmu" for name, (model, _) in drive.models().items()}
+    files = {name: file.parent / f"{part.model.name}.fmu" for name, part in drive.graph.components.items()}
     task = monte_carlo.Task(config, drive, files, 1.0)
     signals = {**drive.loads(config.feed), **drive.reference(config.run.crank_speed, config.run.ramp)}
     with CoSimulation(drive.system(files), signals) as simulation:
@@ -213,7 +213,9 @@ def test_lumps_come_anywhere_in_a_turn(killed):
 def test_what_the_numbers_depend_on_is_in_the_name(killed):
     config = parse(STUDY.format(runs=10))
     drive = Drive(DcMotor, config.motor, config.machine)
-    files = {name: killed[0].parent / f"{model.name}.fmu" for name, (model, _) in drive.models().items()}
+    files = {
+        name: killed[0].parent / f"{part.model.name}.fmu" for name, part in drive.graph.components.items()
+    }
     digest = monte_carlo.Task(config, drive, files, 1.0).digest()
     assert killed[0].name == f"monte_carlo_{digest}.jsonl"
     other = dataclasses.replace(drive, feed_forward=True)
@@ -225,7 +227,9 @@ def test_what_the_numbers_depend_on_is_in_the_name(killed):
 def test_a_run_that_fails_is_a_row(killed, monkeypatch):
     config = parse(STUDY.format(runs=10))
     drive = Drive(DcMotor, config.motor, config.machine)
-    files = {name: killed[0].parent / f"{model.name}.fmu" for name, (model, _) in drive.models().items()}
+    files = {
+        name: killed[0].parent / f"{part.model.name}.fmu" for name, part in drive.graph.components.items()
+    }
     task = monte_carlo.Task(config, drive, files, 1.0)
     good = monte_carlo.one
 
@@ -296,7 +300,7 @@ def test_what_is_left_out_is_computed_anew_and_told(killed, tmp_path):
     file, before, _ = killed
     config = parse(STUDY.format(runs=5))
     drive = Drive(DcMotor, config.motor, config.machine)
-    files = {name: file.parent / f"{model.name}.fmu" for name, (model, _) in drive.models().items()}
+    files = {name: file.parent / f"{part.model.name}.fmu" for name, part in drive.graph.components.items()}
     task = monte_carlo.Task(config, drive, files, 1.0)
     lines = [json.dumps(before[k]) for k in (0, 1, 2)]
     (tmp_path / file.name).write_text("\n".join([*lines, lines[0].replace(":", ";"), "5"]) + "\n")

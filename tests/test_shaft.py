@@ -295,5 +295,5 @@ def test_export_of_the_studys_line(tmp_path):
     said = export_study(loaded, tmp_path / "x.ssp", backend="python")
     assert "driveline (CardanDriveline)" in said
     drive = choose(loaded, tmp_path, lambda *_: None).drive
-    assert ("driveline.driven.w", "machine.w") in drive.connections()
-    assert ("driveline.tau_bias", "motor.load.tau_bias") in drive.connections()
+    assert ("driveline.driven.w", "machine.w") in drive.graph.connections
+    assert ("driveline.tau_bias", "motor.load.tau_bias") in drive.graph.connections

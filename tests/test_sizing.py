@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from systems import component
 from typer.testing import CliRunner
 
 from chainunit.config import parse
@@ -61,14 +62,14 @@ def test_a_flywheel_of_that_size_keeps_the_speed(dc):
     J = flywheel(mean + swing * np.sin(ANGLE), w, delta)
     k, limit = 1.27, (mean + 0.001 * w) / 1.27
     start = {
-        "motor.w_start": w,
-        "motor.rotor.J": J,
-        "motor.limit.i": limit,  # the current limit makes the torque constant
-        "motor.armature.alpha": 0.0,
+        "w_start": w,
+        "rotor.J": J,
+        "limit.i": limit,  # the current limit makes the torque constant
+        "armature.alpha": 0.0,
     }
     assert k == DcMotor.Parameters().armature.k
     load = {"motor.w_ref": 200.0, "motor.load.tau_bias": lambda t: mean + swing * math.cos(w * t)}
-    with CoSimulation(System({"motor": dc}, [], start), load) as simulation:
+    with CoSimulation(System({"motor": component(DcMotor, dc, start)}), load) as simulation:
         run = simulation.run(2.0, 1e-4)
     # the last turn: the drag brings the mean back slowly after the current has risen
     speed = run["motor.w"].values[run["time"].values > 2.0 - 2.0 * math.pi / w]
@@ -78,9 +79,9 @@ def test_a_flywheel_of_that_size_keeps_the_speed(dc):
 def test_start_up_time_by_hand(dc):
     """A constant torque against a constant load and inertia: t = J w/(M - M_L)."""
     J, load, w, k, limit = 0.05, 1.5, 120.0, 1.27, 4.4
-    start = {"motor.rotor.d": 0.0, "motor.limit.v": 1000.0, "motor.speed_control.ki": 0.0}
+    start = {"rotor.d": 0.0, "limit.v": 1000.0, "speed_control.ki": 0.0}
     signals = {"motor.w_ref": w / 0.9, "motor.load.tau_bias": load, "motor.load.J": J}
-    with CoSimulation(System({"motor": dc}, [], start), signals) as simulation:
+    with CoSimulation(System({"motor": component(DcMotor, dc, start)}), signals) as simulation:
         run = simulation.run(3.0, 1e-3)
     inertia = J + DcMotor.Parameters().rotor.J
     reached = float(np.interp(0.5 * w, run["motor.w"].values[:800], run["time"].values[:800]))

@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from command import chainunit
 from fmpy.ssp.ssd import read_ssd, read_ssv
+from systems import component, pair
 
 from chainunit import InputError, RunError, cli, config
 from chainunit.drives.catalogue import catalogue
@@ -26,7 +27,7 @@ from chainunit.models import MODELS
 from chainunit.studies import sizing
 from chainunit.studies.choice import choose
 from chainunit.studies.package import export_study, start_of
-from chainunit.system import CoSimulation, System, port_connections, ssp
+from chainunit.system import CoSimulation, System, fmu_component, shaft_joints, ssp
 
 MINE = """
 title = "Mine, with \\u0001 and <marks>"
@@ -109,7 +110,7 @@ def connections(file):
 
 def test_connectors_are_the_fmus_variables(package, tmp_path):
     """Names, kinds and units, unit definitions included, are those of the FMU's own description."""
-    assert connections(package) == port_connections("machine", "motor")
+    assert connections(package) == pair("ChamberForces", "DcMotor").connections
     with zipfile.ZipFile(package) as archive:
         archive.extractall(tmp_path)
     root = ElementTree.parse(tmp_path / "SystemStructure.ssd").getroot()
@@ -120,11 +121,11 @@ def test_connectors_are_the_fmus_variables(package, tmp_path):
     units = {
         u.get("name"): u.find("ssc:BaseUnit", ns).attrib for u in root.iterfind("ssd:Units/ssc:Unit", ns)
     }
-    for component in root.iterfind("ssd:System/ssd:Elements/ssd:Component", ns):
-        described = fmpy.read_model_description(str(tmp_path / component.get("source")))
+    for node in root.iterfind("ssd:System/ssd:Elements/ssd:Component", ns):
+        described = fmpy.read_model_description(str(tmp_path / node.get("source")))
         connectors = {
             c.get("name"): (c.get("kind"), c.find("ssc:Real", ns).get("unit"))
-            for c in component.iterfind("ssd:Connectors/ssd:Connector", ns)
+            for c in node.iterfind("ssd:Connectors/ssd:Connector", ns)
         }
         causal = {v.name: (v.causality, v.unit) for v in described.modelVariables if v.causality != "local"}
         assert connectors == causal
@@ -224,8 +225,8 @@ def own(file, folder, names, stop, step):
         for e in system.elements
         for p in e.parameterBindings[0].parameterValues[0].parameters
     }
-    files = {e.name: folder / e.source for e in system.elements}
-    with CoSimulation(System(files, connections(file), start)) as simulation:
+    components = {e.name: fmu_component(folder / e.source) for e in system.elements}
+    with CoSimulation(System(components, wires=connections(file), start=start)) as simulation:
         out = simulation.run(stop, step)
     return np.stack([out[name].values[1:] for name in names], axis=1)
 
@@ -274,11 +275,15 @@ def test_runs_as_it_is(tool, package, tmp_path):
 
 
 # a second motor that follows the first: two instances of one model, each with its own start values
-ANOTHER = ssp.ModelSystem(
-    "Another",
-    {"machine": MODELS["ChamberForces"], "motor": MODELS["DcMotor"], "second": MODELS["DcMotor"]},
-    [*port_connections("machine", "motor"), ("motor.w", "second.w_ref")],
-    {"machine.ratio": 30.0, "motor.w_ref": 90.0, "second.rotor.J": 0.02, "second.w_start": 10.0},
+ANOTHER = System(
+    {
+        "machine": component("ChamberForces", values={"ratio": 30.0}),
+        "motor": component("DcMotor"),
+        "second": component("DcMotor", values={"rotor.J": 0.02, "w_start": 10.0}),
+    },
+    shaft_joints("motor", "machine"),
+    [("motor.w", "second.w_ref")],
+    {"motor.w_ref": 90.0},
 )
 
 
@@ -350,7 +355,7 @@ def test_the_motor_that_sizing_chooses_is_packaged(tmp_path):
 
 
 def test_two_alike_share_their_fmu(tmp_path):
-    system = ssp.ModelSystem("Two", {"a": MODELS["DcMotor"], "b": MODELS["DcMotor"]}, [])
+    system = System({"a": component("DcMotor"), "b": component("DcMotor")})
     said = ssp.export(system, tmp_path / "two.ssp", backend="python")
     assert said.startswith(
         "SSP 1.0, a (DcMotor), b (DcMotor), 0 connections; FMI 2.0 Co-Simulation, by pythonfmu;"
@@ -408,9 +413,9 @@ def test_default_name_and_what_the_command_refuses(tmp_path, monkeypatch, capsys
 @pytest.mark.parametrize(
     "models, connected, start, said",
     [
-        ({"a.b": "DcMotor"}, [], {}, r"'a\.b': an instance's name must be of letters"),
+        ({"a.b": "DcMotor"}, [], {}, r'"a\.b": a component.s name must be of letters'),
         ({"m": "DcMotor"}, [], {"m.w": 1.0}, r"m\.w: no such parameter or input"),
-        ({"m": "DcMotor"}, [], {"n.w_ref": 1.0}, r"n\.w_ref: no such parameter or input"),
+        ({"m": "DcMotor"}, [], {"n.w_ref": 1.0}, r'n\.w_ref: there is no component "n"; there are m'),
         ({"m": "DcMotor"}, [], {"m.rotor.J": -1.0}, r"m: rotor\.J = -1 kg\.m2: must be > 0"),
         ({"c": "ChamberForces"}, [], {"c.r": 0.9}, r"c: r = 0\.9 m: the crank cannot turn"),
         ({"m": "DcMotor"}, [], {"m.w_ref": float("nan")}, r"m: w_ref = nan rad/s: must be a finite number"),
@@ -426,9 +431,13 @@ def test_default_name_and_what_the_command_refuses(tmp_path, monkeypatch, capsys
     ],
 )
 def test_systems_that_contradict_themselves(models, connected, start, said, tmp_path):
-    system = ssp.ModelSystem("X", {n: MODELS[model] for n, model in models.items()}, connected, start)
     with pytest.raises(InputError, match=said):
-        ssp.export(system, tmp_path / "x.ssp")
+        components = {name: component(model) for name, model in models.items()}
+        ssp.export(System(components, wires=connected, start=start), tmp_path / "x.ssp")
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_experiment_goes_forward(tmp_path):
     with pytest.raises(InputError, match="must go forward"):
-        ssp.export(system, tmp_path / "x.ssp", step=0.0)
+        ssp.export(System({"m": component("DcMotor")}), tmp_path / "x.ssp", step=0.0)
     assert not list(tmp_path.iterdir())

@@ -86,22 +86,26 @@ def carried(load: LoadPort, phi: Any, w: Any, J: Any, tau: Any) -> tuple[Any, An
 
 OWN = "org.chainunit"
 """Before the names of kinds of terminals that are ours."""
+FLANGE, LOAD = f"{OWN}.flange", f"{OWN}.load"
+"""Kinds of the terminals of a shaft and of a load port."""
+
+
+def flange(flow: str, prefix: str = "", name: str = "flange") -> Terminal:
+    """The terminal, called `name`, of a shaft whose torque flows into the model or out of it ("inflow", "outflow")
+    and whose variables carry `prefix`."""
+    members = {member: prefix + member for member in ("phi", "w", "a", "tau")}
+    return Terminal(name, FLANGE, "the shaft and its torque", members, {"tau": flow})
 
 
 def flanges(flow: str) -> tuple[Terminal, Terminal]:
-    """The terminals of a shaft whose torque flows into the model or out of it ("inflow", "outflow"): our own, and the
-    one that tools with Modelica's library know."""
-    words, flows = "the shaft and its torque", {"tau": flow}
+    """The terminals of the shaft: our own, and the one that tools with Modelica's library know."""
+    own = flange(flow)
     modelica = "Modelica.Mechanics.Rotational.Interfaces.Flange_a"
-    return (
-        Terminal("flange", f"{OWN}.flange", words, {name: name for name in ("phi", "w", "a", "tau")}, flows),
-        Terminal(
-            "flange_a", modelica, f"{words}, as Modelica's", {name: name for name in ("phi", "tau")}, flows
-        ),
-    )
+    members = {name: name for name in ("phi", "tau")}
+    return own, Terminal("flange_a", modelica, f"{own.description}, as Modelica's", members, own.flows)
 
 
 def load_terminal(prefix: str = "", name: str = "load") -> Terminal:
     """The terminal, called `name`, of a load port whose variables carry `prefix`."""
     members = {member: prefix + member for member in Layout(LoadPort).names}
-    return Terminal(name, f"{OWN}.load", "the load port: a load as the shaft sees it", members)
+    return Terminal(name, LOAD, "the load port: a load as the shaft sees it", members)

@@ -29,6 +29,7 @@ from ..ports import (
     PortValues,
     Start,
     carried,
+    flange,
     flanges,
     load_terminal,
 )
@@ -197,7 +198,12 @@ class CardanDriveline(Model):
     Parameters = Parameters
     Inputs = Inputs
     States = States
-    terminals = (*flanges("inflow"), load_terminal(), load_terminal("load.", "machine"))
+    terminals = (
+        *flanges("inflow"),
+        load_terminal(),
+        flange("outflow", "driven.", "driven"),
+        load_terminal("load.", "machine"),
+    )
     input_rates = MappingProxyType({"phi": "w", "w": "a"})
     required = tuple(
         Requirement(name, "rad", "a Hooke joint turns only with a bend below 90 deg") for name in BENDS

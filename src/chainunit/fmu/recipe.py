@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..engines import MATH
 from ..model import Model
-from ..ports import OWN
+from ..ports import FLANGE, LOAD
 from ..quantities import Quantity
 from .slave import ModelSlave
 
@@ -76,7 +76,6 @@ def icon(model: type[Model], kind: str) -> Traversable:
     return own if own.is_file() else folder / f"{general}.{kind}"
 
 
-LOAD, FLANGE = f"{OWN}.load", f"{OWN}.flange"
 _SIZES = {"rad": 0.1, "rad/s": 50.0, "kg": 10.0, "N": 100.0}
 """of an input whose declaration shows none, by unit; others 1"""
 _PUSH = 300.0

@@ -27,7 +27,7 @@ from ..machines.chain_unit import SIDES, ChamberForces, SideLoads
 from ..machines.flexible import flexible
 from ..quantities import Layout, Value, declaration, quantity
 from ..system.instance import Fmu, Instance
-from ..system.master import stoppable
+from ..system.simulation import stoppable
 from ..text import entry
 from .cycle import Cycle, cycle
 from .drive import Drive

@@ -14,14 +14,15 @@ import xarray as xr
 
 from ..drives.driveline import CardanDriveline
 from ..drives.motor import Motor
-from ..fmu.backends import Backend, export
+from ..fmu.backends import Backend
+from ..fmu.backends import export as export_fmu
 from ..machines.api import ChainUnit
 from ..machines.chain_unit import ChamberForces, DirectChainUnit
 from ..machines.flexible import OrganLaw, flexible
 from ..machines.hanging import split
 from ..model import Model
 from ..quantities import Layout
-from ..system import Profile, System, port_connections
+from ..system import ModelComponent, Profile, System, export, shaft_joints
 
 
 @dataclass(frozen=True)
@@ -98,14 +99,22 @@ class Drive:
         given = Layout(type(self.chain)).named(self.chain)
         return {f"organ.{name}": given[name] for name in Layout(OrganLaw).names}
 
-    def models(self) -> dict[str, tuple[type[Model], Any]]:
-        """Models and parameters by instance name, each before what drives it."""
-        line = {} if self.line is None else {"driveline": (CardanDriveline, self.line)}
-        return {
-            "machine": self.load_model(),
-            **line,
-            "motor": (self.motor, self.parameters),
-        }
+    @cached_property
+    def graph(self) -> System:
+        """The system of the models, each before what drives it; with feed-forward also the machine that the control
+        asks, `model`."""
+        components = {"machine": ModelComponent(*self.load_model())}
+        joints = shaft_joints("motor", self.loading)
+        if self.line is not None:
+            components["driveline"] = ModelComponent(CardanDriveline, self.line)
+            joints += shaft_joints("driveline", "machine", flange="driven", load="machine")
+        components["motor"] = ModelComponent(self.motor, self.parameters)
+        if not self.feed_forward:
+            return System(components, joints)
+        # a control knows the machine with two bars
+        components["model"] = ModelComponent(ChamberForces, self.machine.p)
+        wires = [("motor.phi", "model.phi"), ("motor.w", "model.w"), ("model.tau", "motor.tau_ff")]
+        return System(components, joints, wires)
 
     def crank_torque(self, run: xr.Dataset) -> Any:
         """Torque at the crank in a run [N m], shape (time,)."""
@@ -148,24 +157,10 @@ class Drive:
             run.attrs,
         )
 
-    def start(self) -> dict[str, float]:
-        """Parameters of the whole system by full name."""
-        return {
-            f"{name}.{parameter}": value
-            for name, (model, p) in self.models().items()
-            for parameter, value in model.parameter_layout.named(p).items()
-        }
-
     def export(self, folder: Path, backend: Backend | None = None) -> tuple[dict[str, Path], dict[str, str]]:
-        """Write the FMUs, with these start values; returns files by instance name, and how they were made."""
-        files, made = {}, {}
-        for name, (model, p) in self.models().items():
-            files[name], made[name] = _exported(model, p, folder, backend)
-        if self.feed_forward and self.chain is not None:
-            # a control is told what it can know: the machine with two bars
-            files["model"] = folder / f"{ChamberForces.name}.fmu"
-            export(ChamberForces, files["model"], self.machine_parameters(), backend=backend)
-        return files, made
+        """Write the FMUs, with these start values; returns files by component, and how they were made."""
+        exported, made = export(self.graph, folder, backend)
+        return {name: c.file for name, c in exported.components.items() if c.file}, made
 
     def export_machine(self, folder: Path, backend: Backend | None = None) -> tuple[Path, str]:
         """Write the machine's FMU alone; the same as `export` writes."""
@@ -173,19 +168,10 @@ class Drive:
 
     def system(self, files: Mapping[str, Path]) -> System:
         """The system of FMUs that were made of these models, whatever start values they carry."""
-        if not self.feed_forward:
-            files = {name: file for name, file in files.items() if name != "model"}
-            return System(files, self.connections(), self.start())
-        told = {f"model.{name}": value for name, value in self.machine_parameters().items()}
-        return System({"model": files["machine"], **files}, self.connections(), self.start() | told)
-
-    def connections(self, *, slopes: bool = True) -> list[tuple[str, str]]:
-        """The load port and the shaft, see `port_connections`; and what the control is told."""
-        told = [("motor.phi", "model.phi"), ("motor.w", "model.w"), ("model.tau", "motor.tau_ff")]
-        shafts = port_connections(self.loading, "motor", slopes=slopes)
-        if self.line is not None:
-            shafts += port_connections("machine", "driveline", slopes=slopes, shaft="driven.")
-        return shafts + (told if self.feed_forward else [])
+        # the machine that the control asks is the same FMU as the machine, if that has two bars
+        known = {"model": files["machine"], **files}
+        components = {name: replace(c, file=known[name]) for name, c in self.graph.components.items()}
+        return replace(self.graph, components=components)
 
     def reference(self, crank_speed: float, ramp: float | None = None) -> dict[str, Any]:
         """The signal of the speed reference for this crank speed [rad/s], after a ramp from rest where given [s]."""
@@ -231,7 +217,7 @@ class Drive:
     def coasting(self, folder: Path, backend: Backend | None = None) -> Path:
         """Write the FMU of the machine that turns by itself, and with it what is on its shaft."""
         file = folder / f"{DirectChainUnit.name}.fmu"
-        export(DirectChainUnit, file, self.coasting_parameters(), backend=backend)
+        export_fmu(DirectChainUnit, file, self.coasting_parameters(), backend=backend)
         return file
 
     def coasting_parameters(self) -> dict[str, float]:
@@ -242,4 +228,4 @@ class Drive:
 
 def _exported(model: type[Model], p: Any, folder: Path, backend: Backend | None) -> tuple[Path, str]:
     file = folder / f"{model.name}.fmu"
-    return file, export(model, file, model.parameter_layout.named(p), backend=backend)
+    return file, export_fmu(model, file, model.parameter_layout.named(p), backend=backend)

@@ -22,12 +22,11 @@ from ..drives.catalogue import CatalogueMotor, catalogue
 from ..drives.induction_motor import InductionMotor
 from ..engines import numpy_
 from ..errors import InputError, RunError, shown
-from ..fmu.backends import Backend, export
+from ..fmu.backends import Backend
 from ..machines.knife_drive import KnifeDrive, Parameters
-from ..model import Model
 from ..quantities import Layout, Value, declaration, quantity, variables
 from ..reading import Title, first_line, given_values, instance, packaged, read, schema, to_number, toml
-from ..system import Bond, CoSimulation, System, energy_residual, port_connections
+from ..system import Bond, CoSimulation, ModelComponent, System, energy_residual, export, shaft_joints
 from .overload import entries
 from .sizing import flywheel
 
@@ -485,11 +484,8 @@ def run_knife(
     study = KnifeStudy(config, statics(config), config.motor.identify().parameters)
     todo = float(len(config.flywheels) + 2)
     report("exporting FMUs", 0.0, todo)
-    files = {}
-    for name, (model, p) in models(study, 0.0).items():
-        files[name] = folder / "fmu" / f"{model.name}.fmu"
-        files[name].parent.mkdir(parents=True, exist_ok=True)
-        study.made[name] = export(model, files[name], model.parameter_layout.named(p), backend=backend)
+    exported, study.made = export(graph(study, 0.0), folder / "fmu", backend)
+    files = {name: component.file for name, component in exported.components.items() if component.file}
     try:
         for k, wheel in enumerate(config.flywheels):
             report(f"cutting with a flywheel of {wheel:g} kg m2", k + 1.0, todo)
@@ -503,34 +499,31 @@ def run_knife(
     return study
 
 
-def models(study: KnifeStudy, wheel: float, **start: float) -> dict[str, tuple[type[Model], Any]]:
-    """Models and parameters by instance name, each before what drives it; `start` sets parameters of the motor."""
+def graph(study: KnifeStudy, wheel: float, files: Mapping[str, Path] | None = None, **start: float) -> System:
+    """Machine and motor with this flywheel [kg m2], with the FMUs where there are `files`; `start` sets parameters of
+    the motor."""
     p = study.motor
     p = dataclasses.replace(p, rotor=dataclasses.replace(p.rotor, J=p.rotor.J + wheel), **start)
-    return {"machine": (KnifeDrive, study.config.machine), "motor": (InductionMotor, p)}
-
-
-def system(study: KnifeStudy, files: Mapping[str, Path], wheel: float, **start: float) -> System:
-    """The system of the exported FMUs with this flywheel [kg m2]."""
-    values = {
-        f"{name}.{parameter}": value
-        for name, (model, p) in models(study, wheel, **start).items()
-        for parameter, value in model.parameter_layout.named(p).items()
-    }
-    return System(files, port_connections("machine", "motor"), values)
+    models = {"machine": (KnifeDrive, study.config.machine), "motor": (InductionMotor, p)}
+    components = {name: ModelComponent(*of, (files or {}).get(name)) for name, of in models.items()}
+    return System(components, shaft_joints("motor", "machine"))
 
 
 CUT = "machine.cut_force"
-_BOND = Bond("motor", "machine")
+
+
+def _bond(study: KnifeStudy) -> Bond:
+    (bond,) = graph(study, 0.0).bonds
+    return bond
 
 
 def simulated(study: KnifeStudy, files: Mapping[str, Path], wheel: float) -> Wheel:
     """Start without cut, a turn without cut, then a cut each turn."""
     config, run = study.config, study.config.run
-    with CoSimulation(system(study, files, wheel), {CUT: 0.0}) as simulation:
+    with CoSimulation(graph(study, wheel, files), {CUT: 0.0}) as simulation:
         started = STARTED * config.motor.nameplate.speed
         start = simulation.run(START_LONGEST, run.step, guards={"motor.w": started})
-        share = energy_residual(start, _BOND)[1]
+        share = energy_residual(start, _bond(study))[1]
         if float(start["motor.w"][-1]) < started:
             return Wheel(_unanswered(study, wheel, None, share), start)
         took = float(start["time"][-1])
@@ -554,7 +547,7 @@ def running(study: KnifeStudy, files: Mapping[str, Path], wheel: float) -> Wheel
         "w_start": plate.synchronous - (plate.synchronous - plate.speed) * min(share, 1.0),
         "phi_start": study.statics.top * ratio,
     }
-    with CoSimulation(system(study, files, wheel, **start), {CUT: config.cut.force}) as simulation:
+    with CoSimulation(graph(study, wheel, files, **start), {CUT: config.cut.force}) as simulation:
         return _measured(study, simulation, wheel, start["phi_start"])
 
 
@@ -575,7 +568,7 @@ def _measured(study: KnifeStudy, simulation: CoSimulation, wheel: float, phi: fl
     """Cutting, from a top of the blade: first to settle, then what is measured."""
     run = study.config.run
     whole, arrived = _until_top(study, simulation, phi, int(run.settle_turns + run.turns))
-    share = energy_residual(whole, _BOND)[1]
+    share = energy_residual(whole, _bond(study))[1]
     if not arrived:
         return Wheel(_unanswered(study, wheel, None, share), turns=whole, stalled=True)
     angle = whole["motor.phi"].values / study.config.machine.ratio

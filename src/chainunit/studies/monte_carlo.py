@@ -89,8 +89,8 @@ class Task:
         config, drive = self.config, self.drive
         relevant = {
             "chainunit": __version__,
-            "connections": drive.connections(),
-            "start": drive.start(),
+            "connections": drive.graph.connections,
+            "start": drive.graph.values,
             "feed": asdict(config.feed),
             "run": asdict(config.run),
             "overload": asdict(config.overload),

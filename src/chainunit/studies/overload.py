@@ -26,9 +26,10 @@ from ..engines import numpy_
 from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
 from ..machines.api import EMPTY
-from ..machines.chain_unit import SIDES, ChamberForces, SideName
+from ..machines.chain_unit import SIDES, DirectChainUnit, SideName
 from ..quantities import Layout, Value, declaration, quantity
-from ..system import Bond, CoSimulation, Profile, System, energy_residual, monolithic
+from ..system import CoSimulation, Jump, ModelComponent, Profile, System, certify, monolithic
+from ..system.certificate import Feed
 from ..text import entry, number
 from . import protection, verdict
 from .chain import HIGH, ChainResult, study_chain
@@ -452,16 +453,12 @@ def _simulate(
     total += stop * len(starts)
 
     signals = {**drive.loads(config.feed), **drive.reference(run.crank_speed, run.ramp)}
-    bond = Bond(
-        "motor" if drive.line is None else "driveline",
-        "machine",
-        {f"{s}.material_mass": partial(_energy_per_kg, drive, s) for s in ("left", "right")},
-    )
+    feed = {f"machine.{s}.material_mass": partial(_energy_per_kg, drive, s) for s in ("left", "right")}
     guards = _guards(study)
     with CoSimulation(drive.system(files), signals) as simulation:
         progress = partial(_progress, report, "start-up and steady running", 0.0, total)
         start_up, stop = _started(study, simulation, stop, progress, {} if study.start_apart else guards)
-        _certify(study, "start_up", start_up, bond)
+        _certify(study, "start_up", start_up, feed)
         if simulation.time < stop - 0.5 * run.step:
             raise RunError(
                 f"the safety coupling opens in the start-up, at t = {simulation.time:.3g} s; coupling.trip_torque "
@@ -494,7 +491,7 @@ def _simulate(
             progress = partial(_progress, report, SCENARIOS[name], done - start, total)
             transient = _event(config, simulation, name, event, event + follow, progress, guards)
             done += lead + follow
-            _close(study, name, transient, event, event + follow, bond, simulation, folder, backend)
+            _close(study, name, transient, event, event + follow, feed, simulation, folder, backend)
         if "blocked" in study.answers:
             report("the rocker is blocked, over a decade of stiffness", done - start, total)
             study.block_peaks = _block_peaks(study, simulation, event)
@@ -521,7 +518,7 @@ def _simulate(
             before = total - (len(starts) - k) * stop
             progress = partial(_progress, report, SCENARIOS[name], before, total)
             transient = simulation.run(stop, run.step, progress, guards={} if study.start_apart else guards)
-            _close(study, name, transient, 0.0, stop, bond, simulation, folder, backend)
+            _close(study, name, transient, 0.0, stop, feed, simulation, folder, backend)
         if check:
             report(f"monolithic reference: {SCENARIOS[name]}", total, total)
             _compare(study, name, loaded)
@@ -718,7 +715,7 @@ def _close(
     run: xr.Dataset,
     event: float,
     stop: float,
-    bond: Bond,
+    feed: Feed,
     simulation: CoSimulation,
     folder: Path,
     backend: Backend | None,
@@ -748,7 +745,7 @@ def _close(
             "energy_behind": float(coasting["machine.kinetic_energy"][0]),
             "standstill_time": float(coasting["time"][still[0]]) - event if still.size else None,
         }
-    _certify(study, name, run, bond)
+    _certify(study, name, run, feed)
     after = run.sel(time=slice(event, None))
     answers = _answers(study, after, event, study.steady)
     study.answers[name] = replace(answers, **tripped)
@@ -761,8 +758,7 @@ def _coast(
     """The machine behind the open coupling, with the loads that it had, for as long as the motor would have been
     followed and a second more."""
     from_ = float(run["time"][-1])
-    start = {f"machine.{n}": v for n, v in study.drive.coasting_parameters().items()}
-    start |= {f"machine.{x}_start": float(run[f"machine.{x}0"][-1]) for x in ("phi", "w")}
+    start = {f"{x}_start": float(run[f"machine.{x}0"][-1]) for x in ("phi", "w")}
     loads = {
         full: given
         for full, given in scenario_signals(study.config, study.drive, name, study.event[name]).items()
@@ -771,10 +767,9 @@ def _coast(
     loads |= {full: float(run[full][-1]) for full in _block(study.config, 0.0) if full in run}
     if study.coasting is None:
         study.coasting = study.drive.coasting(folder / "fmu", backend)
-    file = study.coasting
-    with CoSimulation(
-        System({"machine": file}, [], start), {**loads, "machine.tau": 0.0}, from_
-    ) as simulation:
+    p = DirectChainUnit.parameter_layout.from_names(study.drive.coasting_parameters() | start)
+    alone = System({"machine": ModelComponent(DirectChainUnit, p, study.coasting)})
+    with CoSimulation(alone, {**loads, "machine.tau": 0.0}, from_) as simulation:
         return simulation.run(max(stop, from_) + 1.0, study.config.run.step)
 
 
@@ -797,13 +792,13 @@ def _progress(report: Report, what: str, before: float, todo: float, time: float
     report(what, before + time, todo)
 
 
-def _certify(study: Study, name: str, run: xr.Dataset, bond: Bond) -> None:
-    run["residual"], share = energy_residual(run, bond)
-    study.certificate[name] = {"energy_residual_share": share}
-    if bond.driver != "motor":
-        before = Bond("motor", bond.driver)
-        run["driveline_residual"], share = energy_residual(run, before)
-        study.certificate[name]["driveline_energy_residual_share"] = share
+def _certify(study: Study, name: str, run: xr.Dataset, feed: Feed) -> None:
+    """The energy residual of each bond, named after what it drives, where that is not the machine."""
+    shares = study.certificate[name] = {}
+    for driven, (residual, share) in certify(run, study.drive.graph, feed).items():
+        prefix = "" if driven == "machine" else f"{driven}_"
+        run[f"{prefix}residual"] = residual
+        shares[f"{prefix}energy_residual_share"] = share
     study.runs[name] = run
 
 
@@ -814,35 +809,17 @@ def _compare(
     the states at its end."""
     run, drive = study.runs[name], study.drive
     rows = np.unique(np.append(np.arange(0, run.sizes["time"], 10), run.sizes["time"] - 1))
-    corners = [c for signal in signals.values() if isinstance(signal, Profile) for c in signal.corners]
     if name in OVERLOADS and OVERLOADS[name].kind == "blocked":
         # what blocks the rocker is there from one instant on
-        event = study.event[name]
-        corners.append(event)
-        block = {full: float(run[full][-1]) for full in _block(study.config, 0.0)}
-        signals = {**signals, **{full: partial(_from, event, value) for full, value in block.items()}}
-    models = drive.models()
-    if drive.feed_forward:
-        models = {"model": (ChamberForces, drive.machine.p), **models}
-    reference = monolithic(
-        models,
-        drive.connections(slopes=False),
-        signals,
-        run["time"].values[rows],
-        corners=corners,
-        start=start,
-    )
+        event, block = study.event[name], _block(study.config, 0.0)
+        signals = {**signals, **{full: Jump(event, 0.0, float(run[full][-1])) for full in block}}
+    reference = monolithic(drive.graph, signals, run["time"].values[rows], start=start)
     for of in ("machine.tau", "motor.w"):
         difference = np.abs(run[of].values[rows] - reference[of].values)
         study.certificate[name][of + DIFFERENCE] = float(
             np.max(difference) / np.max(np.abs(reference[of].values))
         )
     return {full: float(reference[full][-1]) for full in map(str, reference.data_vars)}
-
-
-def _from(begin: float, value: float, t: Any) -> Any:
-    """A signal that is 0 up to the time `begin` [s] and `value` after it."""
-    return np.where(np.asarray(t) > begin, value, 0.0)
 
 
 def _turns(drive: Drive, run: xr.Dataset, most: float = math.inf) -> xr.Dataset:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import tempfile
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from ..config import Config
@@ -18,29 +19,23 @@ from ..machines.flexible import LEAST, MOST, flexible
 from ..machines.hanging import split
 from ..model import Model
 from ..quantities import Layout
-from ..system.ssp import ModelSystem, export
+from ..system import System
+from ..system.ssp import export
 from .choice import choose
 from .drive import Drive
 
 
-def study_system(config: Config, drive: Drive) -> ModelSystem:
+def study_system(config: Config, drive: Drive) -> System:
     """Machine, driveline and motor of a study, from rest: the speed reference is the crank speed at the motor from
     the start on, feed and processing forces are those of normal running; with feed-forward, the machine that the
     control asks is in the system, too."""
-    machine = _machine(config, drive, ChamberForces, drive.driven) | drive.organ()
-    models = {name: model for name, (model, _) in drive.models().items()}
-    start = {name: model.parameter_layout.named(p) for name, (model, p) in drive.models().items()}
-    start["motor"] |= {"w_ref": config.run.crank_speed * drive.ratio}
-    start["machine"] = machine
-    if drive.feed_forward:
-        models["model"], start["model"] = ChamberForces, _machine(config, drive, ChamberForces, drive.machine)
-    return ModelSystem(
-        "ChainUnitDrive",
-        models,
-        drive.connections(),
-        {f"{name}.{variable}": x for name, values in start.items() for variable, x in values.items()},
-        config.title,
-    )
+    start = {"motor.w_ref": config.run.crank_speed * drive.ratio}
+    for name, machine in (("machine", drive.driven), ("model", drive.machine)):
+        if name in drive.graph.components:
+            # what is connected needs no start value, but an FMU that runs alone has one
+            values = _machine(config, drive, ChamberForces, machine)
+            start |= {f"{name}.{variable}": x for variable, x in values.items()}
+    return replace(drive.graph, start=start)
 
 
 def start_of(
@@ -125,4 +120,13 @@ def export_study(
     drive = _drive(config, backend, report)
     run = config.run
     stop = config.settled + run.turns * 2.0 * math.pi / run.crank_speed
-    return export(study_system(config, drive), file, stop=stop, step=run.step, backend=backend, report=report)
+    return export(
+        study_system(config, drive),
+        file,
+        name="ChainUnitDrive",
+        description=config.title,
+        stop=stop,
+        step=run.step,
+        backend=backend,
+        report=report,
+    )

@@ -1,21 +1,45 @@
-"""Co-simulation of FMUs on fmpy, and the monolithic reference beside it.
+"""A system: models or FMU files that are joined by terminals, and all that follows from that graph.
 
-`CoSimulation` runs a `System` with a fixed communication step; `monolithic` solves the same equations
-as one ODE under an error-controlled solver; `energy_residual` is the certificate of a run.
-"""
+`System` is the graph. From it come the FMUs (`export`), the co-simulation (`CoSimulation`), the whole as one ODE of
+Model Exchange FMUs (`ModelExchange`), the reference of the models' own equations (`monolithic`), the certificate of
+a run (`energy_residual` of every power bond), the SSP package (`chainunit.system.ssp`), and twins with a part left
+out (`without`, `rigid`, `held`). An FMU of somebody else is a component, too: `foreign_component`."""
 
-from .certificate import Bond, energy_residual
-from .graph import System, port_connections
+from .certificate import certify, energy_residual
+from .fmus import export
+from .foreign import fmu_component, foreign_component
+from .graph import (
+    Bond,
+    FmuComponent,
+    ModelComponent,
+    System,
+    held,
+    rigid,
+    shaft_joints,
+    without,
+)
 from .master import CoSimulation
+from .me import ModelExchange
 from .reference import monolithic
-from .signals import Profile
+from .signals import Jump, Profile
 
 __all__ = [
     "Bond",
     "CoSimulation",
+    "FmuComponent",
+    "Jump",
+    "ModelComponent",
+    "ModelExchange",
     "Profile",
     "System",
+    "certify",
     "energy_residual",
+    "export",
+    "fmu_component",
+    "foreign_component",
+    "held",
     "monolithic",
-    "port_connections",
+    "rigid",
+    "shaft_joints",
+    "without",
 ]

@@ -1,65 +1,101 @@
 """The energy residual of a power bond: the certificate that every run carries.
 
 What the driver gave to the load inside its own steps must be what the machine stored and dissipated, less what
-the feed brought. The two are computed on different sides of the coupling, from different equations.
-"""
+the feed brought. The two are computed on different sides of the coupling, from different equations. An FMU of
+somebody else may not count its energies: then only what the coupling itself loses is known."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from scipy.integrate import cumulative_simpson
 
+from ..errors import InputError
+from .graph import Bond, System
 
-@dataclass(frozen=True)
-class Bond:
-    """A shaft between `driver` and `machine`, by instance name. A machine that drives another one, such as a
-    driveline, has the output `load_energy` for what it passes on.
-
-    `feed` gives, for each mass input of the machine that changes in the run, dE/dm [J/kg] as a function of the
-    run's Dataset: the energy that a kilogram has on its place in the machine.
-    """
-
-    driver: str
-    machine: str
-    feed: Mapping[str, Callable[[xr.Dataset], Any]] = field(default_factory=dict)
+Feed = Mapping[str, Callable[[xr.Dataset], Any]]
+"""Of each mass input that changes in a run, by full name: dE/dm [J/kg] as a function of the run's Dataset, the energy
+that a kilogram has on its place in the machine."""
 
 
-def energy_residual(run: xr.Dataset, bond: Bond) -> tuple[xr.DataArray, float]:
+def energy_residual(run: xr.Dataset, bond: Bond, feed: Feed | None = None) -> tuple[xr.DataArray, float]:
     """The energy that is missing at each instant [J], shape (time,), and its largest size in relation to the
     energy that went to and fro through the bond (integral of |tau w|), or to a millionth of what the machine holds,
     where that is more: in a machine that stands nothing but rounding moves.
 
-    The dissipated power is integrated by Simpson's rule over the communication points.
+    Powers are integrated by Simpson's rule over the communication points.
     """
     time = run["time"].values
-
-    def value(name: str) -> Any:
-        return run[f"{bond.machine}.{name}"].values
-
-    def integral(y: Any) -> Any:
-        return cumulative_simpson(y, x=time, initial=0.0)
-
-    given = run[f"{bond.driver}.load_energy"].values
-    stored = value("kinetic_energy") + value("potential_energy")
-    if f"{bond.machine}.load_energy" in run:
-        stored = stored + value("load_energy")
-    fed = np.zeros_like(given)
-    for mass, per_kg in bond.feed.items():
-        fed += _stieltjes(per_kg(run), value(mass))
-    missing = (given - given[0]) - (stored - stored[0]) - integral(value("dissipated_power")) + fed
-    moved = float(np.trapezoid(np.abs(value("power")), time))
+    tau, w = _through(run, bond)
+    given = _given(run, bond, tau, w)
+    stored, dissipated = _taken(run, bond)
+    if stored is None:
+        # what the machine does with the energy is not known: its own torque against that of the driver
+        stored, dissipated = np.zeros_like(given), _shaft_power(run, bond.machine, bond.flanges[1], tau, w)
+    brought = np.zeros_like(given)
+    for mass, per_kg in (feed or {}).items():
+        if mass.partition(".")[0] == bond.machine:
+            brought += _stieltjes(per_kg(run), run[mass].values)
+    lost = cumulative_simpson(dissipated, x=time, initial=0.0)
+    missing = (given - given[0]) - (stored - stored[0]) - lost + brought
     residual = xr.DataArray(
         missing,
         dims="time",
         attrs={"units": "J", "long_name": f"energy residual of the bond {bond.driver} - {bond.machine}"},
     )
+    moved = float(np.trapezoid(np.abs(tau * w), time))
     moved = max(moved, 1e-6 * float(np.max(np.abs(stored))), 1e-300)
     return residual, float(np.max(np.abs(missing))) / moved
+
+
+def certify(
+    run: xr.Dataset, system: System, feed: Feed | None = None
+) -> dict[str, tuple[xr.DataArray, float]]:
+    """`energy_residual` of every power bond of the system, by the name of the machine that the bond drives."""
+    return {bond.machine: energy_residual(run, bond, feed) for bond in system.bonds}
+
+
+def _through(run: xr.Dataset, bond: Bond) -> tuple[Any, Any]:
+    """Torque [N m] and speed [rad/s] of the shaft, of the side that gives the torque."""
+    driver, machine = bond.flanges
+    sides = ((bond.machine, machine), (bond.driver, driver))
+    torques = (f"{name}.{side.members['tau']}" for name, side in sides if "tau" in side.members)
+    torque = next((full for full in torques if full in run), None)
+    if torque is None:
+        raise InputError(
+            f"neither {bond.machine} nor {bond.driver} gives the torque of the shaft between them"
+        )
+    return run[torque].values, run[f"{bond.driver}.{driver.members['w']}"].values
+
+
+def _shaft_power(run: xr.Dataset, name: str, terminal: Any, tau: Any, w: Any) -> Any:
+    """Power at a terminal [W], shape (time,), of the torque there where it is known."""
+    full = f"{name}.{terminal.members.get('tau', '')}"
+    return (run[full].values if full in run else tau) * w
+
+
+def _given(run: xr.Dataset, bond: Bond, tau: Any, w: Any) -> Any:
+    """The energy that the driver has given to the load [J], shape (time,)."""
+    full = f"{bond.driver}.load_energy"
+    if full in run:
+        return run[full].values
+    power = _shaft_power(run, bond.driver, bond.flanges[0], tau, w)
+    return cumulative_simpson(power, x=run["time"].values, initial=0.0)
+
+
+def _taken(run: xr.Dataset, bond: Bond) -> tuple[Any, Any]:
+    """The energy that the machine holds or has passed on [J] and the power that it dissipates [W], shape (time,);
+    None twice where it does not count them."""
+    names = [f"{bond.machine}.{x}" for x in ("kinetic_energy", "potential_energy", "dissipated_power")]
+    if any(full not in run for full in names):
+        return None, None
+    kinetic, potential, dissipated = (run[full].values for full in names)
+    passed = f"{bond.machine}.load_energy"
+    stored = kinetic + potential
+    return (stored + run[passed].values if passed in run else stored), dissipated
 
 
 def _stieltjes(y: Any, m: Any) -> Any:

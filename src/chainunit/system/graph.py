@@ -1,37 +1,394 @@
-"""A system: FMUs by name, and connections between their variables."""
+"""A system: components by name, joined by terminals.
+
+A component is a model with its parameters or an FMU file. Two terminals of one kind are joined: of each member that
+both have, the side that gives it is connected with the side that takes it. Where both sides give a member, such as
+the torque of a shaft, nothing is connected: there the two can be compared. A shaft with a load port makes two
+joints, `shaft_joints`."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
-from ..ports import LoadPort, PortValues
-from ..quantities import Layout
+from ..errors import InputError, shown
+from ..model import Model, Terminal
+from ..ports import FLANGE, LOAD, PortSlopes
+from ..quantities import Layout, base_units
+
+Connection = tuple[str, str]
+"""Source and target by full name, such as ``("motor.phi", "machine.phi")``."""
+
+
+@dataclass(frozen=True)
+class Connector:
+    """A variable of a component that a connection can begin or end at, or that has a start value: `causality` is
+    "parameter", "input" or "output". `dimension` holds the powers of the base units; None where the unit is not
+    known."""
+
+    name: str
+    causality: str
+    unit: str
+    dimension: Mapping[str, int] | None
+
+
+@dataclass(frozen=True)
+class ModelComponent:
+    """A model with its `parameters`, an instance of its declaration; `file` is its FMU, whatever start values that
+    carries, once there is one."""
+
+    model: type[Model]
+    parameters: Any
+    file: Path | None = None
+
+    @cached_property
+    def terminals(self) -> Mapping[str, Terminal]:
+        """Its terminals by name."""
+        return {terminal.name: terminal for terminal in self.model.terminals}
+
+    @cached_property
+    def connectors(self) -> Mapping[str, Connector]:
+        """Its variables by name."""
+        model = self.model
+        outputs = [v for part in model.parts for v in part.layout.variables]
+        states = model.state_layout.variables if model.state_layout else ()
+        listed = {
+            "parameter": model.parameter_layout.variables,
+            "input": model.input_layout.variables,
+            "output": (*states, *outputs),
+        }
+        return {
+            v.name: Connector(v.name, causality, v.unit, base_units(v.unit))
+            for causality, variables in listed.items()
+            for v in variables
+        }
+
+    @property
+    def start(self) -> dict[str, float]:
+        """Its parameters by name."""
+        return self.model.parameter_layout.named(self.parameters)
+
+    @property
+    def title(self) -> str:
+        """Its kind, in a word."""
+        return self.model.name
+
+
+@dataclass(frozen=True)
+class FmuComponent:
+    """An FMU `file`; see `chainunit.system.foreign`. `names` maps the names that the system knows to those of the
+    FMU, where they differ; `connectors` and `terminals` are by the system's names."""
+
+    file: Path
+    connectors: Mapping[str, Connector]
+    terminals: Mapping[str, Terminal]
+    names: Mapping[str, str] = field(default_factory=dict)
+    start: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def title(self) -> str:
+        """Its kind, in a word."""
+        return self.file.name
+
+
+Component = ModelComponent | FmuComponent
+
+
+@dataclass(frozen=True)
+class Bond:
+    """A shaft through which power flows, from `driver` to `machine`, by the names of the components; `flanges` are
+    the terminals on both sides."""
+
+    driver: str
+    machine: str
+    flanges: tuple[Terminal, Terminal]
 
 
 @dataclass(frozen=True)
 class System:
-    """What is simulated.
+    """Components, and what connects them.
 
-    `fmus` maps instance names to files, `connections` are pairs (source, target) of full names such as
-    ``("motor.phi", "machine.phi")``, `start` holds start values of parameters and inputs by full name.
+    Parameters
+    ----------
+    components : by name; of two that drive each other the machine comes first
+    joints : pairs of terminals by full name, such as ``("motor.flange", "machine.flange")``
+    wires : single connections from an output to an input
+    start : start values of parameters and inputs by full name, beside those of the components
+    slopes : whether load ports pass their slopes; without them the load is held constant over a step
+
+    Raises
+    ------
+    InputError
+        for a name that is not there, a terminal that is joined twice, terminals that do not fit, an input with two
+        sources, and units that differ.
     """
 
-    fmus: Mapping[str, Path]
-    connections: Sequence[tuple[str, str]]
+    components: Mapping[str, Component]
+    joints: Sequence[tuple[str, str]] = ()
+    wires: Sequence[Connection] = ()
     start: Mapping[str, float] = field(default_factory=dict)
+    slopes: bool = True
+
+    def __post_init__(self) -> None:
+        for name in self.components:
+            # these become names of files, and full names are cut at the first dot
+            if not re.fullmatch(r"[A-Za-z_]\w*", name, re.ASCII):
+                raise InputError(f"{shown(name)}: a component's name must be of letters, digits and _")
+        joined: dict[str, str] = {}
+        for joint in self.joints:
+            for one, other in (joint, joint[::-1]):
+                if one in joined:
+                    raise InputError(f"{one}: is joined to {joined[one]} and to {other}")
+                joined[one] = other
+        sources: dict[str, str] = {}
+        for source, target in self.connections:
+            if target in sources:
+                raise InputError(f"{target}: is connected to {sources[target]} and to {source}")
+            self._check_units(source, target)
+            sources[target] = source
+        for full in self.start:
+            self.connector(full, "parameter", "input")
+
+    # -- names
+
+    def component(self, full: str) -> tuple[str, str, Component]:
+        """Name of the component, rest of the name and component of a full name."""
+        name, _, rest = full.partition(".")
+        if name not in self.components:
+            raise InputError(
+                f"{full}: there is no component {shown(name)}; there are {', '.join(self.components)}"
+            )
+        return name, rest, self.components[name]
+
+    def connector(self, full: str, *causalities: str) -> Connector:
+        """The variable of that full name, of one of these causalities.
+
+        Raises
+        ------
+        InputError
+            where there is none.
+        """
+        _, rest, component = self.component(full)
+        connector = component.connectors.get(rest)
+        if connector is None or (causalities and connector.causality not in causalities):
+            raise InputError(f"{full}: no such {' or '.join(causalities) or 'variable'} in the system")
+        return connector
+
+    def terminal(self, full: str) -> tuple[str, Terminal]:
+        """Name of the component and terminal of that full name."""
+        name, rest, component = self.component(full)
+        if rest not in component.terminals:
+            known = ", ".join(component.terminals) or "none"
+            raise InputError(f"{full}: no such terminal; {name} ({component.title}) has {known}")
+        return name, component.terminals[rest]
+
+    # -- connections
+
+    @cached_property
+    def connections(self) -> list[Connection]:
+        """All connections between variables, those of the joints first."""
+        held = () if self.slopes else Layout(PortSlopes).names
+        listed = [c for joint in self.joints for member, c in self._joined(*joint) if member not in held]
+        for source, target in self.wires:
+            self.connector(source, "output")
+            self.connector(target, "input")
+        return [*listed, *self.wires]
+
+    def _joined(self, one: str, other: str) -> list[tuple[str, Connection]]:
+        """Connections of a joint, by the name of the member."""
+        (name, left), (name2, right) = self.terminal(one), self.terminal(other)
+        if left.kind != right.kind:
+            raise InputError(
+                f"{one} ({left.kind}) cannot be joined to {other} ({right.kind}): the kinds must be alike"
+            )
+        pairs = []
+        for member in left.members:
+            if member not in right.members:
+                continue
+            ends = [f"{name}.{left.members[member]}", f"{name2}.{right.members[member]}"]
+            gives = [self.connector(end).causality == "output" for end in ends]
+            if gives[0] != gives[1]:
+                pairs.append((member, (ends[0], ends[1]) if gives[0] else (ends[1], ends[0])))
+            elif member == "phi":
+                both = "give" if gives[0] else "take"
+                raise InputError(
+                    f"{one} and {other} both {both} the angle: one must give it, the other take it"
+                )
+        return pairs
+
+    def _check_units(self, source: str, target: str) -> None:
+        one, other = self.connector(source), self.connector(target)
+        known = one.dimension is not None and other.dimension is not None
+        if known and one.dimension != other.dimension:
+            raise InputError(f"{source} in {one.unit} cannot be connected to {target} in {other.unit}")
+
+    @cached_property
+    def bonds(self) -> list[Bond]:
+        """Every shaft through which power flows, in the order of the joints."""
+        bonds = []
+        for one, other in self.joints:
+            ends = [self.terminal(one), self.terminal(other)]
+            if ends[0][1].kind != FLANGE:
+                continue
+            (name, terminal), _ = ends
+            if self.connector(f"{name}.{terminal.members['phi']}").causality != "output":
+                ends.reverse()
+            (driver, gives), (machine, takes) = ends
+            bonds.append(Bond(driver, machine, (gives, takes)))
+        return bonds
+
+    # -- values
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Start values of all components and those of `start`, by full name."""
+        own = {f"{name}.{v}": x for name, c in self.components.items() for v, x in c.start.items()}
+        return own | dict(self.start)
+
+    def with_values(self, values: Mapping[str, float]) -> System:
+        """The system with other values of parameters and inputs, by full name."""
+        components, start = dict(self.components), dict(self.start)
+        for full, value in values.items():
+            name, rest, component = self.component(full)
+            if isinstance(component, ModelComponent) and rest in component.model.parameter_layout.names:
+                layout, before = component.model.parameter_layout, components[name]
+                assert isinstance(before, ModelComponent)
+                changed = layout.from_names({rest: value}, before.parameters)
+                components[name] = replace(before, parameters=changed)
+            else:
+                start[full] = value
+        return replace(self, components=components, start=start)
 
 
-def port_connections(
-    machine: str, driver: str, *, slopes: bool = True, shaft: str = ""
+def shaft_joints(
+    driver: str, machine: str, *, flange: str = "flange", load: str = "load"
 ) -> list[tuple[str, str]]:
-    """The connections of a load port and of the shaft behind it: the machine's seven signals to the driver,
-    the driver's angle, speed and acceleration to the machine. Without `slopes` the load is held constant
-    over the step, and the coupling is of first order only. `shaft` goes before the names of a driver's shaft that is
-    not its only one ("driven." of a driveline)."""
-    port = Layout(LoadPort if slopes else PortValues).names
-    return [
-        *((f"{driver}.{shaft}{x}", f"{machine}.{x}") for x in ("phi", "w", "a")),
-        *((f"{machine}.{name}", f"{driver}.load.{name}") for name in port),
-    ]
+    """The two joints of a shaft with its load port; `flange` and `load` are the driver's terminals."""
+    return [(f"{driver}.{flange}", f"{machine}.flange"), (f"{driver}.{load}", f"{machine}.load")]
+
+
+# -- in which order values are known
+
+Direct = Mapping[str, Mapping[str, set[str]]]
+"""By component, of each output the inputs that it depends on directly."""
+
+
+def direct_inputs(component: Component, declared: Mapping[str, set[str] | None]) -> dict[str, set[str]]:
+    """Of each output the inputs that it depends on directly: as `declared`, and where a component does not say, as
+    its terminals promise. Who gives the motion of a shaft owns its inertia, so that angle and speed are states; who
+    gives a load port gives it at a point, whatever the acceleration. All else is taken to depend on all inputs."""
+    kinds: dict[str, list[Terminal]] = {FLANGE: [], LOAD: []}
+    for terminal in component.terminals.values():
+        kinds.setdefault(terminal.kind, []).append(terminal)
+    states = {t.members[x] for t in kinds[FLANGE] for x in ("phi", "w") if x in t.members}
+    accelerations = {t.members["a"] for t in kinds[FLANGE] if "a" in t.members}
+    ports = {variable for t in kinds[LOAD] for variable in t.members.values()}
+    inputs = {c.name for c in component.connectors.values() if c.causality == "input"}
+
+    def promised(output: str) -> set[str]:
+        if output in states:
+            return set()
+        return inputs - accelerations if output in ports else inputs
+
+    return {output: promised(output) if known is None else known for output, known in declared.items()}
+
+
+def ordered(connections: Sequence[Connection], direct: Direct) -> list[tuple[str, list[str]]]:
+    """Groups of connected outputs, each of one component, in an order in which each follows from those before.
+
+    Raises
+    ------
+    InputError
+        for an algebraic loop, which is named.
+    """
+    sources = {target: source for source, target in connections}
+    level: dict[str, int] = {}
+
+    def rank(output: str, above: tuple[str, ...]) -> int:
+        if output in above:
+            loop = " -> ".join((*above[above.index(output) :], output))
+            raise InputError(f"algebraic loop: {loop}; break it with a load port or a state")
+        if output not in level:
+            name, _, variable = output.partition(".")
+            feeding = [
+                sources[f"{name}.{known}"]
+                for known in sorted(direct[name].get(variable, ()))
+                if f"{name}.{known}" in sources
+            ]
+            level[output] = 1 + max((rank(source, (*above, output)) for source in feeding), default=-1)
+        return level[output]
+
+    for output in sources.values():
+        rank(output, ())
+    groups: dict[tuple[int, str], list[str]] = {}
+    for output, at in level.items():
+        name, _, variable = output.partition(".")
+        groups.setdefault((at, name), []).append(variable)
+    places = {name: place for place, name in enumerate(direct)}
+    return [(name, groups[at, name]) for at, name in sorted(groups, key=lambda g: (g[0], places[g[1]]))]
+
+
+# -- twins: the system with a part left out
+
+
+def without(system: System, *names: str) -> System:
+    """The system without these components and what connects to them; inputs that they fed keep their start values."""
+    for name in names:
+        system.component(name)
+
+    def stays(full: str) -> bool:
+        return full.partition(".")[0] not in names
+
+    return replace(
+        system,
+        components={name: c for name, c in system.components.items() if stays(name)},
+        joints=[joint for joint in system.joints if all(map(stays, joint))],
+        wires=[wire for wire in system.wires if all(map(stays, wire))],
+        start={full: x for full, x in system.start.items() if stays(full)},
+    )
+
+
+def held(system: System) -> System:
+    """The system with every load held constant over a step: the coupling is of first order only."""
+    return replace(system, slopes=False)
+
+
+def bridged(system: System, name: str) -> System:
+    """The system without the component `name`, with what drives it joined to what it drives."""
+    rest = without(system, name)
+    ends: dict[str, list[str]] = {}
+    for joint in system.joints:
+        if joint not in rest.joints:
+            for full in joint:
+                if full.partition(".")[0] != name:
+                    ends.setdefault(system.terminal(full)[1].kind, []).append(full)
+    for kind, fulls in ends.items():
+        if len(fulls) != 2:
+            raise InputError(f"{name}: has no two neighbours with a terminal of the kind {kind} to be joined")
+    return replace(rest, joints=[*((one, other) for one, other in ends.values()), *rest.joints])
+
+
+def rigid(system: System, line: str) -> System:
+    """The system with a rigid shaft in place of the component `line`: its inertia `J4` on the rotor of what drives
+    it, its gear `ratio` in the machine behind it.
+
+    Raises
+    ------
+    InputError
+        where one of those has no such parameter, as a foreign FMU may.
+    """
+    bonds = {bond.machine: bond for bond in system.bonds}
+    values = system.values
+    driver = bonds[line].driver
+    machine = next(bond.machine for bond in system.bonds if bond.driver == line)
+    needed = (f"{line}.ratio", f"{line}.J4", f"{driver}.rotor.J", f"{machine}.ratio")
+    for full in needed:
+        if full not in values:
+            raise InputError(f"{full}: is not known, so that there is no twin with a rigid shaft")
+    ratio, J, rotor, gear = (values[full] for full in needed)
+    return bridged(system, line).with_values(
+        {f"{driver}.rotor.J": rotor + J / ratio**2, f"{machine}.ratio": gear * ratio}
+    )

@@ -1,4 +1,4 @@
-"""One FMU 2.0 co-simulation instance on fmpy, by variable name."""
+"""FMUs 2.0 and their instances on fmpy, by variable name: Co-Simulation and Model Exchange."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import atexit
 import contextlib
 import ctypes
 import logging
+import math
 import os
 import re
 import shutil
@@ -13,12 +14,14 @@ import tempfile
 import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, Literal
 
 from ..errors import InputError, RunError, printable, shown
 
 log = logging.getLogger("chainunit.fmu")
-_WARNING, _FATAL = 1, 4  # of fmi2Status
+_WARNING, _DISCARD, _FATAL = 1, 2, 4  # of fmi2Status
+Kind = Literal["Co-Simulation", "Model Exchange"]
+"""Interface of an FMU."""
 _working_directory = threading.Lock()
 """Held while fmpy loads a library: all threads of the process have one working directory."""
 _unpacked: set[str] = set()
@@ -32,13 +35,31 @@ def remove_unpacked() -> None:
         shutil.rmtree(_unpacked.pop(), ignore_errors=True)
 
 
-class Fmu:
-    """An FMU file, unpacked once; instances come from `instantiate`."""
+class DiscardError(RunError):
+    """An FMU cannot compute at the point that it was given; at a nearer one it may."""
 
-    def __init__(self, file: Path) -> None:
+
+class Fmu:
+    """An FMU file, unpacked once; instances come from `Instance` and `ExchangeInstance`.
+
+    Parameters
+    ----------
+    file : the FMU
+    kind : interface that is needed of it
+    names : of the names that it is to be known by those of the FMU, where they differ
+
+    Raises
+    ------
+    InputError
+        where it is no FMU, or has not that interface.
+    """
+
+    def __init__(
+        self, file: Path, kind: Kind = "Co-Simulation", names: Mapping[str, str] | None = None
+    ) -> None:
         from fmpy import extract, read_model_description
 
-        self.file = file
+        self.file, self.kind = file, kind
         if not Path(file).is_file():
             raise InputError(f"{file}: no such FMU")
         self.folder = tempfile.mkdtemp(prefix="chainunit_fmu_")
@@ -46,42 +67,57 @@ class Fmu:
         try:
             extract(str(file), unzipdir=self.folder)
             self.description = read_model_description(self.folder, validate=False)
-            self.identifier = self._checked()
+            self.interface = self._interface()
         except BaseException as error:
             self.close()
             if isinstance(error, InputError) or not isinstance(error, Exception):
                 raise
             raise InputError(f"{file}: is no FMU ({printable(str(error))})") from error
+        ours = {theirs: name for name, theirs in (names or {}).items()}
+        for variable in self.description.modelVariables:
+            variable.name = ours.get(variable.name, variable.name)
         self.variables = {v.name: v for v in self.description.modelVariables}
 
-    def _checked(self) -> str:
-        """Its model identifier, where it is an FMU that can run here."""
+    @property
+    def identifier(self) -> str:
+        """Name of its library."""
+        return str(self.interface.modelIdentifier)
+
+    def _interface(self) -> Any:
+        """What it says of the interface that is needed, where it can run here."""
         description = self.description
-        if description.fmiVersion != "2.0" or description.coSimulation is None:
-            kind = "Co-Simulation" if description.coSimulation else "Model Exchange alone"
-            raise InputError(
-                f"{self.file}: is FMI {printable(description.fmiVersion)}, {kind}; must be FMI 2.0 for Co-Simulation"
+        there = {"Co-Simulation": description.coSimulation, "Model Exchange": description.modelExchange}
+        interface = there[self.kind]
+        if description.fmiVersion != "2.0" or interface is None:
+            has = (
+                self.kind
+                if interface
+                else f"{next((k for k in there if there[k]), 'of no known kind')} alone"
             )
-        identifier = description.coSimulation.modelIdentifier
+            raise InputError(
+                f"{self.file}: is FMI {printable(description.fmiVersion)}, {has}; must be FMI 2.0 for {self.kind}"
+            )
+        identifier = interface.modelIdentifier
         # it becomes part of a path: a foreign one must not lead out of the folder
         if re.fullmatch(r"[A-Za-z_]\w*", identifier, re.ASCII) is None:
             raise InputError(
                 f"{self.file}: modelIdentifier = {shown(identifier)}: must be a name in C (letters, digits, _)"
             )
-        return str(identifier)
+        return interface
 
     def outputs(self) -> list[str]:
-        """Names of the outputs, in declared order."""
-        return [name for name, v in self.variables.items() if v.causality == "output"]
+        """Names of the outputs that are numbers, in declared order."""
+        return [name for name, v in self.variables.items() if v.causality == "output" and v.type == "Real"]
 
-    def feedthrough(self) -> dict[str, set[str]]:
-        """Of each output: the inputs that it depends on directly."""
+    def feedthrough(self) -> dict[str, set[str] | None]:
+        """Of each output: the inputs that it depends on directly; None where the FMU does not say."""
         inputs = {name for name, v in self.variables.items() if v.causality == "input"}
-        depends: dict[str, set[str]] = {}
-        for unknown in self.description.outputs:
-            known = unknown.dependencies
-            depends[unknown.variable.name] = inputs if known is None else {v.name for v in known} & inputs
-        return depends
+        return {
+            unknown.variable.name: None
+            if unknown.dependencies is None
+            else {v.name for v in unknown.dependencies} & inputs
+            for unknown in self.description.outputs
+        }
 
     def close(self) -> None:
         """Remove the unpacked files."""
@@ -102,7 +138,11 @@ def _unloadable(fmu: Fmu, error: Exception) -> str:
 
 
 class Instance:
-    """A running instance; every failing call becomes a `RunError` that cites what the FMU logged."""
+    """A running instance for Co-Simulation; every failing call becomes a `RunError` that cites what the FMU
+    logged."""
+
+    _api: ClassVar[str] = "FMU2Slave"
+    """fmpy's class."""
 
     def __init__(self, fmu: Fmu, name: str, journal: list[str] | None = None) -> None:
         """`journal` takes what the FMU says, for several instances in the order in which they said it."""
@@ -129,7 +169,7 @@ class Instance:
         with _working_directory:
             here = Path.cwd()
             try:
-                self._fmi = api.FMU2Slave(
+                self._fmi = getattr(api, self._api)(
                     guid=fmu.description.guid,
                     unzipDirectory=fmu.folder,
                     modelIdentifier=fmu.identifier,
@@ -146,8 +186,8 @@ class Instance:
             raise RunError(f"{name}: cannot be instantiated{said}") from error
         self._alive = True
         # the functions that a run calls at every step, without fmpy's layer around them, which takes twice their time
-        library, self._component = self._fmi.dll, self._fmi.component
-        self._get, self._set, self._step = library.fmi2GetReal, library.fmi2SetReal, library.fmi2DoStep
+        self._library, self._component = self._fmi.dll, self._fmi.component
+        self._get, self._set = self._library.fmi2GetReal, self._library.fmi2SetReal
 
     def _call(self, what: str, function: Any, *args: Any) -> Any:
         from fmpy.fmi1 import FMICallException
@@ -161,7 +201,12 @@ class Instance:
         if status == _FATAL:
             self._alive = False
         said = f": {self.messages[-1]}" if self.messages else ""
-        return RunError(f"{self.name}: {what} ended with status {status}{said}")
+        kind = DiscardError if status == _DISCARD else RunError
+        return kind(f"{self.name}: {what} ended with status {status}{said}")
+
+    def _check(self, status: int, what: str) -> None:
+        if status > _WARNING:
+            raise self._failure(what, status)
 
     def initialize(self, start: Mapping[str, float], time: float) -> None:
         """Set start values and enter the initialization mode; `finish_initialization` leaves it."""
@@ -182,18 +227,14 @@ class Instance:
     def read(self, handle: tuple[Any, Any, int]) -> Sequence[float]:
         """Values behind a handle."""
         references, values, n = handle
-        status = self._get(self._component, references, n, values)
-        if status > _WARNING:
-            raise self._failure("reading values", status)
+        self._check(self._get(self._component, references, n, values), "reading values")
         return values
 
     def write(self, handle: tuple[Any, Any, int], new: Sequence[float]) -> None:
         """Set the values behind a handle."""
         references, values, n = handle
         values[:] = new
-        status = self._set(self._component, references, n, values)
-        if status > _WARNING:
-            raise self._failure("setting values", status)
+        self._check(self._set(self._component, references, n, values), "setting values")
 
     def get(self, names: Sequence[str]) -> list[float]:
         """Values by name."""
@@ -206,7 +247,7 @@ class Instance:
 
     def step(self, time: float, step: float) -> None:
         """One communication step."""
-        status = self._step(self._component, time, step, 1)
+        status = self._library.fmi2DoStep(self._component, time, step, 1)
         if status > _WARNING:
             raise self._failure(f"step at t = {time:g} s", status)
 
@@ -232,3 +273,78 @@ class Instance:
         with contextlib.suppress(Exception):
             self._fmi.terminate()
         self._fmi.freeInstance()
+
+
+class ExchangeInstance(Instance):
+    """A running instance for Model Exchange: its states belong to the solver of the importer."""
+
+    _api = "FMU2Model"
+
+    def __init__(self, fmu: Fmu, name: str, journal: list[str] | None = None) -> None:
+        super().__init__(fmu, name, journal)
+        self.n_states = int(fmu.description.numberOfContinuousStates)
+        self.n_indicators = int(fmu.description.numberOfEventIndicators)
+        self._states = (ctypes.c_double * self.n_states)()
+        self._rates = (ctypes.c_double * self.n_states)()
+        self._indicators = (ctypes.c_double * self.n_indicators)()
+
+    def put(self, time: float, states: Sequence[float]) -> None:
+        """Go to an instant and to these states, shape (states,)."""
+        library, component = self._library, self._component
+        self._check(library.fmi2SetTime(component, time), "setting the time")
+        if self.n_states:
+            self._states[:] = list(states)
+            status = library.fmi2SetContinuousStates(component, self._states, self.n_states)
+            self._check(status, "setting the states")
+
+    def rates(self) -> Any:
+        """Derivatives of the states there, shape (states,)."""
+        if self.n_states:
+            status = self._library.fmi2GetDerivatives(self._component, self._rates, self.n_states)
+            self._check(status, "computing derivatives")
+        return self._rates
+
+    def indicators(self) -> Any:
+        """The event indicators there: where one changes its sign, there is an event."""
+        if self.n_indicators:
+            status = self._library.fmi2GetEventIndicators(
+                self._component, self._indicators, self.n_indicators
+            )
+            self._check(status, "computing event indicators")
+        return self._indicators
+
+    def states(self) -> list[float]:
+        """The states as the FMU has them, such as after an event."""
+        if self.n_states:
+            self._call("reading the states", self._fmi.getContinuousStates, self._states, self.n_states)
+        return list(self._states)
+
+    def nominals(self) -> list[float]:
+        """Nominal sizes of the states."""
+        sizes = (ctypes.c_double * self.n_states)()
+        if self.n_states:
+            self._call("reading nominal sizes", self._fmi.getNominalsOfContinuousStates, sizes, self.n_states)
+        return list(sizes)
+
+    def completed(self) -> bool:
+        """End a step of the solver; whether the FMU wants an event there."""
+        event, ends = self._call("completing a step", self._fmi.completedIntegratorStep)
+        if ends:
+            raise RunError(f"{self.name}: ends the simulation")
+        return bool(event)
+
+    def enter_event(self) -> None:
+        """Enter the event mode."""
+        self._call("an event", self._fmi.enterEventMode)
+
+    def update(self) -> tuple[bool, float]:
+        """Compute discrete states once, in event mode; whether something changed, so that all must be asked again,
+        and the time of the next event that is known beforehand [s]."""
+        again, ends, _, moved, timed, time = self._call("an event", self._fmi.newDiscreteStates)
+        if ends:
+            raise RunError(f"{self.name}: ends the simulation")
+        return bool(again or moved), float(time) if timed else math.inf
+
+    def leave_event(self) -> None:
+        """Return to continuous time."""
+        self._call("an event", self._fmi.enterContinuousTimeMode)

@@ -1,12 +1,15 @@
 """The monolithic reference: the models' own equations as one ODE under an error-controlled solver.
 
 No communication step and no linearised load: each evaluation gives the driver the machine's load at exactly the
-present angle and speed. It is what a co-simulation converges to.
+present angle and speed. It is what a co-simulation converges to. The equations are traced in casadi once, which is
+several times as fast as the kernels themselves.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -14,34 +17,30 @@ import numpy as np
 import xarray as xr
 from scipy.integrate import solve_ivp
 
-from ..engines import MATH, casadi_, numpy_
-from ..errors import RunError
+from ..engines import MATH, casadi_
+from ..errors import InputError, RunError
 from ..model import Model
+from .graph import ModelComponent, System, held, ordered
+from .signals import at_time, corners
 
 
 def monolithic(
-    models: Mapping[str, tuple[type[Model], Any]],
-    connections: Sequence[tuple[str, str]],
+    system: System,
     signals: Mapping[str, Any],
     times: Any,
     *,
     rtol: float = 1e-10,
-    corners: Sequence[float] = (),
     start: Mapping[str, float] | None = None,
 ) -> xr.Dataset:
     """Solve a system of models.
 
     Parameters
     ----------
-    models : model class and parameters by name, in an order in which each model's load is known before it
-        is driven (the machine before its motor)
-    connections : as in `System`; leave out slopes (``port_connections(..., slopes=False)``), which
-        vanish from the equations at the port's own point
-    signals : by full name of an input, a number or a function of time
+    system : whose components are all models; slopes of load ports vanish from the equations at the ports' own points
+    signals : by full name of an input, a number or a function of time; the solver stops at their `corners`
     times : where the solution is wanted [s], shape (n,)
     rtol : relative tolerance of the solver (DOP853); the absolute one is its thousandth of each
         state's nominal size, and at least 1e-12
-    corners : times at which a signal starts or ends to change; the solver stops there
     start : every state by full name at the first of the times, to go on from another solution; by default the
         models' own start
 
@@ -51,134 +50,185 @@ def monolithic(
 
     Raises
     ------
+    InputError
+        where a component is an FMU, whose equations are not known, and for an algebraic loop.
     RunError
         where the solver gives up.
     """
-    import casadi
-
-    models = {name: (model, model.prepared(MATH, p)) for name, (model, p) in models.items()}
-    offsets, n = {}, 0
-    begin: list[float] = []
-    tolerances: list[float] = []
-    for name, (model, p) in models.items():
-        if model.state_layout:
-            offsets[name] = n
-            begin += model.state_layout.values(model.start(MATH, p, model.input_layout.from_names({})))
-            sizes = [v.quantity.nominal or 1.0 for v in model.state_layout.variables]
-            tolerances += [max(1e-12, rtol * 1e-3 * size) for size in sizes]
-            n = len(begin)
-
-    def pass_through(engine: Any, given: Mapping[str, Any], x: Any, rounds: int) -> dict[str, Any]:
-        """Every value by full name: states, then outputs in the models' order; `rounds` passes carry a
-        value through as many models. `given` are the inputs from outside."""
-        values: dict[str, Any] = {}
-        for name, (model, _) in models.items():
-            if model.state_layout:
-                at = offsets[name]
-                for i, variable in enumerate(model.state_layout.names):
-                    values[f"{name}.{variable}"] = x[at + i]
-        for _ in range(rounds):
-            for name, (model, p) in models.items():
-                u, state = inputs(name, model, given, values), states(name, model, x)
-                shared = model.shared(engine, p, u, state)
-                part = model.parts[0]
-                out = part.layout.values(part.equations(engine, p, u, state, shared))
-                values.update(zip((f"{name}.{v}" for v in part.layout.names), out, strict=True))
-        return values
-
-    sources: dict[str, str] = {target: source for source, target in connections}
-
-    outside = {
-        f"{name}.{v.name}": signals.get(f"{name}.{v.name}", v.quantity.start)
-        for name, (model, _) in models.items()
-        for v in model.input_layout.variables
-        if f"{name}.{v.name}" not in sources
-    }
-
-    def at(t: Any) -> dict[str, Any]:
-        return {full: signal(t) if callable(signal) else signal for full, signal in outside.items()}
-
-    def inputs(name: str, model: type[Model], given: Mapping[str, Any], values: Mapping[str, Any]) -> Any:
-        full = [f"{name}.{variable}" for variable in model.input_layout.names]
-        return model.input_layout.instance(
-            [values.get(sources[f], 0.0) if f in sources else given[f] for f in full]
-        )
-
-    def states(name: str, model: type[Model], x: Any) -> Any:
-        if model.state_layout is None:
-            return None
-        at = offsets[name]
-        return model.state_layout.instance(x[at : at + len(model.state_layout.names)])
-
-    def traced() -> Any:
-        """The derivatives of all states, traced once: several times as fast as the kernels themselves."""
-        engine = casadi_()
-        symbols = casadi.SX.sym("u", len(outside)), casadi.SX.sym("x", n)
-        given, x = dict(zip(outside, casadi.vertsplit(symbols[0]), strict=True)), casadi.vertsplit(symbols[1])
-        values = pass_through(engine, given, x, 1)
-        dx: list[Any] = []
-        for name, (model, p) in models.items():
-            if model.state_layout:
-                dx += model.derivatives(engine, p, inputs(name, model, given, values), states(name, model, x))
-        return casadi.Function("rates", list(symbols), [casadi.cse(casadi.vertcat(*dx))])
-
-    derivatives = traced()
-
-    def rates(t: float, x: Any) -> Any:
-        return derivatives(list(at(t).values()), x).full().ravel()
-
-    # where the start depends on an input that is another one's state, a pass for each on the way
-    for _ in models:
-        values = pass_through(MATH, at(0.0), begin, 1)
-        begun: list[float] = []
-        for name, (model, p) in models.items():
-            if model.state_layout:
-                begun += model.state_layout.values(model.start(MATH, p, inputs(name, model, at(0.0), values)))
-        if begun == begin:
-            break
-        begin = begun
-    if start is not None:
-        begin = [
-            start[f"{name}.{state}"]
-            for name, (model, _) in models.items()
-            if model.state_layout
-            for state in model.state_layout.names
-        ]
+    equations = _Equations(system, signals)
     times = np.asarray(times, float)
-    inner = [c for c in sorted(set(corners)) if times[0] < c < times[-1]]
-    stops = [times[0], *inner, times[-1]]
-    x = np.asarray(begin)
-    found = np.empty((n, len(times)))
-    for low, high in pairwise(stops):
-        chosen = (times >= low) & (times <= high)
+    x = equations.start(float(times[0])) if start is None else [start[full] for full in equations.states]
+    inner = [c for c in corners(signals.values()) if times[0] < c < times[-1]]
+    states = np.empty((len(x), len(times)))
+    for low, high in pairwise([times[0], *inner, times[-1]]):
+        behind = float(np.nextafter(low, high))
+
+        def rates(t: float, x: Any, behind: float = behind) -> Any:
+            return equations.rates(max(t, behind), x)
+
         solution = solve_ivp(
-            rates,
-            (low, high),
-            x,
-            method="DOP853",
-            rtol=rtol,
-            atol=tolerances,
-            dense_output=True,
-        )
+            rates, (low, high), x, method="DOP853", rtol=rtol, atol=equations.tolerances(rtol), dense_output=True
+        )  # fmt: skip
         if not solution.success:
             raise RunError(f"monolithic reference: {solution.message}")
+        chosen = (times >= low) & (times <= high)
         if chosen.any():
-            found[:, chosen] = solution.sol(times[chosen])
+            states[:, chosen] = solution.sol(times[chosen])
         x = solution.y[:, -1]
-    values = pass_through(numpy_(), at(times), found, len(models) + 1)
-    described = {
-        f"{name}.{v.name}": v
-        for name, (model, _) in models.items()
-        for layout in (model.state_layout, model.parts[0].layout)
-        if layout
-        for v in layout.variables
-    }
-    variables = {
-        full: (
-            "time",
-            np.broadcast_to(value, times.shape).astype(float),
-            {"units": described[full].unit, "long_name": described[full].description},
+    return equations.dataset(times, states)
+
+
+@dataclass(frozen=True)
+class _Unit:
+    """A model in casadi: `function` maps its inputs and states to its outputs and the derivatives of its states."""
+
+    model: type[Model]
+    p: Any
+    function: Any
+
+    @cached_property
+    def state_names(self) -> tuple[str, ...]:
+        return self.model.state_layout.names if self.model.state_layout else ()
+
+    @cached_property
+    def output_names(self) -> tuple[str, ...]:
+        return self.model.parts[0].layout.names
+
+    @cached_property
+    def direct(self) -> dict[str, set[str]]:
+        """Of each state and output the inputs that it depends on directly."""
+        known: dict[str, set[str]] = {name: set() for name in (*self.state_names, *self.output_names)}
+        names = self.model.input_layout.names
+        for row, column in zip(*self.function.jac_sparsity(0, 0).get_triplet(), strict=True):
+            known[self.output_names[row]].add(names[column])
+        return known
+
+
+def _traced(name: str, component: Any) -> _Unit:
+    import casadi
+
+    if not isinstance(component, ModelComponent):
+        raise InputError(
+            f"{name} ({component.title}): is an FMU, whose equations are not known; there is no monolithic reference"
         )
-        for full, value in values.items()
-    }
-    return xr.Dataset(variables, {"time": ("time", times, {"units": "s", "long_name": "time"})})
+    model = component.model
+    engine, p = casadi_(), model.prepared(MATH, component.parameters)
+    layouts = (model.input_layout, model.state_layout)
+    symbols = [casadi.SX.sym(s, len(of.names) if of else 0) for s, of in zip("ux", layouts, strict=True)]
+    u, x = (
+        of.instance(casadi.vertsplit(symbol)) if of else None
+        for of, symbol in zip(layouts, symbols, strict=True)
+    )
+    part = model.parts[0]
+    outputs = part.layout.values(part.equations(engine, p, u, x, model.shared(engine, p, u, x)))
+    rates = model.derivatives(engine, p, u, x) if model.state_layout else []
+    sides = [casadi.vertcat(*side) if side else casadi.SX(0, 1) for side in (outputs, rates)]
+    return _Unit(model, p, casadi.Function(name, symbols, sides))
+
+
+class _Equations:
+    """The system as one ODE in the states of all models."""
+
+    def __init__(self, system: System, signals: Mapping[str, Any]) -> None:
+        self._units = {name: _traced(name, c) for name, c in system.components.items()}
+        self._connections = held(system).connections
+        self._sources = {target: source for source, target in self._connections}
+        self.states = [f"{name}.{x}" for name, unit in self._units.items() for x in unit.state_names]
+        values = system.values
+        self._outside = {
+            f"{name}.{v.name}": signals.get(
+                f"{name}.{v.name}", values.get(f"{name}.{v.name}", v.quantity.start)
+            )
+            for name, unit in self._units.items()
+            for v in unit.model.input_layout.variables
+            if f"{name}.{v.name}" not in self._sources
+        }
+        self._compose()
+
+    def _compose(self) -> None:
+        """Functions of the inputs from outside and of all states: derivatives, and all outputs."""
+        import casadi
+
+        symbols = [casadi.SX.sym(s, len(of)) for s, of in (("u", self._outside), ("x", self.states))]
+        values = dict(zip(self._outside, casadi.vertsplit(symbols[0]), strict=True))
+        values |= zip(self.states, casadi.vertsplit(symbols[1]), strict=True)
+        direct = {name: unit.direct for name, unit in self._units.items()}
+        for name, outputs in ordered(self._connections, direct):
+            missing = [output for output in outputs if f"{name}.{output}" not in values]
+            if missing:
+                known, _ = self._call(name, values)
+                values |= {f"{name}.{output}": known[output] for output in missing}
+        rates: list[Any] = []
+        shown: dict[str, Any] = {}
+        for name in self._units:
+            known, dx = self._call(name, values)
+            shown |= {f"{name}.{output}": y for output, y in known.items()}
+            rates.append(dx)
+        self._outputs = list(shown)
+        self._rates = casadi.Function("rates", symbols, [casadi.cse(casadi.vertcat(*rates))])
+        self._all = casadi.Function("outputs", symbols, [casadi.cse(casadi.vertcat(*shown.values()))])
+
+    def _call(self, name: str, values: Mapping[str, Any]) -> tuple[dict[str, Any], Any]:
+        """Outputs by name and derivatives of a model; inputs that are not known yet are undefined."""
+        import casadi
+
+        unit = self._units[name]
+        fulls = [f"{name}.{v}" for v in unit.model.input_layout.names]
+        u = [values.get(self._sources.get(full, full), casadi.SX.nan()) for full in fulls]
+        x = [values[f"{name}.{v}"] for v in unit.state_names]
+        y, dx = unit.function(casadi.vertcat(*u), casadi.vertcat(*x) if x else casadi.SX(0, 1))
+        return dict(zip(unit.output_names, casadi.vertsplit(y), strict=True)), dx
+
+    def _inputs(self, t: Any) -> list[Any]:
+        return [at_time(signal, t) for signal in self._outside.values()]
+
+    def rates(self, t: float, x: Any) -> Any:
+        """Derivatives of all states."""
+        return self._rates(self._inputs(t), x).full().ravel()
+
+    def tolerances(self, rtol: float) -> list[float]:
+        """The absolute tolerance of each state."""
+        layouts = [unit.model.state_layout for unit in self._units.values() if unit.model.state_layout]
+        sizes = [v.quantity.nominal or 1.0 for layout in layouts for v in layout.variables]
+        return [max(1e-12, rtol * 1e-3 * size) for size in sizes]
+
+    def start(self, t: float) -> list[float]:
+        """States at the start. Where one depends on an input that is another model's state, a pass for each on the
+        way."""
+        known = dict(zip(self._outside, self._inputs(t), strict=True))
+        x: list[float] = []
+        for _ in range(len(self._units) + 1):
+            before, x = x, []
+            for name, unit in self._units.items():
+                if unit.model.state_layout:
+                    given = {
+                        v: known[self._sources.get(f"{name}.{v}", f"{name}.{v}")]
+                        for v in unit.model.input_layout.names
+                        if self._sources.get(f"{name}.{v}", f"{name}.{v}") in known
+                    }
+                    u = unit.model.input_layout.from_names(given)
+                    x += unit.model.state_layout.values(unit.model.start(MATH, unit.p, u))
+            known |= zip(self.states, x, strict=True)
+            outputs = self._all(self._inputs(t), x).full().ravel()
+            known |= zip(self._outputs, map(float, outputs), strict=True)
+            if x == before:
+                break
+        return x
+
+    def dataset(self, times: Any, states: Any) -> xr.Dataset:
+        """All states and outputs; `states` have the shape (states, times)."""
+        outside = [np.broadcast_to(u, times.shape) for u in self._inputs(times)]
+        outputs = np.asarray(self._all(np.array(outside).reshape(-1, len(times)), states))
+        described = {
+            f"{name}.{v.name}": v
+            for name, unit in self._units.items()
+            for layout in (unit.model.state_layout, unit.model.parts[0].layout)
+            if layout
+            for v in layout.variables
+        }
+        rows = [*zip(self.states, states, strict=True), *zip(self._outputs, outputs, strict=True)]
+        variables = {
+            full: ("time", row, {"units": described[full].unit, "long_name": described[full].description})
+            for full, row in rows
+        }
+        return xr.Dataset(variables, {"time": ("time", times, {"units": "s", "long_name": "time"})})

@@ -1,7 +1,12 @@
-"""Loads and references over time."""
+"""Loads and references over time.
+
+A signal is a number, or a function of the time [s]. Where it jumps or bends it says so by an attribute `corners`, the
+times of that: a solver stops there.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -58,3 +63,32 @@ class Profile:
     def corners(self) -> list[float]:
         """Times at which a change begins or ends."""
         return [x for at, duration, _ in self.changes for x in (at, at + duration)]
+
+
+@dataclass(frozen=True)
+class Jump:
+    """A value that is `before` up to the time `at` [s] and `after` behind it."""
+
+    at: float
+    before: float
+    after: float
+
+    def __call__(self, t: Any) -> Any:
+        """The value at time `t` (float or array)."""
+        value = np.where(np.asarray(t) > self.at, self.after, self.before)
+        return value if np.ndim(t) else float(value)
+
+    @property
+    def corners(self) -> list[float]:
+        """The time of the jump."""
+        return [self.at]
+
+
+def corners(signals: Iterable[Any]) -> list[float]:
+    """Times at which one of the signals jumps or bends [s], in order."""
+    return sorted({float(at) for signal in signals for at in getattr(signal, "corners", ())})
+
+
+def at_time(signal: Any, t: Any) -> Any:
+    """The value of a signal at the time `t` (float or array)."""
+    return signal(t) if callable(signal) else signal

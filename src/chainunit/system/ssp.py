@@ -9,10 +9,8 @@ connectors of the system itself: inputs that are not connected are left open, wi
 from __future__ import annotations
 
 import math
-import re
 import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
@@ -23,8 +21,8 @@ from ..fmu.backends import Backend
 from ..fmu.backends import export as export_fmu
 from ..fmu.description import Interface, Signal
 from ..fmu.pack import checked, pack, written
-from ..model import Model
 from ..quantities import base_units
+from .graph import ModelComponent, System
 
 PARAMETER_SET = "start"
 """Name of every component's parameter set: tools that choose sets by name apply all that share one."""
@@ -39,26 +37,12 @@ _NAMESPACES = {
 }
 
 
-@dataclass(frozen=True)
-class ModelSystem:
-    """What is packaged: a `chainunit.system.System` of models in place of files.
-
-    `models` maps instance names to models, `connections` are pairs (output, input) of full names such as
-    ``("motor.phi", "machine.phi")``, `start` holds start values of parameters and inputs by full name, in the
-    declared units; others start as declared. `name` and `description` are those of the whole.
-    """
-
-    name: str
-    models: Mapping[str, type[Model]]
-    connections: Sequence[tuple[str, str]]
-    start: Mapping[str, float] = field(default_factory=dict)
-    description: str = ""
-
-
 def export(
-    system: ModelSystem,
+    system: System,
     file: Path,
     *,
+    name: str = "System",
+    description: str = "",
     stop: float = 10.0,
     step: float = 1e-3,
     backend: Backend | None = None,
@@ -68,8 +52,9 @@ def export(
 
     Parameters
     ----------
-    system : models, connections, start values
+    system : components, of which all are models
     file : path of the package; a file there is replaced, in one step
+    name, description : of the whole
     stop, step : end of the default experiment, and its communication step, an annotation that libcosim reads [s]
     backend : of the FMUs, which are FMI 2.0; see `chainunit.fmu.backends.export`
     report : is told what is being done
@@ -77,17 +62,15 @@ def export(
     Raises
     ------
     InputError
-        for a name that is not in the system, an input with two sources, a connection of different units, start
-        values out of bounds or that make no machine, an experiment without end or step, and what
-        `chainunit.fmu.backends.export` refuses.
+        for a component that is an FMU of somebody else, start values out of bounds or that make no machine, an
+        experiment without end or step, and what `chainunit.fmu.backends.export` refuses.
     RunError
         where the compiler fails.
     """
     if not (0.0 < step < math.inf and 0.0 < stop < math.inf):
         raise InputError(f"an experiment of {stop:g} s in steps of {step:g} s: must go forward")
-    start = _start(system)
-    interfaces = {name: _interface(name, model, start[name]) for name, model in system.models.items()}
-    driven = _driven(system, interfaces)
+    interfaces = _interfaces(system)
+    driven = {target for _, target in system.connections}
     file = Path(file)
     folder(file.parent)
     contents: dict[str, bytes] = {}
@@ -95,70 +78,46 @@ def export(
     made: list[str] = []
     packed: dict[tuple[object, ...], str] = {}
     with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
-        for name, model in system.models.items():
-            alike = (model.name, *sorted(start[name].items()))
+        for component, interface in interfaces.items():
+            model, start = interface.model, _start(interface)
+            alike = (model, *sorted(start.items()))
             if alike not in packed:
                 source = f"resources/{model.name}.fmu"
-                packed[alike] = f"resources/{model.name}_{name}.fmu" if source in contents else source
+                packed[alike] = f"resources/{model.name}_{component}.fmu" if source in contents else source
                 fmu = Path(scratch) / f"{model.name}.fmu"
-                made.append(export_fmu(model, fmu, start[name], backend=backend, report=report))
+                made.append(export_fmu(model, fmu, start, backend=backend, report=report))
                 contents[packed[alike]] = fmu.read_bytes()
-            sources[name] = packed[alike]
-    for name, interface in interfaces.items():
-        free = [s for s in interface.of("input") if f"{name}.{s.name}" not in driven]
-        contents[_parameter_file(name)] = written(_parameter_set([*interface.of("parameter"), *free]))
-    contents["SystemStructure.ssd"] = written(_description(system, interfaces, sources, stop, step))
+            sources[component] = packed[alike]
+    for component, interface in interfaces.items():
+        free = [s for s in interface.of("input") if f"{component}.{s.name}" not in driven]
+        contents[_parameter_file(component)] = written(_parameter_set([*interface.of("parameter"), *free]))
+    structure = _description(system, interfaces, sources, (name, description), (stop, step))
+    contents["SystemStructure.ssd"] = written(structure)
     with whole(file) as part:
         pack(contents, part)
-    parts = ", ".join(f"{name} ({model.name})" for name, model in system.models.items())
+    parts = ", ".join(f"{component} ({i.model.name})" for component, i in interfaces.items())
     return f"SSP 1.0, {parts}, {len(system.connections)} connections; {'; '.join(dict.fromkeys(made))}"
 
 
-# -- checks
-
-
-def _start(system: ModelSystem) -> dict[str, dict[str, float]]:
-    """Start values by instance and name."""
-    split: dict[str, dict[str, float]] = {}
-    for name in system.models:
-        # these become names of files, and full names are cut at the first dot
-        if not re.fullmatch(r"[A-Za-z_]\w*", name, re.ASCII):
-            raise InputError(f"{name!r}: an instance's name must be of letters, digits and _")
-        split[name] = {}
-    for full, value in system.start.items():
+def _interfaces(system: System) -> dict[str, Interface]:
+    """The interface of each component with its start values."""
+    start: dict[str, dict[str, float]] = {name: {} for name in system.components}
+    for full, value in system.values.items():
         name, _, variable = full.partition(".")
-        known = system.models.get(name)
-        if known is None or variable not in (*known.parameter_layout.names, *known.input_layout.names):
-            raise InputError(f"{full}: no such parameter or input in the system")
-        split[name][variable] = float(value)
-    return split
+        start[name][variable] = float(value)
+    interfaces = {}
+    for name, component in system.components.items():
+        if not isinstance(component, ModelComponent):
+            raise InputError(f"{name} ({component.title}): is an FMU of somebody else, which is not packaged")
+        try:
+            interfaces[name] = checked(component.model, start[name])
+        except InputError as error:
+            raise InputError(f"{name}: {error}") from error
+    return interfaces
 
 
-def _interface(name: str, model: type[Model], start: Mapping[str, float]) -> Interface:
-    try:
-        return checked(model, start)
-    except InputError as error:
-        raise InputError(f"{name}: {error}") from error
-
-
-def _driven(system: ModelSystem, interfaces: Mapping[str, Interface]) -> dict[str, str]:
-    """Source of each connected input, by full names."""
-    units = {
-        kind: {f"{name}.{s.name}": s.variable.unit for name, i in interfaces.items() for s in i.of(kind)}
-        for kind in ("input", "output")
-    }
-    driven: dict[str, str] = {}
-    for source, target in system.connections:
-        for kind, full in (("output", source), ("input", target)):
-            if full not in units[kind]:
-                raise InputError(f"{full}: no such {kind} in the system")
-        if target in driven:
-            raise InputError(f"{target}: is connected to {driven[target]} and to {source}")
-        given, taken = units["output"][source], units["input"][target]
-        if base_units(given) != base_units(taken):
-            raise InputError(f"{source} in {given} cannot be connected to {target} in {taken}")
-        driven[target] = source
-    return driven
+def _start(interface: Interface) -> dict[str, float]:
+    return {s.name: float(s.start or 0.0) for s in (*interface.of("parameter"), *interface.of("input"))}
 
 
 # -- XML
@@ -196,40 +155,21 @@ def _parameter_set(signals: Sequence[Signal]) -> Element:
 
 
 def _description(
-    system: ModelSystem,
+    system: System,
     interfaces: Mapping[str, Interface],
     sources: Mapping[str, str],
-    stop: float,
-    step: float,
+    title: tuple[str, str],
+    experiment: tuple[float, float],
 ) -> Element:
-    """The XML tree of SystemStructure.ssd; `sources` are the FMUs' paths by instance."""
+    """The XML tree of SystemStructure.ssd; `sources` are the FMUs' paths by component, `title` is name and
+    description of the whole, `experiment` end and step [s]."""
     # a title may hold characters that XML cannot
-    described = "".join(c if c.isprintable() else " " for c in system.description)
-    root = _root("ssd:SystemStructureDescription", system.name, ("ssd", "ssc", "osp"), described)
-    top = SubElement(root, "ssd:System", name=system.name)
+    described = "".join(c if c.isprintable() else " " for c in title[1])
+    root = _root("ssd:SystemStructureDescription", title[0], ("ssd", "ssc", "osp"), described)
+    top = SubElement(root, "ssd:System", name=title[0])
     elements = SubElement(top, "ssd:Elements")
     for name, interface in interfaces.items():
-        component = SubElement(
-            elements,
-            "ssd:Component",
-            name=name,
-            description=interface.model.description,
-            type="application/x-fmu-sharedlibrary",
-            source=sources[name],
-            implementation="CoSimulation",
-        )
-        connectors = SubElement(component, "ssd:Connectors")
-        for s in interface.signals:
-            about = s.variable.description
-            node = SubElement(connectors, "ssd:Connector", name=s.name, description=about, kind=s.causality)
-            SubElement(node, "ssc:Real", unit=s.variable.unit)
-        bindings = SubElement(component, "ssd:ParameterBindings")
-        SubElement(
-            bindings,
-            "ssd:ParameterBinding",
-            type="application/x-ssp-parameter-set",
-            source=_parameter_file(name),
-        )
+        _component(elements, name, interface, sources[name])
     if system.connections:
         connections = SubElement(top, "ssd:Connections")
         for ends in system.connections:
@@ -243,9 +183,34 @@ def _description(
                 endConnector=entry,
             )
     _units(root, "ssd", [s for interface in interfaces.values() for s in interface.signals])
-    experiment = SubElement(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(float(stop)))
-    annotations = SubElement(experiment, "ssd:Annotations")
+    stop, step = (repr(float(x)) for x in experiment)
+    default = SubElement(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=stop)
+    annotations = SubElement(default, "ssd:Annotations")
     annotation = SubElement(annotations, "ssc:Annotation", type="com.opensimulationplatform")
     algorithm = SubElement(annotation, "osp:Algorithm")
-    SubElement(algorithm, "osp:FixedStepAlgorithm", baseStepSize=repr(float(step)))
+    SubElement(algorithm, "osp:FixedStepAlgorithm", baseStepSize=step)
     return root
+
+
+def _component(elements: Element, name: str, interface: Interface, source: str) -> None:
+    component = SubElement(
+        elements,
+        "ssd:Component",
+        name=name,
+        description=interface.model.description,
+        type="application/x-fmu-sharedlibrary",
+        source=source,
+        implementation="CoSimulation",
+    )
+    connectors = SubElement(component, "ssd:Connectors")
+    for s in interface.signals:
+        about = s.variable.description
+        node = SubElement(connectors, "ssd:Connector", name=s.name, description=about, kind=s.causality)
+        SubElement(node, "ssc:Real", unit=s.variable.unit)
+    bindings = SubElement(component, "ssd:ParameterBindings")
+    SubElement(
+        bindings,
+        "ssd:ParameterBinding",
+        type="application/x-ssp-parameter-set",
+        source=_parameter_file(name),
+    )

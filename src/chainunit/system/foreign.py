@@ -1,0 +1,185 @@
+"""FMUs of somebody else as components: a motor or a machine with the terminals that ours have.
+
+A *flange* is angle `phi` [rad], speed `w` [rad/s], acceleration `a` [rad/s2] and torque `tau` [N.m] of a shaft; a
+motor gives the motion and takes a *load*, a machine takes the motion and gives one. The load is torque at constant
+speed `tau_bias` and inertia `J` at the angle `phi0` and speed `w0`, with their slopes (`chainunit.ports`). What
+beyond torque and inertia an FMU leaves out is not connected: without the slopes the load is held constant over a
+step.
+
+Terminals come from the FMU's terminalsAndIcons.xml, where it has one, else from the names of its variables: `phi`,
+`w`, `a`, `tau`; `load.tau_bias` ... at a motor, `tau_bias` ... at a machine. Where its names are others, a mapping
+from ours to its own tells them. An FMU that leaves a unit out is taken to have ours."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, Literal
+from xml.etree import ElementTree
+
+from ..errors import InputError, printable
+from ..model import Terminal
+from ..ports import FLANGE, LOAD, LoadPort, flange, load_terminal
+from ..quantities import Layout, base_units
+from .graph import Connector, FmuComponent
+from .instance import Fmu, Kind
+
+Role = Literal["motor", "machine"]
+"""Which side of a shaft an FMU stands on."""
+
+_UNITS = {"phi": "rad", "w": "rad/s", "a": "rad/s2", "tau": "N.m"} | {
+    v.name: v.unit for v in Layout(LoadPort).variables
+}
+"""Unit of each member of a terminal."""
+_NEEDED = {FLANGE: ("phi", "w"), LOAD: ("tau_bias", "J")}
+_TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
+
+
+def fmu_component(
+    file: Path, names: Mapping[str, str] | None = None, *, kind: Kind = "Co-Simulation"
+) -> FmuComponent:
+    """An FMU with the terminals that it has.
+
+    Parameters
+    ----------
+    file : the FMU
+    names : of our names those that it calls otherwise, such as ``{"w": "speed"}``
+    kind : interface that is needed of it
+
+    Raises
+    ------
+    InputError
+        where it is no FMU 2.0 of that kind, a name is not in it, or the unit of a terminal's variable is not
+        ours.
+    """
+    names, file = dict(names or {}), Path(file)
+    fmu = Fmu(file, kind)
+    try:
+        real = [v for v in fmu.description.modelVariables if v.type == "Real"]
+        known = {v.name for v in real}
+        for name, theirs in names.items():
+            if theirs not in known:
+                raise InputError(f"{file}: has no variable {printable(theirs)}, which was given for {name}")
+        ours = {theirs: name for name, theirs in names.items()}
+        units = {unit.name: unit.baseUnit for unit in fmu.description.unitDefinitions}
+        connectors = {
+            name: Connector(name, v.causality, v.unit or "", _dimension(v.unit, units))
+            for v in real
+            if v.causality in ("parameter", "input", "output")
+            for name in [ours.get(v.name, v.name)]
+        }
+        terminals = _declared(file, ours) or _by_names(connectors)
+    finally:
+        fmu.close()
+    for terminal in terminals:
+        connectors |= _with_units(file, terminal, connectors)
+    return FmuComponent(file, connectors, {t.name: t for t in terminals}, names)
+
+
+def foreign_component(file: Path, role: Role, names: Mapping[str, str] | None = None) -> FmuComponent:
+    """An FMU that can stand in a system as its motor or its machine; see `fmu_component`.
+
+    Raises
+    ------
+    InputError
+        also where a variable is missing, or stands on the wrong side: in one line, with what to do.
+    """
+    found = fmu_component(file, names)
+    motor = role == "motor"
+    wanted = {"flange": FLANGE, "load": LOAD}
+    gives = {FLANGE: "output" if motor else "input", LOAD: "input" if motor else "output"}
+    for name, kind in wanted.items():
+        terminal = found.terminals.get(name)
+        prefix = "load." if kind == LOAD and motor else ""
+        for member in _NEEDED[kind]:
+            variable = terminal.members.get(member, "") if terminal else prefix + member
+            connector = found.connectors.get(variable)
+            called = found.names.get(variable, variable) or prefix + member
+            needs = f"a {role} needs the {gives[kind]} {prefix + member} in {_UNITS[member]}"
+            if connector is None:
+                raise InputError(
+                    f"{file}: has no variable {prefix + member}; {needs}, or a name for it among `names`"
+                )
+            if connector.causality != gives[kind]:
+                raise InputError(f"{file}: {called} is of the kind {connector.causality}; {needs}")
+    return found
+
+
+def _dimension(unit: str | None, definitions: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    """Powers of the base units, with the factor and offset to them where there are any; None where the unit is not
+    known."""
+    if not unit:
+        return None
+    definition = definitions.get(unit)
+    if definition is None:
+        try:
+            return base_units(unit)
+        except ValueError:
+            return None
+    powers = {base: getattr(definition, base) for base in ("kg", "m", "s", "A", "K", "mol", "cd", "rad")}
+    scale = {"factor": definition.factor, "offset": definition.offset}
+    plain = {"factor": 1.0, "offset": 0.0}
+    return {base: n for base, n in powers.items() if n} | {k: x for k, x in scale.items() if x != plain[k]}
+
+
+def _with_units(file: Path, terminal: Terminal, connectors: Mapping[str, Connector]) -> dict[str, Connector]:
+    """The terminal's variables with the units that they must have."""
+    checked = {}
+    for member, name in terminal.members.items():
+        unit, connector = _UNITS.get(member), connectors[name]
+        if unit is None:
+            continue
+        if connector.unit and connector.dimension != base_units(unit):
+            raise InputError(
+                f"{file}: {name} is in {printable(connector.unit)}; must be in {unit} to be joined"
+            )
+        checked[name] = Connector(name, connector.causality, unit, base_units(unit))
+    return checked
+
+
+def _by_names(connectors: Mapping[str, Connector]) -> list[Terminal]:
+    """Terminals, by the names of variables as ours have them."""
+    ends = {name for name, c in connectors.items() if c.causality != "parameter"}
+    found = []
+    for prefix in _prefixes(ends, _NEEDED[FLANGE]):
+        shaft = flange("outflow")
+        found.append(_of(ends, shaft, prefix.rstrip(".") or shaft.name, prefix))
+    prefixes = _prefixes(ends, _NEEDED[LOAD])
+    for prefix in prefixes:
+        # beside a load that it shows itself, the one that it takes is that of the machine behind it
+        name = "load" if prefix in ("", "load.") else prefix.rstrip(".")
+        if prefix == "load." and "" in prefixes:
+            name = "machine"
+        found.append(_of(ends, load_terminal(), name, prefix))
+    return found
+
+
+def _prefixes(names: Iterable[str], members: Iterable[str]) -> list[str]:
+    """What stands before the names of all `members` among the names."""
+    sets = [{n[: -len(m)] for n in names if n == m or n.endswith(f".{m}")} for m in members]
+    return sorted(set.intersection(*sets))
+
+
+def _of(ends: Iterable[str], like: Terminal, name: str, prefix: str) -> Terminal:
+    """A terminal as `like`, of the members that there are."""
+    members = {m: prefix + m for m in like.members if prefix + m in ends}
+    return Terminal(name, like.kind, like.description, members)
+
+
+def _declared(file: Path, ours: Mapping[str, str]) -> list[Terminal]:
+    """The terminals of our kinds that an FMU declares, if it declares any."""
+    with zipfile.ZipFile(file) as archive:
+        if _TERMINALS not in archive.namelist():
+            return []
+        root = ElementTree.fromstring(archive.read(_TERMINALS))
+    found = []
+    for node in root.iter("Terminal"):
+        kind, name = node.get("terminalKind", ""), node.get("name", "")
+        if kind in (FLANGE, LOAD):
+            members = {
+                m.get("memberName", ""): ours.get(m.get("variableName", ""), m.get("variableName", ""))
+                for m in node.iter("TerminalMemberVariable")
+            }
+            found.append(Terminal(name, kind, node.get("description", ""), members))
+    return found

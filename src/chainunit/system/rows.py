@@ -1,0 +1,96 @@
+"""The rows of a run, in memory or in a file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..files import netcdf
+from .instance import Instance
+
+Recorder = tuple[Instance, Any, list[str]]
+"""An instance, the handle of what is kept of it, and the full names of that."""
+BLOCK = 4096
+"""Rows that are written to a file at a time."""
+
+
+class Rows:
+    """The rows of a run: in memory, or in a NetCDF file that takes a block of them at a time."""
+
+    def __init__(self, recorders: Sequence[Recorder], room: int, file: Path | None) -> None:
+        self._recorders = recorders
+        self._names = [name for _, _, names in recorders for name in names]
+        self._values = np.empty((1 + len(self._names), room))
+        self._filled = self._written = 0
+        self._file = None if file is None else self._create(file)
+
+    def __enter__(self) -> Rows:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._file is not None:
+            try:
+                if kind is None:
+                    self._flush()
+            finally:
+                with netcdf():
+                    self._file.close()
+
+    def add(self, time: float) -> None:
+        """Keep the present values as the row of the instant `time`."""
+        if self._filled == self._values.shape[1]:
+            self._flush()
+        row = self._values[:, self._filled]
+        row[0] = time
+        at = 1
+        for instance, handle, names in self._recorders:
+            row[at : at + len(names)] = instance.read(handle)
+            at += len(names)
+        self._filled += 1
+
+    def _attributes(self) -> dict[str, dict[str, str]]:
+        """Units and descriptions, of the time first."""
+        described = {"time": {"units": "s", "long_name": "time"}}
+        for instance, _, names in self._recorders:
+            for full in names:
+                declared = instance.fmu.variables[full.partition(".")[2]]
+                described[full] = {"units": declared.unit or "1", "long_name": declared.description or full}
+        return described
+
+    def _create(self, file: Path) -> Any:
+        import netCDF4
+
+        with netcdf():
+            out = netCDF4.Dataset(file, "w")
+            out.createDimension("time", None)
+            for name, attributes in self._attributes().items():
+                variable = out.createVariable(name, "f8", ("time",), chunksizes=(BLOCK,))
+                variable.setncatts(attributes)
+                # by itself the library keeps megabytes of each variable
+                variable.set_var_chunk_cache(size=8 * BLOCK, nelems=3, preemption=1.0)
+        return out
+
+    def _flush(self) -> None:
+        assert self._file is not None
+        end = self._written + self._filled
+        with netcdf():
+            for values, variable in zip(self._values, self._file.variables.values(), strict=True):
+                variable[self._written : end] = values[: self._filled]
+            self._file.sync()
+        self._written, self._filled = end, 0
+
+    def dataset(self) -> xr.Dataset:
+        """What is in memory. Its variables share it."""
+        rows = {
+            name: ("time", values[: self._filled], attributes)
+            for values, (name, attributes) in zip(self._values, self._attributes().items(), strict=True)
+        }
+        time = rows.pop("time")
+        return xr.Dataset(rows, {"time": time})

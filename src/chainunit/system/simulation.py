@@ -1,0 +1,426 @@
+"""What every run of a system of FMUs has, whoever takes the steps: set-up, transfer of values, rows, branches.
+
+At each communication point the connected variables are transferred in the order that the FMUs' true dependencies
+allow (states first, then what follows from them), so that every recorded row belongs to one instant.
+"""
+
+from __future__ import annotations
+
+import math
+import signal
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from types import TracebackType
+from typing import Any, ClassVar, Self
+
+import numpy as np
+import xarray as xr
+
+from ..errors import InputError, InterruptedRunError, RunError
+from ..files import whole
+from . import rows
+from .graph import FmuComponent, System, direct_inputs, ordered
+from .instance import Fmu, Instance, Kind
+from .signals import Profile, at_time
+
+Progress = Callable[[float], None]
+"""Called with the simulated time [s] now and then."""
+
+
+@contextmanager
+def stoppable() -> Iterator[Callable[[], bool]]:
+    """Whether Ctrl-C was pressed, asked between steps: a KeyboardInterrupt inside an FMU would be a fatal error. So
+    it is with SIGTERM, where somebody handles it by a KeyboardInterrupt. The KeyboardInterrupt of which nobody was
+    told, since nobody asked any more, comes at the end."""
+    caught: list[KeyboardInterrupt] = []
+    told: list[bool] = []
+    if threading.current_thread() is not threading.main_thread():
+        yield lambda: False
+        return
+
+    def later(number: int, frame: Any) -> None:
+        try:
+            previous[number](number, frame)
+        except KeyboardInterrupt as error:
+            caught.append(error)
+
+    def stopped() -> bool:
+        told.extend([True] * len(caught))
+        return bool(told)
+
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    previous: dict[int, Any] = {number: handler for number, handler in handlers.items() if callable(handler)}
+    for number in previous:
+        signal.signal(number, later)
+    try:
+        yield stopped
+    finally:
+        for number, handler in previous.items():
+            signal.signal(number, handler)
+        if caught and not told:
+            raise caught[0]
+
+
+class Simulation(ABC):
+    """A running system of FMUs; use it as a context manager.
+
+    Parameters
+    ----------
+    system : a system whose components all have an FMU; see `chainunit.system.export`
+    signals : by full name of an input, a number or a function of time; see `chainunit.system.signals`
+    start_time : [s]
+
+    Raises
+    ------
+    InputError
+        for a component without FMU, a signal that names no input, and for an algebraic loop, which is named.
+    RunError
+        where an FMU refuses to start.
+    """
+
+    kind: ClassVar[Kind]
+    instances: ClassVar[type[Instance]]
+
+    def __init__(
+        self, system: System, signals: Mapping[str, Any] | None = None, start_time: float = 0.0
+    ) -> None:
+        self.system, self.time = system, start_time
+        self.signals = dict(signals or {})
+        self._fmus: dict[str, Fmu] = {}
+        self._instances: dict[str, Any] = {}
+        self._state: dict[str, Any] = {}
+        self._journal: list[str] = []
+        try:
+            self._open()
+            self._transfers = self._schedule()
+            self._initialize()
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Free every instance and the unpacked files."""
+        for name, instance in self._instances.items():
+            if name in self._state:
+                instance.forget(self._state[name])
+            instance.close()
+        for fmu in self._fmus.values():
+            fmu.close()
+        self._instances, self._fmus, self._state = {}, {}, {}
+
+    # -- set-up
+
+    def _open(self) -> None:
+        """Unpack the FMUs, each file once, and instantiate the components."""
+        opened: dict[Any, Fmu] = {}
+        for name, component in self.system.components.items():
+            if component.file is None:
+                raise InputError(f"{name} ({component.title}): has no FMU yet; export the system first")
+            names = component.names if isinstance(component, FmuComponent) else {}
+            key = (component.file, *sorted(names.items()))
+            if key not in opened:
+                opened[key] = Fmu(component.file, self.kind, names)
+                for variable in opened[key].variables.values():
+                    connector = component.connectors.get(variable.name)
+                    variable.unit = variable.unit or (connector.unit if connector else None)
+            self._fmus[name] = opened[key]
+            self._instances[name] = self.instances(opened[key], name, self._journal)
+
+    def _schedule(self) -> list[tuple[Instance, Any, list[tuple[Instance, Any, list[int]]]]]:
+        """Groups of connected outputs in an order in which each is final when it is read: of each the instance, the
+        handle, and the inputs that they go to."""
+        direct = {
+            name: direct_inputs(component, self._fmus[name].feedthrough())
+            for name, component in self.system.components.items()
+        }
+        transfers = []
+        for name, outputs in ordered(self.system.connections, direct):
+            targets: dict[str, list[tuple[str, int]]] = {}
+            for source, target in self.system.connections:
+                giver, _, output = source.partition(".")
+                taker, _, variable = target.partition(".")
+                if giver == name and output in outputs:
+                    targets.setdefault(taker, []).append((variable, outputs.index(output)))
+            inputs = [
+                (
+                    self._instances[taker],
+                    self._instances[taker].handle([v for v, _ in pairs]),
+                    [i for _, i in pairs],
+                )
+                for taker, pairs in targets.items()
+            ]
+            transfers.append((self._instances[name], self._instances[name].handle(outputs), inputs))
+        return transfers
+
+    def _initialize(self) -> None:
+        start: dict[str, dict[str, float]] = {name: {} for name in self._instances}
+        for full, value in self.system.values.items():
+            name, _, variable = full.partition(".")
+            start[name][variable] = value
+        for name, instance in self._instances.items():
+            instance.initialize(start[name], self.time)
+        for instance, handle, values in self._signal_values(np.array([self.time])):
+            instance.write(handle, values[0].tolist())
+        self._transfer()
+        for instance in self._instances.values():
+            instance.finish_initialization()
+
+    # -- values
+
+    def _by_instance(self, fulls: Iterable[str]) -> dict[str, list[str]]:
+        """Full names, by the component that they belong to."""
+        split: dict[str, list[str]] = {}
+        for full in fulls:
+            split.setdefault(full.partition(".")[0], []).append(full)
+        return split
+
+    def _handles(self, fulls: Iterable[str]) -> list[tuple[Instance, Any, list[str]]]:
+        """Instances, handles and full names, by component."""
+        return [
+            (
+                self._instances[name],
+                self._instances[name].handle([full.partition(".")[2] for full in own]),
+                own,
+            )
+            for name, own in self._by_instance(fulls).items()
+        ]
+
+    def _driven(self) -> list[tuple[Instance, Any, list[str]]]:
+        """Handles of the inputs that have signals."""
+        connected = {target for _, target in self.system.connections}
+        for full in self.signals:
+            self.system.connector(full, "input")
+            if full in connected:
+                raise InputError(f"{full}: is connected, it cannot have a signal")
+        return self._handles(self.signals)
+
+    def _signal_values(self, times: Any) -> list[tuple[Instance, Any, Any]]:
+        """The signals at `times`, shape (n,): of each instance a handle and a table (n, signals)."""
+
+        def column(given: Any) -> Any:
+            if callable(given) and not isinstance(given, Profile):
+                return [given(float(t)) for t in times]
+            return np.broadcast_to(at_time(given, times), len(times))
+
+        return [
+            (
+                instance,
+                handle,
+                np.stack([np.asarray(column(self.signals[full]), float) for full in names], axis=1),
+            )
+            for instance, handle, names in self._driven()
+        ]
+
+    def _transfer(self) -> None:
+        for source, outputs, targets in self._transfers:
+            values = source.read(outputs)
+            for target, inputs, order in targets:
+                target.write(inputs, [values[i] for i in order])
+
+    # -- running
+
+    @abstractmethod
+    def _begin(self, stop: float) -> None:
+        """Make all values consistent at the present time, from which a run to the time `stop` goes on."""
+
+    @abstractmethod
+    def _steps(self, times: Any) -> Iterator[None]:
+        """Go from the first of the `times` to each other one, with all values consistent there."""
+
+    def run(
+        self,
+        stop: float,
+        step: float,
+        progress: Progress | None = None,
+        *,
+        guards: Mapping[str, float] | None = None,
+        every: int = 1,
+        names: Iterable[str] | None = None,
+        file: Path | None = None,
+    ) -> xr.Dataset:
+        """Simulate to the time `stop` [s] with the communication step `step` [s].
+
+        Parameters
+        ----------
+        stop, step : [s]
+        progress : is called with the simulated time now and then
+        guards : limits by full name of an output: where its size passes the limit at the end of a step, the run ends
+            with that row
+        every : each so many rows one is kept, beside the first and the last
+        names : full names of the outputs and driven inputs that are kept; all by default
+        file : a NetCDF file that the rows are written to as they come; then of a row no more than its time stays in
+            memory
+
+        Returns
+        -------
+        every output and connected or driven input, or those of `names`, over the dimension ``time``, with units and
+        descriptions; of a `file` a Dataset that reads from it when asked (close it at the end). A further call goes
+        on from where this one ended.
+
+        Raises
+        ------
+        InputError
+            for a run that does not go forward, and for a name that cannot be watched or kept.
+        RunError
+            where an FMU fails; its attribute ``partial`` holds the Dataset up to there.
+        WriteError
+            where the `file` cannot be written.
+        """
+        start = self.time
+        if not (0.0 < step < math.inf) or not start < stop < math.inf:
+            raise InputError(
+                f"a run from t = {start:g} to {stop:g} s in steps of {step:g} s: must go forward"
+            )
+        if every < 1 or every != int(every):
+            raise InputError(f"every = {every:g}: must be a whole number >= 1")
+        n = max(1, math.ceil((stop - start) / step - 1e-9))
+        recorders, watched = self._recorders(names), self._watched(guards or {})
+        room = n // every + 2 if file is None else rows.BLOCK
+        failure: RunError | None = None
+        try:
+            with (
+                stoppable() as stopped,
+                nullcontext() if file is None else whole(file) as part,
+                rows.Rows(recorders, room, part) as kept,
+            ):
+                said = _Said(self._journal)
+                try:
+                    self._record(kept, stop, step, n, every, watched, progress, stopped, said)
+                except RunError as error:
+                    failure = said.explained(error)
+        except KeyboardInterrupt:
+            # after the last step: the rows are there
+            if self.time == start:
+                raise
+            failure = self._interrupted()
+        run = kept.dataset() if file is None else xr.open_dataset(file, decode_times=False)
+        if failure is not None:
+            failure.partial = run
+            raise failure
+        if progress:
+            progress(self.time)
+        return run
+
+    def _record(
+        self,
+        kept: rows.Rows,
+        stop: float,
+        step: float,
+        n: int,
+        every: int,
+        watched: Sequence[tuple[Instance, Any, list[float]]],
+        progress: Progress | None,
+        stopped: Callable[[], bool],
+        said: _Said,
+    ) -> None:
+        """Take `n` steps, or fewer where a guard or an interrupt ends the run."""
+        start, often, done = self.time, max(1, n // 200), 0
+        self._begin(stop)
+        kept.add(start)
+        said.step()
+        for first in range(0, n, rows.BLOCK):
+            # the last step is shorter where the end is no multiple of the step
+            times = np.minimum(start + step * np.arange(first, min(first + rows.BLOCK, n) + 1), stop)
+            for _ in self._steps(times):
+                done += 1
+                passed = any(
+                    abs(value) > limit
+                    for instance, handle, limits in watched
+                    for value, limit in zip(instance.read(handle), limits, strict=True)
+                )
+                interrupted = stopped()
+                ended = passed or interrupted or done == n
+                if ended or done % every == 0:
+                    kept.add(self.time)
+                if progress and done % often == 0:
+                    progress(self.time)
+                if interrupted:
+                    raise self._interrupted()
+                if ended:
+                    return
+                said.step()
+
+    def _interrupted(self) -> InterruptedRunError:
+        return InterruptedRunError(f"interrupted at t = {self.time:g} s")
+
+    def _recorders(self, names: Iterable[str] | None) -> list[rows.Recorder]:
+        """What is kept of each instance, in declared order."""
+        there: list[str] = []
+        for name, fmu in self._fmus.items():
+            driven = sorted(full for full in self.signals if full.startswith(f"{name}."))
+            there += [*(f"{name}.{v}" for v in fmu.outputs()), *driven]
+        if names is not None:
+            wanted = set(names)
+            for full in sorted(wanted - set(there)):
+                raise InputError(f"{full}: cannot be kept; must be an output or an input with a signal")
+            there = [full for full in there if full in wanted]
+        return self._handles(there)
+
+    def _watched(self, guards: Mapping[str, float]) -> list[tuple[Instance, Any, list[float]]]:
+        """Handles and limits of what is watched, by instance."""
+        for full in guards:
+            self.system.connector(full, "output")
+        return [
+            (instance, handle, [guards[full] for full in names])
+            for instance, handle, names in self._handles(guards)
+        ]
+
+    # -- branching
+
+    def save(self) -> float:
+        """Keep the present state of every FMU, in place of the one kept before; returns the time.
+
+        Raises
+        ------
+        InputError
+            where an FMU cannot give its state.
+        """
+        for name, fmu in self._fmus.items():
+            if not fmu.interface.canGetAndSetFMUstate:
+                raise InputError(
+                    f"{name} ({fmu.file.name}): cannot save its state (canGetAndSetFMUstate), so that no event can "
+                    "branch from steady running; ask its maker for an FMU that can"
+                )
+        for name, instance in self._instances.items():
+            if name in self._state:
+                instance.forget(self._state[name])
+            self._state[name] = instance.state()
+        self._saved_at = self.time
+        return self.time
+
+    def restore(self) -> None:
+        """Return to the state that `save` kept, from which another branch can run."""
+        for name, instance in self._instances.items():
+            instance.restore(self._state[name])
+        self.time = self._saved_at
+
+
+class _Said:
+    """What FMUs say in the course of a run, to explain its failure: the call that fails may only pass on what another
+    FMU complained of before, or while the values for its step were set."""
+
+    def __init__(self, journal: Sequence[str]) -> None:
+        self._journal = journal
+        self._first = self._last = 0
+
+    def step(self) -> None:
+        """A step begins."""
+        self._first, self._last = self._last, len(self._journal)
+
+    def explained(self, error: RunError) -> RunError:
+        """The error with the first complaint since the step before."""
+        hint = f" (before: {self._journal[self._first]})" if len(self._journal) > self._first + 1 else ""
+        failure = type(error)(f"{error}{hint}")
+        failure.__cause__ = error
+        return failure
