@@ -15,14 +15,12 @@ from chainunit.errors import InputError, WriteError
 from chainunit.files import LOCK, claimed, folder, whole
 
 SHORT = """
-events = []
+event = []
 [run]
 ramp = 0.3
 turns = 1
 step = 0.004
 crank_speed = 6
-[overload]
-turns = 1
 [machine]
 ratio = 25
 """
@@ -140,16 +138,16 @@ def test_a_full_disk_is_named_and_costs_no_more_than_the_file(tmp_path):
         """
         import resource, sys
         from chainunit.cli import main
-        from chainunit.studies import overload
+        from chainunit.studies import run
 
-        study = overload.run_study
+        study = run.run_study
 
         def then_full(*args, **options):
             done = study(*args, **options)
             resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, resource.RLIM_INFINITY))
             return done
 
-        overload.run_study = then_full
+        run.run_study = then_full
         sys.argv = ["chainunit", "study", "short.toml", "-o", "out"]
         main()
         """,

@@ -111,17 +111,18 @@ def test_titles_are_harmless_wherever_they_go():
     from chainunit.report.trace import markdown_text
     from chainunit.studies import driveline, knife
     from chainunit.studies.drive import Drive
-    from chainunit.studies.overload import Study
+    from chainunit.studies.limits import statics
+    from chainunit.studies.study import Study
 
     for module in (config, driveline, knife):
         parsed = module.parse(f"title = {toml_text(EVIL)}")
         assert harmless(parsed.title) and "\n" not in parsed.title
         shown_in_markdown = markdown_text(parsed.title)
         assert not re.search(r"(?<!\\)[<>\[\]|`*_]", shown_in_markdown)
-    study = Study(config.parse(f"title = {toml_text(EVIL)}"), None)
+    given = config.parse(f"title = {toml_text(EVIL)}")
+    drive = Drive(config.DcMotor, given.motor, given.machine)
+    study = Study(given, drive, statics(given, drive))
     out = io.StringIO()
-    study.drive = Drive(config.DcMotor, study.config.motor, study.config.machine)
-    study.answers = {}
     table.show(study, Console(file=out, markup=False, width=200))
     assert harmless(out.getvalue())
     assert "\\<script\\>" in line_page.markdown_text(EVIL)

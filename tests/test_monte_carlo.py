@@ -31,13 +31,10 @@ ramp = 0.3
 [monte_carlo]
 runs = {runs}
 duration = 0.5
-force_low = 4000
-force_high = 9000
+event = {{ force = [4000, 9000], duration = 0.1 }}
 [coupling]
 trip_torque = 500
 scatter = 0.2
-[overload]
-jam_duration = 0.1
 """
 # alone in a process, as workers are started anew
 SCRIPT = """
@@ -114,8 +111,9 @@ def test_a_row_is_what_its_number_says(killed):
         simulation.save()
         for number in (7, 3, 20):
             got = monte_carlo.Layout(monte_carlo.Sample).named(monte_carlo.one(task, number, simulation))
-            side = monte_carlo.draw(config, number).side
-            assert {"run": number, "side": side, "failed": None, **got} == before[number]
+            drawn = monte_carlo.draw(config, number)
+            row = {"run": number, "side": drawn.event.side, "drawn": drawn.values, "failed": None}
+            assert {**row, **got} == before[number]
 
 
 def test_answers_hang_together(killed):
@@ -123,7 +121,7 @@ def test_answers_hang_together(killed):
     assert 0.0 < sum(row["trips"] for row in rows) < len(rows)
     for row in rows:
         assert (row["crank_torque_peak"] > row["trip_torque"]) == bool(row["trips"])
-        assert 4000.0 <= row["force"] <= 9000.0
+        assert 4000.0 <= row["drawn"]["force"] <= 9000.0
     assert {row["side"] for row in rows} == {"left", "right"}
     result = monte_carlo.MonteCarloResult(rows, killed[0], 0)
     sides = {side: runs["value"] for side, runs in result.as_dict()["sides"].items()}
@@ -165,7 +163,7 @@ class Still:
     def restore(self):
         pass
 
-    def run(self, stop, step, guards=None):
+    def run(self, stop, step, progress=None, *, guards=None):
         raise RunError("seen")
 
 
@@ -181,12 +179,12 @@ def test_the_lump_comes_on_the_side_of_its_number(number):
     assert drawn == monte_carlo.draw(parse(STUDY.format(runs=99)), number)
     with pytest.raises(RunError, match="seen"):
         monte_carlo.one(task, number, simulation)
-    feed, middle = {"left": 100.0, "right": 700.0}, config.overload.jam_rise + 0.05
+    feed, lump = {"left": 100.0, "right": 700.0}, drawn.event.p
     for side, normal in feed.items():
         force = simulation.signals[f"machine.{side}.processing_force"]
-        if side == drawn.side:
-            assert force(0.0) == normal
-            assert force(1.0 + drawn.offset + middle) == pytest.approx(normal + drawn.force)
+        if side == drawn.event.side:
+            assert force(0.0) == normal and lump.force == drawn.values["force"]
+            assert force(1.0 + drawn.offset + lump.rise + 0.05) == pytest.approx(normal + lump.force)
         else:
             assert force == normal
 
@@ -194,12 +192,15 @@ def test_the_lump_comes_on_the_side_of_its_number(number):
 def test_lumps_come_on_both_sides_alike_often_and_by_the_seed():
     config = parse(STUDY.format(runs=10))
     drawn = [monte_carlo.draw(config, k) for k in range(2000)]
-    left = [d for d in drawn if d.side == "left"]
+    left = [d.event for d in drawn if d.event.side == "left"]
     assert abs(len(left) - 1000) < 4.0 * math.sqrt(500.0)
     # the side does not depend on how hard the lump is
-    assert abs(sum(d.force for d in left) / len(left) - 6500.0) < 4.0 * 5000.0 / math.sqrt(12.0 * len(left))
+    assert abs(sum(event.p.force for event in left) / len(left) - 6500.0) < 4.0 * 5000.0 / math.sqrt(
+        12.0 * len(left)
+    )
     other = parse(STUDY.format(runs=10).replace("[monte_carlo]", "[monte_carlo]\nseed = 2"))
-    assert [d.side for d in drawn[:50]] != [monte_carlo.draw(other, k).side for k in range(50)]
+    sides = [monte_carlo.draw(other, k).event.side for k in range(50)]
+    assert [d.event.side for d in drawn[:50]] != sides
 
 
 def test_lumps_come_anywhere_in_a_turn(killed):
@@ -248,7 +249,8 @@ def test_a_run_that_fails_is_a_row(killed, monkeypatch):
 
 def line(number, **changed):
     good = dict.fromkeys(monte_carlo.Layout(monte_carlo.Sample).names, 1.0)
-    return json.dumps({"run": number, "side": "left", "failed": None, **good, **changed}).encode()
+    row = {"run": number, "side": "left", "drawn": {"force": 1.0}, "failed": None}
+    return json.dumps({**row, **good, **changed}).encode()
 
 
 BAD = {
@@ -258,15 +260,17 @@ BAD = {
     "[]": b"[]",
     "no text": b"\xff",
     "no text in a text": line(3, failed="\x01").replace(b"\\u0001", b"\xff"),
-    "not a number": line(3, force=math.nan),
-    "infinite": line(3, force=math.inf),
+    "not a number": line(3, event=math.nan),
+    "infinite": line(3, event=math.inf),
+    "drawn is not a number": line(3, drawn={"force": math.nan}),
+    "drawn is no table": line(3, drawn=1.0),
     "run -1": line(-1),
     "run 0.5": line(0.5),
     "run true": line(True),
     "no run": line(3).replace(b'"run"', b'"ran"'),
-    "a value missing": line(3).replace(b'"force": 1.0, ', b""),
-    "null in a run that did not fail": line(3, force=None),
-    "text": line(3, force="1.0"),
+    "a value missing": line(3).replace(b'"event": 1.0, ', b""),
+    "null in a run that did not fail": line(3, event=None),
+    "text": line(3, event="1.0"),
     "no side": line(3, side="middle"),
     "the side missing": line(3).replace(b'"side": "left", ', b""),
     "unknown key": line(3, what=1.0),
@@ -289,7 +293,7 @@ def test_rows_of_one_number(tmp_path):
     """Twice the same is one row; two that differ are none."""
     file = tmp_path / "rows.jsonl"
     file.write_bytes(
-        b"\n".join([line(1), line(1), line(2), line(2, force=7.0), line(3), b'{"run": 4, "crank'])
+        b"\n".join([line(1), line(1), line(2), line(2, event=7.0), line(3), b'{"run": 4, "crank'])
     )
     rows, left_out = monte_carlo.read(file)
     assert sorted(rows) == [1, 3] and left_out == 3

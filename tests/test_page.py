@@ -14,6 +14,7 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from event_tables import event_line
 from rich.console import Console
 
 from chainunit import EMPTY, RunError, config
@@ -24,24 +25,23 @@ from chainunit.report import interactive, motion, page, plots, table
 from chainunit.report.trace import at
 from chainunit.studies.chain import rest_forces
 from chainunit.studies.cycle import cycle
-from chainunit.studies.overload import as_dict, run_study
+from chainunit.studies.result import as_dict
+from chainunit.studies.run import run_study
 from chainunit.text import digits_text, shown, unit_text
 from chainunit.text import number as told_as
 
 SHORT = """
 title = "A mill <b>& more</b> </script><!--"
-events = ["feed_left", "jam_left"]
+EVENTS
 [run]
 ramp = 0.3
 settle_turns = 1
 turns = 1
 step = 0.004
 crank_speed = 6
-[overload]
-turns = 1
 [machine]
 ratio = 25
-"""
+""".replace("EVENTS", event_line("feed_left", "jam_left", turns=1))
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +57,9 @@ def written(study, tmp_path_factory):
 @pytest.fixture(scope="module")
 def chains(tmp_path_factory):
     """Rods go slack at the study's own speed and at the higher end of the sweep."""
-    text = 'organ = "chain"\n' + SHORT.replace('"feed_left", "jam_left"', '"jam_left"').replace("= 6", "= 10")
+    text = 'organ = "chain"\n' + SHORT.replace("= 6", "= 10").replace(
+        event_line("feed_left", "jam_left", turns=1), event_line("jam_left", turns=1)
+    )
     few = "[chain]\nsweep_points = 2\nsweep_lowest = 2\nsweep_highest = 12\n"
     return run_study(config.parse(text + few), tmp_path_factory.mktemp("chains"))
 
@@ -190,12 +192,13 @@ def test_every_number_is_traced_to_result_json(study, written):
     for run, answers in result["answers"].items():
         assert {f"answers.{run}.{a}" for a, entry in answers.items() if entry["value"] is not None} <= paths
     factors = (f"overload_factors.{side}" for side in result["overload_factors"])
-    for section in ("machine", "motor", "feed", "run", "overload", "limits", *factors):
+    events = (f"event.{name}" for name in result["event"])
+    for section in ("machine", "motor", "feed", "run", *events, "limits", *factors):
         wanted = {f"{section}.{n}" for n, e in at(result, section).items() if isinstance(e, dict)}
         assert wanted <= paths, section
     for path in ("answers.steady.crank_torque_peak", "certificate.jam_left.energy_residual_share"):
         assert path in paths
-    said = {f"{name}.{i}" for name in ("notes", "warnings") for i in range(len(result[name]))}
+    said = {f"{name}.{i}.text" for name in ("notes", "warnings") for i in range(len(result[name]))}
     assert said | {"verdict.model.text", "verdict.motor.text"} <= {w["data-path"] for w in reader.words}
     # what is not traced holds no number, but for the names of pins
     for section in ("header", "answer", "runs", "plots"):
@@ -314,8 +317,8 @@ def test_the_verdict_comes_first_everywhere(study, written):
         assert reason["value"]["value"] == getattr(run, name) < 0.0
     lines = said_of(study).splitlines()
     assert lines[:2] == [verdict["model"]["text"], verdict["motor"]["text"]]
-    assert sum("pushed" in line for line in study.warnings) == 1
-    assert not any("pull" in line for line in study.notes)
+    assert sum("pushed" in warning.text for warning in study.warnings) == 1
+    assert not any("pull" in note.text for note in study.notes)
     text = written.read_text("utf-8")
     answer = text[text.index('<section id="answer"') :]
     assert (
@@ -387,11 +390,12 @@ def test_what_does_not_act_is_not_given(study):
 
 
 def test_the_speeds_at_which_a_web_goes_slack_are_a_sentence(study):
-    limits = dataclasses.replace(study.limits, slack_speed=0.0, slack_speed_empty=4.64, chain_resonance=5.0)
+    slack = {"slack_speed": 0.0, "slack_speed_empty": 4.64, "chain_resonance": 5.0}
+    limits = dataclasses.replace(study.statics.limits, **slack)
     assert (
         "With this feed, a web is slack at rest; empty, a web first goes slack at 4.64 rad/s of the crank; the "
         "lowest mode of a chain lies near 5.00 rad/s."
-    ) in said_of(dataclasses.replace(study, limits=limits))
+    ) in said_of(dataclasses.replace(study, statics=dataclasses.replace(study.statics, limits=limits)))
 
 
 def test_a_motor_that_sizing_found_insufficient_is_not_praised(study, monkeypatch):
@@ -589,9 +593,8 @@ def test_chains_stand_beside_two_bars(chains, tmp_path):
     assert slack and {rod["rod"] for rod in slack} <= {
         f"{bar} {k}" for bar in ("wall", "web") for k in range(9)
     }
-    assert any(
-        note.startswith("Chains: the crank speed lies among those to avoid") for note in result["warnings"]
-    )
+    (avoid,) = (warning for warning in result["warnings"] if warning["kind"] == "speed to avoid")
+    assert avoid["text"].startswith("Chains: the crank speed lies among those to avoid")
 
     text = page.render(chains, result)
     reader = Reader(text)

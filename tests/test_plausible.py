@@ -46,7 +46,10 @@ def test_what_has_a_lower_bound_has_an_upper_one(name):
             "[feed]\nleft = { processing_force = 1e308 }",
             "feed.left.processing_force = 1e+308 N: must be >= 0 N and",
         ),
-        ("[overload]\njam_force = 1e15", "overload.jam_force = 1e+15 N: must be >= 0 N and <= 1e+08 N"),
+        (
+            "event = [{ type = 'jam', side = 'left', force = 1e15 }]",
+            "event.jam_left.force = 1e+15 N: must be >= 0 N and <= 1e+08 N",
+        ),
         ("[machine]\ncrank = { m = 1e12 }", "machine.crank.m = 1e+12 kg: must be >= 0 kg and <= 1e+06 kg"),
         (
             "[machine]\ncrank = { s = 1e200 }",
@@ -54,11 +57,15 @@ def test_what_has_a_lower_bound_has_an_upper_one(name):
         ),
         (
             "[feed]\nleft = { material_mass = 1e6 }",
-            "feed: material_mass of both sides = 1.00003e+06 kg: must be <= 1e+06",
+            "feed: material_mass of both sides = 1000030 kg: must be <= 1e+06",
         ),
         (
-            "[overload]\njam_force = 1e8",
-            "feed: processing_force of both sides and the hardest lump = 1e+08 N: must be",
+            "event = [{ type = 'jam', side = 'right', force = 1e8 }]",
+            "event.jam_right: right.processing_force comes to 100000010 N with the feed: must be >= 0 N and <= ",
+        ),
+        (
+            "[monte_carlo]\nevent = { force = ['1 kN', '1e5 kN'] }",
+            "monte_carlo.event: left.processing_force comes to 100000010 N with the feed: must be",
         ),
         ("[machine]\ng = 1e30", "machine.g = 1e+30 m/s2: must be >= 0 m/s2 and <= 10000 m/s2"),
     ],
@@ -113,10 +120,10 @@ def test_the_example_and_random_machines_give_no_remark():
         ("[machine]\ncrank = { m = 1e6 }", "machine.crank.m", "1000000 g"),
         ("[machine]\ncrank = { s = 50 }", "machine.crank.s", "50 mm"),
         ("[machine]\nrocker = { s = -120 }", "machine.rocker.s", "-120 mm"),
-        ('[overload]\njam_force = "2000 kN"', "overload.jam_force", "2000 N"),
-        ("[overload]\njam_force = 5e7", "overload.jam_force", ""),
-        ("[overload]\njam_duration = 300", "overload.jam_duration", "300 ms"),
-        ("[overload]\ncrank_angle = 90", "overload.crank_angle", "90 deg"),
+        ('[[event]]\ntype = "jam"\nside = "left"\nforce = "2000 kN"', "event.jam_left.force", "2000 N"),
+        ('[[event]]\ntype = "jam"\nside = "left"\nforce = 5e7', "event.jam_left.force", ""),
+        ('[[event]]\ntype = "jam"\nside = "right"\nduration = 300', "event.jam_right.duration", "300 ms"),
+        ('[[event]]\ntype = "dip"\ncrank_angle = 90', "event.dip.crank_angle", "90 deg"),
         ("[run]\ncrank_speed = 30", "run.crank_speed", "30 rev/min"),
         ("[run]\nramp = 700", "run.ramp", "700 ms"),
     ],
@@ -125,7 +132,11 @@ def test_a_slip_of_the_unit_is_named_with_what_was_meant(text, name, meant):
     (slip,) = config.parse(text).remarks
     assert (slip.variable.name, slip.meant) == (name, meant)
     assert str(slip).startswith(f"{name} = ") and (f'was "{meant}" meant?' in str(slip)) == bool(meant)
-    if meant:
+    if meant and name.startswith("event."):
+        key = name.rsplit(".", 1)[1]
+        line = next(line for line in text.splitlines() if line.startswith(key))
+        assert config.parse(text.replace(line, f'{key} = "{meant}"')).remarks == ()
+    elif meant:
         section, *keys = name.split(".")
         inner = f'"{meant}"'
         for key in reversed(keys[1:]):
@@ -157,11 +168,13 @@ def test_what_is_refused_for_a_slip_says_so(text, told):
 def test_the_remark_stands_on_terminal_page_and_in_json():
     from chainunit.report import page, table
     from chainunit.studies.drive import Drive
-    from chainunit.studies.overload import Study, _statics, as_dict
+    from chainunit.studies.limits import statics
+    from chainunit.studies.result import as_dict
+    from chainunit.studies.study import Study
 
     given = config.parse("[machine]\npin = { diameter = 60 }")
-    study = Study(given, Drive(config.DcMotor, given.motor, given.machine))
-    _statics(study)
+    drive = Drive(config.DcMotor, given.motor, given.machine)
+    study = Study(given, drive, statics(given, drive))
     result = as_dict(study)
     said = str(given.remarks[0])
     assert result["remarks"] == [

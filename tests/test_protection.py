@@ -8,17 +8,22 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
+from event_tables import event_line
 from rich.console import Console
 
 from chainunit import config
-from chainunit.config import SCENARIOS
 from chainunit.drives.induction_motor import InductionMotor, steady
 from chainunit.drives.motor import T_RATED
 from chainunit.engines import MATH
 from chainunit.report import table
-from chainunit.studies import overload, sizing
+from chainunit.studies import sizing
+from chainunit.studies.bearings import mean_load
+from chainunit.studies.coupling import coupling_sentence
 from chainunit.studies.drive import Drive
-from chainunit.studies.protection import Obstacle, Setting, mean_load, relay_trip, stall
+from chainunit.studies.judgement import motor_verdict
+from chainunit.studies.protection import Obstacle, Setting, relay_trip, stall
+from chainunit.studies.result import as_dict
+from chainunit.studies.run import run_study
 
 
 def test_a_relay_of_class_10_trips_when_its_class_says():
@@ -71,7 +76,6 @@ def test_a_setting_lies_between_normal_duty_and_what_opens_it():
 
 
 HEAVY = """
-events = ["feed_left", "feed_right", "jam_left", "jam_right", "blocked", "dip"]
 [machine]
 crank = { m = 160, s = 0.05, I = 4 }
 coupler = { m = 120, s = 0.7, I = 24 }
@@ -83,106 +87,115 @@ left = { material_mass = 300, processing_force = 120 }
 right = { material_mass = 300, processing_force = 120 }
 [run]
 step = 0.002
-[overload]
-turns = 1
-jam_force = %g
 [sizing]
 candidates = 1
 fluctuation = 0.3
 """
 
 
+SIX = ("feed_left", "feed_right", "jam_left", "jam_right", "blocked", "dip")
+
+
+def heavy(*runs):
+    return event_line(*runs, turns=1, force=6000.0) + HEAVY
+
+
 def ran(text, folder, monkeypatch):
     """A study with the motor of 1.1 kW and 4 poles."""
     one = [m for m in sizing.catalogue(None) if (m.nameplate.power, m.nameplate.poles) == (1100.0, 4.0)]
     monkeypatch.setattr(sizing, "catalogue", lambda extra: one)
-    return overload.run_study(config.parse(text), folder)
+    return run_study(config.parse(text), folder)
 
 
 def test_the_recommended_coupling_is_tried_in_its_own_study(tmp_path, monkeypatch):
     """With it, the study opens it in just those overloads that the recommendation names."""
-    study = ran(HEAVY % 6000.0, tmp_path, monkeypatch)
+    study = ran(heavy(*SIX), tmp_path, monkeypatch)
     found = study.setting
     assert found.torque is not None and not study.insufficient
     steady = study.answers["steady"].crank_torque_peak
     assert 1.2 * steady < found.torque < found.motor < study.start_torque
-    said = overload.coupling_sentence(study)
+    said = coupling_sentence(study)
     assert "held shut in the start" in said
     # all feed on the right is normal duty, and its torque the larger
-    assert found.normal > 1.15 * max(study.sizing.cycle.torque_peak, 208.0)
+    assert found.normal > 1.15 * max(study.sizing.duty.numbers.torque_peak, 208.0)
     monkeypatch.undo()
-    tried = ran(HEAVY % 6000.0 + f"[coupling]\ntrip_torque = {found.torque}\n", tmp_path, monkeypatch)
+    tried = ran(heavy(*SIX) + f"[coupling]\ntrip_torque = {found.torque}\n", tmp_path, monkeypatch)
     assert tried.failure is None
     opened = {n for n, a in tried.answers.items() if a.coupling_trip_time is not None}
     assert set(found.opens) == {"jam_left", "jam_right", "blocked"} and set(found.nuisances) == {"dip"}
     assert opened == {*found.opens, *found.nuisances}
     assert "nuisance trip, which protects nothing: it opens, too, where the voltage" in said
-    assert any("nuisance trip that protects nothing: the voltage dips." in note for note in tried.warnings)
+    (nuisance,) = [warning for warning in tried.warnings if warning.kind == "nuisance trip"]
+    assert "nuisance trip that protects nothing: the voltage dips." in nuisance.text and nuisance.runs == (
+        "dip",
+    )
     # it cuts off the peaks that would set it: no advice, and the stiffer stops without it
-    assert tried.setting is None and set(overload.as_dict(tried)["sizing"]["protection"]) == {"relay_current"}
-    for name, peak in vars(study.block_peaks).items():
-        assert getattr(tried.block_peaks, name) == pytest.approx(peak, rel=1e-6), name
-    assert any("These peaks are without the safety coupling" in note for note in tried.notes)
-    assert any("held shut in the start" in note for note in tried.warnings)
+    assert tried.setting is None and set(as_dict(tried)["sizing"]["protection"]) == {"relay_current"}
+    for name, peaks in study.spreads["blocked"].peaks.items():
+        assert tried.spreads["blocked"].peaks[name] == pytest.approx(peaks, rel=1e-6), name
+    (note,) = [note.text for note in tried.notes if note.kind == "assumption"]
+    assert "These peaks are without the safety coupling" in note
+    (warning,) = [warning.text for warning in tried.warnings if warning.kind == "coupling held shut"]
+    assert "held shut in the start" in warning
 
 
 def test_without_a_shock_no_coupling_is_recommended(tmp_path, monkeypatch):
-    text = HEAVY.replace(', "jam_left", "jam_right", "blocked", "dip"', "") % 6000.0
-    study = ran(text, tmp_path, monkeypatch)
+    study = ran(heavy("feed_left", "feed_right"), tmp_path, monkeypatch)
     assert study.setting.obstacle is Obstacle.OVERLOADS
-    numbers = overload.as_dict(study)["sizing"]["protection"]
+    numbers = as_dict(study)["sizing"]["protection"]
     assert numbers["trip_torque"]["value"] is None and numbers["coupling"].startswith("No safety coupling")
 
 
 def test_one_sided_feed_and_a_loaded_soft_start_are_normal_duty(tmp_path, monkeypatch):
     """Sizing has the torque of all feed on the right as the study has it, whatever side is the heavier. A start under
     load is no shock; what passes the gear is told."""
-    text = 'start = "soft"\n' + HEAVY.replace(
-        '"feed_left", "feed_right", "jam_left", "jam_right", "blocked", "dip"',
-        '"feed_right", "start_loaded", "jam_right"',
-    )
-    study = ran(text % 6000.0 + "[gear]\ntorque_limit = 450\n", tmp_path, monkeypatch)
+    text = 'start = "soft"\n' + heavy("feed_right", "start_loaded_left", "jam_right")
+    study = ran(text + "[gear]\ntorque_limit = 450\n", tmp_path, monkeypatch)
     assert study.failure is None and not study.insufficient
     found = study.setting
     assert set(found.overloads) == {"jam_right"} and not found.disturbances
-    start = float(abs(study.runs["start_loaded"]["motor.tau"]).max()) * study.drive.ratio
+    start = float(abs(study.runs["start_loaded_left"]["motor.tau"]).max()) * study.drive.ratio
     assert found.normal == pytest.approx(max(start, study.sizing.best.peak_torque), rel=1e-3)
     fed = float(abs(study.runs["feed_right"]["motor.tau"]).max()) * study.drive.ratio
     assert study.sizing.best.duty_torque == pytest.approx(fed, rel=0.01)
-    (warning,) = [said for said in study.warnings if "the gear's permitted 450 N m" in said]
-    assert SCENARIOS["jam_right"] in warning and SCENARIOS["start_loaded"] not in warning
+    (warning,) = [warning for warning in study.warnings if warning.kind == "gear passed"]
+    assert "the gear's permitted 450 N m" in warning.text and study.called("jam_right") in warning.text
+    assert warning.runs == ("jam_right",) and warning.quantities["limit"] == (450.0, "N.m")
 
 
 def test_an_insufficient_motor_gets_no_advice(tmp_path, monkeypatch):
-    text = HEAVY.replace('"feed_left", "feed_right", ', "").replace(', "jam_right", "blocked", "dip"', "")
-    study = ran(text % 6000.0 + "[gear]\ntorque_limit = 250\n", tmp_path, monkeypatch)
+    study = ran(heavy("jam_left") + "[gear]\ntorque_limit = 250\n", tmp_path, monkeypatch)
     assert study.insufficient and study.setting is None
-    assert overload.as_dict(study)["sizing"]["protection"] == {}
+    assert as_dict(study)["sizing"]["protection"] == {}
     out = io.StringIO()
     table.show(study, Console(file=out, markup=False, width=200))
     assert "Insufficient motor:" in out.getvalue() and "relay at" not in out.getvalue()
 
 
 def test_a_coupling_that_never_opens_gets_a_remark(tmp_path):
-    light = 'events = ["jam_left"]\n[run]\nstep = 0.002\n[overload]\nturns = 1\njam_force = %g\n'
-    study = overload.run_study(config.parse(light % 2000 + "[coupling]\ntrip_torque = 5000\n"), tmp_path)
-    (remark,) = [note for note in study.warnings if "opens in no jam, lump or block" in note]
+
+    def light(force):
+        return event_line("jam_left", turns=1, force=force) + "[run]\nstep = 0.002\n"
+
+    study = run_study(config.parse(light(2000) + "[coupling]\ntrip_torque = 5000\n"), tmp_path)
+    (remark,) = [warning.text for warning in study.warnings if warning.kind == "coupling never opens"]
+    assert "opens in no jam, lump or block" in remark
     # what the jam asks, and the motor's current limit times its torque constant through the gear
     assert f"{study.answers['jam_left'].crank_torque_peak:.0f} N m on it at most" in remark
     assert f"motor gives {4.4 * 1.27 * 50:.0f} N m at most" in remark
-    study = overload.run_study(config.parse(light % 9000 + "[coupling]\ntrip_torque = 320\n"), tmp_path)
+    study = run_study(config.parse(light(9000) + "[coupling]\ntrip_torque = 320\n"), tmp_path)
     assert study.answers["jam_left"].coupling_trip_time is not None
-    assert any("stalls the motor" in note for note in study.warnings)
-    assert not any("opens in no jam, lump or block" in note for note in study.warnings)
+    assert any(w.kind == "coupling above motor" and "stalls the motor" in w.text for w in study.warnings)
+    assert not any(warning.kind == "coupling never opens" for warning in study.warnings)
 
 
 def test_a_motor_at_its_voltage_limit_has_no_reserve(tmp_path):
     """Asked for 30 rad/s, the DC motor turns the crank at an eighth of it: the voltage leaves no more torque."""
-    text = "events = []\n[run]\ncrank_speed = 30\nstep = 0.002\nsettle_turns = 3\n"
-    study = overload.run_study(config.parse(text), tmp_path)
+    text = "event = []\n[run]\ncrank_speed = 30\nstep = 0.002\nsettle_turns = 3\n"
+    study = run_study(config.parse(text), tmp_path)
     found, p = study.answers["steady"], study.motor
     assert found.speed_mean < 5.0 and found.torque_reserve == 0.0
-    verdict = overload.motor_verdict(study)
+    verdict = motor_verdict(study)
     assert verdict["holds"] == "false" and "least reserve of torque 0 %" in verdict["text"]
     run = study.steady
     warm = p.armature.R * (1.0 + p.armature.alpha * (found.winding_temperature - T_RATED))

@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
+from event_tables import event_line
 from scipy.linalg import eigh
 from test_page import Reader, check_traced
 
@@ -16,19 +17,19 @@ from chainunit.models import MODELS
 from chainunit.report import files, page, plots
 from chainunit.studies.choice import choose
 from chainunit.studies.cycle import cycle
-from chainunit.studies.overload import as_dict, run_study
 from chainunit.studies.package import export_study, start_of
+from chainunit.studies.result import as_dict
+from chainunit.studies.run import run_study
 from chainunit.studies.shaft import RIGID, Cycles, rainflow, shaft_answers, torsion
 
-SHORT = """
-events = ["jam_left"]
+JAM, BLOCKED = (event_line(name, turns=1) for name in ("jam_left", "blocked"))
+SHORT = f"""
+{JAM}
 [run]
 ramp = 0.3
 turns = 1
 step = 0.001
 crank_speed = 6
-[overload]
-turns = 1
 [machine]
 ratio = 25
 """
@@ -63,7 +64,8 @@ def test_the_line_amplifies_a_jam(study):
     assert jam.amplification == pytest.approx(jam.tau2_peak / np.max(np.abs(run[RIGID])))
     assert jam.amplification > 1.2 and 1.0 < steady.amplification < 1.3
     assert jam.turns_of_steady > 10.0 and jam.range_equivalent is None
-    assert any("times that of a rigid drive" in note for note in study.warnings)
+    runs = {warning.runs: warning.text for warning in study.warnings if warning.kind == "amplification"}
+    assert "times that of a rigid drive" in runs["jam_left",]
     before = run[RIGID].attrs
     assert before["units"] == "N.m"
 
@@ -111,7 +113,7 @@ def test_before_or_behind_the_gear(tmp_path):
         np.testing.assert_allclose(
             crank.drive.crank_torque(a), motor.drive.crank_torque(b), rtol=1e-7, atol=1e-6
         )
-    assert crank.torsion.k_largest == pytest.approx(motor.torsion.k_largest, rel=1e-12)
+    assert crank.statics.torsion.k_largest == pytest.approx(motor.statics.torsion.k_largest, rel=1e-12)
     assert crank.answers["jam_left"].speed_least == pytest.approx(
         motor.answers["jam_left"].speed_least, rel=1e-9
     )
@@ -208,7 +210,7 @@ def test_a_coupling_that_opens_lets_line_and_machine_coast(tmp_path):
 
 def test_the_rigid_drive_has_the_same_coupling(tmp_path):
     """Where it opens, both peak near the trip torque: what comes after it is in neither."""
-    events = SHORT.replace("jam_left", "blocked")
+    events = SHORT.replace(JAM, BLOCKED)
     study = run_study(config.parse(f"{events}{LINE}[coupling]\ntrip_torque = 150\n"), tmp_path)
     blocked = study.shaft["blocked"]
     assert study.answers["blocked"].coupling_trip_time is not None
@@ -229,7 +231,7 @@ def test_without_a_motor_that_fits_the_shaft_is_that_of_the_nearest(tmp_path):
 def test_the_speed_loop_is_tuned_and_shown_with_the_line(tmp_path):
     """A heavy J4: the gains are those of rotor, J4 and machine, and so is the loop that is shown."""
     study = run_study(config.parse(f"{SHORT}[driveline]\nJ4 = 20\n"), tmp_path)
-    loop, drive = study.loops["mean inertia"], study.drive
+    loop, drive = study.statics.loops["mean inertia"], study.drive
     assert loop.inertia > drive.parameters.rotor.J + 20.0 / 25.0**2
     assert loop.crossover == pytest.approx(study.tuning.crossover, rel=0.05)
 

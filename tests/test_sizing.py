@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from event_tables import event_line
 from systems import component
 from typer.testing import CliRunner
 
@@ -24,6 +25,8 @@ from chainunit.fmu.backends import export
 from chainunit.machines.chain_unit import SideLoads
 from chainunit.studies import sizing
 from chainunit.studies.cycle import cycle
+from chainunit.studies.drive import Drive
+from chainunit.studies.rig import Rig
 from chainunit.studies.sizing import Check, Verdict, flywheel, permitted_starts, rms, start_time
 from chainunit.system import CoSimulation, Profile, System
 
@@ -151,13 +154,14 @@ def test_peaks_are_of_both_sides(sized, tmp_path):
         ]
         turns[side] = cycle(config.machine, config.run.crank_speed, *loads).crank_torque
     peaks = {side: float(np.max(np.abs(torque))) for side, torque in turns.items()}
-    assert sizing.heavier_side(config) == "left" and peaks["right"] > 1.2 * peaks["left"]
-    assert sized.cycle.torque_peak_one_sided == pytest.approx(peaks["right"], rel=1e-9)
+    assert sized.duty.heavier == "left" and peaks["right"] > 1.2 * peaks["left"]
+    assert sized.duty.numbers.torque_peak_one_sided == pytest.approx(peaks["right"], rel=1e-9)
     assert np.mean(turns["left"] ** 2) > np.mean(turns["right"] ** 2)
 
     best = sized.chosen
     files, _ = best.drive.export(tmp_path)
-    signals = sizing.feed_signals(config, 2.0, "right")
+    rig = Rig(config, best.drive, files)
+    signals = rig.signals(rig.event_signals(config.one_sided("right"), 2.0, {}))
     with CoSimulation(best.drive.system(files), signals) as simulation:
         simulation.run(6.0, config.run.step)
         loaded = simulation.run(6.0 + 2.0 * math.pi / config.run.crank_speed, config.run.step)
@@ -170,7 +174,7 @@ def test_the_crank_turns_as_asked(sized, tmp_path):
     drive = sized.chosen.drive
     files, _ = drive.export(tmp_path)
     config = parse(HEAVY)
-    with CoSimulation(drive.system(files), sizing.feed_signals(config, None)) as simulation:
+    with Rig(config, drive, files).from_rest() as simulation:
         simulation.run(8.0, 1e-3)
         run = simulation.run(8.0 + 4.0 * math.pi / 3.0, 1e-3)
     assert float(run["motor.w"].mean()) / drive.ratio == pytest.approx(3.0, rel=0.01)
@@ -272,7 +276,7 @@ def test_without_a_fit_the_study_goes_on_with_the_nearest(tmp_path, monkeypatch)
 
     monkeypatch.setattr(sizing, "catalogue", lambda extra: small(2))
     (tmp_path / "weak.toml").write_text(
-        'events = ["feed_right"]\n' + HEAVY + "fluctuation = 0.5\n[gear]\ntorque_limit = 150\n"
+        event_line("feed_right") + HEAVY + "fluctuation = 0.5\n[gear]\ntorque_limit = 150\n"
     )
     said = CliRunner().invoke(cli.app, ["study", str(tmp_path / "weak.toml"), "-o", str(tmp_path / "out")])
     assert said.exit_code == 1, said.output
@@ -344,7 +348,8 @@ def test_above_the_corner_an_inverter_has_less_torque(tmp_path, monkeypatch):
 
 def test_the_shift_of_the_feed_keeps_its_mass():
     config = parse(HEAVY)
-    signals = sizing.feed_signals(config, 2.0)
+    rig = Rig(config, Drive(DcMotor, config.motor, config.machine), {})
+    signals = rig.event_signals(config.one_sided("left"), 2.0, {})
     left, right = (signals[f"machine.{side}.material_mass"] for side in ("left", "right"))
     assert isinstance(left, Profile)
     for t in (0.0, 2.1, 2.2, 5.0):

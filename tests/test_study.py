@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command import chainunit
+from event_tables import STANDARD, event_line
 from fmpy.validation import validate_fmu
 
 from chainunit import EMPTY, ChainUnit, SideLoads
@@ -25,11 +26,10 @@ settle_turns = 1
 turns = 1
 step = 0.004
 crank_speed = 6
-[overload]
-turns = 1
 [machine]
 ratio = 25
 """
+SHORT = event_line(*STANDARD, turns=1) + SHORT
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +70,7 @@ def test_study_numbers_are_those_of_the_series(done):
         assert set(tree.children) == {"start_up"} | overloads
         for name in overloads:
             run = tree[name].to_dataset()
-            event = numbers["events"][name]["value"]
+            event = numbers["events"][name]["begin"]["value"]
             crank = float(run["motor.phi"].interp(time=event)) / 25.0
             # the speed ripples on the way there
             assert abs((crank + math.pi) % (2 * math.pi) - math.pi) < 0.1
@@ -117,37 +117,39 @@ def test_study_certifies_itself(done):
 
 
 BLOCKED = """
-events = ["blocked"]
 [run]
 ramp = 0.3
 settle_turns = 1
 turns = 1
 step = 0.002
-[overload]
-turns = 1
 """
 
 
 def test_what_blocks_the_rocker_decides_the_peak(tmp_path):
     """Peaks over a decade of the stop's stiffness, as studies with these stops give them; and --check of a stop."""
     from chainunit import config
-    from chainunit.studies.overload import as_dict, run_study
+    from chainunit.studies.result import as_dict
+    from chainunit.studies.run import run_study
 
-    study = run_study(config.parse(BLOCKED), tmp_path, check=True)
+    study = run_study(config.parse(event_line("blocked", turns=1) + BLOCKED), tmp_path, check=True)
     assert study.failure is None
-    found, o = study.block_peaks, study.config.overload
-    assert found.stiffness_high == pytest.approx(10.0 * found.stiffness_low)
-    assert found.stiffness_low < o.block_stiffness < found.stiffness_high
-    assert found.crank_torque_low < study.answers["blocked"].crank_torque_peak < found.crank_torque_high
-    damping = o.block_damping * (found.stiffness_high / o.block_stiffness) ** 0.5
-    stiff = f"block_stiffness = {found.stiffness_high}\nblock_damping = {damping}\n"
-    other = run_study(config.parse(BLOCKED + stiff), tmp_path)
+    found, stop = study.spreads["blocked"], study.config.events["blocked"].p
+    soft, stiff = found.assumed["stiffness"]
+    assert stiff == pytest.approx(10.0 * soft) and soft < stop.stiffness < stiff
+    low, high = found.peaks["crank_torque"]
+    assert low < study.answers["blocked"].crank_torque_peak < high
+    damping = stop.damping * (stiff / stop.stiffness) ** 0.5
+    assert found.assumed["damping"][1] == pytest.approx(damping)
+    line = event_line("blocked", turns=1, stiffness=stiff, damping=damping)
+    other = run_study(config.parse(line + BLOCKED), tmp_path)
     for name in ("crank_torque", "motor_torque", "rocker_torque"):
         peak = getattr(other.answers["blocked"], f"{name}_peak")
-        assert peak == pytest.approx(getattr(found, f"{name}_high"), rel=1e-6)
-    (note,) = (note for note in study.notes if "block_stiffness" in note)
-    assert "are assumed and decide the peak" in note and "distance from the pivot C" in note
-    assert as_dict(study)["block_peaks"]["crank_torque_low"]["unit"] == "N.m"
+        assert peak == pytest.approx(found.peaks[name][1], rel=1e-6)
+    (note,) = (note for note in study.notes if note.kind == "assumption")
+    assert note.runs == ("blocked",)
+    assert "are assumed and decide the peak" in note.text and "distance from the pivot C" in note.text
+    peaks = as_dict(study)["block_peaks"]["blocked"]
+    assert peaks["crank_torque_low"]["unit"] == "N.m" and peaks["stiffness_high"]["value"] == stiff
     certificate = study.certificate["blocked"]
     assert 0.0 < certificate["motor.w_difference_to_monolithic"] < 1e-3
     assert 0.0 < certificate["machine.tau_difference_to_monolithic"] < 1e-2
@@ -200,7 +202,7 @@ def test_what_chains_are_refused(text, told):
 def test_a_run_that_fails_keeps_what_it_computed(tmp_path, monkeypatch):
     from chainunit import config
     from chainunit.report import files, plots
-    from chainunit.studies.overload import run_study
+    from chainunit.studies.run import run_study
     from chainunit.system.instance import Instance
 
     step = Instance.step
@@ -482,9 +484,9 @@ def test_each_side_alone_over_the_speed():
     assert crossed
 
 
-LIGHT = "events = []\n[run]\nstep = 0.002\n"
+LIGHT = "event = []\n[run]\nstep = 0.002\n"
 TWICE = """
-events = []
+event = []
 [ratios]
 l = 3.0
 l1 = 2.7
@@ -503,7 +505,8 @@ def ran(text, folder):
     """A study that was run in this process, with its files in `folder`."""
     from chainunit import config
     from chainunit.report import files
-    from chainunit.studies.overload import as_dict, run_study
+    from chainunit.studies.result import as_dict
+    from chainunit.studies.run import run_study
 
     study = run_study(config.parse(text), folder)
     files.write(study, folder)
@@ -530,7 +533,7 @@ def test_the_load_cycle_is_whole_turns_that_the_numbers_follow_from(text, turns,
     assert rms == pytest.approx(steady["crank_torque_rms"], rel=1e-6)
     assert np.max(np.abs(torque)) * ratio == pytest.approx(steady["crank_torque_peak"], rel=1e-8)
     # what friction and the processing force take, by inverse dynamics at the mean speed
-    ideal = study.cycles["both sides"].crank_torque
+    ideal = study.statics.cycles["both sides"].crank_torque
     assert steady["power_mean"] == pytest.approx(np.mean(ideal) * study.config.run.crank_speed, rel=0.02)
 
 
@@ -572,22 +575,22 @@ def test_the_study_waits_until_the_turns_close(tmp_path):
     study, _ = ran(UNSETTLED, tmp_path)
     assert study.settled > study.config.settled + 1.5
     assert study.answers["steady"].cycle_gap < 0.01 and study.answers["steady"].speed_ripple < 0.05
-    assert not any("do not close" in note for note in study.warnings)
+    assert not any(warning.kind == "turns do not close" for warning in study.warnings)
 
 
 @pytest.mark.parametrize(
     ("text", "told", "there"),
     [
-        (UNSETTLED, "do not close", True),
-        (LIGHT + "[motor]\nlimit = { i = 0.2 }\n", "does not make a whole turn", False),
+        (UNSETTLED, "turns do not close", True),
+        (LIGHT + "[motor]\nlimit = { i = 0.2 }\n", "no whole turn", False),
     ],
 )
 def test_a_cycle_that_does_not_close_is_told(text, told, there, tmp_path, monkeypatch):
-    from chainunit.studies import overload
+    from chainunit.studies import rig
 
-    monkeypatch.setattr(overload, "_PATIENCE", 0.0)
+    monkeypatch.setattr(rig, "_PATIENCE", 0.0)
     study, _ = ran(text, tmp_path)
-    assert any(told in note for note in study.warnings)
+    assert any(warning.kind == told for warning in study.warnings)
     assert (tmp_path / "load_cycle.csv").exists() == there
 
 
@@ -608,30 +611,30 @@ def test_the_winding_temperature_is_that_of_the_duty_for_ever(tmp_path):
 def test_each_overload_has_its_mirror_on_the_other_side():
     """What happens to the left of a feed happens to the right of the mirrored feed."""
     from chainunit import config
-    from chainunit.config import OVERLOADS, STANDARD
+    from chainunit.drives.dc_motor import DcMotor
     from chainunit.studies.drive import Drive
-    from chainunit.studies.overload import scenario_signals
+    from chainunit.studies.events import TYPES
+    from chainunit.studies.rig import Rig
 
     lopsided = "[feed]\n%s = { material_mass = 30, processing_force = 10 }\n%s = { material_mass = 70 }\n"
-    here, there = (config.parse(lopsided % sides) for sides in (("left", "right"), ("right", "left")))
-    assert config.parse("").events == STANDARD
-    pairs = [
-        (a, b)
-        for a, left in OVERLOADS.items()
-        for b, right in OVERLOADS.items()
-        if left.side == "left" and (right.kind, right.side) == (left.kind, "right")
+    rigs = [
+        Rig(c, Drive(DcMotor, c.motor, c.machine), {})
+        for c in (config.parse(lopsided % sides) for sides in (("left", "right"), ("right", "left")))
     ]
-    assert (
-        len(pairs) == 5 and ("right_empties", "left_empties") in pairs and ("lumps", "lumps_right") in pairs
-    )
+    assert tuple(config.parse("").events) == STANDARD
+    sided = [of for of in TYPES.values() if of.sided]
+    assert {of.kind for of in sided} >= {"empties", "feed", "jam", "lumps", "start"}
     swap = {"left": "right", "right": "left"}
-    for a, b in pairs:
-        assert OVERLOADS[b].title == re.sub("left|right", lambda m: swap[m[0]], OVERLOADS[a].title)
+    for of in sided:
+        left, right = of.on("left"), of.on("right")
+        for text in ("name", "title", "short", "loaded_side"):
+            mirror = re.sub("left|right", lambda m: swap[m[0]], getattr(left, text))
+            assert getattr(right, text) == mirror and mirror != getattr(left, text)
         one, other = (
-            scenario_signals(c, Drive(None, None, c.machine), name, 2.0)
-            for c, name in ((here, a), (there, b))
+            rig.signals(rig.event_signals(event, 2.0, {}))
+            for rig, event in zip(rigs, (left, right), strict=True)
         )
-        assert any(callable(signal) for signal in one.values()) or OVERLOADS[a].kind == "start"
+        assert any(callable(signal) for signal in one.values()) or of.from_rest
         for name, signal in one.items():
             mirrored = other[re.sub("left|right", lambda m: swap[m[0]], name)]
             for t in (0.0, 2.005, 2.2, 2.33, 4.0):
@@ -642,7 +645,7 @@ def test_each_overload_has_its_mirror_on_the_other_side():
 
 def test_both_sides_are_run_and_differ(tmp_path):
     """The rocker swings 9.06 deg to the right and 8.19 deg to the left."""
-    study, numbers = ran(LIGHT.replace("events = []\n", "") + "[overload]\nturns = 1\n", tmp_path)
+    study, numbers = ran(LIGHT.replace("event = []\n", event_line(*STANDARD, turns=1)), tmp_path)
     assert set(numbers["answers"]) == {"steady", *study.config.events}
     peaks = {n: a["crank_torque_peak"]["value"] for n, a in numbers["answers"].items()}
     assert peaks["jam_left"] > 1.05 * peaks["jam_right"] > 1.05 * peaks["steady"]
@@ -667,16 +670,17 @@ def test_the_overloads_of_both_sides_are_readable(columns, tables):
     from rich.console import Console
     from rich.table import Table
 
-    from chainunit.config import OVERLOADS, STANDARD
+    from chainunit import config
     from chainunit.report.table import _print_runs
 
     def table(runs):
-        made = Table("crank torque, peak, here", *(OVERLOADS[r].short if r in OVERLOADS else r for r in runs))
+        heads = (events[r].short if r in events else r for r in runs)
+        made = Table("crank torque, peak, here", *heads)
         made.add_row("", *("10.0 N m" for _ in runs))
         return made
 
-    said = io.StringIO()
-    _print_runs(Console(file=said, width=columns), table, ["steady", *STANDARD])
+    said, events = io.StringIO(), config.load().events
+    _print_runs(Console(file=said, width=columns), table, ["steady", *STANDARD], events)
     heads = [line for line in said.getvalue().splitlines() if "steady" in line]
     assert len(heads) == tables and all("jam left" in heads[0] for _ in heads)
     assert "jam right" in heads[-1] and all(len(line) <= columns for line in heads)

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from chainunit.studies.overload import torque_reserve
+from chainunit.studies.measures import torque_reserve
 from chainunit.text import entry, number, shown
 
 

@@ -120,7 +120,8 @@ def study(
         check_own(loaded.catalogue)
     with claimed(output):
         from .report import files, page, plots, table
-        from .studies.overload import LOAD_CYCLE, run_study
+        from .studies.run import run_study
+        from .studies.study import LOAD_CYCLE
 
         _clear(output, "result.json", "result.nc", LOAD_CYCLE, page.NAME, *plots.NAMES)
         console, errors = _console(), _console(stderr=True)

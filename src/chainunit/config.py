@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import ConfigDict, Field, ValidationError, create_model
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from .drives.cardan import check
 from .drives.dc_motor import DcMotor
@@ -18,7 +19,7 @@ from .drives.induction_motor import Inverter, SoftStart
 from .drives.line_table import form, given_line
 from .errors import GeometryError, InputError
 from .machines.api import ChainUnit, ratios
-from .machines.chain_unit import SIDES, ChamberForces, SideLoads, SideName, other
+from .machines.chain_unit import ChamberForces, SideLoads, SideName
 from .machines.flexible import LEAST, MOST, OrganLaw
 from .quantities import Layout, Value, declaration, group, quantity
 from .reading import (
@@ -27,7 +28,6 @@ from .reading import (
     filled,
     first_line,
     given_values,
-    instance,
     merged,
     packaged,
     read,
@@ -35,6 +35,9 @@ from .reading import (
     slips,
     toml,
 )
+from .studies.event_table import RandomEvent, read_events, read_random_event
+from .studies.events import Event, OneSidedFeed
+from .system.signals import Profile
 
 
 @declaration
@@ -91,103 +94,6 @@ class Run:
 
 
 @declaration
-class Overload:
-    """The one-sided overloads."""
-
-    turns: Value = quantity(
-        "1", "crank turns that are followed after the event", default=2.0, min=1.0, max=1e4
-    )
-    crank_angle: Value = quantity(
-        "rad",
-        "crank angle at which the event begins; at 0 the rocker is at its fastest",
-        default=0.0,
-        usual=(0.0, 6.3),
-    )
-    shift: Value = quantity(
-        "s",
-        "time in which material leaves or changes sides",
-        default=0.3,
-        min=1e-4,
-        max=1e4,
-        usual=(1e-3, 60.0),
-    )
-    jam_force: Value = quantity("N", "processing force of a lump that jams an organ", default=2000.0, min=0.0)
-    jam_duration: Value = quantity(
-        "s", "time for which the lump holds", default=0.3, min=1e-4, max=1e4, usual=(1e-3, 60.0)
-    )
-    jam_rise: Value = quantity(
-        "s", "time in which the jam rises and falls", default=0.02, min=1e-4, max=1e4, usual=(1e-4, 60.0)
-    )
-    lumps: Value = quantity(
-        "1", "number of lumps that come one after the other", default=4.0, min=1.0, max=1000.0
-    )
-    lump_pause: Value = quantity(
-        "s", "time between two lumps", default=0.4, min=1e-3, max=1e4, usual=(1e-3, 60.0)
-    )
-    block_stiffness: Value = quantity(
-        "N.m/rad", "stiffness of what blocks the rocker", default=2e5, above=0.0, max=1e9
-    )
-    block_damping: Value = quantity(
-        "N.m.s/rad", "damping of what blocks the rocker", default=2e3, min=0.0, max=1e9
-    )
-    dip_depth: Value = quantity(
-        "1", "share of the voltage that a dip takes away", default=0.5, min=0.0, max=1.0
-    )
-    dip_duration: Value = quantity(
-        "s", "time for which the voltage is down", default=0.3, min=1e-3, max=1e4, usual=(1e-3, 60.0)
-    )
-
-
-@dataclasses.dataclass(frozen=True)
-class Scenario:
-    """An overload: what happens, and to which side."""
-
-    kind: Literal["empties", "feed", "jam", "lumps", "blocked", "dip", "start"]
-    side: SideName | Literal[""]
-    """the side that has to carry it; none where both do"""
-    title: str
-    short: str
-
-
-def _of_side(side: SideName) -> dict[str, Scenario]:
-    gone, suffix = other(side), "" if side == "left" else "_right"
-    return {
-        f"{gone}_empties": Scenario("empties", side, f"the {gone} side empties", f"{gone} empties"),
-        f"feed_{side}": Scenario("feed", side, f"all feed moves to the {side}", f"feed to {side}"),
-        f"jam_{side}": Scenario("jam", side, f"a lump jams the {side} side", f"jam {side}"),
-        f"lumps{suffix}": Scenario(
-            "lumps", side, f"lumps come one after the other on the {side}", f"lumps {side}"
-        ),
-        f"start_loaded{suffix}": Scenario(
-            "start", side, f"start with all feed on the {side}", f"{side} start"
-        ),
-    }
-
-
-OVERLOADS: Mapping[str, Scenario] = {
-    **_of_side("left"),
-    **_of_side("right"),
-    "blocked": Scenario("blocked", "", "the rocker is blocked", "blocked"),
-    "dip": Scenario("dip", "", "the voltage dips", "dip"),
-}
-"""The overloads by the names that `events` takes in a study file."""
-SCENARIOS = {name: scenario.title for name, scenario in OVERLOADS.items()}
-"""Their titles."""
-STANDARD = ("right_empties", "left_empties", "feed_left", "feed_right", "jam_left", "jam_right")
-"""The overloads of a study that names none: the rocker swings farther to one side than to the other, so that both
-count."""
-
-
-def by_side(names: Collection[str]) -> list[list[str]]:
-    """The overloads among `names`: what the left side has to carry, the right side, both; without empty groups."""
-    groups = [
-        [name for name in OVERLOADS if name in names and OVERLOADS[name].side == side]
-        for side in (*SIDES, "")
-    ]
-    return [group for group in groups if group]
-
-
-@declaration
 class Coupling:
     """A safety coupling or shear pin on the motor shaft."""
 
@@ -214,10 +120,8 @@ class MonteCarlo:
 
     runs: Value = quantity("1", "number of runs; 0 leaves the study out", default=0.0, min=0.0, max=1e6)
     duration: Value = quantity(
-        "s", "time that is followed after a lump", default=2.0, min=0.05, max=1e4, usual=(0.05, 600.0)
+        "s", "time that is followed after the event", default=2.0, min=0.05, max=1e4, usual=(0.05, 600.0)
     )
-    force_low: Value = quantity("N", "least processing force of the lump", default=1000.0, min=0.0)
-    force_high: Value = quantity("N", "largest processing force of the lump", default=3000.0, min=0.0)
     seed: Value = quantity("1", "seed of the random numbers", default=1.0, min=0.0, max=1e9)
 
 
@@ -317,56 +221,80 @@ PLACES = ("crank", "motor")
 
 STARTS = ("direct", "soft", "inverter")
 
-_SECTIONS = {
-    "machine": ChamberForces.Parameters,
-    "ratios": Ratios,
-    "feed": Feed,
-    "motor": DcMotor.Parameters,
-    "run": Run,
-    "overload": Overload,
-    "coupling": Coupling,
-    "monte_carlo": MonteCarlo,
-    "sizing": Sizing,
-    "gear": Transmission,
-    "starter": Starter,
-    "chain": Chain,
+
+@dataclasses.dataclass(frozen=True)
+class Section:
+    """A table of a study file. The study has its values, or None where it is `optional` and the file does not have
+    it; what it does not name is of `default`."""
+
+    declared: type
+    default: Any = None
+    optional: bool = False
+    whole: tuple[str, ...] = ()
+    """quantities that are whole numbers"""
+    keys: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    """other keys than quantities, as pydantic fields"""
+    form: Callable[..., type[BaseModel]] = schema
+    values: Callable[[Any], dict[str, Any]] = given_values
+    """what a checked table gives, by the name of the quantity"""
+
+
+SECTIONS: Mapping[str, Section] = {
+    "machine": Section(ChamberForces.Parameters),
+    "ratios": Section(Ratios),
+    "feed": Section(Feed),
+    "motor": Section(DcMotor.Parameters),
+    "run": Section(Run, whole=("turns",)),
+    "coupling": Section(Coupling, optional=True),
+    "monte_carlo": Section(MonteCarlo, whole=("runs", "seed"), keys={"event": (dict[str, Any], {})}),
+    "sizing": Section(Sizing, optional=True),
+    "gear": Section(Transmission, default=KINDS["gear"]),
+    "starter": Section(Starter),
+    "chain": Section(Chain, whole=("rods", "sweep_points", "starts", "turns")),
+    "driveline": Section(
+        Driveline,
+        optional=True,
+        keys={"place": (Literal[PLACES], "crank")},
+        form=form,
+        values=partial(given_line, prefix="driveline."),
+    ),
 }
-_Driveline = form(Driveline, "driveline", "driveline.", place=(Literal[PLACES], "crank"))
+
+
+def _table(name: str, section: Section) -> tuple[Any, Any]:
+    table = section.form(section.declared, name, f"{name}.", **section.keys)
+    return table, Field(default_factory=table)
+
+
 _File = create_model(
     "Config",
     __config__=ConfigDict(extra="forbid"),
     title=(Title, ""),
-    **{
-        name: (section, Field(default_factory=section))
-        for name, section in ((n, schema(d, n, n + ".")) for n, d in _SECTIONS.items())
-    },
-    driveline=(_Driveline, Field(default_factory=_Driveline)),
+    **{name: _table(name, section) for name, section in SECTIONS.items()},
     feed_forward=(bool, False),
     start=(Literal[STARTS], "direct"),
     organ=(Literal[ORGANS], "two-bar"),
     catalogue=(str, ""),
-    events=(list[Literal[*SCENARIOS]], list(STANDARD)),  # type: ignore[valid-type]
+    event=(list[Any], []),
 )  # type: ignore[call-overload]
 
 
 @dataclasses.dataclass(frozen=True)
 class Config:
-    """A study, checked: machine, motor, loads and runs. `motor_given` names the motor parameters that were set."""
+    """A study, checked: machine, motor, loads, runs and events by the names of their runs."""
 
     title: str
     machine: ChainUnit
     feed: Feed
     motor: Any
-    motor_given: frozenset[str]
     run: Run
-    events: tuple[str, ...]
-    overload: Overload
+    events: Mapping[str, Event]
     coupling: Coupling | None
     monte_carlo: MonteCarlo
+    random: RandomEvent
     feed_forward: bool
     sizing: Sizing | None
     gear: Transmission
-    gear_given: frozenset[str]
     start: str
     starter: Starter
     catalogue: Path | None
@@ -378,15 +306,31 @@ class Config:
     chain: Chain | None
     """the organs as chains, or None for two bars"""
     source: str
+    given: frozenset[str]
+    """names of all that the file sets, such as "machine.crank.m"; everything else is the example's"""
     remarks: tuple[Slip, ...] = ()
     """values that look like a slip of the unit"""
+
+    @property
+    def turn(self) -> float:
+        """Time of a turn of the crank at the speed that is asked for [s]."""
+        return float(2.0 * math.pi / self.run.crank_speed)
 
     @property
     def settled(self) -> float:
         """Time from which running counts as steady [s]: `run.settle_turns` after the ramp of the reference or of the
         soft starter."""
         soft = self.starter.soft_start.time if self.start == "soft" else 0.0
-        return float(max(self.run.ramp, soft) + self.run.settle_turns * 2.0 * math.pi / self.run.crank_speed)
+        return float(max(self.run.ramp, soft) + self.run.settle_turns * self.turn)
+
+    def one_sided(self, side: SideName) -> Event:
+        """All feed on that side: the event of the study, where it has one, else the example's."""
+        of_study = (
+            event
+            for event in self.events.values()
+            if (event.kind, event.side) == (OneSidedFeed.kind, side) and event.empties
+        )
+        return next(of_study, OneSidedFeed.on(side))
 
 
 def load(file: Path | None = None) -> Config:
@@ -406,7 +350,8 @@ def example() -> str:
 
 
 def parse(text: str, source: str = "config") -> Config:
-    """A study from TOML text.
+    """A study from TOML text. What it leaves out is the example's: the packaged file's, and where that does not name
+    it, as declared.
 
     Raises
     ------
@@ -419,13 +364,108 @@ def parse(text: str, source: str = "config") -> Config:
         checked: Any = _File.model_validate(_over_example(data))
     except ValidationError as error:
         raise InputError(first_line(error, _File)) from error
-    remarks = tuple(slips({**_SECTIONS, "driveline": Driveline}, data))
+    declared = {name: section.declared for name, section in SECTIONS.items()}
+    remarks = tuple(slips(declared, data))
     try:
-        return _config(data, checked, source, remarks)
+        events = read_events(checked.event)
+        if "event" in data:
+            kinds = {f"event.{name}": event.Parameters for name, event in events.items()}
+            tables = dict(zip(events, data["event"], strict=True))
+            remarks += tuple(slips(kinds, {"event": tables}))
+        return _config(data, checked, events, source, remarks)
     except InputError as error:
         # what does not fit together may be a slip of the unit
         hints = [f'was {slip.variable.name} = "{slip.meant}" meant?' for slip in remarks if slip.meant]
         raise type(error)("; ".join([str(error), *hints])) from error
+
+
+def _config(
+    data: Mapping[str, Any],
+    checked: Any,
+    events: Mapping[str, Event],
+    source: str,
+    remarks: tuple[Slip, ...],
+) -> Config:
+    """The study of a file whose values are each allowed."""
+    _check_company(data)
+    tables = {name: section.values(getattr(checked, name)) for name, section in SECTIONS.items()}
+    values = {
+        name: Layout(section.declared).from_names(
+            {key: x for key, x in tables[name].items() if key in Layout(section.declared).names},
+            section.default,
+        )
+        for name, section in SECTIONS.items()
+    }
+    _check_order(values)
+    parts = {name: values[name] for name in ("feed", "run", "monte_carlo", "gear", "starter")}
+    parts |= {
+        name: values[name] if name in data else None for name, each in SECTIONS.items() if each.optional
+    }
+    if "sizing" in data and checked.start != "inverter" and "inertia_ratio" not in tables["sizing"]:
+        # of motors on the line only where it is given
+        parts["sizing"] = dataclasses.replace(parts["sizing"], inertia_ratio=math.inf)
+    config = Config(
+        title=checked.title,
+        machine=_machine(tables["machine"], tables["ratios"]),
+        motor=_checked("motor: ", DcMotor.check, values["motor"]),
+        events=events,
+        random=read_random_event(checked.monte_carlo.event, "monte_carlo.event"),
+        feed_forward=checked.feed_forward,
+        start=checked.start,
+        catalogue=_beside(checked.catalogue, source),
+        place=checked.driveline.place,
+        damping_ratio=checked.driveline.damping_ratio,
+        chain=values["chain"] if checked.organ == "chain" else None,
+        source=source,
+        given=frozenset(_names(data, events)),
+        remarks=remarks,
+        **parts,
+    )
+    if config.driveline is not None:
+        _checked("driveline.", check, config.driveline)
+    _check_loads(config)
+    _check_steps(config)
+    return config
+
+
+def _checked(prefix: str, check: Callable[[Any], object], values: Any) -> Any:
+    """The `values`, which `check` does not refuse; `prefix` goes before its words."""
+    try:
+        check(values)
+    except InputError as error:
+        raise InputError(f"{prefix}{error}") from error
+    return values
+
+
+def _names(data: Mapping[str, Any], events: Mapping[str, Event], prefix: str = "") -> Iterator[str]:
+    """Names of all values that a file gives, events by the names of their runs."""
+    for name, value in data.items():
+        if name == "event" and not prefix:
+            for run, table in zip(events, value, strict=True):
+                yield from _names(table, {}, f"event.{run}.")
+        elif isinstance(value, Mapping):
+            yield from _names(value, {}, f"{prefix}{name}.")
+        else:
+            yield prefix + name
+
+
+def _machine(given: dict[str, float], of_papers: Mapping[str, float]) -> ChainUnit:
+    """The machine by its lengths, or by the papers' ratios in their place."""
+    if of_papers:
+        try:
+            lengths = ratios(**filled(Ratios, of_papers))
+        except InputError as error:
+            raise InputError(f"ratios: {error}") from error
+        twice = sorted(set(lengths) & set(given))
+        if twice:
+            raise InputError(
+                f"machine.{twice[0]}: given beside [ratios], which sets it; leave out one of the two"
+            )
+        given = given | lengths
+    try:
+        return ChainUnit(given)
+    except InputError as error:
+        raise InputError(f"machine: {error}{_taken_over(error, given)}") from error
 
 
 def _taken_over(error: InputError, given: Mapping[str, float]) -> str:
@@ -436,91 +476,8 @@ def _taken_over(error: InputError, given: Mapping[str, float]) -> str:
     return f"; not in the file, so taken from the packaged example: {', '.join(taken)}" if taken else ""
 
 
-def _config(data: Mapping[str, Any], checked: Any, source: str, remarks: tuple[Slip, ...]) -> Config:
-    """The study of a file whose values are each allowed."""
-    _consistent(data, checked)
-    machine_given = given_values(checked.machine)
-    if checked.ratios.model_fields_set:
-        try:
-            lengths = ratios(**filled(Ratios, given_values(checked.ratios)))
-        except InputError as error:
-            raise InputError(f"ratios: {error}") from error
-        twice = sorted(set(lengths) & set(machine_given))
-        if twice:
-            raise InputError(
-                f"machine.{twice[0]}: given beside [ratios], which sets it; leave out one of the two"
-            )
-        machine_given |= lengths
-    try:
-        machine = ChainUnit(machine_given)
-    except InputError as error:
-        raise InputError(f"machine: {error}{_taken_over(error, machine_given)}") from error
-    motor_given = given_values(checked.motor)
-    motor = DcMotor.parameter_layout.from_names(motor_given)
-    try:
-        DcMotor.check(motor)
-    except InputError as error:
-        raise InputError(f"motor: {error}") from error
-    config = Config(
-        title=checked.title,
-        machine=machine,
-        feed=instance(Feed, given_values(checked.feed)),
-        motor=motor,
-        motor_given=frozenset(motor_given),
-        run=instance(Run, given_values(checked.run)),
-        events=tuple(dict.fromkeys(checked.events)),
-        overload=instance(Overload, given_values(checked.overload)),
-        coupling=instance(Coupling, given_values(checked.coupling)) if "coupling" in data else None,
-        monte_carlo=instance(MonteCarlo, given_values(checked.monte_carlo)),
-        sizing=_sizing(checked) if "sizing" in data else None,
-        feed_forward=checked.feed_forward,
-        gear=instance(
-            Transmission, {**Layout(Transmission).named(KINDS["gear"]), **given_values(checked.gear)}
-        ),
-        gear_given=frozenset(given_values(checked.gear)),
-        start=checked.start,
-        starter=instance(Starter, given_values(checked.starter)),
-        catalogue=_beside(checked.catalogue, source),
-        driveline=_driveline(checked.driveline) if "driveline" in data else None,
-        place=checked.driveline.place,
-        damping_ratio=checked.driveline.damping_ratio,
-        chain=instance(Chain, given_values(checked.chain)) if checked.organ == "chain" else None,
-        source=source,
-        remarks=remarks,
-    )
-    run, turn, o = config.run, 2.0 * math.pi / config.run.crank_speed, config.overload
-    lumps = o.lumps * (2.0 * o.jam_rise + o.jam_duration + o.lump_pause) if "lumps" in config.events else 0.0
-    seconds = config.settled + (run.turns + len(config.events) * (o.turns + 2.0)) * turn + lumps
-    steps = max(seconds, config.monte_carlo.duration) / run.step
-    if not steps <= MOST_STEPS:
-        raise InputError(
-            f"run.step = {run.step:g} s: the study would take {steps:.2g} steps, more than {MOST_STEPS:.0e}; "
-            "lengthen the step, raise the speed, or lessen the turns"
-        )
-    return config
-
-
-def _sizing(checked: Any) -> Sizing:
-    """What is asked of the motor; a motor on the line has a limit of the inertia ratio only where one is given."""
-    given = given_values(checked.sizing)
-    limit = {} if checked.start == "inverter" else {"inertia_ratio": math.inf}
-    asked: Sizing = instance(Sizing, limit | given)
-    return asked
-
-
-def _driveline(section: Any) -> Driveline:
-    given = given_line(section, "driveline.")
-    names = Layout(Driveline).names
-    line: Driveline = instance(Driveline, {name: x for name, x in given.items() if name in names})
-    try:
-        check(line)
-    except InputError as error:
-        raise InputError(f"driveline.{error}") from error
-    return line
-
-
-def _consistent(data: Mapping[str, Any], checked: Any) -> None:
-    """Refuse what would be passed over in silence, and limits that leave nothing between them."""
+def _check_company(data: Mapping[str, Any]) -> None:
+    """Refuse what would be passed over in silence."""
     if "sizing" in data:
         for name in ("motor", "feed_forward"):
             if data.get(name):
@@ -535,47 +492,82 @@ def _consistent(data: Mapping[str, Any], checked: Any) -> None:
                 raise InputError(
                     f"{name}: is of the motor that [sizing] picks; add [sizing], or leave it out"
                 )
-    sizing, random = (
-        instance(Sizing, given_values(checked.sizing)),
-        instance(MonteCarlo, given_values(checked.monte_carlo)),
-    )
-    for low, high, what in (
-        (sizing.poles_least, sizing.poles_most, "sizing.poles_most"),
-        (random.force_low, random.force_high, "monte_carlo.force_high"),
-    ):
-        if high < low:
-            raise InputError(f"{what} = {high:g}: must be >= {low:g}, the least")
-    feed, jam = instance(Feed, given_values(checked.feed)), instance(Overload, given_values(checked.overload))
-    added = {"material_mass": 0.0, "processing_force": max(jam.jam_force, random.force_high)}
+    if "chain" in data and data.get("organ") != "chain":
+        raise InputError('chain: is of organs that are chains; add organ = "chain", or leave it out')
+
+
+_ORDER = (
+    ("sizing.poles_least", ">=", "sizing.poles_most"),
+    ("sizing.ambient", ">", "sizing.temperature"),
+    ("chain.sweep_lowest", ">", "chain.sweep_highest"),
+)
+"""Quantities of which the second has to be more than the first."""
+
+
+def _check_order(values: Mapping[str, Any]) -> None:
+    """Limits that leave nothing between them, and counts that are none."""
+
+    def value(name: str) -> tuple[float, str]:
+        section, _, key = name.partition(".")
+        x, declared = getattr(values[section], key), type(values[section])
+        unit = next(v.unit for v in Layout(declared).variables if v.name == key)
+        return x, f"{x:g}" + ("" if unit == "1" else f" {unit}")
+
+    for low, relation, high in _ORDER:
+        (least, limit), (most, shown) = value(low), value(high)
+        if most < least or (most == least and relation == ">"):
+            raise InputError(f"{high} = {shown}: must be {relation} {low}, {limit}")
+    for section, table in SECTIONS.items():
+        for key in table.whole:
+            number, shown = value(f"{section}.{key}")
+            if number != int(number):
+                raise InputError(f"{section}.{key} = {shown}: must be a whole number")
+
+
+def _check_loads(config: Config) -> None:
+    """Refuse loads that, together, no machine reaches: all on one side, and at the height of each event."""
+    feed = config.feed
     for v in Layout(SideLoads).variables:
-        most = getattr(feed.left, v.name) + getattr(feed.right, v.name) + added[v.name]
+        most = getattr(feed.left, v.name) + getattr(feed.right, v.name)
         if not v.quantity.admits(most):
-            # overloads lay all on one side
-            jams = " and the hardest lump" if added[v.name] else ""
             raise InputError(
-                f"feed: {v.name} of both sides{jams} = {most:g} {v.unit}: must be <= {v.quantity.high:g} {v.unit} "
+                f"feed: {v.name} of both sides = {most:.9g} {v.unit}: must be <= {v.quantity.high:g} {v.unit} "
                 "together, as an overload may lay all of it on one side"
             )
-    if "chain" in data and checked.organ != "chain":
-        raise InputError('chain: is of organs that are chains; add organ = "chain", or leave it out')
-    chain = instance(Chain, given_values(checked.chain))
-    if chain.sweep_highest <= chain.sweep_lowest:
+    inputs = {v.name: v for v in ChamberForces.input_layout.variables}
+    normal = {name: v.quantity.start or 0.0 for name, v in inputs.items()} | Layout(Feed).named(feed)
+    hardest = [(f"event.{name}", event) for name, event in config.events.items()]
+    hardest += [("monte_carlo.event", event) for event in config.random.hardest()]
+    for where, event in hardest:
+        if not set(event.inputs(event.side)) <= set(inputs):
+            continue
+        for name, signal in event.signals(normal, 0.0, dict.fromkeys(event.reads, 0.0)).items():
+            most = (
+                max([signal.start, *(x for *_, x in signal.changes)])
+                if isinstance(signal, Profile)
+                else signal
+            )
+            v = inputs[name]
+            if not v.quantity.admits(most):
+                raise InputError(
+                    f"{where}: {name} comes to {most:.9g} {v.unit} with the feed: must be {v.quantity.allowed}"
+                )
+
+
+MOST_STEPS = 1e6
+
+
+def _check_steps(config: Config) -> None:
+    """Refuse a study that would never end."""
+    run, turn = config.run, config.turn
+    seconds = config.settled + run.turns * turn
+    seconds += sum(event.follow(turn) + 2.0 * turn for event in config.events.values())
+    steps = max(seconds, config.monte_carlo.duration) / run.step
+    if not steps <= MOST_STEPS:
         raise InputError(
-            f"chain.sweep_highest = {chain.sweep_highest:g} rad/s: must be > chain.sweep_lowest, "
-            f"{chain.sweep_lowest:g} rad/s"
+            f"run.step = {run.step:g} s: the study would take {steps:.2g} steps, more than {MOST_STEPS:.0e}; "
+            "lengthen the step, raise the speed, or lessen the turns"
         )
-    if not sizing.temperature > sizing.ambient:
-        raise InputError(
-            f"sizing.temperature = {sizing.temperature:g} K: must be > sizing.ambient, {sizing.ambient:g} K"
-        )
-    for name, number in (
-        ("run.turns", instance(Run, given_values(checked.run)).turns),
-        ("monte_carlo.runs", random.runs),
-        ("monte_carlo.seed", random.seed),
-        *((f"chain.{n}", getattr(chain, n)) for n in ("rods", "sweep_points", "starts", "turns")),
-    ):
-        if number != int(number):
-            raise InputError(f"{name} = {number:g}: must be a whole number")
 
 
 def _beside(name: str, source: str) -> Path | None:
@@ -583,7 +575,6 @@ def _beside(name: str, source: str) -> Path | None:
     return (Path(source).parent / name) if name else None
 
 
-MOST_STEPS = 1e6
 _LENGTHS = ("r", "l", "h", "c", "hy", "e", "l1", "l2", "z")
 
 

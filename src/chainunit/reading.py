@@ -220,10 +220,11 @@ def given_values(section: BaseModel) -> dict[str, float]:
     return flat
 
 
-def first_line(error: ValidationError, file: type[BaseModel]) -> str:
-    """The line that says what is wrong with a table of the form `file`."""
+def first_line(error: ValidationError, file: type[BaseModel], prefix: str = "") -> str:
+    """The line that says what is wrong with a table of the form `file`; `prefix` goes before the names of its
+    keys."""
     first = error.errors()[0]
-    where = printable(".".join(str(part) for part in first["loc"]), 80)
+    where = prefix + printable(".".join(str(part) for part in first["loc"]), 80)
     if first["type"] == "extra_forbidden":
         section: Any = file
         for part in first["loc"][:-1]:

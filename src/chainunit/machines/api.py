@@ -10,12 +10,10 @@ import numpy as np
 
 from ..engines import MATH, numpy_
 from ..errors import GeometryError, InputError
-from ..groups.loads import Stop
-from ..mechanism.machine import MachineState
 from ..ports import PortSlopes
 from ..quantities import Layout, Quantity, Variable, complaint
 from . import chain_unit
-from .chain_unit import PINS, Chamber, ChamberForces, Inputs, Outputs, Parameters, SideLoads
+from .chain_unit import Chamber, ChamberForces, Inputs, Outputs, Parameters, SideLoads, State, Stop
 from .hanging import Hanging, Modes, modes, rods, split
 
 _XP = numpy_()
@@ -109,7 +107,7 @@ class ChainUnit:
             ),
         )
 
-    def _state(self, u: Inputs) -> MachineState:
+    def _state(self, u: Inputs) -> State:
         return ChamberForces.shared(_XP, self.p, u, None)
 
     def forces(
@@ -176,7 +174,10 @@ class ChainUnit:
     ) -> Any:
         """The motor torque without friction [N m], from the reactions, group by group: the second route."""
         u = self._inputs(phi, w, a, left, right, stop)
-        return self._state(u).torque_by_reactions(u.a / self.p.ratio) / self.p.ratio
+        s = self._state(u)
+        w2, a = s.w * s.w, u.a / self.p.ratio
+        forces = chain_unit.Reactions(s.m, self.p, w2, a, s.bias.processing_forces, s.bias.stop.moment)
+        return forces.torque / self.p.ratio
 
     def friction_torque(
         self,
@@ -187,15 +188,15 @@ class ChainUnit:
         stop: Stop = FREE,
     ) -> Any:
         """The part of `tau` that pin friction and joint damping take [N m]."""
-        state = self._state(self._inputs(phi, w, 0.0, left, right, stop))
-        return state.effects["pins"].lost / self.p.ratio
+        bias = self._state(self._inputs(phi, w, 0.0, left, right, stop)).bias
+        return bias.friction / self.p.ratio
 
     def pin_turns(self, phi: Any) -> list[Any]:
         """Angle through which each of the ten pins O1, A, Bd, C, A2, B, A1 (left, then right) has turned [rad], from
         the first of the motor angles `phi`, shape (n,); the sum of all turning to and fro is left to the reader."""
         phi = _array(phi)
         m = self._state(self._inputs(phi, 0.0, 0.0, EMPTY, EMPTY)).m
-        per_turn = [m.turns[joint] for joint in PINS]
+        per_turn = m.pin_rates()
         step = np.diff(phi / self.p.ratio)
         turned = []
         for rate in per_turn:

@@ -10,7 +10,8 @@ import xarray as xr
 
 from .. import __version__
 from ..files import netcdf, whole
-from ..studies.overload import LOAD_CYCLE, SCENARIOS, Study, as_dict
+from ..studies.result import as_dict
+from ..studies.study import LOAD_CYCLE, Study
 
 
 def _load_cycle(study: Study, turns: xr.Dataset, file: Path) -> Path:
@@ -48,10 +49,7 @@ def write(study: Study, folder: Path) -> list[Path]:
     if study.runs:
         series = folder / "result.nc"
         tree = xr.DataTree.from_dict(
-            {
-                f"/{name}": run.assign_attrs(title=SCENARIOS.get(name, name.replace("_", " ")))
-                for name, run in study.runs.items()
-            }
+            {f"/{name}": run.assign_attrs(title=study.called(name)) for name, run in study.runs.items()}
         )
         tree.attrs.update(title=study.config.title, source=f"chainunit {__version__}")
         with whole(series) as part, netcdf():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,10 +14,10 @@ from plotly.subplots import make_subplots  # type: ignore[import-untyped]
 from ..drives.dc_motor import DcMotor
 from ..engines import numpy_
 from ..machines.chain_unit import SIDES, ChamberForces
+from ..studies.bearings import PINS
 from ..studies.chain import HIGH
-from ..studies.overload import PINS, SCENARIOS, Study
-from ..studies.overload import called as in_sentences
 from ..studies.shaft import RIGID
+from ..studies.study import Study
 from .style import LINES, WIDE
 
 COASTING = "_coasting"
@@ -25,7 +25,6 @@ COASTING = "_coasting"
 _TITLES = {
     "start_up": "start-up and steady running",
     "steady": "steady running",
-    **SCENARIOS,
     "unfinished": "the run that stopped early",
 }
 
@@ -102,10 +101,12 @@ class Plot:
     """Whether the event of the run is marked."""
 
 
-def called(run: str) -> str:
-    """What a run is called."""
+def called(events: Mapping[str, Any], run: str) -> str:
+    """Title of a run: one of the `events`, each with its title, or another."""
     if run.endswith(COASTING):
-        return f"{called(run.removesuffix(COASTING))}: behind the open coupling"
+        return f"{called(events, run.removesuffix(COASTING))}: behind the open coupling"
+    if run in events:
+        return str(events[run].title)
     return _TITLES.get(run, run.replace("_", " "))
 
 
@@ -125,9 +126,9 @@ def plots(study: Study) -> Iterator[Plot]:
     driven = [name for name in study.runs if not name.endswith(COASTING)]
     if driven:
         yield _torque_speed(study, driven)
-    if study.cycles:
+    if study.statics.cycles:
         yield _turn(study)
-    if study.sides is not None:
+    if study.statics.sides is not None:
         yield _sides(study)
     if study.chain is not None and len(study.chain.sweep) > 1:
         yield _chains(study)
@@ -188,7 +189,7 @@ def _torque_speed(study: Study, names: list[str]) -> Plot:
         figure.add_scatter(
             x=_small(speed[kept]),
             y=_small(torque[kept]),
-            name=called(name),
+            name=called(study.config.events, name),
             mode="lines",
             line=_style(i),
             hovertemplate=hover,
@@ -220,7 +221,7 @@ def _torque_speed(study: Study, names: list[str]) -> Plot:
 
 def _turn(study: Study) -> Plot:
     figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.07)
-    for i, (name, c) in enumerate(study.cycles.items()):
+    for i, (name, c) in enumerate(study.statics.cycles.items()):
         degrees = _small(np.degrees(np.append(c.angle, 2.0 * math.pi)))
         for row, y in ((1, c.crank_torque), (2, c.outputs.rocker.tau)):
             figure.add_scatter(
@@ -253,13 +254,13 @@ _WHICH = {"both": "both sides"} | {str(side): f"{side} side alone" for side in S
 
 
 def _sides(study: Study) -> Plot:
-    assert study.sides is not None
+    assert study.statics.sides is not None
     figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.07)
     for row, what in ((1, "crank"), (2, "rocker")):
         for i, (which, words) in enumerate(_WHICH.items()):
             figure.add_scatter(
-                x=_small(study.sides.speed),
-                y=_small(getattr(study.sides, f"{what}_{which}")),
+                x=_small(study.statics.sides.speed),
+                y=_small(getattr(study.statics.sides, f"{what}_{which}")),
                 name=words,
                 legendgroup=which,
                 showlegend=row == 1,
@@ -474,7 +475,7 @@ def _transient(study: Study, name: str) -> Plot:
     figure.update_xaxes(range=shown)
     since = "time [s]" if event is None else "time after the event [s]"
     figure.update_xaxes(title_text=since, row=len(series))
-    words = called(name)
+    words = called(study.config.events, name)
     return Plot(
         f"time-{name.replace('_', '-')}",
         words[0].upper() + words[1:],
@@ -530,7 +531,7 @@ def _reactions(study: Study) -> Plot:
     runs, pins = list(study.pins), list(PINS)
     height = 0.84 / len(runs)
     for i, name in enumerate(runs):
-        bar, top, words = _BARS[i % len(_BARS)], -0.42 + i * height, in_sentences(name)
+        bar, top, words = _BARS[i % len(_BARS)], -0.42 + i * height, study.called(name)
         for size, width, offset in (("peak", 0.92 * height, 0.0), ("rms", 0.34 * height, 0.29 * height)):
             peak = size == "peak"
             figure.add_bar(

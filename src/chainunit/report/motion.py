@@ -10,10 +10,10 @@ import numpy as np
 
 from ..engines import numpy_
 from ..groups.chain import pins
-from ..groups.loads import Resistance
-from ..machines.chain_unit import ChamberForces, Inputs, SideLoads
+from ..machines.chain_unit import ChamberForces, Inputs, SideLoads, processing_by_speed
 from ..planar import Motion
-from ..studies.overload import PINS, Study
+from ..studies.bearings import PINS
+from ..studies.study import Study
 from .interactive import called, event_of, in_order
 
 _XP = numpy_()
@@ -117,8 +117,19 @@ def _run(study: Study, name: str, interval: float) -> dict[str, Any]:
     angle, speed = study.drive.crank_motion(part)
     inputs = Inputs(phi=angle * p.ratio, w=speed * p.ratio, a=0.0, left=loads["left"], right=loads["right"])
     state = ChamberForces.shared(_XP, p, inputs, None)
-    joints = {name: pin.p for name, pin in state.m.pins.items()}
-    processing = {side: state.effects[f"{side} processing"].wrenches[0].force for side in ("left", "right")}
+    m = state.m
+    joints = {
+        "O1": m.crank.pin.p,
+        "A": m.a.p,
+        "Bd": m.drive.b.p,
+        "C": m.rocker.pin.p,
+        "A2": m.rocker.at(p.e).p,
+        "A1 left": m.left.dyad.first.pin.p,
+        "A1 right": m.right.dyad.first.pin.p,
+        "B left": m.left.dyad.b.p,
+        "B right": m.right.dyad.b.p,
+    }
+    processing = dict(zip(("left", "right"), state.bias.processing_forces, strict=True))
     walls, webs = rods = _rods(study)
     for side in ("left", "right") if study.drive.chain is not None else ():
         names = _organ_joints(side, rods)[1:-1]
@@ -126,8 +137,7 @@ def _run(study: Study, name: str, interval: float) -> dict[str, Any]:
         if f"machine.{side}.theta_1" in part:
             moving = _chain(p, part, side, rods)
             between, v = [a1 + pin.p for pin in moving[1:-1]], moving[walls].p1
-            law = Resistance(f"B {side}", loads[side].processing_force, p.processing)
-            processing[side] = v * -law.per_speed(numpy_(), v.squared())
+            processing[side] = v * -processing_by_speed(numpy_(), p, loads[side], v.squared())
         else:
             # behind an open coupling the machine is followed with two bars
             between = [a1 + (b - a1) * (k / walls) for k in range(1, walls)]
@@ -147,7 +157,7 @@ def _run(study: Study, name: str, interval: float) -> dict[str, Any]:
     since = value("time") - (event or 0.0)
     return {
         "name": name,
-        "title": called(name),
+        "title": called(study.config.events, name),
         "event": event is not None,
         # the picture that stands still until it is played
         "still": int(np.searchsorted(since, 0.0 if event is not None else study.settled)),

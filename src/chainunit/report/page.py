@@ -16,6 +16,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from html import escape
 from importlib import metadata, resources
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 from plotly.offline import get_plotlyjs  # type: ignore[import-untyped]
@@ -24,15 +25,17 @@ from .. import __version__
 from ..files import whole
 from ..quantities import Layout, Variable
 from ..studies.cycle import OverloadFactors
+from ..studies.limits import Limits
+from ..studies.measures import Answers, Phase, measures_of
 from ..studies.monte_carlo import Sample
-from ..studies.overload import SCENARIOS, Answers, Limits, StartUp, Study, as_dict
-from ..studies.overload import called as in_sentences
+from ..studies.result import as_dict
 from ..studies.shaft import ShaftAnswers, Torsion
 from ..studies.sizing import Verdict
+from ..studies.study import Study
 from ..text import shown
 from .interactive import Plot, called, plots
 from .motion import motion
-from .trace import Traced
+from .trace import Traced, at
 
 NAME = "report.html"
 
@@ -55,7 +58,7 @@ def write(study: Study, folder: Path) -> Path:
 
 
 def render(study: Study, result: Mapping[str, Any]) -> str:
-    """The page of a study whose numbers are `result` (`chainunit.studies.overload.as_dict`)."""
+    """The page of a study whose numbers are `result` (`chainunit.studies.result.as_dict`)."""
     t = Traced(result)
     drawn = list(plots(study))
     moving = motion(study) if study.runs else None
@@ -120,6 +123,15 @@ def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
+def _called(t: Traced, run: str) -> str:
+    """Title of a run."""
+    return called({name: SimpleNamespace(**event) for name, event in t.result["events"].items()}, run)
+
+
+def _in_sentences(t: Traced, run: str) -> str:
+    return "start-up" if run == "start_up" else _called(t, run)
+
+
 def _words(name: str) -> str:
     return name.replace("_", " ")
 
@@ -152,7 +164,7 @@ def _given(t: Traced, section: str, declared: Any, caption: str, leave_out: Coll
     """The table of what was given for a declaration."""
     rows = [
         (escape(_capital(v.description)), t.number(f"{section}.{v.name}", given=True))
-        for v in _variables(declared, t.result[section])
+        for v in _variables(declared, at(t.result, section))
         if v.name not in leave_out
     ]
     return _table((), rows, caption=caption)
@@ -162,7 +174,7 @@ def _header(t: Traced, study: Study, title: str, sections: list[tuple[str, str, 
     def n(path: str, kind: str | None = None, *, given: bool = True) -> str:
         return t.number(path, kind=kind, given=given)
 
-    overloads = [called(name) for name in study.answers if name in SCENARIOS]
+    overloads = [study.called(name) for name in study.overloads]
     if "sizing" in t.result:
         asked = "Which motor, gear and flywheel does this chain unit need? Its crank turns at "
     else:
@@ -182,12 +194,7 @@ def _header(t: Traced, study: Study, title: str, sections: list[tuple[str, str, 
             f" The machine starts from rest{ramp} and is evaluated over {n('run.turns')} {turns} when steady."
         )
     if overloads:
-        ahead = "turn" if study.config.overload.turns == 1.0 else "turns"
-        asked += (
-            " Then come overloads, each by itself, which begin at a crank angle of "
-            f"{n('overload.crank_angle')} and are followed for {n('overload.turns')} {ahead} or longer: "
-            f"{escape('; '.join(overloads))}."
-        )
+        asked += f" Then come overloads, each by itself: {escape('; '.join(overloads))}."
     status = ""
     if t.result["status"] != "complete":
         status = (
@@ -215,14 +222,14 @@ def _all_given(t: Traced, study: Study) -> str:
         for section, declared, caption in (
             ("run", config.run, "Run"),
             ("feed", config.feed, "Feed in normal running"),
-            ("overload", config.overload, "Overloads"),
+            *((f"event.{name}", event.p, study.called(name)) for name, event in config.events.items()),
             ("coupling", config.coupling, "Safety coupling"),
             ("machine", study.drive.machine.p, "Machine"),
             ("chain", config.chain, "Chains"),
             ("driveline", config.driveline, "Driveline"),
             ("motor", study.drive.parameters, "Motor"),
         )
-        if t.result.get(section)
+        if declared is not None
     )
     return f'<div class="given">{tables}</div>'
 
@@ -275,8 +282,12 @@ def _answer(t: Traced, study: Study) -> str:
             for family, members in _families(answers[reference]).items()
             if members[0][1].name in _KEY
         ]
-        large = f"Large: {called(reference)}, the crank at {_speed(t, reference)}."
-        worst = " Below: the overload that asks most." if any(run in SCENARIOS for run in answers) else ""
+        large = f"Large: {_called(t, reference)}, the crank at {_speed(t, reference)}."
+        worst = (
+            " Below: the overload that asks most."
+            if any(run in t.result["events"] for run in answers)
+            else ""
+        )
         parts.append(f'<p class="lead">{large}{worst}</p>')
     else:
         parts.append('<p class="lead">The study ended before any run could be evaluated.</p>')
@@ -288,7 +299,7 @@ def _answer(t: Traced, study: Study) -> str:
         parts.append(
             '<ul class="verdicts">'
             + "".join(
-                f'<li><span class="sign" aria-hidden="true">!</span> {t.text(f"warnings.{i}")}</li>'
+                f'<li><span class="sign" aria-hidden="true">!</span> {t.text(f"warnings.{i}.text")}</li>'
                 for i in warnings
             )
             + "</ul>"
@@ -335,12 +346,12 @@ def _runs(t: Traced) -> str:
                 continue
             cells = [_answer_number(t, run, v) if run in found else "" for run in answers]
             rows.append((escape(_capital(v.description)), *cells))
-        heads = [escape(_capital(called(run))) for run in answers]
+        heads = [escape(_capital(_called(t, run))) for run in answers]
         parts.append(_table(("", *heads), rows, caption="What each run asks of the drive"))
     if t.result.get("start_up"):
         rows = [
             (escape(_capital(v.description)), t.number(f"start_up.{v.name}"))
-            for v in Layout(StartUp).variables
+            for v in measures_of(Phase.START_UP)
             if t.result["start_up"][v.name]["value"] is not None
         ]
         parts.append(_table((), rows, caption="What the start-up asks of the drive"))
@@ -558,10 +569,12 @@ def _pins(t: Traced) -> str:
                 escape(pin),
                 *(t.number(f"pins.{reference}.{pin}.{size}") for size in sizes),
                 t.number(f"pins.{worst}.{pin}.peak"),
-                escape(in_sentences(worst)),
+                escape(_in_sentences(t, worst)),
             )
         )
-    named = (f"{_capital(called(reference))}, {'RMS' if size == 'rms' else _words(size)}" for size in sizes)
+    named = (
+        f"{_capital(_called(t, reference))}, {'RMS' if size == 'rms' else _words(size)}" for size in sizes
+    )
     heads = ("", *map(escape, named), "Largest peak", "In")
     return _table(heads, rows, caption="What the pins carry")
 
@@ -576,7 +589,7 @@ def _shaft(t: Traced) -> str:
         )
         for v in Layout(ShaftAnswers).variables
     ]
-    heads = ("", *(escape(_capital(called(run))) for run in runs))
+    heads = ("", *(escape(_capital(_called(t, run))) for run in runs))
     frequencies = [
         (escape(_capital(v.description)), t.number(f"driveline.{v.name}")) for v in Layout(Torsion).variables
     ]
@@ -590,7 +603,7 @@ def _card(t: Traced, family: str, members: list[tuple[str, Variable]], run: str)
     large, small = members[:2], members[2:]
     figures = "".join(
         f'<div class="figure"><span class="large">{_answer_number(t, run, v)}</span>'
-        f'<span class="which">{escape(kind or called(run))}</span></div>'
+        f'<span class="which">{escape(kind or _called(t, run))}</span></div>'
         for kind, v in large
     )
     lines = []
@@ -598,12 +611,16 @@ def _card(t: Traced, family: str, members: list[tuple[str, Variable]], run: str)
         also = ", ".join(f"{escape(kind)} {_answer_number(t, run, v)}" for kind, v in small)
         lines.append(also)
     kind, v = large[0]
-    sizes = {name: t.value(f"answers.{name}.{v.name}") for name in t.result["answers"] if name in SCENARIOS}
+    sizes = {
+        name: t.value(f"answers.{name}.{v.name}")
+        for name in t.result["answers"]
+        if name in t.result["events"]
+    }
     found = {name: size for name, size in sizes.items() if size is not None}
     if found:
         worst = max(found, key=lambda name: abs(found[name]))
         lines.append(
-            f"overload: {escape(kind)} <strong>{_answer_number(t, worst, v)}</strong>, {escape(SCENARIOS[worst])}"
+            f"overload: {escape(kind)} <strong>{_answer_number(t, worst, v)}</strong>, {escape(_called(t, worst))}"
         )
     return (
         f'<article class="card"><h3>{escape(_capital(family))}</h3><div class="figures">{figures}</div>'
@@ -855,9 +872,9 @@ def _figures(t: Traced, drawn: list[Plot]) -> str:
             caption = "Upright, dashed: the event. Shaded: what the machine is given changes."
             if plot.run in t.result["answers"]:
                 caption += _speed_after(t, plot.run)
-            if plot.run == "blocked" and "block_peaks" in t.result:
+            if plot.run in t.result["block_peaks"]:
                 peaks, stiffness = (
-                    " to ".join(t.number(f"block_peaks.{name}_{end}") for end in ("low", "high"))
+                    " to ".join(t.number(f"block_peaks.{plot.run}.{name}_{end}") for end in ("low", "high"))
                     for name in ("crank_torque", "stiffness")
                 )
                 caption += (
@@ -935,14 +952,14 @@ width goes with its mass. Joints are those of the simulated run.</figcaption>
 def _basis(t: Traced, study: Study) -> str:
     parts = []
     if t.result["notes"]:
-        items = "".join(f"<li>{t.text(f'notes.{i}')}</li>" for i in range(len(t.result["notes"])))
+        items = "".join(f"<li>{t.text(f'notes.{i}.text')}</li>" for i in range(len(t.result["notes"])))
         parts.append(f"<h3>Assumptions</h3><ul>{items}</ul>")
     certificate = t.result["certificate"]
     if certificate:
         names = list(dict.fromkeys(name for shares in certificate.values() for name in shares))
         rows = [
             (
-                escape(_capital(called(run))),
+                escape(_capital(_called(t, run))),
                 *(t.number(f"certificate.{run}.{name}") if name in shares else "" for name in names),
             )
             for run, shares in certificate.items()

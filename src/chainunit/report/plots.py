@@ -11,12 +11,13 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
-from ..config import by_side
 from ..drives.dc_motor import DcMotor
 from ..engines import numpy_
+from ..studies.bearings import PINS
 from ..studies.chain import HIGH
-from ..studies.overload import PINS, SCENARIOS, Study, called
+from ..studies.events import in_groups
 from ..studies.shaft import RIGID
+from ..studies.study import Study
 from .style import LINES, WIDE, draw
 
 NAMES = (
@@ -35,9 +36,9 @@ NAMES = (
 def write(study: Study, folder: Path) -> list[Path]:
     """Write every plot that the study has data for; returns the files."""
     plots = {"torque_angle.png": _torque_angle, "sides_over_speed.png": _sides_over_speed}
-    if study.loops:
+    if study.statics.loops:
         plots["speed_loop.png"] = _speed_loop
-    if any(name in study.runs for name in SCENARIOS):
+    if any(name in study.runs for name in study.config.events):
         plots |= {
             "overload_time.png": _overload_time,
             "torque_speed.png": _torque_speed,
@@ -54,7 +55,7 @@ def write(study: Study, folder: Path) -> list[Path]:
 
 def _torque_angle(study: Study) -> Any:
     figure, (top, bottom) = plt.subplots(2, 1, figsize=(8, 6.5), sharex=True)
-    for line, (name, c) in zip(cycle(LINES), study.cycles.items(), strict=False):
+    for line, (name, c) in zip(cycle(LINES), study.statics.cycles.items(), strict=False):
         degrees = np.degrees(c.angle)
         top.plot(degrees, c.crank_torque, label=name, **line)
         bottom.plot(degrees, c.outputs.rocker.tau, label=name, **line)
@@ -69,7 +70,7 @@ def _torque_angle(study: Study) -> Any:
 
 
 def _sides_over_speed(study: Study) -> Any:
-    sides = study.sides
+    sides = study.statics.sides
     assert sides is not None
     figure, axes = plt.subplots(1, 2, figsize=(10, 5), sharex=True)
     for axis, (torque, crossings) in zip(axes, sides.crossings().items(), strict=True):
@@ -93,7 +94,7 @@ def _speed_loop(study: Study) -> Any:
     figure, axes = plt.subplots(1, 2, figsize=(10, 4.6), width_ratios=(1.0, 1.0))
     gain, step = axes
     phase = gain.twinx()
-    for line, (name, found) in zip(LINES, study.loops.items(), strict=False):
+    for line, (name, found) in zip(LINES, study.statics.loops.items(), strict=False):
         gain.loglog(found.frequency, found.gain, label=name, **line)
         phase.semilogx(found.frequency, found.phase, **{**line, "linewidth": 0.8})
         step.plot(found.time, found.deviation, label=name, **line)
@@ -108,7 +109,7 @@ def _speed_loop(study: Study) -> Any:
     step.set_xlabel("time after a step of the load torque [s]")
     step.set_ylabel("deviation of the motor speed [(rad/s)/(N m)]")
     step.set_title("Disturbance step")
-    step.set_xlim(0.0, max(found.settling for found in study.loops.values()) * 1.5)
+    step.set_xlim(0.0, max(found.settling for found in study.statics.loops.values()) * 1.5)
     step.legend(loc="lower right")
     return figure
 
@@ -147,7 +148,7 @@ def _start_up(study: Study) -> Any:
 
 def _overload_time(study: Study) -> Any:
     """A band of three rows for each side, the scales alike in all."""
-    groups = by_side(study.runs)
+    groups = in_groups(study.config.events, study.runs)
     widest = max(len(names) for names in groups)
     figure, axes = plt.subplots(
         3 * len(groups), widest, figsize=(4.2 * widest, 7.5 * len(groups)), squeeze=False
@@ -169,7 +170,7 @@ def _overload_time(study: Study) -> Any:
                 axis.set_xlim(time[0], time[-1])
             if study.drive.motor is DcMotor:
                 column[2].axhline(study.motor.limit.i, label="current limit", **LINES[1])
-            column[0].set_title(SCENARIOS[name])
+            column[0].set_title(study.called(name))
             column[-1].set_xlabel("time after the event [s]")
         for axis, label in zip(rows[:, 0], labels, strict=True):
             axis.set_ylabel(label)
@@ -197,7 +198,7 @@ def _driveline(study: Study) -> Any:
         time = run["time"].values - since
         top.plot(time, run["driveline.tau2"], label="with this driveline", **LINES[0])
         top.plot(time, run[RIGID], label="with a rigid shaft", **LINES[1])
-        top.set_title(SCENARIOS.get(name, "steady running"), fontsize=10)
+        top.set_title(study.called(name), fontsize=10)
         top.set_xlabel("time [s]")
         top.set_xlim(time[0], time[-1])
         rows = study.cycles_of[name].classes(largest)
@@ -289,14 +290,14 @@ def _chain_sweep(study: Study) -> Any:
 
 def _torque_speed(study: Study) -> Any:
     """The start, and beside it the overloads of each side, at a scale of their own."""
-    groups = [["start_up"], *by_side(study.runs)]
+    groups = [["start_up"], *in_groups(study.config.events, study.runs)]
     figure, axes = plt.subplots(1, len(groups), figsize=(1.0 + 4.6 * len(groups), 5.5))
     for axis, names in zip(axes, groups, strict=True):
         slowest, fastest = math.inf, 0.0
         for line, name in zip(cycle(LINES), names, strict=False):
             # an overload from its event on; what was before is the steady running of the first panel
             run = study.runs[name].sel(time=slice(study.event.get(name), None))
-            title = SCENARIOS.get(name, "start-up and steady")
+            title = "start-up and steady" if name == "start_up" else study.called(name)
             axis.plot(run["motor.w"], run["motor.air_gap_tau"], label=title, **line)
             slowest = min(slowest, float(run["motor.w"].min()))
             fastest = max(fastest, float(run["motor.w"].max()))
@@ -325,7 +326,7 @@ def _reactions(study: Study) -> Any:
             rows + i * height,
             peaks,
             height,
-            label=called(name),
+            label=study.called(name),
             color=shades[i % len(shades)],
             hatch=hatches[(i + i // len(shades)) % len(hatches)],
             edgecolor="#1b1b1b",

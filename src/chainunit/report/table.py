@@ -3,30 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from ..config import OVERLOADS, by_side
 from ..quantities import Layout, Variable
 from ..studies.chain import HIGH, ChainResult, SpeedNumbers
+from ..studies.coupling import coupling_sentence
 from ..studies.cycle import OverloadFactors, factors_for
+from ..studies.events import Event, in_groups
+from ..studies.judgement import motor_verdict
+from ..studies.limits import Limits
+from ..studies.measures import Answers, Phase, measures_of, reaches
 from ..studies.monte_carlo import QUANTILES, MonteCarloResult, Sample
-from ..studies.overload import (
-    DIFFERENCE,
-    Answers,
-    Limits,
-    StartUp,
-    Study,
-    called,
-    coupling_sentence,
-    motor_verdict,
-    reached,
-)
 from ..studies.quantiles import CONFIDENCE, Estimate
+from ..studies.rig import DIFFERENCE
 from ..studies.shaft import ShaftAnswers
+from ..studies.study import Study
 from ..text import number, plain, shown
 
 _HIDDEN = {
@@ -61,19 +56,24 @@ def _head(study: Study) -> str:
     """The speed that the crank reaches, and what was asked for where it is another."""
     asked = number(study.config.run.crank_speed, "rad/s", full=False)
     steady = study.answers.get("steady")
-    if steady is None or reached(steady, study.config.run.crank_speed):
+    if steady is None or reaches(steady.speed_mean, study.config.run.crank_speed):
         return f"crank at {asked}"
     return f"crank at {number(steady.speed_mean, 'rad/s')}; {asked} NOT reached"
 
 
-def _short(run: str) -> str:
+def _short(events: Mapping[str, Event], run: str) -> str:
     """Heading of the column of a run."""
-    return OVERLOADS[run].short if run in OVERLOADS else run.replace("_", "-")
+    return events[run].short if run in events else run.replace("_", "-")
 
 
-def _print_runs(console: Console, table: Callable[[list[str]], Table], runs: Collection[str]) -> None:
+def _print_runs(
+    console: Console,
+    table: Callable[[list[str]], Table],
+    runs: Collection[str],
+    events: Mapping[str, Event],
+) -> None:
     """One table of all runs, a column each; where it is too wide, one for each side with steady running beside."""
-    first, overloads = [run for run in runs if run not in OVERLOADS], by_side(runs)
+    first, overloads = [run for run in runs if run not in events], in_groups(events, runs)
     whole = table([*first, *(run for names in overloads for run in names)])
     unbounded = console.options.update(width=10_000)
     if console.measure(whole, options=unbounded).maximum <= console.width or not overloads:
@@ -89,8 +89,8 @@ def show(study: Study, console: Console) -> None:
     for line in (study.verdict and study.verdict.text, (motor_verdict(study) or {}).get("text")):
         if line:
             console.print(line, soft_wrap=True)
-    for remark in config.remarks:
-        console.print(f"Remark: {remark.sentence}", soft_wrap=True)
+    for slip in config.remarks:
+        console.print(f"Remark: {slip.sentence}", soft_wrap=True)
     if study.sizing is not None:
         _show_sizing(study, console)
     warning = "the motor is insufficient" if study.insufficient else ""
@@ -100,7 +100,7 @@ def show(study: Study, console: Console) -> None:
         table = Table(title=Text(title) if title else None, title_justify="left")
         table.add_column(_head(study))
         for name in runs:
-            table.add_column(_short(name), justify="right")
+            table.add_column(_short(study.config.events, name), justify="right")
         for v in Layout(Answers).variables:
             known = any(getattr(study.answers[run], v.name) is not None for run in runs)
             if v.name not in _HIDDEN and (known or v.name not in _IF_ANY):
@@ -108,25 +108,27 @@ def show(study: Study, console: Console) -> None:
         return table
 
     if study.answers:
-        _print_runs(console, answers, study.answers)
+        _print_runs(console, answers, study.answers, config.events)
     if study.start is not None:
-        asks = ((v, getattr(study.start, v.name)) for v in Layout(StartUp).variables)
+        asks = ((v, getattr(study.start, v.name)) for v in measures_of(Phase.START_UP))
         said = (f"{v.description} {number(x, v.unit, v.kind)}" for v, x in asks if x is not None)
         console.print(f"Start-up: {'; '.join(said)}.", soft_wrap=True)
     if study.chain is not None:
         _show_chain(study.chain, console)
     if study.monte_carlo is not None:
         _show_monte_carlo(study.monte_carlo, console)
-    if study.factors:
+    if study.statics.factors:
         asked = number(config.run.crank_speed, "rad/s", full=False)
         table = Table(title=f"Overload factor, one side against both, at {asked}", title_justify="left")
         table.add_column("way")
-        for side in study.factors:
+        for side in study.statics.factors:
             table.add_column(side, justify="right")
         table.add_column("is for")
-        uses = factors_for(study.factors)
+        uses = factors_for(study.statics.factors)
         for v in Layout(OverloadFactors).variables:
-            sizes = (number(getattr(factors, v.name), v.unit, v.kind) for factors in study.factors.values())
+            sizes = (
+                number(getattr(factors, v.name), v.unit, v.kind) for factors in study.statics.factors.values()
+            )
             table.add_row(v.description, *sizes, uses[v.name])
         console.print(table)
     if study.pins:
@@ -141,12 +143,12 @@ def show(study: Study, console: Console) -> None:
                 number(steady["equivalent"], "N"),
                 number(steady["peak"], "N"),
                 number(heaviest[pin], "N"),
-                _short(worst),
+                _short(config.events, worst),
             )
         console.print(table)
     if study.shaft:
         _show_shaft(study, console)
-    limits = study.limits
+    limits = study.statics.limits
     if limits is not None:
         of = {v.name: number(getattr(limits, v.name), v.unit, v.kind) for v in Layout(Limits).variables}
         console.print(
@@ -167,7 +169,7 @@ def show(study: Study, console: Console) -> None:
             f"{slack[:1].upper()}{slack[1:]}; the lowest mode of a chain lies near {of['chain_resonance']}.",
             soft_wrap=True,
         )
-    for name, found in study.loops.items():
+    for name, found in study.statics.loops.items():
         console.print(
             f"Speed loop, {name} ({number(found.inertia, 'kg.m2')}): phase margin {found.phase_margin:.0f} deg at "
             f"{number(found.crossover, 'rad/s')}; a step of 1 N m takes {number(found.speed_dip, 'rad/s')} off the "
@@ -193,13 +195,13 @@ def show(study: Study, console: Console) -> None:
         worst = max(differences, key=lambda run: differences[run])
         console.print(
             f"Difference of {name} to the monolithic solution, in parts of its peak: at most "
-            f"{number(differences[worst], '1')} ({called(worst)}), {len(differences)} runs compared.",
+            f"{number(differences[worst], '1')} ({study.called(worst)}), {len(differences)} runs compared.",
             soft_wrap=True,
         )
-    for warning in study.warnings:
-        console.print(f"Warning: {warning}", soft_wrap=True)
-    for note in study.notes:
-        console.print(f"Note: {note}", soft_wrap=True)
+    for remark in study.warnings:
+        console.print(f"Warning: {remark}", soft_wrap=True)
+    for remark in study.notes:
+        console.print(f"Note: {remark}", soft_wrap=True)
 
 
 def _show_chain(found: ChainResult, console: Console) -> None:
@@ -287,14 +289,14 @@ def _show_shaft(study: Study, console: Console) -> None:
         table = Table(title="What the driveline carries", title_justify="left")
         table.add_column("")
         for name in runs:
-            table.add_column(_short(name), justify="right")
+            table.add_column(_short(study.config.events, name), justify="right")
         for v in Layout(ShaftAnswers).variables:
             values = [getattr(study.shaft[run], v.name) for run in runs]
             table.add_row(v.description, *(number(x, v.unit, v.kind) for x in values))
         return table
 
-    _print_runs(console, shaft, study.shaft)
-    found = study.torsion
+    _print_runs(console, shaft, study.shaft, study.config.events)
+    found = study.statics.torsion
     assert found is not None
     console.print(
         f"Natural frequency of torsion: {number(found.k_least, 'rad/s')} to {number(found.k_largest, 'rad/s')}; "
@@ -314,7 +316,7 @@ def _show_sizing(study: Study, console: Console) -> None:
     assert sized is not None
     best, caveat = sized.best, _caveat(study)
     wheel = f"flywheel {best.flywheel:.3g} kg m2" if best.flywheel else "no flywheel"
-    relay = f"; relay at {best.motor.nameplate.rated_current:.2f} A" if study.advised else ""
+    relay = f"; relay at {best.motor.nameplate.rated_current:.2f} A" if not study.insufficient else ""
     console.print(f"{sized.answer[:1].upper()}{sized.answer[1:]}.", soft_wrap=True)
     console.print(
         f"{'Insufficient motor' if study.insufficient else 'Motor'}: {best.motor.designation}, ratio "

@@ -67,6 +67,6 @@ def tuned(config: Config, drive: Drive) -> tuple[Drive, Tuning | None]:
     """The drive with controller gains tuned to its inertia, where the config does not give them."""
     both = cycle(config.machine, config.run.crank_speed, config.feed.left, config.feed.right)
     tuning = tune(config.motor.armature, drive.rotor_inertia + float(np.mean(both.outputs.J)))
-    own = {name: gain for name, gain in tuning.parameters.items() if name not in config.motor_given}
+    own = {name: gain for name, gain in tuning.parameters.items() if f"motor.{name}" not in config.given}
     parameters = DcMotor.parameter_layout.from_names(own, config.motor)
     return replace(drive, parameters=parameters), tuning if own else None

@@ -27,7 +27,7 @@ from ..machines.knife_drive import KnifeDrive, Parameters
 from ..quantities import Layout, Value, declaration, quantity, variables
 from ..reading import Title, first_line, given_values, instance, packaged, read, schema, to_number, toml
 from ..system import Bond, CoSimulation, ModelComponent, System, energy_residual, export, shaft_joints
-from .overload import entries
+from .result import entries
 from .sizing import flywheel
 
 PINS = {

@@ -20,7 +20,7 @@ from dataclasses import asdict, dataclass
 from itertools import islice
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
@@ -31,21 +31,22 @@ from ..errors import InterruptedRunError, RunError
 from ..files import whole, writing
 from ..machines.chain_unit import SIDES, SideName
 from ..quantities import Layout, Value, declaration, quantity
-from ..system import CoSimulation, Profile
+from ..system import CoSimulation
 from ..system.instance import remove_unpacked
 from ..text import entry
 from . import protection
 from .drive import Drive
+from .events import Event
 from .quantiles import CONFIDENCE, Estimate, quantile, runs_needed, share
+from .rig import Rig
 
 
 @declaration
 class Sample:
     """One run: what happened, and what came of it."""
 
-    crank_angle: Value = quantity("rad", "crank angle at which the lump comes")
-    event: Value = quantity("s", "time at which the lump comes")
-    force: Value = quantity("N", "processing force of the lump")
+    crank_angle: Value = quantity("rad", "crank angle at which the event begins")
+    event: Value = quantity("s", "time at which the event begins")
     trip_torque: Value = quantity("N.m", "crank torque at which the safety coupling opens in this run")
     crank_torque_peak: Value = quantity("N.m", "crank torque, peak")
     motor_torque_peak: Value = quantity("N.m", "motor torque, peak")
@@ -65,7 +66,8 @@ def _row_form() -> type[BaseModel]:
         "Row",
         __config__=ConfigDict(extra="forbid", strict=True),
         run=(int, Field(ge=0)),
-        side=(SideName, Field()),
+        side=(SideName | None, Field()),
+        drawn=(dict[str, Annotated[float, Field(allow_inf_nan=False)]], Field()),
         failed=(str | None, Field()),
         **fields,
     )
@@ -84,6 +86,11 @@ class Task:
     files: Mapping[str, Path]
     steady: float
 
+    @property
+    def rig(self) -> Rig:
+        """The drive on its co-simulation."""
+        return Rig(self.config, self.drive, self.files)
+
     def digest(self) -> str:
         """Name of what the results depend on: every parameter, and the content of the FMUs."""
         config, drive = self.config, self.drive
@@ -93,7 +100,7 @@ class Task:
             "start": drive.graph.values,
             "feed": asdict(config.feed),
             "run": asdict(config.run),
-            "overload": asdict(config.overload),
+            "event": config.random.as_dict(),
             "monte_carlo": {k: v for k, v in asdict(config.monte_carlo).items() if k != "runs"},
             "coupling": asdict(config.coupling) if config.coupling else None,
             "steady": self.steady,
@@ -131,10 +138,8 @@ def _prepared(task: Task, digest: str) -> CoSimulation:
     """The co-simulation of this process, started up and saved in its steady state."""
     if digest not in _worker:
         _close()
-        run = task.config.run
-        signals = {**task.drive.loads(task.config.feed), **task.drive.reference(run.crank_speed, run.ramp)}
-        simulation = CoSimulation(task.drive.system(task.files), signals)
-        simulation.run(task.steady, run.step)
+        simulation = task.rig.from_rest()
+        simulation.run(task.steady, task.rig.step)
         simulation.save()
         _worker[digest] = simulation
     return _worker[digest]
@@ -144,48 +149,40 @@ def _prepared(task: Task, digest: str) -> CoSimulation:
 class Draw:
     """What is left to chance in one run."""
 
-    side: SideName
-    """on which the lump comes"""
+    event: Event
+    values: dict[str, float]
+    """of the quantities of the event that are drawn"""
     offset: float
-    """time from the saved state to the lump [s]"""
-    force: float
-    """[N]"""
+    """time from the saved state to the event [s]"""
     trip_torque: float
     """[N m] at the crank; infinite without a coupling"""
 
 
 def draw(config: Config, number: int) -> Draw:
-    """The lump of the run of that number: the same whoever draws it, and in whatever order."""
-    mc = config.monte_carlo
-    random = np.random.default_rng([int(mc.seed), number])
-    offset = random.uniform(0.0, 2.0 * math.pi / config.run.crank_speed)
-    force = random.uniform(mc.force_low, mc.force_high)
+    """The event of the run of that number: the same whoever draws it, and in whatever order."""
+    random = np.random.default_rng([int(config.monte_carlo.seed), number])
+    offset = random.uniform(0.0, config.turn)
+    values = config.random.draw(random)
     spread = random.standard_normal()
     trip = (
         config.coupling.trip_torque * max(0.1, 1.0 + config.coupling.scatter * spread)
         if config.coupling
         else math.inf
     )
-    return Draw(SIDES[random.integers(len(SIDES))], offset, force, trip)
+    side: SideName | Literal[""] = config.random.side
+    if config.random.of.sided and not side:
+        side = SIDES[random.integers(len(SIDES))]
+    return Draw(config.random.event(side, values), values, offset, trip)
 
 
 def one(task: Task, number: int, simulation: CoSimulation) -> Sample:
     """Run the overload of that number from the steady state that `simulation` has saved."""
     config, drive, drawn = task.config, task.drive, draw(task.config, number)
-    o, run, trip = config.overload, config.run, drawn.trip_torque
-
-    simulation.restore()
-    event, normal = task.steady + drawn.offset, getattr(config.feed, drawn.side).processing_force
-    rise, hold = o.jam_rise, o.jam_duration
-    lump = Profile(normal, ((event, rise, normal + drawn.force), (event + rise + hold, rise, normal)))
-    simulation.signals = {
-        **drive.loads(config.feed),
-        **drive.reference(run.crank_speed),
-        f"machine.{drawn.side}.processing_force": lump,
-    }
+    run, trip = config.run, drawn.trip_torque
+    event = task.steady + drawn.offset
     stop = event + config.monte_carlo.duration
     guards = {"motor.tau": trip / drive.ratio} if config.coupling else None
-    done = simulation.run(stop, run.step, guards=guards)
+    done = task.rig.follow(simulation, drawn.event, event, stop, guards=guards).run
     time = done["time"].values
     turned, speed = drive.crank_motion(done)
 
@@ -197,7 +194,6 @@ def one(task: Task, number: int, simulation: CoSimulation) -> Sample:
     return Sample(
         crank_angle=angle % (2.0 * math.pi),
         event=event,
-        force=drawn.force,
         trip_torque=trip if config.coupling else None,
         crank_torque_peak=float(np.max(np.abs(drive.crank_torque(done)))),
         motor_torque_peak=peak("motor.air_gap_tau"),
@@ -213,7 +209,8 @@ def row_of(task: Task, digest: str, number: int) -> dict[str, Any]:
     """The result of the run of that number, as a row of the file."""
     simulation = _prepared(task, digest)
     layout = Layout(Sample)
-    named = {"run": number, "side": draw(task.config, number).side}
+    drawn = draw(task.config, number)
+    named = {"run": number, "side": drawn.event.side or None, "drawn": drawn.values}
     try:
         return {**named, "failed": None, **layout.named(one(task, number, simulation))}
     except InterruptedRunError:
@@ -276,7 +273,7 @@ class MonteCarloResult:
         found: dict[str, dict[str, Estimate]] = {}
         for v in Layout(Sample).variables:
             values = [row[v.name] for row in self.rows if row[v.name] is not None]
-            if not values or v.name in ("event", "force", "crank_angle"):
+            if not values or v.name in ("event", "crank_angle"):
                 continue
             if v.name in ("stalls", "trips"):
                 found[v.name] = {"share": share(sum(x > 0.5 for x in values), len(values))}

@@ -1,4 +1,4 @@
-"""What protects a drive, and what it would have done in a run: thermal relay, stall, mean loads of bearings."""
+"""What protects a drive: thermal relay and safety coupling; and the stall that they protect from."""
 
 from __future__ import annotations
 
@@ -118,18 +118,3 @@ def stall(time: Any, speed: Any, asked: float, share: float = 0.1) -> float | No
     moving = np.flatnonzero(~below)
     first = int(moving[-1]) + 1 if moving.size else 0
     return float(time[first]) if first < 0.9 * len(below) else None
-
-
-def mean_load(force: Any, turned: Any, exponent: float = 3.0) -> float:
-    """Equivalent load of a bearing [N]: the mean of ISO 281 over what it turns.
-
-    P = (integral of F^p |d alpha| / integral of |d alpha|)^(1/p), with `force` [N] and the angle `turned` [rad] of
-    the pin in its bearing, both of shape (n,); p = 3 for ball bearings, 10/3 for rollers. Zero where nothing turns.
-    """
-    force = np.asarray(force)
-    weight = np.abs(np.diff(np.asarray(turned)))
-    total = float(np.sum(weight))
-    if total == 0.0:
-        return 0.0
-    middle = 0.5 * (force[1:] + force[:-1])
-    return float((np.sum(middle**exponent * weight) / total) ** (1.0 / exponent))

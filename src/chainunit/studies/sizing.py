@@ -28,12 +28,13 @@ from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
 from ..machines.chain_unit import SIDES, SideName
 from ..quantities import Layout, Value, declaration, quantity
-from ..system import CoSimulation, Profile
 from ..system.instance import Fmu
 from ..text import entry, number
 from .chain import HIGH, duty
 from .cycle import Cycle, all_on_one, cycle
 from .drive import Drive
+from .measures import BURNT
+from .rig import Rig
 
 
 def rms(*parts: tuple[float, Any]) -> float:
@@ -64,8 +65,6 @@ def start_time(time: Any, speed: Any, share: float = 0.95) -> float | None:
     return float(time[int(np.argmax(speed >= share * final))])
 
 
-BURNT = 2000.0
-"""Temperature that stands for a winding without a thermal steady state [K]."""
 _SPEED_DEVIATION = 0.03  # of the crank speed that is asked for
 
 
@@ -182,7 +181,7 @@ class SizingResult:
     """Cycle, candidates in the order of their rank, and which of them is chosen."""
 
     config: Config
-    cycle: CycleNumbers
+    duty: Duty
     candidates: list[Candidate]
     notes: list[str]
     motors: int
@@ -218,8 +217,7 @@ class SizingResult:
         assert self.config.sizing is not None
         return {
             "asked": _entries(self.config.sizing),
-            "one_sided": heavier_side(self.config),
-            "cycle": _entries(self.cycle),
+            **self.duty.as_dict(),
             "flywheel": _entries(Flywheel(J=best.flywheel, fluctuation=best.fluctuation)),
             "tried": {"value": len(self.candidates), "unit": "1"},
             "motors": {"value": self.motors, "unit": "1"},
@@ -248,59 +246,70 @@ def _entries(declared: Any) -> dict[str, Any]:
     }
 
 
-def heavier_side(config: Config) -> SideName:
-    """The side on which all feed asks the larger RMS torque of the crank, with two bars at constant speed: the rocker
-    swings farther to one side than to the other."""
-    feed, w = config.feed, config.run.crank_speed
+@dataclass(frozen=True)
+class Duty:
+    """What the machine asks of any drive, at constant speed of the crank: the turn with both sides loaded, those with
+    all feed on one side, and which of these asks the larger RMS torque with two bars, as the rocker swings farther to
+    one side than to the other; with chains of many turns."""
 
-    def asked(side: SideName) -> float:
-        return rms((1.0, cycle(config.machine, w, *all_on_one(side, feed.left, feed.right)).crank_torque))
+    both: Cycle
+    one_sided: Mapping[SideName, Cycle]
+    heavier: SideName
+    numbers: CycleNumbers
 
-    return "left" if asked("left") >= asked("right") else "right"
-
-
-def duty_cycles(config: Config, folder: Path, backend: Backend | None) -> tuple[Cycle, dict[SideName, Cycle]]:
-    """The turn with both sides loaded, and those with all feed on one side; with chains many turns, by their FMU,
-    which is written to `folder`."""
-    feed, w = config.feed, config.run.crank_speed
-    cases = {side: all_on_one(side, feed.left, feed.right) for side in SIDES}
-    if config.chain is None:
-        machine = config.machine
-        return cycle(machine, w, feed.left, feed.right), {
-            side: cycle(machine, w, *case) for side, case in cases.items()
+    def as_dict(self) -> dict[str, Any]:
+        """Ready for JSON."""
+        peaks = {side: _peak(turn) for side, turn in self.one_sided.items()}
+        return {
+            "cycle": _entries(self.numbers),
+            "one_sided": {
+                "larger_rms": self.heavier,
+                "larger_peak": max(SIDES, key=lambda side: peaks[side]),
+            },
         }
-    drive = Drive(InductionMotor, None, config.machine, chain=config.chain)
-    fmu = Fmu(drive.export_machine(folder, backend)[0])
-    try:
-        both = duty(fmu, drive, w, feed.left, feed.right)
-        one_sided = {side: duty(fmu, drive, w, *case) for side, case in cases.items()}
-    finally:
-        fmu.close()
-    return both, one_sided
 
 
-def cycle_numbers(config: Config, both: Cycle, one_sided: Mapping[SideName, Cycle]) -> CycleNumbers:
-    """What the machine asks of any drive, at constant speed of the crank: with all feed on one side the RMS torque of
-    the heavier, and the larger of both peaks, which may be that of the other side."""
+def duty_of(config: Config, folder: Path, backend: Backend | None) -> Duty:
+    """The duty of a study with `sizing`; chains are run by their FMU, which is written to `folder`."""
+    feed, w = config.feed, config.run.crank_speed
+    loads = {side: all_on_one(side, feed.left, feed.right) for side in SIDES}
+    both = cycle(config.machine, w, feed.left, feed.right)
+    one_sided = {side: cycle(config.machine, w, *case) for side, case in loads.items()}
+    size = {side: rms((1.0, turn.crank_torque)) for side, turn in one_sided.items()}
+    heavier: SideName = "left" if size["left"] >= size["right"] else "right"
+    if config.chain is not None:
+        drive = Drive(InductionMotor, None, config.machine, chain=config.chain)
+        fmu = Fmu(drive.export_machine(folder, backend)[0])
+        try:
+            both = duty(fmu, drive, w, feed.left, feed.right)
+            one_sided = {side: duty(fmu, drive, w, *case) for side, case in loads.items()}
+        finally:
+            fmu.close()
+    return Duty(both, one_sided, heavier, cycle_numbers(config, both, one_sided, heavier))
+
+
+def _peak(cycle: Cycle) -> float:
+    """Largest crank torque of a cycle; of many turns of chains the quantile of their peaks, as no single one is a
+    prediction."""
+    peaks = np.max(np.abs(np.atleast_2d(cycle.crank_torque)), axis=1)
+    return float(np.quantile(peaks, HIGH))
+
+
+def cycle_numbers(
+    config: Config, both: Cycle, one_sided: Mapping[SideName, Cycle], heavier: SideName
+) -> CycleNumbers:
+    """Of a duty: with all feed on one side the RMS torque of the heavier, and the larger of both peaks, which may be
+    that of the other side."""
     assert config.sizing is not None
-    machine = config.machine
-
-    def peak(cycle: Cycle) -> float:
-        # of many turns of chains the quantile of their peaks, as no single one is a prediction
-        peaks = np.max(np.abs(np.atleast_2d(cycle.crank_torque)), axis=1)
-        return float(np.quantile(peaks, HIGH))
-
     w, share = config.run.crank_speed, config.sizing.one_sided_share
-    inertia = both.outputs.J * machine.p.ratio**2
+    inertia = both.outputs.J * config.machine.p.ratio**2
     mean = float(np.mean(both.crank_torque))
     return CycleNumbers(
         power_mean=mean * w,
         torque_mean=mean,
-        torque_peak=peak(both),
-        torque_peak_one_sided=max(peak(turn) for turn in one_sided.values()),
-        torque_rms=rms(
-            (1.0 - share, both.crank_torque), (share, one_sided[heavier_side(config)].crank_torque)
-        ),
+        torque_peak=_peak(both),
+        torque_peak_one_sided=max(_peak(turn) for turn in one_sided.values()),
+        torque_rms=rms((1.0 - share, both.crank_torque), (share, one_sided[heavier].crank_torque)),
         inertia_least=float(np.min(inertia)),
         inertia_mean=float(np.mean(inertia)),
         inertia_largest=float(np.max(inertia)),
@@ -326,7 +335,7 @@ def size(
     ----------
     config : a study with `sizing`
     folder : where the FMUs are written
-    report, backend : see `chainunit.studies.overload.run_study`
+    report, backend : see `chainunit.studies.run.run_study`
 
     Raises
     ------
@@ -336,8 +345,8 @@ def size(
     asked = config.sizing
     assert asked is not None
     report("the machine at constant speed", 0.0, 1.0)
-    both, one_sided = duty_cycles(config, folder, backend)
-    numbers = cycle_numbers(config, both, one_sided)
+    duty = duty_of(config, folder, backend)
+    numbers = duty.numbers
     notes = [
         "Catalogue data are typical; iron losses are not in the motor model.",
         "The gear's losses act as viscous drag on the motor shaft, of the mean power that its efficiency takes.",
@@ -371,30 +380,28 @@ def size(
         if len(found) >= asked.candidates and any(c.fits for c in found):
             break
         report(f"co-simulating {motor.designation}", float(k), float(len(strong)))
-        candidate = proposed(config, motor, numbers, both)
+        candidate = proposed(config, motor, duty)
         if not files:
             files, _ = candidate.drive.export(folder, backend)
-        found.append(with_flywheel(config, candidate, numbers, files))
+        found.append(with_flywheel(config, candidate, duty, files))
     rank(found)
-    return SizingResult(config, numbers, found, notes, len(motors), len(motors) - len(strong))
+    return SizingResult(config, duty, found, notes, len(motors), len(motors) - len(strong))
 
 
-def with_flywheel(
-    config: Config, bare: Candidate, numbers: CycleNumbers, files: Mapping[str, Path]
-) -> Candidate:
+def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[str, Path]) -> Candidate:
     """The candidate as it is, or with the least flywheel, to about a tenth, that keeps the speed as asked; as it is,
     too, where it misses a limit that no flywheel heals.
 
     The largest tried is that of the hand formula, which leaves out that a motor's torque falls with speed and evens
     it, too."""
-    whole = max(0.0, numbers.inertia_wanted / bare.drive.ratio**2 - bare.drive.parameters.rotor.J)
+    whole = max(0.0, duty.numbers.inertia_wanted / bare.drive.ratio**2 - bare.drive.parameters.rotor.J)
 
     def tried(share: float) -> Candidate:
         p = bare.drive.parameters
         p = dataclasses.replace(p, rotor=dataclasses.replace(p.rotor, J=p.rotor.J + share * whole))
         drive = dataclasses.replace(bare.drive, parameters=p)
         candidate = dataclasses.replace(bare, drive=drive, flywheel=share * whole)
-        judge(config, candidate, numbers, files)
+        judge(config, candidate, duty, files)
         return candidate
 
     def even(candidate: Candidate) -> bool:
@@ -422,9 +429,8 @@ def with_flywheel(
     return best
 
 
-def proposed(config: Config, motor: CatalogueMotor, numbers: CycleNumbers, both: Cycle) -> Candidate:
-    """A motor with the gear ratio at which the crank has its speed, without a flywheel; `both` is the turn with both
-    sides loaded."""
+def proposed(config: Config, motor: CatalogueMotor, duty: Duty) -> Candidate:
+    """A motor with the gear ratio at which the crank has its speed, without a flywheel."""
     asked, gear = config.sizing, config.gear
     assert asked is not None
     plate = motor.nameplate
@@ -432,16 +438,16 @@ def proposed(config: Config, motor: CatalogueMotor, numbers: CycleNumbers, both:
     synchronous, rated_speed, rated_torque = plate.synchronous, plate.speed, plate.torque
     w = config.run.crank_speed
     follows = config.start == "inverter"
-    ratio = gear.ratio if "ratio" in config.gear_given else rated_speed / w
+    ratio = gear.ratio if "gear.ratio" in config.given else rated_speed / w
     speed, drag = rated_speed, gear.d
     for _ in range(3):
-        shaft = motor_side(numpy_(), dataclasses.replace(gear, ratio=ratio), both.crank_torque, speed)
+        shaft = motor_side(numpy_(), dataclasses.replace(gear, ratio=ratio), duty.both.crank_torque, speed)
         mean = float(np.mean(shaft))
         # the slip goes with the torque; an inverter makes up for it
         speed = rated_speed if follows else synchronous - (synchronous - rated_speed) * mean / rated_torque
-        if "ratio" not in config.gear_given:
+        if "gear.ratio" not in config.given:
             ratio = speed / w
-        drag = (mean - numbers.torque_mean / ratio) / speed
+        drag = (mean - duty.numbers.torque_mean / ratio) / speed
     soft = config.starter.soft_start if config.start == "soft" else p.soft_start
     slip_hz = (synchronous - rated_speed) * plate.poles / (4.0 * math.pi)
     inverter = config.starter.inverter
@@ -460,25 +466,24 @@ def proposed(config: Config, motor: CatalogueMotor, numbers: CycleNumbers, both:
     return Candidate(motor, drive, 0.0, {})
 
 
-def judge(config: Config, c: Candidate, numbers: CycleNumbers, files: Mapping[str, Path]) -> None:
+def judge(config: Config, c: Candidate, duty: Duty, files: Mapping[str, Path]) -> None:
     """Co-simulate a candidate and fill in its checks."""
     plate, drive = c.motor.nameplate, c.drive
     w, turn = config.run.crank_speed, 2.0 * math.pi / config.run.crank_speed
     ramp = config.run.ramp if drive.follows else None
-    signals = {**feed_signals(config, None), **drive.reference(w, ramp)}
     # three times what the rated torque needs to bring everything up to speed, and at least the ramp of the start
-    inertia = drive.parameters.rotor.J + numbers.inertia_mean / drive.ratio**2
+    inertia = drive.parameters.rotor.J + duty.numbers.inertia_mean / drive.ratio**2
     rise = config.starter.soft_start.time if config.start == "soft" else ramp or 0.0
     window = max(1.0, 3.0 * inertia * plate.speed / plate.torque, 1.5 * rise)
     try:
-        with CoSimulation(drive.system(files), signals) as simulation:
+        rig = Rig(config, drive, files)
+        with rig.from_rest() as simulation:
             start = simulation.run(window, config.run.step)
             steady = simulation.run(window + 2.0 * turn, config.run.step)
             event, shifts, one_sided = simulation.save(), [], {}
             for side in SIDES:
-                simulation.restore()
-                simulation.signals = {**feed_signals(config, event, side), **drive.reference(w)}
-                shifts.append(simulation.run(event + config.overload.shift + turn, config.run.step))
+                feed = config.one_sided(side)
+                shifts.append(rig.follow(simulation, feed, event, event + feed.p.shift + turn).run)
                 one_sided[side] = simulation.run(simulation.time + turn, config.run.step)
     except InterruptedRunError:
         raise
@@ -489,24 +494,10 @@ def judge(config: Config, c: Candidate, numbers: CycleNumbers, files: Mapping[st
     times = np.concatenate([start["time"].values, steady["time"].values])
     expected = w * drive.ratio
     started = start_time(times, speed) if float(np.mean(steady["motor.w"])) > 0.5 * expected else None
-    duty = (steady, *shifts, *one_sided.values())
-    c.duty_torque = max(float(np.max(np.abs(r["machine.tau"]))) for r in duty) * drive.ratio
+    loaded = (steady, *shifts, *one_sided.values())
+    c.duty_torque = max(float(np.max(np.abs(r["machine.tau"]))) for r in loaded) * drive.ratio
     c.peak_torque = max(c.duty_torque, float(np.max(np.abs(start["machine.tau"]))) * drive.ratio)
-    c.checks = _checks(config, c, start, steady, one_sided, started)
-
-
-def feed_signals(config: Config, shift_at: float | None, side: SideName = "left") -> dict[str, Any]:
-    """Loads of both sides; from `shift_at` [s] on all feed moves to `side`."""
-    signals: dict[str, Any] = {}
-    shifted = dict(zip(SIDES, all_on_one(side, config.feed.left, config.feed.right), strict=True))
-    for name, target in shifted.items():
-        for load in ("material_mass", "processing_force"):
-            begin = getattr(getattr(config.feed, name), load)
-            end = getattr(target, load)
-            signals[f"machine.{name}.{load}"] = (
-                begin if shift_at is None else Profile(begin, ((shift_at, config.overload.shift, end),))
-            )
-    return signals
+    c.checks = _checks(config, c, start, steady, one_sided, duty.heavier, started)
 
 
 def _checks(
@@ -515,11 +506,12 @@ def _checks(
     start: xr.Dataset,
     steady: xr.Dataset,
     one_sided: Mapping[SideName, xr.Dataset],
+    heavier_side: SideName,
     started: float | None,
 ) -> dict[str, Check]:
     asked, gear, plate, p = config.sizing, config.gear, c.motor.nameplate, c.drive.parameters
     assert asked is not None
-    share, heavier = asked.one_sided_share, one_sided[heavier_side(config)]
+    share, heavier = asked.one_sided_share, one_sided[heavier_side]
     gap = "motor.air_gap_tau"
     running = steady["motor.w"].values
     mean_speed = float(np.mean(running))
@@ -585,7 +577,7 @@ def _checks(
     if math.isfinite(asked.inertia_ratio):
         ratio = (reflected + p.rotor.J - plate.J) / plate.J
         checks["inertia"] = Check("inertia ratio", ratio, asked.inertia_ratio, "1")
-    if "torque_limit" in config.gear_given:
+    if "gear.torque_limit" in config.given:
         checks["gear"] = Check("torque of the gear", c.peak_torque, gear.torque_limit, "N.m")
     return checks
 

@@ -1,0 +1,154 @@
+"""The safety coupling of a drive: the one that it should have, and whether the one that it has does its work."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+
+from ..text import number
+from .drive import Drive
+from .events import Role
+from .measures import BURNT
+from .protection import MARGIN, Obstacle, Setting
+from .study import Study
+
+
+def on_coupling(drive: Drive, run: xr.Dataset) -> float:
+    """Peak torque on a coupling on the motor shaft in a run, at the crank [N m]."""
+    return float(np.max(np.abs(run["motor.tau"].values))) * drive.ratio
+
+
+def peaks_on_coupling(study: Study, *roles: Role) -> dict[str, float]:
+    """Peak on the coupling in each event of these roles, of any without, at the crank [N m]; a start direct on line
+    is judged apart."""
+    events = study.config.events
+    return {
+        name: on_coupling(study.drive, study.runs[name].sel(time=slice(begin, None)))
+        for name, begin in study.event.items()
+        if name in study.runs
+        and not (study.start_apart and events[name].from_rest)
+        and (not roles or events[name].role in roles)
+    }
+
+
+def recommended(study: Study) -> Setting | None:
+    """The safety coupling that a sized drive should have, tried in the events of the study. None where no motor was
+    chosen, or a coupling is given, or the study ended before the machine ran steadily."""
+    if not study.sizing or study.insufficient or study.config.coupling or "steady" not in study.answers:
+        return None
+    best, drive = study.sizing.best, study.drive
+    lasting = peaks_on_coupling(study, Role.DUTY).values()
+    normal = [on_coupling(drive, study.steady), best.duty_torque, *lasting]
+    if not study.start_apart:
+        normal.append(on_coupling(drive, study.runs["start_up"]))
+    return Setting(
+        normal=max(normal),
+        motor=pull_out(study),
+        gear=study.config.gear.torque_limit,
+        overloads=peaks_on_coupling(study, Role.SHOCK),
+        disturbances=peaks_on_coupling(study, Role.DISTURBANCE),
+    )
+
+
+def pull_out(study: Study) -> float:
+    """Most that the warm motor gives at the crank in steady running [N m]."""
+    return study.drive.pull_out(study.steady, min(BURNT, study.answers["steady"].winding_temperature))
+
+
+def _torque(value: float) -> str:
+    return number(value, "N.m")
+
+
+def coupling_sentence(study: Study) -> str:
+    """Which safety coupling the sized drive should have and what it does in the overloads, or why none protects
+    it."""
+    setting = study.setting
+    assert setting is not None
+    caveat = f" ({study.verdict.caveat})" if study.verdict and study.verdict.caveat else ""
+    above = f"{_torque(setting.least)}, {MARGIN:g} times the {_torque(setting.normal)} of normal duty"
+
+    def listed(names: Mapping[str, float]) -> str:
+        return ", ".join(f"{study.called(name)} ({_torque(peak)})" for name, peak in names.items())
+
+    if setting.obstacle is Obstacle.MOTOR:
+        return (
+            f"No safety coupling protects this drive: it has to open above {above}, and the motor gives at most "
+            f"{_torque(setting.motor)} at the crank."
+        )
+    if setting.obstacle is Obstacle.GEAR:
+        return (
+            f"No safety coupling protects this drive: it has to open above {above}, and the gear may carry "
+            f"{_torque(setting.gear)}."
+        )
+    if setting.obstacle is Obstacle.OVERLOADS:
+        most = max(setting.overloads.values(), default=0.0)
+        return f"No safety coupling is recommended: it has to open above {above}, and " + (
+            f"the jams, lumps and blocks of this study put {_torque(most)} on it at most."
+            if setting.overloads
+            else "this study has no jam, lump or block that would open it."
+        )
+    shut = {name: peak for name, peak in setting.overloads.items() if name not in setting.opens}
+    text = (
+        f"Recommended safety coupling{caveat}: {above}, below the {_torque(setting.motor)} that the motor gives at "
+        f"the crank. It opens where {listed(setting.opens)}"
+    )
+    text += f"; it stays shut where {listed(shut)}." if shut else "."
+    if setting.nuisances:
+        text += f" A nuisance trip, which protects nothing: it opens, too, where {listed(setting.nuisances)}."
+    if study.start_torque is not None and study.start_torque > setting.least:
+        text += (
+            f" A start direct on line puts {_torque(study.start_torque)} on it: it has to be held shut in the start, "
+            "or the motor started softly."
+        )
+    return text
+
+
+def remark_on_coupling(study: Study, trip: float) -> None:
+    """Where the coupling that is given, set to `trip` [N m], does not do its work."""
+    most, peaks = pull_out(study), peaks_on_coupling(study)
+    shocks = peaks_on_coupling(study, Role.SHOCK)
+    setting = {"trip_torque": (trip, "N.m")}
+    if study.start_torque is not None and study.start_torque > trip:
+        study.remark(
+            "warning",
+            "coupling held shut",
+            f"A start direct on line puts {_torque(study.start_torque)} on the safety coupling, which opens at "
+            f"{_torque(trip)}: it is taken to be held shut in the start.",
+            "start_up",
+            start_torque=(study.start_torque, "N.m"),
+            **setting,
+        )
+    opened = [name for name in peaks if study.answers[name].coupling_trip_time is not None]
+    if nuisances := [name for name in opened if name not in shocks]:
+        study.remark(
+            "warning",
+            "nuisance trip",
+            f"The safety coupling, set to {_torque(trip)}, opens where no shock asks for it, a nuisance trip that "
+            f"protects nothing: {'; '.join(map(study.called, nuisances))}.",
+            *nuisances,
+            **setting,
+        )
+    if shocks and not set(opened) & set(shocks):
+        steady = on_coupling(study.drive, study.steady)
+        study.remark(
+            "warning",
+            "coupling never opens",
+            f"The safety coupling opens in no jam, lump or block of this study: it is set to {_torque(trip)}, they "
+            f"put {_torque(max(shocks.values()))} on it at most, steady running {_torque(steady)}; the motor gives "
+            f"{_torque(most)} at most.",
+            *shocks,
+            largest=(max(shocks.values()), "N.m"),
+            motor=(most, "N.m"),
+            **setting,
+        )
+    elif trip > most:
+        study.remark(
+            "warning",
+            "coupling above motor",
+            f"The safety coupling is set to {_torque(trip)} and the motor gives {_torque(most)} at most: what brakes "
+            "the machine slowly stalls the motor and does not open it.",
+            motor=(most, "N.m"),
+            **setting,
+        )

@@ -1,0 +1,169 @@
+"""The TOML table of an event::
+
+    [[event]]
+    type = "jam"
+    side = "right"
+    force = "2 kN"
+
+A quantity that it does not name has its declared default. The run is called after type and side, further ones of the
+same kind get a number (``jam_right_2``), or are called as ``name`` says. The event of random overloads is such a
+table, too; there a quantity may be a range, ``force = ["1 kN", "3 kN"]``, and a side that is not named is drawn.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import ValidationError
+
+from ..errors import InputError, shown
+from ..machines.chain_unit import SIDES, SideName
+from ..quantities import Layout, variables
+from ..reading import first_line, given_values, instance, schema, to_number
+from .events import TYPES, Event
+
+RESERVED = ("start_up", "steady", "constant", "unfinished")
+"""Names of other runs of a study."""
+_NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
+
+
+def read_events(tables: Sequence[Any]) -> dict[str, Event]:
+    """Events by the names of their runs, in the order of the tables.
+
+    Raises
+    ------
+    InputError
+        in one line that names the event, the key, its value and what is allowed.
+    """
+    events: dict[str, Event] = {}
+    for k, table in enumerate(tables, 1):
+        where = f"event {k}"
+        of = _type(table, where)
+        side = _side(of, table, f"{where} ({of.kind})")
+        if not side and of.sided:
+            raise InputError(f'{where} ({of.kind}): side: must be given, "left" or "right"')
+        name = _name(table, of.on(side).name, events, f"{where} ({of.kind})")
+        events[name] = of.on(side, _parameters(of, table, f"event.{name}."), name)
+    return events
+
+
+@dataclass(frozen=True)
+class RandomEvent:
+    """The event of random overloads: quantities that are fixed, and ranges of those that are drawn; without a side
+    one is drawn, too."""
+
+    of: type[Event]
+    side: SideName | Literal[""]
+    p: Any
+    ranges: Mapping[str, tuple[float, float]]
+
+    def draw(self, random: np.random.Generator) -> dict[str, float]:
+        """Values of the quantities that are drawn, evenly from their ranges."""
+        return {name: float(random.uniform(low, high)) for name, (low, high) in self.ranges.items()}
+
+    def event(self, side: SideName | Literal[""], values: Mapping[str, float]) -> Event:
+        """The event on that side with these values of the quantities that are drawn."""
+        return self.of.on(side, replace(self.p, **values))
+
+    def hardest(self) -> list[Event]:
+        """The event on each side that it may come on, with every drawn quantity at the end of its range."""
+        sides = (self.side,) if self.side or not self.of.sided else SIDES
+        return [self.event(side, {name: high for name, (_, high) in self.ranges.items()}) for side in sides]
+
+    def as_dict(self) -> dict[str, Any]:
+        """All that a drawn event depends on, ready for JSON."""
+        fixed = Layout(type(self.p)).named(self.p)
+        return {"type": self.of.kind, "side": self.side, "p": fixed, "ranges": dict(self.ranges)}
+
+
+_PLACED = ("crank_angle", "turns")
+
+
+def read_random_event(table: Mapping[str, Any], where: str) -> RandomEvent:
+    """The event of random overloads, a jam where the table does not say. Which quantities are drawn is by the
+    declaration of the event, where the table gives neither a range nor a number.
+
+    Raises
+    ------
+    InputError
+        see `read_events`.
+    """
+    of = _type({"type": "jam", **table}, where)
+    if of.from_rest:
+        raise InputError(f'{where}.type = "{of.kind}": must be an event in steady running')
+    for name in (*_PLACED, "name"):
+        if name in table:
+            raise InputError(f"{where}.{name}: is not of random overloads, which come at any crank angle")
+    ranges = {name: ends for name, ends in of.draws.items() if name not in table}
+    for v in variables(of.Parameters):
+        ends = table.get(v.name)
+        if isinstance(ends, list):
+            named = replace(v, name=f"{where}.{v.name}")
+            if len(ends) != 2:
+                raise InputError(
+                    f"{named.name} = {shown(ends)}: must be a number, or two: from where to where"
+                )
+            try:
+                low, high = (to_number(named, end) for end in ends)
+            except ValueError as error:
+                raise InputError(str(error)) from error
+            if high < low:
+                raise InputError(f"{named.name} = {shown(ends)}: the second must be >= the first")
+            ranges[v.name] = (low, high)
+    fixed = {name: value for name, value in table.items() if name not in ranges}
+    ordered = {name: ranges[name] for name in Layout(of.Parameters).names if name in ranges}
+    return RandomEvent(of, _side(of, table, where), _parameters(of, fixed, f"{where}."), ordered)
+
+
+def _type(table: Any, where: str) -> type[Event]:
+    if not isinstance(table, Mapping):
+        raise InputError(f"{where} = {shown(table)}: must be a table")
+    name = table.get("type")
+    of = TYPES.get(name) if isinstance(name, str) else None
+    if of is None:
+        raise InputError(f"{where}: type = {shown(name)}: must be one of {', '.join(TYPES)}")
+    return of
+
+
+def _side(of: type[Event], table: Mapping[str, Any], where: str) -> SideName | Literal[""]:
+    if "side" not in table:
+        return ""
+    if not of.sided:
+        raise InputError(f"{where}: side: this event has none; leave it out")
+    for side in SIDES:
+        if table["side"] == side:
+            return side
+    raise InputError(f'{where}: side = {shown(table["side"])}: must be "left" or "right"')
+
+
+def _name(table: Mapping[str, Any], usual: str, others: Mapping[str, Event], where: str) -> str:
+    if "name" not in table:
+        numbers = (usual if k == 1 else f"{usual}_{k}" for k in range(1, len(others) + 2))
+        return next(name for name in numbers if name not in others)
+    name = table["name"]
+    if not isinstance(name, str) or not _NAME.fullmatch(name) or name.endswith("_coasting"):
+        raise InputError(
+            f"{where}: name = {shown(name)}: must be small letters, digits and _, at most 40, with a letter first"
+        )
+    if name in others or name in RESERVED:
+        raise InputError(f"{where}: name = {shown(name)}: is that of another run")
+    return name
+
+
+def _parameters(of: type[Event], table: Mapping[str, Any], prefix: str) -> Any:
+    texts: dict[str, Any] = dict.fromkeys(("type", "side", "name"), (str, ""))
+    form = schema(of.Parameters, "event", prefix, **texts)
+    try:
+        checked = form.model_validate(dict(table))
+    except ValidationError as error:
+        raise InputError(first_line(error, form, prefix)) from error
+    values = {name: x for name, x in given_values(checked).items() if name not in texts}
+    p = instance(of.Parameters, values)
+    for name in of.counts:
+        if getattr(p, name) != int(getattr(p, name)):
+            raise InputError(f"{prefix}{name} = {getattr(p, name):g}: must be a whole number")
+    return p

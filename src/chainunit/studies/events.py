@@ -1,0 +1,446 @@
+"""Events of a study: what happens to a machine that runs steadily, or in its start.
+
+A type of event is a class here. It declares its quantities, names the inputs that it acts on, gives their values over
+time, and says how long it is followed. A class of that kind anywhere is a type that study files may name. Inputs are
+called as the machine or the motor that has them calls them (``left.processing_force``, ``voltage``); a study leaves
+out an event whose inputs its system does not have.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Any, ClassVar, Literal, TypeAlias
+
+from ..machines.chain_unit import SIDES, SideName, other
+from ..quantities import Value, declaration, quantity
+from ..system.signals import Profile
+from ..text import number
+
+OverTime: TypeAlias = float | Profile
+"""Value of an input, or its values over time."""
+
+
+class Role(StrEnum):
+    """What an event is to a safety coupling."""
+
+    DUTY = "duty"
+    """it may last, or comes with every start: a coupling has to carry it"""
+    SHOCK = "shock"
+    """a coupling is there to open in it"""
+    DISTURBANCE = "disturbance"
+    """it passes, and a coupling has to ride it out"""
+
+
+TYPES: dict[str, type[Event]] = {}
+"""The types of events, by the names that a study file uses."""
+
+
+@declaration
+class Timing:
+    """When an event begins, and for how long the machine is followed."""
+
+    crank_angle: Value = quantity(
+        "rad",
+        "crank angle at which the event begins; at 0 the rocker is at its fastest",
+        default=0.0,
+        usual=(0.0, 6.3),
+    )
+    turns: Value = quantity(
+        "1", "crank turns that are followed after the event begins", default=2.0, min=1.0, max=1e4
+    )
+
+
+@dataclass(frozen=True)
+class Event:
+    """An event with its quantities `p`, as the run `name` follows it; `side` is empty where it has none.
+
+    In the texts of a type ``{side}`` stands for that side and ``{other}`` for the one across.
+    """
+
+    kind: ClassVar[str] = ""
+    """its type, as a study file names it"""
+    run: ClassVar[str] = ""
+    """name of the run, where the study file gives none"""
+    words: ClassVar[str] = ""
+    """what happens, as in a sentence"""
+    heading: ClassVar[str] = ""
+    """the same in two or three words"""
+    role: ClassVar[Role]
+    sided: ClassVar[bool] = True
+    from_rest: ClassVar[bool] = False
+    """whether it is a start, and has its signals from rest on"""
+    acts_on: ClassVar[tuple[str, ...]] = ()
+    """inputs that it changes"""
+    reads: ClassVar[tuple[str, ...]] = ()
+    """outputs whose values at its begin decide its signals, which are numbers then: they jump"""
+    draws: ClassVar[Mapping[str, tuple[float, float]]] = {}
+    """quantities that random overloads draw, where the study file says nothing: from where to where"""
+    counts: ClassVar[tuple[str, ...]] = ()
+    """quantities that are whole numbers"""
+    Parameters: ClassVar[type] = Timing
+
+    name: str
+    side: SideName | Literal[""]
+    p: Any
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        TYPES[cls.kind] = cls
+
+    @classmethod
+    def on(cls, side: SideName | Literal[""] = "", p: Any = None, name: str = "") -> Event:
+        """The event on that side, its quantities at their defaults where none are given."""
+        return cls(name or _said(cls.run, side), side, cls.Parameters() if p is None else p)
+
+    @classmethod
+    def inputs(cls, side: SideName | Literal[""]) -> tuple[str, ...]:
+        """Inputs that it changes on that side."""
+        return tuple(_said(name, side) for name in cls.acts_on)
+
+    @property
+    def _mark(self) -> str:
+        """The name of the run, where the side and the type alone do not tell it from others."""
+        usual = _said(self.run, self.side)
+        return "" if self.name == usual else self.name.removeprefix(f"{usual}_").replace("_", " ")
+
+    @property
+    def title(self) -> str:
+        """What happens, as in a sentence."""
+        return _said(self.words, self.side) + (f" ({self._mark})" if self._mark else "")
+
+    @property
+    def short(self) -> str:
+        """The same as a heading of a narrow column."""
+        return " ".join(filter(None, (_said(self.heading, self.side), self._mark)))
+
+    @property
+    def loaded_side(self) -> SideName | Literal[""]:
+        """The side that has to carry it; none where both do."""
+        return self.side
+
+    @property
+    def empties(self) -> bool:
+        """Whether an organ carries no material in it."""
+        return False
+
+    @property
+    def without(self) -> str:
+        """Why a system without its inputs leaves it out, in words."""
+        return f"the system has no {' or '.join(self.inputs(self.side))}"
+
+    def signals(
+        self, normal: Mapping[str, float], at: float, state: Mapping[str, float]
+    ) -> dict[str, OverTime]:
+        """Values of the inputs that it changes, from its begin `at` [s] on.
+
+        `normal` are all inputs in steady running, `state` the outputs that it `reads`, at its begin.
+        """
+        raise NotImplementedError
+
+    def follow(self, turn: float) -> float:
+        """Time that is followed from its begin on [s], where a turn of the crank takes `turn` [s]."""
+        # a little more than asked, so that a dip in speed does not cost a whole turn
+        return float((self.p.turns + 0.1) * turn)
+
+    def variants(self) -> tuple[Event, ...]:
+        """The same event with what is assumed in it at the ends of its range; none where nothing is."""
+        return ()
+
+    def assumption(self, peaks: Mapping[str, tuple[float, float]]) -> str:
+        """What the variants say of the assumption, from the range of each peak over them [N m], in words."""
+        return ""
+
+
+def _said(text: str, side: SideName | Literal[""]) -> str:
+    return text.format(side=side, other=other(side)) if side else text
+
+
+def in_groups(events: Mapping[str, Event], names: Collection[str]) -> list[list[str]]:
+    """The events among `names`: what the left side has to carry, the right side, both; without empty groups."""
+    groups = [
+        [name for name, event in events.items() if name in names and event.loaded_side == side]
+        for side in (*SIDES, "")
+    ]
+    return [group for group in groups if group]
+
+
+def _pulses(normal: float, height: float, begins: list[float], rise: float, hold: float) -> Profile:
+    changes = [
+        change
+        for begin in begins
+        for change in ((begin, rise, normal + height), (begin + rise + hold, rise, normal))
+    ]
+    return Profile(normal, tuple(changes))
+
+
+class Jam(Event):
+    """A lump jams an organ."""
+
+    kind, run = "jam", "jam_{side}"
+    words, heading = "a lump jams the {side} side", "jam {side}"
+    role = Role.SHOCK
+    acts_on = ("{side}.processing_force",)
+    draws: ClassVar[Mapping[str, tuple[float, float]]] = {"force": (1000.0, 3000.0)}
+
+    @declaration
+    class Parameters(Timing):
+        """Of a lump."""
+
+        force: Value = quantity("N", "processing force of the lump", default=2000.0, min=0.0)
+        duration: Value = quantity(
+            "s", "time for which the lump holds", default=0.3, min=1e-4, max=1e4, usual=(1e-3, 60.0)
+        )
+        rise: Value = quantity(
+            "s",
+            "time in which the force rises and falls",
+            default=0.02,
+            min=1e-4,
+            max=1e4,
+            usual=(1e-4, 60.0),
+        )
+
+    def signals(
+        self, normal: Mapping[str, float], at: float, state: Mapping[str, float]
+    ) -> dict[str, OverTime]:
+        """The force on the web, on top of that of normal running."""
+        (name,), p = self.inputs(self.side), self.p
+        return {name: _pulses(normal[name], p.force, self._begins(at), p.rise, p.duration)}
+
+    def _begins(self, at: float) -> list[float]:
+        return [at]
+
+
+class Lumps(Jam):
+    """Lumps come one after the other."""
+
+    kind, run = "lumps", "lumps_{side}"
+    words, heading = "lumps come one after the other on the {side}", "lumps {side}"
+    counts = ("number",)
+
+    @declaration
+    class Parameters(Jam.Parameters):
+        """Of the lumps, all alike."""
+
+        number: Value = quantity("1", "number of lumps", default=4.0, min=1.0, max=1000.0)
+        pause: Value = quantity(
+            "s", "time between two lumps", default=0.4, min=1e-3, max=1e4, usual=(1e-3, 60.0)
+        )
+
+    @property
+    def _period(self) -> float:
+        return float(2.0 * self.p.rise + self.p.duration + self.p.pause)
+
+    def _begins(self, at: float) -> list[float]:
+        return [at + k * self._period for k in range(int(self.p.number))]
+
+    def follow(self, turn: float) -> float:
+        """The turns asked for, and all lumps."""
+        return max(super().follow(turn), self.p.number * self._period)
+
+
+_LOADS = ("material_mass", "processing_force")
+
+
+@declaration
+class Shift:
+    """How fast material moves."""
+
+    shift: Value = quantity(
+        "s",
+        "time in which material leaves or changes sides",
+        default=0.3,
+        min=1e-4,
+        max=1e4,
+        usual=(1e-3, 60.0),
+    )
+
+
+@declaration
+class Share:
+    """How much of the feed is on one side."""
+
+    share: Value = quantity(
+        "1", "part of the other side's feed that the side has to carry, too", default=1.0, min=0.0, max=1.0
+    )
+
+
+class Empties(Event):
+    """One side empties; the other goes on."""
+
+    kind, run = "empties", "{side}_empties"
+    words, heading = "the {side} side empties", "{side} empties"
+    role = Role.DUTY
+    acts_on = tuple(f"{{side}}.{load}" for load in _LOADS)
+
+    @declaration
+    class Parameters(Timing, Shift):
+        """Of the side that empties."""
+
+    @property
+    def loaded_side(self) -> SideName | Literal[""]:
+        """The one across."""
+        return other(self.side) if self.side else ""
+
+    @property
+    def empties(self) -> bool:
+        """The side that it is named after."""
+        return True
+
+    def signals(
+        self, normal: Mapping[str, float], at: float, state: Mapping[str, float]
+    ) -> dict[str, OverTime]:
+        """Its material and processing force go away."""
+        return {name: Profile(normal[name], ((at, self.p.shift, 0.0),)) for name in self.inputs(self.side)}
+
+
+class OneSidedFeed(Event):
+    """All feed moves to one side."""
+
+    kind, run = "feed", "feed_{side}"
+    words, heading = "all feed moves to the {side}", "feed to {side}"
+    role = Role.DUTY
+    acts_on = tuple(f"{{{side}}}.{load}" for side in ("side", "other") for load in _LOADS)
+
+    @declaration
+    class Parameters(Timing, Shift, Share):
+        """Of the feed that moves."""
+
+    @property
+    def empties(self) -> bool:
+        """The other side, where all its feed moves."""
+        return bool(self.p.share == 1.0)
+
+    def ends(self, normal: Mapping[str, float]) -> dict[str, float]:
+        """What each side carries in the end."""
+        ends, share = {}, self.p.share
+        for load in _LOADS:
+            here, there = (_said(f"{{{side}}}.{load}", self.side) for side in ("side", "other"))
+            ends[there] = (1.0 - share) * normal[there]
+            ends[here] = normal[here] + share * normal[there]
+        return ends
+
+    def signals(
+        self, normal: Mapping[str, float], at: float, state: Mapping[str, float]
+    ) -> dict[str, OverTime]:
+        """Material and processing force leave one side for the other, at the same time."""
+        return {
+            name: Profile(normal[name], ((at, self.p.shift, end),)) for name, end in self.ends(normal).items()
+        }
+
+
+class LoadedStart(OneSidedFeed):
+    """A start with all feed on one side."""
+
+    kind, run = "start", "start_loaded_{side}"
+    words, heading = "start with all feed on the {side}", "{side} start"
+    from_rest = True
+
+    @declaration
+    class Parameters(Share):
+        """Of the feed in the start; it begins at rest and is followed as long as the start-up."""
+
+    def signals(
+        self, normal: Mapping[str, float], at: float, state: Mapping[str, float]
+    ) -> dict[str, OverTime]:
+        """The feed on one side from rest on."""
+        return dict(self.ends(normal))
+
+    def follow(self, turn: float) -> float:
+        """As long as the start-up."""
+        return 0.0
+
+
+class Blocked(Event):
+    """A stop holds the rocker where it stands."""
+
+    kind, run = "blocked", "blocked"
+    words, heading = "the rocker is blocked", "blocked"
+    role, sided = Role.SHOCK, False
+    acts_on = ("stop.stiffness", "stop.damping", "stop.psi")
+    reads = ("rocker.psi",)
+
+    @declaration
+    class Parameters(Timing):
+        """Of the stop."""
+
+        stiffness: Value = quantity(
+            "N.m/rad", "stiffness of the stop that blocks the rocker", default=2e5, above=0.0, max=1e9
+        )
+        damping: Value = quantity(
+            "N.m.s/rad", "damping of the stop that blocks the rocker", default=2e3, min=0.0, max=1e9
+        )
+
+    def signals(
+        self, normal: Mapping[str, float], at: float, state: Mapping[str, float]
+    ) -> dict[str, OverTime]:
+        """The stop where the rocker stands."""
+        return {
+            "stop.stiffness": self.p.stiffness,
+            "stop.damping": self.p.damping,
+            "stop.psi": state["rocker.psi"],
+        }
+
+    def variants(self) -> tuple[Event, ...]:
+        """Stops over a decade of stiffness, the damping with its root, as in a swing of the same damping ratio."""
+        p = self.p
+        return tuple(
+            replace(
+                self,
+                p=replace(p, stiffness=factor * p.stiffness, damping=math.sqrt(factor) * p.damping),
+            )
+            for factor in (1.0 / math.sqrt(10.0), math.sqrt(10.0))
+        )
+
+    def assumption(self, peaks: Mapping[str, tuple[float, float]]) -> str:
+        """Whether the stiffness decides the peak of the crank torque, and where one takes it from."""
+        low, high = peaks["crank_torque"]
+        decides = "but hardly change the peak here" if high < _FLAT * low else "and decide the peak"
+        # what is assumed is not known to more than a digit
+        soft, stiff = (number(float(f"{variant.p.stiffness:.1g}"), "N.m/rad") for variant in self.variants())
+        return (
+            f"the stop's stiffness and damping are assumed {decides}, {number(low, 'N.m')} to {number(high, 'N.m')} "
+            f"of crank torque for {soft} to {stiff}, damping with the root of it. Take the stiffness of what is "
+            "jammed (N/m) times the square of its distance from the pivot C (m) for the stiffness of the event, now "
+            f"{number(self.p.stiffness, 'N.m/rad')}, and its damping, now {number(self.p.damping, 'N.m.s/rad')}."
+        )
+
+
+_FLAT = 1.05
+"""Largest over least of the peaks over a decade of stiffness up to which the stop is said to matter little."""
+
+
+class Dip(Event):
+    """The voltage of the supply dips."""
+
+    kind, run = "dip", "dip"
+    words, heading = "the voltage dips", "dip"
+    role, sided = Role.DISTURBANCE, False
+    acts_on = ("voltage",)
+
+    @declaration
+    class Parameters(Timing):
+        """Of the dip."""
+
+        depth: Value = quantity(
+            "1", "share of the voltage that the dip takes away", default=0.5, min=0.0, max=1.0
+        )
+        duration: Value = quantity(
+            "s", "time for which the voltage is down", default=0.3, min=1e-3, max=1e4, usual=(1e-3, 60.0)
+        )
+
+    @property
+    def without(self) -> str:
+        """A DC motor has a supply of its own."""
+        return "this motor's drive has no line voltage of its own"
+
+    def signals(
+        self, normal: Mapping[str, float], at: float, state: Mapping[str, float]
+    ) -> dict[str, OverTime]:
+        """The voltage falls and comes back within a millisecond."""
+        edge = 1e-3
+        whole = normal["voltage"]
+        low = (at, edge, (1.0 - self.p.depth) * whole)
+        return {"voltage": Profile(whole, (low, (at + self.p.duration, edge, whole)))}

@@ -1,0 +1,106 @@
+"""Whether the model and the motor do what is asked of them, from the numbers of the runs."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from ..text import entry, number
+from . import verdict
+from .chain import HIGH
+from .measures import Answers, reaches
+from .quantiles import runs_needed
+from .study import Study
+from .verdict import RESIDUAL, STEADY, Holds, Verdict
+
+
+def model_verdict(study: Study) -> Verdict:
+    """Whether the model of the organs holds, from the numbers of the runs."""
+    config, limits, answers = study.config, study.statics.limits, study.answers
+    steady = answers.get(STEADY)
+    mean = steady.speed_mean if steady else config.run.crank_speed
+    speed, residuals = max(config.run.crank_speed, mean), _residuals(study)
+    runs: dict[str, Answers] = {**answers}
+    if study.start is not None:
+        runs[verdict.START] = study.start
+    if config.chain is None:
+        emptied = {name for name in study.overloads if config.events[name].empties}
+        always = 0.0 in (config.feed.left.material_mass, config.feed.right.material_mass)
+        return verdict.two_bars(
+            speed,
+            limits.chain_resonance,
+            limits.slack_speed,
+            {name: (a.web_pull_least, a.wall_pull_least) for name, a in runs.items()},
+            residuals,
+            empty={""} if always else emptied,
+            reached=mean,
+        )
+    folds = {name: a.fold_largest for name, a in runs.items()}
+    slack = {name: a.slack_time for name, a in runs.items()}
+    needed, turns = runs_needed(HIGH), math.inf
+    if study.chain is not None:
+        own = study.chain.own
+        folds["constant"], slack["constant"] = own.fold_largest, own.slack_time
+        residuals["constant"], turns = own.energy_residual, own.independent_turns
+    return verdict.chains(
+        speed, residuals, folds, config.chain.fold_limit, slack, turns, needed, reached=mean
+    )
+
+
+def _residuals(study: Study) -> dict[str, float]:
+    """By run, the largest energy residual over the energy moved; the start-up and steady running are one."""
+    return {
+        STEADY if name == verdict.START else name: max(
+            x for kind, x in shares.items() if kind.endswith("energy_residual_share")
+        )
+        for name, shares in study.certificate.items()
+    }
+
+
+def motor_verdict(study: Study) -> dict[str, Any] | None:
+    """Whether the motor reaches the speed ("false" where not), and its least reserve of torque with the run of it
+    ("in part" where none is left or known, or sizing found it insufficient), ready for JSON; None without steady
+    running. Runs whose energy balance is not kept say nothing of the motor: they are left out."""
+    steady, asked = study.answers.get(STEADY), study.config.run.crank_speed
+    if steady is None:
+        return None
+    residuals, kept = _residuals(study), reaches(steady.speed_mean, asked)
+    # NaN, too, is no balance
+    left_out = [name for name in study.answers if not residuals.get(name, 0.0) < RESIDUAL]
+    reserves = {
+        name: a.torque_reserve
+        for name, a in study.answers.items()
+        if name not in left_out and a.torque_reserve is not None
+    }
+    run = min(reserves, key=lambda name: float(reserves[name]), default=None)
+    reserve = None if run is None else reserves[run]
+    speed, wanted = number(steady.speed_mean, "rad/s"), number(asked, "rad/s", full=False)
+    if kept:
+        text = f"The motor keeps the crank at {speed}"
+    elif steady.speed_mean > asked:
+        text = f"The motor does NOT keep the speed: the crank turns at {speed}, faster than the {wanted} asked for"
+    else:
+        text = f"The motor does NOT reach the speed: {speed} in place of {wanted}"
+    if study.insufficient:
+        text += f"{', but it' if kept else '; it'} is insufficient by the limits of the sizing"
+    if run is None:
+        text += "; its reserve of torque is not known"
+    elif reserve is not None and reserve >= 0.0:
+        text += f"; least reserve of torque {number(reserve, '1', 'percent')} ({study.called(run)})"
+    else:
+        over = number(-reserves[run], "1", "percent") + (" or more" if reserves[run] <= -1.0 else "")
+        text += f"; no reserve of torque: the torque passes the largest steady one by {over} ({study.called(run)})"
+    if left_out:
+        names = ", ".join(study.called(name) for name in left_out)
+        text += f"; runs whose energy balance is not kept are left out ({names})"
+    enough = reserve is not None and reserve > 0.0 and not study.insufficient
+    holds: Holds = "false" if not kept else "true" if enough else "in part"
+    return {
+        "holds": holds,
+        "text": f"{text}.",
+        "speed": entry(steady.speed_mean, "rad/s"),
+        "asked": entry(asked, "rad/s"),
+        "least_reserve": entry(reserve, "1", "percent"),
+        "run": run,
+        "left_out": left_out,
+    }

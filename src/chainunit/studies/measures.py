@@ -1,0 +1,382 @@
+"""What is read from a run: each measure is declared once, with the function that reads it.
+
+A function takes a `Window` of a run: the start-up, the steady turns, or an overload from its event on.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum, auto
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..quantities import Layout, Value, Variable, declaration, quantity
+from . import protection
+from .drive import Drive
+
+BURNT = 2000.0
+"""Temperature that stands for a winding without a thermal steady state [K]."""
+
+
+class Phase(Enum):
+    """Which part of a study a run is."""
+
+    START_UP = auto()
+    STEADY = auto()
+    EVENT = auto()
+    LOADED_START = auto()
+
+
+_ALL = frozenset(Phase)
+_RUNNING = _ALL - {Phase.START_UP}
+_STEADY = frozenset({Phase.STEADY})
+_EVENTS = frozenset({Phase.EVENT, Phase.LOADED_START})
+# a start begins at rest, and its motor gives for a moment more than it ever does in running
+_AT_SPEED = frozenset({Phase.STEADY, Phase.EVENT})
+
+
+@dataclass(frozen=True)
+class Trip:
+    """A safety coupling that opened: when [s], the energy that passed it until no torque did [J], and the run of the
+    machine behind it."""
+
+    time: float
+    passed: float
+    coasting: xr.Dataset
+
+
+@dataclass(frozen=True)
+class Window:
+    """The rows of a run that measures are read from, with the drive and the crank speed `asked` for [rad/s]; of an
+    overload when it began [s], the steady running before it, and what opened the coupling."""
+
+    phase: Phase
+    run: xr.Dataset
+    drive: Drive
+    sides: tuple[str, ...]
+    """sides whose organs have weight"""
+    asked: float
+    begin: float = 0.0
+    steady: Window | None = None
+    trip: Trip | None = None
+
+    def value(self, name: str) -> Any:
+        """A variable of the run, shape (time,)."""
+        return self.run[name].values
+
+    @cached_property
+    def turns(self) -> xr.Dataset:
+        """Whole turns of the run; all of it where the crank does not make one."""
+        return whole_turns(self.drive, self.run)
+
+    @cached_property
+    def crank_torque(self) -> Any:
+        """[N m], shape (time,)."""
+        return self.drive.crank_torque(self.run)
+
+    @cached_property
+    def speed(self) -> Any:
+        """Of the crank [rad/s], shape (time,)."""
+        return self.drive.crank_motion(self.run)[1]
+
+    @cached_property
+    def speed_mean(self) -> float:
+        """Of the crank over whole turns [rad/s]."""
+        return self.mean(lambda run: self.drive.crank_motion(run)[1])
+
+    @property
+    def since(self) -> Any:
+        """Time since the begin of an overload [s], shape (time,)."""
+        return self.value("time") - self.begin
+
+    @property
+    def current(self) -> str:
+        """Name of the motor's current."""
+        return f"motor.{self.drive.motor.current}"
+
+    @property
+    def power(self) -> str:
+        """Name of the power at the motor's shaft."""
+        return f"{self.drive.loading}.power"
+
+    @property
+    def kept(self) -> float:
+        """Crank speed that the drive keeps where nothing happens [rad/s]: the one that is asked for, or the one that
+        a motor on the line takes."""
+        if self.drive.follows or self.steady is None:
+            return self.asked
+        return self.steady.speed_mean
+
+    @cached_property
+    def settled_temperature(self) -> float:
+        """At which the winding comes to rest if the turns go on for ever [K]; infinite where it does not."""
+        drive = self.drive
+        names = ("heat", drive.motor.temperature, "w")
+        heat, temperature, w = (self.mean(f"motor.{name}") for name in names)
+        return drive.motor.settled_temperature(drive.parameters, heat, temperature, w)
+
+    @property
+    def warm(self) -> float:
+        """Temperature of the winding in steady running [K]; see `BURNT`."""
+        return min(BURNT, (self.steady or self).settled_temperature)
+
+    def mean(self, of: str | Callable[[xr.Dataset], Any]) -> float:
+        """Mean over the time of whole turns, of a variable or of what is read from them."""
+        return mean(self.turns, of(self.turns) if callable(of) else self.turns[of].values)
+
+    def rms(self, of: str | Callable[[xr.Dataset], Any]) -> float:
+        """RMS over the time of whole turns."""
+        return math.sqrt(self.mean(lambda run: (of(run) if callable(of) else run[of].values) ** 2))
+
+    def largest(self, name: str) -> float:
+        """Largest size of a variable."""
+        return peak(self.value(name))
+
+    def swing(self, *names: str) -> float:
+        """Largest deviation of a vector from its mean over whole turns."""
+        parts = [(self.value(name), self.mean(name)) for name in names]
+        return float(np.max(np.sqrt(sum((x - middle) ** 2 for x, middle in parts))))
+
+    def least_pull(self, rod: str) -> float:
+        """Of a kind of rod on either side [N]; infinite where no organ has weight."""
+        pulls = (float(np.min(self.value(f"machine.{side}.{rod}_pull"))) for side in self.sides)
+        return min(pulls, default=math.inf)
+
+
+def peak(x: Any) -> float:
+    """Largest size of an array."""
+    return float(np.max(np.abs(x)))
+
+
+def mean(run: xr.Dataset, x: Any) -> float:
+    """Mean over the time of a run, by the trapezoidal rule."""
+    time = run["time"].values
+    return float(np.trapezoid(x, time) / (time[-1] - time[0]))
+
+
+def whole_turns(drive: Drive, run: xr.Dataset, most: float = math.inf) -> xr.Dataset:
+    """Whole turns of a run, see `Drive.whole_turns`; all of it where the crank does not make one."""
+    turns = drive.whole_turns(run, most)
+    return run if turns is None else turns
+
+
+def end_gap(drive: Drive, turns: xr.Dataset) -> float:
+    """Difference between the ends of `turns`, of crank speed or torque, over the largest value."""
+    _, speed = drive.crank_motion(turns)
+    sizes = ((x[-1] - x[0]) / max(np.max(np.abs(x)), 1e-9) for x in (speed, drive.crank_torque(turns)))
+    return max(abs(float(size)) for size in sizes)
+
+
+def reaches(speed: float, asked: float) -> bool:
+    """Whether the crank runs at the speed that is asked of it, within 1 %."""
+    return bool(abs(speed - asked) <= 0.01 * asked)
+
+
+def torque_reserve(limit: Any, torque: Any) -> float:
+    """Least part of the largest torque that a motor can give which is left over in a run: (limit - |torque|)/limit at
+    the instant at which that is least; both of the motor [N m], shape (time,).
+
+    0 where the motor gives all it can, less where a transient passes that, and -1 where one is twice as large or
+    more, as where it can give none at all.
+    """
+    limit, torque = np.asarray(limit), np.abs(torque)
+    free = limit - torque
+    whole = np.maximum(np.maximum(limit, -free), 1e-12)
+    return float(np.min(free / whole))
+
+
+def _reserve(w: Window) -> float:
+    # the field that is left in a dip brakes for a moment, which is no lack of torque
+    driving = np.maximum(w.value("motor.air_gap_tau") * np.sign(w.value("motor.w")), 0.0)
+    if w.drive.follows and (w.steady or w).speed_mean < 0.99 * w.asked:
+        # a controlled motor that falls behind gives all that it can
+        return 0.0
+    return torque_reserve(w.drive.largest_torque(w.run, w.warm), driving)
+
+
+def _recovery(w: Window) -> float | None:
+    """Time after the event from which the speed stays in the band of steady running, widened by 0.5 %; None if
+    it does not return in the time followed, or only at its very end."""
+    assert w.steady is not None
+    if w.drive.follows and not reaches(w.steady.speed_mean, w.asked):
+        return None
+    steady, since, widening = w.steady.speed, w.since, 0.005 * w.kept
+    outside = (w.speed < np.min(steady) - widening) | (w.speed > np.max(steady) + widening)
+    if not outside.any():
+        return 0.0
+    last = int(np.flatnonzero(outside)[-1])
+    return float(since[last]) if last < len(since) - len(since) // 10 else None
+
+
+def _relay(w: Window) -> float | None:
+    """When the thermal relay, set to the motor's rated current, trips after the event; behind a coupling that opened
+    no load is left that could trip it."""
+    setting = w.drive.rated_current
+    if setting is None or w.trip is not None:
+        return None
+    assert w.steady is not None
+    current = w.value(w.current)
+    # what flows at the end is taken to flow on
+    lasts = float(np.sqrt(np.mean(current[-max(1, len(current) // 5) :] ** 2)))
+    return protection.relay_trip(w.since, current, setting, w.steady.rms(w.current), lasts)
+
+
+def _slack_time(w: Window) -> float | None:
+    """Share of the time in which some rod of a chain is slack."""
+    if w.drive.chain is None:
+        return None
+
+    def some_slack(run: xr.Dataset) -> Any:
+        shares = [run[f"machine.{side}.slack_share"].values for side in w.sides]
+        return (np.max(shares, axis=0) > 0.0).astype(float) if shares else np.zeros(run.sizes["time"])
+
+    return w.mean(some_slack)
+
+
+def _fold(w: Window) -> float | None:
+    if w.drive.chain is None:
+        return None
+    return max((float(np.max(w.value(f"machine.{side}.fold_largest"))) for side in w.sides), default=0.0)
+
+
+def _standstill(w: Window) -> float | None:
+    """When the machine behind an open coupling stands, after the event."""
+    if w.trip is None:
+        return None
+    run = w.trip.coasting
+    still = np.flatnonzero(np.abs(w.drive.crank_motion(run)[1]) < 0.01 * w.asked)
+    return float(run["time"][still[0]]) - w.begin if still.size else None
+
+
+Read = Callable[[Window], float | None]
+
+
+def measure(
+    unit: str, description: str, read: Read, *, kind: str = "", during: frozenset[Phase] = _RUNNING
+) -> Any:
+    """A field that declares a measure: as `quantity`, the function that reads it, and in which runs it means
+    something."""
+    declared = quantity(unit, description, kind=kind)
+    return dataclasses.field(metadata={**declared.metadata, "read": read, "during": during})
+
+
+@declaration
+class Answers:
+    """What a run asks of the drive; torques and speeds are the crank's unless they are called the motor's. Means
+    and RMS are over the time of whole turns of the crank; steady running is the turns that `load_cycle.csv` holds.
+    `power_peak` is the most that the motor gives, 0 where it only brakes.
+
+    The ripple is (largest - least)/mean of the speed; `shaft_share` the peak torque on the machine's shaft over
+    that of the motor (the rest is the rotor's inertia); `shaking_*` the largest deviation of the frame's load
+    from its mean, the moment about C; `torque_reserve` least part that is left of the driving torque that the warm
+    motor can give at an instant, at its speed, voltage and frequency: 0 at the limit, less where a transient passes
+    it, None in a start;
+    `winding_temperature` is where the winding comes to rest if the steady turns go on for ever;
+    `cycle_gap` is the difference between the ends of the steady turns, of speed or torque, over the largest value;
+    times count from the event; `energy_after_trip` passes the safety coupling while it opens, `energy_behind`
+    stays in the machine."""
+
+    crank_torque_peak: Value = measure(
+        "N.m", "crank torque, peak", lambda w: peak(w.crank_torque), during=_ALL
+    )
+    crank_torque_rms: Value = measure("N.m", "crank torque, RMS", lambda w: w.rms(w.drive.crank_torque))
+    crank_torque_mean: Value = measure("N.m", "crank torque, mean", lambda w: w.mean(w.drive.crank_torque))
+    motor_torque_peak: Value = measure(
+        "N.m", "motor torque, peak", lambda w: w.largest("motor.air_gap_tau"), during=_ALL
+    )
+    motor_torque_rms: Value = measure("N.m", "motor torque, RMS", lambda w: w.rms("motor.air_gap_tau"))
+    power_peak: Value = measure("W", "shaft power, peak", lambda w: max(0.0, float(np.max(w.value(w.power)))))
+    power_mean: Value = measure("W", "shaft power, mean", lambda w: w.mean(w.power))
+    supply_power_mean: Value = measure("W", "electric power, mean", lambda w: w.mean("motor.supply_power"))
+    current_peak: Value = measure("A", "motor current, peak", lambda w: w.largest(w.current), during=_ALL)
+    current_rms: Value = measure("A", "motor current, RMS", lambda w: w.rms(w.current))
+    winding_temperature: Value = measure(
+        "K", "winding temperature, thermal steady state", lambda w: w.settled_temperature, during=_STEADY
+    )
+    rocker_torque_peak: Value = measure(
+        "N.m", "rocker torque, peak", lambda w: w.largest("machine.rocker.tau"), during=_ALL
+    )
+    speed_mean: Value = measure("rad/s", "crank speed, mean", lambda w: w.speed_mean)
+    speed_least: Value = measure("rad/s", "crank speed, least", lambda w: float(np.min(w.speed)))
+    speed_ripple: Value = measure(
+        "1",
+        "speed ripple",
+        lambda w: float(np.ptp(w.speed)) / max(abs(w.speed_mean), 1e-9),
+        kind="percent",
+        during=_STEADY,
+    )
+    cycle_gap: Value = measure(
+        "1",
+        "gap between the ends of the steady turns",
+        lambda w: end_gap(w.drive, w.turns),
+        kind="percent",
+        during=_STEADY,
+    )
+    speed_dip: Value = measure(
+        "1", "speed dip", lambda w: float((w.kept - np.min(w.speed)) / w.kept), kind="dip", during=_AT_SPEED
+    )
+    recovery_time: Value = measure("s", "recovery", _recovery, during=_EVENTS)
+    web_pull_least: Value = measure("N", "least pull in a web", lambda w: w.least_pull("web"), during=_ALL)
+    wall_pull_least: Value = measure("N", "least pull in a wall", lambda w: w.least_pull("wall"), during=_ALL)
+    slack_time: Value = measure(
+        "1", "share of the time with a slack rod", _slack_time, kind="percent", during=_ALL
+    )
+    fold_largest: Value = measure("rad", "largest angle between two rods", _fold, during=_ALL)
+    shaft_share: Value = measure(
+        "1",
+        "shaft over motor torque",
+        lambda w: w.largest("motor.tau") / w.largest("motor.air_gap_tau"),
+        kind="percent",
+    )
+    shaking_force: Value = measure(
+        "N", "shaking force", lambda w: w.swing("machine.frame.fx", "machine.frame.fy")
+    )
+    shaking_moment: Value = measure("N.m", "shaking moment", lambda w: w.swing("machine.frame.moment"))
+    torque_reserve: Value = measure("1", "reserve of torque", _reserve, kind="percent", during=_AT_SPEED)
+    stall_time: Value = measure(
+        "s", "crank stands after", lambda w: protection.stall(w.since, w.speed, w.kept), during=_EVENTS
+    )
+    thermal_trip_time: Value = measure("s", "thermal relay trips after", _relay, during=_EVENTS)
+    coupling_trip_time: Value = measure(
+        "s",
+        "safety coupling trips after",
+        lambda w: w.trip.time - w.begin if w.trip else None,
+        during=_EVENTS,
+    )
+    energy_after_trip: Value = measure(
+        "J", "energy after the trip", lambda w: w.trip.passed if w.trip else None, during=_EVENTS
+    )
+    energy_behind: Value = measure(
+        "J",
+        "energy behind it",
+        lambda w: float(w.trip.coasting["machine.kinetic_energy"][0]) if w.trip else None,
+        during=_EVENTS,
+    )
+    standstill_time: Value = measure("s", "machine stands after", _standstill, during=_EVENTS)
+
+
+def read_answers(window: Window) -> Answers:
+    """All measures of a window; None where one means nothing there, or there is no such thing."""
+    values = {
+        each.name: each.metadata["read"](window) if window.phase in each.metadata["during"] else None
+        for each in dataclasses.fields(Answers)
+    }
+    return Answers(**values)
+
+
+def read_measure(name: str, window: Window) -> Any:
+    """One measure of a window."""
+    (declared,) = (each for each in dataclasses.fields(Answers) if each.name == name)
+    return declared.metadata["read"](window)
+
+
+def measures_of(phase: Phase) -> tuple[Variable, ...]:
+    """The measures that mean something in a run of that part."""
+    during = {each.name for each in dataclasses.fields(Answers) if phase in each.metadata["during"]}
+    return tuple(v for v in Layout(Answers).variables if v.name in during)

@@ -1,0 +1,222 @@
+"""Everything that a study found as data: what result.json holds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from .. import __version__
+from ..drives.dc_motor import DcMotor
+from ..quantities import Layout, variables
+from ..text import entry
+from .coupling import coupling_sentence
+from .cycle import factors_for
+from .judgement import motor_verdict
+from .measures import Phase, measures_of
+from .study import Study
+
+
+def entries(declared: Any) -> dict[str, Any]:
+    """The declared values of an instance as ``{name: {"value": .., "unit": ..}}``; what is not finite is null."""
+    layout = Layout(type(declared))
+    return {
+        v.name: entry(value, v.unit, v.kind)
+        for v, value in zip(layout.variables, layout.values(declared), strict=True)
+    }
+
+
+def as_dict(study: Study) -> dict[str, Any]:
+    """Everything but the time series, ready for JSON: each number with its unit."""
+    config = study.config
+    return {
+        "chainunit": __version__,
+        "title": config.title,
+        "source": config.source,
+        "status": f"failed: {study.failure}" if study.failure else "complete",
+        "failure": str(study.failure) if study.failure else None,
+        "verdict": {
+            "model": study.verdict.as_dict() if study.verdict else None,
+            "motor": motor_verdict(study),
+        },
+        "warnings": [remark.as_dict() for remark in study.warnings],
+        "notes": [remark.as_dict() for remark in study.notes],
+        "remarks": [slip.as_dict() for slip in config.remarks],
+        **_given(study),
+        **_statics(study),
+        **_runs(study),
+        **_parts(study),
+        "fmus": study.made,
+    }
+
+
+def _given(study: Study) -> dict[str, Any]:
+    """What the study was given; `given` names what its file sets, everything else is the example's."""
+    config = study.config
+    return {
+        "given": sorted(config.given),
+        "machine": entries(study.drive.machine.p),
+        "motor": {"kind": study.drive.motor.name, **entries(study.motor)},
+        "feed": entries(config.feed),
+        "run": entries(config.run),
+        "event": {name: entries(event.p) for name, event in config.events.items()},
+        "coupling": entries(config.coupling) if config.coupling else None,
+    }
+
+
+def _statics(study: Study) -> dict[str, Any]:
+    """What needs no co-simulation."""
+    statics = study.statics
+    uses = factors_for(statics.factors)
+    return {
+        "overload_factors": {
+            side: {name: factor | {"for": uses[name]} for name, factor in entries(factors).items()}
+            for side, factors in statics.factors.items()
+        },
+        "limits": entries(statics.limits),
+        "sides_over_speed": statics.sides.as_dict(),
+        "speed_loop": {
+            name: {
+                "inertia": entry(loop.inertia, "kg.m2"),
+                "phase_margin": entry(loop.phase_margin, "deg"),
+                "crossover": entry(loop.crossover, "rad/s"),
+                "speed_dip": entry(loop.speed_dip, "rad.s-1/N.m"),
+                "settling": entry(loop.settling, "s"),
+            }
+            for name, loop in statics.loops.items()
+        },
+        "control": {
+            "phase_margin": entry(study.tuning.phase_margin, "deg"),
+            "crossover": entry(study.tuning.crossover, "rad/s"),
+            "current_crossover": entry(study.tuning.current_crossover, "rad/s"),
+        }
+        if study.tuning
+        else "all gains are given"
+        if study.drive.motor is DcMotor
+        else "none: the motor takes the speed that its supply and the load give",
+    }
+
+
+def _runs(study: Study) -> dict[str, Any]:
+    """What was read from the runs, by their names."""
+    start = (
+        {v.name: entry(getattr(study.start, v.name), v.unit, v.kind) for v in measures_of(Phase.START_UP)}
+        if study.start
+        else None
+    )
+    return {
+        "events": {
+            name: {
+                "type": event.kind,
+                "side": event.side or None,
+                "title": event.title,
+                "begin": entry(study.event.get(name), "s"),
+            }
+            for name, event in study.config.events.items()
+        },
+        "answers": {name: entries(answers) for name, answers in study.answers.items()},
+        "start_up": start,
+        "pins": {
+            run: {pin: {k: entry(v, "N") for k, v in sizes.items()} for pin, sizes in table.items()}
+            for run, table in study.pins.items()
+        },
+        "certificate": {name: _pure(shares) for name, shares in study.certificate.items()},
+        "block_peaks": {name: _spread(study, name) for name in study.spreads},
+        "ripple_without_feed_forward": entry(study.ripple_without, "1", "percent"),
+    }
+
+
+def _spread(study: Study, name: str) -> dict[str, Any]:
+    """Ends of what an event assumes, and of the peaks over it."""
+    spread, units = (
+        study.spreads[name],
+        {v.name: v.unit for v in variables(study.config.events[name].Parameters)},
+    )
+    ranges = [(each, ends, units[each]) for each, ends in spread.assumed.items()]
+    ranges += [(each, ends, "N.m") for each, ends in spread.peaks.items()]
+    return {
+        f"{each}_{end}": entry(x, unit)
+        for each, ends, unit in ranges
+        for end, x in zip(("low", "high"), ends, strict=True)
+    }
+
+
+def _parts(study: Study) -> dict[str, Any]:
+    """What only some studies have."""
+    config, parts = study.config, {}
+    if study.sizing:
+        parts["sizing"] = study.sizing.as_dict() | {"protection": _protection(study)}
+    if study.monte_carlo:
+        parts["monte_carlo"] = study.monte_carlo.as_dict()
+    if study.statics.torsion is not None:
+        parts |= _driveline(study)
+    if config.chain:
+        parts["chain"] = entries(config.chain) | (study.chain.as_dict() if study.chain else {})
+    return parts
+
+
+def _protection(study: Study) -> dict[str, Any]:
+    """Settings of the protection of the drive that sizing chose; none for a motor that is insufficient."""
+    assert study.sizing is not None
+    if study.insufficient:
+        return {}
+    relay = {
+        "value": study.sizing.best.motor.nameplate.rated_current,
+        "unit": "A",
+        "title": "thermal relay, setting",
+    }
+    setting = study.setting
+    if setting is None:
+        return {"relay_current": relay}
+
+    def torque(value: float | None, title: str) -> dict[str, Any]:
+        return entry(value, "N.m") | {"title": title}
+
+    return {
+        "trip_torque": torque(setting.torque, "safety coupling, trip torque at the crank"),
+        "relay_current": relay,
+        "coupling": coupling_sentence(study),
+        "obstacle": setting.obstacle,
+        "normal_torque": torque(
+            setting.normal, "largest torque of normal duty on the coupling, at the crank"
+        ),
+        "breakdown_torque": torque(setting.motor, "most that the motor gives at the crank"),
+        "start_torque": torque(study.start_torque, "torque of a start direct on line on the coupling"),
+        "overloads": {
+            name: torque(
+                peak, f"{study.called(name)}: {'opens it' if name in setting.opens else 'leaves it shut'}"
+            )
+            for name, peak in setting.overloads.items()
+        },
+        "disturbances": {
+            name: torque(
+                peak,
+                f"{study.called(name)}: {'a nuisance trip' if name in setting.nuisances else 'leaves it shut'}",
+            )
+            for name, peak in setting.disturbances.items()
+        },
+    }
+
+
+def _driveline(study: Study) -> dict[str, Any]:
+    units = {"from": "N.m", "to": "N.m", "count": "1"}
+    largest = max(answers.range_largest for answers in study.shaft.values()) if study.shaft else 0.0
+    return {
+        "driveline": {
+            "place": study.config.place,
+            "damping_ratio": {"value": study.config.damping_ratio, "unit": "1"},
+            **entries(study.config.driveline),
+            **entries(study.drive.line),
+            **entries(study.statics.torsion),
+        },
+        "shaft": {name: entries(answers) for name, answers in study.shaft.items()},
+        "torque_cycles": {
+            name: [
+                {k: {"value": x, "unit": units[k]} for k, x in row.items()} for row in cycles.classes(largest)
+            ]
+            for name, cycles in study.cycles_of.items()
+        },
+    }
+
+
+def _pure(values: Mapping[str, float]) -> dict[str, Any]:
+    return {name: entry(value, "1") for name, value in values.items()}

@@ -1,0 +1,246 @@
+"""The drive of a study on its co-simulation: started, followed through events, left to itself behind a coupling."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..config import Config
+from ..machines.chain_unit import SIDES, DirectChainUnit
+from ..system import CoSimulation, Jump, ModelComponent, Profile, System, certify, monolithic
+from .drive import Drive
+from .events import Event, OverTime
+from .measures import end_gap, whole_turns
+
+Progress = Callable[[float], None]
+_PATIENCE = 20.0
+"""Turns, at the speed that is asked, that a study runs on until the motor has settled and made its turns."""
+CLOSED = 0.01
+"""Gap between the ends of the steady turns up to which they count as closed."""
+
+
+@dataclass(frozen=True)
+class Transient:
+    """A run with an event that began at `begin` [s]; `signals` are those that it had from there on, `jumps`
+    those among them that are numbers which an event sets at its begin."""
+
+    event: Event
+    begin: float
+    run: xr.Dataset
+    signals: dict[str, OverTime]
+    jumps: dict[str, Jump]
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A drive as the FMUs of `files`, with the loads and the speed of the study."""
+
+    config: Config
+    drive: Drive
+    files: Mapping[str, Path]
+
+    @property
+    def step(self) -> float:
+        """Communication step [s]."""
+        return float(self.config.run.step)
+
+    @property
+    def system(self) -> System:
+        """The FMUs and how they are joined."""
+        return self.drive.system(self.files)
+
+    @property
+    def rigid(self) -> Rig:
+        """The same without the elasticity and unevenness of the driveline."""
+        files = {name: file for name, file in self.files.items() if name != "driveline"}
+        return replace(self, drive=self.drive.rigid(), files=files)
+
+    @property
+    def guards(self) -> dict[str, float]:
+        """What a safety coupling opens at, at the motor."""
+        coupling = self.config.coupling
+        return {"motor.tau": coupling.trip_torque / self.drive.ratio} if coupling else {}
+
+    @cached_property
+    def _inputs(self) -> dict[str, tuple[str, float]]:
+        """Of each input that an event may act on the full name and the value in normal running."""
+        models = {"motor": self.drive.motor, "machine": self.drive.load_model()[0]}
+        inputs = {
+            v.name: (f"{instance}.{v.name}", float(v.quantity.start or 0.0))
+            for instance, model in models.items()
+            for v in model.input_layout.variables
+        }
+        for full, value in self.drive.loads(self.config.feed).items():
+            instance, _, name = full.partition(".")
+            if instance == "machine":
+                inputs[name] = full, value
+        return inputs
+
+    def takes(self, event: Event) -> bool:
+        """Whether the drive has the inputs that the event acts on."""
+        return set(event.inputs(event.side)) <= set(self._inputs)
+
+    def event_signals(self, event: Event, begin: float, state: Mapping[str, float]) -> dict[str, OverTime]:
+        """What the event gives, by full name, where it begins at `begin` [s] with the outputs `state`."""
+        normal = {name: value for name, (_, value) in self._inputs.items()}
+        given = event.signals(normal, begin, state)
+        return {self._inputs[name][0]: signal for name, signal in given.items()}
+
+    def signals(
+        self, given: Mapping[str, OverTime] | None = None, *, ramp: bool = False
+    ) -> dict[str, OverTime]:
+        """Loads of normal running with what is `given` in their place, and the speed reference, from rest with
+        `ramp`."""
+        run = self.config.run
+        return {
+            **self.drive.loads(self.config.feed),
+            **(given or {}),
+            **self.drive.reference(run.crank_speed, run.ramp if ramp else None),
+        }
+
+    def from_rest(self, event: Event | None = None) -> CoSimulation:
+        """The co-simulation from rest on, with the event of a start if there is one."""
+        given = self.event_signals(event, 0.0, {}) if event else {}
+        return CoSimulation(self.system, self.signals(given, ramp=True))
+
+    def lead(self, event: Event, angle: float, speed: float) -> float:
+        """Time of steady running at `speed`, from the crank angle `angle` on, until the crank next stands where the
+        event begins, at least an eighth of a turn [s]; a crank that hardly turns is not waited for."""
+        ahead = (getattr(event.p, "crank_angle", 0.0) - angle) % (2.0 * math.pi)
+        if ahead < 0.25 * math.pi:
+            ahead += 2.0 * math.pi
+        return float(ahead / max(speed, 0.5 * self.config.run.crank_speed))
+
+    def start_up(
+        self, simulation: CoSimulation, stop: float, progress: Progress, guards: Mapping[str, float]
+    ) -> tuple[xr.Dataset, float, float]:
+        """Start-up and steady running to the time `stop`, or longer, see `_missing`; with the time from which it is
+        steady and the time to which it should have run [s]."""
+        longest = stop + _PATIENCE * self.config.turn
+        steady_from = self.config.settled
+        run = simulation.run(stop, self.step, progress, guards=guards)
+        while stop - 0.5 * self.step <= simulation.time < longest:
+            missing, steady_from = self._missing(run, steady_from)
+            if missing is None:
+                break
+            # at the speed that is asked at most; what is still missing then is seen in the next round
+            stop = min(longest, stop + max(missing * self.config.turn, self.step))
+            run = joined([run, simulation.run(stop, self.step, progress, guards=guards)])
+        return run, steady_from, stop
+
+    def _missing(self, run: xr.Dataset, steady_from: float) -> tuple[float | None, float]:
+        """Turns that are missing of those that are evaluated, where the crank turns too slowly, or the motor has not
+        settled: then running is steady a turn later. None where nothing is missing."""
+        turns_asked = self.config.run.turns
+        since = run.sel(time=slice(steady_from, None))
+        turns = self.drive.whole_turns(since, turns_asked)
+        if turns is not None and self.drive.turns(turns) > turns_asked - 0.5:
+            if self.drive.chain is not None or end_gap(self.drive, turns) <= CLOSED:
+                return None, steady_from
+            # as if one turn more had been waited for
+            steady_from = float(whole_turns(self.drive, since, 1)["time"][-1])
+            since = run.sel(time=slice(steady_from, None))
+        return turns_asked + 0.1 - self.drive.turns(since), steady_from
+
+    def follow(
+        self,
+        simulation: CoSimulation,
+        event: Event,
+        begin: float,
+        stop: float,
+        progress: Progress | None = None,
+        guards: Mapping[str, float] | None = None,
+    ) -> Transient:
+        """An event from the state that was saved, to the time `stop` [s] or until a guard ends it."""
+        simulation.restore()
+        before: dict[str, float] = {}
+        state: dict[str, float] = {}
+        pieces = []
+        if event.reads:
+            before = dict(self._inputs[name] for name in event.inputs(event.side))
+            simulation.signals = self.signals(before)
+            pieces.append(simulation.run(begin, self.step, progress))
+            state = {name: float(pieces[0][f"machine.{name}"][-1]) for name in event.reads}
+        given = self.event_signals(event, begin, state)
+        simulation.signals = self.signals(given)
+        pieces.append(simulation.run(stop, self.step, progress, guards=guards))
+        jumps = {
+            full: Jump(begin, value, after)
+            for full, value in before.items()
+            if not isinstance(after := given[full], Profile)
+        }
+        return Transient(event, begin, joined(pieces), given, jumps)
+
+    def coast(self, transient: Transient, run: xr.Dataset, stop: float, file: Path) -> xr.Dataset:
+        """The machine of the FMU `file` behind the coupling that opened at the end of the `run`, with the loads that
+        it had, for as long as the motor would have been followed and a second more."""
+        begin = float(run["time"][-1])
+        start = {f"{x}_start": float(run[f"machine.{x}0"][-1]) for x in ("phi", "w")}
+        p = DirectChainUnit.parameter_layout.from_names(self.drive.coasting_parameters() | start)
+        alone = System({"machine": ModelComponent(DirectChainUnit, p, file)})
+        loads = self.drive.loads(self.config.feed) | transient.signals
+        loads = {full: x for full, x in loads.items() if full.startswith("machine.")}
+        with CoSimulation(alone, {**loads, "machine.tau": 0.0}, begin) as simulation:
+            return simulation.run(max(stop, begin) + 1.0, self.step)
+
+    def residuals(self, run: xr.Dataset) -> dict[str, float]:
+        """Writes the energy residual of each shaft into the run, named after what it drives, where that is not the
+        machine; its share of the energy moved."""
+        feed = {f"machine.{s}.material_mass": partial(self._energy_per_kg, s) for s in SIDES}
+        shares = {}
+        for driven, (residual, share) in certify(run, self.drive.graph, feed).items():
+            prefix = "" if driven == "machine" else f"{driven}_"
+            run[f"{prefix}residual"] = residual
+            shares[f"{prefix}energy_residual_share"] = share
+        return shares
+
+    def _energy_per_kg(self, side: str, run: xr.Dataset) -> Any:
+        if self.drive.chain is not None:
+            return run[f"machine.{side}.energy_per_kg"].values
+        return self.drive.driven.energy_per_kg(side, run["machine.phi0"].values, run["machine.w0"].values)
+
+    def compare(
+        self,
+        run: xr.Dataset,
+        transient: Transient | None = None,
+        start: Mapping[str, float] | None = None,
+    ) -> tuple[dict[str, float], dict[str, float]]:
+        """Compare a run with the monolithic solution of the same signals, from the states `start` on or from rest:
+        the differences of torque and speed in parts of their peaks, and the states at its end."""
+        given = transient.signals if transient else {}
+        signals: dict[str, Any] = dict(self.signals(given, ramp=start is None))
+        if transient:
+            signals |= transient.jumps
+        rows = np.unique(np.append(np.arange(0, run.sizes["time"], 10), run.sizes["time"] - 1))
+        reference = monolithic(self.drive.graph, signals, run["time"].values[rows], start=start)
+        differences = {}
+        for of in ("machine.tau", "motor.w"):
+            difference = np.abs(run[of].values[rows] - reference[of].values)
+            differences[of + DIFFERENCE] = float(np.max(difference) / np.max(np.abs(reference[of].values)))
+        return differences, {full: float(reference[full][-1]) for full in map(str, reference.data_vars)}
+
+    def release(self, simulation: CoSimulation, run: xr.Dataset, time: float) -> tuple[xr.Dataset, float]:
+        """A run that ended as the coupling opened, followed until no torque passes it, `time` [s]; with the energy
+        that passed [J]."""
+        if time <= 0.0:
+            return run, 0.0
+        release = simulation.run(simulation.time + time, min(self.step, time))
+        passed = float(np.trapezoid(release["motor.tau"] * release["motor.w"], release["time"]))
+        return joined([run, release]), passed
+
+
+DIFFERENCE = "_difference_to_monolithic"
+"""Ends the name of a variable's largest difference to the monolithic solution, over its peak."""
+
+
+def joined(pieces: list[xr.Dataset]) -> xr.Dataset:
+    """One run from pieces that follow each other; of the instant that two share the later holds."""
+    kept = [piece.isel(time=slice(None, -1)) for piece in pieces[:-1]]
+    return xr.concat([*kept, pieces[-1]], "time", data_vars="all") if kept else pieces[-1]

@@ -1,0 +1,313 @@
+"""The main job: start-up, steady running and overloads of a machine with its motor.
+
+The FMUs are exported, co-simulated, and the answers are read from what they did. Every overload branches from the
+same steady state, saved once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import xarray as xr
+
+from ..config import Config
+from ..errors import InterruptedRunError, RunError
+from ..fmu.backends import Backend
+from ..system import CoSimulation
+from . import verdict
+from .bearings import pin_loads
+from .chain import study_chain
+from .choice import choose
+from .coupling import on_coupling, recommended
+from .events import Event
+from .limits import statics
+from .measures import Phase, Trip, read_answers, read_measure, whole_turns
+from .monte_carlo import Task
+from .monte_carlo import run as run_monte_carlo
+from .remarks import conclude
+from .rig import Progress, Rig, Transient
+from .shaft import shaft_answers, with_rigid
+from .study import Spread, Study
+
+_PEAKS = ("crank_torque", "motor_torque", "rocker_torque")
+"""What is told over the range of an assumption."""
+Report = Callable[[str, float, float], None]
+"""Called with what is running, the time done and the time to do [s]."""
+
+
+def run_study(
+    config: Config,
+    folder: Path,
+    report: Report | None = None,
+    *,
+    check: bool = False,
+    backend: Backend | None = None,
+) -> Study:
+    """Run the study; FMUs are written to ``folder/fmu``, by `backend` (see `chainunit.fmu.backends`).
+
+    With `check`, every run is also compared with the monolithic solution.
+    A run that fails ends the study early: what was computed is in it, and `failure` says why.
+    """
+    report = report or (lambda what, done, todo: None)
+    choice = choose(config, folder / "fmu", report, backend)
+    drive = choice.drive
+    study = Study(config, drive, statics(config, drive), choice.tuning, choice.sizing)
+    files, study.made = drive.export(folder / "fmu", backend)
+    runner = Runner(study, Rig(config, drive, files), report)
+    try:
+        runner.run(check, lambda: drive.coasting(folder / "fmu", backend))
+        if config.monte_carlo.runs:
+            task = Task(config, drive, files, runner.stop)
+            study.monte_carlo = run_monte_carlo(task, folder, report)
+    except RunError as error:
+        if error.partial is not None:
+            study.runs["unfinished"] = error.partial
+        study.failure = error
+    except KeyboardInterrupt:
+        # between two runs, or in one that is not a co-simulation
+        study.failure = InterruptedRunError("interrupted")
+    study.setting = recommended(study)
+    if drive.chain is not None and not isinstance(study.failure, InterruptedRunError):
+        _chains(study, files["machine"], report)
+    conclude(study)
+    return study
+
+
+def _chains(study: Study, file: Path, report: Report) -> None:
+    """Chains at constant speed; left out where an FMU in Python would take hours for their many turns."""
+    if "native" not in study.made["machine"]:
+        study.remark(
+            "note",
+            "chains left out",
+            "chains at constant speed and the sweep are left out: they need native code, that is a C compiler.",
+        )
+        return
+    try:
+        study.chain, ended = study_chain(study.config, study.drive, file, report)
+    except RunError as error:
+        ended = error
+    except KeyboardInterrupt:
+        ended = InterruptedRunError("interrupted")
+    study.failure = study.failure or ended
+
+
+class Runner:
+    """Runs a study on its rig, and writes into it what it reads."""
+
+    def __init__(self, study: Study, rig: Rig, report: Report) -> None:
+        config = study.config
+        self.study, self.rig, self.report = study, rig, report
+        self.stop = study.settled + (config.run.turns + 0.1) * config.turn
+        """to which the start-up is run [s]; later where the motor takes longer to settle"""
+        taken = [event for event in config.events.values() if rig.takes(event)]
+        self.events = [event for event in taken if not event.from_rest]
+        self.starts = [event for event in taken if event.from_rest]
+        self.total = self.stop * (1 + len(self.starts))
+        self.total += sum(config.turn + event.follow(config.turn) for event in self.events)
+        self.start_guards = {} if study.start_apart else rig.guards
+        self._coasting: Path | None = None
+
+    def run(self, check: bool, coasting: Callable[[], Path]) -> None:
+        """Every run of the study; `check` compares each with the monolithic solution, `coasting` writes the FMU of
+        the machine behind an open coupling."""
+        self._export_coasting = coasting
+        self._leave_out()
+        with self.rig.from_rest() as simulation:
+            self._start_up(simulation)
+            begin, speed = simulation.save(), self.study.answers["steady"].speed_mean
+            angle = float(self.rig.drive.crank_motion(self.study.runs["start_up"])[0][-1])
+            done, transients = 0.0, []
+            for event in self.events:
+                lead = self.rig.lead(event, angle, speed)
+                transients.append(self._event(simulation, event, begin + lead, done))
+                done += lead + event.follow(self.study.config.turn)
+            for transient in transients:
+                self._assumption(simulation, transient, done)
+        if check:
+            self._check(transients)
+        if self.rig.drive.feed_forward:
+            self._without_feed_forward()
+        for k, event in enumerate(self.starts):
+            self._loaded_start(event, self.total - (len(self.starts) - k) * self.stop, check)
+        if self.rig.drive.line is not None:
+            self.report("the same with a rigid shaft", self.total, self.total)
+            try:
+                rigid = self._rigid()
+            except RunError as error:
+                # what it has is the rigid drive's, not this one's
+                error.partial = None
+                raise
+            self._line(rigid)
+
+    def _progress(self, what: str, before: float) -> Progress:
+        def progress(time: float) -> None:
+            self.report(what, before + time, self.total)
+
+        return progress
+
+    def _leave_out(self) -> None:
+        """Remarks of events for which the system has no input."""
+        for event in self.study.config.events.values():
+            if event not in (*self.events, *self.starts):
+                self.study.remark(
+                    "note",
+                    "event left out",
+                    f"{event.title}: it was left out, as {event.without}.",
+                    event.name,
+                )
+
+    def _start_up(self, simulation: CoSimulation) -> None:
+        """Start-up and steady running, and what they answer.
+
+        Raises
+        ------
+        RunError
+            where the safety coupling opens in them.
+        """
+        study, rig, config = self.study, self.rig, self.study.config
+        progress = self._progress("start-up and steady running", 0.0)
+        run, study.steady_from, self.stop = rig.start_up(simulation, self.stop, progress, self.start_guards)
+        self._certify("start_up", run)
+        if simulation.time < self.stop - 0.5 * rig.step:
+            raise RunError(
+                f"the safety coupling opens in the start-up, at t = {simulation.time:.3g} s; coupling.trip_torque "
+                "must be above what starting takes"
+            )
+        steady = study.steady
+        study.answers["steady"] = read_answers(study.window(Phase.STEADY, steady))
+        study.pins["steady"] = pin_loads(rig.drive, steady)
+        start = run.sel(time=slice(None, steady["time"].values[0]))
+        study.start = read_answers(study.window(Phase.START_UP, start))
+        study.pins[verdict.START] = pin_loads(rig.drive, start)
+        if study.start_apart:
+            study.start_torque = on_coupling(rig.drive, run.sel(time=slice(None, study.settled)))
+        asked = on_coupling(rig.drive, steady)
+        if config.coupling and asked > config.coupling.trip_torque:
+            raise RunError(
+                f"the safety coupling opens in steady running, which puts {asked:.4g} N m on it; "
+                "coupling.trip_torque must be above that"
+            )
+
+    def _event(self, simulation: CoSimulation, event: Event, begin: float, done: float) -> Transient:
+        stop = begin + event.follow(self.study.config.turn)
+        progress = self._progress(event.title, done)
+        transient = self.rig.follow(simulation, event, begin, stop, progress, self.rig.guards)
+        self._close(simulation, transient, stop, Phase.EVENT)
+        return transient
+
+    def _loaded_start(self, event: Event, before: float, check: bool) -> None:
+        with self.rig.from_rest(event) as simulation:
+            progress = self._progress(event.title, before)
+            run = simulation.run(self.stop, self.rig.step, progress, guards=self.start_guards)
+            transient = Transient(event, 0.0, run, self.rig.event_signals(event, 0.0, {}), {})
+            self._close(simulation, transient, self.stop, Phase.LOADED_START)
+        if check:
+            self.report(f"monolithic reference: {event.title}", self.total, self.total)
+            self._compare(event.name, transient)
+
+    def _close(self, simulation: CoSimulation, transient: Transient, stop: float, phase: Phase) -> None:
+        """What a transient answers; where the coupling tripped, also what passes it after and how the machine behind
+        it comes to rest."""
+        study, rig, coupling = self.study, self.rig, self.study.config.coupling
+        name, run, trip = transient.event.name, transient.run, None
+        study.event[name] = transient.begin
+        if coupling and simulation.time < stop - 0.5 * rig.step:
+            time = simulation.time
+            run, passed = rig.release(simulation, run, coupling.release_time)
+            if self._coasting is None:
+                self._coasting = self._export_coasting()
+            coasting = rig.coast(transient, run, stop, self._coasting)
+            study.runs[f"{name}_coasting"] = coasting
+            trip = Trip(time, passed, coasting)
+        self._certify(name, run)
+        after = run.sel(time=slice(transient.begin, None))
+        study.answers[name] = read_answers(study.window(phase, after, transient.begin, trip))
+        study.pins[name] = pin_loads(rig.drive, after)
+
+    def _certify(self, name: str, run: xr.Dataset) -> None:
+        self.study.certificate[name] = self.rig.residuals(run)
+        self.study.runs[name] = run
+
+    def _assumption(self, simulation: CoSimulation, transient: Transient, done: float) -> None:
+        """The peaks over the range of what an event assumes, from the steady state that was saved; all without a
+        safety coupling, which would cut them off."""
+        event, begin = transient.event, transient.begin
+        variants = event.variants()
+        if not variants:
+            return
+        self.report(f"{event.title}, over the range of what is assumed", done, self.total)
+        answers = self.study.answers[event.name]
+        peaks = {name: [] if self.rig.guards else [getattr(answers, f"{name}_peak")] for name in _PEAKS}
+        for variant in (*variants, event) if self.rig.guards else variants:
+            stop = begin + event.follow(self.study.config.turn)
+            run = self.rig.follow(simulation, variant, begin, stop).run.sel(time=slice(begin, None))
+            window = self.study.window(Phase.EVENT, run, begin)
+            for name in _PEAKS:
+                peaks[name].append(read_measure(f"{name}_peak", window))
+        ranges = {
+            name: [getattr(variant.p, name) for variant in variants]
+            for name in vars(event.p)
+            if any(getattr(variant.p, name) != getattr(event.p, name) for variant in variants)
+        }
+        self.study.spreads[event.name] = Spread(
+            {name: (min(x), max(x)) for name, x in ranges.items()},
+            {name: (min(x), max(x)) for name, x in peaks.items()},
+        )
+
+    def _check(self, transients: list[Transient]) -> None:
+        """Every run from the start-up on beside the monolithic solution."""
+        self.report("monolithic reference of the start-up", self.total, self.total)
+        states = self._compare("start_up", None)
+        for transient in transients:
+            self.report(f"monolithic reference: {transient.event.title}", self.total, self.total)
+            self._compare(transient.event.name, transient, states)
+
+    def _compare(
+        self, name: str, transient: Transient | None, states: dict[str, float] | None = None
+    ) -> dict[str, float]:
+        differences, end = self.rig.compare(self.study.runs[name], transient, states)
+        self.study.certificate[name] |= differences
+        return end
+
+    def _without_feed_forward(self) -> None:
+        """The fluctuation of the speed that the study would have without its feed-forward."""
+        study, run = self.study, self.study.config.run
+        plain = replace(self.rig, drive=replace(self.rig.drive, feed_forward=False))
+        with plain.from_rest() as simulation:
+            steady = simulation.run(self.stop, self.rig.step).sel(time=slice(study.config.settled, None))
+        steady = whole_turns(self.rig.drive, steady, run.turns)
+        study.ripple_without = read_answers(study.window(Phase.STEADY, steady)).speed_ripple
+
+    def _rigid(self) -> dict[str, xr.Dataset]:
+        """Every run again without the line's elasticity and unevenness, at the same times and with the same
+        coupling."""
+        rig, begins = self.rig.rigid, self.study.event
+        runs = {}
+        with rig.from_rest() as simulation:
+            runs["start_up"] = simulation.run(self.stop, rig.step)
+            simulation.save()
+            for event in self.events:
+                begin = begins[event.name]
+                stop = begin + event.follow(self.study.config.turn)
+                runs[event.name] = rig.follow(simulation, event, begin, stop, guards=rig.guards).run
+        for event in self.starts:
+            with rig.from_rest(event) as simulation:
+                guards = {} if self.study.start_apart else rig.guards
+                runs[event.name] = simulation.run(self.stop, rig.step, guards=guards)
+        return runs
+
+    def _line(self, rigid: dict[str, xr.Dataset]) -> None:
+        """What each run asks of the driveline."""
+        study, line = self.study, self.study.config.driveline
+        assert line is not None
+        per_turn = None
+        for name, run in [("steady", "start_up"), *((name, name) for name in study.event)]:
+            study.runs[run] = with_rigid(study.drive, study.runs[run], rigid[run])
+            since = slice(study.settled if name == "steady" else study.event[name], None)
+            elastic = study.steady if name == "steady" else study.runs[run].sel(time=since)
+            study.shaft[name], study.cycles_of[name], damage = shaft_answers(
+                study.drive, elastic, rigid[run].sel(time=since), line.exponent, per_turn
+            )
+            per_turn = damage if per_turn is None else per_turn

@@ -1,0 +1,194 @@
+"""What a study has: its drive, its runs, and what was read from them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import xarray as xr
+
+from ..config import Config
+from ..drives.speed_control import Tuning
+from ..errors import RunError
+from ..text import entry
+from . import verdict
+from .chain import ChainResult
+from .drive import Drive
+from .limits import Statics
+from .measures import Answers, Phase, Trip, Window, whole_turns
+from .monte_carlo import MonteCarloResult
+from .protection import Setting
+from .shaft import Cycles, ShaftAnswers
+from .sizing import SizingResult
+from .verdict import STEADY, Verdict
+
+LOAD_CYCLE = "load_cycle.csv"
+"""File with the steady turns as the motor's shaft sees them."""
+
+
+@dataclass(frozen=True)
+class Remark:
+    """Something that the reader has to know beside the numbers: a `warning` of what is wrong, or not as was asked, or
+    a `note` of what the numbers rest on. `kind` names what it is about, `runs` where it is so."""
+
+    severity: Literal["warning", "note"]
+    kind: str
+    text: str
+    """the remark in words"""
+    runs: tuple[str, ...] = ()
+    quantities: Mapping[str, tuple[float | None, str]] = field(default_factory=dict)
+    """numbers of the text with their units; what differs from run to run is named ``run.quantity``"""
+
+    def __str__(self) -> str:
+        return self.text[:1].upper() + self.text[1:]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Ready for JSON."""
+        return {
+            "kind": self.kind,
+            "text": str(self),
+            "runs": list(self.runs),
+            "quantities": {name: entry(*number) for name, number in self.quantities.items()},
+        }
+
+
+@dataclass
+class Spread:
+    """What is assumed in an event, and the peaks over the range of the assumption: from and to, by quantity."""
+
+    assumed: dict[str, tuple[float, float]]
+    """in the declared units of the event"""
+    peaks: dict[str, tuple[float, float]]
+    """crank_torque, motor_torque, rocker_torque [N m]"""
+
+
+@dataclass
+class Study:
+    """A study, with everything by the names of its runs: ``start_up``, ``steady`` (its last turns), one for each
+    event. `failure` says why it stopped early, if it did."""
+
+    config: Config
+    drive: Drive
+    statics: Statics
+    tuning: Tuning | None = None
+    sizing: SizingResult | None = None
+    made: dict[str, str] = field(default_factory=dict)
+    """how each FMU was made"""
+    runs: dict[str, xr.Dataset] = field(default_factory=dict)
+    steady_from: float | None = None
+    """when running became steady [s], where that was later than `config.settled`"""
+    event: dict[str, float] = field(default_factory=dict)
+    """when each event that was run began [s]"""
+    answers: dict[str, Answers] = field(default_factory=dict)
+    start: Answers | None = None
+    """what the start-up asks, once the machine ran steadily"""
+    pins: dict[str, dict[str, dict[str, float]]] = field(default_factory=dict)
+    """By run and pin: peak, RMS and equivalent (ISO 281) load."""
+    certificate: dict[str, dict[str, float]] = field(default_factory=dict)
+    shaft: dict[str, ShaftAnswers] = field(default_factory=dict)
+    """what each run asks of the driveline, where there is one"""
+    cycles_of: dict[str, Cycles] = field(default_factory=dict)
+    """rainflow cycles of the torque in shaft 2"""
+    spreads: dict[str, Spread] = field(default_factory=dict)
+    """of the events that rest on an assumption"""
+    start_torque: float | None = None
+    """peak on the coupling in a start direct on line, at the crank [N m]: judged apart"""
+    setting: Setting | None = None
+    """the safety coupling that a sized drive should have, where none is given: one that is given cuts off the peaks
+    which would set it"""
+    ripple_without: float | None = None
+    """fluctuation of the speed in steady running without the feed-forward that the study has"""
+    chain: ChainResult | None = None
+    """the organs as chains at constant speed, where the study has them"""
+    monte_carlo: MonteCarloResult | None = None
+    verdict: Verdict | None = None
+    """whether the model of the organs holds, once there are runs"""
+    remarks: list[Remark] = field(default_factory=list)
+    failure: RunError | None = None
+
+    @property
+    def warnings(self) -> list[Remark]:
+        """Remarks of what is wrong, or not as was asked."""
+        return [remark for remark in self.remarks if remark.severity == "warning"]
+
+    @property
+    def notes(self) -> list[Remark]:
+        """Remarks of what the numbers rest on."""
+        return [remark for remark in self.remarks if remark.severity == "note"]
+
+    def remark(
+        self,
+        severity: Literal["warning", "note"],
+        kind: str,
+        text: str,
+        *runs: str,
+        **quantities: tuple[float | None, str],
+    ) -> None:
+        """Add a remark."""
+        self.remarks.append(Remark(severity, kind, text, runs, quantities))
+
+    @property
+    def titles(self) -> dict[str, str]:
+        """Runs by name, as sentences call them."""
+        named = {STEADY: "steady running", verdict.START: "start-up", "constant": "chains at constant speed"}
+        return named | {name: event.title for name, event in self.config.events.items()}
+
+    def called(self, run: str) -> str:
+        """How sentences call a run."""
+        return self.titles.get(run, run.replace("_", " "))
+
+    def origin(self, name: str) -> Literal["file", "example", "tuned", "sizing"]:
+        """Where the value of a quantity comes from, by its name in a study file ("motor.rotor.J"): the file, the
+        example, tuning, or sizing."""
+        if name in self.config.given:
+            return "file"
+        section, _, parameter = name.partition(".")
+        if self.sizing is not None and (section == "motor" or name == "machine.ratio"):
+            return "sizing"
+        if section == "motor" and self.tuning is not None and parameter in self.tuning.parameters:
+            return "tuned"
+        return "example"
+
+    @property
+    def overloads(self) -> list[str]:
+        """The events that were run and read."""
+        return [name for name in self.answers if name in self.config.events]
+
+    @property
+    def settled(self) -> float:
+        """Time from which running counts as steady [s]."""
+        return self.config.settled if self.steady_from is None else self.steady_from
+
+    @property
+    def insufficient(self) -> bool:
+        """Whether sizing found no motor that fits, so that all is run with the nearest."""
+        return self.sizing is not None and self.sizing.chosen is None
+
+    @property
+    def start_apart(self) -> bool:
+        """Whether the start is judged apart: switched on to the line, a motor gives more for a moment than it ever
+        does in running, and a coupling has to be held shut."""
+        return self.config.sizing is not None and self.config.start == "direct"
+
+    @property
+    def steady(self) -> xr.Dataset:
+        """The steady turns that are evaluated, both ends included; where the crank does not make them, all that was
+        run since it should be steady."""
+        run = self.runs["start_up"].sel(time=slice(self.settled, None))
+        return whole_turns(self.drive, run, self.config.run.turns)
+
+    def window(self, phase: Phase, run: xr.Dataset, begin: float = 0.0, trip: Trip | None = None) -> Window:
+        """The rows of a run to read measures from."""
+        feed = self.config.feed
+        sides = tuple(self.drive.machine.loaded_sides(feed.left, feed.right))
+        asked = self.config.run.crank_speed
+        steady = None
+        if phase in (Phase.EVENT, Phase.LOADED_START):
+            steady = Window(Phase.STEADY, self.steady, self.drive, sides, asked)
+        return Window(phase, run, self.drive, sides, asked, begin, steady, trip)
+
+    @property
+    def motor(self) -> Any:
+        """Parameters of the motor."""
+        return self.drive.parameters

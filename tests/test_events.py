@@ -1,0 +1,239 @@
+"""Events of a study file: what they declare, what they do over time, and that a new type is one class."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from event_tables import STANDARD, event_line
+
+from chainunit import config
+from chainunit.drives.dc_motor import DcMotor
+from chainunit.drives.induction_motor import InductionMotor
+from chainunit.errors import InputError
+from chainunit.quantities import Layout, Value, declaration, quantity
+from chainunit.studies.drive import Drive
+from chainunit.studies.events import TYPES, Event, Role, Timing, in_groups
+from chainunit.studies.result import as_dict
+from chainunit.studies.rig import Rig
+from chainunit.studies.run import run_study
+from chainunit.system import Profile
+
+QUICK = "[run]\nramp = 0.3\nsettle_turns = 1\nstep = 0.004\ncrank_speed = 6\n[machine]\nratio = 25\n"
+
+
+def test_events_are_named_after_type_and_side():
+    assert tuple(config.load().events) == STANDARD
+    text = "".join(
+        f'[[event]]\ntype = "jam"\nside = "right"\n{more}\n'
+        for more in ('force = "3 kN"', "force = 4000", 'name = "hard"', "")
+    )
+    events = config.parse(text).events
+    assert list(events) == ["jam_right", "jam_right_2", "hard", "jam_right_3"]
+    assert [event.p.force for event in events.values()] == [3000.0, 4000.0, 2000.0, 2000.0]
+    assert [event.title for event in events.values()] == [
+        "a lump jams the right side",
+        "a lump jams the right side (2)",
+        "a lump jams the right side (hard)",
+        "a lump jams the right side (3)",
+    ]
+    assert events["hard"].short == "jam right hard"
+    assert config.parse("event = []").events == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("event = 3", "event = 3: "),
+        ("event = [3]", "event 1 = 3: must be a table"),
+        ('[[event]]\nside = "left"', "event 1: type = None: must be one of jam, lumps, empties"),
+        ('[[event]]\ntype = "jamm"', 'event 1: type = "jamm": must be one of jam, lumps'),
+        ('[[event]]\ntype = "jam"', 'event 1 (jam): side: must be given, "left" or "right"'),
+        ('[[event]]\ntype = "jam"\nside = "up"', 'event 1 (jam): side = "up": must be "left" or "right"'),
+        ('[[event]]\ntype = "dip"\nside = "left"', "event 1 (dip): side: this event has none"),
+        (
+            '[[event]]\ntype = "jam"\nside = "left"\nforce = -1',
+            "event.jam_left.force = -1 N: must be >= 0 N",
+        ),
+        (
+            '[[event]]\ntype = "jam"\nside = "left"\nforc = 1',
+            "event.jam_left.forc: unknown key; known here: crank_angle, turns, force",
+        ),
+        ('[[event]]\ntype = "dip"\nname = "Dip 1"', 'event 1 (dip): name = "Dip 1": must be small letters'),
+        ('[[event]]\ntype = "dip"\nname = "steady"', 'event 1 (dip): name = "steady": is that of another'),
+        ('event = [{ type = "dip" }, { type = "blocked", name = "dip" }]', 'event 2 (blocked): name = "dip"'),
+        ('[[event]]\ntype = "lumps"\nside = "left"\nnumber = 2.5', "event.lumps_left.number = 2.5: must be"),
+        ("[monte_carlo]\nevent = { crank_angle = 1 }", "monte_carlo.event.crank_angle: is not of random"),
+        ('[monte_carlo]\nevent = { type = "start" }', 'monte_carlo.event.type = "start": must be an event'),
+        ("[monte_carlo]\nevent = { force = [1, 2, 3] }", "monte_carlo.event.force = [1, 2, 3]: must be a"),
+        ('[monte_carlo]\nevent = { force = [1, "x"] }', 'monte_carlo.event.force = "x": must be a number'),
+        ("[overload]\njam_force = 3", "overload: unknown key"),
+        ('events = ["jam_left"]', "events: unknown key"),
+    ],
+)
+def test_refusals(text, line):
+    with pytest.raises(InputError) as caught:
+        config.parse(text)
+    assert str(caught.value).startswith(line) and "\n" not in str(caught.value)
+
+
+def rig_of(text=""):
+    given = config.parse(text)
+    return Rig(given, Drive(DcMotor, given.motor, given.machine), {})
+
+
+def at(signal, t):
+    return float(signal(t)) if callable(signal) else float(signal)
+
+
+def test_what_lumps_and_jams_do_over_time():
+    """Each lump rises to its force on top of the feed, holds, falls, and the next comes after the pause."""
+    rig = rig_of("[feed]\nright = { processing_force = 50 }\n")
+    lumps = TYPES["lumps"]
+    p = lumps.Parameters(force=700.0, duration=0.2, rise=0.05, number=3.0, pause=0.5)
+    (signal,) = rig.event_signals(lumps.on("right", p), 1.0, {}).values()
+    for k in range(3):
+        begin = 1.0 + 0.8 * k
+        for t, force in ((-0.001, 50.0), (0.025, 400.0), (0.05, 750.0), (0.25, 750.0), (0.3001, 50.0)):
+            assert at(signal, begin + t) == pytest.approx(force, abs=1e-6)
+    assert at(signal, 1.0 + 2.4 + 0.1) == 50.0
+    assert lumps.on("right", p).follow(0.1) == pytest.approx(2.4)
+    assert lumps.on("right", p).follow(10.0) == pytest.approx(21.0)
+    jam = TYPES["jam"]
+    assert set(Layout(jam.Parameters).names) < set(Layout(lumps.Parameters).names)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.25])
+def test_feed_that_moves_keeps_its_mass(share):
+    rig = rig_of("[feed]\nleft = { material_mass = 40 }\nright = { material_mass = 20 }\n")
+    feed = TYPES["feed"]
+    event = feed.on("left", feed.Parameters(share=share, shift=0.5))
+    signals = rig.event_signals(event, 1.0, {})
+    left, right = (signals[f"machine.{side}.material_mass"] for side in ("left", "right"))
+    for t in np.linspace(0.5, 2.0, 16):
+        assert at(left, t) + at(right, t) == pytest.approx(60.0)
+    assert (at(left, 9.0), at(right, 9.0)) == pytest.approx((40.0 + share * 20.0, (1.0 - share) * 20.0))
+    assert event.empties == (share == 1.0)
+    start = TYPES["start"].on("left", TYPES["start"].Parameters(share=share))
+    ends = {name: at(signal, 9.0) for name, signal in signals.items()}
+    assert rig.event_signals(start, 0.0, {}) == ends
+
+
+def test_what_the_system_lacks_is_left_out():
+    """A DC motor has no voltage of the line; an induction motor has."""
+    dip = TYPES["dip"].on()
+    rig = rig_of()
+    assert not rig.takes(dip)
+    line = Rig(rig.config, Drive(InductionMotor, InductionMotor.Parameters(), rig.config.machine), {})
+    assert line.takes(dip)
+    (signal,) = line.event_signals(dip, 2.0, {}).values()
+    assert isinstance(signal, Profile)
+    assert [at(signal, t) for t in (1.9, 2.1, 2.4)] == pytest.approx([1.0, 0.5, 1.0])
+
+
+def test_variants_span_a_decade():
+    blocked = TYPES["blocked"].on()
+    soft, stiff = blocked.variants()
+    assert stiff.p.stiffness == pytest.approx(10.0 * soft.p.stiffness)
+    # the damping ratio, damping over the root of the stiffness, stays
+    for variant in (soft, stiff):
+        ratio = variant.p.damping / math.sqrt(variant.p.stiffness)
+        assert ratio == pytest.approx(blocked.p.damping / math.sqrt(blocked.p.stiffness))
+    assert TYPES["jam"].on("left").variants() == ()
+
+
+def test_groups_are_by_the_side_that_carries():
+    text = event_line("right_empties", "blocked", "jam_right", "feed_left")
+    events = config.parse(text).events
+    assert in_groups(events, list(events)) == [["right_empties", "feed_left"], ["jam_right"], ["blocked"]]
+    assert in_groups(events, ["blocked", "steady"]) == [["blocked"]]
+
+
+def test_random_overloads_draw_what_the_event_declares():
+    """Without a word of the file the force of a jam; with one, the quantities that it gives as ranges."""
+    random = config.load().random
+    assert random.of.kind == "jam" and dict(random.ranges) == dict(random.of.draws)
+    text = '[monte_carlo]\nevent = { type = "lumps", side = "right", number = 2, pause = ["0.1 s", 0.2], force = 9 }'
+    random = config.parse(text).random
+    assert dict(random.ranges) == {"pause": (0.1, 0.2)} and random.p.number == 2.0
+    values = [random.draw(np.random.default_rng(k))["pause"] for k in range(200)]
+    assert 0.1 <= min(values) < 0.11 and 0.19 < max(values) <= 0.2
+    event = random.event("right", {"pause": 0.15})
+    assert (event.side, event.p.pause, event.p.force, event.p.number) == ("right", 0.15, 9.0, 2.0)
+
+
+def test_sizing_takes_the_studys_own_one_sided_feed():
+    text = event_line("feed_right", shift=0.7)
+    assert config.parse(text).one_sided("right").p.shift == 0.7
+    assert config.parse(text).one_sided("left").p.shift == 0.3
+    assert config.parse("").one_sided("left") == config.load().events["feed_left"]
+
+
+def test_two_of_a_kind_run_beside_each_other(tmp_path):
+    """Harder lumps ask more, at any crank angle; each has its own quantities in the result."""
+    text = "event = [{ type = 'jam', side = 'left', force = 500, turns = 1 }, " + (
+        "{ type = 'jam', side = 'left', force = 1500, turns = 1, crank_angle = '90 deg' }]\n"
+    )
+    study = run_study(config.parse(text + QUICK), tmp_path)
+    assert study.failure is None and study.overloads == ["jam_left", "jam_left_2"]
+    assert float(study.runs["jam_left_2"]["machine.left.processing_force"].max()) == pytest.approx(1510.0)
+    assert float(study.runs["jam_left"]["machine.left.processing_force"].max()) == pytest.approx(510.0)
+    for name, angle in (("jam_left", 0.0), ("jam_left_2", 0.5 * math.pi)):
+        phi = study.runs[name]["motor.phi"].interp(time=study.event[name])
+        assert math.remainder(float(phi) / 25.0 - angle, 2.0 * math.pi) == pytest.approx(0.0, abs=0.1)
+    result = as_dict(study)
+    assert result["event"]["jam_left_2"]["force"] == {"value": 1500.0, "unit": "N"}
+    assert result["events"]["jam_left_2"]["title"] == "a lump jams the left side (2)"
+    assert "event.jam_left.force" in result["given"] and "event.jam_left.rise" not in result["given"]
+
+
+@pytest.fixture
+def surge():
+    """A type of event that the package does not have: the material of one side swells and stays."""
+
+    class Surge(Event):
+        """More material comes to one side."""
+
+        kind, run = "surge", "surge_{side}"
+        words, heading = "more material comes to the {side}", "surge {side}"
+        role = Role.DUTY
+        acts_on = ("{side}.material_mass",)
+
+        @declaration
+        class Parameters(Timing):
+            """Of the surge."""
+
+            added: Value = quantity("kg", "material that comes", default=20.0, min=0.0)
+            time: Value = quantity("s", "time in which it comes", default=0.5, above=0.0)
+
+        def signals(self, normal, at, state):
+            """It comes and stays."""
+            (name,) = self.inputs(self.side)
+            return {name: Profile(normal[name], ((at, self.p.time, normal[name] + self.p.added),))}
+
+    yield Surge
+    del TYPES["surge"]
+
+
+def test_a_new_type_of_event_is_one_class(surge, tmp_path):
+    """Defined here, it runs by a study file, on the terminal and the page, and as the event of random overloads."""
+    from command import chainunit
+
+    text = '[[event]]\ntype = "surge"\nside = "right"\nadded = "45 kg"\nturns = 1\n'
+    (tmp_path / "surge.toml").write_text(f"{QUICK}{text}")
+    done = chainunit("study", "surge.toml", "-o", "out", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    numbers = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert numbers["event"]["surge_right"]["added"] == {"value": 45.0, "unit": "kg"}
+    steady, surged = (numbers["answers"][name] for name in ("steady", "surge_right"))
+    assert surged["crank_torque_peak"]["value"] > 1.02 * steady["crank_torque_peak"]["value"]
+    assert numbers["certificate"]["surge_right"]["energy_residual_share"]["value"] < 2e-3
+    assert "surge right" in done.stdout
+    assert "more material comes to the right" in (tmp_path / "out" / "report.html").read_text().lower()
+    random = config.parse('[monte_carlo]\nevent = { type = "surge", added = ["1 kg", "9 kg"] }').random
+    event = random.event("left", random.draw(np.random.default_rng(1)))
+    assert isinstance(event, surge) and 1.0 <= event.p.added <= 9.0
+    with pytest.raises(InputError, match=r"event\.surge_left\.added = -1 kg: must be >= 0 kg"):
+        config.parse('[[event]]\ntype = "surge"\nside = "left"\nadded = -1')
