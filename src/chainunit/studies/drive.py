@@ -14,6 +14,7 @@ import xarray as xr
 
 from ..drives.driveline import CardanDriveline
 from ..drives.motor import Motor
+from ..errors import InputError
 from ..fmu.backends import Backend
 from ..fmu.backends import export as export_fmu
 from ..machines.api import ChainUnit
@@ -22,7 +23,7 @@ from ..machines.flexible import OrganLaw, flexible
 from ..machines.hanging import split
 from ..model import Model
 from ..quantities import Layout
-from ..system import ModelComponent, Profile, System, export, shaft_joints
+from ..system import Component, FmuComponent, ModelComponent, Profile, System, export, shaft_joints
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,10 @@ class Drive:
     line: Any = None
     """parameters of the driveline between motor and machine, if there is one; its `ratio` is the gear before it"""
 
+    foreign: FmuComponent | None = None
+    """the motor, where it is an FMU of somebody else: then `motor` is `Motor`, of which no more is known than its
+    terminals, and there are no `parameters`"""
+
     @property
     def ratio(self) -> float:
         """Motor turns per crank turn."""
@@ -58,8 +63,13 @@ class Drive:
     @property
     def rotor_inertia(self) -> float:
         """Inertia of the rotor, and of the driveline where there is one, at the motor [kg m2]."""
+        self._needs_own("the inertia of its rotor")
         line = 0.0 if self.line is None else self.line.J4 / self.line.ratio**2
         return float(self.parameters.rotor.J + line)
+
+    def _needs_own(self, what: str) -> None:
+        if self.foreign is not None:
+            raise InputError(f"{self.foreign.title}: {what} is not known of an FMU of somebody else")
 
     def rigid(self) -> Drive:
         """The same without the elastic line, its inertia on the rotor."""
@@ -103,12 +113,12 @@ class Drive:
     def graph(self) -> System:
         """The system of the models, each before what drives it; with feed-forward also the machine that the control
         asks, `model`."""
-        components = {"machine": ModelComponent(*self.load_model())}
+        components: dict[str, Component] = {"machine": ModelComponent(*self.load_model())}
         joints = shaft_joints("motor", self.loading)
         if self.line is not None:
             components["driveline"] = ModelComponent(CardanDriveline, self.line)
             joints += shaft_joints("driveline", "machine", flange="driven", load="machine")
-        components["motor"] = ModelComponent(self.motor, self.parameters)
+        components["motor"] = self.foreign or ModelComponent(self.motor, self.parameters)
         if not self.feed_forward:
             return System(components, joints)
         # a control knows the machine with two bars
@@ -170,7 +180,9 @@ class Drive:
         """The system of FMUs that were made of these models, whatever start values they carry."""
         # the machine that the control asks is the same FMU as the machine, if that has two bars
         known = {"model": files["machine"], **files}
-        components = {name: replace(c, file=known[name]) for name, c in self.graph.components.items()}
+        components: dict[str, Component] = {
+            name: replace(c, file=known[name]) for name, c in self.graph.components.items()
+        }
         return replace(self.graph, components=components)
 
     def reference(self, crank_speed: float, ramp: float | None = None) -> dict[str, Any]:
@@ -196,6 +208,7 @@ class Drive:
     def largest_torque(self, run: xr.Dataset, T: float) -> Any:
         """Largest air-gap torque that the motor can give at each instant of a run [N m], shape (time,), with its
         winding at `T` [K]; see `Motor.largest_torque`."""
+        self._needs_own("the largest torque")
         braking = run["motor.air_gap_tau"].values * run["motor.w"].values < 0.0
         columns = []
         for name, resolution in self.motor.limited_by.items():
@@ -211,6 +224,7 @@ class Drive:
     def pull_out(self, run: xr.Dataset, T: float) -> float:
         """Largest torque at the crank [N m] that a load meets which slows the motor down from the mean of a run until
         it stalls, with the winding at `T` [K]; see `Motor.pull_out`."""
+        self._needs_own("the pull-out torque")
         at = (float(np.mean(run[f"motor.{name}"].values)) for name in self.motor.limited_by)
         return self.motor.pull_out(self.parameters, T, *at) * self.ratio
 

@@ -10,6 +10,7 @@ from .fmus import export
 from .foreign import fmu_component, foreign_component
 from .graph import (
     Bond,
+    Component,
     FmuComponent,
     ModelComponent,
     System,
@@ -26,6 +27,7 @@ from .signals import Jump, Profile
 __all__ = [
     "Bond",
     "CoSimulation",
+    "Component",
     "FmuComponent",
     "Jump",
     "ModelComponent",

@@ -1,0 +1,362 @@
+"""FMUs of somebody else in a system: a motor with the terminals' variables alone, by their names or by others."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+from systems import component, pair
+from test_foreign import changed
+
+from chainunit import InputError, config
+from chainunit.drives.motor import Motor
+from chainunit.model import Terminal
+from chainunit.studies.drive import Drive
+from chainunit.system import (
+    CoSimulation,
+    ModelExchange,
+    Profile,
+    System,
+    certify,
+    fmu_component,
+    foreign_component,
+    monolithic,
+    rigid,
+    shaft_joints,
+)
+from chainunit.system.graph import FmuComponent
+
+SCRIPT = Path(__file__).parent / "foreign_motor.py"
+OTHER = MappingProxyType({"w": "rotor_speed", "phi": "rotor_angle", "load.J": "inertia_behind"})
+SIGNALS = {"motor.w_ref": Profile(0.0, ((0.0, 0.2, 150.0),))}
+RATIO = 50.0
+
+
+def build(folder, names=MappingProxyType({}), **options):
+    """The FMU, by pythonfmu in a process of its own; `names` are its own names of variables."""
+    script = folder / "ForeignMotor.py"
+    script.write_text(SCRIPT.read_text().replace("NAMES = {}", f"NAMES = {dict(names)!r}"))
+    given = {"canGetAndSetFMUstate": "true", "canSerializeFMUstate": "true"} | options
+    code = (
+        "from pythonfmu import FmuBuilder\n"
+        f"FmuBuilder.build_FMU({str(script)!r}, {str(folder / 'ForeignMotor.fmu')!r}, **{given!r})\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    return folder / "ForeignMotor.fmu"
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    return build(tmp_path_factory.mktemp("foreign"))
+
+
+@pytest.fixture(scope="module")
+def machine(fmus):
+    return component("ChamberForces", fmus["ChamberForces"], {"ratio": RATIO})
+
+
+def driven(machine, motor):
+    return System({"machine": machine, "motor": motor}, shaft_joints("motor", "machine"))
+
+
+def test_it_has_the_terminals_variables_alone(file):
+    motor = foreign_component(file, "motor")
+    assert set(motor.connectors) == {
+        "phi",
+        "w",
+        "a",
+        "tau",
+        "w_ref",
+        *motor.terminals["load"].members.values(),
+    }
+    assert {name: terminal.kind for name, terminal in motor.terminals.items()} == {
+        "flange": "org.chainunit.flange",
+        "load": "org.chainunit.load",
+    }
+    # it declares no units: they are those of the terminals
+    assert motor.connectors["w"].unit == "rad/s" and motor.connectors["load.J"].unit == "kg.m2"
+
+
+def test_it_runs_as_our_motor_of_the_same_parameters(file, machine, fmus):
+    """Both couplings are of second order; of each other they are no farther than their integrators."""
+    ours = pair(
+        "ChamberForces",
+        "DcMotor",
+        {"machine": machine.file, "motor": fmus["DcMotor"]},
+        {"machine.ratio": RATIO},
+    )
+    exact = monolithic(ours, SIGNALS, np.arange(0.0, 0.4 + 1e-9, 0.004))
+    foreign = driven(machine, foreign_component(file, "motor"))
+    assert foreign.connections == ours.connections
+    errors = []
+    for step in (0.004, 0.002):
+        runs = []
+        for system in (foreign, ours):
+            with CoSimulation(system, SIGNALS) as simulation:
+                runs.append(simulation.run(0.4, step))
+        every = round(0.004 / step)
+        for name in ("motor.w", "machine.tau", "motor.tau", "motor.a"):
+            size = np.max(np.abs(exact[name].values))
+            assert np.max(np.abs(runs[0][name].values - runs[1][name].values)) < 1e-7 * size, name
+        errors.append(
+            [
+                np.max(np.abs(runs[0][name].values[::every] - exact[name].values))
+                / np.ptp(exact[name].values)
+                for name in ("motor.w", "machine.tau")
+            ]
+        )
+        # it does not count the energy that it gives: that is the integral of its torque
+        ((_, share),) = certify(runs[0], foreign).values()
+        assert share < 5e-3 * (step / 0.004) ** 2
+        assert runs[0]["motor.w"].attrs["units"] == "rad/s"
+    assert np.all(np.abs(np.log2(np.array(errors[0]) / errors[1]) - 2.0) < 0.3), errors
+
+
+def test_other_names_are_told_by_a_mapping(file, machine, tmp_path):
+    other = build(tmp_path, OTHER)
+    with pytest.raises(
+        InputError, match=r"has no variable phi; a motor needs the output phi in rad, or a name for it"
+    ):
+        foreign_component(other, "motor")
+    with pytest.raises(InputError, match=r"has no variable speed, which was given for w"):
+        foreign_component(other, "motor", {"w": "speed"})
+    runs = []
+    for motor in (foreign_component(file, "motor"), foreign_component(other, "motor", OTHER)):
+        with CoSimulation(driven(machine, motor), SIGNALS) as simulation:
+            runs.append(simulation.run(0.05, 0.001))
+    assert set(runs[0]) == set(runs[1])
+    for name in runs[0]:
+        np.testing.assert_array_equal(runs[0][name].values, runs[1][name].values, err_msg=name)
+
+
+def units(of, unit, base='rad="1" s="-1"'):
+    """A model description in which a variable has a unit."""
+
+    def add(text):
+        definition = f'<UnitDefinitions><Unit name="{unit}"><BaseUnit {base}/></Unit></UnitDefinitions>'
+        text = text.replace("<LogCategories>", f"{definition}<LogCategories>")
+        return re.sub(rf'(name="{re.escape(of)}"[^>]*>\s*<Real)', rf'\1 unit="{unit}"', text)
+
+    return add
+
+
+@pytest.mark.parametrize(
+    "change, said",
+    [
+        (
+            units("w", "rpm", 'rad="1" s="-1" factor="0.10471975511965977"'),
+            "w is in rpm; must be in rad/s to be joined",
+        ),
+        (units("load.J", "g.m2", 'kg="1" m="2" factor="0.001"'), r"load\.J is in g\.m2; must be in kg\.m2"),
+        (
+            lambda text: text.replace('name="w"', 'name="n"'),
+            "has no variable w; a motor needs the output w in rad/s",
+        ),
+        (
+            lambda text: text.replace('name="load.tau_bias"', 'name="load.torque"'),
+            r"has no variable load\.tau_bias; a motor needs the input load\.tau_bias in N\.m",
+        ),
+    ],
+)
+def test_what_does_not_fit_is_refused_in_a_line(change, said, file, tmp_path):
+    with pytest.raises(InputError, match=rf"x\.fmu: .*{said}") as refused:
+        foreign_component(changed(file, tmp_path / "x.fmu", description=change), "motor")
+    assert "\n" not in str(refused.value)
+
+
+def test_a_unit_that_is_ours_by_another_name_fits(file, machine, tmp_path):
+    other = changed(file, tmp_path / "x.fmu", description=units("w", "radians_per_second"))
+    assert driven(machine, foreign_component(other, "motor")).connections
+
+
+def test_who_stands_on_the_wrong_side_is_refused(file, fmus):
+    with pytest.raises(InputError, match=r"phi is of the kind output; a machine needs the input phi in rad"):
+        foreign_component(file, "machine")
+    with pytest.raises(InputError, match=r"phi is of the kind input; a motor needs the output phi in rad"):
+        foreign_component(fmus["ChamberForces"], "motor")
+
+
+def test_our_own_fmus_are_known_by_their_variables(fmus, native_fmus):
+    """Without declared terminals as with those that an FMU declares: the terminals are those of the model."""
+    for name, (flanges, ports) in {
+        "ChamberForces": (["flange"], ["load"]),
+        "DcMotor": (["flange"], ["load"]),
+        "CardanDriveline": (["driven", "flange"], ["load", "machine"]),
+    }.items():
+        read, model = fmu_component(fmus[name]), component(name)
+        for terminal in (*flanges, *ports):
+            assert dict(read.terminals[terminal].members) == dict(model.terminals[terminal].members), name
+        assert {n: c.causality for n, c in read.connectors.items()} == {
+            n: c.causality for n, c in model.connectors.items()
+        }
+        assert {n: c.dimension for n, c in read.connectors.items()} == {
+            n: c.dimension for n, c in model.connectors.items()
+        }
+
+
+def test_terminals_that_an_fmu_declares_are_used(file, tmp_path):
+    declared = """<?xml version="1.0"?>
+<fmiTerminalsAndIcons fmiVersion="3.0"><Terminals>
+  <Terminal name="flange" terminalKind="org.chainunit.flange" matchingRule="plug">
+    <TerminalMemberVariable memberName="phi" variableName="phi" variableKind="signal"/>
+    <TerminalMemberVariable memberName="w" variableName="w" variableKind="signal"/>
+  </Terminal>
+  <Terminal name="shaft" terminalKind="com.example.shaft" matchingRule="plug"/>
+</Terminals></fmiTerminalsAndIcons>"""
+    extra = [("terminalsAndIcons/terminalsAndIcons.xml", declared)]
+    read = fmu_component(changed(file, tmp_path / "x.fmu", extra=extra))
+    assert {name: dict(t.members) for name, t in read.terminals.items()} == {
+        "flange": {"phi": "phi", "w": "w"}
+    }
+
+
+def test_a_machine_of_somebody_else(fmus, file):
+    """Our machine as if it were foreign: by its file alone."""
+    machine = foreign_component(fmus["ChamberForces"], "machine")
+    system = driven(machine, foreign_component(file, "motor")).with_values({"machine.ratio": RATIO})
+    ours = driven(
+        component("ChamberForces", fmus["ChamberForces"], {"ratio": RATIO}), foreign_component(file, "motor")
+    )
+    runs = []
+    for each in (system, ours):
+        with CoSimulation(each, SIGNALS) as simulation:
+            runs.append(simulation.run(0.05, 0.001))
+    np.testing.assert_array_equal(runs[0]["motor.w"].values, runs[1]["motor.w"].values)
+
+
+def test_a_machine_that_counts_no_energies_has_the_certificate_of_the_shaft(machine, file):
+    """Its own torque against that of the motor: what the exchange of values itself loses."""
+    system = driven(machine, foreign_component(file, "motor"))
+    with CoSimulation(system, SIGNALS) as simulation:
+        run = simulation.run(0.2, 0.002)
+    bare = run.drop_vars(["machine.kinetic_energy"])
+    ((_, share),) = certify(bare, system).values()
+    assert share < 1e-12
+    wrong = bare.assign({"motor.tau": 1.01 * bare["motor.tau"]})
+    ((_, share),) = certify(wrong, system).values()
+    assert share == pytest.approx(0.01, rel=0.2)
+
+
+# -- a system of terminals
+
+
+def test_joints_that_do_not_fit_are_named(file, machine):
+    motor = foreign_component(file, "motor")
+    parts = {"machine": machine, "motor": motor}
+    for joints, said in (
+        (
+            [("motor.shaft", "machine.flange")],
+            r"motor\.shaft: no such terminal; motor \(ForeignMotor\.fmu\) has flange, load",
+        ),
+        (
+            [("gear.flange", "machine.flange")],
+            r'gear\.flange: there is no component "gear"; there are machine, motor',
+        ),
+        (
+            [("motor.flange", "machine.flange"), ("machine.flange", "motor.flange")],
+            r"machine\.flange: is joined to motor\.flange and to motor\.flange",
+        ),
+        (
+            [("motor.flange", "machine.load")],
+            r"motor\.flange \(org\.chainunit\.flange\) cannot be joined to machine\.load \(org\.chainunit\.load\)",
+        ),
+    ):
+        with pytest.raises(InputError, match=said):
+            System(parts, joints)
+    with pytest.raises(
+        InputError, match=r"motor\.flange and second\.flange both give the angle: one must give it"
+    ):
+        System({"motor": motor, "second": motor}, [("motor.flange", "second.flange")])
+
+
+def test_units_that_differ_are_named(machine, file):
+    motor = foreign_component(file, "motor")
+    turned = FmuComponent(
+        motor.file,
+        motor.connectors,
+        {**motor.terminals, "flange": Terminal("flange", "org.chainunit.flange", "", {"phi": "w"})},
+    )
+    with pytest.raises(InputError, match=r"motor\.w in rad/s cannot be connected to machine\.phi in rad"):
+        System({"machine": machine, "motor": turned}, [("motor.flange", "machine.flange")])
+
+
+def test_what_needs_the_equations_says_so(machine, file):
+    system = driven(machine, foreign_component(file, "motor"))
+    with pytest.raises(
+        InputError, match=r"motor \(ForeignMotor\.fmu\): is an FMU, whose equations are not known"
+    ):
+        monolithic(system, SIGNALS, [0.0, 0.1])
+    with pytest.raises(InputError, match=r"Co-Simulation alone; must be FMI 2\.0 for Model Exchange"):
+        ModelExchange(System({"motor": foreign_component(file, "motor")}), SIGNALS)
+
+
+# -- in a drive
+
+
+def test_a_drive_with_a_motor_of_somebody_else(file, tmp_path):
+    """What a study does: from rest to steady running, then a jam from there."""
+    given = config.load()
+    drive = Drive(Motor, None, given.machine, foreign=foreign_component(file, "motor"))
+    assert drive.follows
+    files, made = drive.export(tmp_path, "python")
+    assert set(made) == {"machine"} and files["motor"] == file
+    speed = given.run.crank_speed
+    with CoSimulation(
+        drive.system(files), {**drive.loads(given.feed), **drive.reference(speed, 0.3)}
+    ) as simulation:
+        start = simulation.run(1.0, 0.002)
+        simulation.save()
+        jam = {"machine.left.processing_force": Profile(100.0, ((1.0, 0.02, 2000.0),))}
+        runs = []
+        for more in ({}, jam):
+            simulation.restore()
+            simulation.signals = {**drive.loads(given.feed), **drive.reference(speed), **more}
+            runs.append(simulation.run(1.2, 0.002))
+    _, turning = drive.crank_motion(start)
+    assert turning[-1] == pytest.approx(speed, rel=0.02)
+    plain, jammed = (np.max(np.abs(drive.crank_torque(run))) for run in runs)
+    assert jammed > 1.5 * plain
+    assert certify(runs[1], drive.graph)["machine"][1] < 1e-2
+    for unknown in (
+        lambda: drive.rotor_inertia,
+        lambda: drive.largest_torque(start, 300.0),
+        lambda: drive.pull_out(start, 300.0),
+    ):
+        with pytest.raises(
+            InputError, match=r"ForeignMotor\.fmu: .* is not known of an FMU of somebody else"
+        ):
+            unknown()
+
+
+def test_no_twin_without_a_rotor(file, machine, fmus):
+    line = component("CardanDriveline", fmus["CardanDriveline"])
+    joints = [
+        *shaft_joints("motor", "driveline"),
+        *shaft_joints("driveline", "machine", flange="driven", load="machine"),
+    ]
+    system = System(
+        {"machine": machine, "driveline": line, "motor": foreign_component(file, "motor")}, joints
+    )
+    with pytest.raises(
+        InputError, match=r"motor\.rotor\.J: is not known, so that there is no twin with a rigid shaft"
+    ):
+        rigid(system, "driveline")
+
+
+def test_an_fmu_that_cannot_save_its_state_is_told(machine, tmp_path):
+    system = driven(machine, foreign_component(build(tmp_path, canGetAndSetFMUstate="false"), "motor"))
+    with CoSimulation(system, SIGNALS) as simulation:
+        simulation.run(0.01, 0.002)
+        with pytest.raises(InputError, match=r"motor \(ForeignMotor\.fmu\): cannot save its state"):
+            simulation.save()
+
+
+def test_it_carries_nothing_of_ours(file):
+    with zipfile.ZipFile(file) as archive:
+        assert not any("chainunit" in name for name in archive.namelist())
