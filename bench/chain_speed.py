@@ -42,10 +42,9 @@ DEMANDED, FASTER = 200.0, 20.0
 ERROR = 1e-4
 WALLS, WEBS = 6, 2
 
-INTO = "    double *res[1] = {dx};\n"
 COUNTED = {
     "static int slope(": "long evaluations, projections;\n\nstatic int slope(",
-    INTO + "    kernels.derivatives(": INTO + "    ++evaluations;\n    kernels.derivatives(",
+    "    kernels.derivatives(": "    ++evaluations;\n    kernels.derivatives(",
     "    kernels.closed(": "    ++projections;\n    kernels.closed(",
 }
 

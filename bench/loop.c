@@ -34,9 +34,9 @@ int main(int argc, char **argv) {
     for (size_t i = 0; i < n_port; ++i) port[i] = (fmi2ValueReference)atoi(argv[4 + i]);
     for (size_t i = 0; i < n_all; ++i) all[i] = (fmi2ValueReference)(model.n_p + model.n_u + model.n_x) + (unsigned)i;
     double *p = malloc((size_t)(model.n_p + model.n_u) * sizeof(double)), *u = p + model.n_p, out[MOST];
+    double *w = malloc((size_t)(model.n_w + 1) * sizeof(double));
     for (int i = 0; i < model.n_p + model.n_u; ++i) p[i] = model.start[i];
-    const double *arg[3] = {p, u, NULL};
-    double *res[1] = {out};
+    const double *arg[4] = {p, u, NULL, NULL};
     double best[4] = {1e30, 1e30, 1e30, 1e30}, sink = 0.0, t = 0.0;
     for (int r = 0; r < ROUNDS; ++r)
         for (int what = 0; what < 4; ++what) {
@@ -45,7 +45,7 @@ int main(int argc, char **argv) {
                 const double value[3] = {1e-3 * k, 6.0, 1.0};
                 if (what == 0) {
                     for (int i = 0; i < 3; ++i) u[(int)in[i] - model.n_p] = value[i];
-                    kernels.all(arg, res, NULL, NULL, 0);
+                    kernels.values(arg, out, w, ~0u);
                 } else if (fmi2SetReal(c, in, 3, value) || fmi2DoStep(c, t, 1e-3, 1) ||
                            (what > 1 && fmi2GetReal(c, what == 2 ? port : all, what == 2 ? n_port : n_all, out)))
                     return 1;
@@ -58,5 +58,6 @@ int main(int argc, char **argv) {
     printf("%g %g %g %g\n", best[0], best[1], best[2], best[3]);
     fmi2FreeInstance(c);
     free(p);
+    free(w);
     return sink == 0.12345;
 }

@@ -165,11 +165,8 @@ static Status set_all(Instance *c, const unsigned vr[], size_t n, const double v
     return OK;
 }
 
-static Status output_derivatives(Instance *c, const unsigned vr[], size_t n, const int order[], double value[]) {
-    for (size_t i = 0; i < n; ++i) {
+static Status first_derivatives(Instance *c, const unsigned vr[], size_t n, const int order[], double value[]) {
+    for (size_t i = 0; i < n; ++i)
         if (order[i] != 1) return complain(c, ERROR, "derivatives of outputs: only the first derivative");
-        const Status status = output_derivative(c, vr[i], &value[i]);
-        if (status) return status;
-    }
-    return OK;
+    return output_derivatives(c, vr, n, value);
 }

@@ -135,7 +135,7 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
                                         const fmi2Integer order[], fmi2Real value[]) {
     NEED(STEP);
     NOT_NULL(!n || (vr && order && value));
-    return (fmi2Status)output_derivatives(INSTANCE, vr, n, order, value);
+    return (fmi2Status)first_derivatives(INSTANCE, vr, n, order, value);
 }
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean no_set) {

@@ -196,7 +196,7 @@ fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference vr[
     NEED(STEP);
     NOT_NULL(!n || (vr && order && value));
     CHECK(n == n_values, "as many values as references are needed");
-    return (fmi3Status)output_derivatives(INSTANCE, vr, n, order, value);
+    return (fmi3Status)first_derivatives(INSTANCE, vr, n, order, value);
 }
 
 fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 size, fmi3Boolean no_set, fmi3Boolean *event,

@@ -48,8 +48,9 @@ CHAINUNIT_OLD(pow);
 #pragma GCC visibility push(hidden)
 #endif
 
-/* A casadi function on (p, u, x, k) or (p, u, x, du, dx, k); k is what `derive` found. */
-typedef int (*Kernel)(const double **arg, double **res, long long int *iw, double *w, int mem);
+/* A function on (p, u, x, k) or other arguments; k is what `derive` found. It has memory `w` for `n_w` numbers, and a bit
+ * for each group of results that is wanted: only these are computed and written. */
+typedef void (*Kernel)(const double *const *arg, double *res, double *w, unsigned wanted);
 
 typedef struct {
     const char *name;
@@ -75,17 +76,15 @@ typedef struct {
 
 /* The equations. */
 typedef struct {
-    const Kernel *values;       /* of each group: (p, u, x) -> its outputs */
-    const Kernel *forward;      /* of each group: their directional derivative; NULL: by central differences */
-    Kernel all;                 /* (p, u, x) -> outputs of all groups; cheaper than one after the other */
+    Kernel values;              /* (p, u, x, k) -> outputs, by groups */
+    Kernel forward;             /* (p, u, x, du, dx, k) -> directional derivatives of outputs, by groups, and of `derivatives` */
     Kernel requirements;        /* (p, k) -> value, low, high of each */
     Kernel start_limits;        /* (p, u, x, k) -> value, low, high of each, at the start */
     Kernel derive;              /* (p) -> what follows from fixed parameters and is computed once */
     Kernel guess;               /* (p, u) -> first guess z of what the start is found from */
     Kernel improved;            /* (p, u, z) -> z after one more round */
     Kernel initial;             /* (p, u, z) -> states at the start */
-    Kernel derivatives;         /* (p, u, x) */
-    Kernel derivatives_forward; /* (p, u, x, du, dx) */
+    Kernel derivatives;         /* (p, u, x, k) */
     Kernel internal_step;       /* (p) -> longest step of the internal integrator [s] */
     Kernel tolerance;           /* (p) -> its relative tolerance, where it controls its error */
     Kernel closed;              /* (p, u, x, k) -> states that meet the constraints; after each of its steps */
@@ -95,7 +94,8 @@ typedef struct {
     const char *name;
     const char *guid;  /* of the FMI 2.0 description */
     const char *token; /* of the FMI 3.0 description */
-    int n_p, n_u, n_x, n_y, n_k, n_z, n_groups, n_required, n_start_required;
+    int n_p, n_u, n_x, n_y, n_k, n_z, n_w, n_groups, n_required, n_start_required;
+    unsigned differenced;        /* groups whose directional derivatives are taken by central differences */
     const double *start;         /* parameters, inputs */
     const Quantity *declared;    /* parameters, inputs */
     const double *nominal;       /* of the states */

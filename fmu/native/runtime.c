@@ -30,7 +30,7 @@ struct Instance {
     int model_exchange;
     double time, stop; /* the last that is allowed, with what rounding adds to it */
     /* one block: parameters, inputs, their derivatives, states, derived from parameters, derivatives, outputs, work */
-    double *block, *p, *u, *du, *x, *k, *dx, *y, *work;
+    double *block, *p, *u, *du, *x, *k, *dx, *y, *work, *w; /* w: of the kernels */
     size_t block_size;
     unsigned n_references;
     unsigned *slot, *needs; /* of each value reference: place in the block, and what must be evaluated for it */
@@ -79,10 +79,10 @@ static Instance *instance_new(const char *name, Report report) {
     if (work < saved) work = saved;
     const int moved = 2 * model.n_p + model.n_u + n_in + model.n_k + 2 * (2 * model.n_x + model.n_y) + 2 * model.n_z;
     if (work < moved) work = moved;
-    const size_t n = (size_t)(model.n_p + 2 * model.n_u + 2 * model.n_x + model.n_k + model.n_y + work + 1);
+    const size_t n = (size_t)(model.n_p + 2 * model.n_u + 2 * model.n_x + model.n_k + model.n_y + work + 1 + model.n_w);
     Instance *c = calloc(1, sizeof *c);
     if (!c) return NULL;
-    c->block_size = (n - 1 - (size_t)work) * sizeof(double);
+    c->block_size = (n - 1 - (size_t)work - (size_t)model.n_w) * sizeof(double);
     c->block = calloc(n, sizeof(double));
     c->name = malloc(strlen(name) + 1);
     c->n_references = (unsigned)(model.n_p + model.n_u + 2 * model.n_x + model.n_y);
@@ -100,6 +100,7 @@ static Instance *instance_new(const char *name, Report report) {
     c->dx = c->k + model.n_k;
     c->y = c->dx + model.n_x;
     c->work = c->y + model.n_y;
+    c->w = c->work + work + 1;
     c->needs = c->slot + c->n_references + 1;
     unsigned r = 0;
     for (int k = 0; k < model.n_p + model.n_u; ++k, ++r) c->slot[r] = r, c->needs[r] = 0;
@@ -110,7 +111,7 @@ static Instance *instance_new(const char *name, Report report) {
         c->needs[r] = 1u << STARTED_BIT | 1u << model.group_of[k];
     for (int k = 0; k < model.n_x; ++k, ++r)
         c->slot[r] = (unsigned)(c->dx - c->block + k), c->needs[r] = 1u << STARTED_BIT | 1u << DERIVATIVES_BIT;
-    c->slot[r] = (unsigned)(n - 1), c->needs[r] = 0; /* the time */
+    c->slot[r] = (unsigned)(c->w - 1 - c->block), c->needs[r] = 0; /* the time */
     c->report = report;
     instance_reset(c);
     return c;
@@ -262,31 +263,24 @@ static Status check(Instance *c) {
         if (!admitted(&model.declared[i], c->p[i])) return refuse(c, ERROR, "", i, c->p[i]);
     c->doubtful = 0;
     const double *arg[2] = {c->p, c->k};
-    if (model.n_k) {
-        double *into[1] = {c->k};
-        kernels.derive(arg, into, NULL, NULL, 0);
-    }
+    if (model.n_k) kernels.derive(arg, c->k, c->w, 1u);
     if (!model.n_required) return OK;
-    double *res[1] = {c->work};
-    kernels.requirements(arg, res, NULL, NULL, 0);
+    kernels.requirements(arg, c->work, c->w, 1u);
     Status status = meets(c, model.required, model.n_required, c->work);
     if (status) memset(c->k, 0, (size_t)model.n_k * sizeof(double)); /* nothing that is not finite stays behind */
     return status;
 }
 
 /* The states at the start with the parameters `p` and inputs `u`; `work` has room for twice what they are found from. */
-static void solve_start(const double *p, const double *u, double *work, double *x) {
+static void solve_start(const Instance *c, const double *p, const double *u, double *work, double *x) {
     double *z = work, *next = z + model.n_z;
     const double *arg[3] = {p, u, z};
-    double *res[1] = {z};
-    if (model.n_z) kernels.guess(arg, res, NULL, NULL, 0);
+    if (model.n_z) kernels.guess(arg, z, c->w, 1u);
     for (int round = 0; round < model.start_rounds; ++round) {
-        res[0] = next;
-        kernels.improved(arg, res, NULL, NULL, 0);
+        kernels.improved(arg, next, c->w, 1u);
         memcpy(z, next, (size_t)model.n_z * sizeof(double));
     }
-    res[0] = x;
-    kernels.initial(arg, res, NULL, NULL, 0);
+    kernels.initial(arg, x, c->w, 1u);
 }
 
 static Status start(Instance *c) {
@@ -294,15 +288,14 @@ static Status start(Instance *c) {
     Status status = check(c);
     if (status) return status;
     if (model.n_x) {
-        solve_start(c->p, c->u, c->work, c->x);
+        solve_start(c, c->p, c->u, c->work, c->x);
         if (!all_finite(c->x, model.n_x)) {
             memset(c->x, 0, (size_t)model.n_x * sizeof(double));
             return complain(c, ERROR, "a state at the start is not a finite number");
         }
         if (model.n_start_required) {
             const double *of[4] = {c->p, c->u, c->x, c->k};
-            double *res[1] = {c->work};
-            kernels.start_limits(of, res, NULL, NULL, 0);
+            kernels.start_limits(of, c->work, c->w, 1u);
             status = meets(c, model.required + model.n_required, model.n_start_required, c->work);
             if (status) return status;
         }
@@ -326,17 +319,7 @@ static Status evaluate(Instance *c, unsigned wanted) {
     if (!wanted) return OK;
     if (judge_inputs(c)) return ERROR;
     const double *arg[4] = {c->p, c->u, c->x, c->k};
-    double *res[1] = {c->y};
-    if (wanted & (wanted - 1)) { /* more than one */
-        kernels.all(arg, res, NULL, NULL, 0);
-        wanted = (1u << model.n_groups) - 1u;
-    } else {
-        for (int g = 0; g < model.n_groups; ++g)
-            if (wanted >> g & 1u) {
-                res[0] = c->y + model.groups[g].first;
-                kernels.values[g](arg, res, NULL, NULL, 0);
-            }
-    }
+    kernels.values(arg, c->y, c->w, wanted);
     for (int g = 0; g < model.n_groups; ++g)
         if ((wanted >> g & 1u) && !all_finite(c->y + model.groups[g].first, model.groups[g].count))
             return complain(c, DISCARD, NO_OUTPUT, model.name, c->time);
@@ -350,8 +333,7 @@ static Status derivatives(Instance *c) {
     if (!status) status = judge_inputs(c);
     if (status || !model.n_x || (c->fresh >> DERIVATIVES_BIT)) return status;
     const double *arg[4] = {c->p, c->u, c->x, c->k};
-    double *res[1] = {c->dx};
-    kernels.derivatives(arg, res, NULL, NULL, 0);
+    kernels.derivatives(arg, c->dx, c->w, 1u);
     if (!all_finite(c->dx, model.n_x))
         return complain(c, DISCARD, "a derivative is not a finite number at t = %g s", c->time);
     c->fresh |= 1u << DERIVATIVES_BIT;
@@ -453,14 +435,12 @@ static void differences(Instance *c, int group, const double *du, const double *
     double *u = dy + model.n_y + n_x, *x = u + n_u, *other = x + n_x;
     const double distance = reach(c, du, dx);
     const double *arg[4] = {c->p, u, x, c->k};
-    double *res[1];
     for (int sense = 1; sense >= -1; sense -= 2) {
         for (int i = 0; i < n_u; ++i) u[i] = c->u[i] + sense * distance * du[i];
         for (int i = 0; i < n_x; ++i) x[i] = c->x[i] + sense * distance * dx[i];
-        res[0] = sense > 0 ? dy + g->first : other;
-        kernels.values[group](arg, res, NULL, NULL, 0);
+        kernels.values(arg, sense > 0 ? dy : other, c->w, 1u << group);
     }
-    for (int i = 0; i < g->count; ++i) dy[g->first + i] = (dy[g->first + i] - other[i]) / (2.0 * distance);
+    for (int i = g->first; i < g->first + g->count; ++i) dy[i] = (dy[i] - other[i]) / (2.0 * distance);
 }
 
 /* In initialization the states move with the inputs: what they move by, added to the seeds `dx` of their own. */
@@ -471,7 +451,7 @@ static void start_moves(const Instance *c, const double *du, double *dx, double 
     distance = reach(c, du, far);
     for (int sense = 1; sense >= -1; sense -= 2) {
         for (int i = 0; i < n_u; ++i) u[i] = c->u[i] + sense * distance * du[i];
-        solve_start(c->p, u, more, sense > 0 ? far : near);
+        solve_start(c, c->p, u, more, sense > 0 ? far : near);
     }
     for (int i = 0; i < n_x; ++i) dx[i] += (far[i] - near[i]) / (2.0 * distance);
 }
@@ -499,17 +479,14 @@ static Status along_start(Instance *c, const unsigned *unknown, size_t n_unknown
     for (int sense = 1; sense >= -1; sense -= 2) {
         double *x = sense > 0 ? far : near, *y = x + n_x, *rates = y + n_y;
         const double *arg[4] = {p, u, x, k};
-        double *res[1] = {k};
         for (int i = 0; i < n; ++i) p[i] = c->p[i] + sense * distance * dp[i];
-        if (model.n_k) kernels.derive(arg, res, NULL, NULL, 0);
+        if (model.n_k) kernels.derive(arg, k, c->w, 1u);
         if (n_x) {
-            solve_start(p, u, more, x);
+            solve_start(c, p, u, more, x);
             for (int i = 0; i < n_x; ++i) x[i] += sense * distance * dx[i];
-            res[0] = rates;
-            kernels.derivatives(arg, res, NULL, NULL, 0);
+            kernels.derivatives(arg, rates, c->w, 1u);
         }
-        res[0] = y;
-        kernels.all(arg, res, NULL, NULL, 0);
+        kernels.values(arg, y, c->w, ~0u);
     }
     for (size_t j = 0; j < n_unknown; ++j) {
         const unsigned place = unknown[j] - (unsigned)n;
@@ -523,38 +500,23 @@ static Status along_start(Instance *c, const unsigned *unknown, size_t n_unknown
 
 /* The derivatives of unknowns along the directions of inputs and states that lie at the begin of `work`. */
 static Status along(Instance *c, const unsigned *unknown, size_t n_unknown, double *sensitivity) {
-    double *du = c->work, *dx = du + model.n_u, *dy = dx + model.n_x, *ddx = dy + model.n_y;
+    double *du = c->work, *dx = du + model.n_u, *dy = dx + model.n_x;
     const double *arg[6] = {c->p, c->u, c->x, du, dx, c->k};
-    unsigned done = 0;
+    unsigned wanted = 0;
     for (size_t k = 0; k < n_unknown; ++k) {
         /* below the first, the difference of the unsigned numbers is a large one */
         const unsigned place = unknown[k] - (unsigned)(model.n_p + model.n_u);
-        if (place >= (unsigned)(2 * model.n_x + model.n_y))
-            return no_output(c, unknown[k]);
+        if (place >= (unsigned)(2 * model.n_x + model.n_y)) return no_output(c, unknown[k]);
         const int i = (int)place - model.n_x;
-        if (i < 0) {
-            sensitivity[k] = dx[place];
-            continue;
-        }
-        if (i < model.n_y) {
-            const int g = model.group_of[i];
-            if (!(done & (1u << g))) {
-                double *res[1] = {dy + model.groups[g].first};
-                if (kernels.forward[g])
-                    kernels.forward[g](arg, res, NULL, NULL, 0);
-                else
-                    differences(c, g, du, dx, dy);
-                done |= 1u << g;
-            }
-            sensitivity[k] = dy[model.place[i]];
-        } else {
-            if (!(done >> DERIVATIVES_BIT)) {
-                double *res[1] = {ddx};
-                kernels.derivatives_forward(arg, res, NULL, NULL, 0);
-                done |= 1u << DERIVATIVES_BIT;
-            }
-            sensitivity[k] = ddx[i - model.n_y];
-        }
+        if (i >= 0) wanted |= 1u << (i < model.n_y ? model.group_of[i] : model.n_groups);
+    }
+    if (wanted & ~model.differenced) kernels.forward(arg, dy, c->w, wanted & ~model.differenced);
+    for (int g = 0; g < model.n_groups; ++g)
+        if (wanted & model.differenced & 1u << g) differences(c, g, du, dx, dy);
+    for (size_t k = 0; k < n_unknown; ++k) {
+        const int place = (int)(unknown[k] - (unsigned)(model.n_p + model.n_u)), i = place - model.n_x;
+        /* the derivatives of the states stand behind the outputs */
+        sensitivity[k] = i < 0 ? dx[place] : dy[i < model.n_y ? model.place[i] : i];
         if (!isfinite(sensitivity[k])) return no_derivative(c);
     }
     return OK;
@@ -592,12 +554,12 @@ static double input_curvature(const Instance *c, int i) {
     return c->du[i] != 0.0 || model.rate_of[i] < 0 ? 0.0 : input_rate(c, model.rate_of[i]);
 }
 
-static Status output_derivative(Instance *c, unsigned reference, double *value) {
+static Status output_derivatives(Instance *c, const unsigned *reference, size_t n, double *value) {
     Status status = derivatives(c);
     if (status) return status;
     for (int i = 0; i < model.n_u; ++i) c->work[i] = input_rate(c, i);
     memcpy(c->work + model.n_u, c->dx, (size_t)model.n_x * sizeof(double));
-    return along(c, &reference, 1, value);
+    return along(c, reference, n, value);
 }
 
 /* -- co-simulation; inputs run along their derivatives, to the end of the step */
@@ -615,16 +577,14 @@ static void run_to(const Instance *c, const Course *u, double since) {
 static int slope(Instance *c, const Course *u, double since, const double *x, double *dx) {
     run_to(c, u, since);
     const double *arg[4] = {c->p, u->at, x, c->k};
-    double *res[1] = {dx};
-    kernels.derivatives(arg, res, NULL, NULL, 0);
+    kernels.derivatives(arg, dx, c->w, 1u);
     return all_finite(dx, model.n_x);
 }
 
 static double number(Kernel kernel, const Instance *c) {
     double value = 0.0;
     const double *arg[1] = {c->p};
-    double *res[1] = {&value};
-    kernel(arg, res, NULL, NULL, 0);
+    kernel(arg, &value, c->w, 1u);
     return value;
 }
 
@@ -666,8 +626,7 @@ static Status even_steps(Instance *c, double time, double size, const Course *u,
 static int close_states(Instance *c, const Course *u, double since, double *x, double *spare) {
     run_to(c, u, since);
     const double *arg[4] = {c->p, u->at, x, c->k};
-    double *res[1] = {spare};
-    kernels.closed(arg, res, NULL, NULL, 0);
+    kernels.closed(arg, spare, c->w, 1u);
     if (!all_finite(spare, model.n_x)) return 0;
     memcpy(x, spare, (size_t)model.n_x * sizeof(double));
     return 1;
@@ -774,8 +733,8 @@ static Status step(Instance *c, double time, double size) {
  * state, or NaN where there are none. */
 static double off(Instance *c) {
     const double tolerance = number(kernels.tolerance, c), *arg[4] = {c->p, c->u, c->x, c->k};
-    double *res[1] = {c->work}, most = 0.0;
-    kernels.closed(arg, res, NULL, NULL, 0);
+    double most = 0.0;
+    kernels.closed(arg, c->work, c->w, 1u);
     if (!all_finite(c->work, model.n_x)) return NAN;
     for (int i = 0; i < model.n_x; ++i) {
         const double size = fabs(c->x[i]) > model.nominal[i] ? fabs(c->x[i]) : model.nominal[i];

@@ -107,12 +107,12 @@ def export(
         return written(model_description_3(interface, token, kinds, version))
 
     report("generating C")
-    functions = kernels(interface)
+    functions, room = kernels(interface)
     layer_texts = {name: (recipes() / "native" / name).read_bytes() for name in layer}
     digest = hashlib.sha256(description(""))
     for text in (
         functions.encode(),
-        tables(interface, "", "").encode(),
+        tables(interface, "", "", room).encode(),
         rules().encode(),
         *layer_texts.values(),
     ):
@@ -120,7 +120,7 @@ def export(
     token = f"{{{uuid.UUID(digest.hexdigest()[:32])}}}"
     sources = {
         "kernels.c": functions.encode(),
-        "model.c": tables(interface, token, token).encode(),
+        "model.c": tables(interface, token, token, room).encode(),
         "rules.h": rules().encode(),
         **layer_texts,
         **{name: (_headers() / name).read_bytes() for name in wanted.headers},

@@ -1,4 +1,4 @@
-"""C source of a model: kernels by CasADi, and the tables that model.h asks for.
+"""C source of a model: its kernels, and the tables that model.h asks for.
 
 No equation is written here: the model's own kernels are traced with symbols, so that the C code, its exact
 derivatives and the Python results come from the same lines.
@@ -7,10 +7,7 @@ derivatives and the Python results come from the same lines.
 from __future__ import annotations
 
 import json
-import math
-import tempfile
 from collections.abc import Iterator
-from pathlib import Path
 from string import Formatter
 from typing import Any
 
@@ -20,6 +17,7 @@ from ...integrate import MAX_STEPS
 from ...quantities import Variable
 from .. import recipe
 from ..description import Interface
+from .code import Program, number
 
 
 def groups(interface: Interface) -> list[list[int]]:
@@ -42,15 +40,22 @@ def differenced(interface: Interface) -> set[int]:
     return {g for g, group in enumerate(groups(interface)) if interface.others[group[0]].name in names}
 
 
-def kernels(interface: Interface) -> str:
-    """``kernels.c``: the model's functions, as CasADi writes them."""
+def kernels(interface: Interface) -> tuple[str, int]:
+    """``kernels.c``, the model's functions, and how many numbers of memory they need."""
+    programs = list(_programs(interface))
+    table = [f"    .{program.name} = kernel_{program.name}," for program in programs]
+    text = "\n".join([_BEFORE_KERNELS, *(program.text for program in programs), _TABLE, *table, "};", ""])
+    return text, max(program.room for program in programs)
+
+
+def _programs(interface: Interface) -> Iterator[Program]:
     import casadi
 
     model = interface.model
     (ps, us, xs, ks), p, u, x, outputs, derivatives = interface.traced
     # what is derived from parameters comes last, and only where there is something
     more = [ks] if model.derived else []
-    symbols = [ps, us, xs, *more]
+    point = [ps, us, xs, *more]
     outputs = list(outputs)
     names = [v.name for v in interface.others]
     for part in model.parts:
@@ -58,95 +63,66 @@ def kernels(interface: Interface) -> str:
             # CasADi differentiates the expression; dual numbers would give the same with twice the operations
             column = us[model.input_layout.names.index(by)]
             outputs[names.index(name)] = casadi.jacobian(outputs[names.index(of)], column)
+
+    def one(name: str, arguments: list[Any], results: list[Any], used: str = "ONCE") -> Program:
+        return Program(name, arguments, [casadi.vertcat(*map(casadi.SX, results))], [0], used)
+
+    placed = groups(interface)
+    offsets = [sum(map(len, placed[:g])) for g in range(len(placed))]
+    values = [casadi.vertcat(*(outputs[k] for k in group)) for group in placed]
+    yield Program("values", point, values, offsets, "OFTEN")
     du, dx = casadi.SX.sym("du", us.shape[0]), casadi.SX.sym("dx", xs.shape[0])
-
-    functions = []
-
-    def add(name: str, arguments: list[Any], result: Any) -> None:
-        functions.append(casadi.Function(f"kernel_{name}", arguments, [casadi.cse(casadi.densify(result))]))
-
-    def forward(result: Any) -> Any:
-        return casadi.jtimes(result, casadi.vertcat(us, xs), casadi.vertcat(du, dx))
-
-    add("all", symbols, casadi.vertcat(*(outputs[k] for group in groups(interface) for k in group)))
     apart = differenced(interface)
-    for i, group in enumerate(groups(interface)):
-        values = casadi.vertcat(*(outputs[k] for k in group))
-        add(f"group_{i}", symbols, values)
-        if i not in apart:
-            add(f"group_{i}_forward", [ps, us, xs, du, dx, *more], forward(values))
+    smooth = [casadi.SX(0, 1) if g in apart else group for g, group in enumerate(values)]
+    smooth.append(casadi.vertcat(*derivatives))
+    slopes = [casadi.jtimes(row, casadi.vertcat(us, xs), casadi.vertcat(du, dx)) for row in smooth]
+    yield Program("forward", [ps, us, xs, du, dx, *more], slopes, [*offsets, len(outputs)], "SELDOM")
     if interface.states:
-        rates = casadi.vertcat(*derivatives)
-        add("derivatives", symbols, rates)
-        add("derivatives_forward", [ps, us, xs, du, dx, *more], forward(rates))
+        yield one("derivatives", point, derivatives, "OFTEN")
         assert model.state_layout is not None
         unknowns = casadi.SX.sym("z", model.start_unknowns)
         z = casadi.vertsplit(unknowns) if model.start_unknowns else []
-        started = model.state_layout.values(model.started(casadi_(), p, u, z))
         if z:
-            add("guess", [ps, us], casadi.vertcat(*model.start_guess(casadi_(), p, u)))
-            add("improved", [ps, us, unknowns], casadi.vertcat(*model.start_improved(casadi_(), p, u, z)))
-        add("initial", [ps, us, unknowns], casadi.vertcat(*started))
+            yield one("guess", [ps, us], model.start_guess(casadi_(), p, u))
+            yield one("improved", [ps, us, unknowns], model.start_improved(casadi_(), p, u, z))
+        yield one("initial", [ps, us, unknowns], model.state_layout.values(model.started(casadi_(), p, u, z)))
         if model.start_required:
-            rows = [casadi.SX(v) for row in model.start_limits(casadi_(), p, u, x) for v in row]
-            add("start_limits", symbols, casadi.vertcat(*rows))
-        add("internal_step", [ps], casadi.SX(model.internal_step(casadi_(), p)))
+            yield one(
+                "start_limits", point, [v for row in model.start_limits(casadi_(), p, u, x) for v in row]
+            )
+        yield one("internal_step", [ps], [model.internal_step(casadi_(), p)])
         if model.controlled:
-            add("tolerance", [ps], casadi.SX(model.tolerance(casadi_(), p)))
-            add("closed", symbols, casadi.vertcat(*model.closed(casadi_(), p, u, x)))
-    limits = [casadi.SX(v) for row in model.requirements(casadi_(), p) for v in row]
-    if limits:
-        add("requirements", [ps, *more], casadi.vertcat(*limits))
+            yield one("tolerance", [ps], [model.tolerance(casadi_(), p)])
+            yield one("closed", point, model.closed(casadi_(), p, u, x), "OFTEN")
+    if limits := [v for row in model.requirements(casadi_(), p) for v in row]:
+        yield one("requirements", [ps, *more], limits)
     if model.derived:
-        add("derive", [ps], casadi.vertcat(*interface.derived))
-
-    generator = casadi.CodeGenerator("kernels.c", {"with_header": False, "verbose": False})
-    for function in functions:
-        generator.add(function)
-    with tempfile.TemporaryDirectory() as folder:
-        generator.generate(folder + "/")
-        written = Path(folder, "kernels.c").read_text()
-    return _BEFORE_KERNELS + written + _kernel_table(interface, {f.name() for f in functions})
+        yield one("derive", [ps], interface.derived)
 
 
 _BEFORE_KERNELS = """\
+#include <math.h>
+
 #include "model.h"
 
-/* one table is all that other files see, see the end */
-#define CASADI_SYMBOL_EXPORT static
-#define CASADI_CODEGEN_PREFIX
-#define CODEGEN_PREFIX CHAINUNIT_NAME(kernels_)
-#ifdef __GNUC__
-#pragma GCC diagnostic ignored "-Wunused-function"
+/* the compiler takes less time for what is not computed often */
+#if defined __clang__
+#define OFTEN __attribute__((noinline))
+#define SELDOM OFTEN
+#define ONCE __attribute__((noinline, optnone))
+#elif defined __GNUC__
+#define OFTEN __attribute__((noinline))
+#define SELDOM __attribute__((noinline, optimize("O1")))
+#define ONCE __attribute__((noinline, optimize("O0")))
+#else
+#define OFTEN
+#define SELDOM
+#define ONCE
 #endif
 
+static inline double sign(double x) { return x < 0.0 ? -1.0 : x > 0.0 ? 1.0 : x; }
 """
-
-
-def _kernel_table(interface: Interface, functions: set[str]) -> str:
-    def of_groups(suffix: str) -> list[str]:
-        names = [f"kernel_group_{g}{suffix}" for g in range(len(groups(interface)))]
-        return [name if name in functions else "NULL" for name in names]
-
-    lines = [
-        "",
-        "#include <stddef.h>",
-        "",
-        _array("Kernel", "values", of_groups("")),
-        _array("Kernel", "forwards", of_groups("_forward")),
-        "const Kernels kernels = {",
-        "    .values = values,",
-        "    .forward = forwards,",
-        *(f"    .{f.removeprefix('kernel_')} = {f}," for f in sorted(functions) if "_group_" not in f),
-        "};",
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def _number(x: float) -> str:
-    if math.isinf(x):
-        return "INFINITY" if x > 0 else "-INFINITY"
-    return repr(float(x))
+_TABLE = "const Kernels kernels = {"
 
 
 def _text(s: str) -> str:
@@ -173,7 +149,7 @@ def rules() -> str:
         elif isinstance(value, tuple):
             lines.append(_numbers(name, value))
         else:
-            lines.append(f"#define {name} {_number(value)}")
+            lines.append(f"#define {name} {number(value)}")
     return "\n".join(lines) + "\n"
 
 
@@ -190,20 +166,21 @@ def _printf(text: str) -> str:
 def _numbers(name: str, values: tuple[Any, ...]) -> str:
     """A row of numbers, or rows that zeros fill up."""
     if not isinstance(values[0], tuple):
-        return f"static const double {name}[{len(values)}] = {{{', '.join(map(_number, values))}}};"
-    rows = ",\n".join(f"    {{{', '.join(map(_number, row)) or '0.0'}}}" for row in values)
+        return f"static const double {name}[{len(values)}] = {{{', '.join(map(number, values))}}};"
+    rows = ",\n".join(f"    {{{', '.join(map(number, row)) or '0.0'}}}" for row in values)
     return f"static const double {name}[{len(values)}][{max(map(len, values))}] = {{\n{rows},\n}};"
 
 
-def tables(interface: Interface, guid: str, token: str) -> str:
-    """``model.c``: what model.h asks for, with the FMI 2.0 GUID and the FMI 3.0 instantiation token given."""
+def tables(interface: Interface, guid: str, token: str, room: int) -> str:
+    """``model.c``: what model.h asks for, with the FMI 2.0 GUID and the FMI 3.0 instantiation token given, and
+    the `room` that kernels need."""
     model = interface.model
 
     def quantity(v: Variable) -> str:
         q = v.quantity
         return (
-            f"{{{_text(v.name)}, {_unit(v.unit)}, {_text(q.allowed)}, {_number(q.low)}, {_number(q.high)}, "
-            f"{_number(q.slack)}, {int(q.open_low)}, {int(q.tunable)}}}"
+            f"{{{_text(v.name)}, {_unit(v.unit)}, {_text(q.allowed)}, {number(q.low)}, {number(q.high)}, "
+            f"{number(q.slack)}, {int(q.open_low)}, {int(q.tunable)}}}"
         )
 
     def rate_of(name: str) -> int:
@@ -227,9 +204,9 @@ def tables(interface: Interface, guid: str, token: str) -> str:
         "",
         '#include "model.h"',
         "",
-        _array("double", "starts", [_number(x or 0.0) for x in starts]),
+        _array("double", "starts", [number(x or 0.0) for x in starts]),
         _array("Quantity", "declared", [quantity(v) for v in (*interface.parameters, *interface.inputs)]),
-        _array("double", "nominal", [_number(v.quantity.nominal or 1.0) for v in interface.states]),
+        _array("double", "nominal", [number(v.quantity.nominal or 1.0) for v in interface.states]),
         _array("int", "rate_of", [str(rate_of(v.name)) for v in interface.inputs]),
         _array("int", "place", [str(place[i]) for i in range(n_y)]),
         _array("int", "group_of", [str(group_of[i]) for i in range(n_y)]),
@@ -254,7 +231,9 @@ def tables(interface: Interface, guid: str, token: str) -> str:
         "n_y": n_y,
         "n_k": model.derived,
         "n_z": model.start_unknowns,
+        "n_w": room,
         "n_groups": len(group_rows),
+        "differenced": f"{sum(1 << g for g in differenced(interface))}u",
         "n_required": len(model.required),
         "n_start_required": len(model.start_required),
         "start": "starts",

@@ -1,0 +1,195 @@
+"""C functions of symbolic expressions, in which each operation stands once.
+
+CasADi writes a function for each group of outputs, with all its operations. Here the groups share them: a `Program`
+is cut into parts, each of the operations that the same groups need, and calls the parts that a wanted group needs.
+What a part hands on to others lies in memory. No part is longer than a compiler is fast with.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
+_LONGEST = 2500
+"""operations of a part: the time of a compiler grows faster than the length of a function"""
+_WIDEST = 60
+"""characters of an operation that is written where it is needed, and not into a line of its own"""
+
+
+def _operations() -> Mapping[int, str]:
+    """How C writes each operation of CasADi."""
+    import casadi
+
+    signs = {"ADD": "+", "SUB": "-", "MUL": "*", "DIV": "/", "LT": "<", "LE": "<=", "EQ": "==", "NE": "!="}
+    signs |= {"AND": "&&", "OR": "||"}
+    unary = "sqrt exp log sin cos tan asin acos atan sinh cosh tanh floor ceil fabs"
+    binary = "fmin fmax pow fmod atan2 copysign"
+    forms = {"SQ": "({0}*{0})", "TWICE": "(2.0*{0})", "INV": "(1.0/{0})", "NEG": "(-{0})", "NOT": "(!{0})"}
+    forms |= {
+        "IF_ELSE_ZERO": "({0}?{1}:0.0)",
+        "SIGN": "sign({0})",
+        "CONSTPOW": "pow({0},{1})",
+        "ASSIGN": "{0}",
+    }
+    forms |= {name: f"({{0}}{sign}{{1}})" for name, sign in signs.items()}
+    forms |= {name.upper(): f"{name}({{0}})" for name in unary.split()}
+    forms |= {name.upper(): f"{name}({{0}},{{1}})" for name in binary.split()}
+    return {getattr(casadi, f"OP_{name}"): form for name, form in forms.items()}
+
+
+def number(x: float) -> str:
+    """A number in C."""
+    if math.isnan(x):
+        return "NAN"
+    text = "INFINITY" if math.isinf(x) else repr(abs(float(x)))
+    return f"(-{text})" if math.copysign(1.0, x) < 0.0 else text
+
+
+class Program:
+    """Groups of results of the same arguments.
+
+    `text` defines the function ``kernel_NAME(arg, res, w, wanted)``, which is called with the arguments, the place of
+    the results, memory for `room` numbers, and a bit for each group that is wanted.
+    """
+
+    def __init__(
+        self, name: str, arguments: Sequence[Any], groups: Sequence[Any], offsets: Sequence[int], used: str
+    ) -> None:
+        """
+        Parameters
+        ----------
+        arguments : symbols, as casadi vectors
+        groups : results, as casadi vectors
+        offsets : place of each group among the results
+        used : "OFTEN", "SELDOM" or "ONCE": the less, the more the time of the compiler counts
+        """
+        self.name, self._used = name, used
+        self._read(arguments, groups)
+        self._cut()
+        lines = [line for k, part in enumerate(self._parts) for line in self._part(k, part)]
+        self.text = "\n".join([*lines, *self._function(offsets)]) + "\n"
+
+    def _read(self, arguments: Sequence[Any], groups: Sequence[Any]) -> None:
+        """All operations, each behind those it needs: how it is written, and its operands; none of a number or an
+        argument. Results are places among them."""
+        import casadi
+
+        rows = casadi.densify(casadi.vertcat(*groups))
+        function = casadi.Function("f", list(arguments), [casadi.cse(rows)])
+        forms = _operations()
+        self._forms: list[str] = []
+        self._operands: list[tuple[int, ...]] = []
+        places: dict[int, int] = {}  # of what CasADi's registers hold
+        simple: dict[str, int] = {}
+        results = [0] * rows.numel()
+
+        def add(form: str, operands: tuple[int, ...] = ()) -> int:
+            self._forms.append(form)
+            self._operands.append(operands)
+            return len(self._forms) - 1
+
+        def once(form: str) -> int:
+            if form not in simple:
+                simple[form] = add(form)
+            return simple[form]
+
+        for k in range(function.n_instructions()):
+            kind = function.instruction_id(k)
+            into, of = function.instruction_output(k), function.instruction_input(k)
+            if kind == casadi.OP_CONST:
+                places[into[0]] = once(number(function.instruction_constant(k)))
+            elif kind == casadi.OP_INPUT:
+                places[into[0]] = once(f"i{of[0]}[{of[1]}]")
+            elif kind == casadi.OP_OUTPUT:
+                results[into[1]] = places[of[0]]
+            else:
+                places[into[0]] = add(forms[kind], tuple(places[i] for i in of))
+        ends = [0]
+        for group in groups:
+            ends.append(ends[-1] + group.numel())
+        self._results = [results[begin:end] for begin, end in pairwise(ends)]
+
+    def _cut(self) -> None:
+        """The parts, operations in order, with the groups that need each; slots in memory of what goes from one to
+        another, or is a result."""
+        needed = [0] * len(self._forms)
+        for bit, places in enumerate(self._results):
+            for place in places:
+                needed[place] |= 1 << bit
+        for place in reversed(range(len(needed))):
+            for operand in self._operands[place]:
+                needed[operand] |= needed[place]
+        alike: dict[int, list[int]] = {}
+        for place, groups in enumerate(needed):
+            if self._operands[place]:
+                alike.setdefault(groups, []).append(place)
+        self._parts: list[list[int]] = []
+        self._needed_by: list[int] = []
+        # what more groups need comes first: it depends on nothing that fewer need
+        for groups in sorted(alike, key=lambda g: (-g.bit_count(), g)):
+            places = alike[groups]
+            count = -(-len(places) // _LONGEST)
+            cuts = [n * len(places) // count for n in range(count + 1)]
+            self._parts += [places[begin:end] for begin, end in pairwise(cuts)]
+            self._needed_by += [groups] * count
+        part_of = {place: k for k, part in enumerate(self._parts) for place in part}
+        handed = {place for places in self._results for place in places if self._operands[place]}
+        for place, k in part_of.items():
+            handed.update(i for i in self._operands[place] if part_of.get(i, k) != k)
+        self._slots = {place: slot for slot, place in enumerate(sorted(handed))}
+        self.room = len(self._slots)
+
+    def _part(self, k: int, part: list[int]) -> list[str]:
+        """The definition of a part."""
+        lines: list[str] = []
+        texts: dict[int, str] = {}
+        arguments = set()
+        uses: dict[int, int] = {}
+        for place in part:
+            for n, operand in enumerate(self._operands[place]):
+                uses[operand] = uses.get(operand, 0) + self._forms[place].count(f"{{{n}}}")
+
+        def named(place: int, text: str) -> str:
+            lines.append(f"  const double a{place}={text};")
+            return f"a{place}"
+
+        def outside(place: int) -> str:
+            text = f"w[{self._slots[place]}]" if self._operands[place] else self._forms[place]
+            if text[0] == "i":
+                arguments.add(int(text[1 : text.index("[")]))
+            return named(place, text) if uses[place] > 1 and text[0] in "iw" else text
+
+        for place in part:
+            for operand in self._operands[place]:
+                if operand not in texts:
+                    texts[operand] = outside(operand)
+            text = self._forms[place].format(*(texts[operand] for operand in self._operands[place]))
+            inline = uses.get(place, 0) == 1 and len(text) <= _WIDEST and place not in self._slots
+            texts[place] = text if inline or place not in uses else named(place, text)
+            if place in self._slots:
+                lines.append(f"  w[{self._slots[place]}]={texts[place]};")
+        pointers = [f"  const double *i{n}=arg[{n}];" for n in sorted(arguments)] or ["  (void)arg;"]
+        head = f"{self._used} static void {self.name}_{k}(const double *const *arg, double *restrict w) {{"
+        return [head, *pointers, *lines, "}"]
+
+    def _function(self, offsets: Sequence[int]) -> list[str]:
+        """The definition of the function that calls them."""
+
+        def result(place: int) -> str:
+            text = self._forms[place]
+            argument = f"arg[{text[1:].replace('[', '][', 1)}" if text[0] == "i" else text
+            return f"w[{self._slots[place]}]" if self._operands[place] else argument
+
+        lines = [
+            f"static void kernel_{self.name}(const double *const *arg, double *res, double *w, unsigned wanted) {{"
+        ]
+        for k, groups in enumerate(self._needed_by):
+            lines.append(f"  if(wanted&{groups}u) {self.name}_{k}(arg,w);")
+        for bit, (places, offset) in enumerate(zip(self._results, offsets, strict=True)):
+            if places:
+                lines.append(f"  if(wanted&{1 << bit}u) {{")
+                lines += [f"    res[{offset + n}]={result(place)};" for n, place in enumerate(places)]
+                lines.append("  }")
+        return [*lines, "  (void)arg,(void)w,(void)wanted;", "}"]
