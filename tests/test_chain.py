@@ -15,7 +15,7 @@ from chainunit import ChainUnit, GeometryError, SideLoads
 from chainunit.engines import MATH
 from chainunit.groups.chain import Chain, Rods, closed, end_motion
 from chainunit.groups.driver import crank
-from chainunit.groups.dyad import Dyad
+from chainunit.groups.dyad import SolvedDyad
 from chainunit.machines import hanging
 from chainunit.planar import ZERO, Motion, Vec2
 
@@ -203,7 +203,7 @@ def test_projection_closes_and_is_nearest():
 def rocker(phi, w):
     """Angle, speed and acceleration of the rocker at a crank that turns evenly."""
     link = crank(MATH, Vec2(-M["c_frame"], -M["hy"]), phi)
-    driven = Dyad(MATH, link.at(M["r"]), Motion(ZERO), M["l"], M["h"], -1.0).second
+    driven = SolvedDyad.between(MATH, link.at(M["r"]), Motion(ZERO), M["l"], M["h"], -1.0).links[1]
     return math.asin(driven.u.x), driven.t1 * w, driven.t2 * w * w
 
 
@@ -253,7 +253,7 @@ def test_dynamic_reference(case, hand):
 def test_two_rods_in_motion_are_the_two_bar_machine():
     """The dyad's reactions on a rocker that moves anyhow, with material on the organ: the same forces, another
     route."""
-    from chainunit.machines.chain_unit import Inputs, organs
+    from chainunit.machines.chain_unit import Inputs, organ
     from chainunit.planar import Link
 
     machine, feed = ChainUnit(), SideLoads(material_mass=30.0, processing_force=0.0)
@@ -264,8 +264,8 @@ def test_two_rods_in_motion_are_the_two_bar_machine():
     for _ in range(50):
         psi, speed, rate = rng.uniform(-0.15, 0.15), rng.uniform(-3.0, 3.0), rng.uniform(-20.0, 20.0)
         link = Link(Motion(ZERO), Vec2(math.sin(psi), -math.cos(psi)), 1.0, 0.0)
-        dyad = organs(MATH, p, Inputs(left=feed, right=feed), link)[0].dyad
-        wall, web = dyad.first, dyad.second
+        pins = {"A1 left": Motion(Vec2(-p.z, 0.0)), "A2": link.at(p.e)}
+        wall, web = organ(p, Inputs(left=feed, right=feed), "left").solve(MATH, 0.0, pins, ()).links
         theta = [math.atan2(wall.u.x, -wall.u.y), math.atan2(-web.u.x, web.u.y)]
         omega = [wall.t1 * speed, web.t1 * speed]
         s, c = math.sin(psi), math.cos(psi)

@@ -11,7 +11,7 @@ from systems import component
 
 from chainunit import InputError, engines
 from chainunit.drives import cardan
-from chainunit.drives.cardan import Line, Twist
+from chainunit.drives.cardan import ShaftLine, Twist
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.driveline import CardanDriveline
 from chainunit.errors import GeometryError
@@ -143,7 +143,7 @@ def test_damping_is_that_of_a_cardan_without_mass():
 
     J1, J4, differences = 0.4, 2.0, []
     for d2, d3, alpha2 in ((2.0, 4.0, 0.4), (2.0, 4.0, 0.1), (2.0, 0.0, 0.1), (1.0, 0.0, 0.1)):
-        p = Line(c2=8000.0, c3=16000.0, alpha1=0.4, alpha2=alpha2, d2=d2, d3=d3)
+        p = ShaftLine(c2=8000.0, c3=16000.0, alpha1=0.4, alpha2=alpha2, d2=d2, d3=d3)
         phi3, i, _ = cardan.two_joints(engines.MATH, p, 0.2)
         start = [0.2 + 1e-3, 20.0, phi3, 20.0 * i]
         phi2 = cardan.middle_angle(engines.MATH, p, start[0], phi3)

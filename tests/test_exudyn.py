@@ -28,7 +28,8 @@ import numpy as np
 import pytest
 
 from chainunit.engines import MATH, numpy_
-from chainunit.machines.knife_drive import KnifeDrive, Mechanism
+from chainunit.machines.knife_drive import KnifeDrive
+from chainunit.mechanism.machine import Mechanism
 
 exudyn = pytest.importorskip("exudyn")
 item = pytest.importorskip("exudyn.itemInterface")
@@ -77,8 +78,10 @@ def turned_by_exudyn(steps, fx, fy):
     """Every compared output over one turn from crank angle 0, at the start and after each step."""
     mbs = exudyn.SystemContainer().AddSystem()
     found = {"frame": mbs.AddObject(item.ObjectGround())}
-    start = Mechanism(MATH, KnifeDrive.prepared(MATH, P), None, 0.0)
-    for name, body in zip(BODIES, start.bodies, strict=True):
+    linkage = KnifeDrive.linkage(P, KnifeDrive.Inputs())
+    start = Mechanism(MATH, linkage, 0.0, KnifeDrive.derive(MATH, P))
+    assert set(start.bodies) == set(BODIES)
+    for name, body in start.bodies.items():
         c, link, own = body.c, body.link, getattr(P, name)
         node = mbs.AddNode(
             item.NodeRigidBody2D(

@@ -26,18 +26,18 @@ from chainunit.errors import InterruptedRunError
 from chainunit.fmu.export import export as export_python
 from chainunit.fmu.native.export import export as export_native
 from chainunit.fmu.native.platforms import compiler
+from chainunit.groups.loads import Pin, Processing, Stop
 from chainunit.machines import hanging
 from chainunit.machines.chain_unit import (
     ChamberForces,
-    CrankRocker,
     Inputs,
-    Processing,
     SideLoads,
     SideMasses,
-    Stop,
+    drive,
+    rocker_motion,
 )
 from chainunit.machines.flexible import OrganLaw, flexible
-from chainunit.machines.parts import Pin
+from chainunit.mechanism.machine import MachineState, Mechanism
 from chainunit.studies.chain import numbers_at, study_chain
 from chainunit.studies.drive import Drive
 from chainunit.system import CoSimulation, held, monolithic
@@ -108,6 +108,11 @@ def named(model, p, u, x=None):
     for part, values in zip(model.parts, model.evaluate(MATH, p, u, x), strict=True):
         found |= part.layout.named(values)
     return found
+
+
+def crank_rocker(p, q):
+    """The drive without organs at the crank angle `q`."""
+    return Mechanism(MATH, drive(p, Inputs(), (), {}), q)
 
 
 UNITS = {v.name: v.quantity.unit for part in ChamberForces.parts for v in part.layout.variables}
@@ -206,7 +211,8 @@ def test_starts_where_it_hangs():
             phi=p.ratio * rng.uniform(-7.0, 7.0), w=0.0, left=random_loads(rng), right=random_loads(rng)
         )
         x = model.start(MATH, p, u)
-        psi, states = CrankRocker(MATH, p, u.phi / p.ratio).psi(MATH), model.state_layout.named(x)
+        state = MachineState(MATH, crank_rocker(p, u.phi / p.ratio), 0.0)
+        psi, states = rocker_motion(MATH, state, 0.0)["psi"], model.state_layout.named(x)
         for side, hand in zip(SIDES, (1.0, -1.0), strict=True):
             theta = [hand * states[f"{side}.theta_{k + 1}"] for k in range(number)]
             np.testing.assert_allclose(
@@ -335,7 +341,7 @@ def dense(model, p, u, x, side, a2):
         [(own.wall_mass + loads.material_mass - on_web) / walls, (own.web_mass + on_web) / counts[1]], counts
     )
     l = np.repeat([p.l1 / walls, p.l2 / counts[1]], counts)
-    rocker = CrankRocker(MATH, p, u.phi / p.ratio).rocker
+    rocker = crank_rocker(p, u.phi / p.ratio).links["rocker"]
     n, along_rod = np.stack([np.cos(theta), np.sin(theta)]), np.stack([np.sin(theta), -np.cos(theta)])
     mass, right = np.zeros((N, N)), np.zeros(N)
     for k in range(N):
@@ -362,10 +368,9 @@ def dense(model, p, u, x, side, a2):
 
 def momentum(p, u, x, counts):
     """Momentum, its moment about C, and weights and processing forces with their moment, link by link."""
-    drive = CrankRocker(MATH, p, u.phi)
+    bodies = crank_rocker(p, u.phi).bodies.values()
     parts = [
-        (b.m, b.I, (b.c.p.x, b.c.p.y), (b.c.p1.x * u.w, b.c.p1.y * u.w), b.link.t1 * u.w)
-        for b in drive.bodies
+        (b.m, b.I, (b.c.p.x, b.c.p.y), (b.c.p1.x * u.w, b.c.p1.y * u.w), b.link.t1 * u.w) for b in bodies
     ]
     outside, moment = np.zeros(2), 0.0
     for side, loads, masses, a1 in ((x.left, u.left, p.left, -p.z), (x.right, u.right, p.right, p.z)):
@@ -436,7 +441,7 @@ def test_port_is_that_of_dense_equations():
             ChamberForces.Parameters(**none),
             dataclasses.replace(u, left=nothing, right=nothing),
         )
-        rocker = CrankRocker(MATH, p, u.phi / p.ratio).rocker
+        rocker = crank_rocker(p, u.phi / p.ratio).links["rocker"]
         a2 = rocker.at(p.e)
         first, second = np.array([a2.p1.x, a2.p1.y]), np.array([a2.p2.x, a2.p2.y])
         w, a = u.w / p.ratio, u.a / p.ratio

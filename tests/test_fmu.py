@@ -163,12 +163,12 @@ def test_two_versions_in_one_process_do_not_share_code(fmus, tmp_path, monkeypat
 
     def changed(script):
         files = imported(script)
-        torque = b"return self.J * a + self.bias.total"
-        assert torque in files["machines/driven.py"]
-        doubled = files["machines/driven.py"].replace(
+        torque = b"return self.J * a + self.bias"
+        assert torque in files["mechanism/machine.py"]
+        doubled = files["mechanism/machine.py"].replace(
             torque, torque.replace(b"return ", b"return 2.0 * (") + b")"
         )
-        return files | {"machines/driven.py": doubled}
+        return files | {"mechanism/machine.py": doubled}
 
     monkeypatch.setattr(module, "_imported", changed)
     other = Fmu(export(ChamberForces, tmp_path / "other.fmu"))

@@ -13,7 +13,9 @@ from systems import component
 from chainunit import GeometryError, InputError
 from chainunit.engines import MATH, Dual, dual, numpy_, slope
 from chainunit.fmu.native.export import export
-from chainunit.machines.knife_drive import HARMONICS, KnifeDrive, Mechanism, Reactions, _near, modes
+from chainunit.groups.triad import HARMONICS, pose_of_series
+from chainunit.machines.knife_drive import KnifeDrive, modes
+from chainunit.mechanism.machine import Mechanism
 
 POINTS = json.loads((Path(__file__).parent / "data" / "class_iii.json").read_text())["points"]
 PINS = {
@@ -21,6 +23,7 @@ PINS = {
     "C": "c_pin", "D": "d_pin", "E": "e_pin", "O3": "o3_bearing", "O4": "o4_bearing",
 }  # fmt: skip
 DEFAULT = KnifeDrive.prepared(MATH, KnifeDrive.parameter_layout.from_names({}))
+BODIES = ("crank", "coupler", "rocker", "leg_b", "leg_3", "leg_4", "knife")
 NAMES = [name for part in KnifeDrive.parts for name in part.layout.names]
 
 
@@ -58,7 +61,9 @@ def test_reference_points(point):
     assert deviation(evaluate(DEFAULT, inputs_of(point)), wanted_of(point)) < 1e-9
     u = KnifeDrive.input_layout.from_names(inputs_of(point))
     m, w, a = KnifeDrive.shared(MATH, DEFAULT, u, None).m, u.w, u.a
-    for body, name in zip(m.bodies, ("crank", "ab", "bo2", "bc", "o3d", "o4e", "cde"), strict=True):
+    assert set(m.bodies) == set(BODIES)
+    for link, name in zip(BODIES, ("crank", "ab", "bo2", "bc", "o3d", "o4e", "cde"), strict=True):
+        body = m.bodies[link]
         c, link, given = body.c, body.link, point["outputs"]["bodies"][name]
         got = {
             "x": c.p.x, "y": -c.p.y, "vx": c.p1.x * w, "vy": -c.p1.y * w, "omega": -link.t1 * w,
@@ -85,6 +90,12 @@ def test_reference_points_by_the_native_fmu(fmi, tmp_path):
         assert deviation({name: got[name][0] for name in wanted}, wanted) < 1e-9
 
 
+def moved(xp, p, q, before=2):
+    """The mechanism at the crank angle `q`; with the dyad alone before the triad."""
+    linkage = KnifeDrive.linkage(p, KnifeDrive.Inputs())
+    return Mechanism(xp, linkage.before(before), q, getattr(p, "derived", ()))
+
+
 def random_machine(rng):
     """A knife drive around the packaged one: any triad, hung at any angle, with any bodies; None if it does not
     turn."""
@@ -109,9 +120,7 @@ def random_machine(rng):
     p = KnifeDrive.parameter_layout.from_names(given)
     # the triad is hung from the pin B at crank angle 0, at a random pose and with random legs
     x, y, theta = rng.uniform(0.5, 1.2), rng.uniform(-0.4, 0.4), rng.uniform(-3.0, 3.0)
-    from chainunit.machines.knife_drive import Drive
-
-    b = Drive(MATH, p, 0.0).dyad.b.p
+    b = moved(MATH, p, 0.0, before=1).pins["B"].p
     cos, sin = math.cos(theta), math.sin(theta)
 
     def at(pin):
@@ -162,14 +171,12 @@ def test_power_and_two_torques_of_random_machines():
         size = abs(out.power) + sum(map(abs, grows)) + abs(out.dissipated_power)
         assert abs(out.power - sum(grows) - out.dissipated_power) < 1e-9 * size
         s = KnifeDrive.shared(MATH, p, u, None)
-        by_forces = Reactions(s.m, p, s.w * s.w, a / p.ratio, s.bias.on_blade).torque
-        by_work = s.torque(a / p.ratio) - s.bias.losses
+        by_forces = s.torque_by_reactions(a / p.ratio)
+        by_work = s.torque(a / p.ratio) - s.effects["pins"].lost
         terms = (
             abs(by_forces)
             + abs(s.J * a / p.ratio)
-            + abs(s.bias.cutting)
-            + abs(s.bias.further)
-            + abs(s.bias.losses)
+            + sum(abs(s.effects[load].lost) for load in ("cut", "push", "pins"))
         )
         assert abs(by_forces - by_work) < 1e-9 * max(terms, 1.0)
 
@@ -192,8 +199,8 @@ def test_pins_on_one_line():
         assert all(math.isfinite(x) for x in out.values())
         u = KnifeDrive.input_layout.from_names({"phi": float(phi), "w": 4.0, "a": 2.0, "cut_force": 5e3})
         s = KnifeDrive.shared(MATH, p, u, None)
-        by_forces = Reactions(s.m, p, 16.0, 2.0, s.bias.on_blade).torque
-        assert by_forces == pytest.approx(s.torque(2.0) - s.bias.losses, rel=1e-9)
+        by_forces = s.torque_by_reactions(2.0)
+        assert by_forces == pytest.approx(s.torque(2.0) - s.effects["pins"].lost, rel=1e-9)
 
 
 def test_the_outputs_depend_on_the_angle_alone():
@@ -262,8 +269,8 @@ def test_the_series_is_a_start_and_newton_the_answer():
     *series, misfit, least = DEFAULT.derived
     assert len(series) == 3 * (2 * HARMONICS + 1) and misfit < 1e-14 and 0.3 < least < 0.6
     angles = np.linspace(0.0, 2.0 * math.pi, 257)
-    near = _near(series, np.cos(angles), np.sin(angles))
-    link = Mechanism(numpy_(), DEFAULT, None, angles).triad.link
+    near = pose_of_series(series, np.cos(angles), np.sin(angles))
+    link = moved(numpy_(), DEFAULT, angles).links["knife"]
     off = np.hypot(near.x - link.pin.p.x, near.y - link.pin.p.y)
     assert 1e-10 < np.max(off) < 1e-7
 
@@ -289,9 +296,9 @@ def test_accepted_machines_are_right_all_the_way_round():
         grows = slope(out.kinetic_energy) + slope(out.potential_energy)
         size = np.max(np.abs(out.power.v)) + np.max(np.abs(grows)) + np.max(np.abs(out.dissipated_power.v))
         assert np.max(np.abs(out.power.v - grows - out.dissipated_power.v)) < 1e-9 * size
-        triad = Mechanism(numpy_(), p, None, phi).triad
-        for pin, leg, length in zip(triad.pins, triad.legs, (p.bc, p.o3d, p.o4e), strict=True):
-            r = pin.p - leg.pin.p
+        m = moved(numpy_(), p, phi)
+        for pin, leg, length in (("C", "leg_b", p.bc), ("D", "leg_3", p.o3d), ("E", "leg_4", p.o4e)):
+            r = m.pins[pin].p - m.links[leg].pin.p
             np.testing.assert_allclose(np.hypot(r.x, r.y), length, rtol=1e-12)
         assert np.max(np.abs(np.diff(out.blade.x.v))) < 0.2
 

@@ -214,10 +214,10 @@ def test_the_scheme_of_paper_003_is_the_model_once_corrected():
     p = paper003.machine()
     for angle in np.radians(np.arange(0.0, 360.0, 15.0)):
         s = paper003.state(p, float(angle), cut=paper003.CUT)
-        wanted = paper003.ours(p, s)
+        wanted = paper003.ours(s)
         size = np.max(np.abs(wanted))
-        np.testing.assert_allclose(paper003.as_the_paper(p, s, 0.0), wanted, atol=1e-12 * size)
-        metres, millimetres = (paper003.as_the_paper(p, s, line) - wanted for line in (1.0, 1000.0))
+        np.testing.assert_allclose(paper003.as_the_paper(s, 0.0), wanted, atol=1e-12 * size)
+        metres, millimetres = (paper003.as_the_paper(s, line) - wanted for line in (1.0, 1000.0))
         np.testing.assert_allclose(millimetres, 1000.0 * metres, atol=1e-8 * size)
         assert np.max(np.abs(metres)) > 1e-4 * size
 

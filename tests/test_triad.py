@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import brentq
 
 from chainunit.engines import MATH, Dual, dual, slope
-from chainunit.groups.triad import LEGS, Pose, Triad, assembly_modes, corrected
+from chainunit.groups.triad import LEGS, Pose, SolvedTriad, assembly_modes, corrected
 from chainunit.planar import Motion, Vec2
 
 
@@ -104,7 +104,7 @@ def searched(pins, lengths, arms, tries=600):
         try:
             start = Pose(*rng.uniform(-2.0, 3.0, 2), rng.uniform(-math.pi, math.pi))
             pose = corrected(MATH, pins, lengths, arms, start, 40)
-            triad = Triad(MATH, tuple(Motion(p) for p in pins), lengths, arms, pose)
+            triad = SolvedTriad.at(MATH, tuple(Motion(p) for p in pins), lengths, arms, pose)
         except (ArithmeticError, ValueError):
             continue
         gaps = [math.sqrt((k.p - p).squared()) - l for k, p, l in zip(triad.pins, pins, lengths, strict=True)]
@@ -156,7 +156,7 @@ def test_motion_is_that_of_the_followed_pose(collinear):
     while checked < 40:
         pins, lengths, arms, pose = random_triad(rng, collinear)
         outer, at = moved(rng, pins)
-        triad = Triad(MATH, outer, lengths, arms, pose)
+        triad = SolvedTriad.at(MATH, outer, lengths, arms, pose)
         if abs(triad.margin) < 0.1:
             continue
         checked += 1
@@ -170,14 +170,14 @@ def test_motion_is_that_of_the_followed_pose(collinear):
             )
             return np.array([slope(v) for v in corrected(dual(MATH), pins, lengths, arms, here, 2)])
 
-        link = triad.link
+        *legs, link = triad.links
         np.testing.assert_allclose([link.pin.p1.x, link.pin.p1.y, link.t1], rates(0.0), rtol=1e-9, atol=1e-9)
         second = (rates(h) - rates(-h)) / (2.0 * h)
         scale = np.max(np.abs(second))
         np.testing.assert_allclose(
             [link.pin.p2.x, link.pin.p2.y, link.t2], second, rtol=1e-4, atol=1e-5 * scale
         )
-        for leg, pin, length in zip(triad.legs, triad.pins, lengths, strict=True):
+        for leg, pin, length in zip(legs, triad.pins, lengths, strict=True):
             end = leg.at(length)
             for a, b in ((end.p, pin.p), (end.p1, pin.p1), (end.p2, pin.p2)):
                 assert abs(a.x - b.x) + abs(a.y - b.y) < 1e-10 * (1.0 + abs(b.x) + abs(b.y))
@@ -189,16 +189,17 @@ def test_forces_keep_every_link_in_balance(collinear):
     rng = np.random.default_rng(5)
     for _ in range(60):
         pins, lengths, arms, pose = random_triad(rng, collinear)
-        triad = Triad(MATH, tuple(Motion(p) for p in pins), lengths, arms, pose)
+        triad = SolvedTriad.at(MATH, tuple(Motion(p) for p in pins), lengths, arms, pose)
         if abs(triad.margin) < 1e-2:
             continue
         legs = tuple((Vec2(*rng.uniform(-9, 9, 2)), rng.uniform(-9, 9)) for _ in range(LEGS))
         knife = (Vec2(*rng.uniform(-9, 9, 2)), rng.uniform(-9, 9))
-        outer, inner = triad.reactions(legs, knife)
+        forces = triad.reactions((*legs, knife))
+        outer, inner = forces[:LEGS], forces[LEGS:]
         # unknowns: forces at the inner pins on the legs, six; of each leg the moment, of the knife three equations
         matrix, right = np.zeros((6, 6)), np.zeros(6)
         for i, (p, pin) in enumerate(zip(pins, triad.pins, strict=True)):
-            r, a = pin.p - p, pin.p - triad.link.pin.p
+            r, a = pin.p - p, pin.p - triad.links[-1].pin.p
             matrix[i, 2 * i : 2 * i + 2] = -r.y, r.x
             right[i] = -legs[i][1]
             matrix[3, 2 * i], matrix[4, 2 * i + 1] = 1.0, 1.0
@@ -216,12 +217,12 @@ def test_three_moments_are_singular_on_a_line_and_this_is_not():
     """docs/papers.md, paper 003, item 6: the paper's three moment equations about C, D, E against ours."""
     rng = np.random.default_rng(6)
     pins, lengths, arms, pose = random_triad(rng, collinear=True)
-    triad = Triad(MATH, tuple(Motion(p) for p in pins), lengths, arms, pose)
+    triad = SolvedTriad.at(MATH, tuple(Motion(p) for p in pins), lengths, arms, pose)
     at = [pin.p for pin in triad.pins]
-    pull = [leg.u for leg in triad.legs]
+    pull = [leg.u for leg in triad.links[:LEGS]]
     moments = np.array([[(at[k] - at[i]).cross(pull[k]) for k in range(3)] for i in range(3)])
     assert np.linalg.cond(moments) > 1e12 and abs(triad.margin) > 1e-2
-    _, inner = triad.reactions(((Vec2(0.0, 0.0), 0.0),) * 3, (Vec2(3.0, -40.0), 2.0))
+    inner = triad.reactions((*((Vec2(0.0, 0.0), 0.0),) * LEGS, (Vec2(3.0, -40.0), 2.0)))[LEGS:]
     assert all(math.isfinite(f.x) and math.isfinite(f.y) for f in inner)
 
 
@@ -231,7 +232,7 @@ def test_the_margin_vanishes_where_the_legs_meet():
     meet = Vec2(0.3, 2.0)
     pins = tuple(a + (meet - a) * 0.5 for a in arms)
     lengths = tuple(math.sqrt((p - a).squared()) for p, a in zip(pins, arms, strict=True))
-    triad = Triad(
+    triad = SolvedTriad.at(
         MATH,
         tuple(Motion(p) for p in (pins[0], pins[1], pins[2] + Vec2(1e-9, 0.0))),
         lengths,

@@ -59,7 +59,8 @@ def casadi_() -> SimpleNamespace:
 class Dual:
     """``v + d*epsilon``: a value with its derivative in one direction.
 
-    `v` and `d` are whatever the engine below computes with (floats, arrays, symbols).
+    `v` and `d` are whatever the engine below computes with (floats, arrays, symbols). Values are computed in the same
+    order as without duals, so that equal symbols are found to be equal.
     """
 
     __slots__ = ("d", "v")
@@ -75,7 +76,8 @@ class Dual:
             return Dual(self.v + other.v, self.d + other.d)
         return Dual(self.v + other, self.d)
 
-    __radd__ = __add__
+    def __radd__(self, other: Any) -> Dual:
+        return Dual(other + self.v, self.d)
 
     def __sub__(self, other: Any) -> Dual:
         if isinstance(other, Dual):
@@ -86,21 +88,24 @@ class Dual:
         return Dual(other - self.v, -self.d)
 
     def __mul__(self, other: Any) -> Dual:
+        if other is self:
+            return Dual(self.v * self.v, 2.0 * (self.v * self.d))
         if isinstance(other, Dual):
             return Dual(self.v * other.v, self.v * other.d + self.d * other.v)
         return Dual(self.v * other, self.d * other)
 
-    __rmul__ = __mul__
+    def __rmul__(self, other: Any) -> Dual:
+        return Dual(other * self.v, other * self.d)
 
     def __truediv__(self, other: Any) -> Dual:
         if isinstance(other, Dual):
-            v = self.v / other.v
-            return Dual(v, (self.d - v * other.d) / other.v)
+            v, minus_per = self.v / other.v, -1.0 / other.v
+            return Dual(v, (v * other.d - self.d) * minus_per)
         return Dual(self.v / other, self.d / other)
 
     def __rtruediv__(self, other: Any) -> Dual:
-        v = other / self.v
-        return Dual(v, -v * self.d / self.v)
+        v, minus_per = other / self.v, -1.0 / self.v
+        return Dual(v, v * self.d * minus_per)
 
     def __neg__(self) -> Dual:
         return Dual(-self.v, -self.d)

@@ -15,6 +15,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from .engines import Dual, slope
+
 
 class Vec2:
     """A vector in the plane; a scalar factor stands on the right: ``v * 2.0``."""
@@ -61,6 +63,16 @@ class Vec2:
 _NO_LENGTH = 1e-30
 
 
+def lifted(v: Vec2, d: Vec2) -> Vec2:
+    """The vector `v` as a dual one, with the derivative `d`."""
+    return Vec2(Dual(v.x, d.x), Dual(v.y, d.y))
+
+
+def growth(v: Vec2) -> Vec2:
+    """The derivative of a dual vector."""
+    return Vec2(slope(v.x), slope(v.y))
+
+
 ZERO = Vec2(0.0, 0.0)
 
 
@@ -89,16 +101,31 @@ class Link:
 
     def at(self, s: Any) -> Motion:
         """Motion of the point at distance `s` from the pin along the link."""
-        return self._carried(self.u * s)
+        return self.carried(self.u * s)
 
     def beside(self, s: Any, t: Any) -> Motion:
         """Motion of the point at distance `s` along the link and `t` to its left."""
-        return self._carried(self.u * s + self.u.turned() * t)
+        return self.carried(self.u * s + self.u.turned() * t)
 
-    def _carried(self, r: Vec2) -> Motion:
-        n = r.turned()
+    def carried(self, r: Vec2) -> Motion:
+        """Motion of the point `r` away from the pin."""
+        pin, t1 = self.pin, self.t1
         return Motion(
-            self.pin.p + r,
-            self.pin.p1 + n * self.t1,
-            self.pin.p2 + n * self.t2 - r * (self.t1 * self.t1),
+            Vec2(pin.p.x + r.x, pin.p.y + r.y),
+            Vec2(pin.p1.x - r.y * t1, pin.p1.y + r.x * t1),
+            self._second(r),
         )
+
+    def _second(self, r: Vec2) -> Vec2:
+        base, t2, spin = self.pin.p2, self.t2, self.t1 * self.t1
+        return Vec2(base.x - r.y * t2 - r.x * spin, base.y + r.x * t2 - r.y * spin)
+
+    def lifted(self, pin: Motion, t2: Any) -> Link:
+        """The link with its derivatives by q as dual parts, from those of its pin and of `t2`."""
+        return Link(pin, lifted(self.u, self.u.turned() * self.t1), Dual(self.t1, self.t2), t2)
+
+    def lifted_point(self, point: Motion) -> Motion:
+        """A point of the link, whose motion is known, with its derivatives by q as dual parts; the link is lifted."""
+        p = lifted(point.p, point.p1)
+        p2 = lifted(point.p2, growth(self._second(p - self.pin.p)))
+        return Motion(p, lifted(point.p1, point.p2), p2)

@@ -19,7 +19,7 @@ RIGHT = 0.5 * math.pi
 
 
 @declaration
-class Line:
+class ShaftLine:
     """Two shafts and the cardan between them. The start values are ours: the paper prints no dimensions."""
 
     alpha1: Value = quantity("rad", "bend of the joint on shaft 2", default=0.3, min=0.0)
@@ -35,7 +35,7 @@ class Line:
 
 
 @declaration
-class Cardan(Line):
+class Cardan(ShaftLine):
     """The system of paper 002: the shaft line between two inertias."""
 
     J1: Value = quantity("kg.m2", "inertia of the rotor", default=0.4, above=0.0)
@@ -50,7 +50,7 @@ ORDERS = (2, 4)
 """Of the excitation: i23 varies twice a turn; four times a turn at large bends."""
 
 
-def check(p: Line) -> None:
+def check(p: ShaftLine) -> None:
     """Refuse a line that cannot turn; `p` may declare more than a `Line`.
 
     Raises
@@ -84,7 +84,7 @@ def hooke(xp: Any, bend: Any, angle: Any) -> tuple[Any, Any, Any]:
     return driven, ratio, -2.0 * k * s * c * (1.0 - k * k) / (spread * spread)
 
 
-def two_joints(xp: Any, p: Line, phi2: Any) -> tuple[Any, Any, Any]:
+def two_joints(xp: Any, p: ShaftLine, phi2: Any) -> tuple[Any, Any, Any]:
     """Angle of shaft 3 [rad], i23 and its derivative by `phi2`; the angle of shaft 3 is gamma2, up to half turns."""
     middle, first, first_slope = hooke(xp, p.alpha1, phi2)
     # seen from shaft 3 the second joint is one that is driven backwards: a right angle on, and inverse
@@ -93,7 +93,7 @@ def two_joints(xp: Any, p: Line, phi2: Any) -> tuple[Any, Any, Any]:
     return out + RIGHT, first * second, first_slope * second + first * first * second_slope
 
 
-def ratio_of_paper(xp: Any, p: Line, gamma1: Any, gamma2: Any) -> Any:
+def ratio_of_paper(xp: Any, p: ShaftLine, gamma1: Any, gamma2: Any) -> Any:
     """i23 as paper 002 prints it, with gamma2 at the driven yoke."""
     s1, s2, c1, c2 = xp.sin(p.alpha1), xp.sin(p.alpha2), xp.cos(gamma1), xp.cos(gamma2)
     return (xp.cos(p.alpha1) / xp.cos(p.alpha2)) * (1.0 - s2 * s2 * c2 * c2) / (1.0 - s1 * s1 * c1 * c1)
@@ -164,7 +164,7 @@ def sensitivity(p: Cardan, i: float = 1.0) -> dict[str, float]:
 _NEWTON = 6
 
 
-def middle_angle(xp: Any, p: Line, phi1: Any, phi4: Any, near: Any = None, steps: int = _NEWTON) -> Any:
+def middle_angle(xp: Any, p: ShaftLine, phi1: Any, phi4: Any, near: Any = None, steps: int = _NEWTON) -> Any:
     """The angle phi2 [rad] at which the massless cardan is in balance, c2 (phi1 - phi2) = i23 c3 (phi3 - phi4).
 
     Newton's method from `near`, by default from phi1; a fixed number of steps, as twists are small against the turn
@@ -192,7 +192,15 @@ class Twist:
     __slots__ = ("dissipated", "energy", "i", "phi2", "phi3", "tau1", "tau4", "twist2", "twist3")
 
     def __init__(
-        self, xp: Any, p: Line, phi1: Any, w1: Any, phi4: Any, w4: Any, near: Any = None, steps: int = _NEWTON
+        self,
+        xp: Any,
+        p: ShaftLine,
+        phi1: Any,
+        w1: Any,
+        phi4: Any,
+        w4: Any,
+        near: Any = None,
+        steps: int = _NEWTON,
     ) -> None:
         self.phi2 = phi2 = middle_angle(xp, p, phi1, phi4, near, steps)
         self.phi3, self.i, di = two_joints(xp, p, phi2)

@@ -34,14 +34,14 @@ from ..ports import (
     load_terminal,
 )
 from ..quantities import Value, declaration, group, quantity
-from .cardan import BENDS, RIGHT, Line, Twist, two_joints
+from .cardan import BENDS, RIGHT, ShaftLine, Twist, two_joints
 
 W_SMALL = 0.1
 """Speed of the motor [rad/s] below which the slope by the angle tends to the plain derivative."""
 
 
 @declaration
-class Mounted(Line):
+class Mounted(ShaftLine):
     """A line with what turns on its driven side, as it is mounted."""
 
     J4: Value = quantity("kg.m2", "inertia on shaft 3, beside the machine's", default=0.5, above=0.0)

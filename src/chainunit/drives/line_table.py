@@ -18,7 +18,7 @@ from pydantic import BaseModel, BeforeValidator, Field
 from ..errors import InputError
 from ..quantities import Quantity, Value, Variable, declaration, quantity, variables
 from ..reading import number, schema, to_number
-from .cardan import Cardan, Line
+from .cardan import Cardan, ShaftLine
 from .shafts import SECTIONS, Shaft, stiffness_of
 from .torsion import with_damping_ratio
 
@@ -38,7 +38,7 @@ class Damping:
     )
 
 
-def form(declared: type[Line], title: str, prefix: str, **others: Any) -> type[BaseModel]:
+def form(declared: type[ShaftLine], title: str, prefix: str, **others: Any) -> type[BaseModel]:
     """The pydantic model of the table: the fields of `declared`, tables `shaft2`, `shaft3`, `damping_ratio`,
     `others`.
 

@@ -112,8 +112,8 @@ def polygon(outline: Sequence[Point], holes: Sequence[Sequence[Point]] = ()) -> 
     return float(section.get_j())
 
 
-class Section(NamedTuple):
-    """A kind of section: its dimensions, in the order of its formula, and its torsion constant."""
+class CrossSection(NamedTuple):
+    """A kind of cross-section: its dimensions, in the order of its formula, and its torsion constant."""
 
     takes: tuple[str, ...]
     constant: Callable[..., float]
@@ -122,11 +122,11 @@ class Section(NamedTuple):
 
 
 SECTIONS = {
-    "round": Section(("outer",), hollow),
-    "hollow": Section(("outer", "inner"), hollow),
-    "rectangle": Section(("a", "b"), rectangle),
-    "box": Section(("a", "b", "wall"), box),
-    "polygon": Section(("outline",), polygon, ("holes",)),
+    "round": CrossSection(("outer",), hollow),
+    "hollow": CrossSection(("outer", "inner"), hollow),
+    "rectangle": CrossSection(("a", "b"), rectangle),
+    "box": CrossSection(("a", "b", "wall"), box),
+    "polygon": CrossSection(("outline",), polygon, ("holes",)),
 }
 
 

@@ -6,21 +6,58 @@ coordinate q itself: the counter-clockwise angle of the crank falls at the rate 
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from ..planar import Link, Motion, Vec2
+from .body import Bar, Load
+from .group import Group, SolvedGroup
+
+
+@dataclass
+class Crank(Group):
+    """A crank as data: a bar on a ground pin, and the name of the pin at its end."""
+
+    bar: Bar
+    end: str
+
+    @property
+    def bars(self) -> tuple[Bar, ...]:
+        """Its link."""
+        return (self.bar,)
+
+    @property
+    def pins(self) -> dict[str, str]:
+        """The pin at its end."""
+        return {self.end: self.bar.name}
+
+    @property
+    def joints(self) -> tuple[tuple[str, str], ...]:
+        """Its bearing."""
+        return ((self.bar.pin, self.bar.name),)
+
+    def solve(self, xp: Any, q: Any, pins: Mapping[str, Motion], derived: Sequence[Any]) -> TurnedCrank:
+        """The crank at the angle `q` [rad]."""
+        link = crank(xp, pins[self.bar.pin].p, q)
+        return TurnedCrank((link,), (link.at(self.bar.length),))
+
+
+class TurnedCrank(SolvedGroup):
+    """The crank at one angle: its link, and the pin at its end."""
+
+    __slots__ = ()
+
+    def lifted(self, outer: tuple[Motion, ...]) -> TurnedCrank:
+        """See `SolvedGroup`."""
+        link = self.links[0].lifted(outer[0], 0.0)
+        return TurnedCrank((link,), (link.lifted_point(self.pins[0]),))
+
+    def reactions(self, loads: tuple[Load, ...]) -> tuple[Vec2, ...]:
+        """The force on the crank at its bearing [N]."""
+        return (-loads[0][0],)
 
 
 def crank(xp: Any, bearing: Vec2, angle: Any) -> Link:
     """The crank as a link from its bearing at `angle` [rad]."""
     return Link(Motion(bearing), Vec2(xp.sin(angle), xp.cos(angle)), -1.0, 0.0)
-
-
-def driving_torque(link: Link, pin: Motion, applied: tuple[Vec2, Any], pin_force: Vec2) -> tuple[Any, Vec2]:
-    """Torque along the crank angle [N m] and the force on the crank at its bearing [N].
-
-    `applied` are the crank's own weight and inertia about the bearing, `pin_force` is the force
-    on the crank at its pin: the last step of the force pass, independent of virtual work.
-    """
-    force, moment = applied
-    return moment + (pin.p - link.pin.p).cross(pin_force), -(force + pin_force)

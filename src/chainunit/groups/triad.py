@@ -13,16 +13,34 @@ three moment equations about them that paper 003 solves are singular there.
 
 There is no closed form for the pose: up to six assembly modes are the real roots of a polynomial (`assembly_modes`),
 and a mode is followed from one position to the next by `corrected`.
+
+In a linkage with one crank the pose is a smooth periodic function of the crank angle: it is followed once around,
+from the mode that `Triad.assembly` leads to at q = 0, and kept as a Fourier series (`Triad.derive`). At any angle the
+series gives a pose that is nearly right, and Newton's method makes it exact. So the pose depends on the crank angle
+alone, whatever the step or the history; the branch cannot jump, and parameters with which it ends within the turn
+are refused (`requirements`).
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
 
-from ..planar import Link, Motion, Vec2
+from ..engines import Dual, slope
+from ..model import Requirement
+from ..planar import Link, Motion, Vec2, lifted
+from .body import Bar, Load, Mass
+from .group import Group, SolvedGroup
 
 LEGS = 3
+SAMPLES = 20
+"""Angles of the crank at which a triad is followed once around."""
+HARMONICS = 8
+"""Of the series of its pose."""
+_STEPS = 3
+"""Of Newton's method from the series: an error of 1e-3, as of a pose that moves sharply, is gone after three."""
 
 
 class Pose(NamedTuple):
@@ -36,24 +54,37 @@ class Pose(NamedTuple):
 class _Rows:
     """The three rows (r.x, r.y, A x r) at a pose, and what solves with them."""
 
-    __slots__ = ("arms", "cofactors", "det", "r")
+    __slots__ = ("arms", "cofactors", "det", "minus_per_det", "r")
 
-    def __init__(self, xp: Any, pins: tuple[Vec2, ...], arms: tuple[Vec2, ...], pose: Pose) -> None:
-        c, s = xp.cos(pose.theta), xp.sin(pose.theta)
-        origin = Vec2(pose.x, pose.y)
-        self.arms = tuple(Vec2(c * a.x - s * a.y, s * a.x + c * a.y) for a in arms)
-        self.r = tuple(origin + a - p for a, p in zip(self.arms, pins, strict=True))
-        rows = [(r.x, r.y, a.cross(r)) for r, a in zip(self.r, self.arms, strict=True)]
+    def __init__(self, arms: tuple[Vec2, ...], r: tuple[Vec2, ...]) -> None:
+        self.arms, self.r = arms, r
+        rows = [(v.x, v.y, a.cross(v)) for v, a in zip(r, arms, strict=True)]
         self.cofactors = tuple(_cross(rows[(i + 1) % LEGS], rows[(i + 2) % LEGS]) for i in range(LEGS))
         self.det = _dot(rows[0], self.cofactors[0])
+        # see `chainunit.groups.dyad` for the sign
+        self.minus_per_det = -1.0 / self.det
+
+    @classmethod
+    def at(cls, xp: Any, pins: Sequence[Vec2], arms: Sequence[Vec2], pose: Pose) -> _Rows:
+        """The rows of the arms as they lie in the ternary link, at its pose."""
+        c, s = xp.cos(pose.theta), xp.sin(pose.theta)
+        origin = Vec2(pose.x, pose.y)
+        turned = tuple(Vec2(c * a.x - s * a.y, s * a.x + c * a.y) for a in arms)
+        return cls(turned, tuple(origin + a - p for a, p in zip(turned, pins, strict=True)))
 
     def solve(self, b: tuple[Any, ...]) -> tuple[Any, Any, Any]:
         """z with row_i . z = b_i."""
-        return tuple(sum(b[i] * self.cofactors[i][k] for i in range(LEGS)) / self.det for k in range(3))
+        (b0, b1, b2), (c0, c1, c2) = b, self.cofactors
+        k = self.minus_per_det
+        return (
+            -(b0 * c0[0] + b1 * c1[0] + b2 * c2[0]) * k,
+            -(b0 * c0[1] + b1 * c1[1] + b2 * c2[1]) * k,
+            -(b0 * c0[2] + b1 * c1[2] + b2 * c2[2]) * k,
+        )
 
     def combine(self, force: Vec2, moment: Any) -> tuple[Any, ...]:
         """lambda with sum of lambda_i row_i = (force, moment)."""
-        return tuple(_dot((force.x, force.y, moment), c) / self.det for c in self.cofactors)
+        return tuple(-_dot((force.x, force.y, moment), c) * self.minus_per_det for c in self.cofactors)
 
 
 def _cross(a: tuple[Any, Any, Any], b: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
@@ -66,9 +97,9 @@ def _dot(a: tuple[Any, Any, Any], b: tuple[Any, Any, Any]) -> Any:
 
 def corrected(
     xp: Any,
-    pins: tuple[Vec2, ...],
-    lengths: tuple[Any, ...],
-    arms: tuple[Vec2, ...],
+    pins: Sequence[Vec2],
+    lengths: Sequence[Any],
+    arms: Sequence[Vec2],
     near: Pose,
     steps: int,
 ) -> Pose:
@@ -76,28 +107,170 @@ def corrected(
     number of right digits, and the order to which derivatives by what the pins depend on are right."""
     pose = near
     for _ in range(steps):
-        rows = _Rows(xp, pins, arms, pose)
+        rows = _Rows.at(xp, pins, arms, pose)
         wrong = tuple(0.5 * (l * l - r.squared()) for l, r in zip(lengths, rows.r, strict=True))
         dx, dy, turn = rows.solve(wrong)
         pose = Pose(pose.x + dx, pose.y + dy, pose.theta + turn)
     return pose
 
 
-class Triad:
-    """A solved triad: the ternary link as a `link` (origin and x axis of its frame), its `pins` and the `legs` from
-    their outer pins, in the order in which they were given; `margin`, the determinant over the lengths of the legs
+@dataclass
+class Triad(Group):
+    """A triad as data: the ternary link with its body, three legs whose pins move in a known way, the pins of the
+    ternary link in its own frame [m], each with its leg, further points on it, and the pose from which Newton's
+    method leads to the mode of assembly at crank angle 0."""
+
+    name: str
+    mass: Mass
+    legs: tuple[Bar, Bar, Bar]
+    arms: Mapping[str, Vec2]
+    points: Mapping[str, tuple[Any, Any]]
+    assembly: Pose
+
+    derived: ClassVar[int] = 3 * (2 * HARMONICS + 1) + 2
+    """Numbers that follow from the lengths: the series of the pose, the largest misfit, the least margin."""
+
+    @property
+    def bars(self) -> tuple[Bar, ...]:
+        """Its links, the ternary one last."""
+        return *self.legs, Bar(self.name, "", None, self.mass, self.points)
+
+    @property
+    def pins(self) -> dict[str, str]:
+        """Pins that it adds, each with the link that carries it."""
+        return dict.fromkeys(self.arms, self.name)
+
+    @property
+    def joints(self) -> tuple[tuple[str, str], ...]:
+        """Pin and link of each reaction, as `SolvedTriad.reactions` gives them."""
+        outer = ((leg.pin, leg.name) for leg in self.legs)
+        return *outer, *((pin, leg.name) for pin, leg in zip(self.arms, self.legs, strict=True))
+
+    def _lengths(self) -> tuple[Any, ...]:
+        return tuple(leg.length for leg in self.legs)
+
+    def outer(self, pins: Mapping[str, Motion]) -> tuple[Motion, ...]:
+        """Motion of the outer pins of the legs."""
+        return tuple(pins[leg.pin] for leg in self.legs)
+
+    def solve(self, xp: Any, q: Any, pins: Mapping[str, Motion], derived: Sequence[Any]) -> SolvedTriad:
+        """The triad where its outer `pins` are, on the branch that the series `derived` gives."""
+        outer, arms = self.outer(pins), tuple(self.arms.values())
+        near = pose_of_series(derived, xp.cos(q), xp.sin(q))
+        pose = corrected(xp, [pin.p for pin in outer], self._lengths(), arms, near, _STEPS)
+        return SolvedTriad.at(xp, outer, self._lengths(), arms, pose)
+
+    def modes(self, pins: Mapping[str, Motion]) -> list[Pose]:
+        """All poses in which it can be assembled where its outer `pins` are."""
+        return assembly_modes(
+            tuple(pin.p for pin in self.outer(pins)), self._lengths(), tuple(self.arms.values())
+        )
+
+    def derive(self, xp: Any, pins: Callable[[float], Mapping[str, Motion]]) -> list[Any]:
+        """The series of the pose over the crank angle, the largest misfit and the least margin around; `pins` gives
+        the outer pins at a crank angle [rad]."""
+        angles = [2.0 * math.pi * k / SAMPLES for k in range(SAMPLES)]
+        lengths, arms = self._lengths(), tuple(self.arms.values())
+
+        def pose(q: float, near: Pose, steps: int = _STEPS) -> Pose:
+            return corrected(xp, [pin.p for pin in self.outer(pins(q))], lengths, arms, near, steps)
+
+        poses = [pose(0.0, self.assembly, 8)]
+        for q in angles[1:]:
+            near = poses[-1]
+            if len(poses) > 1:
+                near = Pose(*(2.0 * now - before for now, before in zip(near, poses[-2], strict=True)))
+            poses.append(pose(q, near))
+        series = []
+        for values in zip(*poses, strict=True):
+            series.append(sum(values) / SAMPLES)
+            for n in range(1, HARMONICS + 1):
+                for wave in (math.cos, math.sin):
+                    series.append(
+                        sum(v * (2.0 / SAMPLES * wave(n * q)) for v, q in zip(values, angles, strict=True))
+                    )
+        # as in a run, halfway between the angles
+        misfit, first, least = 0.0, None, None
+        for q in angles:
+            middle = q + math.pi / SAMPLES
+            at = pins(middle)
+            triad = self.solve(xp, middle, at, series)
+            for pin, o, l in zip(triad.pins, self.outer(at), lengths, strict=True):
+                off = xp.abs(xp.sqrt((pin.p - o.p).squared()) / l - 1.0)
+                misfit = xp.maximum(misfit, xp.minimum(off, 1.0))
+            # the sign of the first: a margin that changes sign has passed a dead position
+            first = triad.margin if first is None else first
+            margin = triad.margin * first / xp.abs(first)
+            least = margin if least is None else xp.minimum(least, margin)
+        return [*series, misfit, least]
+
+
+def pose_of_series(series: Sequence[Any], cos: Any, sin: Any) -> Pose:
+    """The pose that the series gives, from cosine and sine of the crank angle."""
+    size = 2 * HARMONICS + 1
+    sums = [series[k * size] for k in range(3)]
+    c, s = cos, sin
+    for n in range(1, HARMONICS + 1):
+        for k in range(3):
+            sums[k] = sums[k] + series[k * size + 2 * n - 1] * c + series[k * size + 2 * n] * s
+        c, s = c * cos - s * sin, s * cos + c * sin
+    return Pose(*sums)
+
+
+def requirements(legs: tuple[str, ...], assembly: tuple[str, ...]) -> tuple[Requirement, Requirement]:
+    """That a triad closes all the way round, clear of its dead positions: with the names of the parameters that are
+    the lengths of its legs and its pose of assembly."""
+    return (
+        Requirement(
+            "largest misfit of a leg over the turn of the crank, in parts of its length",
+            "1",
+            "the triad does not close all the way round in the mode that `assembly` leads to, or moves too sharply "
+            "to be followed",
+            (*legs, *assembly),
+        ),
+        Requirement(
+            "least margin of the triad over the turn of the crank",
+            "1",
+            "the triad comes to a dead position, where the lines of its legs meet in one point",
+            legs,
+        ),
+    )
+
+
+def limits(derived: Sequence[Any]) -> Iterator[tuple[Any, Any, Any]]:
+    """Value, lower and upper limit of each of `requirements`, from `Triad.derive`."""
+    *_, misfit, least = derived
+    yield misfit, -math.inf, 1e-10
+    yield least, 1e-3, math.inf
+
+
+class SolvedTriad(SolvedGroup):
+    """A solved triad: its `links`, the legs from their outer pins and then the ternary link (origin and x axis of
+    its frame), its `pins` in the order of the legs, and its `margin`, the determinant over the lengths of the legs
     and the size of the ternary link: 0 is a dead position."""
 
-    __slots__ = ("_lengths", "_rows", "legs", "link", "margin", "pins")
+    __slots__ = ("_per_square", "_rows")
 
     def __init__(
         self,
-        xp: Any,
-        outer: tuple[Motion, Motion, Motion],
-        lengths: tuple[Any, ...],
-        arms: tuple[Vec2, ...],
-        pose: Pose,
+        rows: _Rows,
+        per_square: tuple[Any, ...],
+        links: tuple[Link, ...],
+        pins: tuple[Motion, ...],
+        margin: Any = 1.0,
     ) -> None:
+        super().__init__(links, pins, margin)
+        self._rows, self._per_square = rows, per_square
+
+    @classmethod
+    def at(
+        cls,
+        xp: Any,
+        outer: Sequence[Motion],
+        lengths: Sequence[Any],
+        arms: Sequence[Vec2],
+        pose: Pose,
+    ) -> SolvedTriad:
         """
         Parameters
         ----------
@@ -107,53 +280,74 @@ class Triad:
         arms : pins on the ternary link, in its own frame [m]
         pose : where it is, see `corrected`
         """
-        rows = _Rows(xp, tuple(p.p for p in outer), arms, pose)
+        rows = _Rows.at(xp, [p.p for p in outer], arms, pose)
         x1, y1, t1 = rows.solve(tuple(r.dot(p.p1) for r, p in zip(rows.r, outer, strict=True)))
         origin1 = Vec2(x1, y1)
         pins1 = tuple(origin1 + a.turned() * t1 for a in rows.arms)
-        second = []
-        for r, a, k1, p in zip(rows.r, rows.arms, pins1, outer, strict=True):
-            second.append(r.dot(p.p2 + a * (t1 * t1)) - (k1 - p.p1).squared())
-        x2, y2, t2 = rows.solve(tuple(second))
-        origin2 = Vec2(x2, y2)
+        origin2, t2 = _accelerated(rows, outer, pins1, t1)
         pins2 = tuple(origin2 + a.turned() * t2 - a * (t1 * t1) for a in rows.arms)
         origin = Motion(Vec2(pose.x, pose.y), origin1, origin2)
-        self.link = Link(origin, Vec2(xp.cos(pose.theta), xp.sin(pose.theta)), t1, t2)
-        self.pins = tuple(
+        ternary = Link(origin, Vec2(xp.cos(pose.theta), xp.sin(pose.theta)), t1, t2)
+        pins = tuple(
             Motion(p.p + r, k1, k2) for p, r, k1, k2 in zip(outer, rows.r, pins1, pins2, strict=True)
         )
-        self.legs = tuple(
-            Link(
-                p,
-                r * (1.0 / l),
-                r.cross(k1 - p.p1) / (l * l),
-                r.cross(k2 - p.p2) / (l * l),
-            )
-            for p, r, l, k1, k2 in zip(outer, rows.r, lengths, pins1, pins2, strict=True)
+        per_square = tuple(1.0 / (l * l) for l in lengths)
+        legs = tuple(
+            Link(p, r * (1.0 / l), r.cross(k.p1 - p.p1) * per, r.cross(k.p2 - p.p2) * per)
+            for p, r, l, k, per in zip(outer, rows.r, lengths, pins, per_square, strict=True)
         )
         size = xp.sqrt(sum((arms[i] - arms[i - 1]).squared() for i in range(LEGS)))
-        self.margin = rows.det / (lengths[0] * lengths[1] * lengths[2] * size)
-        self._rows = rows
-        self._lengths = lengths
+        margin = rows.det / (lengths[0] * lengths[1] * lengths[2] * size)
+        return cls(rows, per_square, (*legs, ternary), pins, margin)
 
-    def reactions(
-        self, legs: tuple[tuple[Vec2, Any], ...], ternary: tuple[Vec2, Any]
-    ) -> tuple[tuple[Vec2, ...], tuple[Vec2, ...]]:
-        """Forces on the legs at their outer pins and at the ternary link [N], from the loads on each leg, as force
+    def lifted(self, outer: tuple[Motion, ...]) -> SolvedTriad:
+        """See `SolvedGroup`."""
+        *legs, ternary = self.links
+        t1 = Dual(ternary.t1, ternary.t2)
+        arms = tuple(lifted(a, a.turned() * ternary.t1) for a in self._rows.arms)
+        rows = _Rows(
+            arms,
+            tuple(
+                lifted(r, k.p1 - leg.pin.p1) for r, k, leg in zip(self._rows.r, self.pins, legs, strict=True)
+            ),
+        )
+        pins1 = tuple(lifted(k.p1, k.p2) for k in self.pins)
+        origin2, t2 = _accelerated(rows, outer, pins1, t1)
+        start = ternary.pin
+        origin = Motion(lifted(start.p, start.p1), lifted(start.p1, start.p2), origin2)
+        plate = ternary.lifted(origin, t2)
+        pins = tuple(plate.lifted_point(k) for k in self.pins)
+        turned = (
+            leg.lifted(p, Dual(leg.t2, slope(r.cross(k.p2 - p.p2) * per)))
+            for leg, p, r, k, per in zip(legs, outer, rows.r, pins, self._per_square, strict=True)
+        )
+        return SolvedTriad(rows, self._per_square, (*turned, plate), pins)
+
+    def reactions(self, loads: tuple[Load, ...]) -> tuple[Vec2, ...]:
+        """Forces on the legs at their outer pins, then at the ternary link [N], from the loads on each leg, as force
         and moment about its outer pin, and on the ternary link, about its origin.
 
         The moment about its outer pin gives the part of the force across each leg; the pulls along the legs follow
         from two forces and one moment on the ternary link.
         """
-        force, moment = ternary
+        *legs, (force, moment) = loads
         across = []
-        for (_, m), r, a, l in zip(legs, self._rows.r, self._rows.arms, self._lengths, strict=True):
-            part = r.turned() * (-m / (l * l))
+        for (_, m), r, a, per in zip(legs, self._rows.r, self._rows.arms, self._per_square, strict=True):
+            part = r.turned() * (-m * per)
             across.append(part)
             force, moment = force - part, moment - a.cross(part)
         along = self._rows.combine(force, moment)
         inner = tuple(t + r * x for t, r, x in zip(across, self._rows.r, along, strict=True))
-        return tuple(-(f + q) for (f, _), q in zip(legs, inner, strict=True)), inner
+        return *(-(f + q) for (f, _), q in zip(legs, inner, strict=True)), *inner
+
+
+def _accelerated(rows: _Rows, outer: Sequence[Motion], pins1: Sequence[Vec2], t1: Any) -> tuple[Vec2, Any]:
+    """Second derivatives of the ternary link's origin and angle by q."""
+    second = []
+    for r, a, k1, p in zip(rows.r, rows.arms, pins1, outer, strict=True):
+        second.append(r.dot(p.p2 + a * (t1 * t1)) - (k1 - p.p1).squared())
+    x2, y2, t2 = rows.solve(tuple(second))
+    return Vec2(x2, y2), t2
 
 
 def assembly_modes(pins: tuple[Vec2, ...], lengths: tuple[float, ...], arms: tuple[Vec2, ...]) -> list[Pose]:
@@ -209,7 +403,7 @@ def assembly_modes(pins: tuple[Vec2, ...], lengths: tuple[float, ...], arms: tup
             try:
                 near = Pose(float(start.x), float(start.y), theta)
                 pose = corrected(MATH, pins, lengths, arms, near, 20)
-                rows = _Rows(MATH, pins, arms, pose)
+                rows = _Rows.at(MATH, pins, arms, pose)
             except (ArithmeticError, ValueError):
                 continue
             turned = math.remainder(pose.theta, 2.0 * math.pi)

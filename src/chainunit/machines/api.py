@@ -10,10 +10,12 @@ import numpy as np
 
 from ..engines import MATH, numpy_
 from ..errors import GeometryError, InputError
+from ..groups.loads import Stop
+from ..mechanism.machine import MachineState
 from ..ports import PortSlopes
 from ..quantities import Layout, Quantity, Variable, complaint
 from . import chain_unit
-from .chain_unit import Chamber, ChamberForces, Inputs, Outputs, Parameters, SideLoads, State, Stop
+from .chain_unit import PINS, Chamber, ChamberForces, Inputs, Outputs, Parameters, SideLoads
 from .hanging import Hanging, Modes, modes, rods, split
 
 _XP = numpy_()
@@ -107,7 +109,7 @@ class ChainUnit:
             ),
         )
 
-    def _state(self, u: Inputs) -> State:
+    def _state(self, u: Inputs) -> MachineState:
         return ChamberForces.shared(_XP, self.p, u, None)
 
     def forces(
@@ -174,10 +176,7 @@ class ChainUnit:
     ) -> Any:
         """The motor torque without friction [N m], from the reactions, group by group: the second route."""
         u = self._inputs(phi, w, a, left, right, stop)
-        s = self._state(u)
-        w2, a = s.w * s.w, u.a / self.p.ratio
-        forces = chain_unit.Reactions(s.m, self.p, w2, a, s.bias.processing_forces, s.bias.stop.moment)
-        return forces.torque / self.p.ratio
+        return self._state(u).torque_by_reactions(u.a / self.p.ratio) / self.p.ratio
 
     def friction_torque(
         self,
@@ -188,15 +187,15 @@ class ChainUnit:
         stop: Stop = FREE,
     ) -> Any:
         """The part of `tau` that pin friction and joint damping take [N m]."""
-        bias = self._state(self._inputs(phi, w, 0.0, left, right, stop)).bias
-        return bias.friction / self.p.ratio
+        state = self._state(self._inputs(phi, w, 0.0, left, right, stop))
+        return state.effects["pins"].lost / self.p.ratio
 
     def pin_turns(self, phi: Any) -> list[Any]:
         """Angle through which each of the ten pins O1, A, Bd, C, A2, B, A1 (left, then right) has turned [rad], from
         the first of the motor angles `phi`, shape (n,); the sum of all turning to and fro is left to the reader."""
         phi = _array(phi)
         m = self._state(self._inputs(phi, 0.0, 0.0, EMPTY, EMPTY)).m
-        per_turn = m.pin_rates()
+        per_turn = [m.turns[joint] for joint in PINS]
         step = np.diff(phi / self.p.ratio)
         turned = []
         for rate in per_turn:

@@ -7,29 +7,37 @@ crank angle from the upward vertical, clockwise; ``psi`` the rocker angle from t
 positive towards +x. x right, y up. A force is the one on the machine part from its support
 or neighbour. Paper 000's eqs. (24)-(34), (41)-(45), with the corrections of docs/physics.md, follow from
 the dyad of `chainunit.groups.dyad`.
-
-Below, q is the crank angle, `w` and `a` its derivatives; only at the port are `phi w a tau J` the
-motor's, with the gear `ratio` between.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, Literal
 
-from ..groups.body import Body, point_load, reflected, total
-from ..groups.driver import crank, driving_torque
+from ..groups.body import Bar, Mass
+from ..groups.driver import Crank
 from ..groups.dyad import Dyad
-from ..groups.friction import pin_losses
-from ..model import Model, Part, Requirement
-from ..planar import ZERO, Link, Motion, Vec2
-from ..ports import PortSlopes, PortValues, Start, flanges, load_terminal
+from ..groups.loads import Block, Pin, PinLosses, Processing, Resistance, Stop, Weight
+from ..mechanism.linkage import Linkage
+from ..mechanism.machine import MachineState, Mechanism
+from ..mechanism.models import (
+    AddedInertia,
+    DirectMachine,
+    DrivingTorque,
+    InverseMachine,
+    ShaftMotion,
+    Turning,
+    direct_parts,
+    inverse_parts,
+)
+from ..model import Requirement
+from ..planar import ZERO, Link, Vec2
+from ..ports import PortValues, Start
 from ..quantities import Value, declaration, group, quantity
 from .crank_rocker import TURNS, angle_at_pivot, longest_crank, pressure_angle
-from .driven import DrivenState, slopes
-from .parts import Force, Pin, Rod, force
+from .parts import Force, Rod, force
 
 SideName = Literal["left", "right"]
 SIDES: tuple[SideName, ...] = ("left", "right")
@@ -46,15 +54,6 @@ class SideMasses:
 
     wall_mass: Value = quantity("kg", "mass of the wall (rod l1)", default=54.0, min=0.0, tunable=True)
     web_mass: Value = quantity("kg", "mass of the web (rod l2)", default=21.6, min=0.0, tunable=True)
-
-
-@declaration
-class Processing:
-    """The law of the processing force."""
-
-    v_smooth: Value = quantity(
-        "m/s", "speed of B below which the force is smoothed", default=0.02, min=1e-9, tunable=True
-    )
 
 
 @declaration
@@ -127,27 +126,17 @@ class SideLoads:
 
 
 @declaration
-class Stop:
-    """A spring and damper between rocker and frame, which hold a blocked rocker; off where both are zero. The
-    smoothed friction and processing force hold nothing at rest."""
+class OrganLoads:
+    """Loads of both organs, and the stop."""
 
-    stiffness: Value = quantity("N.m/rad", "stiffness", default=0.0, min=0.0, nominal=1e6)
-    damping: Value = quantity("N.m.s/rad", "damping", default=0.0, min=0.0, nominal=1e4)
-    psi: Value = quantity("rad", "rocker angle at which the spring is free", default=0.0)
-
-
-@declaration
-class Inputs:
-    """Motion of the motor shaft and loads of the organs."""
-
-    phi: Value = quantity(
-        "rad", "motor angle; crank angle is phi/ratio, from the upward vertical, clockwise", default=0.0
-    )
-    w: Value = quantity("rad/s", "motor speed", default=0.0)
-    a: Value = quantity("rad/s2", "motor acceleration", default=0.0)
     left: SideLoads = group(SideLoads, "left organ", default=SideLoads())
     right: SideLoads = group(SideLoads, "right organ", default=SideLoads())
     stop: Stop = group(Stop, "stop that blocks the rocker", default=Stop())
+
+
+@declaration
+class Inputs(OrganLoads, ShaftMotion):
+    """Motion of the motor shaft and loads of the organs."""
 
 
 @declaration
@@ -241,92 +230,84 @@ class Outputs(Loads, PortValues):
 
 
 @declaration
-class DirectParameters(Start, Parameters):
+class DirectParameters(Start, AddedInertia, Parameters):
     """Parameters of the machine that turns by itself."""
 
-    J_added: Value = quantity(
-        "kg.m2", "inertia on the motor shaft beside the machine's", default=0.0, min=0.0, tunable=True
+
+@declaration
+class DirectInputs(OrganLoads, DrivingTorque):
+    """Torque of the motor and loads of the organs."""
+
+
+@declaration
+class DirectOutputs(Turning, Loads):
+    """Acceleration and everything the machine carries."""
+
+
+def supports(p: Any) -> dict[str, Vec2]:
+    """A1 of the left and of the right organ."""
+    return {"A1 left": Vec2(-p.z, 0.0), "A1 right": Vec2(p.z, 0.0)}
+
+
+def organ(p: Any, u: Any, side: SideName) -> Dyad:
+    """A working organ as two bars: wall (A1-B) and web (A2-B) with the material on it."""
+    masses, loads = getattr(p, side), getattr(u, side)
+    on_web = p.web_share * loads.material_mass
+
+    def rod(mass: Any, length: Any) -> Mass:
+        return Mass(mass, 0.5 * length, p.rod_inertia * mass * (length * length) * (1.0 / 12.0))
+
+    return Dyad(
+        f"B {side}",
+        Bar(
+            f"{side} wall",
+            f"A1 {side}",
+            p.l1,
+            rod(masses.wall_mass + (loads.material_mass - on_web), p.l1),
+        ),
+        Bar(f"{side} web", "A2", p.l2, rod(masses.web_mass + on_web, p.l2)),
+        -1.0 if side == "left" else 1.0,
     )
 
 
-@declaration
-class DirectInputs:
-    """Torque of the motor and loads of the organs."""
-
-    tau: Value = quantity("N.m", "torque of the motor on the shaft", default=0.0, nominal=100.0)
-    left: SideLoads = group(SideLoads, "left organ", default=SideLoads())
-    right: SideLoads = group(SideLoads, "right organ", default=SideLoads())
-    stop: Stop = group(Stop, "stop that blocks the rocker", default=Stop())
+def resistances(p: Any, u: Any) -> dict[str, Resistance]:
+    """The processing force of each side."""
+    return {
+        f"{side} processing": Resistance(f"B {side}", getattr(u, side).processing_force, p.processing)
+        for side in SIDES
+    }
 
 
-@declaration
-class DirectStates:
-    """States of the machine; each is an output, too."""
-
-    phi: Value = quantity("rad", "motor angle; crank angle is phi/ratio, from the upward vertical, clockwise")
-    w: Value = quantity("rad/s", "motor speed")
-
-
-@declaration
-class DirectOutputs(Loads):
-    """Acceleration and everything the machine carries."""
-
-    a: Value = quantity("rad/s2", "motor acceleration", nominal=100.0)
-    tau_bias: Value = quantity("N.m", "torque needed at constant speed of the shaft", nominal=100.0)
-    J: Value = quantity("kg.m2", "inertia reflected to the shaft")
-
-
-def processing_by_speed(xp: Any, p: Any, loads: Any, v2: Any) -> Any:
-    """The processing force by the speed of B, where that is `v2` squared [N s/m]."""
-    return loads.processing_force / xp.sqrt(v2 + p.processing.v_smooth * p.processing.v_smooth)
-
-
-class Organ:
-    """A working organ: the dyad wall (A1-B) and web (A2-B) with the material on it."""
-
-    __slots__ = ("dyad", "wall", "web")
-
-    def __init__(self, xp: Any, p: Any, a1: Vec2, a2: Motion, masses: Any, loads: Any, side: float) -> None:
-        self.dyad = Dyad(xp, Motion(a1), a2, p.l1, p.l2, side)
-        on_web = p.web_share * loads.material_mass
-        self.wall = self._rod(self.dyad.first, masses.wall_mass + (loads.material_mass - on_web), p.l1, p)
-        self.web = self._rod(self.dyad.second, masses.web_mass + on_web, p.l2, p)
-
-    @staticmethod
-    def _rod(link: Link, mass: Any, length: Any, p: Any) -> Body:
-        return Body(link, mass, 0.5 * length, p.rod_inertia * mass * (length * length) * (1.0 / 12.0))
-
-    def resistance(self, xp: Any, p: Any, loads: Any, w: Any) -> tuple[Vec2, Any]:
-        """The processing force on the web at B, and the torque that overcomes it (its power over w)."""
-        v1 = self.dyad.b.p1
-        v = processing_by_speed(xp, p, loads, v1.squared() * (w * w)) * w
-        return v1 * (-v), v1.squared() * v
-
-    def reactions(self, w2: Any, a: Any, g: Any, processing: Vec2) -> tuple[Vec2, Vec2, Vec2]:
-        """Forces at A1 and B on the wall and at A2 on the web."""
-        wall = self.wall.applied(w2, a, g)
-        web = total(self.web.applied(w2, a, g), point_load(self.dyad.b, self.dyad.second.pin, processing))
-        return self.dyad.reactions(wall, web)
-
-    def loads(
-        self, xp: Any, psi_hand: float, rocker: Link, forces: tuple[Vec2, Vec2, Vec2], processing: Vec2
-    ) -> Side:
-        """What the organ carries; `psi_hand` is +1 on the left and -1 on the right."""
-        at_a1, at_b, at_a2 = forces
-        wall_axis, web_axis = self.dyad.first.u, self.dyad.second.u
-        return Side(
-            **side(rocker, psi_hand, forces),
-            web_pull=xp.minimum(-web_axis.dot(at_a2), -web_axis.dot(at_b - processing)),
-            wall_pull=xp.minimum(-wall_axis.dot(at_a1), wall_axis.dot(at_b)),
+def _on_sides(xp: Any, p: Any, s: MachineState, reactions: Mapping[Any, Vec2], rocker: Link) -> Chamber:
+    """Loads of the organs, and of the rocker."""
+    sides = []
+    for side, hand in zip(SIDES, (1.0, -1.0), strict=True):
+        wall, web = f"{side} wall", f"{side} web"
+        forces = reactions[f"A1 {side}", wall], reactions[f"B {side}", wall], reactions["A2", web]
+        (processing,) = s.effects[f"{side} processing"].wrenches
+        sides.append(
+            Side(
+                **on_side(rocker, hand, forces),
+                web_pull=_pull(xp, s.m.links[web].u, forces[2], forces[1] - processing.force),
+                wall_pull=_pull(xp, s.m.links[wall].u, forces[0], -forces[1]),
+            )
         )
+    left, right = sides
+    return Chamber(rocker=RockerLoad(**rocker_load(p, left, right)), left=left, right=right)
 
 
-def side(rocker: Link, psi_hand: float, forces: tuple[Vec2, Vec2, Vec2]) -> dict[str, Any]:
-    """The fields of `Side` but the pulls, from the forces at A1, B and A2; see `Organ.loads`."""
+def _pull(xp: Any, axis: Vec2, begin: Vec2, end: Vec2) -> Any:
+    """The least pull in a rod along `axis`, from the force on it at its begin and minus that at its end."""
+    return xp.minimum(-axis.dot(begin), -axis.dot(end))
+
+
+def on_side(rocker: Link, hand: float, forces: tuple[Vec2, Vec2, Vec2]) -> dict[str, Any]:
+    """The fields of `Side` but the pulls, from the forces at A1 and B on the wall and at A2 on the web; `hand` is +1
+    on the left and -1 on the right."""
     at_a1, at_b, at_a2 = forces
     return {
         # X cos s + Y sin s with s = +-psi: the force across the arm, along the arm
-        "tangential_load": rocker.u.turned().dot(at_a2) * psi_hand,
+        "tangential_load": rocker.u.turned().dot(at_a2) * hand,
         "normal_load": -rocker.u.dot(at_a2),
         "support": force(at_a1),
         "hinge": force(at_b),
@@ -334,178 +315,8 @@ def side(rocker: Link, psi_hand: float, forces: tuple[Vec2, Vec2, Vec2]) -> dict
     }
 
 
-class CrankRocker:
-    """The drive at crank angle q: crank and dyad (coupler, rocker) as links and bodies."""
-
-    __slots__ = ("a", "bodies", "coupler_body", "crank", "crank_body", "drive", "rocker", "rocker_body")
-
-    def __init__(self, xp: Any, p: Any, q: Any) -> None:
-        self.crank = crank(xp, Vec2(-p.c, -p.hy), q)
-        self.a = self.crank.at(p.r)
-        self.drive = Dyad(xp, self.a, Motion(ZERO), p.l, p.h, -1.0)
-        self.rocker = self.drive.second
-        self.crank_body = Body(self.crank, p.crank.m, p.crank.s, p.crank.I)
-        self.coupler_body = Body(self.drive.first, p.coupler.m, p.coupler.s, p.coupler.I)
-        self.rocker_body = Body(self.rocker, p.rocker.m, p.rocker.s, p.rocker.I)
-        self.bodies: tuple[Body, ...] = (self.crank_body, self.coupler_body, self.rocker_body)
-
-    def psi(self, xp: Any) -> Any:
-        """Angle of the rocker [rad], which never reaches the horizontal."""
-        return xp.asin(self.rocker.u.x)
-
-    def pin_rates(self) -> tuple[Any, ...]:
-        """Relative rotation per crank rotation in the pins O1, A, Bd, C."""
-        k0, k1, k2 = self.crank.t1, self.drive.first.t1, self.rocker.t1
-        return k0, k1 - k0, k1 - k2, k2
-
-    def inertia(self) -> tuple[Any, Any]:
-        """Reflected inertia at the crank J [kg m2] and dJ/dq."""
-        return reflected(self.bodies)
-
-    def potential(self, g: Any) -> Any:
-        """Potential energy [J], zero at the level of C."""
-        return sum(body.potential(g) for body in self.bodies)
-
-
-class Mechanism(CrankRocker):
-    """The moving machine at crank angle q: the drive, and both organs as dyads."""
-
-    __slots__ = ("left", "right")
-
-    def __init__(self, xp: Any, p: Any, u: Any, q: Any) -> None:
-        super().__init__(xp, p, q)
-        self.left, self.right = organs(xp, p, u, self.rocker)
-        self.bodies += (self.left.wall, self.left.web, self.right.wall, self.right.web)
-
-    def pin_rates(self) -> tuple[Any, ...]:
-        """Those of the drive, then of A2, B, A1 of each side."""
-        k2, rates = self.rocker.t1, list(super().pin_rates())
-        for organ in (self.left, self.right):
-            wall, web = organ.dyad.first.t1, organ.dyad.second.t1
-            rates += [web - k2, web - wall, wall]
-        return tuple(rates)
-
-
-def supports(p: Any) -> tuple[Vec2, Vec2]:
-    """A1 of the left and of the right organ."""
-    return Vec2(-p.z, 0.0), Vec2(p.z, 0.0)
-
-
-def organs(xp: Any, p: Any, u: Any, rocker: Link) -> tuple[Organ, Organ]:
-    """Both working organs on a rocker that moves in a known way."""
-    a2, (left, right) = rocker.at(p.e), supports(p)
-    return (
-        Organ(xp, p, left, a2, p.left, u.left, -1.0),
-        Organ(xp, p, right, a2, p.right, u.right, 1.0),
-    )
-
-
-class DriveReactions:
-    """The force pass of the drive, last group first, at crank speed w (squared: `w2`) and acceleration `a`, with the
-    forces of both organs and a moment on the rocker.
-
-    Friction is left out of it: it is small, and with it the torque would no longer be linear in `a`.
-    """
-
-    __slots__ = ("at_a", "at_bd", "at_c", "at_o1", "left", "right", "torque")
-
-    def __init__(
-        self,
-        m: CrankRocker,
-        p: Any,
-        w2: Any,
-        a: Any,
-        left: tuple[Vec2, Vec2, Vec2],
-        right: tuple[Vec2, Vec2, Vec2],
-        moment: Any,
-    ) -> None:
-        """`left`, `right` are the forces at A1 and B on the wall and at A2 on the web."""
-        g = p.g
-        self.left, self.right = left, right
-        rocker = total(
-            m.rocker_body.applied(w2, a, g),
-            point_load(m.rocker.at(p.e), m.rocker.pin, -(left[2] + right[2])),
-            (ZERO, moment),
-        )
-        self.at_a, self.at_bd, self.at_c = m.drive.reactions(m.coupler_body.applied(w2, a, g), rocker)
-        self.torque, self.at_o1 = driving_torque(m.crank, m.a, m.crank_body.applied(w2, a, g), -self.at_a)
-
-    def pins(self, m: CrankRocker) -> tuple[tuple[Vec2, Any], ...]:
-        """Reaction and relative rotation per crank rotation of the pins, as in `CrankRocker.pin_rates`."""
-        return tuple(zip((self.at_o1, self.at_a, self.at_bd, self.at_c), m.pin_rates(), strict=True))
-
-
-class Reactions(DriveReactions):
-    """The force pass of the whole machine, with the `processing` force of each side and the stop's moment."""
-
-    __slots__ = ()
-
-    def __init__(
-        self, m: Mechanism, p: Any, w2: Any, a: Any, processing: tuple[Vec2, Vec2], stop_moment: Any
-    ) -> None:
-        left, right = (
-            organ.reactions(w2, a, p.g, f) for organ, f in zip((m.left, m.right), processing, strict=True)
-        )
-        super().__init__(m, p, w2, a, left, right, stop_moment)
-
-    def pins(self, m: CrankRocker) -> tuple[tuple[Vec2, Any], ...]:
-        """Reaction and relative rotation per crank rotation of the ten pins, as in `Mechanism.pin_rates`."""
-        forces = (self.at_o1, self.at_a, self.at_bd, self.at_c, *self.left[::-1], *self.right[::-1])
-        return tuple(zip(forces, m.pin_rates(), strict=True))
-
-
-class StopLoad:
-    """The stop on the rocker at crank speed `w`: moment on the rocker [N m], torque at the crank that overcomes it,
-    energy that it holds [J]."""
-
-    __slots__ = ("damping", "moment", "potential", "torque")
-
-    def __init__(self, xp: Any, u: Any, m: CrankRocker, w: Any) -> None:
-        k, turned = m.rocker.t1, m.psi(xp) - u.stop.psi
-        held = u.stop.stiffness * turned
-        self.potential = 0.5 * held * turned
-        self.damping = u.stop.damping * (k * k) * w
-        self.moment = -(held + u.stop.damping * k * w)
-        self.torque = held * k
-
-
-class Bias:
-    """The torque at constant crank speed, by virtual work, and its parts [N m at the crank].
-
-    Each loss is its power over w, written so that w = 0 is regular.
-    """
-
-    __slots__ = (
-        "conservative", "friction", "processing", "processing_forces", "reactions", "stop", "total"
-    )  # fmt: skip
-
-    def __init__(self, xp: Any, p: Any, u: Any, m: Mechanism, dJ: Any, w: Any) -> None:
-        w2 = w * w
-        force_l, torque_l = m.left.resistance(xp, p, u.left, w)
-        force_r, torque_r = m.right.resistance(xp, p, u.right, w)
-        self.processing_forces = (force_l, force_r)
-        self.processing = torque_l + torque_r
-        self.stop = StopLoad(xp, u, m, w)
-        self.reactions = Reactions(m, p, w2, 0.0, self.processing_forces, self.stop.moment)
-
-        self.friction = pin_losses(xp, p.pin, p.joint_damping, w, self.reactions.pins(m))
-        weight = sum(body.weight_slope(p.g) for body in m.bodies)
-        self.conservative = 0.5 * dJ * w2 + weight + self.stop.torque
-        self.total = self.conservative + self.processing + self.friction + self.stop.damping
-
-
-class State(DrivenState):
-    """The machine at one point: mechanism, inertia, and torque at constant speed."""
-
-    __slots__ = ()
-
-    mechanism_of, bias_of = Mechanism, Bias
-    m: Mechanism
-    bias: Bias
-
-
-def _rocker_load(p: Any, left: Side, right: Side, at_a2: Any = 0.0) -> dict[str, Any]:
-    """The fields of `RockerLoad`, which `Rocker` has, too."""
+def rocker_load(p: Any, left: Side, right: Side, at_a2: Any = 0.0) -> dict[str, Any]:
+    """The fields of `RockerLoad`, with a moment on both organs in A2 from the rocker [N m]."""
     tangential = left.tangential_load - right.tangential_load
     return {
         "tau": p.e * tangential + at_a2,
@@ -515,108 +326,91 @@ def _rocker_load(p: Any, left: Side, right: Side, at_a2: Any = 0.0) -> dict[str,
 
 
 def chamber(xp: Any, p: Any, u: Any, psi: Any, psi_w: Any, psi_a: Any) -> Chamber:
-    """Both organs on a rocker at angle `psi` with speed `psi_w` and acceleration `psi_a`, whatever drives it."""
-    rocker = Link(Motion(ZERO), Vec2(xp.sin(psi), -xp.cos(psi)), 1.0, 0.0)
-    left, right = organs(xp, p, u, rocker)
-    w2 = psi_w * psi_w
-    processing = (left.resistance(xp, p, u.left, psi_w)[0], right.resistance(xp, p, u.right, psi_w)[0])
-    forces = (
-        left.reactions(w2, psi_a, p.g, processing[0]),
-        right.reactions(w2, psi_a, p.g, processing[1]),
+    """Both organs on a rocker at angle `psi` with speed `psi_w` and acceleration `psi_a`, whatever drives it: the
+    rocker is the crank of this linkage, whose angle from the upward vertical falls as psi rises."""
+    linkage = Linkage(
+        {"C": ZERO, **supports(p)},
+        Crank(Bar("rocker", "C", p.e), "A2"),
+        tuple(organ(p, u, side) for side in SIDES),
+        {"weight": Weight(p.g), **resistances(p, u)},
     )
-    on_left = left.loads(xp, 1.0, rocker, forces[0], processing[0])
-    on_right = right.loads(xp, -1.0, rocker, forces[1], processing[1])
-    load = RockerLoad(**_rocker_load(p, on_left, on_right))
-    return Chamber(rocker=load, left=on_left, right=on_right)
+    s = MachineState(xp, Mechanism(xp, linkage, math.pi - psi), -psi_w)
+    return _on_sides(xp, p, s, s.reactions(-psi_a), s.m.links["rocker"])
 
 
-def drive_loads(
-    xp: Any,
-    p: Any,
-    s: Any,
-    a: Any,
-    f: DriveReactions,
-    left: Side,
-    right: Side,
-    at_a2: Any = 0.0,
-    at_a1: Any = 0.0,
+JOINTS = {
+    "crank_bearing": ("O1", "crank"),
+    "crank_pin": ("A", "coupler"),
+    "coupler_pin": ("Bd", "coupler"),
+    "pivot": ("C", "rocker"),
+}
+"""Output and joint of each reaction of the drive."""
+PINS = (
+    *JOINTS.values(),
+    *(
+        joint
+        for side in SIDES
+        for joint in (("A2", f"{side} web"), (f"B {side}", f"{side} wall"), (f"A1 {side}", f"{side} wall"))
+    ),
+)
+"""All joints: O1, A, Bd, C, then A2, B, A1 of each side."""
+
+
+def on_drive(
+    xp: Any, p: Any, s: Any, a: Any, reactions: Mapping[Any, Vec2], at_a1: Any = 0.0
 ) -> dict[str, Any]:
-    """The fields of `Loads` but energies and margin, at crank acceleration `a`.
-
-    Parameters
-    ----------
-    s : state with crank speed `w`, drive `m`, `bias` and `torque`
-    f, left, right : the force pass at `a`, and what the organs carry in it
-    at_a2, at_a1 : moments on both organs in these pins, from the rocker and from the frame [N m]
-    """
-    m, w = s.m, s.w
-    torque, rocker = s.torque(a), m.rocker
-    at_frame = f.at_o1 + f.at_c + f.left[0] + f.right[0]
-    moment = m.crank.pin.p.cross(f.at_o1) + at_a1
-    for a1, forces in zip(supports(p), (f.left, f.right), strict=True):
-        moment = moment + a1.cross(forces[0])
+    """The fields of `Loads` that do not depend on the kind of organ, at crank acceleration `a`; `at_a1` is the moment
+    on both organs at their walls, from the frame [N m]."""
+    at_frame, moment = ZERO, at_a1
+    for (pin, _), f in reactions.items():
+        if pin in s.m.linkage.ground:
+            at_frame = at_frame + f
+            moment = moment + s.m.pins[pin].p.cross(f)
+    (stop,) = s.effects["stop"].wrenches
+    friction = s.effects["pins"].lost
+    a_to_c = s.m.pins["A"].p
     return {
-        "rocker": Rocker(
-            psi=m.psi(xp),
-            w=rocker.t1 * w,
-            a=rocker.t1 * a + rocker.t2 * (w * w),
-            **_rocker_load(p, left, right, at_a2),
-        ),
-        "left": left,
-        "right": right,
-        "pivot": force(f.at_c),
-        "crank_bearing": force(f.at_o1),
-        "crank_pin": force(f.at_a),
-        "coupler_pin": force(f.at_bd),
-        "pressure_angle": pressure_angle(xp, p.l, p.h, (m.drive.r1 - m.drive.r2).squared()),
-        "frame": Frame(
-            fx=-at_frame.x, fy=-at_frame.y, moment=torque - s.bias.friction - moment - s.bias.stop.moment
-        ),
-        "power": torque * w,
+        **{name: force(reactions[joint]) for name, joint in JOINTS.items()},
+        "pressure_angle": pressure_angle(xp, p.l, p.h, a_to_c.squared()),
+        "frame": Frame(fx=-at_frame.x, fy=-at_frame.y, moment=s.torque(a) - friction - moment - stop.moment),
     }
 
 
-def _loads(xp: Any, p: Any, s: State, a: Any) -> dict[str, Any]:
-    """The fields of `Loads` at crank acceleration `a`."""
-    m, w, bias = s.m, s.w, s.bias
-    f = Reactions(m, p, w * w, a, bias.processing_forces, bias.stop.moment)
-    force_l, force_r = bias.processing_forces
-    on_left = m.left.loads(xp, 1.0, m.rocker, f.left, force_l)
-    on_right = m.right.loads(xp, -1.0, m.rocker, f.right, force_r)
+def rocker_motion(xp: Any, s: Any, a: Any) -> dict[str, Any]:
+    """The motion of the rocker at crank acceleration `a`, as `Rocker` has it; it never reaches the horizontal."""
+    link = s.m.links["rocker"]
     return {
-        **drive_loads(xp, p, s, a, f, on_left, on_right),
-        "kinetic_energy": 0.5 * s.J * (w * w),
-        "potential_energy": m.potential(p.g) + bias.stop.potential,
-        "dissipated_power": (bias.friction + bias.processing + bias.stop.damping) * w,
-        "margin": xp.minimum(
-            xp.abs(m.drive.transmission),
-            xp.minimum(xp.abs(m.left.dyad.transmission), xp.abs(m.right.dyad.transmission)),
-        ),
+        "psi": xp.asin(link.u.x),
+        "w": link.t1 * s.w,
+        "a": link.t1 * a + link.t2 * (s.w * s.w),
     }
 
 
-def _outputs(xp: Any, p: Any, u: Any, x: Any, s: State) -> Outputs:
-    a = u.a / p.ratio
-    return Outputs(
-        tau=s.torque(a) / p.ratio,
-        **s.port(p, u),
-        **_loads(xp, p, s, a),
+def drive(p: Any, u: Any, organs: tuple[Any, ...], processing: Mapping[str, Any]) -> Linkage:
+    """The crank-rocker with its stop, and the organs on it."""
+    rocker = Bar("rocker", "C", p.h, p.rocker, {"A2": (p.e, 0.0)})
+    return Linkage(
+        {"O1": Vec2(-p.c, -p.hy), "C": ZERO, **supports(p)},
+        Crank(Bar("crank", "O1", p.r, p.crank), "A"),
+        (Dyad("Bd", Bar("coupler", "A", p.l, p.coupler), rocker, -1.0), *organs),
+        {
+            "weight": Weight(p.g),
+            **processing,
+            "stop": Block("rocker", u.stop),
+            "pins": PinLosses(p.pin, p.joint_damping),
+        },
     )
 
 
-def _acceleration(p: Any, u: Any, s: State) -> Any:
-    """Motor acceleration: (J_added + J) a = tau - tau_bias, all at the motor shaft."""
-    return (u.tau - s.bias.total / p.ratio) / (p.J_added + s.J / (p.ratio * p.ratio))
-
-
-def _direct_outputs(xp: Any, p: Any, u: Any, x: Any, s: State) -> DirectOutputs:
-    a = _acceleration(p, u, s)
-    return DirectOutputs(
-        a=a,
-        tau_bias=s.bias.total / p.ratio,
-        J=s.J / (p.ratio * p.ratio),
-        **_loads(xp, p, s, a / p.ratio),
-    )
+def _probes(xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
+    reactions = s.reactions(a)
+    organs = _on_sides(xp, p, s, reactions, s.m.links["rocker"])
+    return {
+        "rocker": Rocker(**rocker_motion(xp, s, a), **vars(organs.rocker)),
+        "left": organs.left,
+        "right": organs.right,
+        **on_drive(xp, p, s, a, reactions),
+    }
 
 
 def rocker_extremes(xp: Any, p: Any) -> tuple[Any, Any]:
@@ -651,7 +445,7 @@ def half_width_range(xp: Any, e: Any, l1: Any, l2: Any, swing: Any, z: Any = mat
     return xp.maximum(low, 0.0), xp.minimum(high, longest)
 
 
-class ChamberForces(Model):
+class ChamberForces(InverseMachine):
     """The inverse model: motion of the motor shaft in, torque and every reaction out."""
 
     name = "ChamberForces"
@@ -661,7 +455,6 @@ class ChamberForces(Model):
     )
     Parameters = Parameters
     Inputs = Inputs
-    terminals = (*flanges("inflow"), load_terminal())
 
     required = (
         Requirement("c", "m", "the crank circle must stay left of the pivot C", depends=("r",)),
@@ -694,24 +487,14 @@ class ChamberForces(Model):
         yield p.z, low, high
 
     @staticmethod
-    def shared(xp: Any, p: Any, u: Any, x: Any) -> State:
-        """The machine at the crank angle and speed that belong to the motor's."""
-        return State(xp, p, u, u.phi / p.ratio, u.w / p.ratio)
+    def linkage(p: Any, u: Any) -> Linkage:
+        """Crank, dyad, and an organ on each side."""
+        return drive(p, u, tuple(organ(p, u, side) for side in SIDES), resistances(p, u))
 
-    parts = (
-        Part(
-            Outputs,
-            _outputs,
-        ),
-        Part(
-            PortSlopes,
-            slopes,
-            derivatives={"tau_bias_dphi": ("tau_bias", "phi"), "tau_bias_dw": ("tau_bias", "w")},
-        ),
-    )
+    parts = inverse_parts(Outputs, _probes)
 
 
-class DirectChainUnit(Model):
+class DirectChainUnit(DirectMachine):
     """The direct model: motor torque in, motion out. As an FMU it is called ChainUnit."""
 
     name = "ChainUnit"
@@ -721,42 +504,7 @@ class DirectChainUnit(Model):
     )
     Parameters = DirectParameters
     Inputs = DirectInputs
-    States = DirectStates
-    terminals = flanges("inflow")
-    required = (
-        *ChamberForces.required,
-        Requirement(
-            "inertia of the crank and on its shaft",
-            "kg.m2",
-            "at the dead points of the rocker nothing else carries the torque; give crank.I, crank.m or J_added",
-        ),
-    )
+    inverse = ChamberForces
+    required = (*ChamberForces.required, DirectMachine.carried)
 
-    @staticmethod
-    def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """Those of the inverse model, and an inertia that never vanishes."""
-        yield from ChamberForces.requirements(xp, p)
-        yield p.J_added * p.ratio * p.ratio + p.crank.I + p.crank.m * p.crank.s * p.crank.s, 0.0, math.inf
-
-    @staticmethod
-    def initial_states(xp: Any, p: Any) -> Any:
-        """The start angle and speed."""
-        return DirectStates(phi=p.phi_start, w=p.w_start)
-
-    @staticmethod
-    def internal_step(xp: Any, p: Any) -> Any:
-        """A quarter of a millisecond: the motion is slow, and smoothed friction near rest, its fastest part, takes
-        some milliseconds with the declared `pin.w_smooth`; a much smaller one wants Model Exchange."""
-        return 2.5e-4
-
-    @staticmethod
-    def shared(xp: Any, p: Any, u: Any, x: Any) -> State:
-        """The machine at the crank angle and speed that belong to the motor's."""
-        return State(xp, p, u, x.phi / p.ratio, x.w / p.ratio)
-
-    @staticmethod
-    def derivatives(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
-        """Time derivatives of the states, in declared order."""
-        return [x.w, _acceleration(p, u, DirectChainUnit.shared(xp, p, u, x))]
-
-    parts = (Part(DirectOutputs, _direct_outputs),)
+    parts = direct_parts(DirectOutputs, _probes)

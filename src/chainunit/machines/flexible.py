@@ -35,27 +35,29 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..engines import Dual, dual, slope
 from ..errors import InputError
 from ..groups import chain
-from ..groups.dyad import Dyad
-from ..groups.friction import pin_losses
+from ..groups.loads import Effect, Resistance, wrench_at
 from ..integrate import Solver
+from ..mechanism.linkage import Linkage
+from ..mechanism.machine import MachineState, Mechanism
 from ..model import Model, Part, Requirement
 from ..planar import ZERO, Link, Motion, Vec2
 from ..ports import PortSlopes
 from ..quantities import Layout, Value, declaration, group, quantity
 from . import chain_unit
 from .chain_unit import (
+    SIDES,
     ChamberForces,
-    CrankRocker,
-    DriveReactions,
     Inputs,
     Outputs,
-    StopLoad,
-    drive_loads,
+    Rocker,
+    on_drive,
+    rocker_load,
+    rocker_motion,
     supports,
 )
 
@@ -163,7 +165,8 @@ class Hung:
         rods: chain.Rods,
         walls: int,
         a1: Vec2,
-        rocker: Link,
+        a2: Motion,
+        turn: Any,
         w: Any,
         state: tuple[Sequence[Any], Sequence[Any]],
         loads: Any,
@@ -174,18 +177,18 @@ class Hung:
         Parameters
         ----------
         walls : number of rods in the wall
-        rocker : its motion per rotation of the crank
+        a2, turn : motion of A2, and rotation of the rocker per rotation of the crank
         w, a : speed of the crank [rad/s], and the acceleration for which `chain` is solved [rad/s2]
         state : angles and speeds of the rods
         loads : `SideLoads`
         closing : rate at which the chain is drawn to A2 [1/s]
         """
         self.rods, self.walls, self.state = rods, walls, state
-        self.a2, self.turn = rocker.at(p.e), rocker.t1
+        self.a2, self.turn = a2, turn
         theta, omega = state
         pins = chain.pins(rods.lengths, theta, omega, xp)
         v, end = pins[walls].p1, pins[-1]
-        per_speed = chain_unit.processing_by_speed(xp, p, loads, v.squared())
+        per_speed = Resistance("B", loads.processing_force, p.processing).per_speed(xp, v.squared())
         self.processing, self.resisted = v * (-per_speed), v.squared() * per_speed
         self.missing = self.a2.p - a1 - end.p
         late = self.a2.p1 * w - end.p1
@@ -247,113 +250,78 @@ def _energies(xp: Any, p: Any, hung: Hung, a1: Vec2) -> tuple[Any, Any, Any]:
     return kinetic, potential, per_kg
 
 
-def _organs(
-    xp: Any,
-    p: Any,
-    u: Any,
-    rods: Sequence[chain.Rods],
-    walls: int,
-    states: Any,
-    m: CrankRocker,
-    w: Any,
-    a: Any = 0.0,
-    closing: float = 0.0,
-) -> tuple[Hung, ...]:
-    """Both chains on the rocker of `m`."""
-    return tuple(
-        Hung(xp, p, each, walls, a1, m.rocker, w, state, loads, a, closing)
-        for each, a1, state, loads in zip(rods, supports(p), states, (u.left, u.right), strict=True)
-    )
+class HangingOrgan(NamedTuple):
+    """A chain as a load of the rocker: of the `side`, of these rods, `walls` of them in the wall, in this state, with
+    these `SideLoads`."""
 
+    p: Any
+    side: str
+    rods: chain.Rods
+    walls: int
+    state: tuple[Sequence[Any], Sequence[Any]]
+    loads: Any
+    by_reactions: bool = False
 
-class _Bias:
-    """The torque at constant crank speed and what it consists of [N m at the crank]."""
+    def hung(self, xp: Any, m: Mechanism, w: Any, a: Any = 0.0, closing: float = 0.0) -> Hung:
+        """The chain where the rocker holds it; see `Hung`."""
+        a1, turn = m.pins[f"A1 {self.side}"].p, m.links["rocker"].t1
+        return Hung(
+            xp, self.p, self.rods, self.walls, a1, m.pins["A2"], turn, w, self.state, self.loads, a, closing
+        )
 
-    __slots__ = ("friction", "stop", "total")
-
-    def __init__(
-        self, xp: Any, p: Any, u: Any, m: CrankRocker, dJ: Any, w: Any, organs: Sequence[Hung]
-    ) -> None:
-        self.stop = StopLoad(xp, u, m, w)
-        reactions = _reactions(p, m, organs, [h.chain.forces for h in organs], w, 0.0, self.stop)
-        self.friction = pin_losses(xp, p.pin, p.joint_damping, w, reactions.pins(m))
-        weight = sum(body.weight_slope(p.g) for body in m.bodies)
-        self.total = (
-            0.5 * dJ * w * w
-            + weight
-            + self.stop.torque
-            + self.stop.damping
-            + self.friction
-            + sum(h.torque() for h in organs)
+    def effect(self, xp: Any, m: Mechanism, w: Any, reactions: Any) -> Effect:
+        """See `chainunit.groups.loads.Acting`."""
+        h = self.hung(xp, m, w)
+        at_a2 = wrench_at(m, "A2", -h.chain.forces[-1])
+        return Effect(
+            (at_a2._replace(moment=at_a2.moment - h.chain.moment_at_end),),
+            held=h.torque(),
+            inertia=h.inertia(),
+            inertial=(wrench_at(m, "A2", -h.per_acceleration()),),
+            source=h,
         )
 
 
-def _reactions(
-    p: Any,
-    m: CrankRocker,
-    organs: Sequence[Hung],
-    forces: Sequence[list[Vec2]],
-    w: Any,
-    a: Any,
-    stop: StopLoad,
-) -> DriveReactions:
-    left, right = ((-f[0], f[h.walls], f[-1]) for h, f in zip(organs, forces, strict=True))
-    moment = stop.moment - sum(h.chain.moment_at_end for h in organs)
-    return DriveReactions(m, p, w * w, a, left, right, moment)
+class State(MachineState):
+    """The machine at one point: the drive as mechanism, and both chains as loads on it."""
 
+    __slots__ = ("_slopes", "organs")
 
-class State:
-    """The machine at one point: drive `m`, both chains, inertia `J` and torque at constant speed."""
-
-    __slots__ = ("J", "_slopes", "_turned", "bias", "drive_inertia", "m", "organs", "w")
-
-    def __init__(
-        self, xp: Any, p: Any, u: Any, rods: Sequence[chain.Rods], walls: int, states: Any, q: Any, w: Any
-    ) -> None:
-        self.w = w
-        self._turned = (xp, p, u, rods, walls, states, q)
+    def __init__(self, xp: Any, m: Mechanism, w: Any, loads: Any = None) -> None:
+        super().__init__(xp, m, w, loads)
+        self.organs: tuple[Hung, ...] = tuple(self.effects[f"{side} organ"].source for side in SIDES)
         self._slopes: tuple[Any, Any, Any] | None = None
-        self.m = m = CrankRocker(xp, p, q)
-        self.organs = _organs(xp, p, u, rods, walls, states, m, w)
-        self.drive_inertia, dJ = m.inertia()
-        self.J = self.drive_inertia + sum(h.inertia() for h in self.organs)
-        self.bias = _Bias(xp, p, u, m, dJ, w, self.organs)
 
-    def torque(self, a: Any) -> Any:
-        """The crank torque at crank acceleration `a` [N m]."""
-        return self.J * a + self.bias.total
+    def _moving(self, omegas: Sequence[Any], rates: Sequence[Any]) -> dict[str, Any]:
+        """The loads with chains that move at these rates of their angles (none: they stand) and speeds."""
+        loads = dict(self._loads)
+        for side, h, omega, rate in zip(SIDES, self.organs, omegas, rates, strict=True):
+            theta, speeds = h.state
+            angles = theta if omega is None else [Dual(x, v) for x, v in zip(theta, omega, strict=True)]
+            moving = angles, [Dual(v, a) for v, a in zip(speeds, rate, strict=True)]
+            loads[f"{side} organ"] = loads[f"{side} organ"]._replace(state=moving)
+        return loads
 
-    def slopes(self) -> tuple[Any, Any, Any]:
-        """tau_bias_dphi, tau_bias_dw and dJ_dphi at the crank, along the motion."""
+    def along(self, q: Any) -> tuple[Any, Any, Any]:
+        """tau_bias_dphi, tau_bias_dw and dJ_dphi at the crank angle `q`, along the motion."""
         if self._slopes is None:
-            xp, p, u, rods, walls, states, q = self._turned
-            w, engine = self.w, dual(xp)
-            moving = [
-                ([Dual(a, v) for a, v in zip(theta, omega, strict=True)],
-                 [Dual(v, rate) for v, rate in zip(omega, h.chain.rates, strict=True)])
-                for (theta, omega), h in zip(states, self.organs, strict=True)
-            ]  # fmt: skip
-            along = State(engine, p, u, rods, walls, moving, Dual(q, w), w)
-            faster = []
-            for (theta, omega), h in zip(states, self.organs, strict=True):
-                pushed, _ = h.at(1.0)
-                by_a = [one - rate for one, rate in zip(pushed, h.chain.rates, strict=True)]
-                faster.append((theta, [Dual(v, more) for v, more in zip(omega, by_a, strict=True)]))
-            quick = Dual(w, 1.0)
-            organs = _organs(engine, p, u, rods, walls, faster, self.m, quick)
-            quicker = _Bias(engine, p, u, self.m, self.m.inertia()[1], quick, organs)
+            w, engine = self.w, dual(self._xp)
+            rates = [h.chain.rates for h in self.organs]
+            moved = Mechanism(engine, self.m.linkage, Dual(q, w))
+            along = MachineState(engine, moved, w, self._moving([h.state[1] for h in self.organs], rates))
+            by_a = [
+                [one - rate for one, rate in zip(h.at(1.0)[0], h.chain.rates, strict=True)]
+                for h in self.organs
+            ]
+            quicker = MachineState(engine, self.m, Dual(w, 1.0), self._moving([None, None], by_a))
             w2 = w * w
             share = w * w2 / (w2 * w2 + W_SMALL * W_SMALL * W_SMALL * W_SMALL)
-            self._slopes = (
-                slope(along.bias.total) * share,
-                slope(quicker.total),
-                slope(along.J) * share,
-            )
+            self._slopes = slope(along.bias) * share, slope(quicker.bias), slope(along.J) * share
         return self._slopes
 
 
 def _side(
-    xp: Any, p: Any, h: Hung, a1: Vec2, hand: float, m: CrankRocker, forces: list[Vec2], given: Any
+    xp: Any, p: Any, h: Hung, a1: Vec2, hand: float, m: Mechanism, forces: list[Vec2], given: Any
 ) -> dict[str, Any]:
     """The fields of the declared side of an organ; `hand` is +1 on the left and -1 on the right."""
     theta, walls, N = h.state[0], h.walls, len(h.rods)
@@ -366,7 +334,7 @@ def _side(
     slack = [xp.maximum(0.0, xp.minimum(1.0, -pull * (1.0 / _NO_PULL))) for pull in pulls]
     kinetic, potential, per_kg = _energies(xp, p, h, a1)
     return {
-        **chain_unit.side(m.rocker, hand, (-forces[0], forces[walls], forces[-1])),
+        **chain_unit.on_side(m.links["rocker"], hand, (-forces[0], forces[walls], forces[-1])),
         "web_pull": functools.reduce(xp.minimum, least[walls:]),
         "wall_pull": functools.reduce(xp.minimum, least[:walls]),
         "slack_share": sum(slack) * (1.0 / N),
@@ -385,11 +353,11 @@ def _largest_fold(xp: Any, theta: Sequence[Any]) -> Any:
     return functools.reduce(xp.maximum, [xp.abs(outer - inner) for inner, outer in pairwise(theta)])
 
 
-def _bars(xp: Any, dyad: Dyad) -> list[Any]:
+def _bars(xp: Any, first: Link, second: Link) -> list[Any]:
     """Angles of wall and web as two rods."""
-    wall, web = dyad.first.u, -dyad.second.u
-    first = xp.atan2(wall.x, -wall.y)
-    return [first, first + xp.atan2(wall.cross(web), wall.dot(web))]
+    wall, web = first.u, -second.u
+    angle = xp.atan2(wall.x, -wall.y)
+    return [angle, angle + xp.atan2(wall.cross(web), wall.dot(web))]
 
 
 def _gradient(b: Sequence[Any], l: Sequence[Any], H: Any, v: Any, reach: tuple[Any, Any], xp: Any) -> Any:
@@ -506,56 +474,68 @@ def _flexible(walls: int, webs: int) -> type[Model]:
     def rods(p: Any, u: Any) -> tuple[chain.Rods, chain.Rods]:
         return _rods(p, counts, p.left, u.left), _rods(p, counts, p.right, u.right)
 
+    def linkage(p: Any, u: Any, state: Sequence[Any]) -> Linkage:
+        organs = {
+            f"{side} organ": HangingOrgan(p, side, each, walls, own, getattr(u, side))
+            for side, each, own in zip(SIDES, rods(p, u), state, strict=True)
+        }
+        return chain_unit.drive(p, u, (), organs)
+
+    def hung(xp: Any, m: Mechanism, w: Any, a: Any = 0.0, closing: float = 0.0) -> Iterator[Hung]:
+        for side in SIDES:
+            yield m.linkage.loads[f"{side} organ"].hung(xp, m, w, a, closing)
+
     def results(xp: Any, p: Any, u: Any, x: Any, s: State) -> Any:
         a = u.a / p.ratio
         forces = [h.at(a)[1] for h in s.organs]
         left, right = (
             side_loads(**_side(xp, p, h, a1, hand, s.m, each, state.energy_due))
             for h, a1, hand, each, state in zip(
-                s.organs, supports(p), (1.0, -1.0), forces, (x.left, x.right), strict=True
+                s.organs, supports(p).values(), (1.0, -1.0), forces, (x.left, x.right), strict=True
             )
         )
-        margin = xp.abs(s.m.drive.transmission)
+        margin = s.margin()
         if N == LEAST:
             for theta, _ in (h.state for h in s.organs):
                 margin = xp.minimum(margin, xp.abs(xp.sin(theta[1] - theta[0])))
-        drive = drive_loads(
-            xp,
-            p,
-            s,
-            a,
-            _reactions(p, s.m, s.organs, forces, s.w, a, s.bias.stop),
-            left,
-            right,
-            sum(h.chain.moment_at_end for h in s.organs),
-            sum(h.chain.moment_at_start for h in s.organs),
+        reactions = s.reactions(a)
+        for side, each in zip(SIDES, forces, strict=True):
+            reactions[f"A1 {side}", f"{side} wall"] = -each[0]
+        at_a2, at_a1 = (
+            sum(getattr(h.chain, moment) for h in s.organs) for moment in ("moment_at_end", "moment_at_start")
         )
         return outputs(
             tau=s.torque(a) / p.ratio,
-            tau_bias=s.bias.total / p.ratio,
+            tau_bias=s.bias / p.ratio,
             J=s.J / (p.ratio * p.ratio),
-            dJ_dphi=s.slopes()[2] / (p.ratio * p.ratio * p.ratio),
+            dJ_dphi=s.along(u.phi / p.ratio)[2] / (p.ratio * p.ratio * p.ratio),
             phi0=u.phi,
             w0=u.w,
-            **drive,
-            kinetic_energy=0.5 * s.drive_inertia * (s.w * s.w) + left.kinetic_energy + right.kinetic_energy,
-            potential_energy=s.m.potential(p.g)
-            + s.bias.stop.potential
-            + left.potential_energy
-            + right.potential_energy,
-            dissipated_power=(s.bias.friction + s.bias.stop.damping) * s.w + sum(h.lost() for h in s.organs),
+            rocker=Rocker(**rocker_motion(xp, s, a), **rocker_load(p, left, right, at_a2)),
+            left=left,
+            right=right,
+            **on_drive(xp, p, s, a, reactions, at_a1),
+            power=s.torque(a) * s.w,
+            kinetic_energy=0.5 * (s.J - sum(h.inertia() for h in s.organs)) * (s.w * s.w)
+            + left.kinetic_energy
+            + right.kinetic_energy,
+            potential_energy=s.held_energy + left.potential_energy + right.potential_energy,
+            dissipated_power=s.lost * s.w + sum(h.lost() for h in s.organs),
             margin=margin,
         )
 
     def port_slopes(xp: Any, p: Any, u: Any, x: Any, s: State) -> PortSlopes:
-        by_angle, by_speed, _ = s.slopes()
+        by_angle, by_speed, _ = s.along(u.phi / p.ratio)
         per_motor_turn = 1.0 / (p.ratio * p.ratio)
         return PortSlopes(tau_bias_dphi=by_angle * per_motor_turn, tau_bias_dw=by_speed * per_motor_turn)
 
-    def reaches(xp: Any, p: Any, rocker: Link) -> Iterator[tuple[Any, Any]]:
+    def bare_drive(xp: Any, p: Any, u: Any, q: Any) -> Mechanism:
+        return Mechanism(xp, chain_unit.drive(p, u, (), {}), q)
+
+    def reaches(xp: Any, p: Any, m: Mechanism) -> Iterator[tuple[Any, Any]]:
         """From A1 to A2 in parts of the length, the right organ mirrored."""
-        a2, whole = rocker.at(p.e).p, p.l1 + p.l2
-        for hand, a1 in zip((1.0, -1.0), supports(p), strict=True):
+        a2, whole = m.pins["A2"].p, p.l1 + p.l2
+        for hand, a1 in zip((1.0, -1.0), supports(p).values(), strict=True):
             yield (a2 - a1).x * hand / whole, (a2 - a1).y / whole
 
     class ChainUnitFlexible(Model):
@@ -622,8 +602,8 @@ def _flexible(walls: int, webs: int) -> type[Model]:
         @staticmethod
         def start_limits(xp: Any, p: Any, u: Any, x: Any) -> Iterator[tuple[Any, Any, Any]]:
             """Of each side: the chain ends at A2, and no stop between rods is met."""
-            m = CrankRocker(xp, p, u.phi / p.ratio)
-            for h in _organs(xp, p, u, rods(p, u), walls, split(x), m, 0.0):
+            m = Mechanism(xp, linkage(p, u, split(x)), u.phi / p.ratio)
+            for h in hung(xp, m, 0.0):
                 yield h.missing.length(xp), -math.inf, _CLOSED
                 yield _largest_fold(xp, h.state[0]), -math.inf, p.organ.fold_limit
 
@@ -643,7 +623,7 @@ def _flexible(walls: int, webs: int) -> type[Model]:
             found: list[Any] = []
             if N == LEAST:
                 return found
-            for x, y in reaches(xp, p, CrankRocker(xp, p, u.phi / p.ratio).rocker):
+            for x, y in reaches(xp, p, bare_drive(xp, p, u, u.phi / p.ratio)):
                 spare = xp.maximum(1e-9, 1.0 - xp.sqrt(x * x + y * y))
                 found += [xp.maximum(x, 0.05) / xp.sqrt(24.0 * spare), 0.5, 1.0]
             return found
@@ -651,7 +631,7 @@ def _flexible(walls: int, webs: int) -> type[Model]:
         @staticmethod
         def start_improved(xp: Any, p: Any, u: Any, z: Sequence[Any]) -> list[Any]:
             """One round of each side; see `_hang`."""
-            where = reaches(xp, p, CrankRocker(xp, p, u.phi / p.ratio).rocker)
+            where = reaches(xp, p, bare_drive(xp, p, u, u.phi / p.ratio))
             left, right = (
                 _hang(xp, each, reach, z[3 * k : 3 * k + 3])
                 for k, (each, reach) in enumerate(zip(rods(p, u), where, strict=True))
@@ -661,21 +641,21 @@ def _flexible(walls: int, webs: int) -> type[Model]:
         @classmethod
         def started(cls, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> Any:
             """Hanging at rest, and taken along by A2 where the crank turns."""
-            m, w = CrankRocker(xp, p, u.phi / p.ratio), u.w / p.ratio
+            of = ChamberForces.linkage(p, u) if N == LEAST else chain_unit.drive(p, u, (), {})
+            m, w = Mechanism(xp, of, u.phi / p.ratio), u.w / p.ratio
             found = []
-            bars = chain_unit.organs(xp, p, u, m.rocker) if N == LEAST else ()
-            for k, (hand, each) in enumerate(zip((1.0, -1.0), rods(p, u), strict=True)):
+            for k, (side, hand, each) in enumerate(zip(SIDES, (1.0, -1.0), rods(p, u), strict=True)):
                 if N == LEAST:
-                    theta = _bars(xp, bars[k].dyad)
+                    theta = _bars(xp, m.links[f"{side} wall"], m.links[f"{side} web"])
                 else:
                     H, v = z[3 * k : 3 * k + 2]
                     theta = [xp.atan2(hand * H, v - b) for b in _shape(each)[1]]
                 hanging = theta, [0.0 * theta[0]] * N
                 # once: of a chain that was not found to hang it leaves a gap, see `start_limits`
-                found.append(_closed(xp, p, each, supports(p)[k], m.rocker, w, hanging, 1)[:2])
-            organs = _organs(xp, p, u, rods(p, u), walls, found, m, w)
+                found.append(_closed(xp, each, side, m, w, hanging)[:2])
+            m = Mechanism(xp, linkage(p, u, found), u.phi / p.ratio)
             sides = []
-            for (theta, omega), h, a1 in zip(found, organs, supports(p), strict=True):
+            for (theta, omega), h, a1 in zip(found, hung(xp, m, w), supports(p).values(), strict=True):
                 kinetic, potential, _ = _energies(xp, p, h, a1)
                 sides.append(of_side.instance([*theta, *omega, kinetic + potential]))
             return states(left=sides[0], right=sides[1])
@@ -684,27 +664,27 @@ def _flexible(walls: int, webs: int) -> type[Model]:
         def closed(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
             """Both chains end at A2 and move with it, by the smallest change in the metric of the masses. Where the
             drive has corrected its speed this is a jolt from the rocker, whose work counts."""
-            m, w = CrankRocker(xp, p, u.phi / p.ratio), u.w / p.ratio
+            m, w = bare_drive(xp, p, u, u.phi / p.ratio), u.w / p.ratio
             found: list[Any] = []
-            for each, a1, state, due in zip(
-                rods(p, u), supports(p), split(x), (x.left.energy_due, x.right.energy_due), strict=True
-            ):
-                theta, omega, work = _closed(xp, p, each, a1, m.rocker, w, state, 1)
+            dues = x.left.energy_due, x.right.energy_due
+            for side, each, state, due in zip(SIDES, rods(p, u), split(x), dues, strict=True):
+                theta, omega, work = _closed(xp, each, side, m, w, state)
                 found += [*theta, *omega, due + work]
             return found
 
         @staticmethod
         def shared(xp: Any, p: Any, u: Any, x: Any) -> State:
             """The machine at the crank angle and speed that belong to the motor's."""
-            return State(xp, p, u, rods(p, u), walls, split(x), u.phi / p.ratio, u.w / p.ratio)
+            m = Mechanism(xp, linkage(p, u, split(x)), u.phi / p.ratio)
+            return State(xp, m, u.w / p.ratio)
 
         @staticmethod
         def derivatives(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
             """Time derivatives of the states, in declared order."""
             w, a = u.w / p.ratio, u.a / p.ratio
-            m = CrankRocker(xp, p, u.phi / p.ratio)
+            m = Mechanism(xp, linkage(p, u, split(x)), u.phi / p.ratio)
             rates: list[Any] = []
-            for h in _organs(xp, p, u, rods(p, u), walls, split(x), m, w, a, CLOSING):
+            for h in hung(xp, m, w, a, CLOSING):
                 rates += [*h.state[1], *h.chain.rates, h.torque() * w - h.lost()]
             return rates
 
@@ -717,10 +697,10 @@ def _flexible(walls: int, webs: int) -> type[Model]:
 
 
 def _closed(
-    xp: Any, p: Any, rods: chain.Rods, a1: Vec2, rocker: Link, w: Any, state: tuple[Any, Any], rounds: int
+    xp: Any, rods: chain.Rods, side: str, m: Mechanism, w: Any, state: tuple[Any, Any]
 ) -> tuple[list[Any], list[Any], Any]:
-    a2 = rocker.at(p.e)
-    return chain.jolted(xp, rods, *state, Motion(a2.p - a1, a2.p1 * w), rounds)
+    a1, a2 = m.pins[f"A1 {side}"], m.pins["A2"]
+    return chain.jolted(xp, rods, *state, Motion(a2.p - a1.p, a2.p1 * w), 1)
 
 
 ChainUnitFlexible = flexible(6, 2)

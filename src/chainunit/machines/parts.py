@@ -1,4 +1,4 @@
-"""What machines declare alike: links as bodies, pins, forces."""
+"""What machines declare alike: links as bodies, forces."""
 
 from __future__ import annotations
 
@@ -20,19 +20,6 @@ class Rod:
         tunable=True,
     )
     I: Value = quantity("kg.m2", "moment of inertia about the centroid", default=0.0, min=0.0, tunable=True)
-
-
-@declaration
-class Pin:
-    """The pins, all alike."""
-
-    friction: Value = quantity("1", "coefficient of friction", default=0.12, min=0.0, max=100.0, tunable=True)
-    diameter: Value = quantity(
-        "m", "diameter", default=0.06, min=0.0, max=100.0, tunable=True, usual=(1e-3, 1.0)
-    )
-    w_smooth: Value = quantity(
-        "rad/s", "relative speed below which friction is smoothed", default=0.02, min=1e-9, tunable=True
-    )
 
 
 @declaration

@@ -13,14 +13,15 @@ from typing import Any
 import numpy as np
 
 from ..engines import MATH
-from ..groups.body import point_load, total
 from ..groups.triad import LEGS
-from ..machines.knife_drive import KnifeDrive, Reactions, State
-from ..planar import Vec2
+from ..machines.knife_drive import KnifeDrive
+from ..mechanism.machine import MachineState
 from .table import PICK
 
 W = 4.0
 CUT = 5000.0
+_LEGS = "leg_b", "leg_3", "leg_4"
+_PINS = "C", "D", "E"
 _ANGLES = np.radians(np.arange(0.0, 360.0, 5.0))
 
 
@@ -30,14 +31,20 @@ def machine(**values: float) -> Any:
     return KnifeDrive.prepared(MATH, KnifeDrive.parameter_layout.from_names(values))
 
 
-def state(p: Any, angle: float, cut: float = 0.0) -> State:
+def state(p: Any, angle: float, cut: float = 0.0) -> MachineState:
     """The machine at the crank angle [rad], with the resistance of the stack [N]."""
     u = KnifeDrive.input_layout.from_names({"phi": angle, "w": W, "cut_force": cut})
-    shared: State = KnifeDrive.shared(MATH, p, u, None)
-    return shared
+    return KnifeDrive.shared(MATH, p, u, None)
 
 
-def as_the_paper(p: Any, s: State, line: float, *, cut: bool = True) -> Any:
+def _acting(s: MachineState, *names: str) -> dict[str, Any]:
+    """What acts on each link at constant speed, of inertia and of the loads with these names."""
+    w2 = s.w * s.w
+    wrenches = (wrench for name in names for wrench in s.effects[name].wrenches)
+    return s.m.acting(lambda body: body.centrifugal(w2), wrenches)
+
+
+def as_the_paper(s: MachineState, line: float, *, cut: bool = True) -> Any:
     """Forces at C, D, E on the legs [N], shape (3, 2), by the paper's scheme.
 
     The part across each leg comes from the moment about its outer pin, the parts along the legs from three moments
@@ -45,20 +52,17 @@ def as_the_paper(p: Any, s: State, line: float, *, cut: bool = True) -> Any:
     multiplied by `line`: 0 as it must be, 1 as printed with lengths in m, 1000 as printed with lengths in mm. Without
     `cut` the force of the stack is left out, as in the print.
     """
-    m, w2 = s.m, s.w * s.w
-    legs = [body.applied(w2, 0.0, p.g) for body in m.bodies[3:6]]
-    knife = m.bodies[6].applied(w2, 0.0, p.g)
-    if cut:
-        knife = total(knife, point_load(m.blade, m.triad.link.pin, s.bias.on_blade))
-    inner = [pin.p for pin in m.triad.pins]
-    outer = [leg.pin.p for leg in m.triad.legs]
+    m, acting = s.m, _acting(s, "weight", *(("cut",) if cut else ()))
+    legs = [acting[leg] for leg in _LEGS]
+    inner = [m.pins[pin].p for pin in _PINS]
+    outer = [m.links[leg].pin.p for leg in _LEGS]
     across = [
         (k - o).turned() * (-moment / (k - o).squared())
         for k, o, (_, moment) in zip(inner, outer, legs, strict=True)
     ]
     matrix, right = np.zeros((6, 6)), np.zeros(6)
-    force, moment = knife
-    origin = m.triad.link.pin.p
+    force, moment = acting["knife"]
+    origin = m.links["knife"].pin.p
     for i, about in enumerate(inner):
         right[i] = moment + (origin - about).cross(force)
         for k, at in enumerate(inner):
@@ -72,19 +76,18 @@ def as_the_paper(p: Any, s: State, line: float, *, cut: bool = True) -> Any:
     return along + np.array([[t.x, t.y] for t in across])
 
 
-def ours(p: Any, s: State) -> Any:
+def ours(s: MachineState) -> Any:
     """The same forces as the model has them."""
-    inner = Reactions(s.m, p, s.w * s.w, 0.0, s.bias.on_blade).inner
-    return np.array([[f.x, f.y] for f in inner])
+    reactions = s.steady.reactions
+    return np.array([[reactions[joint].x, reactions[joint].y] for joint in zip(_PINS, _LEGS, strict=True)])
 
 
 def error(angle: float, line: float) -> float:
     """Largest error of the forces at C, D, E by the printed line equation, over the largest of them [%]."""
-    p = machine()
-    s = state(p, angle)
-    right = ours(p, s)
+    s = state(machine(), angle)
+    right = ours(s)
     size = np.max(np.hypot(*right.T))
-    return float(100.0 * np.max(np.hypot(*(as_the_paper(p, s, line) - right).T)) / size)
+    return float(100.0 * np.max(np.hypot(*(as_the_paper(s, line) - right).T)) / size)
 
 
 @cache
@@ -101,40 +104,45 @@ def across_at_e(arm_from: str) -> float:
     """Item 2: the force across O4E at E [N] at crank angle 0, by the moment about O4; as printed, the weight has the
     arm "O3"-cM in place of "O4"-cM."""
     p = machine()
-    triad, body = state(p, 0.0).m.triad, state(p, 0.0).m.bodies[5]
-    leg = triad.legs[2]
-    force, moment = body.applied(W * W, 0.0, p.g)
+    s = state(p, 0.0)
+    leg, body = s.m.links["leg_4"], s.m.bodies["leg_4"]
+    force, moment = _acting(s, "weight")["leg_4"]
     if arm_from == "O3":
         # of the length the paper names, along the leg
-        length = math.sqrt((body.c.p - triad.legs[1].pin.p).squared())
+        length = math.sqrt((body.c.p - s.m.links["leg_3"].pin.p).squared())
         moment += (leg.u * length - (body.c.p - leg.pin.p)).cross(force)
     return float(-moment / p.o4e)
+
+
+def _cut_squared(s: MachineState) -> float:
+    (cut,) = s.effects["cut"].wrenches
+    return float(cut.force.squared())
 
 
 def force_in_cut(pin: str, moments: str) -> float:
     """Item 4: the force at C, D or E [N] where the cutting force is largest, by "all" moments, or by those "printed",
     without the cut."""
     p = machine()
-    cutting = max((state(p, angle, CUT) for angle in _ANGLES), key=lambda s: Vec2.squared(s.bias.cut))
-    forces = ours(p, cutting) if moments == "all" else as_the_paper(p, cutting, 0.0, cut=False)
+    cutting = max((state(p, angle, CUT) for angle in _ANGLES), key=_cut_squared)
+    forces = ours(cutting) if moments == "all" else as_the_paper(cutting, 0.0, cut=False)
     return float(np.hypot(*forces["CDE".index(pin)]))
 
 
-def _in_line() -> Any:
+def _in_line() -> MachineState:
     """The triad with C, D and E on one line."""
     straight = {"knife.c.y": 0.0, "knife.d.y": 0.0, "knife.e.y": 0.0}
     near = {"assembly.x": 1.02, "assembly.y": -0.01, "assembly.theta": 0.0}
-    return state(machine(**straight, **near), 0.0).m.triad
+    return state(machine(**straight, **near), 0.0)
 
 
 def rank_in_line() -> float:
     """Item 6: rank of the three moments with C, D and E on one line."""
-    triad = _in_line()
-    at = [pin.p for pin in triad.pins]
-    moments = [[(at[k] - at[i]).cross(triad.legs[k].u) for k in range(LEGS)] for i in range(LEGS)]
+    m = _in_line().m
+    at, legs = [m.pins[pin].p for pin in _PINS], [m.links[leg].u for leg in _LEGS]
+    moments = [[(at[k] - at[i]).cross(legs[k]) for k in range(LEGS)] for i in range(LEGS)]
     return float(np.linalg.matrix_rank(np.array(moments)))
 
 
 def margin_in_line() -> float:
     """Item 6: the margin of the same triad by two forces and one moment."""
-    return float(abs(_in_line().margin))
+    return float(abs(_in_line().m.margins()[1]))

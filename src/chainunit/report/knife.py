@@ -19,7 +19,7 @@ from rich.text import Text
 
 from ..engines import numpy_
 from ..files import whole
-from ..machines.knife_drive import Mechanism
+from ..machines.knife_drive import Inputs, KnifeDrive
 from ..quantities import DISPLAY_UNITS, Layout
 from ..studies.knife import Answers, KnifeStudy, Turn, Wheel, as_dict
 from .style import LINES, draw
@@ -204,20 +204,10 @@ def markdown(study: KnifeStudy, plots: list[str]) -> str:
 def _joints(study: KnifeStudy, q: float) -> dict[str, tuple[float, float]]:
     """Pins and the ends of the edge at crank angle `q` [m]."""
     p = study.config.machine
-    m = Mechanism(numpy_(), p, None, q)
-    knife = m.triad.link
+    m = KnifeDrive.state(numpy_(), p, Inputs(), q, 0.0).m
+    knife = m.links["knife"]
     at: dict[str, Any] = {
-        "O1": p.o1,
-        "A": m.drive.pin.p,
-        "B": m.drive.dyad.b.p,
-        "O2": p.o2,
-        "O3": p.o3,
-        "O4": p.o4,
-        **{
-            name: knife.beside(a.x, a.y).p
-            for name, a in zip("CDE", (p.knife.c, p.knife.d, p.knife.e), strict=True)
-        },
-        "blade": m.blade.p,
+        **{name: pin.p for name, pin in m.pins.items()},
         # the edge is drawn as long as the knife's pins lie apart
         "first": knife.beside(min(p.knife.d.x, p.knife.e.x), p.knife.blade.y).p,
         "last": knife.beside(max(p.knife.d.x, p.knife.e.x), p.knife.blade.y).p,

@@ -10,7 +10,8 @@ import numpy as np
 
 from ..engines import numpy_
 from ..groups.chain import pins
-from ..machines.chain_unit import ChamberForces, Inputs, SideLoads, processing_by_speed
+from ..groups.loads import Resistance
+from ..machines.chain_unit import ChamberForces, Inputs, SideLoads
 from ..planar import Motion
 from ..studies.bearings import PINS
 from ..studies.study import Study
@@ -117,19 +118,8 @@ def _run(study: Study, name: str, interval: float) -> dict[str, Any]:
     angle, speed = study.drive.crank_motion(part)
     inputs = Inputs(phi=angle * p.ratio, w=speed * p.ratio, a=0.0, left=loads["left"], right=loads["right"])
     state = ChamberForces.shared(_XP, p, inputs, None)
-    m = state.m
-    joints = {
-        "O1": m.crank.pin.p,
-        "A": m.a.p,
-        "Bd": m.drive.b.p,
-        "C": m.rocker.pin.p,
-        "A2": m.rocker.at(p.e).p,
-        "A1 left": m.left.dyad.first.pin.p,
-        "A1 right": m.right.dyad.first.pin.p,
-        "B left": m.left.dyad.b.p,
-        "B right": m.right.dyad.b.p,
-    }
-    processing = dict(zip(("left", "right"), state.bias.processing_forces, strict=True))
+    joints = {name: pin.p for name, pin in state.m.pins.items()}
+    processing = {side: state.effects[f"{side} processing"].wrenches[0].force for side in ("left", "right")}
     walls, webs = rods = _rods(study)
     for side in ("left", "right") if study.drive.chain is not None else ():
         names = _organ_joints(side, rods)[1:-1]
@@ -137,7 +127,8 @@ def _run(study: Study, name: str, interval: float) -> dict[str, Any]:
         if f"machine.{side}.theta_1" in part:
             moving = _chain(p, part, side, rods)
             between, v = [a1 + pin.p for pin in moving[1:-1]], moving[walls].p1
-            processing[side] = v * -processing_by_speed(numpy_(), p, loads[side], v.squared())
+            law = Resistance(f"B {side}", loads[side].processing_force, p.processing)
+            processing[side] = v * -law.per_speed(numpy_(), v.squared())
         else:
             # behind an open coupling the machine is followed with two bars
             between = [a1 + (b - a1) * (k / walls) for k in range(1, walls)]

@@ -1,0 +1,57 @@
+"""An Assur group as data, and the group solved at one position: the protocol of all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar
+
+from ..planar import Link, Motion, Vec2
+from .body import Bar, Load
+
+
+class SolvedGroup:
+    """A group at one position: its `links` in the order of the group's bars, the `pins` that it adds, and the
+    `margin`, which is 0 in a dead position."""
+
+    __slots__ = ("links", "margin", "pins")
+
+    def __init__(self, links: tuple[Link, ...], pins: tuple[Motion, ...], margin: Any = 1.0) -> None:
+        self.links, self.pins, self.margin = links, pins, margin
+
+    def lifted(self, outer: tuple[Motion, ...]) -> SolvedGroup:
+        """The same with its derivatives by q as dual parts; the outer pins have them."""
+        raise NotImplementedError
+
+    def reactions(self, loads: tuple[Load, ...]) -> Sequence[Vec2]:
+        """Forces in the group's joints, in their order [N], from the load of each link."""
+        raise NotImplementedError
+
+
+class Group:
+    """A group as data."""
+
+    derived: ClassVar[int] = 0
+    """How many numbers follow from its lengths once, before a run (`derive`)."""
+
+    @property
+    def bars(self) -> tuple[Bar, ...]:
+        """Its links; each with a pin that is there before hangs on it."""
+        raise NotImplementedError
+
+    @property
+    def pins(self) -> dict[str, str]:
+        """Pins that it adds, each with the link that carries what else hangs on it."""
+        raise NotImplementedError
+
+    @property
+    def joints(self) -> tuple[tuple[str, str], ...]:
+        """Pin and link of each reaction, as `SolvedGroup.reactions` gives them."""
+        raise NotImplementedError
+
+    def derive(self, xp: Any, pins: Callable[[float], Mapping[str, Motion]]) -> list[Any]:
+        """Numbers that follow from its lengths; `pins` gives the pins before it at a crank angle [rad]."""
+        return []
+
+    def solve(self, xp: Any, q: Any, pins: Mapping[str, Motion], derived: Sequence[Any]) -> SolvedGroup:
+        """The group at the crank angle `q` [rad], where the `pins` are."""
+        raise NotImplementedError

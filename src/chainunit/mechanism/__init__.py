@@ -1,0 +1,1 @@
+"""A mechanism as data, and the two models of it: motion in and torque out, torque in and motion out."""

@@ -1,0 +1,203 @@
+"""The two models of a linkage: the inverse one takes the motion of the motor shaft and gives torque and load port,
+the direct one takes the torque and gives the motion.
+
+q is the crank angle, `w`, `a` its derivatives; at the shaft `phi w a tau J` are the motor's, ``p.ratio`` turns for
+one of the crank.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from ..model import Model, Part, Requirement
+from ..ports import PortSlopes, flanges, load_terminal
+from ..quantities import Value, declaration, quantity
+from .linkage import Linkage
+from .machine import MachineState, Mechanism, derived_numbers
+
+Probes = Callable[[Any, Any, Any, MachineState, Any], dict[str, Any]]
+"""Called with engine, parameters, inputs, state and crank acceleration; gives the machine's own outputs."""
+
+
+@declaration
+class ShaftMotion:
+    """Motion of the motor shaft."""
+
+    phi: Value = quantity(
+        "rad", "motor angle; crank angle is phi/ratio, from the upward vertical, clockwise", default=0.0
+    )
+    w: Value = quantity("rad/s", "motor speed", default=0.0)
+    a: Value = quantity("rad/s2", "motor acceleration", default=0.0)
+
+
+class LinkageModel(Model):
+    """A model whose mechanics are those of a linkage."""
+
+    @staticmethod
+    def linkage(p: Any, u: Any) -> Linkage:
+        """The linkage with these parameters and inputs; places and lengths do not depend on the inputs."""
+        raise NotImplementedError
+
+    @classmethod
+    def derive(cls, xp: Any, p: Any) -> list[Any]:
+        """What the groups derive from the lengths."""
+        return derived_numbers(xp, cls.linkage(p, cls.Inputs()))
+
+    @classmethod
+    def state(cls, xp: Any, p: Any, u: Any, q: Any, w: Any) -> MachineState:
+        """The machine at crank angle `q` [rad] and speed `w` [rad/s]."""
+        return MachineState(xp, Mechanism(xp, cls.linkage(p, u), q, getattr(p, "derived", ())), w)
+
+
+class InverseMachine(LinkageModel):
+    """Motion of the motor shaft in, torque, load port and every reaction out."""
+
+    terminals = (*flanges("inflow"), load_terminal())
+
+    @classmethod
+    def shared(cls, xp: Any, p: Any, u: Any, x: Any) -> MachineState:
+        """The machine at the crank angle and speed that belong to the motor's."""
+        return cls.state(xp, p, u, u.phi / p.ratio, u.w / p.ratio)
+
+
+def inverse_parts(declared: type, probes: Probes) -> tuple[Part, Part]:
+    """The parts of an `InverseMachine` with the outputs `declared`, among them those of the load port, and those that
+    `running` gives."""
+
+    def outputs(xp: Any, p: Any, u: Any, x: Any, s: MachineState) -> Any:
+        a = u.a / p.ratio
+        return declared(
+            tau=s.torque(a) / p.ratio,
+            tau_bias=s.bias / p.ratio,
+            J=s.J / (p.ratio * p.ratio),
+            dJ_dphi=s.dJ / (p.ratio * p.ratio * p.ratio),
+            phi0=u.phi,
+            w0=u.w,
+            **running(s, a),
+            **probes(xp, p, u, s, a),
+        )
+
+    return Part(declared, outputs), Part(PortSlopes, slopes)
+
+
+def running(s: MachineState, a: Any) -> dict[str, Any]:
+    """Power and energies at crank acceleration `a` and the margin, which every machine has as outputs."""
+    return {
+        "power": s.torque(a) * s.w,
+        "kinetic_energy": s.kinetic_energy,
+        "potential_energy": s.held_energy,
+        "dissipated_power": s.lost * s.w,
+        "margin": s.margin(),
+    }
+
+
+def slopes(xp: Any, p: Any, u: Any, x: Any, s: MachineState) -> PortSlopes:
+    """The slopes of the port at the motor."""
+    by_angle, by_speed = s.slopes()
+    per_turn = 1.0 / (p.ratio * p.ratio)
+    return PortSlopes(tau_bias_dphi=by_angle * per_turn, tau_bias_dw=by_speed * per_turn)
+
+
+@declaration
+class AddedInertia:
+    """What is on the shaft of a machine that turns by itself."""
+
+    J_added: Value = quantity(
+        "kg.m2", "inertia on the motor shaft beside the machine's", default=0.0, min=0.0, tunable=True
+    )
+
+
+@declaration
+class TurningStates:
+    """States of the machine; each is an output, too."""
+
+    phi: Value = quantity("rad", "motor angle; crank angle is phi/ratio, from the upward vertical, clockwise")
+    w: Value = quantity("rad/s", "motor speed")
+
+
+@declaration
+class DrivingTorque:
+    """Torque of the motor."""
+
+    tau: Value = quantity("N.m", "torque of the motor on the shaft", default=0.0, nominal=100.0)
+
+
+@declaration
+class Turning:
+    """Acceleration, and what the shaft feels."""
+
+    a: Value = quantity("rad/s2", "motor acceleration", nominal=100.0)
+    tau_bias: Value = quantity("N.m", "torque needed at constant speed of the shaft", nominal=100.0)
+    J: Value = quantity("kg.m2", "inertia reflected to the shaft")
+
+
+class DirectMachine(LinkageModel):
+    """Torque of the motor in, motion and every reaction out. `inverse` is the model of the same machine with the
+    motion given."""
+
+    inverse: type[InverseMachine]
+    States = TurningStates
+    terminals = flanges("inflow")
+    carried = Requirement(
+        "inertia of the crank and on its shaft",
+        "kg.m2",
+        "at the dead points of the rocker nothing else carries the torque; give crank.I, crank.m or J_added",
+    )
+
+    @classmethod
+    def linkage(cls, p: Any, u: Any) -> Linkage:
+        """That of the inverse model."""
+        return cls.inverse.linkage(p, u)
+
+    @classmethod
+    def requirements(cls, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
+        """Those of the inverse model, and an inertia that never vanishes."""
+        yield from cls.inverse.requirements(xp, p)
+        crank = cls.linkage(p, cls.Inputs()).crank.bar.mass
+        yield p.J_added * p.ratio * p.ratio + crank.I + crank.m * crank.s * crank.s, 0.0, math.inf
+
+    @staticmethod
+    def initial_states(xp: Any, p: Any) -> Any:
+        """The start angle and speed."""
+        return TurningStates(phi=p.phi_start, w=p.w_start)
+
+    @staticmethod
+    def internal_step(xp: Any, p: Any) -> Any:
+        """A quarter of a millisecond: the motion is slow, and smoothed friction near rest, its fastest part, takes
+        some milliseconds with the declared `pin.w_smooth`; a much smaller one wants Model Exchange."""
+        return 2.5e-4
+
+    @classmethod
+    def shared(cls, xp: Any, p: Any, u: Any, x: Any) -> MachineState:
+        """The machine at the crank angle and speed that belong to the motor's."""
+        return cls.state(xp, p, u, x.phi / p.ratio, x.w / p.ratio)
+
+    @classmethod
+    def derivatives(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+        """Time derivatives of the states, in declared order."""
+        return [x.w, acceleration(p, u, cls.shared(xp, p, u, x))]
+
+
+def acceleration(p: Any, u: Any, s: MachineState) -> Any:
+    """Motor acceleration [rad/s2]: (J_added + J) a = tau - tau_bias, all at the motor shaft."""
+    return (u.tau - s.bias / p.ratio) / (p.J_added + s.J / (p.ratio * p.ratio))
+
+
+def direct_parts(declared: type, probes: Probes) -> tuple[Part]:
+    """The part of a `DirectMachine` with the outputs `declared`, among them `Turning` and those that `running`
+    gives."""
+
+    def outputs(xp: Any, p: Any, u: Any, x: Any, s: MachineState) -> Any:
+        a = acceleration(p, u, s)
+        at_crank = a / p.ratio
+        return declared(
+            a=a,
+            tau_bias=s.bias / p.ratio,
+            J=s.J / (p.ratio * p.ratio),
+            **running(s, at_crank),
+            **probes(xp, p, u, s, at_crank),
+        )
+
+    return (Part(declared, outputs),)
