@@ -78,7 +78,7 @@ def half_turn_steps(p: Cardan, speed: Any) -> Any:
     return np.ceil(np.maximum(STEPS_PER_HARMONIC * harmonics, STEPS_PER_PERIOD * periods)).astype(int)
 
 
-class _Equations:
+class _LineRates:
     """Right-hand sides over `duration` as the unit of time; keeps the twist of shaft 2, from which the balance of the
     cardan is sought next, and both torques at the start of each step. `held`: 1 for the slopes of dual numbers that
     leave the common speed alone, else 0, (slopes, 1)."""
@@ -303,7 +303,7 @@ def _branch(angle: Any, near: Any) -> Any:
 
 def _half_turn(
     p: Cardan, x: Any, drive: Any, load: Any, period: Any, count: int
-) -> tuple[Any, Any, _Equations]:
+) -> tuple[Any, Any, _LineRates]:
     """States (4, n) after half a turn and their slopes (4, 7, n): by the states at its start and the drive, then by
     the twist phi1 - phi4 and its speed with the common speed held."""
     seeds = np.zeros((5, 7, x.shape[1]))
@@ -313,7 +313,7 @@ def _half_turn(
         seeds[i, 5 + i], seeds[2 + i, 5 + i] = 1.0 - share, -share
     states: list[Any] = [Dual(x[i], seeds[i]) for i in range(4)]
     held = np.array([[0.0]] * 5 + [[1.0]] * 2)
-    equations = _Equations(p, load, period, Dual(drive, seeds[4]), held)
+    equations = _LineRates(p, load, period, Dual(drive, seeds[4]), held)
     states = equations.steps(states, count, 1.0 / count)
     return np.stack([s.v for s in states]), np.stack([s.d for s in states]), equations
 
@@ -326,7 +326,7 @@ def _free(p: Cardan, x: Any, drive: Any, load: Any, monodromy: Any) -> Any:
     """
     k = np.sqrt(p.c2 / p.J1)
     scale = np.stack([np.ones_like(k), k, np.ones_like(k), k])
-    along = np.stack(_Equations(p, load, 1.0, drive)(1.0, list(x))) / scale
+    along = np.stack(_LineRates(p, load, 1.0, drive)(1.0, list(x))) / scale
     basis = np.repeat(np.eye(4)[None], len(k), axis=0)
     basis[:, :, 0] = along.T
     rotation, _ = np.linalg.qr(basis)
@@ -396,7 +396,7 @@ def simulate(
     gain, slow = 10.0 / settled, 2.0 * period
     h = period / counts
     inertia = p.J1 + p.J4
-    equations = _Equations(q, load, h, load)
+    equations = _LineRates(q, load, h, load)
 
     def rates(time: float, x: Sequence[Any]) -> list[Any]:
         common, bias = x[4], x[5]
