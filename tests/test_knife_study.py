@@ -17,10 +17,12 @@ from chainunit.engines import MATH
 from chainunit.fmu.backends import export
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.quantities import Layout
+from chainunit.report import files as report_files
 from chainunit.report import knife as page
 from chainunit.studies import knife
 from chainunit.studies.knife import Answers, KnifeStudy, example, load, parse, run_knife, statics
 from chainunit.system import CoSimulation, energy_residual, monolithic
+from chainunit.text import entry, number
 
 
 def bare(text=""):
@@ -193,6 +195,12 @@ def test_the_coupling_converges_to_the_monolithic_solution(files):
     assert errors[1] < 0.02 and errors[0] / errors[1] > 3.0
 
 
+def write(study, folder):
+    return [file for write in report_files.writers(page.report(study), folder, "knife") for file in write()]
+
+
+NAMES = report_files.names("knife", page.PICTURES)
+NUMBERS, TEXT = NAMES[:2]
 SMALL = """
 [drive]
 flywheel = 0.4
@@ -223,23 +231,24 @@ def test_the_study_and_its_files(study, tmp_path):
     assert 0.4 < least.flywheel < 1.2 and 0.97 * 0.05 <= least.fluctuation <= 0.05
     assert least.flywheel < study.flywheel_by_hand
     assert study.by_hand(study.flywheel_by_hand) == pytest.approx(0.05, rel=1e-9)
-    assert any(line.startswith("A fluctuation of 5 % takes a flywheel of") for line in study.notes)
+    assert any(line.startswith("A fluctuation of 5.00 % takes a flywheel of") for line in study.notes)
     # rated current is passed by the light flywheels alone
     assert any(
-        f"fluctuates by {100 * by[1].fluctuation:.3g} % with the flywheel that" in w for w in study.warnings
+        f"fluctuates by {number(by[1].fluctuation, '1', 'percent')} with the flywheel that" in w
+        for w in study.warnings
     )
     hot = [line for line in study.warnings if "the RMS current is" in line]
     assert len(hot) == sum(a.current_rms > study.config.motor.nameplate.rated_current for a in by) > 0
 
-    written = page.write(study, tmp_path)
-    assert [file.name for file in written] == list(page.NAMES)
+    written = write(study, tmp_path)
+    assert {file.name for file in written} == set(NAMES)
     assert all(file.stat().st_size > 1000 for file in written)
-    numbers = json.loads((tmp_path / page.NUMBERS).read_text())
+    numbers = json.loads((tmp_path / NUMBERS).read_text())
     for found, wheel in zip(numbers["flywheels"], study.wheels, strict=True):
         for v in Layout(Answers).variables:
-            assert found[v.name] == {"value": getattr(wheel.answers, v.name), "unit": v.unit}
-    text = (tmp_path / page.TEXT).read_text()
-    assert "1.2 kg m2" in text and "(given)" in text and "(least)" in text and "![flywheel]" in text
+            assert found[v.name] == entry(getattr(wheel.answers, v.name), v.unit, v.kind)
+    text = (tmp_path / TEXT).read_text()
+    assert "1.20 kg m2" in text and "(given)" in text and "(least)" in text and "](flywheel.png)" in text
 
 
 def test_a_run_that_fails_keeps_what_was_computed(exported, tmp_path, monkeypatch):
@@ -253,9 +262,9 @@ def test_a_run_that_fails_keeps_what_was_computed(exported, tmp_path, monkeypatc
     monkeypatch.setattr(knife, "simulated", fails)
     study = run_knife(parse(SMALL), tmp_path)
     assert [wheel.flywheel for wheel in study.wheels] == [0.1] and str(study.failure) == "motor: gave up"
-    page.write(study, tmp_path)
-    assert json.loads((tmp_path / page.NUMBERS).read_text())["failure"] == "motor: gave up"
-    assert "stopped early: motor: gave up" in (tmp_path / page.TEXT).read_text()
+    write(study, tmp_path)
+    assert json.loads((tmp_path / NUMBERS).read_text())["failure"] == "motor: gave up"
+    assert "stopped early: motor: gave up" in (tmp_path / TEXT).read_text()
     # nothing is said of what was not tried
     assert not [line for line in study.warnings if line.startswith("No flywheel")]
 
@@ -266,7 +275,7 @@ def test_a_flywheel_that_does_not_start_is_not_too_light(exported, tmp_path):
     )
     (wheel,) = study.wheels
     assert wheel.answers.start_time is None and not wheel.stalled
-    assert any("does not come to 95 % of its rated speed in 30 s" in line for line in study.warnings)
+    assert any("does not come to 95.0 % of its rated speed in 30 s" in line for line in study.warnings)
     assert 0.4 < study.least.flywheel < 1.2 and study.least.keeps(0.05)
 
 
@@ -275,7 +284,7 @@ def test_a_large_motor_needs_no_flywheel(exported, tmp_path):
     study = run_knife(parse(big + "[run]\nsettle_turns = 1\nturns = 1\n"), tmp_path)
     assert study.least.flywheel == 0.0 and study.flywheel_by_hand == 0.0
     assert study.notes[0].startswith(
-        "For a fluctuation of 5 % no flywheel is needed; nor is it by hand. Without "
+        "For a fluctuation of 5.00 % no flywheel is needed; nor is it by hand. Without "
     )
 
 
@@ -287,8 +296,8 @@ def test_a_motor_that_stalls(exported, tmp_path):
     assert study.least is None
     assert any("of the motor on average, rated is 14.4 N m" in line for line in study.warnings)
     assert any("nor does a larger one that was tried" in line for line in study.warnings)
-    written = [file.name for file in page.write(study, tmp_path)]
-    assert "flywheel.png" not in written and "stalls" in (tmp_path / page.TEXT).read_text()
+    written = [file.name for file in write(study, tmp_path)]
+    assert "flywheel.png" not in written and "stalls" in (tmp_path / TEXT).read_text()
 
 
 @pytest.mark.parametrize(
@@ -322,7 +331,7 @@ def test_words_for_a_slow_start_and_a_poor_run():
     said = knife._warnings(study)
     assert [line.split(" kg m2 ")[1].split(",")[0] for line in said] == [
         "the start takes 12.0 s",
-        "3 % of the energy is missing: a shorter run.step is needed.",
+        "3.00 % of the energy is missing: a shorter run.step is needed.",
         "the speed still changes over the measured turns",
     ]
 
@@ -384,17 +393,17 @@ def test_the_command(exported, monkeypatch, tmp_path, capsys):
     file, out = tmp_path / "knife.toml", tmp_path / "out"
     file.write_text('title = "[Mine]"' + SMALL.replace("[0.1, 1.2]", "[]"))
     out.mkdir()
-    (out / page.NUMBERS).write_text("old")
+    (out / NUMBERS).write_text("old")
     assert command(monkeypatch, file, "-o", out) in (0, None)
     shown = capsys.readouterr()
     assert "[Mine]" in shown.out and "Written:" in shown.out and "least" in shown.out
-    assert {path.name for path in out.iterdir()} == {*page.NAMES, "fmu"}
+    assert {path.name for path in out.iterdir()} == {*NAMES, "fmu"}
     file.write_text("[cut]\nforce = -2")
     assert command(monkeypatch, file, "-o", out) == 2
     said = capsys.readouterr().err
     assert said.startswith(f"chainunit: {file}: cut.force = -2 N: must be > 0 N") and said.count("\n") == 1
     # nothing of an earlier run was taken away
-    assert (out / page.NUMBERS).stat().st_size > 1000
+    assert (out / NUMBERS).stat().st_size > 1000
     assert command(monkeypatch, "--example") in (0, None)
     assert capsys.readouterr().out == example()
 
@@ -407,4 +416,4 @@ def test_the_command_says_that_a_run_failed(exported, monkeypatch, tmp_path, cap
     assert command(monkeypatch, "-o", tmp_path) == 1
     said = capsys.readouterr()
     assert "The run stopped early: motor: gave up. What was computed before is in" in said.err
-    assert (tmp_path / page.NUMBERS).exists() and (tmp_path / "reactions.png").exists()
+    assert (tmp_path / NUMBERS).exists() and (tmp_path / "reactions.png").exists()

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import io
 import json
 import math
 
 import numpy as np
 import pytest
 from machines import random_machine
-from rich.console import Console
+from reports import page_of, said_of
 
 from chainunit import config
 from chainunit.errors import InputError
@@ -166,7 +165,6 @@ def test_what_is_refused_for_a_slip_says_so(text, told):
 
 
 def test_the_remark_stands_on_terminal_page_and_in_json():
-    from chainunit.report import page, table
     from chainunit.studies.drive import Drive
     from chainunit.studies.limits import statics
     from chainunit.studies.result import as_dict
@@ -186,10 +184,9 @@ def test_the_remark_stands_on_terminal_page_and_in_json():
         }
     ]
     json.dumps(result, allow_nan=False)
-    out = io.StringIO()
-    table.show(study, Console(file=out, markup=False, width=200))
-    assert f"Remark: {said}\n" in out.getvalue() and "?." not in out.getvalue()
-    html = page.render(study, result)
+    told = said_of(study)
+    assert told.count(f"Remark: {said}\n") == 1 and "?." not in told
+    html = page_of(study, result)
     assert 'data-path="remarks.0.said"' in html and "Is this what was meant?" in html
 
 

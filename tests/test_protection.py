@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import io
 import math
 
 import numpy as np
 import pytest
 import xarray as xr
 from event_tables import event_line
-from rich.console import Console
+from reports import said_of
 
 from chainunit import config
 from chainunit.drives.induction_motor import InductionMotor, steady
 from chainunit.drives.motor import T_RATED
 from chainunit.engines import MATH
-from chainunit.report import table
 from chainunit.studies import sizing
 from chainunit.studies.bearings import mean_load
 from chainunit.studies.coupling import coupling_sentence
@@ -167,9 +165,8 @@ def test_an_insufficient_motor_gets_no_advice(tmp_path, monkeypatch):
     study = ran(heavy("jam_left") + "[gear]\ntorque_limit = 250\n", tmp_path, monkeypatch)
     assert study.insufficient and study.setting is None
     assert as_dict(study)["sizing"]["protection"] == {}
-    out = io.StringIO()
-    table.show(study, Console(file=out, markup=False, width=200))
-    assert "Insufficient motor:" in out.getvalue() and "relay at" not in out.getvalue()
+    told = said_of(study)
+    assert "Insufficient motor:" in told and "relay at" not in told
 
 
 def test_a_coupling_that_never_opens_gets_a_remark(tmp_path):

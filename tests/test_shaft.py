@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 import xarray as xr
 from event_tables import event_line
+from reports import write
 from scipy.linalg import eigh
 from test_page import Reader, check_traced
 
 from chainunit import InputError, config
 from chainunit.drives.shafts import hollow, stiffness
 from chainunit.models import MODELS
-from chainunit.report import files, page, plots
 from chainunit.studies.choice import choose
 from chainunit.studies.cycle import cycle
 from chainunit.studies.package import export_study, start_of
@@ -170,9 +170,8 @@ def test_damage_of_a_steady_swing(study, turns, phase):
 
 
 def test_the_report_shows_it(study, tmp_path):
-    written = [*files.write(study, tmp_path), *plots.write(study, tmp_path)]
-    assert (tmp_path / "driveline.png") in written
-    text = page.write(study, tmp_path).read_text("utf-8")
+    assert (tmp_path / "driveline.png") in write(study, tmp_path)
+    text = (tmp_path / "report.html").read_text("utf-8")
     reader = Reader(text)
     check_traced(reader, json.loads((tmp_path / "result.json").read_text()))
     paths = {n["data-path"] for n in reader.numbers}
@@ -224,8 +223,7 @@ def test_without_a_motor_that_fits_the_shaft_is_that_of_the_nearest(tmp_path):
     assert study.sizing.chosen is None and study.insufficient
     assert study.drive.ratio == study.sizing.best.drive.ratio
     assert set(as_dict(study)["shaft"]) == set(study.answers) and "steady" in study.shaft
-    files.write(study, tmp_path)
-    page.write(study, tmp_path)
+    write(study, tmp_path)
 
 
 def test_the_speed_loop_is_tuned_and_shown_with_the_line(tmp_path):

@@ -14,9 +14,10 @@ import xarray as xr
 from command import chainunit
 from event_tables import STANDARD, event_line
 from fmpy.validation import validate_fmu
+from reports import write
 
 from chainunit import EMPTY, ChainUnit, SideLoads
-from chainunit.report import plots
+from chainunit.report import chain_unit
 from chainunit.studies.cycle import alone, cycle, factors_for, overload_factors, sides_over_speed
 
 SHORT = """
@@ -44,7 +45,15 @@ def done(tmp_path_factory):
 def test_study_writes_numbers_series_plots_and_fmus(done):
     result, folder = done
     names = {p.name for p in folder.iterdir()}
-    assert names == {"report.html", "result.json", "result.nc", "load_cycle.csv", "fmu", *plots.NAMES} - {
+    assert names == {
+        "report.html",
+        "result.json",
+        "result.nc",
+        "load_cycle.csv",
+        "fmu",
+        "result.md",
+        *chain_unit.PICTURES,
+    } - {
         "driveline.png",
         "chain_sweep.png",
     }
@@ -201,7 +210,6 @@ def test_what_chains_are_refused(text, told):
 
 def test_a_run_that_fails_keeps_what_it_computed(tmp_path, monkeypatch):
     from chainunit import config
-    from chainunit.report import files, plots
     from chainunit.studies.run import run_study
     from chainunit.system.instance import Instance
 
@@ -217,8 +225,7 @@ def test_a_run_that_fails_keeps_what_it_computed(tmp_path, monkeypatch):
     monkeypatch.setattr(Instance, "step", fails_late)
     study = run_study(config.parse(SHORT), tmp_path)
     assert "it broke" in str(study.failure) and "start_up" in study.runs and "unfinished" in study.runs
-    files.write(study, tmp_path)
-    plots.write(study, tmp_path)
+    write(study, tmp_path)
     assert json.loads((tmp_path / "result.json").read_text())["status"].startswith("failed: motor: step")
     with xr.open_datatree(tmp_path / "result.nc") as tree:
         assert {"start_up", "unfinished"} <= set(tree.children)
@@ -288,7 +295,7 @@ def study_of(text, tmp_path):
 
 def test_a_motor_that_cannot_reach_the_speed_is_told(tmp_path):
     text, numbers = study_of("[motor]\nlimit = { v = 60 }", tmp_path)
-    assert "in place of 6 rad/s" in text
+    assert "in place of 6 rad/s" in text and "does not return" not in text
     assert numbers["answers"]["jam_left"]["recovery_time"]["value"] is None
 
 
@@ -480,7 +487,7 @@ def test_each_side_alone_over_the_speed():
             assert np.all(sides.speed[before] < at) and np.all(at < sides.speed[before + 1])
             assert np.interp(at, sides.speed, excess) == pytest.approx(0.0, abs=1e-9)
             told = sides.as_dict()["crossings"][torque][side]
-            assert told == [{"value": speed, "unit": "rad/s"} for speed in at]
+            assert told == [{"value": speed, "unit": "rad/s", "kind": "speed"} for speed in at]
     assert crossed
 
 
@@ -504,12 +511,11 @@ step = 0.002
 def ran(text, folder):
     """A study that was run in this process, with its files in `folder`."""
     from chainunit import config
-    from chainunit.report import files
     from chainunit.studies.result import as_dict
     from chainunit.studies.run import run_study
 
     study = run_study(config.parse(text), folder)
-    files.write(study, folder)
+    write(study, folder)
     return study, as_dict(study)
 
 
@@ -668,19 +674,19 @@ def test_the_overloads_of_both_sides_are_readable(columns, tables):
     import io
 
     from rich.console import Console
-    from rich.table import Table
 
     from chainunit import config
-    from chainunit.report.table import _print_runs
+    from chainunit.report import terminal
+    from chainunit.report.blocks import Column, Table, TableRow
+    from chainunit.studies.events import in_groups
 
-    def table(runs):
-        heads = (events[r].short if r in events else r for r in runs)
-        made = Table("crank torque, peak, here", *heads)
-        made.add_row("", *("10.0 N m" for _ in runs))
-        return made
-
-    said, events = io.StringIO(), config.load().events
-    _print_runs(Console(file=said, width=columns), table, ["steady", *STANDARD], events)
+    runs, events = ["steady", *STANDARD], config.load().events
+    groups = tuple(tuple(runs.index(run) + 1 for run in group) for group in in_groups(events, runs))
+    heads = (Column(events[run].short if run in events else run) for run in runs)
+    row = TableRow(("", *("10.0 N m" for _ in runs)))
+    said = io.StringIO()
+    table = Table((row,), (Column("crank torque, peak, here"), *heads), groups=groups)
+    terminal._show_table(table, Console(file=said, width=columns), {})
     heads = [line for line in said.getvalue().splitlines() if "steady" in line]
     assert len(heads) == tables and all("jam left" in heads[0] for _ in heads)
     assert "jam right" in heads[-1] and all(len(line) <= columns for line in heads)

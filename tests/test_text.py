@@ -6,8 +6,9 @@ import math
 
 import pytest
 
+from chainunit.errors import InputError
 from chainunit.studies.measures import torque_reserve
-from chainunit.text import entry, number, shown
+from chainunit.text import chosen_units, entry, forms, number
 
 
 @pytest.mark.parametrize(
@@ -21,7 +22,10 @@ from chainunit.text import entry, number, shown
         (313.15, "K", "", ("40.0", "°C"), "40.0 degC"),
         (80.0, "K", "difference", ("80.0", "K"), "80.0 K"),
         (1.5707963, "rad/s", "", ("1.57", "rad/s"), "1.57 rad/s"),
-        (1.5707963, "rad/s", "rotation", ("15.0", "rev/min"), "15.0 rev/min"),
+        (63246.0, "N.m/rad", "assumed", ("60\u202f000", "N\u00a0m/rad"), "60000 N m/rad"),
+        (6324.6, "N.m/rad", "assumed", ("6000", "N\u00a0m/rad"), "6000 N m/rad"),
+        (-0.2349, "m", "millimetres", ("−235", "mm"), "-235 mm"),
+        (2200.0, "W", "", ("2.20", "kW"), "2.20 kW"),
         (1.43, "1", "", ("1.43", ""), "1.43"),
         # one form of a share, whatever its size
         (0.809, "1", "percent", ("80.9", "%"), "80.9 %"),
@@ -40,8 +44,35 @@ from chainunit.text import entry, number, shown
     ],
 )
 def test_one_form_by_unit_and_kind(value, unit, kind, page, terminal):
-    assert shown(value, unit, kind) == page
+    assert forms(value, unit, kind) == [page]
     assert number(value, unit, kind) == terminal
+
+
+def test_a_speed_is_shown_in_both_units():
+    assert forms(1.5707963, "rad/s", "speed") == [("1.57", "rad/s"), ("15.0", "rev/min")]
+    assert number(1.5707963, "rad/s", "speed") == "1.57 rad/s (15.0 rev/min)"
+    # beside a number as it was given the other one is a result
+    assert number(3.0, "rad/s", "speed", 6, full=False) == "3 rad/s (28.6 rev/min)"
+    assert number(260.98, "rad/s", "frequency", 5) == "260.98 rad/s (41.536 Hz)"
+
+
+def test_the_engineer_chooses_units():
+    units = chosen_units({"speed": "rev/min", "power": "W", "torque": "kN.m"})
+    assert number(1.5707963, "rad/s", "speed", units=units) == "15.0 rev/min"
+    assert number(2200.0, "W", units=units) == "2200 W"
+    assert number(1461.0, "N.m", units=units) == "1.46 kN m"
+    # what is no speed stays, and so do shares of a unit that may be chosen
+    assert (
+        number(5.0, "rad/s", units=units) == "5.00 rad/s"
+        and number(0.5, "1", "percent", units=units) == "50.0 %"
+    )
+    for given, words in (
+        ({"mass": "t"}, "report.units.mass: unknown kind; must be one of speed, power, torque, force"),
+        ({"speed": "rpm"}, 'report.units.speed = "rpm": must be "rad/s" or "rev/min"'),
+    ):
+        with pytest.raises(InputError) as refused:
+            chosen_units(given)
+        assert str(refused.value) == words
 
 
 def test_what_is_not_there():

@@ -6,11 +6,11 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 import typer.core
@@ -19,6 +19,9 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 
 from .errors import InputError, InterruptedRunError, RunError, WriteError, printable
 from .files import claimed, full, leftovers
+
+if TYPE_CHECKING:
+    from .report.blocks import Report
 
 
 class Backend(StrEnum):
@@ -105,7 +108,7 @@ def study(
 ) -> None:
     """Run the machine with its motor: start-up, steady running, one-sided overloads.
 
-    Writes report.html, result.json, result.nc, plots and the FMUs into the output folder.
+    Writes report.html, result.json, result.md, result.nc, plots and the FMUs into the output folder.
     """
     from . import config as configuration
 
@@ -119,25 +122,21 @@ def study(
         # before anything of an earlier run is taken away
         check_own(loaded.catalogue)
     with claimed(output):
-        from .report import files, page, plots, table
+        from .report import chain_unit, files
         from .studies.run import run_study
         from .studies.study import LOAD_CYCLE
 
-        _clear(output, "result.json", "result.nc", LOAD_CYCLE, page.NAME, *plots.NAMES)
-        console, errors = _console(), _console(stderr=True)
-        with _progress("exporting FMUs", errors) as report:
+        _clear(output, *files.names("result", chain_unit.PICTURES), files.SERIES, LOAD_CYCLE)
+        errors = _console(stderr=True)
+        with _progress("exporting FMUs", errors) as progress:
             result = run_study(
-                loaded, output, report, check=check, backend=backend.value if backend else None
+                loaded, output, progress, check=check, backend=backend.value if backend else None
             )
-        # what one file has no room for must not cost the others, nor the answer on the terminal
-        written, unwritten = [], None
-        for write in (files.write, plots.write, lambda *which: [page.write(*which)]):
-            try:
-                written += write(result, output)
-            except WriteError as error:
-                unwritten = unwritten or error
-        table.show(result, console)
-        _show_written(written, console)
+        report = chain_unit.report(result)
+        numbers, *others = files.writers(report, output, "result")
+        unwritten = _leave(
+            report, (numbers, lambda: files.series(result, output), *others), remarks=not errors.is_terminal
+        )
     if result.failure is not None:
         _stopped_early(result.failure, output, errors)
     if unwritten is not None:
@@ -145,6 +144,27 @@ def study(
     if result.insufficient:
         errors.print("No motor of the catalogue fits; all is run with the nearest, which is insufficient.")
         raise typer.Exit(1)
+
+
+def _leave(
+    report: Report, writers: Iterable[Callable[[], list[Path]]], *, remarks: bool = True
+) -> WriteError | None:
+    """Write all files of a report and show it; returns the error of the first file that there was no room for. It
+    costs neither the others nor what is shown. On a terminal that has the remarks already they are not repeated.
+    """
+    from .report import terminal
+
+    written: list[Path] = []
+    unwritten = None
+    for write in writers:
+        try:
+            written += write()
+        except WriteError as error:
+            unwritten = unwritten or error
+    console = _console()
+    terminal.show(report, console, remarks=remarks or not console.is_terminal)
+    _show_written(written, console)
+    return unwritten
 
 
 def _show_written(written: list[Path], console: Console) -> None:
@@ -193,7 +213,7 @@ def driveline(
 ) -> None:
     """A machine behind a cardan shaft: natural frequency, resonance and stability in rotation.
 
-    Writes driveline.json, driveline.md and plots into the output folder.
+    Writes report.html, driveline.json, driveline.md and plots into the output folder.
     """
     from .studies import driveline as lines
 
@@ -202,15 +222,16 @@ def driveline(
         return
     loaded = lines.load(config)
     with claimed(output):
-        from .report import driveline as page
+        from .report import driveline as contents
+        from .report import files
 
-        _clear(output, *page.NAMES)
-        console, errors = _console(), _console(stderr=True)
-        with _progress("steady motion", errors) as report:
-            result = lines.run_driveline(loaded, report)
-        written = page.write(result, output)
-        page.show(result, console)
-        _show_written(written, console)
+        _clear(output, *files.names("driveline", contents.PICTURES))
+        with _progress("steady motion", _console(stderr=True)) as progress:
+            result = lines.run_driveline(loaded, progress)
+        report = contents.report(result)
+        unwritten = _leave(report, files.writers(report, output, "driveline"))
+    if unwritten is not None:
+        raise unwritten
 
 
 @app.command()
@@ -229,7 +250,7 @@ def knife(
 ) -> None:
     """A paper cutter's knife drive with motor and flywheel: blade, reactions, cut, speed fluctuation.
 
-    Writes knife.json, knife.md, plots and the FMUs into the output folder.
+    Writes report.html, knife.json, knife.md, plots and the FMUs into the output folder.
     """
     from .studies import knife as knives
 
@@ -238,17 +259,19 @@ def knife(
         return
     loaded = knives.load(config)
     with claimed(output):
-        from .report import knife as page
+        from .report import files
+        from .report import knife as contents
 
-        _clear(output, *page.NAMES)
-        console, errors = _console(), _console(stderr=True)
-        with _progress("the turn at constant speed", errors) as report:
-            result = knives.run_knife(loaded, output, report, backend.value if backend else None)
-        written = page.write(result, output)
-        page.show(result, console)
-        _show_written(written, console)
+        _clear(output, *files.names("knife", contents.PICTURES))
+        errors = _console(stderr=True)
+        with _progress("the turn at constant speed", errors) as progress:
+            result = knives.run_knife(loaded, output, progress, backend.value if backend else None)
+        report = contents.report(result)
+        unwritten = _leave(report, files.writers(report, output, "knife"))
     if result.failure is not None:
         _stopped_early(result.failure, output, errors)
+    if unwritten is not None:
+        raise unwritten
 
 
 def _stopped_early(failure: RunError, output: Path, errors: Console) -> None:

@@ -71,6 +71,7 @@ class Run:
         min=0.01,
         max=1000.0,
         usual=(0.05, 25.0),
+        kind="speed",
     )
     ramp: Value = quantity(
         "s",

@@ -2,19 +2,25 @@
 
 Kinds, beside the unit (see `quantities.quantity`):
 
-``percent``     a share, shown in %
-``dip``         the share of a speed that is lost: where all or more is lost, the shaft stands or turns back
-``used``        how much of what is permitted, in % up to ten times of it
-``difference``  of temperatures: it stays in K
-``rotation``    a speed in rev/min
+``percent``      a share, shown in %
+``dip``          the share of a speed that is lost: where all or more is lost, the shaft stands or turns back
+``used``         how much of what is permitted, in % up to ten times of it
+``difference``   of temperatures: it stays in K
+``speed``        of a shaft, in rad/s and rev/min
+``frequency``    an angular one, in rad/s and Hz
+``assumed``      known to one digit
+``millimetres``  a length in mm
 """
 
 from __future__ import annotations
 
 import math
 import re
-from typing import Any
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, TypeAlias
 
+from .errors import InputError
 from .quantities import DISPLAY_UNITS, finite
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -26,6 +32,57 @@ _NOTHING = 5e-5
 """A share below that is none."""
 _TIMES = 1000.0
 """Beyond, what is used is "over 1000 times" of what is permitted: its size says nothing any more."""
+_SHARES = ("percent", "dip", "used")
+
+Units: TypeAlias = Mapping[str, tuple[str, ...]]
+"""By kind, the units in which its numbers are shown: one, or one and another beside it."""
+
+DEFAULT_UNITS: Units = MappingProxyType(
+    {"speed": ("rad/s", "rev/min"), "frequency": ("rad/s", "Hz"), "power": ("kW",), "millimetres": ("mm",)}
+)
+_KIND_OF = {"W": "power", "N.m": "torque", "N": "force"}
+"""Kind of a quantity that declares none, by its unit."""
+_SCALES: dict[str, dict[str, tuple[float, float]]] = {
+    "speed": {"rad/s": (1.0, 0.0), "rev/min": (30.0 / math.pi, 0.0)},
+    "frequency": {"rad/s": (1.0, 0.0), "Hz": (0.5 / math.pi, 0.0)},
+    "power": {"W": (1.0, 0.0), "kW": (1e-3, 0.0)},
+    "torque": {"N.m": (1.0, 0.0), "kN.m": (1e-3, 0.0)},
+    "force": {"N": (1.0, 0.0), "kN": (1e-3, 0.0)},
+    "millimetres": {"mm": (1e3, 0.0)},
+}
+"""By kind, the units it may be shown in: shown = factor * value + offset."""
+CHOICES = {kind: tuple(scales) for kind, scales in _SCALES.items() if len(scales) > 1 and kind != "frequency"}
+"""Units that an engineer may choose, by kind."""
+
+
+def chosen_units(given: Mapping[str, str]) -> Units:
+    """The units to show numbers in, where those of some kinds are chosen: ``{"speed": "rev/min"}``.
+
+    Raises
+    ------
+    InputError
+        for a kind or a unit that there is not.
+    """
+    for kind, unit in given.items():
+        if kind not in CHOICES:
+            raise InputError(f"report.units.{kind}: unknown kind; must be one of {', '.join(CHOICES)}")
+        if unit not in CHOICES[kind]:
+            allowed = " or ".join(f'"{name}"' for name in CHOICES[kind])
+            raise InputError(f'report.units.{kind} = "{unit}": must be {allowed}')
+    return {**DEFAULT_UNITS, **{kind: (unit,) for kind, unit in given.items()}}
+
+
+def scales(unit: str, kind: str = "", units: Units = DEFAULT_UNITS) -> list[tuple[str, float, float]]:
+    """The units in which a quantity is shown, the first before the one beside it, each with factor and offset:
+    shown = factor * value + offset."""
+    if kind in _SHARES:
+        return [("%", 100.0, 0.0)]
+    of = kind if kind in _SCALES else _KIND_OF.get(unit, "")
+    if of in units:
+        return [(name, *_SCALES[of][name]) for name in units[of]]
+    if unit in DISPLAY_UNITS and unit != "rad/s" and kind != "difference":
+        return [DISPLAY_UNITS[unit]]
+    return [(unit, 1.0, 0.0)]
 
 
 def unit_text(unit: str) -> str:
@@ -59,25 +116,40 @@ def digits_text(value: float, digits: int = 3, *, full: bool = True) -> str:
     return text.replace("-", "−")
 
 
-def shown(value: float, unit: str, kind: str = "", digits: int = 3, *, full: bool = True) -> tuple[str, str]:
-    """The number, or words in its place, and the unit that follows it, of a `value` in its declared `unit`."""
+def _share(value: float, kind: str, digits: int, full: bool) -> tuple[str, str]:
     if kind == "dip" and value >= 0.995:
         return "stands" if value < 1.005 else "turns back", ""
-    if kind in ("percent", "dip", "used"):
-        if abs(value) < _NOTHING:
-            value = 0.0
-        if abs(value) <= _PERCENT:
-            return digits_text(100.0 * value, digits, full=full), "%"
-        if kind == "used":
-            much = value <= _TIMES
-            return (digits_text(value, digits) if much else f"over {digits_text(_TIMES)}"), "times"
-        return f"{'over' if value > 0.0 else 'below −'} {digits_text(100.0 * _PERCENT)}".replace(
-            "− ", "−"
-        ), "%"
-    factor, offset = 1.0, 0.0
-    if unit in DISPLAY_UNITS and (kind == "rotation" or (unit != "rad/s" and kind != "difference")):
-        unit, factor, offset = DISPLAY_UNITS[unit]
-    return digits_text(factor * value + offset, digits, full=full), unit_text(unit)
+    if abs(value) < _NOTHING:
+        value = 0.0
+    if abs(value) <= _PERCENT:
+        return digits_text(100.0 * value, digits, full=full), "%"
+    if kind == "used":
+        much = value <= _TIMES
+        return (digits_text(value, digits) if much else f"over {digits_text(_TIMES)}"), "times"
+    return f"{'over ' if value > 0.0 else 'below −'}{digits_text(100.0 * _PERCENT)}", "%"
+
+
+def forms(
+    value: float,
+    unit: str,
+    kind: str = "",
+    digits: int = 3,
+    *,
+    full: bool = True,
+    units: Units = DEFAULT_UNITS,
+) -> list[tuple[str, str]]:
+    """The number, or words in its place, and the unit that follows it, of a `value` in its declared `unit`: in each
+    unit in which it is shown."""
+    if kind in _SHARES:
+        return [_share(value, kind, digits, full)]
+    if kind == "assumed":
+        value, full = float(f"{value:.0e}"), False
+    texts = []
+    for name, factor, offset in scales(unit, kind, units):
+        texts.append((digits_text(factor * value + offset, digits, full=full), unit_text(name)))
+        # beside a number as it was given the other unit is a result
+        digits, full = digits if full else 3, True
+    return texts
 
 
 def entry(value: float | None, unit: str, kind: str = "") -> dict[str, Any]:
@@ -93,13 +165,17 @@ def number(
     *,
     full: bool = True,
     none: str = "-",
+    units: Units = DEFAULT_UNITS,
 ) -> str:
-    """The same in one piece and in plain letters, for a terminal or a message; `none` stands for a number that is not
-    there."""
+    """The same in one piece and in plain letters, for a terminal or a message, the second unit in brackets; `none`
+    stands for a number that is not there."""
     if value is None or math.isnan(value):
         return none
-    text, follows = shown(value, unit, kind, digits, full=full)
-    return plain(f"{text} {follows}") if follows else plain(text)
+    shown = [
+        plain(f"{text} {follows}" if follows else text)
+        for text, follows in forms(value, unit, kind, digits, full=full, units=units)
+    ]
+    return shown[0] + "".join(f" ({other})" for other in shown[1:])
 
 
 _PLAIN = {"−": "-", _THIN: "", "°C": "degC", "°": "deg", "Ω": "Ohm", "∞": "inf"}

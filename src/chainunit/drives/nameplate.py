@@ -43,7 +43,7 @@ class Nameplate:
     voltage: Value = quantity("V", "rated voltage, line to line, RMS", default=400.0, above=0.0)
     frequency: Value = quantity("Hz", "rated frequency", default=50.0, above=0.0)
     poles: Value = quantity("1", "number of poles", min=2.0, max=48.0)
-    speed: Value = quantity("rad/s", "rated speed", above=0.0)
+    speed: Value = quantity("rad/s", "rated speed", above=0.0, kind="speed")
     efficiency: Value = quantity("1", "rated efficiency", above=0.0, max=1.0)
     power_factor: Value = quantity("1", "rated power factor", above=0.0, max=1.0)
     current: Value = quantity(

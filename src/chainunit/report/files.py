@@ -1,17 +1,52 @@
-"""result.json and result.nc; each file appears whole or not at all."""
+"""The files of a report, and those of the series; each appears whole or not at all."""
 
 from __future__ import annotations
 
 import csv
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import xarray as xr
 
 from .. import __version__
 from ..files import netcdf, whole
-from ..studies.result import as_dict
 from ..studies.study import LOAD_CYCLE, Study
+from . import html, print_figures
+from .accessors import title
+from .blocks import Report
+from .markdown import markdown
+
+SERIES = "result.nc"
+
+
+def writers(report: Report, folder: Path, name: str) -> list[Callable[[], list[Path]]]:
+    """What writes the numbers (``NAME.json``), the pictures, the text (``NAME.md``) and the page of a report, in this
+    order; each returns its files."""
+    pictures: list[Path] = []
+
+    def numbers() -> list[Path]:
+        file = folder / f"{name}.json"
+        with whole(file) as part:
+            part.write_text(json.dumps(report.result, indent=1, allow_nan=False) + "\n", "utf-8")
+        return [file]
+
+    def draw() -> list[Path]:
+        pictures.extend(print_figures.write(report.figures, folder, report.units))
+        return pictures
+
+    def text() -> list[Path]:
+        file = folder / f"{name}.md"
+        with whole(file) as part:
+            part.write_text(markdown(report, [picture.name for picture in pictures]), "utf-8")
+        return [file]
+
+    return [numbers, draw, text, lambda: [html.write(report, folder)]]
+
+
+def names(name: str, pictures: tuple[str, ...]) -> tuple[str, ...]:
+    """The files that a report may leave."""
+    return (f"{name}.json", f"{name}.md", html.NAME, *pictures)
 
 
 def _load_cycle(study: Study, turns: xr.Dataset, file: Path) -> Path:
@@ -34,25 +69,22 @@ def _load_cycle(study: Study, turns: xr.Dataset, file: Path) -> Path:
     return file
 
 
-def write(study: Study, folder: Path) -> list[Path]:
-    """Write numbers and time series; returns the files.
+def series(study: Study, folder: Path) -> list[Path]:
+    """Write the load cycle and the time series of a study; returns the files.
 
     ``result.nc`` is netCDF-4 with a group per run (open it with `xarray.open_datatree`); each variable has its
     unit and description.
     """
-    numbers = folder / "result.json"
-    with whole(numbers) as part:
-        part.write_text(json.dumps(as_dict(study), indent=2, allow_nan=False) + "\n", "utf-8")
-    written = [numbers]
+    written = []
     if "steady" in study.answers and study.drive.whole_turns(study.steady) is not None:
         written.append(_load_cycle(study, study.steady, folder / LOAD_CYCLE))
     if study.runs:
-        series = folder / "result.nc"
+        file = folder / SERIES
         tree = xr.DataTree.from_dict(
-            {f"/{name}": run.assign_attrs(title=study.called(name)) for name, run in study.runs.items()}
+            {f"/{name}": run.assign_attrs(title=title(study, name)) for name, run in study.runs.items()}
         )
         tree.attrs.update(title=study.config.title, source=f"chainunit {__version__}")
-        with whole(series) as part, netcdf():
+        with whole(file) as part, netcdf():
             tree.to_netcdf(part, engine="netcdf4")
-        written.append(series)
+        written.append(file)
     return written

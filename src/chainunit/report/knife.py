@@ -1,450 +1,352 @@
-"""What ``chainunit knife`` leaves behind: knife.json, knife.md, plots, and tables on the terminal."""
+"""The report on a knife drive: the turn at constant speed, the pins, the flywheels."""
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Callable
-from functools import partial
-from pathlib import Path
+from collections.abc import Iterator
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.patches import Rectangle
-from matplotlib.ticker import FuncFormatter
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 from ..engines import numpy_
-from ..files import whole
-from ..machines.knife_drive import Inputs, KnifeDrive
-from ..quantities import DISPLAY_UNITS, Layout
-from ..studies.knife import Answers, KnifeStudy, Turn, Wheel, as_dict
-from .style import LINES, draw
-from .trace import markdown_text
+from ..machines.knife_drive import JOINTS, Inputs, KnifeDrive
+from ..mechanism.machine import Mechanism
+from ..quantities import Layout
+from ..studies.knife import PINS, Answers, KnifeStudy, Reaction, Turn, Wheel, as_dict, turning
+from ..text import number
+from . import blocks as b
+from . import figure as fig
+from . import linkage
+from .motion import Animation, Clip, DrawnLink, Reading
+from .style import LINES
 
-NUMBERS, TEXT = "knife.json", "knife.md"
-PLOTS = ("blade_path.png", "torque.png", "reactions.png", "flywheel.png")
-NAMES = (NUMBERS, TEXT, *PLOTS)
-_GREY = "#777777"
-_STACK: dict[str, Any] = {"facecolor": "#dddddd", "edgecolor": _GREY, "hatch": "--", "linewidth": 0.8}
-_WHITE = {"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.85}
+KIND = "Knife drive: blade, reactions, cut and speed fluctuation"
+PICTURES = ("blade_path.png", "torque.png", "reactions.png", "flywheel.png")
+_TABLE_WIDTH = 5  # flywheels beside each other on a terminal
+_MINOR = "inertia speed_least motor_torque_rms current_peak supply_power_mean drift residual".split()
+"""Answers that the terminal leaves out."""
+_LOOKS = {
+    "coupler": "light",
+    "rocker": "heavy",
+    "leg_b": "light",
+    "leg_3": "light",
+    "leg_4": "light",
+    "knife": "light",
+}
+_EDGE = DrawnLink("edge", ("first", "last"), "heavy")
+_PICTURES = 120  # of a turn
 
 
-def write(study: KnifeStudy, folder: Path) -> list[Path]:
-    """Write numbers, text and plots; returns the files. Without any run there is no plot of the flywheels."""
-    numbers, text = folder / NUMBERS, folder / TEXT
-    with whole(numbers) as part:
-        part.write_text(json.dumps(as_dict(study), indent=1, allow_nan=False) + "\n", "utf-8")
-    makers: dict[str, Callable[[KnifeStudy], Any]] = dict(
-        zip(PLOTS, (_blade_path, _torque, _reactions, _flywheel), strict=True)
+def report(study: KnifeStudy) -> b.Report:
+    """The report."""
+    s, config = b.Source(as_dict(study)), study.config
+    given = (
+        s.given("Cut", config.cut, "cut"),
+        s.given("Drive", config.train, "drive"),
+        s.given("Run", config.run, "run"),
+        s.given("Machine", config.machine, "machine"),
     )
-    if not any(wheel.answers.fluctuation is not None for wheel in study.wheels):
-        del makers["flywheel.png"]
-    drawn = draw({name: partial(make, study) for name, make in makers.items()}, folder)
-    with whole(text) as part:
-        part.write_text(markdown(study, [file.name for file in drawn]), "utf-8")
-    return [numbers, text, *drawn]
+    sections = (
+        b.Section("answer", "The answer", tuple(s.said())),
+        b.Section("turn", "A turn at constant speed", (_turn(s), _pins(s))),
+        b.Section("flywheels", "Flywheels, co-simulated", tuple(_flywheels(s, study))),
+        b.Section("plots", "Plots", tuple(_figures(study))),
+        b.Section("motion", "The machine in motion", (_motion(study),)),
+        b.Section("given", "All that was given", (b.Given(given),)),
+    )
+    failure = s.words("failure") if study.failure is not None else ()
+    return b.Report(config.title, KIND, s.result, (), sections, s.line("chainunit {chainunit}"), failure)
 
 
-def _value(x: float | None, unit: str) -> str:
-    """A number in the unit that is read; "-" for none."""
-    if x is None or not math.isfinite(x):
-        return "-"
-    if unit == "1":
-        # by hand nothing fluctuates by more than the speed itself
-        return f"{100.0 * x:.3g} %" if x < 2.0 else "> 200 %"
-    if unit == "m":
-        return f"{1e3 * x:.1f} mm"
-    if unit in DISPLAY_UNITS:
-        unit, factor, offset = DISPLAY_UNITS[unit]
-        x = factor * x + offset
-        return f"{x:.{4 if abs(x) >= 1.0 else 2}g} {unit}"
-    return f"{x:.3g} {unit.replace('.', ' ')}" if abs(x) < 1e3 else f"{x:.0f} {unit.replace('.', ' ')}"
-
-
-def turn_rows(study: KnifeStudy) -> list[tuple[str, str]]:
+def _turn(s: b.Source) -> b.Table:
     """The turn at constant speed: quantity and value."""
-    turn, layout = study.statics.turn, Layout(Turn)
-    rows = [
-        (v.description, f"{x:.3g}" if v.name == "margin" else _value(x, v.unit))
-        for v, x in zip(layout.variables, layout.values(turn), strict=True)
-    ]
-    title, most = max(study.statics.pins.items(), key=lambda item: item[1].peak)
-    return [*rows, (f"largest reaction, {title}", _value(most.peak, "N"))]
+    most = max(s.result["pins"], key=lambda pin: s.result["pins"][pin]["peak"]["value"])
+    largest = b.TableRow((f"largest reaction, {most}", s.number(f"pins.{most}.peak")))
+    return b.Table((*s.rows(Turn, "turn", digits=4), largest))
 
 
-def columns(study: KnifeStudy) -> list[tuple[str, Wheel]]:
-    """The flywheels by inertia, and what each of them is."""
-    found = [("given" if wheel is study.given else "", wheel) for wheel in study.wheels]
-    if study.least is not None:
-        if study.least in study.wheels:
-            k = study.wheels.index(study.least)
-            found[k] = (", ".join(word for word in (found[k][0], "least") if word), study.least)
-        else:
-            found.append(("least", study.least))
-    return sorted(found, key=lambda item: item[1].flywheel)
+def _pins(s: b.Source) -> b.Table:
+    names = Layout(Reaction).names
+    rows = (
+        b.TableRow((pin, *(s.number(f"pins.{pin}.{name}") for name in names))) for pin in s.result["pins"]
+    )
+    heads = b.heads("pin", "peak, cutting", "at", "peak, without cut", "at")
+    return b.Table(tuple(rows), heads, title="What the pins carry over a turn at constant speed", form="long")
 
 
-def wheel_rows(study: KnifeStudy) -> list[tuple[str, list[str]]]:
-    """What each flywheel gave: quantity, and a value for each of `columns`."""
-    wheels = [wheel for _, wheel in columns(study)]
+def wheels(study: KnifeStudy) -> list[tuple[str, Wheel, str]]:
+    """The flywheels by inertia: in words what each of them is, its run, and its place in the result."""
+    runs = [(wheel, f"flywheels.{i}") for i, wheel in enumerate(study.wheels)]
+    if study.least is not None and study.least not in study.wheels:
+        runs.append((study.least, "least_flywheel"))
+    special = (("given", study.given), ("least", study.least))
     return [
-        (v.description, [_value(getattr(wheel.answers, v.name), v.unit) for wheel in wheels])
+        (", ".join(word for word, which in special if wheel is which), wheel, path)
+        for wheel, path in sorted(runs, key=lambda run: run[0].flywheel)
+    ]
+
+
+def _flywheels(s: b.Source, study: KnifeStudy) -> Iterator[b.Block]:
+    if not study.wheels:
+        return
+    rated = ", ".join(f"{{drive.rated_{name}}}" for name in ("power", "speed", "torque", "current"))
+    yield b.Text(s.line(f"Motor: {{drive.motor}}, rated {rated}; ratio {{machine.ratio:4}}."))
+    found = wheels(study)
+    heads = (
+        s.line(f"{{{path}.flywheel}}{f' ({what})' if what else ''}{' stalls' if wheel.stalled else ''}")
+        for what, wheel, path in found
+    )
+    rows = (
+        b.TableRow(
+            (v.description, *(s.number(f"{path}.{v.name}") for _, _, path in found)),
+            form="long" if v.name in _MINOR else "both",
+        )
         for v in Layout(Answers).variables
         if v.name != "flywheel"
-    ]
-
-
-def _heads(study: KnifeStudy) -> list[str]:
-    return [
-        _value(wheel.flywheel, "kg.m2")
-        + (f" ({what})" if what else "")
-        + (" stalls" if wheel.stalled else "")
-        for what, wheel in columns(study)
-    ]
-
-
-_SHORT = tuple(
-    (head, name, next(v.unit for v in Layout(Answers).variables if v.name == name))
-    for head, name in (
-        ("flywheel", "flywheel"),
-        ("start", "start_time"),
-        ("ripple", "fluctuation"),
-        ("by hand", "fluctuation_by_hand"),
-        ("peak torque", "motor_torque_peak"),
-        ("current", "current_share"),
-        ("lent", "stored_share_most"),
     )
-)
-"""Columns on the terminal: head, name in `Answers`, unit."""
+    columns = range(1, len(found) + 1)
+    groups = (tuple(columns[i : i + _TABLE_WIDTH]) for i in range(0, len(found), _TABLE_WIDTH))
+    yield b.Table(tuple(rows), b.heads("flywheel", *heads), title="Flywheels", groups=tuple(groups))
 
 
-def show(study: KnifeStudy, console: Console) -> None:
-    """Print the turn, the flywheels, warnings and notes."""
-    title = study.config.title
-    table = Table(title=Text(title) if title else None, title_justify="left", show_header=False)
-    table.add_column("quantity")
-    table.add_column("value", justify="right")
-    for name, value in turn_rows(study):
-        table.add_row(name, value)
-    console.print(table)
-    if study.wheels:
-        table = Table(
-            title="Flywheels (ripple: fluctuation of the speed; current: RMS of rated; lent: of a cut's work)",
-            title_justify="left",
-        )
-        for head, _, unit in _SHORT:
-            table.add_column(f"{head}\n[{'%' if unit == '1' else unit.replace('.', ' ')}]", justify="right")
-        table.add_column("")
-        for what, wheel in columns(study):
-            cells = [_value(getattr(wheel.answers, name), unit) for _, name, unit in _SHORT]
-            # the unit is in the head
-            bare = [cell.partition(" ")[0] if cell[:1].isdigit() else cell for cell in cells]
-            table.add_row(*bare, what + (" stalls" if wheel.stalled else ""))
-        console.print(table)
-    for kind, lines in (("Warning", study.warnings), ("Note", study.notes)):
-        for line in lines:
-            console.print(f"{kind}: {line}", soft_wrap=True)
+# -- figures
 
 
-def markdown(study: KnifeStudy, plots: list[str]) -> str:
-    """The turn, the pins, the flywheels, the warnings, what was given, and the plots."""
-    config, plate = study.config, study.config.motor.nameplate
-    lines = [f"# {markdown_text(config.title) or 'Knife drive'}", ""]
-    if study.failure is not None:
-        lines += [f"The run stopped early: {markdown_text(str(study.failure))}.", ""]
-    lines += ["## A turn at constant speed", "", "| quantity | value |", "|---|---|"]
-    lines += [f"| {name} | {value} |" for name, value in turn_rows(study)]
-    lines += ["", "| pin | peak, cutting | at | peak, without cut | at |", "|---|---|---|---|---|"]
-    lines += [
-        f"| {title} | {_value(r.peak, 'N')} | {_value(r.angle, 'rad')} | {_value(r.peak_free, 'N')} | "
-        f"{_value(r.angle_free, 'rad')} |"
-        for title, r in study.statics.pins.items()
-    ]
-    if study.wheels:
-        heads = _heads(study)
-        lines += ["", "## Flywheels, co-simulated", "", f"Motor: {config.motor.designation}, rated "]
-        lines[-1] += ", ".join(
-            _value(x, unit)
-            for x, unit in (
-                (plate.power, "W"),
-                (plate.speed, "rad/s"),
-                (plate.torque, "N.m"),
-                (plate.rated_current, "A"),
-            )
-        )
-        lines[-1] += f"; ratio {config.machine.ratio:.4g}."
-        lines += ["", f"| flywheel | {' | '.join(heads)} |", "|---" * (len(heads) + 1) + "|"]
-        lines += [f"| {name} | {' | '.join(values)} |" for name, values in wheel_rows(study)]
-    for title, said in (("Warnings", study.warnings), ("Notes", study.notes)):
-        if said:
-            lines += ["", f"## {title}", "", *(f"- {line}" for line in said)]
-    lines += ["", "## Given", "", "| name | value | meaning |", "|---|---|---|"]
-    for section, declared in (
-        ("cut", config.cut),
-        ("drive", config.train),
-        ("run", config.run),
-        ("machine", config.machine),
-    ):
-        layout = Layout(type(declared))
-        for v, x in zip(layout.variables, layout.values(declared), strict=True):
-            unit = "" if v.unit == "1" else " " + v.unit.replace(".", " ")
-            lines.append(f"| {section}.{v.name} | {x:.6g}{unit} | {v.description} |")
-    for name in plots:
-        lines += ["", f"![{name.removesuffix('.png')}]({name})"]
-    return "\n".join(lines) + "\n"
+def _figures(study: KnifeStudy) -> Iterator[fig.Figure]:
+    yield _blade_path(study)
+    yield _torque(study)
+    yield _reactions(study)
+    if any(wheel.answers.fluctuation is not None for wheel in study.wheels):
+        yield _flywheel(study)
 
 
-# -- plots
+def _mechanism(study: KnifeStudy, q: Any) -> Mechanism:
+    return KnifeDrive.state(numpy_(), study.config.machine, Inputs(), q, 0.0).m
 
 
-def _joints(study: KnifeStudy, q: float) -> dict[str, tuple[float, float]]:
-    """Pins and the ends of the edge at crank angle `q` [m]."""
-    p = study.config.machine
-    m = KnifeDrive.state(numpy_(), p, Inputs(), q, 0.0).m
-    knife = m.links["knife"]
-    at: dict[str, Any] = {
-        **{name: pin.p for name, pin in m.pins.items()},
-        # the edge is drawn as long as the knife's pins lie apart
-        "first": knife.beside(min(p.knife.d.x, p.knife.e.x), p.knife.blade.y).p,
-        "last": knife.beside(max(p.knife.d.x, p.knife.e.x), p.knife.blade.y).p,
-    }
-    return {name: (float(point.x), float(point.y)) for name, point in at.items()}
+def _links(m: Mechanism) -> tuple[DrawnLink, ...]:
+    return (*linkage.links(m.linkage, _LOOKS), _EDGE)
 
 
-_LINKS = (("O1", "A"), ("A", "B"), ("B", "O2"), ("B", "C"), ("O3", "D"), ("O4", "E"))
+def _places(study: KnifeStudy, m: Mechanism) -> dict[str, tuple[Any, Any]]:
+    """Pins, the middle of the edge and its ends [m]; the edge is drawn as long as the knife's pins lie apart."""
+    knife = study.config.machine.knife
+    ends = {"first": min(knife.d.x, knife.e.x), "last": max(knife.d.x, knife.e.x)}
+    edge = {name: m.links["knife"].beside(x, knife.blade.y).p for name, x in ends.items()}
+    return linkage.places(m) | {name: (point.x, point.y) for name, point in edge.items()}
 
 
-def _blade_path(study: KnifeStudy) -> Any:
+def _drawn(links: tuple[DrawnLink, ...], at: dict[str, tuple[Any, Any]]) -> tuple[Any, Any]:
+    """All links as one line with gaps, shape (points,)."""
+    gap, points = (math.nan, math.nan), []
+    for link in links:
+        points += [at[pin] for pin in (*link.joints, *link.joints[: int(link.closed)])] + [gap]
+    x, y = np.array(points, float).T
+    return x, y
+
+
+def _angle_axis(label: str = "crank angle") -> fig.Axis:
+    return fig.Axis(label, "rad", low=0.0, high=2.0 * math.pi, step=60.0)
+
+
+def _spans(study: KnifeStudy) -> list[fig.Shade]:
+    """Where the blade goes down in the stack."""
     s, stack = study.statics, study.config.machine.stack
-    figure = plt.figure(figsize=(11.0, 9.0))
-    grid = figure.add_gridspec(2, 2, height_ratios=(1.25, 1.0), width_ratios=(1.5, 1.0))
-    axis = figure.add_subplot(grid[0, :])
-    bottom = float(s.angle[np.argmin(s.y)])
-    fall = (bottom - s.top) % (2.0 * math.pi)
-    for line, (name, q) in zip(
-        (LINES[2], LINES[1], LINES[0]),
-        (("blade at its top", s.top), ("half-way", s.top + 0.5 * fall), ("at its bottom", s.top + fall)),
-        strict=True,
-    ):
-        at = _joints(study, q)
-        marker = {"marker": "o", "markersize": 4.0, "markerfacecolor": "white", "zorder": 3}
-        for k, link in enumerate(_LINKS):
-            axis.plot(
-                *zip(*(at[pin] for pin in link), strict=True),
-                label=None if k else f"{name}, crank at {math.degrees(q) % 360.0:.0f} deg",
-                **line,
-                **marker,
-            )
-        axis.plot(*zip(*(at[pin] for pin in "CDEC"), strict=True), **line, **marker)
-        axis.plot(*zip(at["first"], at["last"], strict=True), **{**line, "linewidth": 2.6}, zorder=4)
-        if name == "at its bottom":
-            _names(axis, at)
-    left, right = sorted((at["first"][0], at["last"][0]))
-    axis.add_patch(
-        Rectangle(
-            (left, stack.table), right - left, stack.top - stack.table, zorder=1, label="stack", **_STACK
-        )
-    )
-    axis.plot(s.x, s.y, color="#1b1b1b", linewidth=1.0, zorder=5, label="path of the edge's middle")
-    axis.set_aspect("equal")
-    axis.set_xlabel("x [m]")
-    axis.set_ylabel("y [m]")
-    axis.legend(loc="upper left", fontsize=9)
-    axis.set_title("The linkage in three positions")
+    inside = (np.roll(s.y, -1) < s.y) & (s.y < stack.top) & (s.y > stack.table)
+    edge = np.diff(np.concatenate([[False], inside, [False]]).astype(int))
+    angle = np.append(s.angle, 2.0 * math.pi)
+    ends = zip(angle[edge > 0], angle[edge < 0], strict=True)
+    return [fig.Shade(float(low), float(high), "in the stack") for low, high in ends]
 
-    path, tilt = figure.add_subplot(grid[1, 0]), figure.add_subplot(grid[1, 1])
-    x, y = 1e3 * np.append(s.x, s.x[0]), 1e3 * np.append(s.y, s.y[0])
-    path.axhspan(1e3 * stack.table, 1e3 * stack.top, zorder=1, **_STACK)
-    path.plot(x, y, **LINES[0])
+
+def _blade_path(study: KnifeStudy) -> fig.Figure:
+    s, stack = study.statics, study.config.machine.stack
+    fall = (float(s.angle[np.argmin(s.y)]) - s.top) % (2.0 * math.pi)
+    positions: list[fig.Item] = []
+    for look, (name, q) in (
+        (2, ("blade at its top", s.top)),
+        (1, ("half-way", s.top + 0.5 * fall)),
+        (0, ("at its bottom", s.top + fall)),
+    ):
+        m = _mechanism(study, q)
+        at = _places(study, m)
+        words = f"{name}, crank at {number(q % (2.0 * math.pi), 'rad')}"
+        positions.append(fig.Curve(words, *_drawn(_links(m), at), look, "o"))
+    ends = sorted(float(at[name][0]) for name in ("first", "last"))
+    low, high = ([each, each] for each in (stack.table, stack.top))
+    positions += [
+        fig.Between("stack", ends, low, high, "hatched"),
+        fig.Curve("path of the edge's middle", s.x, s.y, "path"),
+        *(fig.Label(float(x), float(y), name) for name, (x, y) in at.items() if len(name) < 3),
+    ]
+    x, y = (np.append(each, each[0]) for each in (s.x, s.y))
+    path: list[fig.Item] = [
+        fig.Shade(stack.table, stack.top, "stack", "y", "hatched"),
+        fig.Curve("path of the edge's middle", x, y, listed=False),
+    ]
     # on the way down alone: the way up may run along the same line
     for k in range(7):
-        at_k = int((math.radians(30.0 * k) * fall / math.pi + s.top) / (2.0 * math.pi) * len(s.angle)) % len(
-            s.angle
-        )
-        path.plot([x[at_k]], [y[at_k]], "o", color="#1b1b1b", markersize=4.0, markerfacecolor="white")
-        path.annotate(
-            f"{math.degrees(s.angle[at_k]):.0f} deg",
-            (x[at_k], y[at_k]),
-            (-8, -4) if k == 6 else (8, -9),
-            textcoords="offset points",
-            ha="right" if k == 6 else "left",
-            fontsize=9,
-            bbox=_WHITE,
-        )
-    path.margins(x=0.3, y=0.2)
-    path.set_aspect("equal", adjustable="datalim")
-    path.set_xlabel("x [mm]")
-    path.set_ylabel("y [mm]")
-    path.set_title("Path of the edge's middle; crank angles on its way down")
-    tilt.plot(np.degrees(s.angle), np.degrees(s.tilt), **LINES[0])
-    _span(tilt, study)
-    _turn_axis(tilt)
-    tilt.set_ylabel("tilt of the blade [deg]")
-    tilt.set_title("Tilt; grey: in the stack")
-    return figure
+        i = round((s.top + fall * k / 6.0) / (2.0 * math.pi) * len(s.angle)) % len(s.angle)
+        words = number(float(s.angle[i]), "rad")
+        path.append(fig.Curve("", [s.x[i]], [s.y[i]], marker="o", joined=False, listed=False))
+        path.append(fig.Label(float(s.x[i]), float(s.y[i]), words, "left" if k == 6 else "right"))
+    metre, small = ((fig.Axis("x", "m", kind), fig.Axis("y", "m", kind)) for kind in ("", "millimetres"))
+    tilt: tuple[fig.Item, ...] = (fig.Curve("tilt", s.angle, s.tilt, listed=False), *_spans(study))
+    panels = (
+        fig.Panel(*metre, tuple(positions), "The linkage in three positions", equal=True),
+        fig.Panel(*small, tuple(path), "Path of the edge's middle; crank angles on its way down", equal=True),
+        fig.Panel(_angle_axis(), fig.Axis("tilt of the blade", "rad"), tilt, "Tilt of the blade"),
+    )
+    return fig.Figure(
+        "blade-path",
+        "The linkage in three positions, the path of its blade and its tilt",
+        "The linkage with its blade at the top, half-way and at the bottom; the path of the edge's middle; the tilt "
+        "of the blade over the crank angle.",
+        tuple((panel,) for panel in panels),
+        file="blade_path.png",
+        heights=(2.2, 1.5, 1.0),
+    )
 
 
-def _names(axis: Any, at: dict[str, tuple[float, float]]) -> None:
-    for name in ("O1", "A", "B", "O2", "C", "D", "E", "O3", "O4"):
-        if name.startswith("O"):
-            axis.plot([at[name][0]], [at[name][1]], "^", color="#1b1b1b", markersize=9.0, zorder=2)
-        axis.annotate(
-            name,
-            at[name],
-            (-4, -17) if name in "CDE" else (7, 7),
-            textcoords="offset points",
-            fontsize=10,
-            zorder=6,
-            bbox=_WHITE,
-        )
+def _torque(study: KnifeStudy) -> fig.Figure:
+    s, config, spans = study.statics, study.config, _spans(study)
+    mean = f"mean, cutting: {number(s.turn.torque_mean, 'N.m')}"
+    torque = (
+        fig.Curve(f"cutting, {number(config.cut.force, 'N')}", s.angle, s.torque),
+        fig.Curve("without cut", s.angle, s.torque_free, 1),
+        fig.Mark(s.turn.torque_mean, mean, axis="y", look=2),
+    )
+    inertia = fig.Curve("inertia", s.angle, s.inertia, listed=False)
+    return fig.Figure(
+        "torque",
+        f"A turn at constant {number(config.run.crank_speed, 'rad/s', 'speed')}",
+        "Crank torque with and without the cut, and the inertia reflected to the crank, over the crank angle.",
+        (
+            (fig.Panel(_angle_axis(), fig.Axis("crank torque", "N.m"), (*torque, *spans)),),
+            (fig.Panel(_angle_axis(), fig.Axis("reflected inertia", "kg.m2", low=0.0), (inertia, *spans)),),
+        ),
+        file="torque.png",
+        heights=(1.5, 1.0),
+    )
 
 
-def _turn_axis(axis: Any, label: bool = True) -> None:
-    axis.set_xlim(0.0, 360.0)
-    axis.set_xticks(range(0, 361, 60))
-    if label:
-        axis.set_xlabel("crank angle [deg]")
-
-
-def _span(axis: Any, study: KnifeStudy) -> None:
-    """Shade where the blade goes down in the stack."""
-    s, stack = study.statics, study.config.machine.stack
-    falling = np.roll(s.y, -1) < s.y
-    inside = falling & (s.y < stack.top) & (s.y > stack.table)
-    edge = np.diff(np.concatenate([[False], inside, [False]]).astype(int))
-    degrees = np.degrees(np.append(s.angle, 2.0 * math.pi))
-    for a, b in zip(np.flatnonzero(edge > 0), np.flatnonzero(edge < 0), strict=True):
-        axis.axvspan(degrees[a], degrees[b], facecolor="#ececec", edgecolor="none", zorder=0)
-
-
-def _torque(study: KnifeStudy) -> Any:
-    s, config = study.statics, study.config
-    figure, (top, bottom) = plt.subplots(2, 1, figsize=(8.0, 6.5), sharex=True, height_ratios=(1.6, 1.0))
-    degrees = np.degrees(s.angle)
-    top.plot(degrees, s.torque, label=f"cutting, {1e-3 * config.cut.force:.4g} kN", **LINES[0])
-    top.plot(degrees, s.torque_free, label="without cut", **LINES[1])
-    top.axhline(s.turn.torque_mean, label=f"mean, cutting: {s.turn.torque_mean:.3g} N m", **LINES[2])
-    top.set_ylabel("crank torque [N m]")
-    top.set_title(f"A turn at constant {_value(config.run.crank_speed, 'rad/s')}; grey: in the stack")
-    top.legend(loc="upper right", fontsize=9)
-    bottom.plot(degrees, s.inertia, **LINES[0])
-    bottom.set_ylim(bottom=0.0)
-    bottom.set_ylabel("inertia reflected\nto the crank [kg m2]")
-    for axis in (top, bottom):
-        _span(axis, study)
-        _turn_axis(axis, axis is bottom)
-    return figure
-
-
-def _reactions(study: KnifeStudy) -> Any:
-    pins = study.statics.pins
-    figure, axis = plt.subplots(figsize=(8.5, 5.2))
-    rows = np.arange(len(pins))
-    for shift, name, shade, hatch, angle in (
-        (-0.2, "peak", "#4d4d4d", "", "angle"),
-        (0.2, "peak_free", "#d4d4d4", "//", "angle_free"),
+def _reactions(study: KnifeStudy) -> fig.Figure:
+    pins, items = study.statics.pins, []
+    for look, shift, words, size, angle in (
+        (1, -0.2, "cutting", "peak", "angle"),
+        (2, 0.2, "without cut", "peak_free", "angle_free"),
     ):
-        sizes = [1e-3 * getattr(r, name) for r in pins.values()]
-        axis.barh(
-            rows + shift,
-            sizes,
-            0.38,
-            label="cutting" if name == "peak" else "without cut",
-            color=shade,
-            hatch=hatch,
-            edgecolor="#1b1b1b",
-            linewidth=0.6,
-        )
-        for row, size, r in zip(rows, sizes, pins.values(), strict=True):
-            axis.annotate(
-                f"{size:.3g} kN at {math.degrees(getattr(r, angle)):.0f} deg",
-                (size, row + shift),
-                (4, 0),
-                textcoords="offset points",
-                va="center",
-                fontsize=8,
-            )
-    axis.set_yticks(rows, list(pins))
-    axis.invert_yaxis()
-    axis.margins(x=0.22)
-    axis.set_xlim(left=0.0)
-    axis.set_xlabel("largest reaction [kN], and the crank angle at which it comes")
-    axis.set_title("What the pins carry over a turn at constant speed")
-    axis.grid(axis="y", visible=False)
-    axis.legend(loc="lower right")
-    return figure
+        peaks = [(getattr(r, size), getattr(r, angle)) for r in pins.values()]
+        places = tuple(f"{number(peak, 'N')} at {number(at, 'rad')}" for peak, at in peaks)
+        at = np.arange(len(pins)) + shift
+        items.append(fig.Bars(words, at, [peak for peak, _ in peaks], 0.38, look, words=places))
+    # room for the words beside the bars
+    x = fig.Axis("largest reaction", "N", low=0.0, high=1.3 * max(r.peak for r in pins.values()))
+    return fig.Figure(
+        "reactions",
+        "What the pins carry over a turn at constant speed",
+        "Bars of the largest reaction of every pin, cutting and without cut, with the crank angle at which it comes.",
+        ((fig.Panel(x, fig.Axis("pin", names=tuple(pins)), tuple(items)),),),
+        file="reactions.png",
+        heights=(0.17 * len(pins),),
+    )
 
 
-def _flywheel(study: KnifeStudy) -> Any:
-    figure, axes = plt.subplots(2, 2, figsize=(11.0, 8.0))
-    (speed, torque), (current, size) = axes
-    cutting = [wheel for _, wheel in columns(study) if wheel.answers.fluctuation is not None]
+def _flywheel(study: KnifeStudy) -> fig.Figure:
+    cutting = [wheel for _, wheel, _ in wheels(study) if wheel.answers.fluctuation is not None]
     # as many as there are lines to tell apart, from the least to the largest
-    shown = [cutting[round(k)] for k in np.linspace(0, len(cutting) - 1, min(len(cutting), len(LINES)))]
-    config = study.config
-    ratio, plate = config.machine.ratio, config.motor.nameplate
-    for line, wheel in zip(LINES, shown, strict=False):
-        assert wheel.turns is not None
+    some = [cutting[round(k)] for k in np.linspace(0, len(cutting) - 1, min(len(cutting), len(LINES)))]
+    ratio, plate = study.config.machine.ratio, study.config.motor.nameplate
+    speed, torque, current = (
+        fig.Axis("crank speed", "rad/s", "speed"),
+        fig.Axis("motor torque, air gap", "N.m"),
+        fig.Axis("motor current, RMS of a phase", "A"),
+    )
+    items: dict[fig.Axis, list[fig.Item]] = {
+        speed: [],
+        torque: [fig.Mark(plate.torque, "rated", axis="y", look="reference")],
+        current: [fig.Mark(plate.rated_current, "rated", axis="y", look="reference")],
+    }
+    for look, wheel in enumerate(some):
         run = wheel.turns
+        assert run is not None
         # the last turn, from one top of the blade to the next
-        angle = np.degrees(run["motor.phi"].values / ratio - study.statics.top)
-        first = int(np.searchsorted(angle, angle[-1] - 360.0))
-        after = angle[first:] - angle[-1] + 360.0
-        for axis, y in (
-            (speed, run["motor.w"].values / ratio * 30.0 / math.pi),
-            (torque, run["motor.air_gap_tau"].values),
-            (current, run["motor.i"].values),
+        angle = run["motor.phi"].values / ratio - study.statics.top
+        first = int(np.searchsorted(angle, angle[-1] - 2.0 * math.pi))
+        after = angle[first:] - angle[-1] + 2.0 * math.pi
+        for axis, name, factor in (
+            (speed, "w", 1.0 / ratio),
+            (torque, "air_gap_tau", 1.0),
+            (current, "i", 1.0),
         ):
-            axis.plot(after, y[first:], label=_value(wheel.flywheel, "kg.m2"), **line)
-    torque.axhline(plate.torque, color=_GREY, linewidth=1.2, linestyle=(0, (6, 2)), label="rated")
-    current.axhline(plate.rated_current, color=_GREY, linewidth=1.2, linestyle=(0, (6, 2)), label="rated")
-    speed.set_ylabel("crank speed [rev/min]")
-    torque.set_ylabel("motor torque, air gap [N m]")
-    current.set_ylabel("motor current, RMS of a phase [A]")
-    for axis in (speed, torque, current):
-        _turn_axis(axis)
-        axis.set_xlabel("crank angle after the blade's top [deg]")
-    speed.set_title("A cut with each flywheel")
-    torque.legend(loc="best", fontsize=9)
-    _sizes(study, size, cutting)
-    return figure
+            y = factor * run[f"motor.{name}"].values[first:]
+            items[axis].append(fig.Curve(number(wheel.flywheel, "kg.m2"), after, y, look))
+    x = _angle_axis("crank angle after the blade's top")
+    panels = [fig.Panel(x, axis, tuple(drawn)) for axis, drawn in items.items()]
+    return fig.Figure(
+        "flywheel",
+        "A cut with each flywheel, and the fluctuation of the speed over the inertia",
+        "Crank speed, motor torque and current of a cut with each flywheel; fluctuation over inertia.",
+        ((panels[0], panels[1]), (panels[2], _fluctuation(study, cutting))),
+        file="flywheel.png",
+        heights=(1.3, 1.3),
+    )
 
 
-def _sizes(study: KnifeStudy, axis: Any, cutting: list[Wheel]) -> None:
+def _fluctuation(study: KnifeStudy, cutting: list[Wheel]) -> fig.Panel:
     """Fluctuation over the inertia on the motor shaft."""
     inertia = np.array([wheel.answers.inertia for wheel in cutting])
-    ends = np.array(
-        [min(inertia[0], study.inertia(0.0)), 1.3 * max(inertia[-1], study.inertia(study.flywheel_by_hand))]
-    )
-    by_hand = [study.by_hand(J - study.inertia(0.0)) for J in ends]
-    axis.loglog(ends, by_hand, label="by hand, dE/(J w2)", **LINES[1])
-    axis.loglog(
-        inertia,
-        [wheel.answers.fluctuation for wheel in cutting],
-        marker="o",
-        markersize=5.0,
-        markerfacecolor="white",
-        label="co-simulated",
-        **LINES[0],
-    )
-    axis.axhline(
-        study.config.run.fluctuation, color=_GREY, linewidth=1.2, linestyle=(0, (6, 2)), label="permitted"
-    )
+    sizes = [wheel.answers.fluctuation for wheel in cutting]
+    bare, permitted = study.inertia(0.0), study.config.run.fluctuation
+    ends = np.array([min(inertia[0], bare), 1.3 * max(inertia[-1], study.inertia(study.flywheel_by_hand))])
+    by_hand = [study.by_hand(J - bare) for J in ends]
+    items: list[fig.Item] = [
+        fig.Curve("by hand, dE/(J w2)", ends, by_hand, 1),
+        fig.Curve("co-simulated", inertia, sizes, marker="o"),
+        fig.Mark(permitted, "permitted", axis="y", look=3),
+    ]
     if study.least is not None and study.least in cutting:
         a = study.least.answers
-        axis.plot([a.inertia], [a.fluctuation], "s", color="#1b1b1b", markersize=7.0, label="least flywheel")
-    axis.set_ylim(top=min(2.0, 1.5 * max(by_hand)))
-    percent = FuncFormatter(lambda y, _: f"{100.0 * y:g} %")
-    axis.yaxis.set_major_formatter(percent)
-    axis.yaxis.set_minor_formatter(
-        FuncFormatter(lambda y, _: f"{100 * y:g} %" if f"{y:e}"[0] in "25" else "")
+        items.append(fig.Curve("least flywheel", [a.inertia], [a.fluctuation], marker="s", joined=False))
+    low, high = 0.7 * min(*sizes, permitted), min(2.0, 1.5 * max(by_hand))
+    y = fig.Axis("fluctuation of the speed", "1", "percent", low=low, high=high, log=True)
+    x = fig.Axis("inertia on the motor shaft", "kg.m2", log=True)
+    return fig.Panel(x, y, tuple(items), "Fluctuation over inertia")
+
+
+# -- motion
+
+
+def _motion(study: KnifeStudy) -> Animation:
+    """The turn at constant speed, with and without the cut."""
+    config, statics = study.config, study.statics
+    angle = np.linspace(0.0, 2.0 * math.pi, _PICTURES + 1)
+    m = _mechanism(study, angle)
+    places = _places(study, m)
+    pins = {output: pin for output, (pin, _) in JOINTS.items()}
+
+    def run(name: str, title: str, force: float) -> Clip:
+        out = turning(config, angle, force)
+        readings = (
+            Reading("Crank angle", angle, "rad"),
+            Reading("Crank torque", out.tau * config.machine.ratio, "N.m"),
+            Reading("Blade, x", out.blade.x, "m", "millimetres"),
+            Reading("Blade, y", out.blade.y, "m", "millimetres"),
+            Reading("Tilt", out.blade.tilt, "rad"),
+        )
+        arrows = linkage.arrows(PINS, pins, lambda pin: (getattr(out, pin).fx, getattr(out, pin).fy))
+        return Clip(name, title, angle / config.run.crank_speed, places, readings, tuple(arrows))
+
+    return Animation(
+        _links(m),
+        tuple(m.linkage.ground),
+        (
+            run("cutting", "a turn at constant speed, cutting", config.cut.force),
+            run("free", "a turn at constant speed, without cut", 0.0),
+        ),
+        2.0 * math.pi / config.run.crank_speed,
+        "An arrow is the force on the first-named part of a pin; the thin line is the path of the edge's middle.",
+        orbit=("O1", "A"),
+        names=dict.fromkeys(("first", "last", "blade"), ""),
+        paths={"path of the edge's middle": (statics.x[::20], statics.y[::20])},
     )
-    axis.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
-    axis.set_xlabel("inertia on the motor shaft [kg m2]")
-    axis.set_ylabel("fluctuation of the speed [%]")
-    axis.set_title("Fluctuation over inertia")
-    axis.legend(loc="best", fontsize=9)

@@ -38,8 +38,6 @@
   if (!motion || !stage) return;
   const SVG = "http://www.w3.org/2000/svg";
   const WIDTH = 900;
-  // where the name of a joint stands beside it, clear of its links; those of a side stand outside
-  const LABEL = { O1: [-26, 16], C: [26, 20], Bd: [22, 26], A2: [30, 8] };
   const add = (parent, tag, attributes, text) => {
     const element = document.createElementNS(SVG, tag);
     for (const [name, value] of Object.entries(attributes || {})) element.setAttribute(name, value);
@@ -49,7 +47,15 @@
   };
   const of = (list, i) => list[Math.min(i, list.length - 1)];
 
-  const crank = motion.links.find((link) => link.kind === "crank"), crankPin = crank.to;
+  const colour = (group) => "group-" + (motion.groups.indexOf(group) + 1);
+  const called = (joint) => (joint in motion.names ? motion.names[joint] : joint);
+  // joints that a joint is linked with: its name stands on the other side
+  const beside = {};
+  for (const link of motion.links)
+    link.joints.forEach((joint, i) => {
+      const next = [link.joints[i - 1], link.joints[i + 1]].filter((other) => other !== undefined);
+      (beside[joint] = beside[joint] || []).push(...next);
+    });
   let run, frame, played, playing = false, last = null, parts, scale, origin, perNewton, height;
   const select = byId("run"), factor = byId("factor"), arrows = byId("arrows"), slider = byId("slider");
   motion.runs.forEach((r, i) => select.add(new Option(r.title, i)));
@@ -70,15 +76,15 @@
   function build() {
     stage.replaceChildren();
     const x = [], y = [];
-    for (const r of motion.runs)
+    for (const r of [...motion.runs, { joints: motion.paths }])
       for (const j of Object.values(r.joints))
         for (const [list, all] of [[j.x, x], [j.y, y]]) {
           all.push(list.reduce((a, b) => Math.min(a, b)), list.reduce((a, b) => Math.max(a, b)));
         }
     const [x0, x1] = [Math.min(...x), Math.max(...x)], [y0, y1] = [Math.min(...y), Math.max(...y)];
     const size = Math.max(x1 - x0, y1 - y0);
-    const arrow = 0.28 * size;
-    const left = 0.11 * size, right = 0.13 * size, above = 1.2 * arrow, below = 0.1 * size;
+    const arrow = 0.26 * size;
+    const left = 0.16 * size, right = 0.16 * size, above = 1.2 * arrow, below = 0.1 * size;
     scale = WIDTH / (x1 - x0 + left + right);
     height = Math.round(scale * (y1 - y0 + above + below));
     origin = [scale * (left - x0), scale * (y1 + above)];
@@ -87,35 +93,38 @@
 
     const ground = add(stage, "g");
     frame = 0;
-    for (const name of motion.fixed) {
+    for (const name of motion.grounds) {
       const [px, py] = at(name);
       // what hangs has its support above, what stands below
-      const up = name.startsWith("A1") || name === "C" ? -1 : 1;
+      const up = motion.hanging.includes(name) ? -1 : 1;
       add(ground, "path", { class: "ground", d: `M${px} ${py} l-14 ${22 * up} h28 z` });
       add(ground, "path", {
         class: "hatch",
         d: `M${px - 22} ${py + 22 * up} h44` + [-18, -8, 2, 12].map((s) => `M${px + s} ${py + 22 * up} l8 ${8 * up}`).join(""),
       });
     }
-    const [ox, oy] = at(crank.from);
-    add(stage, "circle", { class: "orbit", cx: ox, cy: oy, r: crank.length * scale });
-    parts.material = {};
-    for (const side of ["left", "right"]) parts.material[side] = add(stage, "g", { class: side });
-    for (const side of ["left", "right"]) {
-      const loaded = motion.links.filter((l) => /^(web|wall)$/.test(l.kind) && (l.from + l.to).includes(side));
-      const group = parts.material[side];
-      parts.material[side] = loaded.map((link) => [link, add(group, "line", { class: "material" })]);
+    if (motion.orbit) {
+      const [[ox, oy], [px, py]] = motion.orbit.map(at);
+      add(stage, "circle", { class: "orbit", cx: ox, cy: oy, r: Math.hypot(px - ox, py - oy) });
     }
-    parts.links = motion.links.map((link) => add(stage, "line", { class: "link " + link.kind }));
+    for (const path of motion.paths) {
+      const points = path.x.map((px, i) => `${origin[0] + scale * px} ${origin[1] - scale * of(path.y, i)}`);
+      add(add(stage, "path", { class: "path", d: "M" + points.join("L") }), "title", {}, path.title);
+    }
+    parts.loads = motion.links
+      .filter((link) => link.name in run.loads)
+      .map((link) => [link, add(stage, "polyline", { class: "material" })]);
+    parts.links = motion.links.map((link) =>
+      add(stage, link.closed ? "polygon" : "polyline", { class: `link ${link.look}${link.closed ? " closed" : ""}` }));
     parts.joints = {};
     for (const name of Object.keys(run.joints)) {
       parts.joints[name] = [
-        add(stage, "circle", { class: "joint", r: name.startsWith("rod") ? 3 : 5 }),
-        add(stage, "text", { "text-anchor": "middle" }, name.startsWith("rod") ? "" : name.split(" ")[0]),
+        add(stage, "circle", { class: "joint", r: called(name) ? 5 : 3 }),
+        add(stage, "text", { "text-anchor": "middle" }, called(name)),
       ];
     }
     parts.forces = run.forces.map((force) => {
-      const group = add(stage, "g", { class: `arrow ${force.side} ${force.kind}` });
+      const group = add(stage, "g", { class: `arrow ${colour(force.group)} ${force.kind}` });
       add(group, "title", {}, force.title);
       return {
         line: add(group, "path", { class: "force" }),
@@ -129,11 +138,20 @@
     parts.legendText = add(parts.legend, "text", {});
     parts.caption = add(stage, "text", { x: 16, y: 28, class: "where" });
 
+    const values = byId("read-values");
+    while (values.rows.length > 1) values.deleteRow(1);
+    parts.readings = run.readings.map((reading) => {
+      const row = values.insertRow(), name = document.createElement("th");
+      name.scope = "row";
+      name.textContent = reading.title;
+      row.appendChild(name);
+      return row.insertCell();
+    });
     const rows = byId("read-forces");
     rows.replaceChildren();
     parts.rows = run.forces.map((force) => {
       const row = rows.insertRow();
-      row.className = force.side;
+      row.className = colour(force.group);
       const head = document.createElement("th");
       head.scope = "row";
       head.textContent = force.title;
@@ -170,39 +188,35 @@
   };
 
   function draw() {
-    motion.links.forEach((link, i) => {
-      const [x1, y1] = at(link.from), [x2, y2] = at(link.to);
-      for (const [name, value] of Object.entries({ x1, y1, x2, y2 })) parts.links[i].setAttribute(name, value);
-    });
-    const heaviest = Math.max(1e-9, ...motion.runs.flatMap((r) => Object.values(r.material).flat()));
-    for (const side of ["left", "right"]) {
-      const mass = of(run.material[side], frame);
-      for (const [link, band] of parts.material[side]) {
-        const share = link.kind === "web" ? motion.web_share : 1 - motion.web_share;
-        const [x1, y1] = at(link.from), [x2, y2] = at(link.to);
-        for (const [name, value] of Object.entries({ x1, y1, x2, y2 })) band.setAttribute(name, value);
-        band.setAttribute("stroke-width", (34 * mass * share) / heaviest);
-      }
-      byId("read-" + side).textContent = digits(mass, 3) + " kg";
+    const points = (link) => link.joints.map((joint) => at(joint).join(" ")).join(",");
+    motion.links.forEach((link, i) => parts.links[i].setAttribute("points", points(link)));
+    const heaviest = Math.max(1e-9, ...motion.runs.flatMap((r) => Object.values(r.loads).flat()));
+    for (const [link, band] of parts.loads) {
+      band.setAttribute("points", points(link));
+      band.setAttribute("stroke-width", (34 * of(run.loads[link.name], frame)) / heaviest);
     }
     for (const [name, [dot, text]] of Object.entries(parts.joints)) {
       const [x, y] = at(name);
       dot.setAttribute("cx", x);
       dot.setAttribute("cy", y);
-      const side = name.endsWith("left") ? -1 : name.endsWith("right") ? 1 : 0;
-      let [dx, dy] = LABEL[name] || [24 * side, 6];
-      if (name === crankPin) {
-        // outside the circle that it runs on
-        const [ox, oy] = at(crank.from), length = Math.hypot(x - ox, y - oy);
-        [dx, dy] = [(22 * (x - ox)) / length, (22 * (y - oy)) / length + 6];
+      let dx = 0, dy = 0;
+      for (const other of beside[name] || []) {
+        const [ox, oy] = at(other), length = Math.hypot(x - ox, y - oy) || 1;
+        dx += (x - ox) / length;
+        dy += (y - oy) / length;
       }
-      text.setAttribute("x", x + dx);
-      text.setAttribute("y", y + dy);
+      const length = Math.hypot(dx, dy);
+      // beside the support
+      if (motion.grounds.includes(name)) [dx, dy] = [dx > 0 ? 1.1 : -1.1, 0];
+      else if (length < 0.3) [dx, dy] = length ? [-dy / length, dx / length] : [1, 0];
+      else [dx, dy] = [dx / length, dy / length];
+      text.setAttribute("x", x + 24 * dx);
+      text.setAttribute("y", y + 22 * dy + 6);
     }
     perNewton = run.largest > 0 ? (parts.arrow * Number(arrows.value)) / run.largest : 0;
     run.forces.forEach((force, i) => {
       const [x, y] = at(force.at), fx = of(force.x, frame), fy = of(force.y, frame);
-      arrow(parts.forces[i], x, y, perNewton * fx, -perNewton * fy, force.short);
+      arrow(parts.forces[i], x, y, perNewton * fx, -perNewton * fy, force.short || called(force.at));
       parts.rows[i].textContent = Math.hypot(fx, fy).toFixed(0) + " N";
     });
     if (perNewton) {
@@ -216,9 +230,10 @@
     }
     const time = of(run.time, frame).toFixed(3).replace("-", "−") + " s";
     byId("read-time").textContent = time;
-    byId("read-angle").textContent = of(run.angle, frame).toFixed(1) + "°";
-    byId("read-speed").textContent = digits(of(run.speed, frame), 3) + " rad/s";
-    byId("read-torque").textContent = digits(of(run.torque, frame), 3) + " N m";
+    run.readings.forEach((reading, i) => {
+      const unit = reading.unit === "°" ? "°" : reading.unit ? "\u00a0" + reading.unit : "";
+      parts.readings[i].textContent = digits(of(reading.values, frame), 3) + unit;
+    });
     parts.caption.textContent = `${run.title}, ${run.event ? "event" : "start"} ${run.time[frame] < 0 ? "−" : "+"} ` +
       `${Math.abs(run.time[frame]).toFixed(2)} s`;
     slider.value = frame;

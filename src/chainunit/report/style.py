@@ -33,8 +33,36 @@ LINES = [
     {"color": "#4d4d4d", "linestyle": (0, (1, 3)), "linewidth": 2.4},
     {"color": "#00796b", "linestyle": (0, (6, 2, 1, 2, 1, 2)), "linewidth": 1.8},
 ]
+LOOKS: dict[str, dict[str, Any]] = {
+    "mark": {"color": "#555555", "linestyle": "--", "linewidth": 1.2},
+    "thin": {"color": "#777777", "linestyle": "-", "linewidth": 0.8},
+    "limit": {"color": "#777777", "linestyle": "-", "linewidth": 3.0},
+    "reference": {"color": "#777777", "linestyle": (0, (6, 2)), "linewidth": 1.2},
+    "path": {"color": "#1b1b1b", "linestyle": "-", "linewidth": 1.0},
+    "edge": {"color": "#1b1b1b", "linestyle": "-", "linewidth": 2.8},
+}
+"""Lines that mean the same in every plot."""
+INK = "#1b1b1b"
+FILLS = {"pale": "#ececec", "dark": "#a9a9a9", "band": "#c8c8c8", "hatched": "#e4e4e4"}
+CLASSES = ("#ffffff", "#d4d4d4", "#9a9a9a", "#4d4d4d")
+"""Shades of the classes of a map."""
+BARS = (
+    {"color": "#ffffff", "pattern": "", "hatch": ""},
+    {"color": "#d4d4d4", "pattern": "", "hatch": ""},
+    {"color": "#ffffff", "pattern": "/", "hatch": "//"},
+    {"color": "#e9c3b2", "pattern": "x", "hatch": "xx"},
+    {"color": "#ffffff", "pattern": "|", "hatch": "||"},
+    {"color": "#c9dbe6", "pattern": ".", "hatch": ".."},
+    {"color": "#ffffff", "pattern": "-", "hatch": "--"},
+    {"color": "#d9e4d0", "pattern": "+", "hatch": "++"},
+)
 WIDE = 30.0
 """From that ratio of largest to least on an axis is logarithmic."""
+
+
+def look_of(look: int | str) -> dict[str, Any]:
+    """Colour, dash and weight of a line, as matplotlib takes them."""
+    return LOOKS[look] if isinstance(look, str) else LINES[look % len(LINES)]
 
 
 def draw(plots: Mapping[str, Callable[[], Any]], folder: Path) -> list[Path]:

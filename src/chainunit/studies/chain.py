@@ -54,7 +54,7 @@ class SpeedNumbers:
     The turns of a start are not independent; where they count for too few, a quantile has no interval (NaN): the
     starts do not tell it."""
 
-    speed: Value = quantity("rad/s", "crank speed")
+    speed: Value = quantity("rad/s", "crank speed", kind="speed")
     crank_torque_median: Value = quantity("N.m", "crank torque, peak of a turn, median")
     crank_torque_high: Value = quantity("N.m", f"crank torque, peak of a turn, {100 * HIGH:g} % quantile")
     crank_torque_high_from: Value = quantity("N.m", "interval of that quantile, from")
@@ -176,19 +176,19 @@ class ChainResult:
             "quantile": pure(HIGH, "percent"),
             "confidence": pure(CONFIDENCE, "percent"),
             "own_speed": row(self.own),
-            "resonance": {"value": self.resonance, "unit": "rad/s"},
+            "resonance": entry(self.resonance, "rad/s", "speed"),
             "distance_to_resonance": pure(self.distance, "percent"),
             "sweep": [row(numbers) for numbers in self.sweep],
             "avoid": [
                 {
-                    "from": {"value": b.low, "unit": "rad/s"},
-                    "to": {"value": b.high, "unit": "rad/s"},
+                    "from": entry(b.low, "rad/s", "speed"),
+                    "to": entry(b.high, "rad/s", "speed"),
                     "why": b.why,
                 }
                 for b in self.avoid
             ],
             "critical_speeds": [
-                {"mode": pure(mode), "order": pure(order), "speed": {"value": speed, "unit": "rad/s"}}
+                {"mode": pure(mode), "order": pure(order), "speed": entry(speed, "rad/s", "speed")}
                 for mode, order, speed in self.critical
             ],
             "slack_by_rod": {

@@ -12,6 +12,7 @@ import numpy as np
 from ..machines.api import EMPTY, ChainUnit
 from ..machines.chain_unit import SIDES, SideLoads, SideName, other
 from ..quantities import Value, declaration, quantity
+from ..text import entry
 
 
 @dataclass(frozen=True)
@@ -160,7 +161,7 @@ class Sides:
             "speed": {"value": self.speed.tolist(), "unit": "rad/s"},
             **{name: {"value": getattr(self, name).tolist(), "unit": "N.m"} for name in _MAXIMA},
             "crossings": {
-                torque: {side: [{"value": w, "unit": "rad/s"} for w in speeds] for side, speeds in of.items()}
+                torque: {side: [entry(w, "rad/s", "speed") for w in speeds] for side, speeds in of.items()}
                 for torque, of in self.crossings().items()
             },
         }

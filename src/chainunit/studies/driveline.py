@@ -55,6 +55,7 @@ from ..reading import (
     to_number,
     toml,
 )
+from ..text import number
 
 TONGUES = (1, 2, 3, 4)
 """n of the parametric resonances 2 speed = 2 k/n."""
@@ -70,6 +71,8 @@ DRIFT = 0.01
 """growth of a deviation of the mean speed [1/s] from which on it is worth a word"""
 PEAK = 8
 """points between a peak of the coarse resonance curve and its neighbours"""
+ROUNDOFF, ROUNDOFF_TORQUE = 1e-9, 1e-6
+"""amplitude of an order [rad] and torque [N.m] up to which they are none"""
 SIMULATED = 5
 """every so many points of the resonance curve are simulated"""
 
@@ -78,11 +81,15 @@ SIMULATED = 5
 class Running:
     """How the driveline runs, and what is looked at."""
 
-    speed: Value = quantity("rad/s", "mean speed in normal running", default=150.0, above=0.0, max=1e4)
+    speed: Value = quantity(
+        "rad/s", "mean speed in normal running", default=150.0, above=0.0, max=1e4, kind="speed"
+    )
     load: Value = quantity("N.m", "mean torque on the driven inertia", default=375.0, min=0.0, max=1e9)
-    speed_low: Value = quantity("rad/s", "least speed that is looked at", default=40.0, above=0.0, max=1e4)
+    speed_low: Value = quantity(
+        "rad/s", "least speed that is looked at", default=40.0, above=0.0, max=1e4, kind="speed"
+    )
     speed_high: Value = quantity(
-        "rad/s", "largest speed that is looked at", default=300.0, above=0.0, max=1e4
+        "rad/s", "largest speed that is looked at", default=300.0, above=0.0, max=1e4, kind="speed"
     )
     points: Value = quantity(
         "1", "number of speeds of the resonance curve", default=200.0, min=10.0, max=5000.0
@@ -93,6 +100,7 @@ class Running:
         default=0.15,
         min=0.0,
         max=1.0,
+        kind="percent",
     )
     factor: Value = quantity(
         "1", "permitted ratio of the peak torque to that of the load alone", default=1.5, min=1.0, max=100.0
@@ -224,13 +232,13 @@ def _consistent(config: Config) -> None:
     ):
         if not high > low:
             raise InputError(f"{name} = {high:g} {unit}: must be > {low:g} {unit}, the least")
-    for name, number in (
+    for name, count in (
         ("running.points", running.points),
         ("stability.speeds", map_.speeds),
         ("stability.bends", map_.bends),
     ):
-        if number != int(number):
-            raise InputError(f"{name} = {number:g}: must be a whole number")
+        if count != int(count):
+            raise InputError(f"{name} = {count:g}: must be a whole number")
     k = frozen_frequency(numpy_(), config.line, 1.0)
     if not 0.01 <= k <= 1e6:
         raise InputError(
@@ -377,7 +385,8 @@ def run_driveline(config: Config, report: Report = lambda what, done, todo: None
     angle = np.linspace(0.0, 2.0 * math.pi, 721)
     phi3, ratio, _ = two_joints(xp, line, angle)
     lead = phi3 - angle
-    excitation = {n: float(2.0 * abs(np.mean(lead[:-1] * np.exp(-1j * n * angle[:-1])))) for n in ORDERS}
+    amplitudes = {n: float(2.0 * abs(np.mean(lead[:-1] * np.exp(-1j * n * angle[:-1])))) for n in ORDERS}
+    excitation = {n: size if size > ROUNDOFF else 0.0 for n, size in amplitudes.items()}
     speed = speeds(running.speed_low, running.speed_high, k, int(running.points))
     curve = steady(line, speed, running.load, lambda done: report("steady motion", done, 1.0))
     speed, curve = _refined(line, running.load, speed, curve)
@@ -436,16 +445,25 @@ def stability_map(config: Config, progress: Callable[[float], None] = lambda don
     )
 
 
-def rev(speed: Any) -> Any:
-    """rad/s in rev/min."""
-    return speed * 30.0 / math.pi
+def speed_text(*ends: float) -> str:
+    """A speed [rad/s], or a range of speeds from one to the other, in words."""
+    return " to ".join(number(float(end), "rad/s", "speed", 4) for end in ends)
 
 
-def both_units(low: float, high: float | None = None) -> str:
-    """A speed or a range of speeds in rev/min and rad/s."""
-    if high is None:
-        return f"{rev(low):.0f} rev/min ({low:.1f} rad/s)"
-    return f"{rev(low):.0f} to {rev(high):.0f} rev/min ({low:.1f} to {high:.1f} rad/s)"
+def _torque(value: float) -> str:
+    return number(value, "N.m", digits=4)
+
+
+def _percent(value: float) -> str:
+    return number(value, "1", "percent")
+
+
+def _ratio(value: float) -> str:
+    return number(float(value), "1", digits=4)
+
+
+def _degrees(value: float) -> str:
+    return number(value, "rad")
 
 
 def _notes(study: DrivelineStudy) -> list[str]:
@@ -453,7 +471,7 @@ def _notes(study: DrivelineStudy) -> list[str]:
     names = {"J1": "rotor J1", "J4": "driven inertia J4", "c2": "shaft 2", "c3": "shaft 3"}
     strongest = sorted(by, key=lambda name: -abs(by[name]))
     said = ", ".join(
-        f"{'stiffer' if name[0] == 'c' else 'lighter'} {names[name]}: {abs(by[name]):.2f} %"
+        f"{'stiffer' if name[0] == 'c' else 'lighter'} {names[name]}: {_percent(0.01 * abs(by[name]))}"
         for name in strongest
     )
     notes = [f"What raises the natural frequency, per 1 %: {said}."]
@@ -464,16 +482,16 @@ def _notes(study: DrivelineStudy) -> list[str]:
         )
     elif study.simulated is None:
         notes.append(
-            f"Transients take too long for a time simulation (damping ratio {study.damping_ratio:.2g}): the "
+            f"Transients take too long for a time simulation (damping ratio {number(study.damping_ratio, '1')}): the "
             "resonance curve is that of the steady motion."
         )
     elif not np.all(study.kept):
         lost = study.asked[~study.kept]
         notes.append(
             f"The slow control of the time simulation lost the speed at {len(lost)} of {len(study.asked)} speeds, "
-            f"{both_units(float(lost.min()), float(lost.max()))}; they are not drawn."
+            f"{speed_text(float(lost.min()), float(lost.max()))}; they are not drawn."
         )
-    drifting = "; ".join(both_units(*ends) for ends in study.drifting_ranges())
+    drifting = "; ".join(speed_text(*ends) for ends in study.drifting_ranges())
     if drifting:
         notes.append(f"Held by a speed control or slip only, not by a motor of constant torque: {drifting}.")
     notes.append(
@@ -493,27 +511,27 @@ def _warnings(study: DrivelineStudy) -> list[str]:
             near = max(low - at, at - high, 0.0) / at
             if n in ORDERS and near < margin:
                 warnings.append(
-                    f"Running at {both_units(at)} is {100.0 * near:.1f} % from where order {n} meets the natural "
-                    f"frequency, {both_units(low, high)}; permitted is {100.0 * margin:.0f} %: change "
-                    f"the speed or the shafts. Amplitude of the order: {math.degrees(study.excitation[n]):.2g} deg."
+                    f"Running at {speed_text(at)} is {_percent(near)} from where order {n} meets the natural "
+                    f"frequency, {speed_text(low, high)}; permitted is {_percent(margin)}: change "
+                    f"the speed or the shafts. Amplitude of the order: {_degrees(study.excitation[n])}."
                 )
     warnings += _even_running(line, study.ratio)
     found = study.operating
     if not found.found[0]:
         warnings.append(
-            f"No steady motion found at {both_units(at)}: either none repeats itself each half turn, or the search "
+            f"No steady motion found at {speed_text(at)}: either none repeats itself each half turn, or the search "
             "did not reach it; more damping or less bend helps both."
         )
     else:
         warnings += _at_operation(study)
     for low, high in study.unstable_ranges():
         warnings.append(
-            f"Unstable from {both_units(low, high)} at the damping ratio {study.damping_ratio:.3g}: torsional "
-            "vibration grows by itself (parametric resonance); more damping or less uneven joints end it."
+            f"Unstable from {speed_text(low, high)} at the damping ratio {number(study.damping_ratio, '1')}: "
+            "torsional vibration grows by itself (parametric resonance); more damping or less uneven joints end it."
         )
     for low, high in study.missing_ranges():
         warnings.append(
-            f"No steady motion found from {both_units(low, high)}: either none repeats itself each half turn, or the "
+            f"No steady motion found from {speed_text(low, high)}: either none repeats itself each half turn, or the "
             "search did not reach it."
         )
     return warnings
@@ -522,31 +540,31 @@ def _warnings(study: DrivelineStudy) -> list[str]:
 def _at_operation(study: DrivelineStudy) -> list[str]:
     running, found = study.config.running, study.operating
     at, warnings = running.speed, []
-    for number, peak, static in (
+    for shaft, peak, static in (
         (2, float(found.peak2[0]), study.static2),
         (3, float(found.peak3[0]), running.load),
     ):
         if static > 0.0 and peak > running.factor * static:
             warnings.append(
-                f"Shaft {number} carries {peak:.0f} N m at {both_units(at)}, {peak / static:.2f} times what the "
-                f"load alone asks; permitted is {running.factor:g}."
+                f"Shaft {shaft} carries {_torque(peak)} at {speed_text(at)}, {number(peak / static, '1')} times what "
+                f"the load alone asks; permitted is {running.factor:g}."
             )
     least = float(found.least2[0])
     if running.load > 0.0 and least < 0.0:
         warnings.append(
-            f"The torque of shaft 2 falls to {least:.0f} N m in each half turn: with play in splines and joints, "
+            f"The torque of shaft 2 falls to {_torque(least)} in each half turn: with play in splines and joints, "
             "which is not modelled, it hammers."
         )
     if found.unstable[0]:
         warnings.append(
-            f"Running at {both_units(at)} is unstable: a torsional vibration grows e-fold in "
-            f"{1.0 / found.growth[0]:.3g} s."
+            f"Running at {speed_text(at)} is unstable: a torsional vibration grows e-fold in "
+            f"{number(1.0 / float(found.growth[0]), 's')}."
         )
     elif found.free_growth[0] > DRIFT:
         warnings.append(
-            f"A motor whose torque does not fall with speed would not hold {both_units(at)}: deviations grow by "
-            f"{found.free_growth[0]:.2g} 1/s, as above a resonance faster running takes less torque; its control, or "
-            "slip, must outweigh that."
+            f"A motor whose torque does not fall with speed would not hold {speed_text(at)}: deviations grow by "
+            f"{number(float(found.free_growth[0]), '1/s')}, as above a resonance faster running takes less torque; "
+            "its control, or slip, must outweigh that."
         )
     return warnings
 
@@ -557,45 +575,56 @@ def _even_running(line: Cardan, ratio: Any) -> list[str]:
     wrong = []
     if not math.isclose(line.alpha1, line.alpha2, abs_tol=1e-6):
         wrong.append(
-            f"make the bends equal (alpha1 = {math.degrees(line.alpha1):.3g} deg, alpha2 = "
-            f"{math.degrees(line.alpha2):.3g} deg)"
+            f"make the bends equal (alpha1 = {_degrees(line.alpha1)}, alpha2 = {_degrees(line.alpha2)})"
         )
     off = (line.delta_yokes - line.beta_planes + 0.5 * math.pi) % math.pi - 0.5 * math.pi
     if not math.isclose(off, 0.0, abs_tol=1e-6):
-        wrong.append(
-            f"turn the yokes of the middle shaft by {-math.degrees(off):.3g} deg (delta_yokes = beta_planes)"
-        )
+        wrong.append(f"turn the yokes of the middle shaft by {_degrees(-off)} (delta_yokes = beta_planes)")
     return [
-        f"Shaft 3 does not run evenly: i23 from {np.min(ratio):.4f} to {np.max(ratio):.4f}; {', and '.join(wrong)}."
+        f"Shaft 3 does not run evenly: i23 from {_ratio(np.min(ratio))} to {_ratio(np.max(ratio))}; "
+        f"{', and '.join(wrong)}."
     ]
 
 
 def as_dict(study: DrivelineStudy) -> dict[str, Any]:
     """Ready for JSON, each number with its unit; what was not found is null."""
 
-    def number(x: Any, unit: str) -> dict[str, Any]:
+    def sizes(x: Any, unit: str, kind: str = "") -> dict[str, Any]:
         array = np.asarray(x, dtype=float)
         finite = array.astype(object)
         finite[~np.isfinite(array)] = None
-        return {"value": finite.tolist(), "unit": unit}
+        return {"value": finite.tolist(), "unit": unit} | ({"kind": kind} if kind else {})
+
+    def speed(x: Any) -> dict[str, Any]:
+        return sizes(x, "rad/s", "speed")
+
+    def frequency(x: Any) -> dict[str, Any]:
+        return sizes(x, "rad/s", "frequency")
+
+    def torque(x: Any) -> dict[str, Any]:
+        return sizes(np.where(np.abs(x) < ROUNDOFF_TORQUE, 0.0, x), "N.m")
 
     def declared(instance: Any) -> dict[str, Any]:
         layout = Layout(type(instance))
         return {
-            v.name: number(x, v.unit) for v, x in zip(layout.variables, layout.values(instance), strict=True)
+            v.name: sizes(x, v.unit, v.kind)
+            for v, x in zip(layout.variables, layout.values(instance), strict=True)
         }
 
     def motion(found: SteadyMotion) -> dict[str, Any]:
         return {
             "found": found.found.tolist(),
-            "peak_torque2": number(found.peak2, "N.m"),
-            "peak_torque3": number(found.peak3, "N.m"),
-            "least_torque2": number(found.least2, "N.m"),
-            "drive_torque": number(found.drive, "N.m"),
-            "growth": number(found.growth, "1/s"),
-            "largest_multiplier": number(found.multiplier, "1"),
-            "growth_with_constant_torque": number(found.free_growth, "1/s"),
-            "frequency": number(found.frequency, "rad/s"),
+            "peak_torque2": torque(found.peak2),
+            "peak_torque3": torque(found.peak3),
+            "least_torque2": torque(found.least2),
+            "largest_torque2": torque(found.largest2),
+            "least_torque3": torque(found.least3),
+            "largest_torque3": torque(found.largest3),
+            "drive_torque": sizes(found.drive, "N.m"),
+            "growth": sizes(found.growth, "1/s"),
+            "largest_multiplier": sizes(found.multiplier, "1"),
+            "growth_with_constant_torque": sizes(found.free_growth, "1/s"),
+            "frequency": frequency(found.frequency),
         }
 
     config, band, simulated = study.config, study.band, study.simulated
@@ -604,41 +633,45 @@ def as_dict(study: DrivelineStudy) -> dict[str, Any]:
         "title": config.title,
         "driveline": declared(config.line),
         "running": declared(config.running),
-        "damping_ratio": number(study.damping_ratio, "1"),
+        "damping_ratio": sizes(study.damping_ratio, "1"),
         "natural_frequency": {
-            "even": number(study.at_even, "rad/s"),
-            "least": number(band.least, "rad/s"),
-            "largest": number(band.largest, "rad/s"),
-            "at_ratio_zero": number(band.at_zero, "rad/s"),
-            "at_ratio_infinite": number(band.at_infinity, "rad/s"),
+            "even": frequency(study.at_even),
+            "least": frequency(band.least),
+            "largest": frequency(band.largest),
+            "at_ratio_zero": frequency(band.at_zero),
+            "at_ratio_infinite": frequency(band.at_infinity),
         },
-        "sensitivity": {name: number(x, "1") for name, x in study.sensitivity.items()},
-        "ratio": {"least": number(np.min(study.ratio), "1"), "largest": number(np.max(study.ratio), "1")},
-        "excitation": {f"order {n}": number(x, "rad") for n, x in study.excitation.items()},
-        "crossings": {f"speed = k/{n}": number(ends, "rad/s") for n, ends in study.crossings().items()},
-        "operating": {"static_torque2": number(study.static2, "N.m"), **motion(study.operating)},
+        "sensitivity": {name: sizes(x, "1") for name, x in study.sensitivity.items()},
+        "ratio": {"least": sizes(np.min(study.ratio), "1"), "largest": sizes(np.max(study.ratio), "1")},
+        "excitation": {f"order {n}": sizes(x, "rad") for n, x in study.excitation.items()},
+        "crossings": {f"speed = k/{n}": speed(ends) for n, ends in study.crossings().items()},
+        "operating": {"static_torque2": sizes(study.static2, "N.m"), **motion(study.operating)},
         "resonance": {
-            "speed": number(study.speed, "rad/s"),
+            "speed": speed(study.speed),
             **motion(study.steady),
-            "rigid_torque2": number(study.rigid.peak2, "N.m"),
-            "rigid_torque3": number(study.rigid.peak3, "N.m"),
-            "unstable": number(study.unstable_ranges(), "rad/s"),
-            "no_steady_motion": number(study.missing_ranges(), "rad/s"),
+            "peaks": {
+                "speed": speed([at for at, _ in study.resonances()]),
+                "torque2": sizes([peak for _, peak in study.resonances()], "N.m"),
+            },
+            "rigid_torque2": sizes(study.rigid.peak2, "N.m"),
+            "rigid_torque3": sizes(study.rigid.peak3, "N.m"),
+            "unstable": speed(study.unstable_ranges()),
+            "no_steady_motion": speed(study.missing_ranges()),
         },
         "simulation": None
         if simulated is None
         else {
-            "asked_speed": number(study.asked, "rad/s"),
-            "speed": number(simulated.speed, "rad/s"),
-            "peak_torque2": number(simulated.peak2, "N.m"),
-            "peak_torque3": number(simulated.peak3, "N.m"),
+            "asked_speed": speed(study.asked),
+            "speed": speed(simulated.speed),
+            "peak_torque2": sizes(simulated.peak2, "N.m"),
+            "peak_torque3": sizes(simulated.peak3, "N.m"),
         },
         "stability": {
             "joint": config.joint,
-            "speed": number(study.map.speed, "rad/s"),
-            "bend": number(study.map.bend, "rad"),
-            "damping_ratio": number(study.map.ratio, "1"),
-            "growth": number(study.map.growth, "1/s"),
+            "speed": speed(study.map.speed),
+            "bend": sizes(study.map.bend, "rad"),
+            "damping_ratio": sizes(study.map.ratio, "1"),
+            "growth": sizes(study.map.growth, "1/s"),
         },
         "warnings": list(study.warnings),
         "notes": list(study.notes),

@@ -398,8 +398,7 @@ class Blocked(Event):
         """Whether the stiffness decides the peak of the crank torque, and where one takes it from."""
         low, high = peaks["crank_torque"]
         decides = "but hardly change the peak here" if high < _FLAT * low else "and decide the peak"
-        # what is assumed is not known to more than a digit
-        soft, stiff = (number(float(f"{variant.p.stiffness:.1g}"), "N.m/rad") for variant in self.variants())
+        soft, stiff = (number(variant.p.stiffness, "N.m/rad", "assumed") for variant in self.variants())
         return (
             f"the stop's stiffness and damping are assumed {decides}, {number(low, 'N.m')} to {number(high, 'N.m')} "
             f"of crank torque for {soft} to {stiff}, damping with the root of it. Take the stiffness of what is "

@@ -27,6 +27,7 @@ from ..machines.knife_drive import KnifeDrive, Parameters
 from ..quantities import Layout, Value, declaration, quantity, variables
 from ..reading import Title, first_line, given_values, instance, packaged, read, schema, to_number, toml
 from ..system import Bond, CoSimulation, ModelComponent, System, energy_residual, export, shaft_joints
+from ..text import number
 from .result import entries
 from .sizing import flywheel
 
@@ -89,7 +90,12 @@ class Running:
     """How the cutter runs, and what is measured."""
 
     crank_speed: Value = quantity(
-        "rad/s", "speed of the crank, a cut each turn", default=40.0 * _TURN / 60.0, min=0.01, max=1e3
+        "rad/s",
+        "speed of the crank, a cut each turn",
+        default=40.0 * _TURN / 60.0,
+        min=0.01,
+        max=1e3,
+        kind="speed",
     )
     settle_turns: Value = quantity(
         "1", "turns with the cut before what is measured", default=4.0, min=1.0, max=1000.0
@@ -102,6 +108,7 @@ class Running:
         default=0.05,
         min=1e-4,
         max=1.0,
+        kind="percent",
     )
 
 
@@ -229,9 +236,9 @@ def parse(text: str, source: str = "knife") -> Config:
 
 
 def _consistent(run: Running) -> None:
-    for name, number in (("settle_turns", run.settle_turns), ("turns", run.turns)):
-        if number != int(number):
-            raise InputError(f"run.{name} = {number:g}: must be a whole number")
+    for name, count in (("settle_turns", run.settle_turns), ("turns", run.turns)):
+        if count != int(count):
+            raise InputError(f"run.{name} = {count:g}: must be a whole number")
     longest = _TURN / run.crank_speed / 300.0
     if run.step > longest:
         raise InputError(
@@ -254,9 +261,9 @@ def _motor(designation: str) -> CatalogueMotor:
 class Turn:
     """A turn of the crank at constant speed."""
 
-    blade_top: Value = quantity("m", "blade, highest y")
-    blade_bottom: Value = quantity("m", "blade, lowest y")
-    blade_draw: Value = quantity("m", "blade, way along x in the stack")
+    blade_top: Value = quantity("m", "blade, highest y", kind="millimetres")
+    blade_bottom: Value = quantity("m", "blade, lowest y", kind="millimetres")
+    blade_draw: Value = quantity("m", "blade, way along x in the stack", kind="millimetres")
     tilt_least: Value = quantity("rad", "tilt of the blade, least")
     tilt_largest: Value = quantity("rad", "tilt of the blade, largest")
     speed_in_stack: Value = quantity("m/s", "speed of the blade in the stack, largest")
@@ -264,7 +271,7 @@ class Turn:
     torque_peak_free: Value = quantity("N.m", "crank torque, peak, without cut")
     torque_mean: Value = quantity("N.m", "crank torque, mean, cutting")
     cut_work: Value = quantity("J", "work of a cut")
-    cut_path: Value = quantity("m", "path of the blade through the stack")
+    cut_path: Value = quantity("m", "path of the blade through the stack", kind="millimetres")
     cut_work_by_path: Value = quantity("J", "force times path through the stack")
     losses: Value = quantity("J", "losses of the pins in a turn, cutting")
     energy_swing: Value = quantity("J", "energy to be stored at constant torque of the drive")
@@ -314,7 +321,7 @@ def statics(config: Config) -> Statics:
     """The turn at the crank speed asked for, with and without the cut."""
     p, w = config.machine, config.run.crank_speed
     angle = np.arange(POINTS) * (_TURN / POINTS)
-    cutting, free = _turn(config, angle, config.cut.force), _turn(config, angle, 0.0)
+    cutting, free = turning(config, angle, config.cut.force), turning(config, angle, 0.0)
     torque, torque_free = (np.broadcast_to(o.tau * p.ratio, angle.shape) for o in (cutting, free))
     blade = cutting.blade
     time = _TURN / POINTS / w
@@ -358,7 +365,8 @@ def statics(config: Config) -> Statics:
     return Statics(angle, torque, torque_free, inertia, blade.x, blade.y, blade.tilt, turn, pins)
 
 
-def _turn(config: Config, angle: Any, force: float) -> Any:
+def turning(config: Config, angle: Any, force: float) -> Any:
+    """The machine's outputs at crank angles [rad] and the crank speed asked for, under a cutting force [N]."""
     given = {"phi": angle * config.machine.ratio, "w": config.motor_speed, "cut_force": force}
     return KnifeDrive.evaluate(numpy_(), config.machine, KnifeDrive.input_layout.from_names(given))[0]
 
@@ -384,22 +392,26 @@ class Answers:
     flywheel: Value = quantity("kg.m2", "flywheel, on the motor shaft")
     inertia: Value = quantity("kg.m2", "rotor, flywheel and mean of the machine, on the motor shaft")
     start_time: Value = quantity("s", "start without cut, to 95 % of the rated speed")
-    speed_mean: Value = quantity("rad/s", "crank speed, mean; cuts per minute")
-    speed_least: Value = quantity("rad/s", "crank speed, least")
-    fluctuation: Value = quantity("1", "fluctuation of the speed")
-    fluctuation_by_hand: Value = quantity("1", "fluctuation by hand, dE/(J w2)")
+    speed_mean: Value = quantity("rad/s", "crank speed, mean; cuts per minute", kind="speed")
+    speed_least: Value = quantity("rad/s", "crank speed, least", kind="speed")
+    fluctuation: Value = quantity("1", "fluctuation of the speed", kind="percent")
+    fluctuation_by_hand: Value = quantity("1", "fluctuation by hand, dE/(J w2)", kind="percent")
     motor_torque_peak: Value = quantity("N.m", "motor torque (air gap), peak")
     motor_torque_rms: Value = quantity("N.m", "motor torque (air gap), RMS")
     current_peak: Value = quantity("A", "motor current, peak")
     current_rms: Value = quantity("A", "motor current, RMS")
-    current_share: Value = quantity("1", "RMS current over rated current")
+    current_share: Value = quantity("1", "RMS current over rated current", kind="percent")
     supply_power_mean: Value = quantity("W", "electric power, mean")
-    stored_share: Value = quantity("1", "share of a cut's work from flywheel and moving masses, over the cut")
-    stored_share_most: Value = quantity(
-        "1", "the same, from the beginning of the cut to where they have least"
+    stored_share: Value = quantity(
+        "1", "share of a cut's work from flywheel and moving masses, over the cut", kind="percent"
     )
-    drift: Value = quantity("1", "change of speed over the measured turns, as a share of the fluctuation")
-    residual: Value = quantity("1", "energy residual, the larger of start and cutting")
+    stored_share_most: Value = quantity(
+        "1", "the same, from the beginning of the cut to where they have least", kind="percent"
+    )
+    drift: Value = quantity(
+        "1", "change of speed over the measured turns, as a share of the fluctuation", kind="percent"
+    )
+    residual: Value = quantity("1", "energy residual, the larger of start and cutting", kind="percent")
 
 
 @dataclasses.dataclass
@@ -707,7 +719,15 @@ def _least(study: KnifeStudy, files: Mapping[str, Path], tell: Callable[[float],
 
 
 def _kg_m2(inertia: float) -> str:
-    return f"{inertia:.3g} kg m2"
+    return number(inertia, "kg.m2")
+
+
+def _percent(share: float) -> str:
+    return number(share, "1", "percent")
+
+
+def _height(y: float) -> str:
+    return number(y, "m", "millimetres", 4)
 
 
 def _warnings(study: KnifeStudy) -> list[str]:
@@ -716,25 +736,25 @@ def _warnings(study: KnifeStudy) -> list[str]:
     warnings = []
     if turn.blade_bottom > stack.top:
         warnings.append(
-            f"No cut takes place: the blade comes down to y = {1e3 * turn.blade_bottom:.1f} mm, the stack's top is "
-            f"at {1e3 * stack.top:.1f} mm."
+            f"No cut takes place: the blade comes down to y = {_height(turn.blade_bottom)}, the stack's top is "
+            f"at {_height(stack.top)}."
         )
     elif turn.blade_bottom > stack.table:
         warnings.append(
-            f"The blade does not reach the table: it comes down to y = {1e3 * turn.blade_bottom:.1f} mm, the table "
-            f"is at {1e3 * stack.table:.1f} mm."
+            f"The blade does not reach the table: it comes down to y = {_height(turn.blade_bottom)}, the table "
+            f"is at {_height(stack.table)}."
         )
     if turn.blade_top < stack.top:
         warnings.append(
-            f"The blade does not leave the stack: it rises to y = {1e3 * turn.blade_top:.1f} mm, the stack's top is "
-            f"at {1e3 * stack.top:.1f} mm."
+            f"The blade does not leave the stack: it rises to y = {_height(turn.blade_top)}, the stack's top is "
+            f"at {_height(stack.top)}."
         )
     plate = config.motor.nameplate
     rated, mean = plate.rated_current, turn.torque_mean / config.machine.ratio
     if mean > plate.torque:
         warnings.append(
-            f"Cutting takes {mean:.3g} N m of the motor on average, rated is {plate.torque:.3g} N m: a larger motor "
-            "helps, no flywheel does."
+            f"Cutting takes {number(mean, 'N.m')} of the motor on average, rated is "
+            f"{number(plate.torque, 'N.m')}: a larger motor helps, no flywheel does."
         )
     for wheel in study.wheels:
         a, which = wheel.answers, f"With a flywheel of {_kg_m2(wheel.flywheel)}"
@@ -744,36 +764,39 @@ def _warnings(study: KnifeStudy) -> list[str]:
             )
         elif a.start_time is None:
             warnings.append(
-                f"{which} the motor does not come to {100 * STARTED:.0f} % of its rated speed in "
-                f"{START_LONGEST:g} s."
+                f"{which} the motor does not come to {_percent(STARTED)} of its rated speed in "
+                f"{number(START_LONGEST, 's', full=False)}."
             )
         elif a.current_share > 1.0:
             warnings.append(
-                f"{which} the RMS current is {a.current_rms:.3g} A, rated is {rated:.3g} A: the motor becomes too "
-                "hot."
+                f"{which} the RMS current is {number(a.current_rms, 'A')}, rated is {number(rated, 'A')}: the motor "
+                "becomes too hot."
             )
         if a.start_time is not None and a.start_time > START_LONG:
-            warnings.append(f"{which} the start takes {a.start_time:.1f} s, more than {START_LONG:g} s.")
+            warnings.append(
+                f"{which} the start takes {number(a.start_time, 's')}, more than "
+                f"{number(START_LONG, 's', full=False)}."
+            )
         if a.residual > RESIDUAL:
             warnings.append(
-                f"{which} {100 * a.residual:.2g} % of the energy is missing: a shorter run.step is needed."
+                f"{which} {_percent(a.residual)} of the energy is missing: a shorter run.step is needed."
             )
         if a.drift is not None and a.drift > 0.1:
             warnings.append(
-                f"{which} the speed still changes over the measured turns, by {100 * a.drift:.0f} % of its "
+                f"{which} the speed still changes over the measured turns, by {_percent(a.drift)} of its "
                 "fluctuation: more run.settle_turns."
             )
     permitted = config.run.fluctuation
     given = study.given
     if given is not None and given.answers.fluctuation is not None and not given.keeps(permitted):
         warnings.append(
-            f"The speed fluctuates by {100 * given.answers.fluctuation:.3g} % with the flywheel that is given, "
-            f"{_kg_m2(given.flywheel)}; permitted is {100 * permitted:.3g} %."
+            f"The speed fluctuates by {_percent(given.answers.fluctuation)} with the flywheel that is given, "
+            f"{_kg_m2(given.flywheel)}; permitted is {_percent(permitted)}."
         )
     # what was not tried is not judged
     if study.failure is None and not any(wheel.keeps(permitted) for wheel in study.wheels):
         warnings.append(
-            f"No flywheel of the list keeps the speed within {100 * permitted:.3g} %"
+            f"No flywheel of the list keeps the speed within {_percent(permitted)}"
             + ("." if study.least is not None else ", nor does a larger one that was tried.")
         )
     return warnings
@@ -789,10 +812,10 @@ def _notes(study: KnifeStudy) -> list[str]:
             f"the hand formula asks for {_kg_m2(by_hand)}" if by_hand else "nor is it by hand",
         )
         said = (
-            f"A fluctuation of {100 * permitted:.3g} % takes a flywheel of {_kg_m2(least.flywheel)} at least, found "
-            f"to {100 * CLOSE:.0f} % of the fluctuation; {hand}"
+            f"A fluctuation of {_percent(permitted)} takes a flywheel of {_kg_m2(least.flywheel)} at least, found "
+            f"to {_percent(CLOSE)} of the fluctuation; {hand}"
             if least.flywheel
-            else f"For a fluctuation of {100 * permitted:.3g} % no flywheel is needed; {hand}"
+            else f"For a fluctuation of {_percent(permitted)} no flywheel is needed; {hand}"
         )
         if by_hand:
             said += ", as it leaves out that the motor's torque rises where the speed falls"
@@ -803,19 +826,18 @@ def _notes(study: KnifeStudy) -> list[str]:
         else:
             lent = a.stored_share_most
             words = (
-                []
-                if lent is None
-                else [f"flywheel and moving masses lend {100 * lent:.0f} % of a cut's work"]
+                [] if lent is None else [f"flywheel and moving masses lend {_percent(lent)} of a cut's work"]
             )
             words += [
-                f"the RMS current is {100 * a.current_share:.0f} % of the rated",
-                f"the start takes {a.start_time:.2g} s",
+                f"the RMS current is {_percent(a.current_share)} of the rated",
+                f"the start takes {number(a.start_time, 's')}",
             ]
             notes.append(f"{said}. {'With it' if least.flywheel else 'Without'} {', '.join(words)}.")
     if turn.cut_path > 0.0:
         notes.append(
-            f"Work of a cut {turn.cut_work:.0f} J; force times path through the stack {turn.cut_work_by_path:.0f} J. "
-            "The resistance rises and falls over stack.edge, and fades below stack.v_smooth."
+            f"Work of a cut {number(turn.cut_work, 'J')}; force times path through the stack "
+            f"{number(turn.cut_work_by_path, 'J')}. The resistance rises and falls over stack.edge, and fades "
+            "below stack.v_smooth."
         )
     notes.append(
         "The windings begin cold and have no time to warm up in these runs; warm, the motor slips more."
@@ -826,8 +848,8 @@ def _notes(study: KnifeStudy) -> list[str]:
 def as_dict(study: KnifeStudy) -> dict[str, Any]:
     """Ready for JSON, each number with its unit; what there is not is null."""
 
-    def number(x: Any, unit: str) -> dict[str, Any]:
-        return {"value": np.asarray(x, dtype=float).tolist(), "unit": unit}
+    def sizes(x: Any, unit: str, kind: str = "") -> dict[str, Any]:
+        return {"value": np.asarray(x, dtype=float).tolist(), "unit": unit} | ({"kind": kind} if kind else {})
 
     config, s, plate = study.config, study.statics, study.config.motor.nameplate
     return {
@@ -838,26 +860,27 @@ def as_dict(study: KnifeStudy) -> dict[str, Any]:
         "drive": {
             **entries(config.train),
             "motor": config.motor.designation,
-            "rated_current": number(plate.rated_current, "A"),
-            "rated_torque": number(plate.torque, "N.m"),
-            "rated_speed": number(plate.speed, "rad/s"),
-            "rotor_inertia": number(study.motor.rotor.J, "kg.m2"),
+            "rated_power": sizes(plate.power, "W"),
+            "rated_current": sizes(plate.rated_current, "A"),
+            "rated_torque": sizes(plate.torque, "N.m"),
+            "rated_speed": sizes(plate.speed, "rad/s", "speed"),
+            "rotor_inertia": sizes(study.motor.rotor.J, "kg.m2"),
         },
         "run": entries(config.run),
         "turn": entries(s.turn),
         "pins": {title: entries(reaction) for title, reaction in s.pins.items()},
         "over_turn": {
-            "angle": number(s.angle[::10], "rad"),
-            "torque": number(s.torque[::10], "N.m"),
-            "torque_free": number(s.torque_free[::10], "N.m"),
-            "inertia": number(s.inertia[::10], "kg.m2"),
-            "blade_x": number(s.x[::10], "m"),
-            "blade_y": number(s.y[::10], "m"),
-            "tilt": number(s.tilt[::10], "rad"),
+            "angle": sizes(s.angle[::10], "rad"),
+            "torque": sizes(s.torque[::10], "N.m"),
+            "torque_free": sizes(s.torque_free[::10], "N.m"),
+            "inertia": sizes(s.inertia[::10], "kg.m2"),
+            "blade_x": sizes(s.x[::10], "m"),
+            "blade_y": sizes(s.y[::10], "m"),
+            "tilt": sizes(s.tilt[::10], "rad"),
         },
         "flywheels": [{**entries(w.answers), "stalled": w.stalled} for w in study.wheels],
         "least_flywheel": None if study.least is None else entries(study.least.answers),
-        "flywheel_by_hand": number(study.flywheel_by_hand, "kg.m2"),
+        "flywheel_by_hand": sizes(study.flywheel_by_hand, "kg.m2"),
         "fmus": study.made,
         "warnings": study.warnings,
         "notes": study.notes,

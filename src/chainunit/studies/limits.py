@@ -24,10 +24,14 @@ from .shaft import Torsion, torsion
 class Limits:
     """Where the model ends."""
 
-    slack_speed: Value = quantity("rad/s", "crank speed at which a web first goes slack with this feed")
-    slack_speed_empty: Value = quantity("rad/s", "crank speed at which a web first goes slack, empty")
+    slack_speed: Value = quantity(
+        "rad/s", "crank speed at which a web first goes slack with this feed", kind="speed"
+    )
+    slack_speed_empty: Value = quantity(
+        "rad/s", "crank speed at which a web first goes slack, empty", kind="speed"
+    )
     chain_resonance: Value = quantity(
-        "rad/s", "crank speed at the lowest natural frequency of an organ as a chain"
+        "rad/s", "crank speed at the lowest natural frequency of an organ as a chain", kind="speed"
     )
     rocker_extreme_right: Value = quantity("rad", "right extreme of the rocker")
     rocker_extreme_left: Value = quantity("rad", "left extreme of the rocker")

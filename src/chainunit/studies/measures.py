@@ -302,8 +302,10 @@ class Answers:
     rocker_torque_peak: Value = measure(
         "N.m", "rocker torque, peak", lambda w: w.largest("machine.rocker.tau"), during=_ALL
     )
-    speed_mean: Value = measure("rad/s", "crank speed, mean", lambda w: w.speed_mean)
-    speed_least: Value = measure("rad/s", "crank speed, least", lambda w: float(np.min(w.speed)))
+    speed_mean: Value = measure("rad/s", "crank speed, mean", lambda w: w.speed_mean, kind="speed")
+    speed_least: Value = measure(
+        "rad/s", "crank speed, least", lambda w: float(np.min(w.speed)), kind="speed"
+    )
     speed_ripple: Value = measure(
         "1",
         "speed ripple",

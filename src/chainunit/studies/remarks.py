@@ -173,7 +173,7 @@ def _happenings(study: Study, name: str) -> Iterator[tuple[str, str, dict[str, t
             f"after {number(*time)}; {number(*passed)} pass it while it opens, {number(*behind)} stay behind it",
             {"coupling_trip_time": time, "energy_after_trip": passed, "energy_behind": behind},
         )
-    elif name in config.events and answers.recovery_time is None:
+    elif name in config.events and answers.recovery_time is None and study.returns:
         yield "not recovered", "", {}
 
 

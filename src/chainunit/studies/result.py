@@ -92,6 +92,8 @@ def _statics(study: Study) -> dict[str, Any]:
         if study.tuning
         else "all gains are given"
         if study.drive.motor is DcMotor
+        else "an inverter, which follows the speed asked for by its frequency"
+        if study.drive.follows
         else "none: the motor takes the speed that its supply and the load give",
     }
 
@@ -131,11 +133,11 @@ def _spread(study: Study, name: str) -> dict[str, Any]:
         study.spreads[name],
         {v.name: v.unit for v in variables(study.config.events[name].Parameters)},
     )
-    ranges = [(each, ends, units[each]) for each, ends in spread.assumed.items()]
-    ranges += [(each, ends, "N.m") for each, ends in spread.peaks.items()]
+    ranges = [(each, ends, units[each], "assumed") for each, ends in spread.assumed.items()]
+    ranges += [(each, ends, "N.m", "") for each, ends in spread.peaks.items()]
     return {
-        f"{each}_{end}": entry(x, unit)
-        for each, ends, unit in ranges
+        f"{each}_{end}": entry(x, unit, kind)
+        for each, ends, unit, kind in ranges
         for end, x in zip(("low", "high"), ends, strict=True)
     }
 

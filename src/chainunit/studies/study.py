@@ -16,7 +16,7 @@ from . import verdict
 from .chain import ChainResult
 from .drive import Drive
 from .limits import Statics
-from .measures import Answers, Phase, Trip, Window, whole_turns
+from .measures import Answers, Phase, Trip, Window, reaches, whole_turns
 from .monte_carlo import MonteCarloResult
 from .protection import Setting
 from .shaft import Cycles, ShaftAnswers
@@ -149,6 +149,18 @@ class Study:
         if section == "motor" and self.tuning is not None and parameter in self.tuning.parameters:
             return "tuned"
         return "example"
+
+    @property
+    def reaches(self) -> bool:
+        """Whether the crank turns at the speed that is asked for, as far as is known."""
+        steady = self.answers.get(STEADY)
+        return steady is None or reaches(steady.speed_mean, self.config.run.crank_speed)
+
+    @property
+    def returns(self) -> bool:
+        """Whether there is a band of steady running that the speed could return to: a motor that follows the speed
+        asked for has to reach it."""
+        return STEADY in self.answers and (not self.drive.follows or self.reaches)
 
     @property
     def overloads(self) -> list[str]:

@@ -1,0 +1,73 @@
+"""What the report on a chain unit reads of its study, in one place."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Any
+
+from ..quantities import Variable
+from ..studies.bearings import PINS as PINS
+from ..studies.events import in_groups
+from ..studies.measures import Phase, measures_of
+from ..studies.rig import DIFFERENCE as DIFFERENCE
+from ..studies.study import Study
+
+COASTING = "_coasting"
+"""Ends the name of a run of the machine alone, behind the safety coupling that opened in the run named before it."""
+START_UP = tuple(measures_of(Phase.START_UP))
+"""What is measured in a start-up."""
+_TITLES = {"start_up": "start-up and steady running", "unfinished": "the run that stopped early"}
+_MINOR = "supply_power_mean winding_temperature speed_mean speed_least power_mean crank_torque_mean cycle_gap".split()
+
+
+def is_event(study: Study, run: str) -> bool:
+    """Whether a run is an overload."""
+    return run in study.config.events
+
+
+def groups(study: Study, runs: Collection[str]) -> list[list[str]]:
+    """The overloads among `runs` by the side that has to carry them."""
+    return in_groups(study.config.events, list(runs))
+
+
+def short(study: Study, run: str) -> str:
+    """A run in two or three words."""
+    return study.config.events[run].short if is_event(study, run) else run.replace("_", "-")
+
+
+def title(study: Study, run: str) -> str:
+    """What a run is called."""
+    if run.endswith(COASTING):
+        return f"{title(study, run.removesuffix(COASTING))}: behind the open coupling"
+    return _TITLES.get(run) or study.called(run)
+
+
+def driven(study: Study) -> list[str]:
+    """The runs in which the motor turns the machine."""
+    return [name for name in study.runs if not name.endswith(COASTING)]
+
+
+def in_order(study: Study) -> list[str]:
+    """The runs, each followed by that of the machine behind the open coupling, where there is one."""
+    return [run for name in driven(study) for run in (name, name + COASTING) if run in study.runs]
+
+
+def event_time(study: Study, run: str) -> float | None:
+    """When the overload of a run begins [s]; None where it has none, or is one from the start."""
+    return study.event.get(run.removesuffix(COASTING)) or None
+
+
+def minor(variable: Variable) -> bool:
+    """Whether the terminal leaves an answer out."""
+    return variable.name in _MINOR
+
+
+def series(study: Study, run: str) -> dict[str, Any]:
+    """Time after the event, crank torque and speed, motor current of a run, each of the shape (time,)."""
+    rows, drive = study.runs[run], study.drive
+    return {
+        "time": rows["time"].values - (event_time(study, run) or 0.0),
+        "torque": drive.crank_torque(rows),
+        "speed": drive.crank_motion(rows)[1],
+        "current": rows[f"motor.{drive.motor.current}"].values,
+    }

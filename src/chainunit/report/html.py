@@ -1,0 +1,314 @@
+"""A report as one page that needs nothing else, neither files nor a network.
+
+Every number in its text is an element that names its place in the result, which the page carries whole
+(``<script id="result">``). Curves and the moving machine are of the series, thinned out.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from html import escape
+from importlib import resources
+from itertools import groupby
+from pathlib import Path
+
+from plotly.offline import get_plotlyjs  # type: ignore[import-untyped]
+
+from .. import __version__
+from ..files import whole
+from ..text import Units, forms
+from . import blocks as b
+from . import motion, page_figures
+from .figure import Figure
+from .lines import Aside, Line, Number, Piece, Strong, Words, pieces
+
+NAME = "report.html"
+
+_SPACE = "\u00a0"  # before a unit
+_POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; "
+    "font-src data:"
+)
+_SIGN = {"good": "✓", "partly": "◐", "bad": "✗", "warning": "!"}
+_ORIGIN = {"file": "the study file's", "example": "the example's", "default": "the default"}
+
+
+def write(report: b.Report, folder: Path) -> Path:
+    """Write the page into `folder`; returns the file."""
+    file = folder / NAME
+    page = render(report)
+    with whole(file) as part:
+        part.write_text(page, "utf-8")
+    return file
+
+
+def render(report: b.Report) -> str:
+    """The page."""
+    page = _Page(report.units)
+    sections = [
+        (section, content)
+        for section in report.sections
+        if (content := page.blocks(b.of_form(section.blocks, "long")))
+    ]
+    title = report.title or report.kind
+    drawn = ",".join(
+        f"{json.dumps(figure.name)}:{page_figures.figure(figure, report.units).to_json()}"
+        for figure in report.figures
+        if figure.on_page
+    )
+    moving = next((block for block in report.blocks("long") if isinstance(block, motion.Animation)), None)
+    embedded = {
+        "result": json.dumps(report.result, allow_nan=False, ensure_ascii=False),
+        "figures": f"{{{drawn}}}",
+        "pictures": json.dumps(
+            moving and motion.pictures(moving, report.units), allow_nan=False, separators=(",", ":")
+        ),
+    }
+    return "\n".join(
+        [
+            "<!DOCTYPE html>",
+            '<html lang="en">',
+            "<head>",
+            '<meta charset="utf-8">',
+            f'<meta http-equiv="Content-Security-Policy" content="{escape(_POLICY)}">',
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            f'<meta name="generator" content="chainunit {__version__}">',
+            f"<title>{escape(title)}</title>",
+            '<link rel="icon" href="data:,">',
+            f"<style>\n{_resource('page.css')}</style>",
+            "</head>",
+            "<body>",
+            page.header(report, title, [section.name for section, _ in sections]),
+            "<main>",
+            *(
+                f'<section id="{section.name}" aria-labelledby="{section.name}-title">\n'
+                f'<h2 id="{section.name}-title">{section.heading}</h2>\n{content}\n</section>'
+                for section, content in sections
+            ),
+            "</main>",
+            # no text can end the element early
+            *(
+                f'<script type="application/json" id="{name}">{text.replace("<", chr(92) + "u003c")}</script>'
+                for name, text in embedded.items()
+            ),
+            f'<script id="plotly">{get_plotlyjs()}</script>',
+            f"<script>\n{_resource('page.js')}</script>",
+            "</body>",
+            "</html>\n",
+        ]
+    )
+
+
+def _resource(name: str) -> str:
+    return (resources.files(__package__) / name).read_text("utf-8")
+
+
+def _kind(block: b.Block) -> str:
+    """What makes blocks stand together."""
+    if isinstance(block, b.Judgement) and block.severity == "warning":
+        return "warnings"
+    return "figures" if isinstance(block, Figure) else ""
+
+
+class _Page:
+    """Renders blocks with numbers in these units."""
+
+    def __init__(self, units: Units) -> None:
+        self.units = units
+
+    # -- pieces
+
+    def number(self, n: Number) -> str:
+        """A number as an element that carries its place in the result, and its value as it is there."""
+        if n.value is None:
+            words = f'<span class="none">{escape(n.none)}</span>'
+        else:
+            digits = n.digits or (6 if n.given else 3)
+            first, *others = forms(n.value, n.unit, n.kind, digits, full=not n.given, units=self.units)
+            words = ("▲ " if n.over else "") + self._form(*first)
+            words += "".join(f' <span class="beside">{self._form(*other)}</span>' for other in others)
+        known = "no value" if n.value is None else f"{n.value:.9g}" + ("" if n.unit == "1" else f" {n.unit}")
+        element = (
+            f'<data class="n" data-path="{escape(n.path)}" value="{json.dumps(n.value)}" '
+            f'title="{escape(f"{n.path}: {known}")}">{words}</data>'
+        )
+        return f"<strong>{element}</strong>" if n.over else element
+
+    def _form(self, text: str, unit: str) -> str:
+        gap = "" if unit in ("", "°") else _SPACE
+        return escape(text) + (f'{gap}<span class="u">{escape(unit)}</span>' if unit else "")
+
+    def line(self, line: Line) -> str:
+        """A line of text."""
+        return "".join(map(self._piece, pieces(line)))
+
+    def _piece(self, piece: Piece) -> str:
+        match piece:
+            case Number():
+                return self.number(piece)
+            case Words():
+                return f'<span class="t" data-path="{escape(piece.path)}">{escape(piece.text)}</span>'
+            case Strong():
+                return f"<strong>{self.line(piece.line)}</strong>"
+            case Aside():
+                return f' <span class="of">{self.line(piece.line)}</span>'
+            case _:
+                return escape(piece)
+
+    # -- blocks
+
+    def blocks(self, blocks: Sequence[b.Block]) -> str:
+        """Blocks in order; warnings and figures that follow each other stand together."""
+        parts = []
+        for kind, together in groupby(blocks, _kind):
+            html = [self.block(block) for block in together]
+            if kind == "warnings":
+                html = [f'<ul class="verdicts">{"".join(html)}</ul>']
+            elif kind == "figures" and any(html):
+                html = [_PLOTS.format("".join(html))]
+            parts += [each for each in html if each]
+        return "\n".join(parts)
+
+    def block(self, block: b.Block) -> str:
+        """One block."""
+        match block:
+            case b.Text():
+                return f'<p class="{block.role}">{self.line(block.line)}</p>'
+            case b.Judgement():
+                return self._verdict(block)
+            case b.Cards():
+                few = " four" if len(block.cards) == 4 else ""
+                return f'<div class="cards{few}">{"".join(map(self._card, block.cards))}</div>'
+            case b.Table():
+                return self._table(block)
+            case b.Tables():
+                return f'<div class="given whole">{"".join(map(self._table, block.tables))}</div>'
+            case b.Given():
+                tables = "".join(self._given(title, values) for title, values in block.sections if values)
+                return f'<div class="given">{tables}</div>'
+            case Figure():
+                return self._figure(block) if block.on_page else ""
+            case motion.Animation():
+                return _resource("motion.html").replace("<!-- caption -->", self.line(block.caption))
+
+    def _verdict(self, verdict: b.Judgement) -> str:
+        text = self.line(verdict.line)
+        items = "".join(f"<li>{self.line(item)}</li>" for item in verdict.items)
+        if verdict.severity in ("alarm", "remark"):
+            return f'<div class="alarm">{text}{f"<ul>{items}</ul>" if items else ""}</div>'
+        sign = f'<span class="sign" aria-hidden="true">{_SIGN[verdict.severity]}</span>'
+        if verdict.severity == "warning":
+            return f'<li>{sign} <span class="said">{text}</span></li>'
+        return f'<p class="judged {verdict.severity}">{sign} {text}</p>'
+
+    def _card(self, card: b.Card) -> str:
+        figures = "".join(
+            f'<div class="figure"><span class="large{"" if isinstance(value, Number) else " name"}">'
+            f'{self.line(value)}</span><span class="which">{escape(which)}</span></div>'
+            for value, which in card.numbers
+        )
+        return (
+            f'<article class="card"><h3>{escape(card.title)}</h3><div class="figures">{figures}</div>'
+            + "".join(f'<p class="also">{self.line(each)}</p>' for each in card.also)
+            + "</article>"
+        )
+
+    def _table(self, table: b.Table) -> str:
+        columns = [i for i, c in enumerate(table.columns) if c.form != "short"] or range(
+            len(table.rows[0].cells)
+        )
+        heads = "".join(
+            f'<th scope="col">{self.line(table.columns[i].title)}</th>' for i in columns if table.columns
+        )
+        noted = any(row.note for row in table.rows)
+        rows = [self._row(row, columns) for row in table.rows if row.form != "short"]
+        body = "".join(rows) if noted else f"<tbody>{''.join(rows)}</tbody>"
+        css = "candidates" if noted else "numbers" if table.numeric else "words"
+        return (
+            f'<div class="wide"><table class="{css}">'
+            + (f"<caption>{self.line(table.title)}</caption>" if table.title else "")
+            + (f"<thead><tr>{heads}</tr></thead>" if heads else "")
+            + f"{body}</table></div>"
+        )
+
+    def _row(self, row: b.TableRow, columns: Iterable[int]) -> str:
+        first, *rest = (row.cells[i] for i in columns)
+        span = ' rowspan="2"' if row.note else ""
+        cells = f'<th scope="row"{span}>{self._inside(first)}</th>' + "".join(map(self._cell, rest))
+        if not row.note:
+            return f"<tr>{cells}</tr>"
+        note = f'<tr><td class="why" colspan="{len(rest)}">{self.line(row.note)}</td></tr>'
+        return f'<tbody class="{row.severity or "plain"}"><tr>{cells}</tr>{note}</tbody>'
+
+    def _cell(self, cell: b.Cell) -> str:
+        css = ""
+        if isinstance(cell, b.Share):
+            css = ' class="check over"' if cell.used.over else ' class="check"'
+        return f"<td{css}>{self._inside(cell)}</td>"
+
+    def _inside(self, cell: b.Cell) -> str:
+        if not isinstance(cell, b.Share):
+            return self.line(cell)
+        used = cell.used.value or 0.0
+        width = 100.0 * min(max(used, 0.0), 1.5) / 1.5
+        bar = f'<span class="bar" aria-hidden="true"><span style="width:{width:.1f}%"></span></span>'
+        of = f'<span class="of">{self.line(cell.of)}</span>' if cell.of else ""
+        return self.number(cell.used) + bar + of
+
+    def _given(self, title: str, values: Iterable[b.GivenValue]) -> str:
+        rows = "".join(
+            f'<tr><th scope="row" title="{escape(value.name)}">{escape(value.description)}</th>'
+            f"<td>{self.line((value.value,))}{self._origin(value)}</td></tr>"
+            for value in values
+        )
+        return (
+            f'<div class="wide"><table class="numbers"><caption>{escape(title)}</caption>'
+            f"<tbody>{rows}</tbody></table></div>"
+        )
+
+    def _origin(self, value: b.GivenValue) -> str:
+        """A mark at what the file does not give."""
+        if value.origin in ("", "file"):
+            return ""
+        return f'<abbr class="from" title="{_ORIGIN[value.origin]}">{value.origin[0]}</abbr>'
+
+    def _figure(self, figure: Figure) -> str:
+        height = page_figures.height(figure)
+        return (
+            f'<figure class="plot-box{" half" if figure.half else ""}">'
+            f'<h3 id="{figure.name}-title">{escape(figure.title)}</h3>'
+            f'<div class="plot" id="plot-{figure.name}" data-figure="{figure.name}" role="img" '
+            f'aria-label="{escape(figure.seen)}" style="height:{height}px"></div>'
+            f"<figcaption>{self.line(figure.caption)}</figcaption></figure>"
+        )
+
+    # -- the head of the page
+
+    def header(self, report: b.Report, title: str, names: Iterable[str]) -> str:
+        """Title, source, state, navigation and what was asked."""
+        status = (
+            '<p class="alarm"><strong>The run stopped early:</strong> '
+            f"{self.line(report.failure)}. What was computed before is shown.</p>"
+            if report.failure
+            else ""
+        )
+        headings = {section.name: section.heading for section in report.sections}
+        links = "".join(f'<a href="#{name}">{headings[name]}</a>' for name in names)
+        opening = self.blocks(b.of_form(report.opening, "long"))
+        source = self.line(report.source)
+        return (
+            f'<header>\n<p class="kind">{escape(report.kind)}</p>\n<h1>{escape(title)}</h1>\n'
+            f'<p class="from">{source}{" · " if source else ""}status: '
+            f"{'stopped early' if status else 'complete'}</p>\n"
+            f'{status}\n<nav aria-label="Sections">{links}</nav>\n'
+            + (f'<h2 id="asked">What was asked</h2>\n<div class="asked">{opening}</div>\n' if opening else "")
+            + "</header>"
+        )
+
+
+_PLOTS = (
+    "<noscript><p>Plots and the moving machine need JavaScript; the numbers of this page do not.</p></noscript>"
+    '<div class="plots">{}</div>'
+    '<p class="hint">Drag to zoom, double-click to zoom out, click a name in a legend to hide its line.</p>'
+)

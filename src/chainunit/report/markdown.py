@@ -1,0 +1,94 @@
+"""A report as Markdown: its long form, with the pictures beside it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable, Iterator
+
+from ..text import Units
+from .blocks import Block, Cards, Given, Judgement, Report, Table, Tables, Text, of_form
+from .figure import Figure
+from .lines import Line, capital
+from .terminal import plain_cell, plain_line
+
+_SIGNS = {"good": "✓ ", "partly": "◐ ", "bad": "✗ ", "warning": "", "alarm": "▲ ", "remark": ""}
+
+
+def markdown_text(text: str) -> str:
+    """A text that is not ours, as Markdown shows it literally: no link, no table cell, no HTML."""
+    return re.sub(r"([\\`*_\[\]<>#!|~&$])", r"\\\1", text)
+
+
+def markdown(report: Report, pictures: Collection[str]) -> str:
+    """The long form; a figure is shown where its file is among the `pictures`."""
+    units = report.units
+    lines = [f"# {markdown_text(report.title or report.kind)}", ""]
+    if report.failure:
+        lines += [f"The run stopped early: {_line(report.failure, units)}.", ""]
+    if report.source:
+        lines += [_line(report.source, units), ""]
+    for block in report.opening:
+        lines += _block(block, units, pictures)
+    for section in report.sections:
+        inside = [text for each in of_form(section.blocks, "long") for text in _block(each, units, pictures)]
+        if inside:
+            lines += [f"## {section.heading}", "", *inside]
+    return "\n".join(lines).rstrip("\n") + "\n"
+
+
+def _line(line: Line, units: Units) -> str:
+    return markdown_text(plain_line(line, units))
+
+
+def _grid(rows: Iterable[Iterable[str]], head: Iterable[str]) -> Iterator[str]:
+    heads = list(head)
+    yield f"| {' | '.join(heads)} |"
+    yield "|---" * len(heads) + "|"
+    for row in rows:
+        yield f"| {' | '.join(row)} |"
+    yield ""
+
+
+def _block(block: Block, units: Units, pictures: Collection[str]) -> list[str]:
+    match block:
+        case Text():
+            return [_line(block.line, units), ""]
+        case Judgement():
+            text = f"- {_SIGNS[block.severity]}{_line(block.line, units)}"
+            return [text, *(f"  - {_line(item, units)}" for item in block.items), ""]
+        case Cards():
+            rows = [
+                (markdown_text(capital(card.title)), _line(value, units), markdown_text(which))
+                for card in block.cards
+                for value, which in card.numbers
+            ]
+            return list(_grid(rows, ("", "", "")))
+        case Table():
+            return _table(block, units)
+        case Tables():
+            return [text for table in block.tables for text in _table(table, units)]
+        case Given():
+            given = [
+                (value.name, _line((value.value,), units), markdown_text(value.description), value.origin)
+                for _, values in block.sections
+                for value in values
+            ]
+            return list(_grid(given, ("name", "value", "meaning", "from")))
+        case Figure():
+            return [f"![{block.title}]({block.file})", ""] if block.file in pictures else []
+        case _:
+            return []
+
+
+def _table(table: Table, units: Units) -> list[str]:
+    count = len(table.columns) or len(table.rows[0].cells)
+    heads = [_line(column.title, units) for column in table.columns] or ["quantity", *[""] * (count - 1)]
+    notes = any(row.note for row in table.rows)
+    rows = [
+        [markdown_text(plain_cell(cell, units)) for cell in row.cells]
+        + ([_line(row.note, units)] if notes else [])
+        for row in table.rows
+        if row.form != "short"
+    ]
+    title = [f"**{_line(table.title, units)}**", ""] if table.title else []
+    return [*title, *_grid(rows, heads + ([table.note_title] if notes else []))]
