@@ -6,7 +6,7 @@ import io
 
 from rich.console import Console
 
-from chainunit.report import chain_unit, files, html, motion, terminal
+from chainunit.report import chain_unit, files, html, motion, series, terminal
 from chainunit.text import DEFAULT_UNITS
 
 
@@ -23,7 +23,7 @@ def said_of(study, width=200):
 
 def write(study, folder):
     numbers, *others = files.writers(chain_unit.report(study), folder, "result")
-    return [file for each in (numbers, lambda: files.series(study, folder), *others) for file in each()]
+    return [file for each in (numbers, lambda: series.write(study, folder), *others) for file in each()]
 
 
 def pictures(moving):

@@ -122,11 +122,11 @@ def study(
         # before anything of an earlier run is taken away
         check_own(loaded.catalogue)
     with claimed(output):
-        from .report import chain_unit, files
+        from .report import chain_unit, files, series
         from .studies.run import run_study
         from .studies.study import LOAD_CYCLE
 
-        _clear(output, *files.names("result", chain_unit.PICTURES), files.SERIES, LOAD_CYCLE)
+        _clear(output, *files.names("result", chain_unit.PICTURES), series.SERIES, LOAD_CYCLE)
         errors = _console(stderr=True)
         with _progress("exporting FMUs", errors) as progress:
             result = run_study(
@@ -135,7 +135,7 @@ def study(
         report = chain_unit.report(result)
         numbers, *others = files.writers(report, output, "result")
         unwritten = _leave(
-            report, (numbers, lambda: files.series(result, output), *others), remarks=not errors.is_terminal
+            report, (numbers, lambda: series.write(result, output), *others), remarks=not errors.is_terminal
         )
     if result.failure is not None:
         _stopped_early(result.failure, output, errors)

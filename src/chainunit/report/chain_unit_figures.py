@@ -84,6 +84,8 @@ def _torque_speed(study: Study, names: list[str]) -> fig.Figure:
         low = slowest - room if slowest < 0.0 else max(0.0, slowest - room)
         w = np.linspace(low, fastest + room, 301)
         most = np.broadcast_to(study.drive.motor.limit(numpy_(), study.drive.parameters, w), w.shape)
+        # beyond the synchronous speed it falls out of all that is run
+        most = np.where(most < min(float(np.min(curve.y)) for curve in curves), np.nan, most)
         x = fig.Axis("motor speed", "rad/s", "speed", low=low, high=fastest + room)
         limit = fig.Curve("most that the drive gives, steady", w, most, "limit")
         panels.append(fig.Panel(x, fig.Axis("air-gap torque", "N.m"), (*curves, limit)))

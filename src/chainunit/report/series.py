@@ -1,0 +1,56 @@
+"""The series of a study on a chain unit: result.nc and the load cycle; each file appears whole or not at all."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import xarray as xr
+
+from .. import __version__
+from ..files import netcdf, whole
+from ..studies.study import LOAD_CYCLE, Study
+from .accessors import title
+
+SERIES = "result.nc"
+
+
+def _load_cycle(study: Study, turns: xr.Dataset, file: Path) -> Path:
+    """The load that the motor shaft sees in the steady turns, in the form that sizing tools import: a row per instant
+    with time, speed, torque of the load and inertia of the load, units in the head. The last row is the first of the
+    next turn."""
+    names = {
+        "time": "time",
+        "motor.w": "speed",
+        f"{study.drive.loading}.tau": "torque",
+        "machine.J": "inertia",
+    }
+    with whole(file) as part, part.open("w", newline="", encoding="utf-8") as out:
+        writer = csv.writer(out)
+        writer.writerow(f"{title} [{turns[name].attrs['units']}]" for name, title in names.items())
+        columns = [turns[name].values for name in names]
+        columns[0] = columns[0] - columns[0][0]
+        columns[-1] = study.drive.load_inertia(turns)
+        writer.writerows([f"{x:.9g}" for x in row] for row in zip(*columns, strict=True))
+    return file
+
+
+def write(study: Study, folder: Path) -> list[Path]:
+    """Write the load cycle and the time series of a study; returns the files.
+
+    ``result.nc`` is netCDF-4 with a group per run (open it with `xarray.open_datatree`); each variable has its
+    unit and description.
+    """
+    written = []
+    if "steady" in study.answers and study.drive.whole_turns(study.steady) is not None:
+        written.append(_load_cycle(study, study.steady, folder / LOAD_CYCLE))
+    if study.runs:
+        file = folder / SERIES
+        tree = xr.DataTree.from_dict(
+            {f"/{name}": run.assign_attrs(title=title(study, name)) for name, run in study.runs.items()}
+        )
+        tree.attrs.update(title=study.config.title, source=f"chainunit {__version__}")
+        with whole(file) as part, netcdf():
+            tree.to_netcdf(part, engine="netcdf4")
+        written.append(file)
+    return written

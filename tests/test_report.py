@@ -1,0 +1,258 @@
+"""A report as blocks: every renderer shows the same numbers, a figure is drawn for page and print from one
+description, and nothing that renders knows a study."""
+
+from __future__ import annotations
+
+import ast
+import io
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+import chainunit.report
+from chainunit.report import blocks as b
+from chainunit.report import figure as fig
+from chainunit.report import html, page_figures, print_figures, terminal
+from chainunit.report.lines import Aside, Number, Strong, Words, joined, line
+from chainunit.report.markdown import markdown
+from chainunit.report.motion import Animation, Arrow, Clip, DrawnLink, Reading, pictures
+from chainunit.text import DEFAULT_UNITS, chosen_units
+
+RESULT = {
+    "speed": {"value": 314.159, "unit": "rad/s", "kind": "speed"},
+    "power": {"value": 2200.0, "unit": "W"},
+    "torque": {"value": [1461.0, None], "unit": "N.m"},
+    "used": {"value": 1.31, "unit": "1", "kind": "used"},
+    "band": {"value": 2.0, "unit": "1", "kind": ""},
+    "band_from": {"value": 1.0, "unit": "1"},
+    "band_to": {"value": 3.0, "unit": "1"},
+    "words": "the *motor* <b>",
+    "warnings": ["too hot", {"text": "too slow"}],
+    "notes": ["assumed"],
+    "given": ["speed"],
+}
+S = b.Source(RESULT)
+
+
+def curve(name="a line", **more):
+    x = np.linspace(0.0, 1.0, 50)
+    return fig.Curve(name, x, np.sin(6.0 * x), **more)
+
+
+def a_figure(*items, **more):
+    panel = fig.Panel(fig.Axis("speed", "rad/s", "speed"), fig.Axis("torque", "N.m"), items or (curve(),))
+    return fig.Figure("one", "One figure", "A line.", ((panel,),), file="one.png", **more)
+
+
+def a_report(units=DEFAULT_UNITS):
+    share = b.Share(S.number("used", over=True), S.line("{power} of {power}"))
+    blocks = (
+        b.Judgement("partly", S.line("It turns at {speed}.")),
+        b.Judgement("remark", Strong("Was this meant?"), items=(S.words("words"),)),
+        b.Cards((b.Card("power", ((S.number("power"), "peak"),), (S.line("also {speed}"),)),)),
+        b.Table(
+            (
+                b.TableRow(("first", S.number("torque", 0), share), note="because"),
+                b.TableRow(("second", S.number("torque", 1, none="none"), ""), form="long"),
+            ),
+            (b.Column("row"), b.Column("a long head", "short"), b.Column("used", form="long")),
+            title=S.line("At {=speed}"),
+            note_title="why",
+        ),
+        b.Text(S.estimate("band")),
+        *S.said(),
+        b.Text("fine", "fine", "long"),
+        a_figure(),
+    )
+    sections = (b.Section("answer", "The answer", blocks), b.Section("none", "Empty", ()))
+    return b.Report("A title", "kind", RESULT, (), sections, units=units)
+
+
+def told(report, **more):
+    out = io.StringIO()
+    terminal.show(report, Console(file=out, width=120, markup=False), **more)
+    return out.getvalue()
+
+
+def test_every_renderer_shows_the_same_numbers():
+    text, page, document = told(a_report()), html.render(a_report()), markdown(a_report(), ["one.png"])
+    plain = re.sub(r"<[^>]*>", "", page[: page.index("<script")]).replace("\u00a0", " ").replace("\u202f", "")
+    # cards and the shares of a limit are of the long form
+    for each, short in (
+        ("314 rad/s", True),
+        ("3000 rev/min", True),
+        ("1461 N m", True),
+        ("2.20 kW", False),
+        ("131 %", False),
+    ):
+        assert each in plain and each in document and (each in text) == short, each
+    for said in (text, plain, document.replace("\\", "")):
+        assert "too hot" in said and "too slow" in said and "assumed" in said and "because" in said
+        assert (
+            "2.00" in said
+            and "1.00 to 3.00" in said
+            and "the *motor* <b>" in said.replace("&lt;b&gt;", "<b>")
+        )
+    assert "second" in plain and "second" not in text and "a long head" in plain and "short" in text
+    assert "![One figure](one.png)" in document and "](one.png)" not in markdown(a_report(), [])
+    assert "\\<b\\>" in document and "the *motor* &lt;b&gt;" in page
+    # what is wrong stands last, next to the prompt; an empty section has no heading
+    assert text.rstrip().splitlines()[-3:] == ["Warning: too hot", "Warning: too slow", "Note: assumed"]
+    assert "Empty" not in page.partition("<script")[0] and "Empty" not in document
+
+
+def test_each_number_of_a_page_names_its_place():
+    page = html.render(a_report())
+    places = re.findall(r'data-path="([^"]*)" value="([^"]*)"', page)
+    assert {path for path, _ in places} >= {"speed", "power", "torque.value.0", "torque.value.1", "band_from"}
+    for path, value in places:
+        node = b.at(RESULT, path)
+        assert json.loads(value) == (node["value"] if isinstance(node, dict) else node)
+
+
+def test_a_remark_that_was_printed_before_is_not_repeated():
+    remark = "Remark: the *motor* <b>"
+    assert told(a_report()).count(remark) == 1 and remark not in told(a_report(), remarks=False)
+
+
+def test_the_chosen_units_are_everywhere():
+    units = chosen_units({"speed": "rev/min", "power": "W", "torque": "kN.m"})
+    report = a_report(units)
+    text, page, document = told(report), html.render(report), markdown(report, [])
+    for said in (text, page.replace("\u00a0", " ").replace("</span>", ""), document):
+        assert "rad/s" not in re.sub(r'title="[^"]*"', "", said.partition("<script")[0])
+    assert "3000 rev/min" in text and "1.46 kN m" in text and "2200 W" in document
+    axes = page_figures.figure(a_figure(), units).layout
+    assert axes.xaxis.title.text == "speed [rev/min]" and axes.yaxis.title.text == "torque [kN m]"
+    drawn = page_figures.figure(a_figure(), units).data[0]
+    assert drawn.x[-1] == pytest.approx(30.0 / np.pi) and np.max(drawn.y) == pytest.approx(1e-3, rel=1e-2)
+
+
+ITEMS = (
+    curve("a line", look=2),
+    curve("points", marker="o", joined=False),
+    fig.Between("between", [0.0, 1.0], [0.0, 0.0], [0.5, 1.0]),
+    fig.Shade(0.2, 0.4, "shade"),
+    fig.Shade(0.2, 0.4, "lying shade", "y"),
+    fig.Mark(0.5, "mark", "here"),
+    fig.Mark(0.5, "lying mark", axis="y"),
+    fig.Label(0.5, 0.5, "a label"),
+)
+
+
+def test_a_figure_is_drawn_for_page_and_print_from_one_description(tmp_path, monkeypatch):
+    field = fig.Field(
+        [0.0, 1.0], [0.0, 1.0], np.array([[0.0, 2.0], [1.0, np.nan]]), (-1.0, 0.5, 3.0), ("low", "high"), 0.5
+    )
+    axis = fig.Axis("x")
+    bars = fig.Bars("bars", [0, 1], [3.0, 4.0], 0.4, 3, words=("three", "four"))
+    panels = (
+        (fig.Panel(axis, fig.Axis("y"), ITEMS, "all"), fig.Panel(axis, fig.Axis("map"), (field,))),
+        (fig.Panel(axis, fig.Axis("y", log=True, low=1e-3, high=1.0), (curve(),)), None),
+        (fig.Panel(fig.Axis("size", "N", low=0.0), fig.Axis("pin", names=("A", "B")), (bars,)), None),
+    )
+    figure = fig.Figure("many", "Many", "Everything.", panels, file="many.png")
+    drawn = page_figures.figure(figure, DEFAULT_UNITS)
+    names = [trace.name for trace in drawn.data if trace.showlegend]
+    wanted = {
+        "a line",
+        "points",
+        "between",
+        "shade",
+        "lying shade",
+        "mark",
+        "lying mark",
+        "low",
+        "high",
+        "bars",
+    }
+    # each name once, though two panels have the line
+    assert sorted(names) == sorted(wanted)
+    assert {"here", "a label", "<b>all</b>"} <= {each.text for each in drawn.layout.annotations}
+    # the panels of a column that share an axis have one cursor
+    assert {trace.xaxis for trace in drawn.data if trace.name == "a line"} == {"x"}
+    assert (
+        drawn.layout.hoversubplots == "axis"
+        and figure.sharing(0, 0) == [0, 1]
+        and figure.sharing(2, 0) == [2]
+    )
+    legends = []
+    legend = print_figures._legend
+
+    def keep(drawing, *rest):
+        legend(drawing, *rest)
+        legends.append({text.get_text() for text in drawing.legends[0].get_texts()})
+
+    monkeypatch.setattr(print_figures, "_legend", keep)
+    (file,) = print_figures.write([figure, fig.Figure("page", "", "", panels)], tmp_path, DEFAULT_UNITS)
+    assert file.name == "many.png" and file.read_bytes().startswith(b"\x89PNG")
+    assert legends == [wanted]
+
+
+def test_curves_over_the_same_points_are_thinned_together():
+    x = np.linspace(0.0, 1.0, 5001)
+    straight, bent = fig.Curve("straight", x, x), fig.Curve("bent", x, np.abs(x - 0.3))
+    other = fig.Curve("other", x.copy(), x)
+    drawn = page_figures.figure(a_figure(straight, bent, other), DEFAULT_UNITS).data
+    assert [len(trace.x) for trace in drawn] == [3, 3, 2]
+    assert drawn[0].x[1] == pytest.approx(0.3, abs=1e-6)
+
+
+def test_what_moves_is_played_as_it_is():
+    turn = np.linspace(0.0, 2.0 * np.pi, 50)
+    crank = {"O": (0.0, 0.0), "A": (np.sin(turn), np.cos(turn))}
+    clip = Clip(
+        "turn",
+        "a turn",
+        0.1 * turn,
+        crank,
+        (Reading("Speed", np.full(50, 10.0), "rad/s", "speed"),),
+        (Arrow("bearing", "O", 0.0 * turn, 10.0 + turn),),
+        still=0.3,
+    )
+    moving = Animation((DrawnLink("crank", ("O", "A"), "crank"),), ("O",), (clip,), 0.6)
+    played = json.loads(json.dumps(pictures(moving, chosen_units({"speed": "rev/min"}))))
+    (run,) = played["runs"]
+    assert run["joints"]["O"] == {"x": [0], "y": [0]} and len(run["joints"]["A"]["x"]) == 50
+    assert np.hypot(run["joints"]["A"]["x"], run["joints"]["A"]["y"]) == pytest.approx(1.0, abs=1e-4)
+    assert run["readings"] == [{"title": "Speed", "unit": "rev/min", "values": [pytest.approx(95.49)]}]
+    assert run["forces"][0]["y"][-1] == pytest.approx(10.0 + 2.0 * np.pi, rel=1e-3)
+    assert run["time"][run["still"] - 1] < 0.3 <= run["time"][run["still"]]
+
+
+def test_lines():
+    assert line("a", ("b", "c"), Aside("d")) == ("a", "b", "c", Aside("d"))
+    assert joined(["a", ("b", "c")], "; ") == ("a", "; ", "b", "c") and joined([]) == ()
+    assert S.line("at {=speed} {who}", who="!") == (
+        "at ",
+        Number(314.159, "rad/s", "speed", "speed", given=True),
+        " ",
+        "!",
+    )
+    assert S.line("{power:5}")[0].digits == 5 and S.line("{words}") == (Words("the *motor* <b>", "words"),)
+
+
+RENDERERS = (
+    "blocks figure files html lines linkage markdown motion page_figures print_figures style terminal".split()
+)
+
+
+@pytest.mark.parametrize("name", RENDERERS)
+def test_nothing_that_renders_knows_a_study(name):
+    folder = Path(chainunit.report.__file__).parent
+    tree = ast.parse((folder / f"{name}.py").read_text("utf-8"))
+    imported = {
+        (node.level, node.module or alias.name)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    own = {module for level, module in imported if level == 1}
+    beyond = {module.split(".")[0] for level, module in imported if level == 2}
+    assert own <= set(RENDERERS)
+    assert beyond <= {"text", "quantities", "files", "__version__", "mechanism"}
+    assert ("mechanism" in beyond) == (name == "linkage")
