@@ -71,11 +71,6 @@ class Drive:
         if self.foreign is not None:
             raise InputError(f"{self.foreign.title}: {what} is not known of an FMU of somebody else")
 
-    def rigid(self) -> Drive:
-        """The same without the elastic line, its inertia on the rotor."""
-        heavier = replace(self.parameters.rotor, J=self.rotor_inertia)
-        return replace(self, line=None, parameters=replace(self.parameters, rotor=heavier))
-
     def load_inertia(self, run: xr.Dataset) -> Any:
         """Inertia at the motor's shaft beside the rotor [kg m2], shape (time,); with a driveline that of its even
         ratio."""
@@ -84,8 +79,8 @@ class Drive:
 
     @property
     def loading(self) -> str:
-        """Name of the instance that loads the motor."""
-        return "machine" if self.line is None else "driveline"
+        """Name of the component that loads the motor."""
+        return next(bond.machine for bond in self.graph.bonds if bond.driver == "motor")
 
     @property
     def rods(self) -> tuple[int, int]:
@@ -114,10 +109,12 @@ class Drive:
         """The system of the models, each before what drives it; with feed-forward also the machine that the control
         asks, `model`."""
         components: dict[str, Component] = {"machine": ModelComponent(*self.load_model())}
-        joints = shaft_joints("motor", self.loading)
-        if self.line is not None:
+        if self.line is None:
+            joints = shaft_joints("motor", "machine")
+        else:
             components["driveline"] = ModelComponent(CardanDriveline, self.line)
-            joints += shaft_joints("driveline", "machine", flange="driven", load="machine")
+            behind = shaft_joints("driveline", "machine", flange="driven", load="machine")
+            joints = [*shaft_joints("motor", "driveline"), *behind]
         components["motor"] = self.foreign or ModelComponent(self.motor, self.parameters)
         if not self.feed_forward:
             return System(components, joints)

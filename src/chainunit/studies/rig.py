@@ -14,7 +14,7 @@ import xarray as xr
 
 from ..config import Config
 from ..machines.chain_unit import SIDES, DirectChainUnit
-from ..system import CoSimulation, Jump, ModelComponent, Profile, System, certify, monolithic
+from ..system import CoSimulation, Jump, ModelComponent, Profile, System, certify, monolithic, rigid, without
 from .drive import Drive
 from .events import Event, OverTime
 from .measures import end_gap, whole_turns
@@ -40,27 +40,41 @@ class Transient:
 
 @dataclass(frozen=True)
 class Rig:
-    """A drive as the FMUs of `files`, with the loads and the speed of the study."""
+    """A drive as the FMUs of `files`, with the loads and the speed of the study; or its `twin`, a function of the
+    system that leaves a part out."""
 
     config: Config
     drive: Drive
     files: Mapping[str, Path]
+    twin: Callable[[System], System] | None = None
 
     @property
     def step(self) -> float:
         """Communication step [s]."""
         return float(self.config.run.step)
 
+    def _twin(self, system: System) -> System:
+        return system if self.twin is None else self.twin(system)
+
     @property
     def system(self) -> System:
         """The FMUs and how they are joined."""
-        return self.drive.system(self.files)
+        return self._twin(self.drive.system(self.files))
+
+    @cached_property
+    def graph(self) -> System:
+        """The models and how they are joined."""
+        return self._twin(self.drive.graph)
 
     @property
     def rigid(self) -> Rig:
         """The same without the elasticity and unevenness of the driveline."""
-        files = {name: file for name, file in self.files.items() if name != "driveline"}
-        return replace(self, drive=self.drive.rigid(), files=files)
+        return replace(self, twin=partial(rigid, line="driveline"))
+
+    @property
+    def plain(self) -> Rig:
+        """The same without feed-forward."""
+        return replace(self, twin=partial(without, names=("model",)))
 
     @property
     def guards(self) -> dict[str, float]:
@@ -71,11 +85,11 @@ class Rig:
     @cached_property
     def _inputs(self) -> dict[str, tuple[str, float]]:
         """Of each input that an event may act on the full name and the value in normal running."""
-        models = {"motor": self.drive.motor, "machine": self.drive.load_model()[0]}
         inputs = {
-            v.name: (f"{instance}.{v.name}", float(v.quantity.start or 0.0))
-            for instance, model in models.items()
-            for v in model.input_layout.variables
+            c.name: (f"{name}.{c.name}", c.start)
+            for name in ("motor", "machine")
+            for c in self.graph.components[name].connectors.values()
+            if c.causality == "input"
         }
         for full, value in self.drive.loads(self.config.feed).items():
             instance, _, name = full.partition(".")
@@ -99,11 +113,13 @@ class Rig:
         """Loads of normal running with what is `given` in their place, and the speed reference, from rest with
         `ramp`."""
         run = self.config.run
-        return {
+        signals = {
             **self.drive.loads(self.config.feed),
             **(given or {}),
             **self.drive.reference(run.crank_speed, run.ramp if ramp else None),
         }
+        # a twin has no use for those of the part that is left out
+        return {full: x for full, x in signals.items() if full.partition(".")[0] in self.graph.components}
 
     def from_rest(self, event: Event | None = None) -> CoSimulation:
         """The co-simulation from rest on, with the event of a start if there is one."""
@@ -195,7 +211,7 @@ class Rig:
         machine; its share of the energy moved."""
         feed = {f"machine.{s}.material_mass": partial(self._energy_per_kg, s) for s in SIDES}
         shares = {}
-        for driven, (residual, share) in certify(run, self.drive.graph, feed).items():
+        for driven, (residual, share) in certify(run, self.graph, feed).items():
             prefix = "" if driven == "machine" else f"{driven}_"
             run[f"{prefix}residual"] = residual
             shares[f"{prefix}energy_residual_share"] = share
@@ -219,7 +235,7 @@ class Rig:
         if transient:
             signals |= transient.jumps
         rows = np.unique(np.append(np.arange(0, run.sizes["time"], 10), run.sizes["time"] - 1))
-        reference = monolithic(self.drive.graph, signals, run["time"].values[rows], start=start)
+        reference = monolithic(self.graph, signals, run["time"].values[rows], start=start)
         differences = {}
         for of in ("machine.tau", "motor.w"):
             difference = np.abs(run[of].values[rows] - reference[of].values)

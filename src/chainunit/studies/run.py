@@ -7,7 +7,6 @@ same steady state, saved once.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import xarray as xr
@@ -127,11 +126,11 @@ class Runner:
                 self._assumption(simulation, transient, done)
         if check:
             self._check(transients)
-        if self.rig.drive.feed_forward:
+        if "model" in self.rig.graph.components:
             self._without_feed_forward()
         for k, event in enumerate(self.starts):
             self._loaded_start(event, self.total - (len(self.starts) - k) * self.stop, check)
-        if self.rig.drive.line is not None:
+        if "driveline" in self.rig.graph.components:
             self.report("the same with a rigid shaft", self.total, self.total)
             try:
                 rigid = self._rigid()
@@ -274,8 +273,7 @@ class Runner:
     def _without_feed_forward(self) -> None:
         """The fluctuation of the speed that the study would have without its feed-forward."""
         study, run = self.study, self.study.config.run
-        plain = replace(self.rig, drive=replace(self.rig.drive, feed_forward=False))
-        with plain.from_rest() as simulation:
+        with self.rig.plain.from_rest() as simulation:
             steady = simulation.run(self.stop, self.rig.step).sel(time=slice(study.config.settled, None))
         steady = whole_turns(self.rig.drive, steady, run.turns)
         study.ripple_without = read_answers(study.window(Phase.STEADY, steady)).speed_ripple

@@ -112,13 +112,13 @@ def torsion(drive: Drive, inertia: Any) -> Torsion:
 
 
 def rigid_torque(drive: Drive, rigid: xr.Dataset) -> Any:
-    """Torque in shaft 2 [N m], shape (time,), in a run of ``drive.rigid()``."""
+    """Torque in shaft 2 [N m], shape (time,), in a run of the twin with a rigid shaft."""
     line = drive.line
     return line.ratio * rigid["machine.tau"].values + line.J4 / line.ratio * rigid["motor.a"].values
 
 
 def with_rigid(drive: Drive, run: xr.Dataset, rigid: xr.Dataset) -> xr.Dataset:
-    """The `run` with the torque in shaft 2 of the same run of ``drive.rigid()`` beside it."""
+    """The `run` with the torque in shaft 2 of the same run of the twin with a rigid shaft beside it."""
     torque = rigid_torque(drive, rigid)
     # a coupling opens at its own time in each; behind that of the rigid drive there is nothing
     there = np.interp(run["time"].values, rigid["time"].values, torque, right=np.nan)

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import zipfile
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 from xml.etree import ElementTree
@@ -64,7 +65,7 @@ def fmu_component(
         ours = {theirs: name for name, theirs in names.items()}
         units = {unit.name: unit.baseUnit for unit in fmu.description.unitDefinitions}
         connectors = {
-            name: Connector(name, v.causality, v.unit or "", _dimension(v.unit, units))
+            name: Connector(name, v.causality, v.unit or "", _dimension(v.unit, units), float(v.start or 0.0))
             for v in real
             if v.causality in ("parameter", "input", "output")
             for name in [ours.get(v.name, v.name)]
@@ -134,7 +135,7 @@ def _with_units(file: Path, terminal: Terminal, connectors: Mapping[str, Connect
             raise InputError(
                 f"{file}: {name} is in {printable(connector.unit)}; must be in {unit} to be joined"
             )
-        checked[name] = Connector(name, connector.causality, unit, base_units(unit))
+        checked[name] = replace(connector, unit=unit, dimension=base_units(unit))
     return checked
 
 

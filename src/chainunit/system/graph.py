@@ -8,7 +8,7 @@ joints, `shaft_joints`."""
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -25,7 +25,7 @@ Connection = tuple[str, str]
 
 @dataclass(frozen=True)
 class Connector:
-    """A variable of a component that a connection can begin or end at, or that has a start value: `causality` is
+    """A variable of a component that a connection can begin or end at, or that has a `start` value: `causality` is
     "parameter", "input" or "output". `dimension` holds the powers of the base units; None where the unit is not
     known."""
 
@@ -33,6 +33,7 @@ class Connector:
     causality: str
     unit: str
     dimension: Mapping[str, int] | None
+    start: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ class ModelComponent:
             "output": (*states, *outputs),
         }
         return {
-            v.name: Connector(v.name, causality, v.unit, base_units(v.unit))
+            v.name: Connector(v.name, causality, v.unit, base_units(v.unit), float(v.quantity.start or 0.0))
             for causality, variables in listed.items()
             for v in variables
         }
@@ -334,7 +335,7 @@ def ordered(connections: Sequence[Connection], direct: Direct) -> list[tuple[str
 # -- twins: the system with a part left out
 
 
-def without(system: System, *names: str) -> System:
+def without(system: System, names: Collection[str]) -> System:
     """The system without these components and what connects to them; inputs that they fed keep their start values."""
     for name in names:
         system.component(name)
@@ -358,7 +359,7 @@ def held(system: System) -> System:
 
 def bridged(system: System, name: str) -> System:
     """The system without the component `name`, with what drives it joined to what it drives."""
-    rest = without(system, name)
+    rest = without(system, (name,))
     ends: dict[str, list[str]] = {}
     for joint in system.joints:
         if joint not in rest.joints:
@@ -380,15 +381,14 @@ def rigid(system: System, line: str) -> System:
     InputError
         where one of those has no such parameter, as a foreign FMU may.
     """
-    bonds = {bond.machine: bond for bond in system.bonds}
     values = system.values
-    driver = bonds[line].driver
-    machine = next(bond.machine for bond in system.bonds if bond.driver == line)
-    needed = (f"{line}.ratio", f"{line}.J4", f"{driver}.rotor.J", f"{machine}.ratio")
+    driver = next((bond.driver for bond in system.bonds if bond.machine == line), "what drives it")
+    machine = next((bond.machine for bond in system.bonds if bond.driver == line), "what it drives")
+    needed = (f"{line}.J4", f"{line}.ratio", f"{driver}.rotor.J", f"{machine}.ratio")
     for full in needed:
         if full not in values:
             raise InputError(f"{full}: is not known, so that there is no twin with a rigid shaft")
-    ratio, J, rotor, gear = (values[full] for full in needed)
+    J, ratio, rotor, gear = (values[full] for full in needed)
     return bridged(system, line).with_values(
         {f"{driver}.rotor.J": rotor + J / ratio**2, f"{machine}.ratio": gear * ratio}
     )
