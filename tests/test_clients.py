@@ -59,7 +59,8 @@ SIMULATE = """
     import json, sys
     import fmpy
 
-    print("values", json.dumps(fmpy.simulate_fmu(**json.loads(sys.argv[1])).tolist()))
+    run = fmpy.simulate_fmu(**json.loads(sys.argv[1]))
+    print("values", json.dumps({name: run[name].tolist() for name in run.dtype.names}))
 """
 
 
@@ -154,8 +155,8 @@ def simulated(file, names, **more):
     """Columns by name of a run in fmpy, in a process of its own."""
     wanted = {"filename": str(file), "fmi_type": "CoSimulation", "output": names, "stop_time": STEPS * STEP}
     steps = {"step_size": STEP, "output_interval": STEP}
-    columns = np.transpose(values(SIMULATE, json.dumps(wanted | steps | more)))
-    return dict(zip(["time", *names], columns, strict=True))
+    run = values(SIMULATE, json.dumps(wanted | steps | more))
+    return {name: np.array(column) for name, column in run.items()}
 
 
 def by_fmpy(file, names):
