@@ -86,6 +86,10 @@ class Motion:
         self.p1 = p1
         self.p2 = p2
 
+    def lifted(self) -> Motion:
+        """The motion with the derivatives by q as dual parts, without its second ones."""
+        return Motion(lifted(self.p, self.p1), lifted(self.p1, self.p2))
+
 
 class Link:
     """A rigid link: the pin it starts from, the unit vector `u` along it, and the first and
@@ -101,31 +105,33 @@ class Link:
 
     def at(self, s: Any) -> Motion:
         """Motion of the point at distance `s` from the pin along the link."""
-        return self.carried(self.u * s)
+        return self.carried(Vec2(self.u.x * s, self.u.y * s))
 
     def beside(self, s: Any, t: Any) -> Motion:
         """Motion of the point at distance `s` along the link and `t` to its left."""
-        return self.carried(self.u * s + self.u.turned() * t)
+        u = self.u
+        return self.carried(Vec2(u.x * s - u.y * t, u.y * s + u.x * t))
 
     def carried(self, r: Vec2) -> Motion:
         """Motion of the point `r` away from the pin."""
-        pin, t1 = self.pin, self.t1
+        # in components: a vector costs `math` ten times a number
+        p, p1, p2, x, y = self.pin.p, self.pin.p1, self.pin.p2, r.x, r.y
+        t1, t2 = self.t1, self.t2
+        spin = t1 * t1
         return Motion(
-            Vec2(pin.p.x + r.x, pin.p.y + r.y),
-            Vec2(pin.p1.x - r.y * t1, pin.p1.y + r.x * t1),
-            self._second(r),
+            Vec2(p.x + x, p.y + y),
+            Vec2(p1.x - y * t1, p1.y + x * t1),
+            Vec2(p2.x - y * t2 - x * spin, p2.y + x * t2 - y * spin),
         )
 
-    def _second(self, r: Vec2) -> Vec2:
-        base, t2, spin = self.pin.p2, self.t2, self.t1 * self.t1
-        return Vec2(base.x - r.y * t2 - r.x * spin, base.y + r.x * t2 - r.y * spin)
+    def third(self, r: Vec2, start: Vec2, t3: Any) -> Vec2:
+        """Third derivative by q of the point `r` away from the pin, from `start` of the pin and `t3` of the angle."""
+        t1 = self.t1
+        across, along = t3 - t1 * t1 * t1, 3.0 * (t1 * self.t2)
+        return Vec2(start.x - r.y * across - r.x * along, start.y + r.x * across - r.y * along)
 
-    def lifted(self, pin: Motion, t2: Any) -> Link:
-        """The link with its derivatives by q as dual parts, from those of its pin and of `t2`."""
-        return Link(pin, lifted(self.u, self.u.turned() * self.t1), Dual(self.t1, self.t2), t2)
-
-    def lifted_point(self, point: Motion) -> Motion:
-        """A point of the link, whose motion is known, with its derivatives by q as dual parts; the link is lifted."""
-        p = lifted(point.p, point.p1)
-        p2 = lifted(point.p2, growth(self._second(p - self.pin.p)))
-        return Motion(p, lifted(point.p1, point.p2), p2)
+    def lifted(self) -> Link:
+        """The link with the derivatives by q as dual parts, without its second ones."""
+        return Link(
+            self.pin.lifted(), lifted(self.u, self.u.turned() * self.t1), Dual(self.t1, self.t2), None
+        )

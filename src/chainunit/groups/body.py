@@ -60,10 +60,6 @@ class Body:
         t = mass.t if isinstance(mass, Mass) else None
         return cls(link, mass.m, link.at(mass.s) if t is None else link.beside(mass.s, t), mass.I)
 
-    def lifted(self, link: Link) -> Body:
-        """The body with its derivatives by q as dual parts, on the lifted link."""
-        return Body(link, self.m, link.lifted_point(self.c), self.I)
-
     def inertia(self) -> tuple[Any, Any]:
         """Reflected inertia J [kg m2] and its derivative dJ/dq by the coordinate."""
         c, k = self.c, self.link
@@ -72,17 +68,31 @@ class Body:
             2.0 * (self.m * c.p1.dot(c.p2) + self.I * (k.t1 * k.t2)),
         )
 
-    def _resists(self, acceleration: Vec2, spin: Any) -> Load:
-        force = acceleration * (-self.m)
-        return force, (self.c.p - self.link.pin.p).cross(force) - self.I * spin
+    # in components: this runs for each body in each force pass, and a vector costs `math` ten times a number
+    def _resists(self, ax: Any, ay: Any, spin: Any) -> Load:
+        c, pin = self.c.p, self.link.pin.p
+        fx, fy = -(self.m * ax), -(self.m * ay)
+        return Vec2(fx, fy), (c.x - pin.x) * fy - (c.y - pin.y) * fx - self.I * spin
 
-    def centrifugal(self, w2: Any) -> Load:
-        """The inertia force (d'Alembert) at constant speed of the coordinate, `w2` its square."""
-        return self._resists(self.c.p2 * w2, self.link.t2 * w2)
+    def centrifugal(self, w2: Any, field: Any = 0.0) -> Load:
+        """The inertia force (d'Alembert) at constant speed of the coordinate, `w2` its square, in a frame that is
+        accelerated by `field` along y [m/s2]: the weight where that is g."""
+        c2 = self.c.p2
+        return self._resists(c2.x * w2, c2.y * w2 + field, self.link.t2 * w2)
+
+    def centrifugal_slope(self, w2: Any, field: Any, third: tuple[Vec2, Any]) -> Load:
+        """The derivative of `centrifugal` by q, from the third derivatives of the link's pin and angle."""
+        start, t3 = third
+        pin, c = self.link.pin, self.c
+        arm, turning = c.p - pin.p, c.p1 - pin.p1
+        force = self.link.third(arm, start, t3) * (-(self.m * w2))
+        # the present force on an arm that turns
+        turned = turning.x * (c.p2.y * w2 + field) - turning.y * (c.p2.x * w2)
+        return force, arm.cross(force) - turned * self.m - self.I * (t3 * w2)
 
     def inertial(self) -> Load:
         """The inertia force by the acceleration of the coordinate."""
-        return self._resists(self.c.p1, self.link.t1)
+        return self._resists(self.c.p1.x, self.c.p1.y, self.link.t1)
 
 
 def reflected(bodies: Iterable[Body]) -> tuple[Any, Any]:

@@ -10,9 +10,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..planar import Link, Motion, Vec2
+from ..planar import ZERO, Link, Motion, Vec2
 from .body import Bar, Load
-from .group import Group, SolvedGroup
+from .group import Group, SolvedGroup, Third
 
 
 @dataclass
@@ -48,12 +48,12 @@ class TurnedCrank(SolvedGroup):
 
     __slots__ = ()
 
-    def lifted(self, outer: tuple[Motion, ...]) -> TurnedCrank:
+    def third(self, outer: Sequence[Vec2]) -> tuple[Sequence[Third], Sequence[Vec2]]:
         """See `SolvedGroup`."""
-        link = self.links[0].lifted(outer[0], 0.0)
-        return TurnedCrank((link,), (link.lifted_point(self.pins[0]),))
+        (link,), (end,) = self.links, self.pins
+        return [(ZERO, 0.0)], [link.third(end.p - link.pin.p, ZERO, 0.0)]
 
-    def reactions(self, loads: tuple[Load, ...]) -> tuple[Vec2, ...]:
+    def reactions(self, loads: Sequence[Load]) -> tuple[Vec2, ...]:
         """The force on the crank at its bearing [N]."""
         return (-loads[0][0],)
 

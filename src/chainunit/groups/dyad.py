@@ -13,10 +13,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..engines import Dual, slope
-from ..planar import Link, Motion, Vec2, lifted
+from ..planar import Link, Motion, Vec2
 from .body import Bar, Load
-from .group import Group, SolvedGroup
+from .group import Group, SolvedGroup, Third
 
 
 @dataclass
@@ -58,20 +57,19 @@ class SolvedDyad(SolvedGroup):
     """A solved dyad: its links from P and from Q, the inner pin B, the arms `r1`, `r2`; its margin is the sine of the
     angle between them."""
 
-    __slots__ = ("_minus_per_det", "_rates", "r1", "r2")
+    __slots__ = ("_minus_per_det", "r1", "r2")
 
     def __init__(
         self,
         arms: tuple[Vec2, Vec2],
         minus_per_det: Any,
-        rates: tuple[Any, Any],
         links: tuple[Link, Link],
         pin: Motion,
         margin: Any = 1.0,
     ) -> None:
         super().__init__(links, (pin,), margin)
         self.r1, self.r2 = arms
-        self._minus_per_det, self._rates = minus_per_det, rates
+        self._minus_per_det = minus_per_det
 
     @classmethod
     def between(cls, xp: Any, p: Motion, q: Motion, a: Any, b: Any, side: float) -> SolvedDyad:
@@ -83,48 +81,40 @@ class SolvedDyad(SolvedGroup):
         a, b : lengths P-B and Q-B [m]
         side : +1 where B lies to the left of the ray from P to Q, -1 where to the right
         """
-        d = q.p - p.p
-        # a factor 1/x would come back from casadi as a division by x wherever it is used; -1/x stays one
-        minus_per_d2 = -1.0 / d.squared()
+        # in components, as in `Body`; casadi would make a division by x of each use of 1/x, but not of -1/x
+        dx, dy = q.p.x - p.p.x, q.p.y - p.p.y
+        minus_per_d2 = -1.0 / (dx * dx + dy * dy)
         along = 0.5 * (1.0 + (b * b - a * a) * minus_per_d2)
         across = side * xp.sqrt(-(a * a * minus_per_d2) - along * along)
-        r1 = d * along + d.turned() * across
-        r2 = r1 - d
-        det = r1.cross(r2)
+        x1, y1 = dx * along - dy * across, dy * along + dx * across
+        x2, y2 = x1 - dx, y1 - dy
+        det = x1 * y2 - y1 * x2
         minus_per_det = -1.0 / det
-        g = p.p1 - q.p1
-        rates = g.dot(r2) * minus_per_det, g.dot(r1) * minus_per_det
-        x, y = _second(p, q, r1, r2, rates, minus_per_det)
-        first, second = Link(p, r1 * (1.0 / a), rates[0], x), Link(q, r2 * (1.0 / b), rates[1], y)
-        return cls((r1, r2), minus_per_det, rates, (first, second), first.carried(r1), det / (a * b))
+        gx, gy = p.p1.x - q.p1.x, p.p1.y - q.p1.y
+        s1, s2 = (gx * x2 + gy * y2) * minus_per_det, (gx * x1 + gy * y1) * minus_per_det
+        k1, k2 = s1 * s1, s2 * s2
+        hx = p.p2.x - q.p2.x - x1 * k1 + x2 * k2
+        hy = p.p2.y - q.p2.y - y1 * k1 + y2 * k2
+        minus_per_a, minus_per_b = -1.0 / a, -1.0 / b
+        r1, u1 = Vec2(x1, y1), Vec2(-(x1 * minus_per_a), -(y1 * minus_per_a))
+        r2, u2 = Vec2(x2, y2), Vec2(-(x2 * minus_per_b), -(y2 * minus_per_b))
+        first = Link(p, u1, s1, (hx * x2 + hy * y2) * minus_per_det)
+        second = Link(q, u2, s2, (hx * x1 + hy * y1) * minus_per_det)
+        return cls((r1, r2), minus_per_det, (first, second), first.carried(r1), det / (a * b))
 
-    def lifted(self, outer: tuple[Motion, ...]) -> SolvedDyad:
+    def third(self, outer: Sequence[Vec2]) -> tuple[Sequence[Third], Sequence[Vec2]]:
         """See `SolvedGroup`."""
         (p, q), (first, second) = outer, self.links
-        r1, r2 = (lifted(r, r.turned() * s) for r, s in zip((self.r1, self.r2), self._rates, strict=True))
-        rates = Dual(first.t1, first.t2), Dual(second.t1, second.t2)
-        per = self._minus_per_det
-        minus_per_det = Dual(per, per * per * slope(r1.cross(r2)))
-        x, y = _second(p, q, r1, r2, rates, minus_per_det)
-        # the values are known; derivatives alone are new
-        links = (
-            first.lifted(p, Dual(first.t2, slope(x))),
-            second.lifted(q, Dual(second.t2, slope(y))),
-        )
-        return SolvedDyad((r1, r2), minus_per_det, rates, links, links[0].lifted_point(self.pins[0]))
+        (r1, s1, x), (r2, s2, y) = (self.r1, first.t1, first.t2), (self.r2, second.t1, second.t2)
+        h = p - q - r1.turned() * (s1 * s1 * s1) + r2.turned() * (s2 * s2 * s2)
+        h = h - r1 * (3.0 * (s1 * x)) + r2 * (3.0 * (s2 * y))
+        thirds = (p, h.dot(r2) * self._minus_per_det), (q, h.dot(r1) * self._minus_per_det)
+        return thirds, (first.third(r1, *thirds[0]),)
 
-    def reactions(self, loads: tuple[Load, ...]) -> tuple[Vec2, Vec2, Vec2]:
+    def reactions(self, loads: Sequence[Load]) -> tuple[Vec2, Vec2, Vec2]:
         """Forces at P (on the first link), at B (on the first link, from the second) and at Q
         (on the second link) [N], from the loads on each link: force and moment about P and Q."""
         (f1, m1), (f2, m2) = loads
-        at_b = (self.r1 * m2 + self.r2 * m1) * self._minus_per_det
-        return -(f1 + at_b), at_b, at_b - f2
-
-
-def _second(
-    p: Motion, q: Motion, r1: Vec2, r2: Vec2, rates: tuple[Any, Any], minus_per_det: Any
-) -> tuple[Any, Any]:
-    """Second derivatives of both links' angles by q."""
-    s1, s2 = rates
-    h = p.p2 - q.p2 - r1 * (s1 * s1) + r2 * (s2 * s2)
-    return h.dot(r2) * minus_per_det, h.dot(r1) * minus_per_det
+        r1, r2, k = self.r1, self.r2, self._minus_per_det
+        x, y = (r1.x * m2 + r2.x * m1) * k, (r1.y * m2 + r2.y * m1) * k
+        return Vec2(-(f1.x + x), -(f1.y + y)), Vec2(x, y), Vec2(x - f2.x, y - f2.y)

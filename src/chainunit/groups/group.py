@@ -8,6 +8,9 @@ from typing import Any, ClassVar
 from ..planar import Link, Motion, Vec2
 from .body import Bar, Load
 
+Third = tuple[Vec2, Any]
+"""Third derivatives by q of a link: of its pin and of its angle."""
+
 
 class SolvedGroup:
     """A group at one position: its `links` in the order of the group's bars, the `pins` that it adds, and the
@@ -18,11 +21,12 @@ class SolvedGroup:
     def __init__(self, links: tuple[Link, ...], pins: tuple[Motion, ...], margin: Any = 1.0) -> None:
         self.links, self.pins, self.margin = links, pins, margin
 
-    def lifted(self, outer: tuple[Motion, ...]) -> SolvedGroup:
-        """The same with its derivatives by q as dual parts; the outer pins have them."""
+    def third(self, outer: Sequence[Vec2]) -> tuple[Sequence[Third], Sequence[Vec2]]:
+        """Third derivatives by q of each link and of each pin that the group adds, from those of the pins that its
+        bars start from."""
         raise NotImplementedError
 
-    def reactions(self, loads: tuple[Load, ...]) -> Sequence[Vec2]:
+    def reactions(self, loads: Sequence[Load]) -> Sequence[Vec2]:
         """Forces in the group's joints, in their order [N], from the load of each link."""
         raise NotImplementedError
 

@@ -53,15 +53,17 @@ class Wrench(NamedTuple):
 
 
 class Effect(NamedTuple):
-    """What a load does at one place and speed: wrenches on links, and the torques at the coordinate that overcome it
-    [N m]: `held` against what has the `energy` [J], `lost` against what takes power. A load that resists acceleration
-    adds the `inertia` [kg m2] and the wrenches `inertial`, each by the acceleration of the coordinate; `source` is
-    what it was computed from."""
+    """The effect of a load at one place and speed: wrenches on links, and the torques at the coordinate that overcome
+    it [N m]: `held` against the part that has the `energy` [J], `lost` against the part that takes power. A weight is
+    a `field`: it acts as if the frame were accelerated along y [m/s2]. A load that resists acceleration adds the
+    `inertia` [kg m2] and the wrenches `inertial`, each by the acceleration of the coordinate; `source` is the object
+    that they were computed from."""
 
     wrenches: tuple[Wrench, ...] = ()
     held: Any = 0.0
     lost: Any = 0.0
     energy: Any = 0.0
+    field: Any = 0.0
     inertia: Any = 0.0
     inertial: tuple[Wrench, ...] = ()
     source: Any = None
@@ -72,7 +74,8 @@ class Acting(Protocol):
 
     @property
     def by_reactions(self) -> bool:
-        """Whether it follows from the reactions of the pins: then it is asked after them, and has no wrench."""
+        """Whether it follows from the reactions of the pins: then it is asked after them, has no wrench, and gives
+        its own slope, see `PinLosses.slope`."""
 
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Mapping[Joint, Vec2]) -> Effect:
         """Its effect at the speed `w` of the coordinate [rad/s]; `reactions` are those at constant speed, [N]."""
@@ -92,12 +95,10 @@ class Weight(NamedTuple):
 
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Any) -> Effect:
         """See `Acting`."""
-        wrenches, held, energy = [], 0.0, 0.0
-        for name, body in m.bodies.items():
-            weight, c = body.m * self.g, body.c
-            wrenches.append(Wrench(name, Vec2(0.0, -weight), -(c.p.x - body.link.pin.p.x) * weight))
-            held, energy = held + weight * c.p1.y, energy + weight * c.p.y
-        return Effect(tuple(wrenches), held=held, energy=energy)
+        held, energy = 0.0, 0.0
+        for body in m.bodies.values():
+            held, energy = held + body.m * body.c.p1.y, energy + body.m * body.c.p.y
+        return Effect(held=held * self.g, energy=energy * self.g, field=self.g)
 
 
 class Push(NamedTuple):
@@ -246,14 +247,44 @@ class PinLosses(NamedTuple):
 
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Mapping[Joint, Vec2]) -> Effect:
         """See `Acting`."""
-        pin = self.pin
-        per_newton = 0.5 * pin.friction * pin.diameter
-        smooth2, w2, lost = pin.w_smooth * pin.w_smooth, w * w, 0.0
+        per_newton, smooth2, w2, lost = *self._law(), w * w, 0.0
         for joint, force in reactions.items():
-            turn = m.turns[joint]
-            k2 = turn * turn
-            # one root of the ratio of squares, which has a slope at zero, too
-            minus_per = -1.0 / (k2 * w2 + smooth2)
-            rubbed = xp.sqrt(_TINY - force.squared() * minus_per)
+            k2, _, rubbed = _rubbed(xp, force, m.turns[joint], w2, smooth2)
             lost = lost + k2 * (per_newton * rubbed + self.damping)
         return Effect(lost=lost * w)
+
+    def slope(
+        self,
+        xp: Any,
+        m: Moving,
+        w: Any,
+        reactions: Mapping[Joint, Vec2],
+        growing: Mapping[Joint, Vec2],
+        turning: Mapping[Joint, Any] | None,
+    ) -> Any:
+        """The slope of the lost torque in the direction in which the reactions grow and the relative rotations
+        change; without these by the speed."""
+        per_newton, smooth2, w2, rest, slope = *self._law(), w * w, 0.0, 0.0
+        for joint, force in reactions.items():
+            k = m.turns[joint]
+            k2, minus_per, rubbed = _rubbed(xp, force, k, w2, smooth2)
+            # of rubbed^2 = |R|^2/(k^2 w^2 + smooth^2)
+            wider = k2 * w if turning is None else k * turning[joint] * w2
+            grows = (rubbed * rubbed * wider - force.dot(growing[joint])) * (minus_per / rubbed)
+            slope = slope + k2 * (per_newton * grows)
+            taken = per_newton * rubbed + self.damping
+            rest = rest + (k2 * taken if turning is None else 2.0 * (k * turning[joint]) * taken)
+        return slope * w + (rest if turning is None else rest * w)
+
+    def _law(self) -> tuple[Any, Any]:
+        """Moment by force, and the square of the speed that smooths."""
+        pin = self.pin
+        return 0.5 * pin.friction * pin.diameter, pin.w_smooth * pin.w_smooth
+
+
+def _rubbed(xp: Any, force: Vec2, turn: Any, w2: Any, smooth2: Any) -> tuple[Any, Any, Any]:
+    """The square of the relative rotation, -1/(k^2 w^2 + smooth^2), and |R| by the root of that, which has a slope at
+    zero, too; one root of the ratio of squares is cheaper than two."""
+    k2 = turn * turn
+    minus_per = -1.0 / (k2 * w2 + smooth2)
+    return k2, minus_per, xp.sqrt(_TINY - force.squared() * minus_per)

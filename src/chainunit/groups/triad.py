@@ -28,11 +28,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
-from ..engines import Dual, slope
 from ..model import Requirement
-from ..planar import Link, Motion, Vec2, lifted
+from ..planar import Link, Motion, Vec2
 from .body import Bar, Load, Mass
-from .group import Group, SolvedGroup
+from .group import Group, SolvedGroup, Third
 
 LEGS = 3
 SAMPLES = 20
@@ -284,7 +283,11 @@ class SolvedTriad(SolvedGroup):
         x1, y1, t1 = rows.solve(tuple(r.dot(p.p1) for r, p in zip(rows.r, outer, strict=True)))
         origin1 = Vec2(x1, y1)
         pins1 = tuple(origin1 + a.turned() * t1 for a in rows.arms)
-        origin2, t2 = _accelerated(rows, outer, pins1, t1)
+        second = []
+        for r, a, k1, p in zip(rows.r, rows.arms, pins1, outer, strict=True):
+            second.append(r.dot(p.p2 + a * (t1 * t1)) - (k1 - p.p1).squared())
+        x2, y2, t2 = rows.solve(tuple(second))
+        origin2 = Vec2(x2, y2)
         pins2 = tuple(origin2 + a.turned() * t2 - a * (t1 * t1) for a in rows.arms)
         origin = Motion(Vec2(pose.x, pose.y), origin1, origin2)
         ternary = Link(origin, Vec2(xp.cos(pose.theta), xp.sin(pose.theta)), t1, t2)
@@ -300,30 +303,24 @@ class SolvedTriad(SolvedGroup):
         margin = rows.det / (lengths[0] * lengths[1] * lengths[2] * size)
         return cls(rows, per_square, (*legs, ternary), pins, margin)
 
-    def lifted(self, outer: tuple[Motion, ...]) -> SolvedTriad:
+    def third(self, outer: Sequence[Vec2]) -> tuple[Sequence[Third], Sequence[Vec2]]:
         """See `SolvedGroup`."""
-        *legs, ternary = self.links
-        t1 = Dual(ternary.t1, ternary.t2)
-        arms = tuple(lifted(a, a.turned() * ternary.t1) for a in self._rows.arms)
-        rows = _Rows(
-            arms,
-            tuple(
-                lifted(r, k.p1 - leg.pin.p1) for r, k, leg in zip(self._rows.r, self.pins, legs, strict=True)
-            ),
-        )
-        pins1 = tuple(lifted(k.p1, k.p2) for k in self.pins)
-        origin2, t2 = _accelerated(rows, outer, pins1, t1)
-        start = ternary.pin
-        origin = Motion(lifted(start.p, start.p1), lifted(start.p1, start.p2), origin2)
-        plate = ternary.lifted(origin, t2)
-        pins = tuple(plate.lifted_point(k) for k in self.pins)
-        turned = (
-            leg.lifted(p, Dual(leg.t2, slope(r.cross(k.p2 - p.p2) * per)))
-            for leg, p, r, k, per in zip(legs, outer, rows.r, pins, self._per_square, strict=True)
-        )
-        return SolvedTriad(rows, self._per_square, (*turned, plate), pins)
+        (*legs, ternary), rows = self.links, self._rows
+        t1, t2 = ternary.t1, ternary.t2
+        spin, mixed = t1 * t1 * t1, 3.0 * (t1 * t2)
+        b = []
+        for r, a, k, leg, p in zip(rows.r, rows.arms, self.pins, legs, outer, strict=True):
+            moved = 3.0 * (k.p1 - leg.pin.p1).dot(k.p2 - leg.pin.p2)
+            b.append(r.dot(p + a.turned() * spin + a * mixed) - moved)
+        x, y, t3 = rows.solve(tuple(b))
+        origin = Vec2(x, y)
+        pins = [ternary.third(a, origin, t3) for a in rows.arms]
+        thirds: list[Third] = []
+        for r, k3, leg, p, per in zip(rows.r, pins, legs, outer, self._per_square, strict=True):
+            thirds.append((p, r.cross(k3 - p) * per + leg.t1 * leg.t1 * leg.t1))
+        return [*thirds, (origin, t3)], pins
 
-    def reactions(self, loads: tuple[Load, ...]) -> tuple[Vec2, ...]:
+    def reactions(self, loads: Sequence[Load]) -> tuple[Vec2, ...]:
         """Forces on the legs at their outer pins, then at the ternary link [N], from the loads on each leg, as force
         and moment about its outer pin, and on the ternary link, about its origin.
 
@@ -339,15 +336,6 @@ class SolvedTriad(SolvedGroup):
         along = self._rows.combine(force, moment)
         inner = tuple(t + r * x for t, r, x in zip(across, self._rows.r, along, strict=True))
         return *(-(f + q) for (f, _), q in zip(legs, inner, strict=True)), *inner
-
-
-def _accelerated(rows: _Rows, outer: Sequence[Motion], pins1: Sequence[Vec2], t1: Any) -> tuple[Vec2, Any]:
-    """Second derivatives of the ternary link's origin and angle by q."""
-    second = []
-    for r, a, k1, p in zip(rows.r, rows.arms, pins1, outer, strict=True):
-        second.append(r.dot(p.p2 + a * (t1 * t1)) - (k1 - p.p1).squared())
-    x2, y2, t2 = rows.solve(tuple(second))
-    return Vec2(x2, y2), t2
 
 
 def assembly_modes(pins: tuple[Vec2, ...], lengths: tuple[float, ...], arms: tuple[Vec2, ...]) -> list[Pose]:

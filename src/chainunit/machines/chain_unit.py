@@ -14,7 +14,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from ..groups.body import Bar, Mass
 from ..groups.driver import Crank
@@ -249,46 +249,55 @@ def supports(p: Any) -> dict[str, Vec2]:
     return {"A1 left": Vec2(-p.z, 0.0), "A1 right": Vec2(p.z, 0.0)}
 
 
+class OrganNames(NamedTuple):
+    """Names of an organ's parts in the linkage: pins, links, load; its `hand` is +1 on the left, -1 on the right."""
+
+    a1: str
+    b: str
+    wall: str
+    web: str
+    processing: str
+    hand: float
+
+
+NAMES: dict[SideName, OrganNames] = {
+    side: OrganNames(f"A1 {side}", f"B {side}", f"{side} wall", f"{side} web", f"{side} processing", hand)
+    for side, hand in zip(SIDES, (1.0, -1.0), strict=True)
+}
+
+
 def organ(p: Any, u: Any, side: SideName) -> Dyad:
     """A working organ as two bars: wall (A1-B) and web (A2-B) with the material on it."""
-    masses, loads = getattr(p, side), getattr(u, side)
+    masses, loads, names = getattr(p, side), getattr(u, side), NAMES[side]
     on_web = p.web_share * loads.material_mass
+    wall = _rod(p, masses.wall_mass + (loads.material_mass - on_web), p.l1)
+    web = _rod(p, masses.web_mass + on_web, p.l2)
+    return Dyad(names.b, Bar(names.wall, names.a1, p.l1, wall), Bar(names.web, "A2", p.l2, web), -names.hand)
 
-    def rod(mass: Any, length: Any) -> Mass:
-        return Mass(mass, 0.5 * length, p.rod_inertia * mass * (length * length) * (1.0 / 12.0))
 
-    return Dyad(
-        f"B {side}",
-        Bar(
-            f"{side} wall",
-            f"A1 {side}",
-            p.l1,
-            rod(masses.wall_mass + (loads.material_mass - on_web), p.l1),
-        ),
-        Bar(f"{side} web", "A2", p.l2, rod(masses.web_mass + on_web, p.l2)),
-        -1.0 if side == "left" else 1.0,
-    )
+def _rod(p: Any, mass: Any, length: Any) -> Mass:
+    return Mass(mass, 0.5 * length, p.rod_inertia * mass * (length * length) * (1.0 / 12.0))
 
 
 def resistances(p: Any, u: Any) -> dict[str, Resistance]:
     """The processing force of each side."""
+    law = p.processing
     return {
-        f"{side} processing": Resistance(f"B {side}", getattr(u, side).processing_force, p.processing)
-        for side in SIDES
+        names.processing: Resistance(names.b, getattr(u, side).processing_force, law)
+        for side, names in NAMES.items()
     }
 
 
 def _on_sides(xp: Any, p: Any, s: MachineState, reactions: Mapping[Any, Vec2], rocker: Link) -> Chamber:
     """Loads of the organs, and of the rocker."""
     sides = []
-    for side, hand in zip(SIDES, (1.0, -1.0), strict=True):
-        wall, web = f"{side} wall", f"{side} web"
-        forces = reactions[f"A1 {side}", wall], reactions[f"B {side}", wall], reactions["A2", web]
-        (processing,) = s.effects[f"{side} processing"].wrenches
+    for a1, b, wall, web, processing, hand in NAMES.values():
+        forces = reactions[a1, wall], reactions[b, wall], reactions["A2", web]
+        at_b = forces[1] - s.effects[processing].wrenches[0].force
         sides.append(
             Side(
                 **on_side(rocker, hand, forces),
-                web_pull=_pull(xp, s.m.links[web].u, forces[2], forces[1] - processing.force),
+                web_pull=_pull(xp, s.m.links[web].u, forces[2], at_b),
                 wall_pull=_pull(xp, s.m.links[wall].u, forces[0], -forces[1]),
             )
         )
@@ -349,8 +358,8 @@ PINS = (
     *JOINTS.values(),
     *(
         joint
-        for side in SIDES
-        for joint in (("A2", f"{side} web"), (f"B {side}", f"{side} wall"), (f"A1 {side}", f"{side} wall"))
+        for side in NAMES.values()
+        for joint in (("A2", side.web), (side.b, side.wall), (side.a1, side.wall))
     ),
 )
 """All joints: O1, A, Bd, C, then A2, B, A1 of each side."""
@@ -505,6 +514,4 @@ class DirectChainUnit(DirectMachine):
     Parameters = DirectParameters
     Inputs = DirectInputs
     inverse = ChamberForces
-    required = (*ChamberForces.required, DirectMachine.carried)
-
     parts = direct_parts(DirectOutputs, _probes)

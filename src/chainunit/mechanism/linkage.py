@@ -7,56 +7,77 @@ follow from the description.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
-from ..groups.body import Bar
 from ..groups.driver import Crank
 from ..groups.group import Group
 from ..groups.loads import Joint
 from ..planar import Vec2
 
 
-@dataclass(frozen=True)
+class Connections(NamedTuple):
+    """How a group hangs in its linkage: names of its links, of the pins that it adds, of the pins that its bars start
+    from, and its joints: each with the link on which the opposite reaction acts, None for the ground, and again that
+    link where it stands before the group."""
+
+    links: tuple[str, ...]
+    pins: tuple[str, ...]
+    outer: tuple[str, ...]
+    joints: tuple[tuple[Joint, str | None, str | None], ...]
+
+
+class Topology(NamedTuple):
+    """The names of a linkage: the link that `carries` each pin or point that is not in the ground, the crank and the
+    groups with their connections, and the `points` on each link."""
+
+    carries: dict[str, str]
+    groups: tuple[Connections, ...]
+    points: dict[str, tuple[str, ...]]
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """Pin and link of each reaction."""
+        return tuple(joint for group in self.groups for joint, *_ in group.joints)
+
+    @property
+    def links(self) -> dict[str, tuple[str, ...]]:
+        """The pins and points on each link, as it is drawn; those that it starts from first."""
+        pins: dict[str, dict[str, None]] = {link: {} for group in self.groups for link in group.links}
+        for pin, link in (*self.joints, *self.carries.items()):
+            pins[link][pin] = None
+        return {link: tuple(each) for link, each in pins.items()}
+
+
+@dataclass
 class Linkage:
-    """A mechanism with one crank. Places in the frame [m], others in the frame of their link."""
+    """A mechanism with one crank. Places in the frame [m], others in the frame of their link; loads as
+    `chainunit.groups.loads.Acting` describes them."""
 
     ground: Mapping[str, Vec2]
     crank: Crank
     groups: tuple[Group, ...]
     loads: Mapping[str, Any]
-    """See `chainunit.groups.loads.Acting`."""
 
     @property
-    def bars(self) -> Iterator[Bar]:
-        """All links, the crank first."""
-        yield from self.crank.bars
-        for group in self.groups:
-            yield from group.bars
-
-    @property
-    def pins(self) -> dict[str, str]:
-        """The link that carries each pin or point that is not in the ground."""
-        carriers = dict(self.crank.pins)
-        for group in self.groups:
-            carriers |= group.pins
-        return carriers | {point: bar.name for bar in self.bars for point in bar.points}
-
-    @property
-    def links(self) -> dict[str, tuple[str, ...]]:
-        """The pins on each link, the one that it starts from first, as it is drawn."""
-        pins = {bar.name: [bar.pin] if bar.pin else [] for bar in self.bars}
-        for pin, link in self.joints:
-            pins[link].append(pin)
-        for pin, link in self.pins.items():
-            pins[link].append(pin)
-        return {link: tuple(dict.fromkeys(each)) for link, each in pins.items()}
-
-    @property
-    def joints(self) -> tuple[Joint, ...]:
-        """Pin and link of each reaction."""
-        return (*self.crank.joints, *(joint for group in self.groups for joint in group.joints))
+    def topology(self) -> Topology:
+        """Its names; they depend on no value."""
+        carries: dict[str, str] = {}
+        groups, points = [], {}
+        for group in (self.crank, *self.groups):
+            inner, bars = group.pins, group.bars
+            carries |= inner
+            joints = []
+            for pin, link in group.joints:
+                carrier = carries.get(pin)
+                joints.append(((pin, link), carrier, None if pin in inner else carrier))
+            for bar in bars:
+                carries |= dict.fromkeys(bar.points, bar.name)
+                points[bar.name] = tuple(bar.points)
+            outer = tuple(bar.pin for bar in bars if bar.pin)
+            groups.append(Connections(tuple(bar.name for bar in bars), tuple(inner), outer, tuple(joints)))
+        return Topology(carries, tuple(groups), points)
 
     @property
     def derived(self) -> int:

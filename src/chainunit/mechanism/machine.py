@@ -12,124 +12,153 @@ are new.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..engines import Dual, dual, slope
-from ..groups.body import UNLOADED, Bar, Body, Load, reflected
-from ..groups.group import Group, SolvedGroup
-from ..groups.loads import Acting, Effect, Joint, Wrench
-from ..planar import Link, Motion, Vec2, growth, lifted
-from .linkage import Linkage
-
-
-class _Place(NamedTuple):
-    """A group at one position: names of its links, and each joint with the link before the group that it loads."""
-
-    group: Group
-    solved: SolvedGroup
-    links: tuple[str, ...]
-    joints: tuple[tuple[Joint, str | None], ...]
+from ..groups.body import UNLOADED, Body, Load, reflected
+from ..groups.group import SolvedGroup, Third
+from ..groups.loads import Effect, Joint, Moving, Wrench
+from ..planar import ZERO, Link, Motion, Vec2, growth
+from .linkage import Connections, Linkage, Topology
 
 
 class Mechanism:
     """The links of a linkage at crank angle `q` [rad]: `links`, `pins` with points, and `bodies` by name; `turns` the
-    relative rotation in each joint per rotation of the crank; `margin` of each group, 0 in a dead position."""
+    relative rotation in each joint per rotation of the crank."""
 
-    __slots__ = ("_carriers", "_solved", "bodies", "linkage", "links", "pins", "turns")
+    __slots__ = ("_groups", "bodies", "linkage", "links", "pins", "topology", "turns")
 
-    def __init__(self, xp: Any, linkage: Linkage, q: Any, derived: Sequence[Any] = ()) -> None:
-        self._begin(linkage)
-        first = 0
-        for group in (linkage.crank, *linkage.groups):
-            last = first + group.derived
-            bars = self._add(group, group.solve(xp, q, self.pins, derived[first:last]))
-            first = last
-            for bar in bars:
-                link = self.links[bar.name]
-                for point, (s, t) in bar.points.items():
-                    self.pins[point] = link.beside(s, t)
-                if bar.mass is not None:
-                    self.bodies[bar.name] = Body.on(link, bar.mass)
-
-    def _begin(self, linkage: Linkage) -> None:
+    def __init__(
+        self,
+        xp: Any,
+        linkage: Linkage,
+        q: Any,
+        derived: Sequence[Any] = (),
+        topology: Topology | None = None,
+    ) -> None:
+        """
+        Parameters
+        ----------
+        xp : engine (see `chainunit.engines`)
+        derived : numbers that the groups derive from the lengths, see `derived_numbers`
+        topology : that of the linkage, if it is known
+        """
         self.linkage = linkage
+        self.topology = linkage.topology if topology is None else topology
         self.links: dict[str, Link] = {}
         self.pins = {name: Motion(at) for name, at in linkage.ground.items()}
         self.bodies: dict[str, Body] = {}
         self.turns: dict[Joint, Any] = {}
-        self._solved: list[_Place] = []
-        self._carriers: dict[str, str] = {}
-
-    def _add(self, group: Group, solved: SolvedGroup) -> tuple[Bar, ...]:
-        bars = group.bars
-        links, carriers = self.links, self._carriers
-        for bar, link in zip(bars, solved.links, strict=True):
-            links[bar.name] = link
-        inner = group.pins
-        self.pins.update(zip(inner, solved.pins, strict=True))
-        carriers |= inner
-        joints = []
-        for joint in group.joints:
-            pin, name = joint
-            turn, carrier = links[name].t1, carriers.get(pin)
-            if carrier is not None:
-                turn = turn - links[carrier].t1
-            self.turns[joint] = turn
-            # forces in the pins of the group itself stay inside it
-            joints.append((joint, None if pin in inner else carrier))
-        self._solved.append(_Place(group, solved, tuple(bar.name for bar in bars), tuple(joints)))
-        for bar in bars:
-            for point in bar.points:
-                carriers[point] = bar.name
-        return bars
-
-    def lifted(self) -> Mechanism:
-        """The same with its derivatives by q as dual parts."""
-        m = Mechanism.__new__(Mechanism)
-        m._begin(self.linkage)
-        for group, solved, *_ in self._solved:
-            outer = tuple(m.pins[bar.pin] for bar in group.bars if bar.pin)
-            for bar in m._add(group, solved.lifted(outer)):
-                link = m.links[bar.name]
-                for point in bar.points:
-                    m.pins[point] = link.lifted_point(self.pins[point])
+        self._groups: list[tuple[SolvedGroup, Connections]] = []
+        links, pins, first = self.links, self.pins, 0
+        for group, connections in zip((linkage.crank, *linkage.groups), self.topology.groups, strict=True):
+            last = first + group.derived
+            solved = group.solve(xp, q, pins, derived[first:last])
+            first = last
+            self._groups.append((solved, connections))
+            pins.update(zip(connections.pins, solved.pins, strict=True))
+            for bar, link in zip(group.bars, solved.links, strict=True):
+                links[bar.name] = link
+                for point, (s, t) in bar.points.items():
+                    pins[point] = link.beside(s, t)
                 if bar.mass is not None:
-                    m.bodies[bar.name] = self.bodies[bar.name].lifted(link)
-        return m
+                    self.bodies[bar.name] = Body.on(link, bar.mass)
+            for joint, carrier, _ in connections.joints:
+                turn = links[joint[1]].t1
+                self.turns[joint] = turn if carrier is None else turn - links[carrier].t1
+
+    def lifted(self) -> LiftedMechanism:
+        """The same as loads see it, with its derivatives by q as dual parts."""
+        return LiftedMechanism(self)
+
+    def third(self) -> dict[str, Third]:
+        """Third derivatives by q of each link."""
+        pins: dict[str, Vec2] = {}
+        thirds: dict[str, Third] = {}
+        for solved, connections in self._groups:
+            links, inner = solved.third([pins.get(pin, ZERO) for pin in connections.outer])
+            thirds.update(zip(connections.links, links, strict=True))
+            pins.update(zip(connections.pins, inner, strict=True))
+            for name in connections.links:
+                link = self.links[name]
+                for point in self.topology.points[name]:
+                    pins[point] = link.third(self.pins[point].p - link.pin.p, *thirds[name])
+        return thirds
+
+    def turning(self, reactions: Mapping[Joint, Vec2]) -> Iterator[Wrench]:
+        """What the reactions add to the moments on the links as their arms turn with q."""
+        for _, connections in self._groups:
+            for joint, carrier, _ in connections.joints:
+                (pin, name), force = joint, reactions[joint]
+                p1, start = self.pins[pin].p1, self.links[name].pin.p1
+                if p1 is not start:
+                    yield Wrench(name, ZERO, (p1 - start).cross(force))
+                if carrier is not None:
+                    yield Wrench(carrier, ZERO, (self.links[carrier].pin.p1 - p1).cross(force))
 
     def carrier(self, pin: str) -> str:
         """The link that carries a pin or a point."""
-        return self._carriers[pin]
+        return self.topology.carries[pin]
+
+    def turns2(self) -> dict[Joint, Any]:
+        """The derivatives of `turns` by q."""
+        slopes = {}
+        for _, connections in self._groups:
+            for joint, carrier, _ in connections.joints:
+                t2 = self.links[joint[1]].t2
+                slopes[joint] = t2 if carrier is None else t2 - self.links[carrier].t2
+        return slopes
 
     def margins(self) -> list[Any]:
         """Of each group; 0 is a dead position."""
-        return [place.solved.margin for place in self._solved[1:]]
+        return [solved.margin for solved, _ in self._groups[1:]]
 
     def reactions(self, acting: Mapping[str, Load]) -> tuple[Any, dict[Joint, Vec2]]:
         """The torque along the crank angle [N m] and the force in each joint on its link [N], from what acts on the
         links, without friction: the force pass, independent of virtual work."""
         loads = dict(acting)
         reactions: dict[Joint, Vec2] = {}
-        for _, solved, links, joints in reversed(self._solved):
-            forces = solved.reactions(tuple(loads.get(name, UNLOADED) for name in links))
-            for (joint, carrier), force in zip(joints, forces, strict=True):
+        for solved, connections in reversed(self._groups):
+            forces = solved.reactions([loads.get(name, UNLOADED) for name in connections.links])
+            for (joint, _, before), force in zip(connections.joints, forces, strict=True):
                 reactions[joint] = force
-                if carrier is not None:
-                    before, moment = loads.get(carrier, UNLOADED)
-                    arm = self.pins[joint[0]].p - self.links[carrier].pin.p
-                    loads[carrier] = before - force, moment - arm.cross(force)
+                if before is not None:
+                    total, moment = loads.get(before, UNLOADED)
+                    at, pin = self.pins[joint[0]].p, self.links[before].pin.p
+                    loads[before] = (
+                        total - force,
+                        moment - (at.x - pin.x) * force.y + (at.y - pin.y) * force.x,
+                    )
         _, torque = loads.get(self.linkage.crank.bar.name, UNLOADED)
         return torque, reactions
 
-    def acting(self, at: Callable[[Body], Load], wrenches: Iterable[Wrench]) -> dict[str, Load]:
-        """What acts on each link: of its body by `at`, and of the loads."""
-        loads = {name: at(body) for name, body in self.bodies.items()}
+    def acting(self, at: Callable[[str, Body], Load], wrenches: Iterable[Wrench]) -> dict[str, Load]:
+        """What acts on each link: of its body by `at`, from the name of the link and the body, and of the loads."""
+        loads = {name: at(name, body) for name, body in self.bodies.items()}
         for link, force, moment in wrenches:
             before, moment0 = loads.get(link, UNLOADED)
             loads[link] = before + force, moment0 + moment
         return loads
+
+
+class LiftedMechanism:
+    """A mechanism as loads see it, with its derivatives by q as dual parts."""
+
+    __slots__ = ("_of", "bodies", "links", "pins", "turns")
+
+    def __init__(self, m: Mechanism) -> None:
+        self._of = m
+        self.links = {name: link.lifted() for name, link in m.links.items()}
+        self.pins = {name: pin.lifted() for name, pin in m.pins.items()}
+        self.bodies: Mapping[str, Body] = {}
+        self.turns: Mapping[Joint, Any] = {}
+
+    def carrier(self, pin: str) -> str:
+        """The link that carries a pin or a point."""
+        return self._of.carrier(pin)
 
 
 def _pins(xp: Any, linkage: Linkage, derived: Sequence[Any], q: float) -> dict[str, Motion]:
@@ -148,21 +177,22 @@ class Steadiness:
     """A mechanism at constant crank speed `w`: the `effects` of the loads on links by name, the `reactions` in the
     joints [N], the `torque` at the crank from these forces [N m], and the `losses` that the reactions set."""
 
-    __slots__ = ("effects", "losses", "reactions", "torque")
+    __slots__ = ("effects", "field", "losses", "reactions", "torque")
 
-    def __init__(self, xp: Any, m: Mechanism, w: Any, loads: Mapping[str, Acting]) -> None:
+    def __init__(self, xp: Any, m: Mechanism, w: Any, loads: Mapping[str, Any]) -> None:
         w2 = w * w
         self.effects = _effects(xp, m, w, loads)
-        acting = m.acting(lambda body: body.centrifugal(w2), _wrenches(self.effects))
+        field = self.field = sum(effect.field for effect in self.effects.values())
+        acting = m.acting(lambda _, body: body.centrifugal(w2, field), _wrenches(self.effects))
         self.torque, self.reactions = m.reactions(acting)
         self.losses = _effects(xp, m, w, loads, self.reactions)
 
 
 def _effects(
     xp: Any,
-    m: Mechanism,
+    m: Moving,
     w: Any,
-    loads: Mapping[str, Acting],
+    loads: Mapping[str, Any],
     reactions: dict[Joint, Vec2] | None = None,
 ) -> dict[str, Effect]:
     """Effects of the loads that act on links; or, with the reactions, of those that follow from them."""
@@ -186,7 +216,7 @@ class MachineState:
 
     __slots__ = ("J", "_by_acceleration", "_loads", "_xp", "bias", "dJ", "effects", "m", "steady", "w")
 
-    def __init__(self, xp: Any, m: Mechanism, w: Any, loads: Mapping[str, Acting] | None = None) -> None:
+    def __init__(self, xp: Any, m: Mechanism, w: Any, loads: Mapping[str, Any] | None = None) -> None:
         """
         Parameters
         ----------
@@ -213,13 +243,17 @@ class MachineState:
     def _inertial(self) -> tuple[Any, dict[Joint, Vec2]]:
         if self._by_acceleration is None:
             wrenches = (k for effect in self.effects.values() for k in effect.inertial)
-            self._by_acceleration = self.m.reactions(self.m.acting(Body.inertial, wrenches))
+            self._by_acceleration = self.m.reactions(self.m.acting(lambda _, body: body.inertial(), wrenches))
         return self._by_acceleration
 
     def reactions(self, a: Any) -> dict[Joint, Vec2]:
         """The force in each joint on its link at crank acceleration `a` [N], without friction."""
         _, inertial = self._inertial()
-        return {joint: force + inertial[joint] * a for joint, force in self.steady.reactions.items()}
+        reactions = {}
+        for joint, f in self.steady.reactions.items():
+            more = inertial[joint]
+            reactions[joint] = Vec2(f.x + more.x * a, f.y + more.y * a)
+        return reactions
 
     def torque_by_reactions(self, a: Any) -> Any:
         """The crank torque from the forces, group by group, without friction [N m]: the second route."""
@@ -249,23 +283,44 @@ class MachineState:
         return least
 
     def slopes(self) -> tuple[Any, Any]:
-        """Derivatives of `bias` by the crank angle [N m/rad] and the crank speed [N m s/rad], by the second route:
-        the force pass is differentiated for the losses in any case, and its torque comes with it."""
+        """Derivatives of `bias` by the crank angle [N m/rad] and the crank speed [N m s/rad].
+
+        By the second route: the losses need the slopes of all reactions, and the torque comes with them. The sums of
+        forces and moments on each link are zero, and so are their derivatives: a force pass with the slopes of the
+        loads gives those of the reactions. By the angle the present reactions add moments, as their arms turn.
+        """
         return self._by_angle(), self._by_speed()
 
     def _by_angle(self) -> Any:
-        steady = Steadiness(dual(self._xp), self.m.lifted(), self.w, self._loads)
-        return slope(steady.torque) + _growing(steady.losses)
+        m, w2, field, third = self.m, self.w * self.w, self.steady.field, self.m.third()
+        return self._slope(
+            m.lifted(),
+            self.w,
+            lambda name, body: body.centrifugal_slope(w2, field, third[name]),
+            m.turning(self.steady.reactions),
+            m.turns2(),
+        )
 
     def _by_speed(self) -> Any:
-        """The geometry stays: what acts is differentiated, and the force pass is linear in it."""
-        xp, m, quick, loads = dual(self._xp), self.m, Dual(self.w, 1.0), self._loads
-        wrenches = _wrenches(_effects(xp, m, quick, loads))
-        growing = (Wrench(k.link, growth(k.force), slope(k.moment)) for k in wrenches)
-        torque, more = m.reactions(m.acting(lambda body: body.centrifugal(2.0 * self.w), growing))
-        reactions = {joint: lifted(force, more[joint]) for joint, force in self.steady.reactions.items()}
-        return torque + _growing(_effects(xp, m, quick, loads, reactions))
+        return self._slope(
+            self.m, Dual(self.w, 1.0), lambda _, body: body.centrifugal(2.0 * self.w), (), None
+        )
 
-
-def _growing(losses: Mapping[str, Effect]) -> Any:
-    return sum(slope(loss.lost) for loss in losses.values())
+    def _slope(
+        self,
+        moving: Any,
+        w: Any,
+        at: Callable[[str, Body], Load],
+        wrenches: Iterable[Wrench],
+        turning: Mapping[Joint, Any] | None,
+    ) -> Any:
+        """The slope of `bias` in the direction of the dual parts of `moving` and `w`, with the slopes of what acts on
+        the bodies and of the rotations in the joints, and further wrenches."""
+        m, reactions = self.m, self.steady.reactions
+        effects = _effects(dual(self._xp), moving, w, self._loads)
+        growing = (Wrench(k.link, growth(k.force), slope(k.moment)) for k in _wrenches(effects))
+        torque, more = m.reactions(m.acting(at, itertools.chain(wrenches, growing)))
+        for load in self._loads.values():
+            if load.by_reactions:
+                torque = torque + load.slope(self._xp, m, self.w, reactions, more, turning)
+        return torque

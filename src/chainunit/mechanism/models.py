@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from functools import cache
 from typing import Any
 
 from ..model import Model, Part, Requirement
 from ..ports import PortSlopes, flanges, load_terminal
 from ..quantities import Value, declaration, quantity
-from .linkage import Linkage
+from .linkage import Linkage, Topology
 from .machine import MachineState, Mechanism, derived_numbers
 
 Probes = Callable[[Any, Any, Any, MachineState, Any], dict[str, Any]]
@@ -48,7 +49,14 @@ class LinkageModel(Model):
     @classmethod
     def state(cls, xp: Any, p: Any, u: Any, q: Any, w: Any) -> MachineState:
         """The machine at crank angle `q` [rad] and speed `w` [rad/s]."""
-        return MachineState(xp, Mechanism(xp, cls.linkage(p, u), q, getattr(p, "derived", ())), w)
+        derived = p.derived if cls.derived else ()
+        return MachineState(xp, Mechanism(xp, cls.linkage(p, u), q, derived, cls.topology()), w)
+
+    @classmethod
+    @cache
+    def topology(cls) -> Topology:
+        """The names of the linkage."""
+        return cls.linkage(cls.Parameters(), cls.Inputs()).topology
 
 
 class InverseMachine(LinkageModel):
@@ -140,11 +148,16 @@ class DirectMachine(LinkageModel):
     inverse: type[InverseMachine]
     States = TurningStates
     terminals = flanges("inflow")
-    carried = Requirement(
+    _carried = Requirement(
         "inertia of the crank and on its shaft",
         "kg.m2",
         "at the dead points of the rocker nothing else carries the torque; give crank.I, crank.m or J_added",
     )
+
+    def __init_subclass__(cls) -> None:
+        cls.required = (*cls.inverse.required, cls._carried)
+        cls.derived = cls.inverse.derived
+        super().__init_subclass__()
 
     @classmethod
     def linkage(cls, p: Any, u: Any) -> Linkage:

@@ -39,9 +39,9 @@ def state(p: Any, angle: float, cut: float = 0.0) -> MachineState:
 
 def _acting(s: MachineState, *names: str) -> dict[str, Any]:
     """What acts on each link at constant speed, of inertia and of the loads with these names."""
-    w2 = s.w * s.w
+    w2, field = s.w * s.w, sum(s.effects[name].field for name in names)
     wrenches = (wrench for name in names for wrench in s.effects[name].wrenches)
-    return s.m.acting(lambda body: body.centrifugal(w2), wrenches)
+    return s.m.acting(lambda _, body: body.centrifugal(w2, field), wrenches)
 
 
 def as_the_paper(s: MachineState, line: float, *, cut: bool = True) -> Any:

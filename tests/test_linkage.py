@@ -1,0 +1,301 @@
+"""Linkages from data: a third machine, a Stephenson six-bar (crank, dyad, dyad), against an independent multibody
+solution; energy, two routes to the torque, slopes, and the direct model of any linkage."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from chainunit.engines import MATH, Dual, casadi_, dual, numpy_, slope
+from chainunit.groups.body import Bar, Mass
+from chainunit.groups.driver import Crank
+from chainunit.groups.dyad import Dyad
+from chainunit.groups.loads import Pin, PinLosses, Processing, Push, Resistance, Weight
+from chainunit.machines.knife_drive import KnifeDrive
+from chainunit.machines.parts import Force, force
+from chainunit.mechanism.linkage import Linkage
+from chainunit.mechanism.models import (
+    AddedInertia,
+    DirectMachine,
+    DrivingTorque,
+    InverseMachine,
+    ShaftMotion,
+    Turning,
+    direct_parts,
+    inverse_parts,
+)
+from chainunit.planar import Vec2
+from chainunit.ports import PortValues, Start
+from chainunit.quantities import Value, declaration, group, quantity
+
+DATA = json.loads((Path(__file__).parent / "data" / "stephenson.json").read_text())
+BODIES = {body["name"]: body for body in DATA["description"]["bodies"]}
+GROUND = {name: Vec2(*at) for name, at in DATA["description"]["ground"].items()}
+G = -DATA["description"]["gravity"][1]
+LOAD = Vec2(*DATA["description"]["loads"][0]["force"])
+
+
+@declaration
+class Parameters:
+    """Of the six-bar; its lengths and masses are those of the file."""
+
+    g: Value = quantity("m/s2", "gravity", default=G, tunable=True)
+    ratio: Value = quantity("1", "gear ratio", default=1.0, above=0.0)
+    pin: Pin = group(Pin, "pins", default=Pin(friction=0.0))
+    joint_damping: Value = quantity("N.m.s/rad", "damping of each pin", default=0.0, min=0.0)
+    processing: Processing = group(Processing, "resistance", default=Processing())
+
+
+@declaration
+class Loads:
+    """On the output link."""
+
+    load: Force = group(Force, "load", default=Force(fx=LOAD.x, fy=LOAD.y))
+    resistance: Value = quantity("N", "resistance to the coupler point", default=0.0, min=0.0)
+
+
+@declaration
+class Inputs(Loads, ShaftMotion):
+    """Motion and loads."""
+
+
+@declaration
+class Carried:
+    """What the machine carries."""
+
+    output_bearing: Force = group(Force, "on the output link at O3")
+    angle: Value = quantity("rad", "angle of the output link")
+    power: Value = quantity("W", "power")
+    kinetic_energy: Value = quantity("J", "kinetic energy")
+    potential_energy: Value = quantity("J", "potential energy")
+    dissipated_power: Value = quantity("W", "dissipated power")
+    margin: Value = quantity("1", "margin")
+
+
+@declaration
+class Outputs(Carried, PortValues):
+    """Torque and load port."""
+
+    tau: Value = quantity("N.m", "torque")
+
+
+def probes(xp, p, u, s, a):
+    output = s.m.links["output"].u
+    return {
+        "output_bearing": force(s.reactions(a)["O3", "output"]),
+        "angle": xp.atan2(output.y, output.x),
+    }
+
+
+def bar(name: str, pin: str, end: str, points: Any = None) -> Bar:
+    body = BODIES[name]
+    s, t = body["centroid"]
+    mass = Mass(body["mass"], s, body["inertia"], t)
+    return Bar(name, pin, body["points"][end][0], mass, {n: tuple(body["points"][n]) for n in points or ()})
+
+
+class SixBar(InverseMachine):
+    """A Stephenson six-bar: the second dyad hangs on a point of the coupler."""
+
+    name = "SixBar"
+    description = "Stephenson six-bar"
+    Parameters = Parameters
+    Inputs = Inputs
+    parts = inverse_parts(Outputs, probes)
+
+    @staticmethod
+    def linkage(p, u):
+        """Crank, dyad, dyad."""
+        return Linkage(
+            GROUND,
+            Crank(bar("crank", "O1", "A"), "A"),
+            (
+                Dyad("B", bar("coupler", "A", "B", ["P"]), bar("rocker", "O2", "B"), 1.0),
+                Dyad("Q", bar("link", "P", "Q"), bar("output", "O3", "Q", ["W"]), -1.0),
+            ),
+            {
+                "weight": Weight(p.g),
+                "load": Push("W", Vec2(u.load.fx, u.load.fy)),
+                "resistance": Resistance("P", u.resistance, p.processing),
+                "pins": PinLosses(p.pin, p.joint_damping),
+            },
+        )
+
+
+@declaration
+class DirectParameters(Start, AddedInertia, Parameters):
+    """Of the six-bar that turns by itself."""
+
+
+@declaration
+class DirectInputs(Loads, DrivingTorque):
+    """Torque and loads."""
+
+
+@declaration
+class DirectOutputs(Turning, Carried):
+    """Motion and reactions."""
+
+
+class TurningSixBar(DirectMachine):
+    """The same linkage, driven by a torque."""
+
+    name = "TurningSixBar"
+    description = "Stephenson six-bar that turns by itself"
+    inverse = SixBar
+    Parameters = DirectParameters
+    Inputs = DirectInputs
+    parts = direct_parts(DirectOutputs, probes)
+
+
+LOSSY = {"ratio": 3.0, "pin.friction": 0.15, "joint_damping": 0.3}
+
+
+def case(seed, xp=MATH, **inputs):
+    """Parameters, inputs and state at a random motion, with losses."""
+    rng = np.random.default_rng(seed)
+    p = SixBar.parameter_layout.from_names(LOSSY)
+    motion = {"phi": rng.uniform(-9.0, 9.0), "w": rng.uniform(-30.0, 30.0), "a": rng.uniform(-99.0, 99.0)}
+    u = SixBar.input_layout.from_names(motion | {"resistance": rng.uniform(0.0, 400.0)} | inputs)
+    return p, u, SixBar.shared(xp, p, u, None)
+
+
+@pytest.mark.parametrize("state", DATA["states"], ids=lambda s: f"{s['phi']:.2f}")
+def test_reference_points(state):
+    """Torque, load port with slopes, energies, every reaction, motion of every centroid and pin. The reference counts
+    the crank angle counter-clockwise from the x axis."""
+    p, q, w, a = SixBar.Parameters(), 0.5 * math.pi - state["phi"], -state["w"], -state["a"]
+    u = SixBar.Inputs(phi=q, w=w, a=a)
+    s = SixBar.shared(MATH, p, u, None)
+    out, slopes = SixBar.evaluate(MATH, p, u)
+    got = {
+        "tau": -out.tau, "J": out.J, "tau_bias": -out.tau_bias, "dJ_dphi": -out.dJ_dphi,
+        "dtau_bias_dphi": slopes.tau_bias_dphi, "dtau_bias_dw": slopes.tau_bias_dw,
+        "kinetic_energy": out.kinetic_energy, "potential_energy": out.potential_energy,
+    }  # fmt: skip
+    for name, value in got.items():
+        assert value == pytest.approx(state[name], rel=1e-10), name
+    reactions = s.reactions(a)
+    for joint in DATA["description"]["joints"]:
+        (on, pin), (by, _) = joint["on"], joint["by"]
+        sign, at = (1.0, (pin, on)) if (pin, on) in reactions else (-1.0, (pin, by))
+        wanted = state["reactions"][joint["name"]]
+        size = math.hypot(wanted["fx"], wanted["fy"])
+        got = sign * reactions[at].x, sign * reactions[at].y
+        assert got == pytest.approx((wanted["fx"], wanted["fy"]), abs=1e-10 * size), joint["name"]
+    for name, wanted in state["points"].items():
+        body, point = name.split(".")
+        c = s.m.bodies[body].c if point == "cg" else s.m.pins[point]
+        speed, growth = c.p1 * w, c.p1 * a + c.p2 * (w * w)
+        got = (c.p.x, c.p.y, speed.x, speed.y, growth.x, growth.y)
+        assert got == pytest.approx(wanted, rel=1e-9, abs=1e-10), name
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_power_and_two_torques(seed):
+    """tau w = d/dt energy + dissipation, the rate by dual numbers in time; the torque from the reactions beside that
+    of virtual work."""
+    p, u, s = case(seed)
+    out = SixBar.evaluate(MATH, p, u)[0]
+    moving = SixBar.input_layout.from_names({"phi": Dual(u.phi, u.w), "w": Dual(u.w, u.a)}, u)
+    stored = SixBar.evaluate(dual(MATH), p, moving)[0]
+    grows = slope(stored.kinetic_energy), slope(stored.potential_energy)
+    size = abs(out.power) + sum(map(abs, grows)) + abs(out.dissipated_power)
+    assert abs(out.power - sum(grows) - out.dissipated_power) < 1e-11 * size
+    a = u.a / p.ratio
+    by_work = s.torque(a) - s.effects["pins"].lost
+    assert s.torque_by_reactions(a) == pytest.approx(
+        by_work, abs=1e-11 * (abs(s.J * a) + abs(s.bias) + 100.0)
+    )
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_slopes_match_the_complex_step(seed):
+    p, u, _ = case(seed)
+    slopes = SixBar.evaluate(MATH, p, u)[1]
+    for got, by in ((slopes.tau_bias_dphi, "phi"), (slopes.tau_bias_dw, "w")):
+        moved = SixBar.input_layout.from_names({by: getattr(u, by) + 1e-30j}, u)
+        wanted = (SixBar.shared(numpy_(), p, moved, None).bias / p.ratio).imag / 1e-30
+        assert got == pytest.approx(float(wanted), rel=1e-10, abs=1e-10)
+
+
+def test_engines_agree():
+    import casadi
+
+    p, u, _ = case(5)
+    wanted = [
+        v
+        for part, out in zip(SixBar.parts, SixBar.evaluate(MATH, p, u), strict=True)
+        for v in part.layout.values(out)
+    ]
+    us = casadi.SX.sym("u", len(SixBar.input_layout.names))
+    parts = SixBar.evaluate(casadi_(), p, SixBar.input_layout.instance(casadi.vertsplit(us)))
+    symbols = [v for part, out in zip(SixBar.parts, parts, strict=True) for v in part.layout.values(out)]
+    f = casadi.Function("f", [us], [casadi.vertcat(*symbols)])
+    np.testing.assert_allclose(f(SixBar.input_layout.values(u)).full().ravel(), wanted, rtol=1e-11)
+    many = SixBar.input_layout.from_names({"phi": np.full((2, 3), u.phi)}, u)
+    tau = SixBar.evaluate(numpy_(), p, many)[0].tau
+    np.testing.assert_allclose(tau, np.full((2, 3), SixBar.evaluate(MATH, p, u)[0].tau), rtol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_direct_model_is_the_inverse_of_the_inverse_one(seed):
+    _, u, _ = case(seed)
+    p = TurningSixBar.parameter_layout.from_names(LOSSY | {"J_added": 0.02})
+    given = TurningSixBar.Inputs(tau=7.0, load=u.load, resistance=u.resistance)
+    x = TurningSixBar.States(phi=u.phi, w=u.w)
+    rates = TurningSixBar.derivatives(MATH, p, given, x)
+    (out,) = TurningSixBar.evaluate(MATH, p, given, x)
+    need = SixBar.evaluate(MATH, p, SixBar.input_layout.from_names({"a": rates[1]}, u))[0]
+    assert rates == [u.w, out.a]
+    assert need.tau + 0.02 * out.a == pytest.approx(7.0, rel=1e-11)
+    assert out.output_bearing.fx == pytest.approx(need.output_bearing.fx, rel=1e-11)
+
+
+def test_names_follow_from_the_description():
+    topology = SixBar.topology()
+    assert topology.links == {
+        "crank": ("O1", "A"), "coupler": ("A", "B", "P"), "rocker": ("O2", "B"), "link": ("P", "Q"),
+        "output": ("O3", "Q", "W"),
+    }  # fmt: skip
+    assert {pin for pin, _ in topology.joints} == {joint["name"] for joint in DATA["description"]["joints"]}
+
+
+class TurningKnifeDrive(DirectMachine):
+    """The knife drive as a machine that turns by itself: declarations, and not a line of mechanics."""
+
+    inverse = KnifeDrive
+
+    @declaration
+    class Parameters(Start, AddedInertia, KnifeDrive.Parameters):
+        """Of the drive."""
+
+    @declaration
+    class Inputs(DrivingTorque):
+        """Torque, and forces on the blade."""
+
+        cut_force: Value = quantity("N", "resistance of the stack", default=0.0)
+        blade: Force = group(Force, "force on the blade", default=Force(fx=0.0, fy=0.0))
+
+
+def test_a_knife_drive_without_losses_keeps_its_energy():
+    """A turn under its own weight and momentum, through the triad's branch, by an error-controlled solver."""
+    model = TurningKnifeDrive
+    p = model.check(model.parameter_layout.from_names({"w_start": 12.0, "J_added": 0.5}))
+    u, layout = model.Inputs(), model.state_layout
+    run = solve_ivp(
+        lambda _, x: model.derivatives(MATH, p, u, layout.instance([float(v) for v in x])),
+        (0.0, 0.6), layout.values(model.initial_states(MATH, p)), rtol=1e-11, atol=1e-11, method="DOP853",
+    )  # fmt: skip
+    energies = []
+    for phi, w in run.y.T:
+        s = model.shared(MATH, p, u, model.States(phi=float(phi), w=float(w)))
+        energies.append(s.kinetic_energy + s.held_energy + 0.5 * p.J_added * w * w)
+    assert run.y[0, -1] > 2.0 * math.pi and np.ptp(run.y[1]) > 1.0
+    assert np.ptp(energies) < 1e-8 * abs(np.max(np.abs(energies)))
