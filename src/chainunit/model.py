@@ -78,15 +78,12 @@ class Part:
         equations: Callable[..., Any],
         *,
         by_differences: frozenset[str] = frozenset(),
-        derivatives: Mapping[str, tuple[str, str]] | None = None,
     ) -> None:
         """`by_differences` names outputs that are derivatives themselves and whose own derivatives it takes by
-        central differences: exact ones would be the largest part of its code. `derivatives` says which output by
-        which input each of this part's is the derivative of, for an engine that differentiates by itself."""
+        central differences: exact ones would be the largest part of its code."""
         self.layout = Layout(declared)
         self.equations = equations
         self.by_differences = by_differences
-        self.derivatives = dict(derivatives or {})
 
 
 class Model:

@@ -13,7 +13,7 @@ from .motion import Arrow, DrawnLink
 def links(linkage: Linkage, looks: Mapping[str, str]) -> Iterator[DrawnLink]:
     """The links as they are drawn, the crank first; a link with more than two pins is an area. `looks` are those of
     links that are not to look like a rod."""
-    for name, pins in linkage.links.items():
+    for name, pins in linkage.topology.links.items():
         usual = "crank" if name == linkage.crank.bar.name else "rod"
         yield DrawnLink(name, pins, looks.get(name, usual), closed=len(pins) > 2)
 

@@ -57,12 +57,6 @@ def _programs(interface: Interface) -> Iterator[Program]:
     more = [ks] if model.derived else []
     point = [ps, us, xs, *more]
     outputs = list(outputs)
-    names = [v.name for v in interface.others]
-    for part in model.parts:
-        for name, (of, by) in part.derivatives.items():
-            # CasADi differentiates the expression; dual numbers would give the same with twice the operations
-            column = us[model.input_layout.names.index(by)]
-            outputs[names.index(name)] = casadi.jacobian(outputs[names.index(of)], column)
 
     def one(name: str, arguments: list[Any], results: list[Any], used: str = "ONCE") -> Program:
         return Program(name, arguments, [casadi.vertcat(*map(casadi.SX, results))], [0], used)
