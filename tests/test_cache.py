@@ -14,9 +14,9 @@ import pytest
 
 from chainunit import RunError
 from chainunit.fmu.native import cache, platforms
-from chainunit.fmu.native.cache import OFF, VARIABLE, kept
+from chainunit.fmu.native.cache import OFF, VARIABLE, entry
 from chainunit.fmu.native.export import export
-from chainunit.fmu.native.platforms import Compiler, compiled
+from chainunit.fmu.native.platforms import Compiler, compile_code
 from chainunit.models import MODELS
 
 COUNTING = """#!/bin/sh
@@ -50,31 +50,33 @@ def counting(tmp_path, store):
 
 def test_the_same_is_compiled_once_and_nothing_else(counting, monkeypatch):
     compiler, calls = counting
-    first = compiled(compiler, ARGUMENTS, FILES, "a.o")
+    first = compile_code(compiler, ARGUMENTS, FILES, "a.o")
     assert first and calls() == 1
-    assert compiled(compiler, ARGUMENTS, FILES, "a.o") == first and calls() == 1
+    assert compile_code(compiler, ARGUMENTS, FILES, "a.o") == first and calls() == 1
     # a header, a flag, another file beside them, the name of a file
-    assert compiled(compiler, ARGUMENTS, FILES | {"a.h": b"#define N 2\n"}, "a.o") != first and calls() == 2
-    compiled(compiler, ("-DX", *ARGUMENTS), FILES, "a.o")
-    compiled(compiler, ARGUMENTS, FILES | {"b.h": b""}, "a.o")
+    assert (
+        compile_code(compiler, ARGUMENTS, FILES | {"a.h": b"#define N 2\n"}, "a.o") != first and calls() == 2
+    )
+    compile_code(compiler, ("-DX", *ARGUMENTS), FILES, "a.o")
+    compile_code(compiler, ARGUMENTS, FILES | {"b.h": b""}, "a.o")
     assert calls() == 4
     # another version of the compiler
     changed = Compiler(compiler.command, zig=False)
     with Path(compiler.command[0]).open("a") as file:
         file.write("\n")
-    compiled(changed, ARGUMENTS, FILES, "a.o")
+    compile_code(changed, ARGUMENTS, FILES, "a.o")
     assert calls() == 5
     # where headers are looked for
     monkeypatch.setenv("CPATH", "/nowhere")
-    compiled(Compiler(compiler.command, zig=False), ARGUMENTS, FILES, "a.o")
+    compile_code(Compiler(compiler.command, zig=False), ARGUMENTS, FILES, "a.o")
     assert calls() == 6
 
 
-def test_a_failure_is_not_kept(counting, store):
+def test_a_failure_is_not_entry(counting, store):
     compiler, calls = counting
     for n in (1, 2):
         with pytest.raises(RunError, match=r"the C compiler .*real cc failed: .*a\.c"):
-            compiled(compiler, ARGUMENTS, FILES | {"a.c": b"int f(void) { return g; }\n"}, "a.o")
+            compile_code(compiler, ARGUMENTS, FILES | {"a.c": b"int f(void) { return g; }\n"}, "a.o")
         assert calls() == n
     assert not store.exists()
 
@@ -94,19 +96,19 @@ def test_a_second_export_compiles_nothing(counting, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("damage", [lambda b: b[:-1], lambda b: b"", lambda b: b[:40] + b"x" + b[41:]])
 def test_a_damaged_entry_is_made_anew(store, damage):
-    assert kept(b"key", lambda: b"code " * 10) == b"code " * 10
+    assert entry(b"key", lambda: b"code " * 10) == b"code " * 10
     (file,) = store.iterdir()
     good = file.read_bytes()
     file.write_bytes(damage(good))
-    assert kept(b"key", lambda: b"code " * 10) == b"code " * 10 and file.read_bytes() == good
-    assert kept(b"key", lambda: b"other") == b"code " * 10
+    assert entry(b"key", lambda: b"code " * 10) == b"code " * 10 and file.read_bytes() == good
+    assert entry(b"key", lambda: b"other") == b"code " * 10
 
 
 def test_off_keeps_nothing(store, monkeypatch, tmp_path):
     monkeypatch.setenv(VARIABLE, OFF)
     calls = []
     for _ in range(2):
-        assert kept(b"key", lambda: calls.append(1) or b"code") == b"code"
+        assert entry(b"key", lambda: calls.append(1) or b"code") == b"code"
     assert len(calls) == 2 and cache.folder() is None and not store.exists()
     environment = os.environ | {VARIABLE: str(store)}
     command = [sys.executable, "-m", "chainunit.cli", "--no-cache", "export", "DcMotor"]
@@ -116,14 +118,14 @@ def test_off_keeps_nothing(store, monkeypatch, tmp_path):
 
 def test_a_folder_that_takes_nothing_costs_only_the_cache(store, monkeypatch, tmp_path):
     store.write_text("a file in its place")
-    assert kept(b"key", lambda: b"code") == b"code"
+    assert entry(b"key", lambda: b"code") == b"code"
     store.unlink()
 
     def full(*_):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("pathlib.Path.write_bytes", full)
-    assert kept(b"key", lambda: b"code") == b"code"
+    assert entry(b"key", lambda: b"code") == b"code"
     monkeypatch.undo()
     assert list(store.iterdir()) == [], "nothing half-written"
 
@@ -144,23 +146,23 @@ def test_where_it_is(monkeypatch, tmp_path):
 def test_it_is_bounded_and_keeps_what_was_used_last(store, monkeypatch):
     monkeypatch.setattr(cache, "_MOST", 5 * (32 + 1000))
     for n in range(5):
-        kept(b"%d" % n, lambda: bytes(1000))
+        entry(b"%d" % n, lambda: bytes(1000))
         for k, file in enumerate(sorted(store.iterdir(), key=lambda f: f.stat().st_mtime)):
             os.utime(file, (1000.0 * n + k, 1000.0 * n + k))
     calls = []
-    kept(b"0", lambda: calls.append(0) or b"")
-    kept(b"5", lambda: bytes(1000))
+    entry(b"0", lambda: calls.append(0) or b"")
+    entry(b"5", lambda: bytes(1000))
     assert len(list(store.iterdir())) == 5 and not calls
-    kept(b"0", lambda: calls.append(0) or b"")
+    entry(b"0", lambda: calls.append(0) or b"")
     assert not calls
-    kept(b"1", lambda: calls.append(1) or b"")
+    entry(b"1", lambda: calls.append(1) or b"")
     assert calls == [1], "the one that was not used for longest"
     # what a killed process left, and what another one is at
     old, new = store / "x.1234.part", store / "y.1234.part"
     for file in (old, new):
         file.write_bytes(b"x")
     os.utime(old, (time.time() - 1e5,) * 2)
-    kept(b"6", lambda: b"code")
+    entry(b"6", lambda: b"code")
     assert not old.exists() and new.exists()
 
 
@@ -172,7 +174,7 @@ def test_many_at_once(store):
         return b"code" * 1000
 
     def one():
-        results.extend(kept(b"%d" % n, make) for n in range(5))
+        results.extend(entry(b"%d" % n, make) for n in range(5))
 
     threads = [threading.Thread(target=one) for _ in range(8)]
     for thread in threads:

@@ -13,7 +13,7 @@ import pytest
 from chainunit.engines import casadi_
 from chainunit.fmu.description import Interface
 from chainunit.fmu.native import code, generate
-from chainunit.fmu.native.platforms import compiled, compiler
+from chainunit.fmu.native.platforms import compile_code, compiler
 from chainunit.models import MODELS
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
@@ -35,7 +35,7 @@ def called(tmp_path):
         files = {"a.c": f"{HEAD}{program.text}{shown}\n".encode()}
         flags = ("-std=c99", "-O2", "-fPIC", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-shared")
         library = tmp_path / f"{next(numbers)}.so"
-        library.write_bytes(compiled(compiler(), (*flags, "a.c", "-o", "a.so", "-lm"), files, "a.so"))
+        library.write_bytes(compile_code(compiler(), (*flags, "a.c", "-o", "a.so", "-lm"), files, "a.so"))
         rows = [(ctypes.c_double * max(1, len(a)))(*a) for a in arguments]
         pointers = (ctypes.POINTER(ctypes.c_double) * len(rows))(*rows)
         results, memory = (ctypes.c_double * 50)(*[np.nan] * 50), (ctypes.c_double * (program.room + 1))()

@@ -34,7 +34,7 @@ from chainunit.fmu.description import Interface
 from chainunit.fmu.export import export as export_python
 from chainunit.fmu.native.cache import OFF, VARIABLE
 from chainunit.fmu.native.export import export
-from chainunit.fmu.native.platforms import compiled, compiler
+from chainunit.fmu.native.platforms import compile_code, compiler
 from chainunit.fmu.recipe import excitation, experiment
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.models import MODELS
@@ -482,7 +482,7 @@ def test_random_calls_under_sanitizers(native, name, fmi, share, tmp_path):
     ]  # fmt: skip
     # what CasADi wrote is compiled apart, once for both versions of FMI: its warnings are not ours
     files = {file: (sources / file).read_bytes() for file in ("kernels.c", "model.h")}
-    kernels = compiled(compiler(), ("-O1", "-c", "kernels.c", "-o", "kernels.o"), files, "kernels.o")
+    kernels = compile_code(compiler(), ("-O1", "-c", "kernels.c", "-o", "kernels.o"), files, "kernels.o")
     (tmp_path / "kernels.o").write_bytes(kernels)
     subprocess.run([*command, str(tmp_path / "kernels.o")], check=True)
     # whose steps take steps of their own

@@ -67,10 +67,10 @@ def rk4(
     BudgetError
         where it takes more than `most` of them, before it begins.
     """
-    wanted = step / longest - 1e-9
-    if wanted > most:
+    count = step / longest - 1e-9
+    if count > most:
         raise BudgetError(most)
-    n = max(1, math.ceil(wanted))
+    n = max(1, math.ceil(count))
     h = step / n
     now = list(x)
     for s in range(n):
@@ -97,7 +97,7 @@ STAGES: tuple[tuple[float, ...], ...] = (
 ERRORS = (71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40)
 """of its error, the weights of the stages"""
 SHORTEST = 1e-6
-"""of the longest step: one as short is taken as it is, as a snatch must not stop a run"""
+"""of the longest step: one as short is steps as it is, as a snatch must not stop a run"""
 FIRST = 0.01
 """of the longest step, where nothing is known of the states yet"""
 SAFETY, ERROR_POWER = 0.9, -0.2
@@ -135,10 +135,10 @@ def controlled(
     BudgetError
         where it takes more than `most` steps.
     """
-    now, since, taken, pace = list(x), 0.0, 0, pace or FIRST * longest
+    now, since, steps, pace = list(x), 0.0, 0, pace or FIRST * longest
     while since < step:
-        taken += 1
-        if taken > most:
+        steps += 1
+        if steps > most:
             raise BudgetError(most)
         left = step - since
         h = left if pace >= left else 0.5 * left if pace > 0.5 * left else pace
@@ -155,8 +155,8 @@ def controlled(
         except (ArithmeticError, ValueError):
             usable = False
         for i, (v, after, size) in enumerate(zip(now, at, nominal, strict=True) if usable else ()):
-            wrong = abs(h * sum(e * r[i] for e, r in zip(ERRORS, k, strict=True)))
-            error = max(error, wrong / (tolerance * max(abs(v), abs(after), size)))
+            deviation = abs(h * sum(e * r[i] for e, r in zip(ERRORS, k, strict=True)))
+            error = max(error, deviation / (tolerance * max(abs(v), abs(after), size)))
         last_resort = h <= SHORTEST * longest
         if not usable and last_resort:
             raise ArithmeticError("the states left all bounds")

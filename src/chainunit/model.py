@@ -34,11 +34,11 @@ class Requirement:
     remedy: str = ""
     depends: tuple[str, ...] = ()
 
-    def refusal(self, value: float, low: float, high: float, given: Mapping[str, float]) -> str:
+    def refusal(self, value: float, low: float, high: float, values: Mapping[str, float]) -> str:
         """The line that refuses `value`."""
         unit = refusals.unit_behind(self.unit)
         formats = (refusals.FIRST_PARAMETER, *[refusals.NEXT_PARAMETER] * len(self.given))
-        those = "".join(f.format(name=n, value=given[n]) for f, n in zip(formats, self.given, strict=False))
+        those = "".join(f.format(name=n, value=values[n]) for f, n in zip(formats, self.given, strict=False))
         bounded = math.isfinite(low), math.isfinite(high)
         limits = {(True, False): refusals.ABOVE, (False, True): refusals.BELOW}.get(bounded, refusals.BETWEEN)
         return refusals.REQUIREMENT.format(
@@ -178,9 +178,9 @@ class Model:
     ) -> None:
         for each, (value, low, high) in zip(required, limits, strict=True):
             if not low < value < high:
-                refused = GeometryError(each.refusal(value, low, high, cls.parameter_layout.named(p)))
-                refused.names = (each.subject, *each.given, *each.depends)
-                raise refused
+                error = GeometryError(each.refusal(value, low, high, cls.parameter_layout.named(p)))
+                error.names = (each.subject, *each.given, *each.depends)
+                raise error
 
     @classmethod
     def course(cls, values: Sequence[Any]) -> list[tuple[int, Any, Any]]:

@@ -141,7 +141,7 @@ MOST: dict[str, float] = {
     "A/rad": 1e15,
     "Ohm/s": 1e12,
 }
-"""Upper bound of what has a lower bound and declares no upper one, by unit: no machine reaches it, and the equations
+"""Upper bound of a quantity that declares a lower bound alone, by unit: no machine reaches it, and the equations
 stay within the range of numbers."""
 
 USUAL: dict[str, tuple[float, float]] = {"m": (1e-4, 30.0), "kg": (1e-3, 2e4), "N": (1e-3, 1e6)}
@@ -220,7 +220,7 @@ def quantity(
     base_units(unit)
     low = min if above is None else above
     high = MOST.get(unit, math.inf) if math.isinf(max) and math.isfinite(low) else max
-    declared = Quantity(
+    q = Quantity(
         unit,
         description,
         default,
@@ -232,7 +232,7 @@ def quantity(
         usual or USUAL.get(unit),
         kind,
     )
-    metadata = {"quantity": declared}
+    metadata = {"quantity": q}
     if default is None:
         return dataclasses.field(metadata=metadata)
     return dataclasses.field(default=default, metadata=metadata)
@@ -290,8 +290,8 @@ def variables(cls: type, prefix: str = "", context: str = "", default: Any = Non
             yield Variable(name, context + q.description, q)
         else:
             inner = field.metadata["default"] if default is None else getattr(default, field.name)
-            described = f"{context}{field.metadata['group']}: "
-            yield from variables(field.metadata["of"], name + ".", described, inner)
+            words = f"{context}{field.metadata['group']}: "
+            yield from variables(field.metadata["of"], name + ".", words, inner)
 
 
 def finite(value: Any) -> float | None:
@@ -323,22 +323,22 @@ class Layout:
         """The instance that holds `values`, given in declared order."""
         return _build(self._plan, values)
 
-    def from_names(self, given: dict[str, Any], default: Any = None) -> Any:
-        """The instance with the values named in `given`; others from `default`, else at start.
+    def from_names(self, values: dict[str, Any], default: Any = None) -> Any:
+        """The instance with these `values` by name; others from `default`, else at start.
 
         Raises
         ------
         KeyError
             for a name that is not declared.
         """
-        unknown = set(given) - set(self.names)
+        unknown = set(values) - set(self.names)
         if unknown:
             raise KeyError(f"no variable {sorted(unknown)[0]!r} in {self.cls.__qualname__}")
         if default is not None:
             base = self.values(default)
         else:
             base = [v.quantity.start for v in self.variables]
-        return self.instance([given.get(n, b) for n, b in zip(self.names, base, strict=True)])
+        return self.instance([values.get(n, b) for n, b in zip(self.names, base, strict=True)])
 
 
 def _plan(cls: type, i: int) -> tuple[tuple[type, list[tuple[str, Any]]], int]:

@@ -119,7 +119,7 @@ class Outputs(MotorOutputs):
     v: Value = quantity("V", "armature voltage", nominal=100.0)
 
 
-class Point(MotorPoint):
+class DcMotorPoint(MotorPoint):
     """Everything at one state: control, electric circuit, shaft."""
 
     __slots__ = ("R", "cut_i", "cut_v", "di", "error_i", "error_w", "heat", "i_ref", "v")
@@ -151,7 +151,7 @@ class Point(MotorPoint):
         ]
 
 
-def _outputs(xp: Any, p: Any, u: Any, x: Any, s: Point) -> Outputs:
+def _outputs(xp: Any, p: Any, u: Any, x: Any, s: DcMotorPoint) -> Outputs:
     return Outputs(**s.outputs(), i_ref=s.i_ref, v=s.v, supply_power=s.v * x.armature.i, heat=s.heat)
 
 
@@ -165,7 +165,7 @@ class DcMotor(Motor):
     Parameters = Parameters
     Inputs = Inputs
     States = States
-    Point = Point
+    Point = DcMotorPoint
     current, temperature, winding = "armature.i", "armature.T", "armature"
     limited_by: ClassVar[Mapping[str, float]] = {"w": 1e-9}
     required = (

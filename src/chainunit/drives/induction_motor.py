@@ -134,7 +134,7 @@ class Parameters(MotorParameters):
 
 @declaration
 class Inputs(LoadInput):
-    """The load, the supply and what is asked of the inverter."""
+    """The load, the supply and what is demand of the inverter."""
 
     voltage: Value = quantity(
         "1",
@@ -143,7 +143,7 @@ class Inputs(LoadInput):
         min=0.0,
         max=2.0,
     )
-    w_ref: Value = quantity("rad/s", "speed asked of the inverter", default=0.0)
+    w_ref: Value = quantity("rad/s", "speed demand of the inverter", default=0.0)
 
 
 @declaration
@@ -327,7 +327,7 @@ def _cooling(xp: Any, p: Any, w: Any) -> Any:
     return p.cooling.still + (1.0 - p.cooling.still) * turning
 
 
-class Point(MotorPoint):
+class InductionMotorPoint(MotorPoint):
     """Everything at one state: supply, circuit, shaft."""
 
     __slots__ = (
@@ -347,9 +347,9 @@ class Point(MotorPoint):
         by_frequency = 1.0 + p.inverter.on * (volts_per_hertz(xp, p, f) - 1.0)
         self.u = math.sqrt(2.0 / 3.0) * p.supply.V * u.voltage * x.supply.ramp * by_frequency
         self.air_gap = 1.5 * p.pole_pairs * (psi.d * self.i_q - psi.q * self.i_d)
-        asked = p.pole_pairs * u.w_ref / _TURN + p.inverter.slip * self.air_gap
-        wanted = p.supply.f + p.inverter.on * (xp.maximum(asked, 0.0) - p.supply.f)
-        self.df = xp.maximum(xp.minimum((wanted - f) / p.inverter.lag, p.inverter.ramp), -p.inverter.ramp)
+        demand = p.pole_pairs * u.w_ref / _TURN + p.inverter.slip * self.air_gap
+        target = p.supply.f + p.inverter.on * (xp.maximum(demand, 0.0) - p.supply.f)
+        self.df = xp.maximum(xp.minimum((target - f) / p.inverter.lag, p.inverter.ramp), -p.inverter.ramp)
         self.heat = 1.5 * (
             self.R_s * (self.i_d * self.i_d + self.i_q * self.i_q)
             + self.R_r * (self.ir_d * self.ir_d + self.ir_q * self.ir_q)
@@ -374,7 +374,7 @@ class Point(MotorPoint):
         ]
 
 
-def _outputs(xp: Any, p: Any, u: Any, x: Any, s: Point) -> Outputs:
+def _outputs(xp: Any, p: Any, u: Any, x: Any, s: InductionMotorPoint) -> Outputs:
     psi = x.stator.psi
     squared = psi.d * psi.d + psi.q * psi.q
     b = p.main.beta * p.main.beta * squared
@@ -409,7 +409,7 @@ class InductionMotor(Motor):
     Parameters = Parameters
     Inputs = Inputs
     States = States
-    Point = Point
+    Point = InductionMotorPoint
     current, temperature, winding = "i", "stator.T", "stator"
     limited_by: ClassVar[Mapping[str, float]] = {"v": 1e-3, "supply.frequency": 1e-3}
     required = (

@@ -25,7 +25,7 @@ def export(
     platforms: Sequence[str] = (),
     report: Callable[[str], None] = lambda what: None,
 ) -> str:
-    """Write `model` as an FMU and say, in words, which backend made it and why.
+    """Write `model` as an FMU and say, in words, which backend words it and why.
 
     Parameters
     ----------
@@ -43,10 +43,8 @@ def export(
         raise InputError(f"fmi = {fmi}: must be 2 or 3")
     if backend == "python":
         return _by_python(model, file, start, fmi, platforms, "")
-    if backend is None and not platforms:
-        found = targets.compiler()
-        if found is None or fmi not in targets.PLATFORMS[targets.host() or "linux64"].folders:
-            return _by_python(model, file, start, fmi, platforms, ", no C compiler for this machine found")
+    if backend is None and not platforms and not targets.compiles(fmi):
+        return _by_python(model, file, start, fmi, platforms, ", no C compiler for this machine found")
     names, compiler = targets.chosen(platforms, fmi)
     try:
         native.export(model, file, start, fmi=fmi, platforms=platforms, report=report)
@@ -56,10 +54,10 @@ def export(
         if backend or fmi != 2 or platforms:
             raise
         return _by_python(model, file, start, fmi, platforms, f", the C compiler {compiler.name} failed")
-    made = f"FMI {fmi}.0, Co-Simulation and Model Exchange, native code by {compiler.name}"
+    words = f"FMI {fmi}.0, Co-Simulation and Model Exchange, native code by {compiler.name}"
     if not platforms:
-        return made + ("" if backend else ", the C compiler found here")
-    return f"{made} for " + ", ".join(f"{name} ({targets.PLATFORMS[name].tried})" for name in names)
+        return words + ("" if backend else ", the C compiler found here")
+    return f"{words} for " + ", ".join(f"{name} ({targets.PLATFORMS[name].tried})" for name in names)
 
 
 def _by_python(

@@ -97,8 +97,8 @@ class Interface:
 
     @cached_property
     def dependencies(self) -> list[tuple[list[int], list[int]]]:
-        """Of each output, and of each state's derivative behind them: value references of what it truly depends
-        on, in a run (inputs and states) and at the start (parameters and inputs), from the sparsity of the
+        """Of each output, and of each state's derivative behind them: value references of its true
+        dependencies, in a run (inputs and states) and at the start (parameters and inputs), from the sparsity of the
         traced equations. A state, in a run, depends on itself alone."""
         model = self.model
         symbols, p, u, x, outputs, derivatives = self.traced

@@ -37,17 +37,17 @@ def page(interface: Interface, version: str) -> str:
 
 
 def _table(signals: list[Signal], causality: str) -> str:
-    given = causality != "output"
+    settable = causality != "output"
     head = (
         "<tr><th>name</th><th>unit</th>"
-        + ("<th>start</th><th>allowed</th>" if given else "")
+        + ("<th>start</th><th>allowed</th>" if settable else "")
         + "<th>meaning</th></tr>"
     )
     rows = []
     for signal in signals:
         v, q = signal.variable, signal.variable.quantity
         cells = [f"<td><code>{escape(v.name)}</code></td>", f"<td>{escape(v.unit)}</td>"]
-        if given:
+        if settable:
             allowed = escape(q.allowed) + (
                 "" if causality == "input" else ", tunable" if q.tunable else ", fixed"
             )

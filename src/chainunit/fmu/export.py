@@ -90,10 +90,10 @@ def complete(slave: type[ModelSlave], resources: Path) -> Element:
     interface = checked(slave.model, slave.start)
     script = resources / f"{slave.__module__}.py"
     text = script.read_text("utf-8")
-    shipped = _imported(text)
-    version, hashed = metadata.version("chainunit"), _hash(interface, shipped, slave.__name__)
+    files = _imported(text)
+    version, hashed = metadata.version("chainunit"), _hash(interface, files, slave.__name__)
     package = resources / f"chainunit_{hashed[:12]}"
-    for name, content in shipped.items():
+    for name, content in files.items():
         target = package / name
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_bytes(content)
@@ -107,10 +107,10 @@ def complete(slave: type[ModelSlave], resources: Path) -> Element:
     )
 
 
-def _hash(interface: Interface, shipped: Mapping[str, bytes], identifier: str) -> str:
+def _hash(interface: Interface, files: Mapping[str, bytes], identifier: str) -> str:
     """Of all that the FMU is made of, 32 digits."""
     digest = hashlib.sha256()
-    for name, content in sorted(shipped.items()):
+    for name, content in sorted(files.items()):
         digest.update(name.encode() + b"\0" + content + b"\0")
     digest.update(metadata.version("pythonfmu").encode())
     version = metadata.version("chainunit")
@@ -126,7 +126,7 @@ def _imported(script: str) -> dict[str, bytes]:
     InputError
         for an import that is none of a module.
     """
-    found: dict[str, bytes] = {}
+    files: dict[str, bytes] = {}
     waiting = list(_imports(ast.walk(ast.parse(script)), ()))
     for module in waiting:
         if not module or not _file(module):
@@ -139,12 +139,12 @@ def _imported(script: str) -> dict[str, bytes]:
         for depth in range(1, len(module) + 1):
             path = _file(module[:depth])
             name = path.relative_to(_PACKAGE).as_posix() if path else ""
-            if path is None or name in found:
+            if path is None or name in files:
                 continue
-            found[name] = path.read_bytes()
+            files[name] = path.read_bytes()
             place = module[:depth] if path.name == "__init__.py" else module[: depth - 1]
-            waiting += _imports(_at_import(ast.parse(found[name])), place)
-    return found
+            waiting += _imports(_at_import(ast.parse(files[name])), place)
+    return files
 
 
 def _imports(nodes: Iterable[ast.AST], package: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
@@ -193,7 +193,7 @@ from chainunit.fmu.slave import ModelSlave, hold
 
 @hold(globals())
 class {name}(ModelSlave):
-    model = {module}.{made}
+    model = {module}.{call}
 """
 
 
@@ -202,13 +202,13 @@ def _script(model: type[Model], start: dict[str, float]) -> str:
     that function's arguments."""
     file = recipes() / f"{model.name}.py"
     *package, module = model.__module__.split(".")
-    made = model.built_by or model.__qualname__
-    plain = _SCRIPT.format(name=model.name, package=".".join(package), module=module, made=made)
+    call = model.built_by or model.__qualname__
+    plain = _SCRIPT.format(name=model.name, package=".".join(package), module=module, call=call)
     text = file.read_text() if file.is_file() else plain
     if model.built_by:
         text = re.sub(r"(?m)^(    model = \w+\.)\w+\([\d, ]*\)", rf"\g<1>{model.built_by}", text)
-    given = {name: float(start[name]) for name in sorted(start)}
-    return text + (f"    start = {given!r}\n" if given else "")
+    values = {name: float(start[name]) for name in sorted(start)}
+    return text + (f"    start = {values!r}\n" if values else "")
 
 
 def _build(script: Path, file: Path) -> Path:

@@ -117,10 +117,10 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         self._doubtful = True  # an input may be out of its bounds
         self._time = 0.0
         self._stop = math.inf  # the last time that is allowed, with what rounding adds to it
-        self._refused = ""  # why the parameters make no model
+        self._refusal = ""  # why the parameters make no model
         self._unstarted = ""  # why the states could not be started
         self._unrestored = ""  # why the last saved state could not be taken
-        self._told = ""
+        self._last_line = ""
 
     # -- life cycle
 
@@ -321,18 +321,18 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
             self._tell(bad)
             return bad
         if self._p is None:
-            self._refused = ""
+            self._refusal = ""
             derived, self._derived = self._derived if self._initialized else None, None
             try:
                 p = self._p = self.model.parameter_layout.instance(self._set[: self._n_p])
                 p = self._p = self.model.check(p, derived)
                 self._derived = getattr(p, "derived", None)
             except BaseException as reason:
-                self._refused = str(reason) or repr(reason)
-                self._tell(self._refused)
-        if self._n_x and not (self._x or self._refused or self._unstarted):
+                self._refusal = str(reason) or repr(reason)
+                self._tell(self._refusal)
+        if self._n_x and not (self._x or self._refusal or self._unstarted):
             self._start()
-        return self._refused or self._unstarted
+        return self._refusal or self._unstarted
 
     def _start(self) -> None:
         """The states at the start, or why they cannot be found; an input is judged only where they depend on it."""
@@ -380,8 +380,8 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         return ""
 
     def _tell(self, reason: str) -> None:
-        if reason != self._told:
-            self._told = reason
+        if reason != self._last_line:
+            self._last_line = reason
             self.log(reason, Fmi2Status.error)
 
     # every variable is a Real; pythonfmu would raise for another type, which is fatal for the host
@@ -480,10 +480,10 @@ class ModelSlave(Fmi2Slave):  # type: ignore[misc]
         if checksum != b"%08x" % binascii.crc32(text):
             return {"damaged": refusals.STATE_DAMAGED}
         try:
-            read = json.loads(text)
+            saved = json.loads(text)
         except ValueError:
             return {}
-        return read if isinstance(read, dict) else {}
+        return saved if isinstance(saved, dict) else {}
 
     def to_xml(self, model_options: Any = None) -> Element:
         """Called when pythonfmu builds the FMU: the description from the declarations (pythonfmu's own lacks units,

@@ -26,9 +26,9 @@ _ABANDONED = 3600.0  # s, after which the part of a file belongs to a process th
 
 def folder() -> Path | None:
     """Where compiled code is kept; None where it is not."""
-    given = os.environ.get(VARIABLE, "")
-    if given:
-        return None if given == OFF else Path(given)
+    setting = os.environ.get(VARIABLE, "")
+    if setting:
+        return None if setting == OFF else Path(setting)
     name = "LOCALAPPDATA" if sys.platform == "win32" else "XDG_CACHE_HOME"
     try:
         home = Path.home()
@@ -39,7 +39,7 @@ def folder() -> Path | None:
     return Path(base) / "chainunit"
 
 
-def kept(key: bytes, make: Callable[[], bytes]) -> bytes:
+def entry(key: bytes, make: Callable[[], bytes]) -> bytes:
     """What `make` gives, or gave for this `key` before."""
     place = folder()
     if place is None:

@@ -15,7 +15,7 @@ from typing import Any
 _LONGEST = 2500
 """operations of a part: the time of a compiler grows faster than the length of a function"""
 _WIDEST = 60
-"""characters of an operation that is written where it is needed, and not into a line of its own"""
+"""characters of an operation that is written where it is users, and not into a line of its own"""
 
 
 def _operations() -> Mapping[int, str]:
@@ -81,7 +81,7 @@ class Program:
         forms = _operations()
         self._forms: list[str] = []
         self._operands: list[tuple[int, ...]] = []
-        places: dict[int, int] = {}  # of what CasADi's registers hold
+        places: dict[int, int] = {}  # where CasADi's registers are now
         simple: dict[str, int] = {}
         results = [0] * rows.numel()
 
@@ -112,17 +112,17 @@ class Program:
         self._results = [results[begin:end] for begin, end in pairwise(ends)]
 
     def _cut(self) -> None:
-        """The parts, operations in order, with the groups that need each; slots in memory of what goes from one to
-        another, or is a result."""
-        needed = [0] * len(self._forms)
+        """The parts, operations in order, with the groups that need each; and slots in memory for values that go from
+        one part to another, or are results."""
+        users = [0] * len(self._forms)
         for bit, places in enumerate(self._results):
             for place in places:
-                needed[place] |= 1 << bit
-        for place in reversed(range(len(needed))):
+                users[place] |= 1 << bit
+        for place in reversed(range(len(users))):
             for operand in self._operands[place]:
-                needed[operand] |= needed[place]
+                users[operand] |= users[place]
         alike: dict[int, list[int]] = {}
-        for place, groups in enumerate(needed):
+        for place, groups in enumerate(users):
             if self._operands[place]:
                 alike.setdefault(groups, []).append(place)
         self._parts: list[list[int]] = []
@@ -135,10 +135,10 @@ class Program:
             self._parts += [places[begin:end] for begin, end in pairwise(cuts)]
             self._needed_by += [groups] * count
         part_of = {place: k for k, part in enumerate(self._parts) for place in part}
-        handed = {place for places in self._results for place in places if self._operands[place]}
+        crossing = {place for places in self._results for place in places if self._operands[place]}
         for place, k in part_of.items():
-            handed.update(i for i in self._operands[place] if part_of.get(i, k) != k)
-        self._slots = {place: slot for slot, place in enumerate(sorted(handed))}
+            crossing.update(i for i in self._operands[place] if part_of.get(i, k) != k)
+        self._slots = {place: slot for slot, place in enumerate(sorted(crossing))}
         self.room = len(self._slots)
 
     def _part(self, k: int, part: list[int]) -> list[str]:

@@ -91,12 +91,12 @@ def export(
     interface = checked(model, start)
     file = Path(file)
     folder(file.parent)
-    wanted = _VERSIONS[fmi]
+    of_version = _VERSIONS[fmi]
     version = metadata.version("chainunit")
-    layer = (*_LAYER, wanted.layer)
-    compiled = ("kernels.c", "model.c", wanted.layer)
+    layer = (*_LAYER, of_version.layer)
+    compiled = ("kernels.c", "model.c", of_version.layer)
 
-    kinds = dict(wanted.kinds)
+    kinds = dict(of_version.kinds)
     if fmi == 3 and model.state_layout:
         # FMI 2.0 expects the call from every importer
         kinds["ModelExchange"] = {**kinds["ModelExchange"], "needsCompletedIntegratorStep": "true"}
@@ -123,7 +123,7 @@ def export(
         "model.c": tables(interface, token, token, room).encode(),
         "rules.h": rules().encode(),
         **layer_texts,
-        **{name: (_headers() / name).read_bytes() for name in wanted.headers},
+        **{name: (_headers() / name).read_bytes() for name in of_version.headers},
     }
     contents = {f"sources/{name}": text for name, text in sources.items()}
     contents["modelDescription.xml"] = description(token)

@@ -22,7 +22,7 @@ from .code import Program, number
 
 def groups(interface: Interface) -> list[list[int]]:
     """Outputs that are evaluated together, as places among the declared outputs."""
-    found: list[list[int]] = []
+    lists: list[list[int]] = []
     connected, at = recipe.often(interface.model), 0
     for part in interface.model.parts:
         places = {name: at + i for i, name in enumerate(part.layout.names)}
@@ -30,8 +30,8 @@ def groups(interface: Interface) -> list[list[int]]:
         often = [i for name, i in places.items() if name in connected - part.by_differences]
         apart = [i for name, i in places.items() if name in part.by_differences]
         rest = [i for i in places.values() if i not in often and i not in apart]
-        found += [group for group in (often, rest, apart) if group]
-    return found
+        lists += [group for group in (often, rest, apart) if group]
+    return lists
 
 
 def differenced(interface: Interface) -> set[int]:
@@ -61,9 +61,9 @@ def _programs(interface: Interface) -> Iterator[Program]:
     def one(name: str, arguments: list[Any], results: list[Any], used: str = "ONCE") -> Program:
         return Program(name, arguments, [casadi.vertcat(*map(casadi.SX, results))], [0], used)
 
-    placed = groups(interface)
-    offsets = [sum(map(len, placed[:g])) for g in range(len(placed))]
-    values = [casadi.vertcat(*(outputs[k] for k in group)) for group in placed]
+    places = groups(interface)
+    offsets = [sum(map(len, places[:g])) for g in range(len(places))]
+    values = [casadi.vertcat(*(outputs[k] for k in group)) for group in places]
     yield Program("values", point, values, offsets, "OFTEN")
     du, dx = casadi.SX.sym("du", us.shape[0]), casadi.SX.sym("dx", xs.shape[0])
     apart = differenced(interface)
@@ -99,7 +99,7 @@ _BEFORE_KERNELS = """\
 
 #include "model.h"
 
-/* the compiler takes less time for what is not computed often */
+/* the compiler takes less time for a function that is not called often */
 #if defined __clang__
 #define OFTEN __attribute__((noinline))
 #define SELDOM OFTEN
@@ -206,12 +206,12 @@ def tables(interface: Interface, guid: str, token: str, room: int) -> str:
         _array("int", "group_of", [str(group_of[i]) for i in range(n_y)]),
         _array("Group", "group", group_rows),
     ]
-    wanted = (*model.required, *model.start_required)
-    for i, r in enumerate(wanted):
+    requirements = (*model.required, *model.start_required)
+    for i, r in enumerate(requirements):
         lines.append(_array("int", f"given_{i}", [str(parameter_names.index(n)) for n in r.given]))
     rows = [
         f"{{{_text(r.subject)}, {_unit(r.unit)}, {_text(r.why)}, {_text(r.remedy)}, {len(r.given)}, given_{i}}}"
-        for i, r in enumerate(wanted)
+        for i, r in enumerate(requirements)
     ]
     if rows:
         lines.append(_array("Requirement", "required", rows))

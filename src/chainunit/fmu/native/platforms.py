@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import InputError, RunError
-from .cache import kept
+from .cache import entry
 
 _FLAGS = ("-std=c99", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off")
 _SHARED = ("-shared", "-s")
@@ -97,9 +97,14 @@ def compiler() -> Compiler | None:
     # elsewhere the layout of libraries is the platform's own, which zig knows
     if sys.platform == "linux":
         for name in ("cc", "gcc", "clang"):
-            if found := shutil.which(name):
-                return Compiler((found,), zig=False)
+            if path := shutil.which(name):
+                return Compiler((path,), zig=False)
     return _zig()
+
+
+def compiles(fmi: int) -> bool:
+    """Whether there is a compiler for this machine, and a folder for it in that version of FMI."""
+    return compiler() is not None and fmi in PLATFORMS[host() or "linux64"].folders
 
 
 def _zig() -> Compiler | None:
@@ -123,22 +128,22 @@ def chosen(names: Sequence[str], fmi: int) -> tuple[tuple[str, ...], Compiler]:
             raise InputError(f"--platforms {name}: FMI {fmi}.0 has no folder for it; export with --fmi 3")
     here = host()
     if not names:
-        found = compiler()
-        if here is None or found is None:
+        own = compiler()
+        if here is None or own is None:
             raise InputError(
                 "no C compiler (cc, gcc, clang, or zig by pip install 'chainunit[cross]') for this machine found: "
                 "install one, or export with --backend python"
             )
         if fmi not in PLATFORMS[here].folders:
             raise InputError(f"FMI {fmi}.0 has no folder for {here}; export with --fmi 3 or --backend python")
-        return (here,), found
+        return (here,), own
     # zig where it is there, for its floors; the system's compiler knows this machine alone
-    found = _zig() or (compiler() if set(names) == {here} else None)
-    if found is None:
+    able = _zig() or (compiler() if set(names) == {here} else None)
+    if able is None:
         raise InputError(
             f"--platforms {' '.join(names)}: needs zig, a C compiler for all of them: pip install 'chainunit[cross]'"
         )
-    return tuple(dict.fromkeys(names)), found
+    return tuple(dict.fromkeys(names)), able
 
 
 def build(
@@ -163,13 +168,13 @@ def build(
     RunError
         where the compiler fails, with what it said.
     """
-    described = PLATFORMS[name]
-    made = {}
-    for folder, targets in described.folders[fmi].items():
-        slices = [_compile(compiler, t, identifier + described.suffix, sources, translated) for t in targets]
+    wanted = PLATFORMS[name]
+    libraries = {}
+    for folder, targets in wanted.folders[fmi].items():
+        slices = [_compile(compiler, t, identifier + wanted.suffix, sources, translated) for t in targets]
         library = slices[0] if len(slices) == 1 else fat(slices)
-        made[f"binaries/{folder}/{identifier}{described.suffix}"] = library
-    return made
+        libraries[f"binaries/{folder}/{identifier}{wanted.suffix}"] = library
+    return libraries
 
 
 def _compile(
@@ -180,14 +185,18 @@ def _compile(
     flags = (*own, *_FLAGS)
     # the kernels take almost all of the time, and are the same for whatever start values
     kernels = {name: sources[name] for name in (KERNELS, HEADER)}
-    object_code = compiled(compiler, (*flags, "-c", KERNELS, "-o", KERNELS_OBJECT), kernels, KERNELS_OBJECT)
+    object_code = compile_code(
+        compiler, (*flags, "-c", KERNELS, "-o", KERNELS_OBJECT), kernels, KERNELS_OBJECT
+    )
     rest = {name: text for name, text in sources.items() if name != KERNELS} | {KERNELS_OBJECT: object_code}
     others = [name for name in files if name != KERNELS]
     arguments = (*flags, *_SHARED, *others, KERNELS_OBJECT, "-o", library, *math)
-    return compiled(compiler, arguments, rest, library)
+    return compile_code(compiler, arguments, rest, library)
 
 
-def compiled(compiler: Compiler, arguments: Sequence[str], files: Mapping[str, bytes], product: str) -> bytes:
+def compile_code(
+    compiler: Compiler, arguments: Sequence[str], files: Mapping[str, bytes], product: str
+) -> bytes:
     """The file `product` that the compiler makes by `arguments` of these `files`, by their names, or has made before:
     see `chainunit.fmu.native.cache`.
 
@@ -210,7 +219,7 @@ def compiled(compiler: Compiler, arguments: Sequence[str], files: Mapping[str, b
     key = hashlib.sha256(repr((compiler.identity, list(arguments), product)).encode())
     for name, content in sorted(files.items()):
         key.update(f"{name} {len(content)} ".encode() + content)
-    return kept(key.digest(), make)
+    return entry(key.digest(), make)
 
 
 def fat(slices: Sequence[bytes]) -> bytes:
