@@ -1,4 +1,4 @@
-"""Events of study files in tests, by the names of their runs."""
+"""Study files in tests: events by the names of their runs, and a machine to size a motor for."""
 
 from __future__ import annotations
 
@@ -24,3 +24,19 @@ def _table(run: str, quantities: dict[str, float]) -> str:
                 keys += [f"{name} = {x}" for name, x in quantities.items() if name in names]
                 return f"{{ {', '.join(keys)} }}"
     raise ValueError(run)
+
+
+HEAVY_MACHINE = """
+[machine]
+crank = { m = 160, s = 0.05, I = 4 }
+coupler = { m = 120, s = 0.7, I = 24 }
+rocker = { m = 480, s = 0.5, I = 60 }
+left = { wall_mass = 540, web_mass = 216 }
+right = { wall_mass = 540, web_mass = 216 }
+[feed]
+left = { material_mass = 300, processing_force = 120 }
+right = { material_mass = 300, processing_force = 120 }
+[run]
+step = 0.002
+"""
+"""Ten times as heavy as the packaged one."""

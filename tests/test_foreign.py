@@ -105,6 +105,7 @@ def test_a_foreign_catalogue_is_cited_in_short(tmp_path):
 
 def test_titles_are_harmless_wherever_they_go():
     """Terminal, page and Markdown, of each study that has a title."""
+    from chainunit.drives.dc_motor import DcMotor
     from chainunit.report.markdown import markdown_text
     from chainunit.studies import driveline, knife
     from chainunit.studies.drive import Drive
@@ -117,7 +118,7 @@ def test_titles_are_harmless_wherever_they_go():
         shown_in_markdown = markdown_text(parsed.title)
         assert not re.search(r"(?<!\\)[<>\[\]|`*_]", shown_in_markdown)
     given = config.parse(f"title = {toml_text(EVIL)}")
-    drive = Drive(config.DcMotor, given.motor, given.machine)
+    drive = Drive(DcMotor, given.motor, given.machine)
     assert harmless(said_of(Study(given, drive, statics(given, drive))))
     assert "\\<script\\>" in markdown_text(EVIL)
 

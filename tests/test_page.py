@@ -18,7 +18,6 @@ from event_tables import event_line
 from reports import page_of, pictures, said_of, write
 
 from chainunit import EMPTY, RunError, config
-from chainunit.config import Feed, Starter
 from chainunit.drives.induction_motor import SoftStart
 from chainunit.report import chain_unit, chain_unit_motion, html, page_figures
 from chainunit.report.blocks import at
@@ -26,6 +25,7 @@ from chainunit.studies.chain import rest_forces
 from chainunit.studies.cycle import cycle
 from chainunit.studies.result import as_dict
 from chainunit.studies.run import run_study
+from chainunit.studies.sections import Feed, Starter
 from chainunit.text import DEFAULT_UNITS, digits_text, forms, scales, unit_text
 from chainunit.text import number as told_as
 

@@ -11,11 +11,13 @@ from machines import random_machine
 from reports import page_of, said_of
 
 from chainunit import config
+from chainunit.drives.dc_motor import DcMotor
 from chainunit.errors import InputError
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.models import MODELS
 from chainunit.quantities import Layout
 from chainunit.reading import slips
+from chainunit.studies.sections import Feed
 
 MM = {"r": 150, "l": 1500, "h": 1000, "c": 1492.48, "hy": 1000, "e": 810, "l1": 1350, "l2": 540, "z": 853.815}
 
@@ -87,7 +89,7 @@ def test_at_the_bounds_every_number_is_finite(seed):
         loads = {
             f"{side}.{u.name}": u.quantity.high
             for side in ("left", "right")
-            for u in Layout(type(config.Feed().left)).variables
+            for u in Layout(type(Feed().left)).variables
         }
         out = heavy.evaluate({"phi": 0.3, "w": 100.0, "a": 50.0, **loads})
         assert all(np.all(np.isfinite(x)) for x in out.values()), v.name
@@ -171,7 +173,7 @@ def test_the_remark_stands_on_terminal_page_and_in_json():
     from chainunit.studies.study import Study
 
     given = config.parse("[machine]\npin = { diameter = 60 }")
-    drive = Drive(config.DcMotor, given.motor, given.machine)
+    drive = Drive(DcMotor, given.motor, given.machine)
     study = Study(given, drive, statics(given, drive))
     result = as_dict(study)
     said = str(given.remarks[0])

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from event_tables import event_line
+from event_tables import HEAVY_MACHINE, event_line
 from reports import said_of
 
 from chainunit import config
@@ -73,19 +73,7 @@ def test_a_setting_lies_between_normal_duty_and_what_opens_it():
     assert dip.obstacle is Obstacle.OVERLOADS and dip.opens == {} and dip.nuisances == {"dip": 300.0}
 
 
-HEAVY = """
-[machine]
-crank = { m = 160, s = 0.05, I = 4 }
-coupler = { m = 120, s = 0.7, I = 24 }
-rocker = { m = 480, s = 0.5, I = 60 }
-left = { wall_mass = 540, web_mass = 216 }
-right = { wall_mass = 540, web_mass = 216 }
-[feed]
-left = { material_mass = 300, processing_force = 120 }
-right = { material_mass = 300, processing_force = 120 }
-[run]
-step = 0.002
-[sizing]
+HEAVY = f"""{HEAVY_MACHINE}[sizing]
 candidates = 1
 fluctuation = 0.3
 """

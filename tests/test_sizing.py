@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from event_tables import event_line
+from event_tables import HEAVY_MACHINE, event_line
 from systems import component
 from typer.testing import CliRunner
 
@@ -26,8 +26,10 @@ from chainunit.machines.chain_unit import SideLoads
 from chainunit.studies import sizing
 from chainunit.studies.cycle import cycle
 from chainunit.studies.drive import Drive
+from chainunit.studies.duty import flywheel, rms
 from chainunit.studies.rig import Rig
-from chainunit.studies.sizing import Check, Verdict, flywheel, permitted_starts, rms, start_time
+from chainunit.studies.sizing import Verdict
+from chainunit.studies.trial import Check, permitted_starts, start_time
 from chainunit.system import CoSimulation, Profile, System
 
 ANGLE = np.linspace(0.0, 2.0 * math.pi, 7200, endpoint=False)
@@ -106,19 +108,7 @@ def test_a_check_is_what_is_used_of_what_is_permitted():
     assert Check("x", None, 4.0, "N.m").utilisation is None
 
 
-HEAVY = """
-[machine]
-crank = { m = 160, s = 0.05, I = 4 }
-coupler = { m = 120, s = 0.7, I = 24 }
-rocker = { m = 480, s = 0.5, I = 60 }
-left = { wall_mass = 540, web_mass = 216 }
-right = { wall_mass = 540, web_mass = 216 }
-[feed]
-left = { material_mass = 300, processing_force = 120 }
-right = { material_mass = 300, processing_force = 120 }
-[run]
-step = 0.002
-[sizing]
+HEAVY = f"""{HEAVY_MACHINE}[sizing]
 candidates = 5
 poles_least = 4
 poles_most = 4

@@ -5,261 +5,47 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping
-from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+from pydantic import ConfigDict, Field, ValidationError, create_model
 
 from .drives.cardan import check
 from .drives.dc_motor import DcMotor
-from .drives.driveline import Mounted
-from .drives.gearing import KINDS, Transmission
-from .drives.induction_motor import Inverter, SoftStart
-from .drives.line_table import form, given_line
+from .drives.gearing import Transmission
 from .errors import GeometryError, InputError
 from .machines.api import ChainUnit, ratios
 from .machines.chain_unit import ChamberForces, SideLoads, SideName
-from .machines.flexible import LEAST, MOST, OrganLaw
-from .quantities import Layout, Value, declaration, group, quantity
+from .quantities import Layout
 from .reading import (
     Slip,
     Title,
     filled,
     first_line,
-    given_values,
     merged,
     packaged,
     read,
-    schema,
     slips,
     toml,
 )
 from .studies.event_table import RandomEvent, read_events, read_random_event
 from .studies.events import Event, OneSidedFeed
+from .studies.sections import (
+    ORGANS,
+    SECTIONS,
+    STARTS,
+    Chain,
+    Coupling,
+    Driveline,
+    Feed,
+    MonteCarlo,
+    Ratios,
+    Run,
+    Section,
+    Sizing,
+    Starter,
+)
 from .system.signals import Profile
-
-
-@declaration
-class Feed:
-    """The material on both organs in normal running."""
-
-    left: SideLoads = group(SideLoads, "left organ", default=SideLoads())
-    right: SideLoads = group(SideLoads, "right organ", default=SideLoads())
-
-
-@declaration
-class Ratios:
-    """The papers' ratios, in place of lengths."""
-
-    rho: Value = quantity("1", "r/l, crank to coupler", default=0.1, above=0.0, max=1.0)
-    lam: Value = quantity("1", "h/l, rocker to coupler", default=2.0 / 3.0, above=0.0)
-    mu: Value = quantity("1", "e/l1, rocker arm of the web hinge to wall", default=0.6, above=0.0, max=1.0)
-    zeta: Value = quantity("1", "z/z_max, half width", default=0.5, above=0.0, max=1.0)
-    l: Value = quantity("m", "coupler A-Bd", default=1.5, above=0.0)
-    l1: Value = quantity("m", "wall A1-B", default=1.35, above=0.0)
-
-
-@declaration
-class Run:
-    """How the machine is run."""
-
-    crank_speed: Value = quantity(
-        "rad/s",
-        "speed of the crank in normal running",
-        default=3.0,
-        min=0.01,
-        max=1000.0,
-        usual=(0.05, 25.0),
-        kind="speed",
-    )
-    ramp: Value = quantity(
-        "s",
-        "time in which the speed reference rises from rest",
-        default=1.5,
-        min=0.001,
-        max=1e4,
-        usual=(1e-3, 600.0),
-    )
-    settle_turns: Value = quantity(
-        "1", "crank turns after the ramp, before running counts as steady", default=2.0, min=0.0, max=1e4
-    )
-    turns: Value = quantity(
-        "1",
-        "whole crank turns of steady running that are evaluated and that load_cycle.csv holds",
-        default=1.0,
-        min=1.0,
-        max=1e4,
-    )
-    step: Value = quantity("s", "communication step of the co-simulation", default=0.001, min=1e-5, max=0.02)
-
-
-@declaration
-class Coupling:
-    """A safety coupling or shear pin on the motor shaft."""
-
-    trip_torque: Value = quantity("N.m", "torque of the crank at which it opens", default=1000.0, above=0.0)
-    release_time: Value = quantity(
-        "s",
-        "time from the trip until no torque passes; near 0 for a shear pin",
-        default=0.005,
-        min=0.0,
-        max=1.0,
-    )
-    scatter: Value = quantity(
-        "1",
-        "standard deviation of the trip torque in a Monte Carlo study, as a share",
-        default=0.05,
-        min=0.0,
-        max=0.5,
-    )
-
-
-@declaration
-class MonteCarlo:
-    """Overloads at random crank angles and times."""
-
-    runs: Value = quantity("1", "number of runs; 0 leaves the study out", default=0.0, min=0.0, max=1e6)
-    duration: Value = quantity(
-        "s", "time that is followed after the event", default=2.0, min=0.05, max=1e4, usual=(0.05, 600.0)
-    )
-    seed: Value = quantity("1", "seed of the random numbers", default=1.0, min=0.0, max=1e9)
-
-
-@declaration
-class Sizing:
-    """What is asked of a motor from the catalogue."""
-
-    one_sided_share: Value = quantity(
-        "1", "share of the running time with all feed on one side", default=0.1, min=0.0, max=1.0
-    )
-    starts_per_hour: Value = quantity("1", "starts per hour", default=2.0, min=0.0, max=1000.0)
-    fluctuation: Value = quantity(
-        "1",
-        "permitted fluctuation of the crank speed, (largest - least)/mean",
-        default=0.05,
-        above=0.0,
-        max=1.0,
-    )
-    breakdown_margin: Value = quantity(
-        "1", "factor between the peak torque and the breakdown torque", default=1.25, min=1.0, max=10.0
-    )
-    inertia_ratio: Value = quantity(
-        "1",
-        "permitted ratio of all other inertia at the motor shaft, flywheel included, to that of the rotor; of motors "
-        "on the line only where it is given",
-        default=10.0,
-        above=0.0,
-        max=1000.0,
-    )
-    ambient: Value = quantity("K", "temperature of the surroundings", default=313.15, min=230.0, max=340.0)
-    temperature: Value = quantity(
-        "K", "permitted temperature of the winding", default=393.15, min=330.0, max=500.0
-    )
-    poles_least: Value = quantity("1", "least number of poles", default=2.0, min=2.0, max=48.0)
-    poles_most: Value = quantity("1", "largest number of poles", default=6.0, min=2.0, max=48.0)
-    candidates: Value = quantity(
-        "1",
-        "least number of motors that are co-simulated; more follow until one fits",
-        default=9.0,
-        min=1.0,
-        max=200.0,
-    )
-
-
-@declaration
-class Starter:
-    """How an induction motor is started, where `start` is "soft" or "inverter"."""
-
-    soft_start: SoftStart = group(SoftStart, "soft starter", default=SoftStart(voltage=0.5, time=1.0))
-    inverter: Inverter = group(Inverter, "inverter", default=Inverter())
-
-
-@declaration
-class Driveline(Mounted):
-    """A cardan driveline between motor and machine. The start values are ours: the paper prints no dimensions."""
-
-    exponent: Value = quantity(
-        "1",
-        "exponent of Woehler's line for the damage of torque cycles; assumed",
-        default=5.0,
-        min=1.0,
-        max=20.0,
-    )
-
-
-@declaration
-class Chain(OrganLaw):
-    """The organs as chains, where `organ` is "chain", and the sweep over crank speeds with them."""
-
-    rods: Value = quantity("1", "number of rods of an organ", default=8.0, min=float(LEAST), max=float(MOST))
-    sweep_lowest: Value = quantity(
-        "rad/s", "lowest crank speed of the sweep", default=1.0, min=0.01, max=1000.0
-    )
-    sweep_highest: Value = quantity(
-        "rad/s", "highest crank speed of the sweep", default=15.0, above=0.0, max=1000.0
-    )
-    sweep_points: Value = quantity(
-        "1",
-        "number of speeds of the sweep; 0 leaves all but the study's own out",
-        default=15.0,
-        min=0.0,
-        max=200.0,
-    )
-    starts: Value = quantity(
-        "1", "starts at each speed, evenly over the turn: at least 10", default=10.0, min=10.0, max=1000.0
-    )
-    turns: Value = quantity(
-        "1", "crank turns that are evaluated of each start: at least 30", default=30.0, min=30.0, max=1e4
-    )
-
-
-ORGANS = ("two-bar", "chain")
-"""How the organs are modelled."""
-
-PLACES = ("crank", "motor")
-"""Where a driveline is: on the crank's shaft, behind the gear, or on the motor's, before it."""
-
-STARTS = ("direct", "soft", "inverter")
-
-
-@dataclasses.dataclass(frozen=True)
-class Section:
-    """A table of a study file. The study has its values, or None where it is `optional` and the file does not have
-    it; what it does not name is of `default`."""
-
-    declared: type
-    default: Any = None
-    optional: bool = False
-    whole: tuple[str, ...] = ()
-    """quantities that are whole numbers"""
-    keys: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    """other keys than quantities, as pydantic fields"""
-    form: Callable[..., type[BaseModel]] = schema
-    values: Callable[[Any], dict[str, Any]] = given_values
-    """what a checked table gives, by the name of the quantity"""
-
-
-SECTIONS: Mapping[str, Section] = {
-    "machine": Section(ChamberForces.Parameters),
-    "ratios": Section(Ratios),
-    "feed": Section(Feed),
-    "motor": Section(DcMotor.Parameters),
-    "run": Section(Run, whole=("turns",)),
-    "coupling": Section(Coupling, optional=True),
-    "monte_carlo": Section(MonteCarlo, whole=("runs", "seed"), keys={"event": (dict[str, Any], {})}),
-    "sizing": Section(Sizing, optional=True),
-    "gear": Section(Transmission, default=KINDS["gear"]),
-    "starter": Section(Starter),
-    "chain": Section(Chain, whole=("rods", "sweep_points", "starts", "turns")),
-    "driveline": Section(
-        Driveline,
-        optional=True,
-        keys={"place": (Literal[PLACES], "crank")},
-        form=form,
-        values=partial(given_line, prefix="driveline."),
-    ),
-}
 
 
 def _table(name: str, section: Section) -> tuple[Any, Any]:

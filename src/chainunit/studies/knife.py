@@ -28,8 +28,8 @@ from ..quantities import Layout, Value, declaration, quantity, variables
 from ..reading import Title, first_line, given_values, instance, packaged, read, schema, to_number, toml
 from ..system import Bond, CoSimulation, ModelComponent, System, energy_residual, export, shaft_joints
 from ..text import number
+from .duty import flywheel
 from .result import entries
-from .sizing import flywheel
 
 PINS = {
     "O1 crank bearing": "crank_bearing",

@@ -363,6 +363,12 @@ class Answers:
     standstill_time: Value = measure("s", "machine stands after", _standstill, during=_EVENTS)
 
 
+def same_measure(name: str) -> Any:
+    """A field that declares the measure of that name in another declaration, too."""
+    (declared,) = (each for each in dataclasses.fields(Answers) if each.name == name)
+    return dataclasses.field(metadata=declared.metadata)
+
+
 def read_answers(window: Window) -> Answers:
     """All measures of a window; None where one means nothing there, or there is no such thing."""
     values = {

@@ -16,7 +16,7 @@ import signal
 from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from itertools import islice
 from multiprocessing import get_context
 from pathlib import Path
@@ -34,9 +34,9 @@ from ..quantities import Layout, Value, declaration, quantity
 from ..system import CoSimulation
 from ..system.instance import remove_unpacked
 from ..text import entry
-from . import protection
 from .drive import Drive
 from .events import Event
+from .measures import Phase, Window, read_measure, same_measure
 from .quantiles import CONFIDENCE, Estimate, quantile, runs_needed, share
 from .rig import Rig
 
@@ -48,11 +48,11 @@ class Sample:
     crank_angle: Value = quantity("rad", "crank angle at which the event begins")
     event: Value = quantity("s", "time at which the event begins")
     trip_torque: Value = quantity("N.m", "crank torque at which the safety coupling opens in this run")
-    crank_torque_peak: Value = quantity("N.m", "crank torque, peak")
-    motor_torque_peak: Value = quantity("N.m", "motor torque, peak")
-    current_peak: Value = quantity("A", "motor current, peak")
-    rocker_torque_peak: Value = quantity("N.m", "rocker torque, peak")
-    speed_least: Value = quantity("rad/s", "crank speed, least")
+    crank_torque_peak: Value = same_measure("crank_torque_peak")
+    motor_torque_peak: Value = same_measure("motor_torque_peak")
+    current_peak: Value = same_measure("current_peak")
+    rocker_torque_peak: Value = same_measure("rocker_torque_peak")
+    speed_least: Value = same_measure("speed_least")
     stalls: Value = quantity("1", "1 where the crank stands at the end of the run")
     trips: Value = quantity("1", "1 where the safety coupling opens")
 
@@ -183,24 +183,17 @@ def one(task: Task, number: int, simulation: CoSimulation) -> Sample:
     stop = event + config.monte_carlo.duration
     guards = {"motor.tau": trip / drive.ratio} if config.coupling else None
     done = task.rig.follow(simulation, drawn.event, event, stop, guards=guards).run
-    time = done["time"].values
-    turned, speed = drive.crank_motion(done)
-
-    def peak(name: str) -> float:
-        return float(np.max(np.abs(done[name].values)))
-
-    angle = float(np.interp(event, time, turned))
+    angle = float(np.interp(event, done["time"].values, drive.crank_motion(done)[0]))
     tripped = simulation.time < stop - 0.5 * run.step
+    # from the saved state on: a lump may come in the middle of a step
+    window = Window(Phase.EVENT, done, drive, (), run.crank_speed)
+    stalls = not tripped and read_measure("stall_time", window) is not None
     return Sample(
         crank_angle=angle % (2.0 * math.pi),
         event=event,
         trip_torque=trip if config.coupling else None,
-        crank_torque_peak=float(np.max(np.abs(drive.crank_torque(done)))),
-        motor_torque_peak=peak("motor.air_gap_tau"),
-        current_peak=peak(f"motor.{drive.motor.current}"),
-        rocker_torque_peak=peak("machine.rocker.tau"),
-        speed_least=float(np.min(speed)),
-        stalls=float(not tripped and protection.stall(time, speed, run.crank_speed) is not None),
+        **{each.name: read_measure(each.name, window) for each in fields(Sample) if "read" in each.metadata},
+        stalls=float(stalls),
         trips=float(tripped),
     )
 

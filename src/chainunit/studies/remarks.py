@@ -7,7 +7,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..config import Chain
 from ..drives.cardan import ORDERS, two_joints
 from ..drives.dc_motor import DcMotor
 from ..engines import numpy_
@@ -16,6 +15,7 @@ from .coupling import peaks_on_coupling, remark_on_coupling
 from .judgement import model_verdict
 from .measures import Answers, reaches
 from .rig import CLOSED
+from .sections import Chain
 from .shaft import AMPLIFIED, NEAR
 from .study import LOAD_CYCLE, Study
 from .verdict import RESIDUAL, STEADY

@@ -16,74 +16,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import xarray as xr
 
 from ..config import Config
 from ..drives.catalogue import CatalogueMotor, catalogue
 from ..drives.gearing import motor_side
-from ..drives.induction_motor import InductionMotor, volts_per_hertz
-from ..drives.motor import T_RATED
-from ..engines import MATH, numpy_
+from ..drives.induction_motor import InductionMotor
+from ..engines import numpy_
 from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
-from ..machines.chain_unit import SIDES, SideName
-from ..quantities import Layout, Value, declaration, quantity
-from ..system.instance import Fmu
-from ..text import entry, number
-from .chain import HIGH, duty
-from .cycle import Cycle, all_on_one, cycle
+from ..quantities import Value, declaration, quantity
+from ..text import number
+from .chain import HIGH
 from .drive import Drive
-from .measures import BURNT
-from .rig import Rig
-
-
-def rms(*parts: tuple[float, Any]) -> float:
-    """RMS over parts of the time: pairs of (share of the time, values evenly spaced in that part)."""
-    whole = sum(share for share, _ in parts)
-    return math.sqrt(sum(share * float(np.mean(np.square(x))) for share, x in parts) / whole)
-
-
-def flywheel(torque: Any, speed: float, fluctuation: float) -> float:
-    """Inertia [kg m2] on the shaft that keeps (largest - least)/mean of its speed at `fluctuation`.
-
-    `torque` [N m] is what the shaft needs over a turn at constant `speed` [rad/s], evenly spaced in angle, shape
-    (n,), against a drive that gives its mean: J = (E_max - E_min)/(fluctuation w^2), with E the energy that runs
-    ahead of the mean (Wittenbauer's method with the torque at constant speed).
-    """
-    torque = np.asarray(torque, dtype=float)
-    excess = np.cumsum(torque - np.mean(torque)) * (2.0 * math.pi / len(torque))
-    return float(np.ptp(excess)) / (fluctuation * speed * speed)
-
-
-def start_time(time: Any, speed: Any, share: float = 0.95) -> float | None:
-    """Time at which the speed first reaches `share` of its mean over the last fifth of the run; None where the shaft
-    does not turn by then."""
-    speed = np.asarray(speed)
-    final = float(np.mean(speed[-max(1, len(speed) // 5) :]))
-    if not final > 0.0:
-        return None
-    return float(time[int(np.argmax(speed >= share * final))])
-
-
-_SPEED_DEVIATION = 0.03  # of the crank speed that is asked for
-
-
-@declaration
-class CycleNumbers:
-    """What the machine asks over a turn at constant crank speed; at the crank."""
-
-    power_mean: Value = quantity("W", "mean power")
-    torque_mean: Value = quantity("N.m", "mean torque, both sides loaded")
-    torque_peak: Value = quantity("N.m", "peak torque, both sides loaded")
-    torque_peak_one_sided: Value = quantity("N.m", "peak torque, all feed on one side, the larger of both")
-    torque_rms: Value = quantity("N.m", "RMS torque of the duty, both cases in their shares of time")
-    inertia_least: Value = quantity("kg.m2", "reflected inertia, least")
-    inertia_mean: Value = quantity("kg.m2", "reflected inertia, mean")
-    inertia_largest: Value = quantity("kg.m2", "reflected inertia, largest")
-    inertia_wanted: Value = quantity(
-        "kg.m2",
-        "inertia at the crank that the wanted fluctuation takes by the hand formula: rotor, gear and flywheel",
-    )
+from .duty import Duty, duty_of, titled_entries
+from .trial import Check, try_motor
 
 
 @declaration
@@ -92,38 +38,6 @@ class Flywheel:
 
     J: Value = quantity("kg.m2", "flywheel on the motor shaft")
     fluctuation: Value = quantity("1", "fluctuation of the crank speed in the run", kind="percent")
-
-
-@dataclass(frozen=True)
-class Check:
-    """What is used of what is permitted, in one unit."""
-
-    title: str
-    value: float | None
-    limit: float
-    unit: str
-    kind: str = ""
-
-    @property
-    def utilisation(self) -> float | None:
-        """value/limit; None where there is no value: the candidate does not get that far."""
-        return None if self.value is None else self.value / self.limit
-
-    @property
-    def passed(self) -> str:
-        """A limit that is passed, in words."""
-        value, limit = (number(x, self.unit, self.kind, full=False) for x in (self.value, self.limit))
-        used = number(self.utilisation, "1", "used")
-        return f"{self.title} {value}, {used}{' of' if used.endswith('%') else ''} the permitted {limit}"
-
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON."""
-        return {
-            "title": self.title,
-            "utilisation": entry(self.utilisation, "1", "used"),
-            "value": entry(self.value, self.unit, self.kind),
-            "limit": entry(self.limit, self.unit, self.kind),
-        }
 
 
 class Verdict(StrEnum):
@@ -216,9 +130,9 @@ class SizingResult:
         best = self.best
         assert self.config.sizing is not None
         return {
-            "asked": _entries(self.config.sizing),
+            "asked": titled_entries(self.config.sizing),
             **self.duty.as_dict(),
-            "flywheel": _entries(Flywheel(J=best.flywheel, fluctuation=best.fluctuation)),
+            "flywheel": titled_entries(Flywheel(J=best.flywheel, fluctuation=best.fluctuation)),
             "tried": {"value": len(self.candidates), "unit": "1"},
             "motors": {"value": self.motors, "unit": "1"},
             "weak": {"value": self.weak, "unit": "1"},
@@ -236,90 +150,6 @@ class SizingResult:
             "nearest": None if self.chosen else self.candidates.index(best),
             "notes": self.notes,
         }
-
-
-def _entries(declared: Any) -> dict[str, Any]:
-    layout = Layout(type(declared))
-    return {
-        v.name: entry(value, v.unit, v.kind) | {"title": v.description}
-        for v, value in zip(layout.variables, layout.values(declared), strict=True)
-    }
-
-
-@dataclass(frozen=True)
-class Duty:
-    """What the machine asks of any drive, at constant speed of the crank: the turn with both sides loaded, those with
-    all feed on one side, and which of these asks the larger RMS torque with two bars, as the rocker swings farther to
-    one side than to the other; with chains of many turns."""
-
-    both: Cycle
-    one_sided: Mapping[SideName, Cycle]
-    heavier: SideName
-    numbers: CycleNumbers
-
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON."""
-        peaks = {side: _peak(turn) for side, turn in self.one_sided.items()}
-        return {
-            "cycle": _entries(self.numbers),
-            "one_sided": {
-                "larger_rms": self.heavier,
-                "larger_peak": max(SIDES, key=lambda side: peaks[side]),
-            },
-        }
-
-
-def duty_of(config: Config, folder: Path, backend: Backend | None) -> Duty:
-    """The duty of a study with `sizing`; chains are run by their FMU, which is written to `folder`."""
-    feed, w = config.feed, config.run.crank_speed
-    loads = {side: all_on_one(side, feed.left, feed.right) for side in SIDES}
-    both = cycle(config.machine, w, feed.left, feed.right)
-    one_sided = {side: cycle(config.machine, w, *case) for side, case in loads.items()}
-    size = {side: rms((1.0, turn.crank_torque)) for side, turn in one_sided.items()}
-    heavier: SideName = "left" if size["left"] >= size["right"] else "right"
-    if config.chain is not None:
-        drive = Drive(InductionMotor, None, config.machine, chain=config.chain)
-        fmu = Fmu(drive.export_machine(folder, backend)[0])
-        try:
-            both = duty(fmu, drive, w, feed.left, feed.right)
-            one_sided = {side: duty(fmu, drive, w, *case) for side, case in loads.items()}
-        finally:
-            fmu.close()
-    return Duty(both, one_sided, heavier, cycle_numbers(config, both, one_sided, heavier))
-
-
-def _peak(cycle: Cycle) -> float:
-    """Largest crank torque of a cycle; of many turns of chains the quantile of their peaks, as no single one is a
-    prediction."""
-    peaks = np.max(np.abs(np.atleast_2d(cycle.crank_torque)), axis=1)
-    return float(np.quantile(peaks, HIGH))
-
-
-def cycle_numbers(
-    config: Config, both: Cycle, one_sided: Mapping[SideName, Cycle], heavier: SideName
-) -> CycleNumbers:
-    """Of a duty: with all feed on one side the RMS torque of the heavier, and the larger of both peaks, which may be
-    that of the other side."""
-    assert config.sizing is not None
-    w, share = config.run.crank_speed, config.sizing.one_sided_share
-    inertia = both.outputs.J * config.machine.p.ratio**2
-    mean = float(np.mean(both.crank_torque))
-    return CycleNumbers(
-        power_mean=mean * w,
-        torque_mean=mean,
-        torque_peak=_peak(both),
-        torque_peak_one_sided=max(_peak(turn) for turn in one_sided.values()),
-        torque_rms=rms((1.0 - share, both.crank_torque), (share, one_sided[heavier].crank_torque)),
-        inertia_least=float(np.min(inertia)),
-        inertia_mean=float(np.mean(inertia)),
-        inertia_largest=float(np.max(inertia)),
-        inertia_wanted=float(
-            np.quantile(
-                [flywheel(turn, w, config.sizing.fluctuation) for turn in np.atleast_2d(both.crank_torque)],
-                HIGH,
-            )
-        ),
-    )
 
 
 def size(
@@ -467,128 +297,17 @@ def proposed(config: Config, motor: CatalogueMotor, duty: Duty) -> Candidate:
 
 
 def judge(config: Config, c: Candidate, duty: Duty, files: Mapping[str, Path]) -> None:
-    """Co-simulate a candidate and fill in its checks."""
-    plate, drive = c.motor.nameplate, c.drive
-    w, turn = config.run.crank_speed, 2.0 * math.pi / config.run.crank_speed
-    ramp = config.run.ramp if drive.follows else None
-    # three times what the rated torque needs to bring everything up to speed, and at least the ramp of the start
-    inertia = drive.parameters.rotor.J + duty.numbers.inertia_mean / drive.ratio**2
-    rise = config.starter.soft_start.time if config.start == "soft" else ramp or 0.0
-    window = max(1.0, 3.0 * inertia * plate.speed / plate.torque, 1.5 * rise)
+    """Try a candidate and fill in its checks."""
     try:
-        rig = Rig(config, drive, files)
-        with rig.from_rest() as simulation:
-            start = simulation.run(window, config.run.step)
-            steady = simulation.run(window + 2.0 * turn, config.run.step)
-            event, shifts, one_sided = simulation.save(), [], {}
-            for side in SIDES:
-                feed = config.one_sided(side)
-                shifts.append(rig.follow(simulation, feed, event, event + feed.p.shift + turn).run)
-                one_sided[side] = simulation.run(simulation.time + turn, config.run.step)
+        trial = try_motor(config, c.motor, c.drive, duty, files)
     except InterruptedRunError:
         raise
     except RunError as error:
         c.reason = f"its run failed: {error}"
         return
-    speed = np.concatenate([start["motor.w"].values, steady["motor.w"].values])
-    times = np.concatenate([start["time"].values, steady["time"].values])
-    expected = w * drive.ratio
-    started = start_time(times, speed) if float(np.mean(steady["motor.w"])) > 0.5 * expected else None
-    loaded = (steady, *shifts, *one_sided.values())
-    c.duty_torque = max(float(np.max(np.abs(r["machine.tau"]))) for r in loaded) * drive.ratio
-    c.peak_torque = max(c.duty_torque, float(np.max(np.abs(start["machine.tau"]))) * drive.ratio)
-    c.checks = _checks(config, c, start, steady, one_sided, duty.heavier, started)
-
-
-def _checks(
-    config: Config,
-    c: Candidate,
-    start: xr.Dataset,
-    steady: xr.Dataset,
-    one_sided: Mapping[SideName, xr.Dataset],
-    heavier_side: SideName,
-    started: float | None,
-) -> dict[str, Check]:
-    asked, gear, plate, p = config.sizing, config.gear, c.motor.nameplate, c.drive.parameters
-    assert asked is not None
-    share, heavier = asked.one_sided_share, one_sided[heavier_side]
-    gap = "motor.air_gap_tau"
-    running = steady["motor.w"].values
-    mean_speed = float(np.mean(running))
-    c.fluctuation = float(np.ptp(running[len(running) // 2 :])) / mean_speed if mean_speed > 0.0 else math.inf
-    motor = c.drive.motor
-    cooling = motor.cooling(MATH, p, mean_speed)
-
-    def checked(value: float | None) -> float | None:
-        return value if started is not None else None
-
-    # heat of a start beyond that of running, as if spread over the hour
-    time, heat = start["time"].values, start["motor.heat"].values
-    steady_heat = (1.0 - share) * float(np.mean(steady["motor.heat"])) + share * float(
-        np.mean(heavier["motor.heat"])
-    )
-    extra = max(0.0, float(np.trapezoid(heat - steady_heat, time)))
-    mean_heat = steady_heat + asked.starts_per_hour * extra / 3600.0
-    # the runs are short and the winding in them as cold as the surroundings: as warm as it becomes, it heats more
-    ran_at = float(np.mean(steady[f"motor.{motor.temperature}"]))
-    temperature = min(BURNT, motor.settled_temperature(p, mean_heat, ran_at, mean_speed))
-    peak = max(float(np.max(np.abs(r[gap]))) for r in (steady, *one_sided.values()))
-    reflected = float(np.max(steady["machine.J"]))
-    torque = rms((1.0 - share, steady[gap].values), (share, heavier[gap].values))
-    hot = (1.0 + p.stator.alpha * (asked.temperature - T_RATED)) / (1.0 + p.stator.alpha * (ran_at - T_RATED))
-    permitted = permitted_starts(p, hot * steady_heat, hot * extra, cooling, asked.temperature)
-    if plate.starts and config.start == "direct":
-        # the catalogue's number is that of the bare rotor
-        total = p.rotor.J + float(np.mean(steady["machine.J"]))
-        permitted = min(permitted, plate.starts * plate.J / total)
-    frequency, voltage = plate.frequency, 1.0
-    longest = plate.locked_time
-    if c.drive.follows:
-        frequency = max(mean_speed * plate.poles / (4.0 * math.pi), 1.0)
-        voltage = float(volts_per_hertz(MATH, p, frequency))
-        longest = 1.0 + 1.2 * config.run.ramp
-    # as warm as it may become, at the frequency at which it runs: above the corner an inverter has no more voltage
-    c.breakdown_torque = motor.largest_torque(p, asked.temperature, voltage * p.supply.V, frequency)
-    weaker = min(1.0, plate.frequency / frequency)
-    cooled = min(1.0, cooling / motor.cooling(MATH, p, plate.speed))
-    checks = {
-        "start": Check("time to start", started, longest, "s"),
-        "rms_torque": Check("RMS torque", checked(torque), plate.torque * weaker * math.sqrt(cooled), "N.m"),
-        "peak_torque": Check(
-            "peak torque", checked(peak), c.breakdown_torque / asked.breakdown_margin, "N.m"
-        ),
-        "temperature": Check(
-            "rise of temperature",
-            checked(temperature - p.ambient.T),
-            asked.temperature - p.ambient.T,
-            "K",
-            "difference",
-        ),
-        "starts": Check("starts per hour", asked.starts_per_hour, permitted, "1"),
-        "crank_speed": Check(
-            "deviation of the crank speed",
-            checked(abs(mean_speed / (c.drive.ratio * config.run.crank_speed) - 1.0)),
-            _SPEED_DEVIATION,
-            "1",
-            "percent",
-        ),
-        "speed": Check("speed fluctuation", checked(c.fluctuation), asked.fluctuation, "1", "percent"),
-    }
-    if math.isfinite(asked.inertia_ratio):
-        ratio = (reflected + p.rotor.J - plate.J) / plate.J
-        checks["inertia"] = Check("inertia ratio", ratio, asked.inertia_ratio, "1")
-    if "gear.torque_limit" in config.given:
-        checks["gear"] = Check("torque of the gear", c.peak_torque, gear.torque_limit, "N.m")
-    return checks
-
-
-def permitted_starts(
-    p: Any, running_heat: float, start_heat: float, cooling: float, temperature: float
-) -> float:
-    """Starts per hour that bring the winding to its permitted `temperature` [K], beside `running_heat` [W], with
-    `start_heat` [J] each; a ten-thousandth where running alone is too hot."""
-    spare = (temperature - p.ambient.T) * cooling / p.stator.R_th - running_heat
-    return max(1e-4, 3600.0 * spare / start_heat) if start_heat > 0.0 else 1e6
+    c.checks, c.fluctuation = trial.checks(), trial.fluctuation
+    c.peak_torque, c.duty_torque = trial.peak_torque, trial.duty_torque
+    c.breakdown_torque = trial.breakdown_torque
 
 
 def rank(candidates: list[Candidate]) -> None:

@@ -1,0 +1,146 @@
+"""What a machine asks of any drive: turns at constant speed, and the inertia that evens the speed.
+
+The turns are by inverse dynamics, of chains by their FMU."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..config import Config
+from ..drives.induction_motor import InductionMotor
+from ..fmu.backends import Backend
+from ..machines.chain_unit import SIDES, SideName
+from ..quantities import Layout, Value, declaration, quantity
+from ..system.instance import Fmu
+from ..text import entry
+from .chain import HIGH
+from .chain import duty as chain_duty
+from .cycle import Cycle, all_on_one, cycle
+from .drive import Drive
+
+
+def rms(*parts: tuple[float, Any]) -> float:
+    """RMS over parts of the time: pairs of (share of the time, values evenly spaced in that part)."""
+    whole = sum(share for share, _ in parts)
+    return math.sqrt(sum(share * float(np.mean(np.square(x))) for share, x in parts) / whole)
+
+
+def flywheel(torque: Any, speed: float, fluctuation: float) -> float:
+    """Inertia [kg m2] on the shaft that keeps (largest - least)/mean of its speed at `fluctuation`.
+
+    `torque` [N m] is what the shaft needs over a turn at constant `speed` [rad/s], evenly spaced in angle, shape
+    (n,), against a drive that gives its mean: J = (E_max - E_min)/(fluctuation w^2), with E the energy that runs
+    ahead of the mean (Wittenbauer's method with the torque at constant speed).
+    """
+    torque = np.asarray(torque, dtype=float)
+    excess = np.cumsum(torque - np.mean(torque)) * (2.0 * math.pi / len(torque))
+    return float(np.ptp(excess)) / (fluctuation * speed * speed)
+
+
+@declaration
+class CycleNumbers:
+    """What the machine asks over a turn at constant crank speed; at the crank."""
+
+    power_mean: Value = quantity("W", "mean power")
+    torque_mean: Value = quantity("N.m", "mean torque, both sides loaded")
+    torque_peak: Value = quantity("N.m", "peak torque, both sides loaded")
+    torque_peak_one_sided: Value = quantity("N.m", "peak torque, all feed on one side, the larger of both")
+    torque_rms: Value = quantity("N.m", "RMS torque of the duty, both cases in their shares of time")
+    inertia_least: Value = quantity("kg.m2", "reflected inertia, least")
+    inertia_mean: Value = quantity("kg.m2", "reflected inertia, mean")
+    inertia_largest: Value = quantity("kg.m2", "reflected inertia, largest")
+    inertia_wanted: Value = quantity(
+        "kg.m2",
+        "inertia at the crank that the wanted fluctuation takes by the hand formula: rotor, gear and flywheel",
+    )
+
+
+@dataclass(frozen=True)
+class Duty:
+    """What the machine asks of any drive, at constant speed of the crank: the turn with both sides loaded, those with
+    all feed on one side, and which of these asks the larger RMS torque with two bars, as the rocker swings farther to
+    one side than to the other; with chains of many turns."""
+
+    both: Cycle
+    one_sided: Mapping[SideName, Cycle]
+    heavier: SideName
+    numbers: CycleNumbers
+
+    def as_dict(self) -> dict[str, Any]:
+        """Ready for JSON."""
+        peaks = {side: _peak(turn) for side, turn in self.one_sided.items()}
+        return {
+            "cycle": titled_entries(self.numbers),
+            "one_sided": {
+                "larger_rms": self.heavier,
+                "larger_peak": max(SIDES, key=lambda side: peaks[side]),
+            },
+        }
+
+
+def duty_of(config: Config, folder: Path, backend: Backend | None) -> Duty:
+    """The duty of a study with `sizing`; chains are run by their FMU, which is written to `folder`."""
+    feed, w = config.feed, config.run.crank_speed
+    loads = {side: all_on_one(side, feed.left, feed.right) for side in SIDES}
+    both = cycle(config.machine, w, feed.left, feed.right)
+    one_sided = {side: cycle(config.machine, w, *case) for side, case in loads.items()}
+    size = {side: rms((1.0, turn.crank_torque)) for side, turn in one_sided.items()}
+    heavier: SideName = "left" if size["left"] >= size["right"] else "right"
+    if config.chain is not None:
+        drive = Drive(InductionMotor, None, config.machine, chain=config.chain)
+        fmu = Fmu(drive.export_machine(folder, backend)[0])
+        try:
+            both = chain_duty(fmu, drive, w, feed.left, feed.right)
+            one_sided = {side: chain_duty(fmu, drive, w, *case) for side, case in loads.items()}
+        finally:
+            fmu.close()
+    return Duty(both, one_sided, heavier, cycle_numbers(config, both, one_sided, heavier))
+
+
+def _peak(cycle: Cycle) -> float:
+    """Largest crank torque of a cycle; of many turns of chains the quantile of their peaks, as no single one is a
+    prediction."""
+    peaks = np.max(np.abs(np.atleast_2d(cycle.crank_torque)), axis=1)
+    return float(np.quantile(peaks, HIGH))
+
+
+def cycle_numbers(
+    config: Config, both: Cycle, one_sided: Mapping[SideName, Cycle], heavier: SideName
+) -> CycleNumbers:
+    """Of a duty: with all feed on one side the RMS torque of the heavier, and the larger of both peaks, which may be
+    that of the other side."""
+    assert config.sizing is not None
+    w, share = config.run.crank_speed, config.sizing.one_sided_share
+    inertia = both.outputs.J * config.machine.p.ratio**2
+    mean = float(np.mean(both.crank_torque))
+    return CycleNumbers(
+        power_mean=mean * w,
+        torque_mean=mean,
+        torque_peak=_peak(both),
+        torque_peak_one_sided=max(_peak(turn) for turn in one_sided.values()),
+        torque_rms=rms((1.0 - share, both.crank_torque), (share, one_sided[heavier].crank_torque)),
+        inertia_least=float(np.min(inertia)),
+        inertia_mean=float(np.mean(inertia)),
+        inertia_largest=float(np.max(inertia)),
+        inertia_wanted=float(
+            np.quantile(
+                [flywheel(turn, w, config.sizing.fluctuation) for turn in np.atleast_2d(both.crank_torque)],
+                HIGH,
+            )
+        ),
+    )
+
+
+def titled_entries(declared: Any) -> dict[str, Any]:
+    """The values of an instance with unit, kind and description, ready for JSON."""
+    layout = Layout(type(declared))
+    return {
+        v.name: entry(value, v.unit, v.kind) | {"title": v.description}
+        for v, value in zip(layout.variables, layout.values(declared), strict=True)
+    }

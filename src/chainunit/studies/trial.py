@@ -1,0 +1,272 @@
+"""A motor on trial: what its runs with the machine use of what is permitted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..config import Config
+from ..drives.catalogue import CatalogueMotor
+from ..drives.induction_motor import volts_per_hertz
+from ..drives.motor import T_RATED
+from ..engines import MATH
+from ..machines.chain_unit import SIDES, SideName
+from ..text import entry, number
+from .drive import Drive
+from .duty import Duty, rms
+from .measures import BURNT, peak
+from .rig import Rig
+
+_SPEED_DEVIATION = 0.03  # of the crank speed that is asked for
+_GAP = "motor.air_gap_tau"
+
+
+def start_time(time: Any, speed: Any, share: float = 0.95) -> float | None:
+    """Time at which the speed first reaches `share` of its mean over the last fifth of the run; None where the shaft
+    does not turn by then."""
+    speed = np.asarray(speed)
+    final = float(np.mean(speed[-max(1, len(speed) // 5) :]))
+    if not final > 0.0:
+        return None
+    return float(time[int(np.argmax(speed >= share * final))])
+
+
+@dataclass(frozen=True)
+class Check:
+    """What is used of what is permitted, in one unit."""
+
+    title: str
+    value: float | None
+    limit: float
+    unit: str
+    kind: str = ""
+
+    @property
+    def utilisation(self) -> float | None:
+        """value/limit; None where there is no value: the candidate does not get that far."""
+        return None if self.value is None else self.value / self.limit
+
+    @property
+    def passed(self) -> str:
+        """A limit that is passed, in words."""
+        value, limit = (number(x, self.unit, self.kind, full=False) for x in (self.value, self.limit))
+        used = number(self.utilisation, "1", "used")
+        return f"{self.title} {value}, {used}{' of' if used.endswith('%') else ''} the permitted {limit}"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Ready for JSON."""
+        return {
+            "title": self.title,
+            "utilisation": entry(self.utilisation, "1", "used"),
+            "value": entry(self.value, self.unit, self.kind),
+            "limit": entry(self.limit, self.unit, self.kind),
+        }
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Runs of a motor from the catalogue in a `drive`: a start under load, steady running, and with all feed on each
+    side, while it moves there and a turn of the crank after."""
+
+    config: Config
+    motor: CatalogueMotor
+    drive: Drive
+    heavier: SideName
+    start: xr.Dataset
+    steady: xr.Dataset
+    shifts: tuple[xr.Dataset, ...]
+    one_sided: Mapping[SideName, xr.Dataset]
+
+    @cached_property
+    def started(self) -> float | None:
+        """Time to start [s]; None where the motor does not bring the machine up to speed."""
+        runs = (self.start, self.steady)
+        speed, time = (np.concatenate([run[name].values for run in runs]) for name in ("motor.w", "time"))
+        expected = self.config.run.crank_speed * self.drive.ratio
+        return start_time(time, speed) if self.speed > 0.5 * expected else None
+
+    @cached_property
+    def speed(self) -> float:
+        """Of the motor, mean [rad/s]."""
+        return float(np.mean(self.steady["motor.w"]))
+
+    @cached_property
+    def fluctuation(self) -> float:
+        """(Largest - least)/mean of the speed."""
+        w = self.steady["motor.w"].values
+        return float(np.ptp(w[len(w) // 2 :])) / self.speed if self.speed > 0.0 else math.inf
+
+    @cached_property
+    def duty_torque(self) -> float:
+        """Peak at the crank in steady running, and while all feed moves to either side and runs there [N m]."""
+        runs = (self.steady, *self.shifts, *self.one_sided.values())
+        return max(peak(run["machine.tau"]) for run in runs) * self.drive.ratio
+
+    @cached_property
+    def peak_torque(self) -> float:
+        """The same, and in the start [N m]."""
+        return max(self.duty_torque, peak(self.start["machine.tau"]) * self.drive.ratio)
+
+    @cached_property
+    def frequency(self) -> float:
+        """Of the supply in steady running [Hz]."""
+        plate = self.motor.nameplate
+        return max(self.speed * plate.poles / (4.0 * math.pi), 1.0) if self.drive.follows else plate.frequency
+
+    @cached_property
+    def breakdown_torque(self) -> float:
+        """Of the motor [N m], as warm as it may become, at the frequency at which it runs: above the corner an
+        inverter has no more voltage."""
+        assert self.config.sizing is not None
+        p = self.drive.parameters
+        voltage = float(volts_per_hertz(MATH, p, self.frequency)) if self.drive.follows else 1.0
+        T = self.config.sizing.temperature
+        return float(self.drive.motor.largest_torque(p, T, voltage * p.supply.V, self.frequency))
+
+    @cached_property
+    def temperature(self) -> float:
+        """Of the winding, as if the duty with its starts went on for ever [K]; `BURNT` where it does not settle."""
+        assert self.config.sizing is not None
+        steady, extra = self._heat
+        mean = steady + self.config.sizing.starts_per_hour * extra / 3600.0
+        p, motor = self.drive.parameters, self.drive.motor
+        return min(BURNT, motor.settled_temperature(p, mean, self._ran_at, self.speed))
+
+    @cached_property
+    def permitted_starts(self) -> float:
+        """Starts per hour that the winding permits, and of a motor on the line the catalogue."""
+        assert self.config.sizing is not None
+        p, plate = self.drive.parameters, self.motor.nameplate
+        warm, cold = (
+            1.0 + p.stator.alpha * (T - T_RATED) for T in (self.config.sizing.temperature, self._ran_at)
+        )
+        # the runs are short and the winding in them as cold as the surroundings: as warm as it becomes, it heats more
+        running, start = (warm / cold * heat for heat in self._heat)
+        permitted = permitted_starts(p, running, start, self._cooling, self.config.sizing.temperature)
+        if plate.starts and self.config.start == "direct":
+            # the catalogue's number is that of the bare rotor
+            total = p.rotor.J + float(np.mean(self.steady["machine.J"]))
+            permitted = min(permitted, plate.starts * plate.J / total)
+        return permitted
+
+    @property
+    def _cooling(self) -> float:
+        return float(self.drive.motor.cooling(MATH, self.drive.parameters, self.speed))
+
+    @cached_property
+    def _ran_at(self) -> float:
+        """Temperature of the winding in the runs [K]."""
+        return float(np.mean(self.steady[f"motor.{self.drive.motor.temperature}"]))
+
+    @cached_property
+    def _heat(self) -> tuple[float, float]:
+        """Heat of the duty [W], and that of a start beyond it [J]."""
+        running, one_sided = (
+            float(np.mean(run["motor.heat"])) for run in (self.steady, self.one_sided[self.heavier])
+        )
+        steady = (1.0 - self._share) * running + self._share * one_sided
+        time, heat = self.start["time"].values, self.start["motor.heat"].values
+        return steady, max(0.0, float(np.trapezoid(heat - steady, time)))
+
+    @property
+    def _share(self) -> float:
+        assert self.config.sizing is not None
+        return float(self.config.sizing.one_sided_share)
+
+    def checks(self) -> dict[str, Check]:
+        """What is used of what is permitted, by name; without a value where the machine does not get up to speed."""
+        asked, plate, p = self.config.sizing, self.motor.nameplate, self.drive.parameters
+        assert asked is not None
+
+        def check(title: str, value: float, limit: float, unit: str, kind: str = "") -> Check:
+            return Check(title, value if self.started is not None else None, limit, unit, kind)
+
+        longest = 1.0 + 1.2 * self.config.run.ramp if self.drive.follows else plate.locked_time
+        torques = (self.steady[_GAP].values, self.one_sided[self.heavier][_GAP].values)
+        weaker = min(1.0, plate.frequency / self.frequency)
+        cooled = min(1.0, self._cooling / self.drive.motor.cooling(MATH, p, plate.speed))
+        breakdown = self.breakdown_torque / asked.breakdown_margin
+        asked_speed = self.drive.ratio * self.config.run.crank_speed
+        checks = {
+            "start": Check("time to start", self.started, longest, "s"),
+            "rms_torque": check(
+                "RMS torque",
+                rms((1.0 - self._share, torques[0]), (self._share, torques[1])),
+                plate.torque * weaker * math.sqrt(cooled),
+                "N.m",
+            ),
+            "peak_torque": check(
+                "peak torque",
+                max(peak(run[_GAP]) for run in (self.steady, *self.one_sided.values())),
+                breakdown,
+                "N.m",
+            ),
+            "temperature": check(
+                "rise of temperature",
+                self.temperature - p.ambient.T,
+                asked.temperature - p.ambient.T,
+                "K",
+                "difference",
+            ),
+            "starts": Check("starts per hour", asked.starts_per_hour, self.permitted_starts, "1"),
+            "crank_speed": check(
+                "deviation of the crank speed",
+                abs(self.speed / asked_speed - 1.0),
+                _SPEED_DEVIATION,
+                "1",
+                "percent",
+            ),
+            "speed": check("speed fluctuation", self.fluctuation, asked.fluctuation, "1", "percent"),
+        }
+        if math.isfinite(asked.inertia_ratio):
+            reflected = float(np.max(self.steady["machine.J"]))
+            ratio = (reflected + p.rotor.J - plate.J) / plate.J
+            checks["inertia"] = Check("inertia ratio", ratio, asked.inertia_ratio, "1")
+        if "gear.torque_limit" in self.config.given:
+            limit = self.config.gear.torque_limit
+            checks["gear"] = Check("torque of the gear", self.peak_torque, limit, "N.m")
+        return checks
+
+
+def try_motor(
+    config: Config, motor: CatalogueMotor, drive: Drive, duty: Duty, files: Mapping[str, Path]
+) -> Trial:
+    """Co-simulate a motor in its drive.
+
+    Raises
+    ------
+    RunError
+        where an FMU fails.
+    """
+    plate, turn = motor.nameplate, config.turn
+    ramp = config.run.ramp if drive.follows else 0.0
+    # three times what the rated torque needs to bring everything up to speed, and at least the ramp of the start
+    inertia = drive.parameters.rotor.J + duty.numbers.inertia_mean / drive.ratio**2
+    rise = config.starter.soft_start.time if config.start == "soft" else ramp
+    window = max(1.0, 3.0 * inertia * plate.speed / plate.torque, 1.5 * rise)
+    rig = Rig(config, drive, files)
+    with rig.from_rest() as simulation:
+        start = simulation.run(window, rig.step)
+        steady = simulation.run(window + 2.0 * turn, rig.step)
+        event, shifts, one_sided = simulation.save(), [], {}
+        for side in SIDES:
+            feed = config.one_sided(side)
+            shifts.append(rig.follow(simulation, feed, event, event + feed.p.shift + turn).run)
+            one_sided[side] = simulation.run(simulation.time + turn, rig.step)
+    return Trial(config, motor, drive, duty.heavier, start, steady, tuple(shifts), one_sided)
+
+
+def permitted_starts(
+    p: Any, running_heat: float, start_heat: float, cooling: float, temperature: float
+) -> float:
+    """Starts per hour that bring the winding to its permitted `temperature` [K], beside `running_heat` [W], with
+    `start_heat` [J] each; a ten-thousandth where running alone is too hot."""
+    spare = (temperature - p.ambient.T) * cooling / p.stator.R_th - running_heat
+    return max(1e-4, 3600.0 * spare / start_heat) if start_heat > 0.0 else 1e6
