@@ -186,7 +186,9 @@ def test_two_of_a_kind_run_beside_each_other(tmp_path):
     result = as_dict(study)
     assert result["event"]["jam_left_2"]["force"] == {"value": 1500.0, "unit": "N"}
     assert result["events"]["jam_left_2"]["title"] == "a lump jams the left side (2)"
-    assert "event.jam_left.force" in result["given"] and "event.jam_left.rise" not in result["given"]
+    assert (
+        result["origins"]["event.jam_left.force"] == "file" and "event.jam_left.rise" not in result["origins"]
+    )
 
 
 @pytest.fixture

@@ -96,7 +96,7 @@ def test_at_the_bounds_every_number_is_finite(seed):
 
 
 def test_the_example_and_random_machines_give_no_remark():
-    assert config.load().remarks == ()
+    assert config.load().slips == ()
     rng = np.random.default_rng(5)
     for _ in range(20):
         named = ChamberForces.parameter_layout.named(random_machine(rng).p)
@@ -130,24 +130,24 @@ def test_the_example_and_random_machines_give_no_remark():
     ],
 )
 def test_a_slip_of_the_unit_is_named_with_what_was_meant(text, name, meant):
-    (slip,) = config.parse(text).remarks
+    (slip,) = config.parse(text).slips
     assert (slip.variable.name, slip.meant) == (name, meant)
     assert str(slip).startswith(f"{name} = ") and (f'was "{meant}" meant?' in str(slip)) == bool(meant)
     if meant and name.startswith("event."):
         key = name.rsplit(".", 1)[1]
         line = next(line for line in text.splitlines() if line.startswith(key))
-        assert config.parse(text.replace(line, f'{key} = "{meant}"')).remarks == ()
+        assert config.parse(text.replace(line, f'{key} = "{meant}"')).slips == ()
     elif meant:
         section, *keys = name.split(".")
         inner = f'"{meant}"'
         for key in reversed(keys[1:]):
             inner = f"{{ {key} = {inner} }}"
-        assert config.parse(f"[{section}]\n{keys[0]} = {inner}").remarks == ()
+        assert config.parse(f"[{section}]\n{keys[0]} = {inner}").slips == ()
 
 
 def test_a_machine_in_millimetres_is_told_for_each_length():
     text = "[machine]\n" + "\n".join(f"{name} = {x}" for name, x in MM.items())
-    assert {slip.variable.name: slip.meant for slip in config.parse(text).remarks} == {
+    assert {slip.variable.name: slip.meant for slip in config.parse(text).slips} == {
         f"machine.{name}": f"{x:g} mm" for name, x in MM.items()
     }
 
@@ -176,8 +176,8 @@ def test_the_remark_stands_on_terminal_page_and_in_json():
     drive = Drive(DcMotor, given.motor, given.machine)
     study = Study(given, drive, statics(given, drive))
     result = as_dict(study)
-    said = str(given.remarks[0])
-    assert result["remarks"] == [
+    said = str(given.slips[0])
+    assert result["slips"] == [
         {
             "name": "machine.pin.diameter",
             "given": {"value": 60.0, "unit": "m"},
@@ -189,9 +189,9 @@ def test_the_remark_stands_on_terminal_page_and_in_json():
     told = said_of(study)
     assert told.count(f"Remark: {said}\n") == 1 and "?." not in told
     html = page_of(study, result)
-    assert 'data-path="remarks.0.said"' in html and "Is this what was meant?" in html
+    assert 'data-path="slips.0.said"' in html and "Is this what was meant?" in html
 
 
 def test_a_gear_ratio_that_no_drive_has_is_remarked():
-    (told,) = map(str, config.parse("[machine]\nratio = 5000").remarks)
+    (told,) = map(str, config.parse("[machine]\nratio = 5000").slips)
     assert told.startswith("machine.ratio = 5000: is unusual") and "usual: 1 to 500" in told

@@ -28,7 +28,7 @@ from chainunit.studies.cycle import cycle
 from chainunit.studies.drive import Drive
 from chainunit.studies.duty import flywheel, rms
 from chainunit.studies.rig import Rig
-from chainunit.studies.sizing import Verdict
+from chainunit.studies.sizing import Standing
 from chainunit.studies.trial import Check, permitted_starts, start_time
 from chainunit.system import CoSimulation, Profile, System
 
@@ -127,10 +127,10 @@ def test_the_smallest_that_fits_is_chosen_and_the_others_are_told_why(sized):
         assert c.reason
         used = [check.utilisation for check in c.checks.values()]
         fits = all(u is not None and u <= 1.0 for u in used)
-        assert fits == c.fits == (c.verdict is not Verdict.REJECTED)
-        if c.verdict is Verdict.FITS:
+        assert fits == c.fits == (c.verdict is not Standing.REJECTED)
+        if c.verdict is Standing.FITS:
             assert c.motor.nameplate.power >= chosen.motor.nameplate.power
-    assert {c.verdict for c in sized.candidates} >= {Verdict.CHOSEN, Verdict.FITS}
+    assert {c.verdict for c in sized.candidates} >= {Standing.CHOSEN, Standing.FITS}
 
 
 def test_peaks_are_of_both_sides(sized, tmp_path):
@@ -180,7 +180,7 @@ def test_a_fixed_ratio_is_kept_and_must_give_the_speed(tmp_path, monkeypatch):
     monkeypatch.setattr(sizing, "catalogue", lambda extra: small(1))
     found = sizing.size(one_candidate("[gear]\nratio = 62\n", fluctuation=0.5), tmp_path, lambda *said: None)
     (c,) = found.candidates
-    assert c.drive.ratio == 62.0 and c.verdict is Verdict.INSUFFICIENT and found.chosen is None
+    assert c.drive.ratio == 62.0 and c.verdict is Standing.INSUFFICIENT and found.chosen is None
     assert c.checks["crank_speed"].value == pytest.approx(1.0 - 52.0 / 62.0, abs=0.02)
 
 
@@ -198,7 +198,7 @@ def test_without_a_fit_the_whole_catalogue_is_tried_and_the_nearest_is_named(tmp
     assert found.chosen is None and len(found.candidates) == found.motors == 4
     violations = [c.checks["gear"].utilisation for c in found.candidates]
     assert violations == sorted(violations) and violations[0] > 1.0
-    assert [c.verdict for c in found.candidates] == [Verdict.INSUFFICIENT] + 3 * [Verdict.REJECTED]
+    assert [c.verdict for c in found.candidates] == [Standing.INSUFFICIENT] + 3 * [Standing.REJECTED]
     assert found.best is found.candidates[0] and "torque of the gear" in found.answer
     assert "4 of 4 were tried" in found.answer
     result = found.as_dict()
@@ -237,7 +237,7 @@ def test_sizing_climbs_until_one_fits(tmp_path, monkeypatch):
     found = sizing.size(config, tmp_path, lambda *said: None)
     assert found.chosen is not None and 1 < len(found.candidates) < found.motors
     others = [c for c in found.candidates if c is not found.chosen]
-    assert all(c.verdict is Verdict.REJECTED for c in others)
+    assert all(c.verdict is Standing.REJECTED for c in others)
     assert all(c.motor.nameplate.power < found.chosen.motor.nameplate.power for c in others)
 
 
@@ -333,7 +333,7 @@ def test_above_the_corner_an_inverter_has_less_torque(tmp_path, monkeypatch):
     rated = c.motor.nameplate.torque
     assert c.checks["rms_torque"].limit == pytest.approx(0.5 * rated, rel=0.1)
     # all feed on the right asks more than it has left, all on the left does not
-    assert c.verdict is Verdict.INSUFFICIENT and "peak torque" in c.reason
+    assert c.verdict is Standing.INSUFFICIENT and "peak torque" in c.reason
 
 
 def test_the_shift_of_the_feed_keeps_its_mass():

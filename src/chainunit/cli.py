@@ -85,8 +85,8 @@ def _study_file(file: Path | None) -> Any:
     from . import config as configuration
 
     loaded = configuration.load(file)
-    for remark in loaded.remarks:
-        _console(stderr=True).print(f"Remark: {remark.sentence}", soft_wrap=True)
+    for slip in loaded.slips:
+        _console(stderr=True).print(f"Remark: {slip.sentence}", soft_wrap=True)
     return loaded
 
 

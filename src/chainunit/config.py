@@ -95,7 +95,7 @@ class Config:
     source: str
     given: frozenset[str]
     """names of all that the file sets, such as "machine.crank.m"; everything else is the example's"""
-    remarks: tuple[Slip, ...] = ()
+    slips: tuple[Slip, ...] = ()
     """values that look like a slip of the unit"""
 
     @property
@@ -109,6 +109,10 @@ class Config:
         soft starter."""
         soft = self.starter.soft_start.time if self.start == "soft" else 0.0
         return float(max(self.run.ramp, soft) + self.run.settle_turns * self.turn)
+
+    def gives(self, section: str) -> bool:
+        """Whether the file sets anything in that table."""
+        return any(name.startswith(f"{section}.") for name in self.given)
 
     def one_sided(self, side: SideName) -> Event:
         """All feed on that side: the event of the study, where it has one, else the example's."""
@@ -152,17 +156,17 @@ def parse(text: str, source: str = "config") -> Config:
     except ValidationError as error:
         raise InputError(first_line(error, _File)) from error
     declared = {name: section.declared for name, section in SECTIONS.items()}
-    remarks = tuple(slips(declared, data))
+    unusual = tuple(slips(declared, data))
     try:
         events = read_events(checked.event)
         if "event" in data:
             kinds = {f"event.{name}": event.Parameters for name, event in events.items()}
             tables = dict(zip(events, data["event"], strict=True))
-            remarks += tuple(slips(kinds, {"event": tables}))
-        return _config(data, checked, events, source, remarks)
+            unusual += tuple(slips(kinds, {"event": tables}))
+        return _config(data, checked, events, source, unusual)
     except InputError as error:
         # what does not fit together may be a slip of the unit
-        hints = [f'was {slip.variable.name} = "{slip.meant}" meant?' for slip in remarks if slip.meant]
+        hints = [f'was {slip.variable.name} = "{slip.meant}" meant?' for slip in unusual if slip.meant]
         raise type(error)("; ".join([str(error), *hints])) from error
 
 
@@ -171,7 +175,7 @@ def _config(
     checked: Any,
     events: Mapping[str, Event],
     source: str,
-    remarks: tuple[Slip, ...],
+    unusual: tuple[Slip, ...],
 ) -> Config:
     """The study of a file whose values are each allowed."""
     _check_company(data)
@@ -205,7 +209,7 @@ def _config(
         chain=values["chain"] if checked.organ == "chain" else None,
         source=source,
         given=frozenset(_names(data, events)),
-        remarks=remarks,
+        slips=unusual,
         **parts,
     )
     if config.driveline is not None:
@@ -362,14 +366,14 @@ def _beside(name: str, source: str) -> Path | None:
     return (Path(source).parent / name) if name else None
 
 
-_LENGTHS = ("r", "l", "h", "c", "hy", "e", "l1", "l2", "z")
+LENGTHS = ("r", "l", "h", "c", "hy", "e", "l1", "l2", "z")
 
 
 def _over_example(data: Mapping[str, Any]) -> dict[str, Any]:
     """A study file laid over the packaged example: what is not named is the example's. Its ratios give way to
     lengths of the user's own."""
     base = toml(example())
-    if any(name in data.get("machine", {}) for name in _LENGTHS) and "ratios" not in data:
+    if any(name in data.get("machine", {}) for name in LENGTHS) and "ratios" not in data:
         del base["ratios"]
     base["title"] = ""
     return merged(base, data)

@@ -19,7 +19,7 @@ from .motion import Animation
 
 Form = Literal["both", "short", "long"]
 Severity = Literal["good", "partly", "bad", "warning", "alarm", "remark"]
-Origin = Literal["", "file", "example", "default"]
+Origin = Literal["", "file", "example", "tuned", "sizing", "default"]
 
 
 @dataclass(frozen=True)
@@ -298,6 +298,7 @@ class Source:
 
     def _origin(self, path: str) -> Origin:
         """Where a given value is from, if the result says it."""
-        if "given" not in self.result:
+        if "origins" not in self.result:
             return ""
-        return "file" if path in self.result["given"] else "example"
+        origin: Origin = self.result["origins"].get(path, "example")
+        return origin

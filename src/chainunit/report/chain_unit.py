@@ -128,8 +128,8 @@ def _answer(s: b.Source, study: Study) -> Iterator[b.Block]:
         verdict = s.result["verdict"][of]
         if verdict is not None:
             yield b.Judgement(_HOLDS[verdict["holds"]], s.words(f"verdict.{of}.text"))
-    if slips := s.result["remarks"]:
-        items = tuple(s.words(f"remarks.{i}.said") for i in range(len(slips)))
+    if slips := s.result["slips"]:
+        items = tuple(s.words(f"slips.{i}.said") for i in range(len(slips)))
         yield b.Judgement("remark", Strong("Is this what was meant?"), items=items)
     nearest = s.result["sizing"].get("nearest") if "sizing" in s.result else None
     if nearest is not None:

@@ -7,15 +7,15 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from ..studies.sizing import Verdict
+from ..studies.sizing import Standing
 from ..studies.study import Study
 from . import blocks as b
 from .lines import Aside, Line, Strong, capital, joined, line
 
 _NAMED = 5  # of the candidates that do not fit; the table has all
-_RANK = {verdict.value: i for i, verdict in enumerate(Verdict)}
-_SIGN = {Verdict.CHOSEN: "✓", Verdict.FITS: "○", Verdict.INSUFFICIENT: "✗", Verdict.REJECTED: "✗"}
-_SEVERITY: dict[str, b.Severity] = {Verdict.CHOSEN: "good", Verdict.FITS: "partly"}
+_RANK = {standing.value: i for i, standing in enumerate(Standing)}
+_SIGN = {Standing.CHOSEN: "✓", Standing.FITS: "○", Standing.INSUFFICIENT: "✗", Standing.REJECTED: "✗"}
+_SEVERITY: dict[str, b.Severity] = {Standing.CHOSEN: "good", Standing.FITS: "partly"}
 
 
 def spoken(name: str) -> str:

@@ -31,7 +31,13 @@ _POLICY = (
     "font-src data:"
 )
 _SIGN = {"good": "✓", "partly": "◐", "bad": "✗", "warning": "!"}
-_ORIGIN = {"file": "the study file's", "example": "the example's", "default": "the default"}
+_ORIGIN = {
+    "file": "the study file's",
+    "example": "the example's",
+    "tuned": "tuned to the machine",
+    "sizing": "found by sizing",
+    "default": "the default",
+}
 
 
 def write(report: b.Report, folder: Path) -> Path:

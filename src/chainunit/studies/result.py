@@ -40,7 +40,7 @@ def as_dict(study: Study) -> dict[str, Any]:
         },
         "warnings": [remark.as_dict() for remark in study.warnings],
         "notes": [remark.as_dict() for remark in study.notes],
-        "remarks": [slip.as_dict() for slip in config.remarks],
+        "slips": [slip.as_dict() for slip in config.slips],
         **_given(study),
         **_statics(study),
         **_runs(study),
@@ -50,10 +50,21 @@ def as_dict(study: Study) -> dict[str, Any]:
 
 
 def _given(study: Study) -> dict[str, Any]:
-    """What the study was given; `given` names what its file sets, everything else is the example's."""
+    """What the study was given; `origins` says where values come from that are not the example's, by their names."""
     config = study.config
+    sections = {
+        "machine": study.drive.machine.p,
+        "motor": study.motor,
+        "feed": config.feed,
+        "run": config.run,
+        **{f"event.{name}": event.p for name, event in config.events.items()},
+        "coupling": config.coupling,
+        "chain": config.chain,
+        "driveline": config.driveline,
+    }
+    names = [v.name for section, p in sections.items() if p for v in variables(type(p), f"{section}.")]
     return {
-        "given": sorted(config.given),
+        "origins": {name: origin for name in names if (origin := study.origin(name)) != "example"},
         "machine": entries(study.drive.machine.p),
         "motor": {"kind": study.drive.motor.name, **entries(study.motor)},
         "feed": entries(config.feed),

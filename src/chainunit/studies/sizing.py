@@ -40,7 +40,7 @@ class Flywheel:
     fluctuation: Value = quantity("1", "fluctuation of the crank speed in the run", kind="percent")
 
 
-class Verdict(StrEnum):
+class Standing(StrEnum):
     """How a candidate came off."""
 
     CHOSEN = "chosen"
@@ -70,7 +70,7 @@ class Candidate:
     duty_torque: float = math.nan
     """peak at the crank in steady running, and while all feed moves to either side and runs there [N m]"""
     fluctuation: float = math.nan
-    verdict: Verdict | None = None
+    verdict: Standing | None = None
     """None until it is judged or ranked"""
     reason: str = ""
 
@@ -106,7 +106,7 @@ class SizingResult:
     @property
     def chosen(self) -> Candidate | None:
         """The candidate that was chosen, if one fits."""
-        return self.candidates[0] if self.candidates[0].verdict is Verdict.CHOSEN else None
+        return self.candidates[0] if self.candidates[0].verdict is Standing.CHOSEN else None
 
     @property
     def best(self) -> Candidate:
@@ -317,14 +317,17 @@ def rank(candidates: list[Candidate]) -> None:
         over = [check for name, check in c.checks.items() if c.sizes[name] > 1.0]
         if c.fits:
             most = max(c.checks.values(), key=lambda check: check.utilisation or 0.0)
-            c.verdict, c.reason = Verdict.FITS, f"most used: {most.title}, {number(c.violation, '1', 'used')}"
+            c.verdict, c.reason = (
+                Standing.FITS,
+                f"most used: {most.title}, {number(c.violation, '1', 'used')}",
+            )
         elif not c.checks:
             # its run failed, and the reason is there
-            c.verdict = Verdict.REJECTED
+            c.verdict = Standing.REJECTED
         elif math.isinf(c.violation):
-            c.verdict, c.reason = Verdict.REJECTED, "it does not bring the machine up to speed"
+            c.verdict, c.reason = Standing.REJECTED, "it does not bring the machine up to speed"
         else:
-            c.verdict, c.reason = Verdict.REJECTED, "; ".join(check.passed for check in over)
+            c.verdict, c.reason = Standing.REJECTED, "; ".join(check.passed for check in over)
         if c.flywheel:
             c.reason += f", with a flywheel of {c.flywheel:.3g} kg m2"
     candidates.sort(
@@ -336,10 +339,10 @@ def rank(candidates: list[Candidate]) -> None:
     )
     best = candidates[0]
     if not best.fits:
-        best.verdict = Verdict.INSUFFICIENT
+        best.verdict = Standing.INSUFFICIENT
         best.reason = f"the nearest of those that do not fit; {best.reason}"
         return
-    best.verdict, best.reason = Verdict.CHOSEN, f"the smallest that fits; {best.reason}"
+    best.verdict, best.reason = Standing.CHOSEN, f"the smallest that fits; {best.reason}"
     for c in candidates[1:]:
         if c.fits:
             larger = c.motor.nameplate.power > best.motor.nameplate.power

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import xarray as xr
 
-from ..config import Config
+from ..config import LENGTHS, Config
 from ..drives.speed_control import Tuning
 from ..errors import RunError
 from ..text import entry
@@ -141,9 +141,10 @@ class Study:
     def origin(self, name: str) -> Literal["file", "example", "tuned", "sizing"]:
         """Where the value of a quantity comes from, by its name in a study file ("motor.rotor.J"): the file, the
         example, tuning, or sizing."""
-        if name in self.config.given:
-            return "file"
         section, _, parameter = name.partition(".")
+        of_ratios = section == "machine" and parameter in LENGTHS and self.config.gives("ratios")
+        if name in self.config.given or of_ratios:
+            return "file"
         if self.sizing is not None and (section == "motor" or name == "machine.ratio"):
             return "sizing"
         if section == "motor" and self.tuning is not None and parameter in self.tuning.parameters:
