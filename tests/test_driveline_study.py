@@ -19,7 +19,7 @@ from chainunit.drives.cardan import Cardan, Twist, frozen_frequency, two_joints
 from chainunit.drives.torsion import rigid, settling_time, simulate, steady, with_damping_ratio
 from chainunit.engines import MATH
 from chainunit.report.driveline import PICTURES
-from chainunit.studies import driveline
+from chainunit.studies import driveline, torsion_answers
 from chainunit.studies.driveline import example, load, parse, run_driveline
 from chainunit.text import number
 
@@ -48,7 +48,7 @@ def test_even_running_has_the_multipliers_of_two_damped_masses():
     A[3] = np.array([c, d, -c, -d]) / p.J4
     speed = np.array([0.15, 0.43, 0.8, 1.7]) * k
     found = steady(p, speed, 50.0)
-    assert np.all(found.found)
+    assert np.all(found.exists)
     np.testing.assert_allclose(found.growth, -0.04 * k, rtol=1e-3)
     np.testing.assert_allclose(found.free_growth, 0.0, atol=1e-5)
     np.testing.assert_allclose(found.frequency, k * math.sqrt(1.0 - 0.04**2), rtol=2e-4)
@@ -90,7 +90,7 @@ def test_steady_motion_and_multipliers_by_another_integrator(name):
     k = frequency(p)
     speed, half_turns = share * k, 12
     found = steady(p, speed, 100.0)
-    assert found.found[0]
+    assert found.exists[0]
     assert found.unstable[0] == name.startswith("unstable")
     period = math.pi / speed
     start, drive = found.start[:, 0], float(found.drive[0])
@@ -123,7 +123,7 @@ def test_what_holds_the_common_speed():
     speed = 0.7 * k
     period = math.pi / speed
     found = steady(p, speed, 100.0)
-    assert found.found[0] and found.growth[0] < 0.0 < found.free_growth[0]
+    assert found.exists[0] and found.growth[0] < 0.0 < found.free_growth[0]
     start, f = found.start[:, 0], rates(p, float(found.drive[0]), 100.0)
     path = integrate(p, float(found.drive[0]), 100.0, start, period, dense_output=True).sol
     inertia, gain = p.J1 + p.J4, 30.0 * k
@@ -386,12 +386,12 @@ def small(text="", running="", stability=""):
 
 @pytest.fixture(scope="module")
 def study():
-    return run_driveline(small("[driveline]\nalpha1 = '35 deg'\ndamping_ratio = 0.015\n"))
+    return run_driveline(small("[driveline]\nalpha1 = '35 deg'\ndamping_ratio = 0.015\n")).analysis
 
 
 def test_the_orders_of_one_joint_have_a_closed_form():
     """The series of atan(tan(x)/cos(alpha)) - x."""
-    study = run_driveline(small("[driveline]\nalpha1 = '30 deg'\nalpha2 = 0\n", "load = 0\n"))
+    study = run_driveline(small("[driveline]\nalpha1 = '30 deg'\nalpha2 = 0\n", "load = 0\n")).analysis
     square = math.tan(math.radians(15.0)) ** 2
     assert study.excitation == {
         2: pytest.approx(square, rel=1e-9),
@@ -402,7 +402,7 @@ def test_the_orders_of_one_joint_have_a_closed_form():
 
 
 def said(study, beginning):
-    return [line for line in study.warnings if line.startswith(beginning)]
+    return [line for line in torsion_answers.warnings(study) if line.startswith(beginning)]
 
 
 def test_crossings_are_where_the_orders_meet_the_band(study):
@@ -410,7 +410,7 @@ def test_crossings_are_where_the_orders_meet_the_band(study):
         assert [n * w for w in ends] == pytest.approx([study.band.least, study.band.largest])
     low, high = study.crossings()[2]
     (warning,) = said(study, "Running at 146.6 rad/s (1400 rev/min) is")
-    near = (study.config.running.speed - high) / study.config.running.speed
+    near = (study.rotation.speed - high) / study.rotation.speed
     ends = [number(end, "rad/s", "speed", 4) for end in (low, high)]
     assert f"is {number(near, '1', 'percent')} from where order 2" in warning and " to ".join(ends) in warning
 
@@ -438,24 +438,24 @@ def test_what_is_uneven_is_named(study):
     assert "make the bends equal (alpha1 = 35.0 deg, alpha2 = 8.00 deg)" in warning
     off = Cardan(alpha1=0.2, alpha2=0.2, beta_planes=0.1, delta_yokes=0.3)
     _, ratio, _ = two_joints(np, off, np.linspace(0.0, math.pi, 50))
-    (line,) = driveline._even_running(off, ratio)
+    (line,) = torsion_answers._even_running(off, ratio)
     assert "turn the yokes of the middle shaft by -11.5 deg" in line and "equal" not in line
     mended = dataclasses.replace(off, delta_yokes=off.delta_yokes - math.radians(11.459156))
     _, ratio, _ = two_joints(np, mended, np.linspace(0.0, math.pi, 50))
-    assert driveline._even_running(mended, ratio) == []
+    assert torsion_answers._even_running(mended, ratio) == []
 
 
 def test_an_even_line_has_nothing_to_warn_of():
-    study = run_driveline(small("[driveline]\nalpha1 = '8 deg'\n", stability="joint = 'both'\n"))
-    assert study.warnings == () and study.unstable_ranges() == []
+    study = run_driveline(small("[driveline]\nalpha1 = '8 deg'\n", stability="joint = 'both'\n")).analysis
+    assert torsion_answers.warnings(study) == [] and study.unstable_ranges() == []
     assert not np.any(study.map.unstable) and np.all(np.isfinite(study.map.growth))
     np.testing.assert_allclose(study.steady.peak2, 375.0, rtol=1e-6)
 
 
 def test_without_damping_it_says_so():
-    study = run_driveline(small("[driveline]\nd2 = 0\n"))
+    study = run_driveline(small("[driveline]\nd2 = 0\n")).analysis
     assert study.simulated is None and study.damping_ratio == 0.0
-    assert any(note.startswith("Without damping no transient dies") for note in study.notes)
+    assert any(note.startswith("Without damping no transient dies") for note in torsion_answers.notes(study))
 
 
 # the command

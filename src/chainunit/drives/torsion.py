@@ -127,8 +127,8 @@ class _LineRates:
 class SteadyMotion(NamedTuple):
     """Steady motions at n points; NaN where none was found."""
 
-    found: Any
-    """bool, (n,)"""
+    exists: Any
+    """whether a steady motion was found, bool, (n,)"""
     start: Any
     """phi1, w1, phi4, w4 where phi1 = 0 [rad, rad/s], (4, n)"""
     drive: Any
@@ -184,9 +184,9 @@ def steady(
     # near a resonance Newton's method needs a neighbour to start from, and steps of the speed from there
     for walk in _WALKS:
         for side in (-1, 1):
-            gaps = np.flatnonzero(~motion.found)
+            gaps = np.flatnonzero(~motion.exists)
             gaps = gaps[(gaps + side >= 0) & (gaps + side < n)]
-            gaps = gaps[motion.found[gaps + side]]
+            gaps = gaps[motion.exists[gaps + side]]
             if not len(gaps):
                 continue
             beside, q = gaps + side, _pick(p, gaps)
@@ -281,7 +281,7 @@ def _shoot(
         free[closed] = _free(q, x[:, closed], drive[closed], load[closed], monodromy[:, :, closed])
     k = frozen_frequency(numpy_(), p, 1.0)
     return SteadyMotion(
-        found=closed,
+        exists=closed,
         start=x,
         drive=drive,
         **extremes,
