@@ -19,10 +19,15 @@ from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.quantities import Layout
 from chainunit.report import files as report_files
 from chainunit.report import knife as page
-from chainunit.studies import knife
-from chainunit.studies.knife import Answers, KnifeStudy, example, load, parse, run_knife, statics
+from chainunit.studies import cutting, knife, knife_answers
+from chainunit.studies.flywheels import Wheel, WheelAnswers
+from chainunit.studies.knife import KnifeStudy, example, load, parse, run_knife
 from chainunit.system import CoSimulation, energy_residual, monolithic
 from chainunit.text import entry, number
+
+
+def statics(config):
+    return cutting.statics(config.machine, config.run.crank_speed, config.cut.force)
 
 
 def bare(text=""):
@@ -81,7 +86,7 @@ def test_the_share_of_a_path_in_the_stack():
     at = np.linspace(0.0, 2.0 * math.pi, 1001)[:-1]
     x, y = np.cos(at), np.sin(at)
     stack = dataclasses.replace(load().machine.stack, top=0.5, table=-0.2)
-    inside = knife.in_stack(stack, x, y)
+    inside = cutting.in_stack(stack, x, y)
     length = np.sum(inside * np.hypot(np.roll(x, -1) - x, np.roll(y, -1) - y))
     assert length == pytest.approx(math.asin(0.5) + math.asin(0.2), rel=1e-4)
     assert np.all(inside[x > 0.01] == 0.0)
@@ -102,7 +107,7 @@ def test_pins_have_their_peaks_where_they_say():
             u = KnifeDrive.input_layout.from_names(
                 {"phi": angle * p.ratio, "w": study.config.motor_speed, "cut_force": force}
             )
-            f = getattr(KnifeDrive.evaluate(MATH, p, u)[0], knife.PINS[title])
+            f = getattr(KnifeDrive.evaluate(MATH, p, u)[0], cutting.PINS[title])
             assert math.hypot(f.fx, f.fy) == pytest.approx(peak, rel=1e-9)
     # a heavier cut, not the inertia, loads the pins: in proportion, but for weight and inertia
     twice = bare("[cut]\nforce = 4e4\n")
@@ -160,7 +165,7 @@ def test_energy_over_a_cut(files):
     study, wheel = bare(), 0.8
     found = knife.running(study, files, wheel)
     run = found.turns
-    power, time = knife.cutting_power(run), run["time"].values
+    power, time = cutting.cutting_power(run), run["time"].values
     rotor = run["motor.w"].values
     given = (run["motor.air_gap_tau"].values - study.motor.rotor.d * rotor) * rotor
     inside = power > 0.01 * np.max(power)
@@ -221,7 +226,7 @@ def study(exported, tmp_path):
 
 def test_the_study_and_its_files(study, tmp_path):
     assert [wheel.flywheel for wheel in study.wheels] == [0.1, 0.4, 1.2]
-    assert study.given is study.wheels[1] and study.failure is None
+    assert study.own_wheel is study.wheels[1] and study.failure is None
     by = [wheel.answers for wheel in study.wheels]
     for name, falls in (("fluctuation", True), ("current_rms", True), ("start_time", False)):
         values = [getattr(a, name) for a in by]
@@ -231,13 +236,15 @@ def test_the_study_and_its_files(study, tmp_path):
     assert 0.4 < least.flywheel < 1.2 and 0.97 * 0.05 <= least.fluctuation <= 0.05
     assert least.flywheel < study.flywheel_by_hand
     assert study.by_hand(study.flywheel_by_hand) == pytest.approx(0.05, rel=1e-9)
-    assert any(line.startswith("A fluctuation of 5.00 % takes a flywheel of") for line in study.notes)
+    assert any(
+        line.startswith("A fluctuation of 5.00 % takes a flywheel of") for line in knife_answers.notes(study)
+    )
     # rated current is passed by the light flywheels alone
     assert any(
-        f"fluctuates by {number(by[1].fluctuation, '1', 'percent')} with the flywheel that" in w
-        for w in study.warnings
+        f"fluctuates by {number(by[1].fluctuation, '1', 'percent')} with the flywheel of the drive" in w
+        for w in knife_answers.warnings(study)
     )
-    hot = [line for line in study.warnings if "the RMS current is" in line]
+    hot = [line for line in knife_answers.warnings(study) if "the RMS current is" in line]
     assert len(hot) == sum(a.current_rms > study.config.motor.nameplate.rated_current for a in by) > 0
 
     written = write(study, tmp_path)
@@ -245,7 +252,7 @@ def test_the_study_and_its_files(study, tmp_path):
     assert all(file.stat().st_size > 1000 for file in written)
     numbers = json.loads((tmp_path / NUMBERS).read_text())
     for found, wheel in zip(numbers["flywheels"], study.wheels, strict=True):
-        for v in Layout(Answers).variables:
+        for v in Layout(WheelAnswers).variables:
             assert found[v.name] == entry(getattr(wheel.answers, v.name), v.unit, v.kind)
     text = (tmp_path / TEXT).read_text()
     assert "1.20 kg m2" in text and "(given)" in text and "(least)" in text and "](flywheel.png)" in text
@@ -266,7 +273,7 @@ def test_a_run_that_fails_keeps_what_was_computed(exported, tmp_path, monkeypatc
     assert json.loads((tmp_path / NUMBERS).read_text())["failure"] == "motor: gave up"
     assert "stopped early: motor: gave up" in (tmp_path / TEXT).read_text()
     # nothing is said of what was not tried
-    assert not [line for line in study.warnings if line.startswith("No flywheel")]
+    assert not [line for line in knife_answers.warnings(study) if line.startswith("No flywheel")]
 
 
 def test_a_flywheel_that_does_not_start_is_not_too_light(exported, tmp_path):
@@ -275,7 +282,9 @@ def test_a_flywheel_that_does_not_start_is_not_too_light(exported, tmp_path):
     )
     (wheel,) = study.wheels
     assert wheel.answers.start_time is None and not wheel.stalled
-    assert any("does not come to 95.0 % of its rated speed in 30 s" in line for line in study.warnings)
+    assert any(
+        "does not come to 95.0 % of its rated speed in 30 s" in line for line in knife_answers.warnings(study)
+    )
     assert 0.4 < study.least.flywheel < 1.2 and study.least.keeps(0.05)
 
 
@@ -283,7 +292,7 @@ def test_a_large_motor_needs_no_flywheel(exported, tmp_path):
     big = "[drive]\nmotor = 'IE3 4-pole 75 kW, 280S'\nflywheel = 0.1\nflywheels = []\n"
     study = run_knife(parse(big + "[run]\nsettle_turns = 1\nturns = 1\n"), tmp_path)
     assert study.least.flywheel == 0.0 and study.flywheel_by_hand == 0.0
-    assert study.notes[0].startswith(
+    assert knife_answers.notes(study)[0].startswith(
         "For a fluctuation of 5.00 % no flywheel is needed; nor is it by hand. Without "
     )
 
@@ -292,10 +301,10 @@ def test_a_motor_that_stalls(exported, tmp_path):
     study = run_knife(parse(SMALL.replace("[0.1, 1.2]", "[]") + "[cut]\nforce = 1e5\n"), tmp_path)
     (wheel,) = study.wheels
     assert wheel.stalled and wheel.answers.fluctuation is None and wheel.answers.start_time is not None
-    assert any("the motor stalls under the cut" in line for line in study.warnings)
+    assert any("the motor stalls under the cut" in line for line in knife_answers.warnings(study))
     assert study.least is None
-    assert any("of the motor on average, rated is 14.4 N m" in line for line in study.warnings)
-    assert any("nor does a larger one that was tried" in line for line in study.warnings)
+    assert any("of the motor on average, rated is 14.4 N m" in line for line in knife_answers.warnings(study))
+    assert any("nor does a larger one that was tried" in line for line in knife_answers.warnings(study))
     written = [file.name for file in write(study, tmp_path)]
     assert "flywheel.png" not in written and "stalls" in (tmp_path / TEXT).read_text()
 
@@ -313,13 +322,15 @@ def test_a_motor_that_stalls(exported, tmp_path):
     ],
 )
 def test_where_the_stack_lies(stack, beginning):
-    said = knife._warnings(dataclasses.replace(bare(f"[machine]\nstack = {stack}\n"), failure=RunError("x")))
+    said = knife_answers.warnings(
+        dataclasses.replace(bare(f"[machine]\nstack = {stack}\n"), failure=RunError("x"))
+    )
     assert said == [] if beginning is None else len(said) == 1 and said[0].startswith(beginning)
 
 
 def test_words_for_a_slow_start_and_a_poor_run():
     study = bare()
-    sound = {v.name: 0.04 for v in Layout(Answers).variables}
+    sound = {v.name: 0.04 for v in Layout(WheelAnswers).variables}
     given = sound | {
         "flywheel": 5.0,
         "start_time": 12.0,
@@ -327,8 +338,8 @@ def test_words_for_a_slow_start_and_a_poor_run():
         "drift": 0.4,
         "current_share": 0.9,
     }
-    study.wheels = [knife.Wheel(Answers(**given))]
-    said = knife._warnings(study)
+    study.wheels = [Wheel(WheelAnswers(**given))]
+    said = knife_answers.warnings(study)
     assert [line.split(" kg m2 ")[1].split(",")[0] for line in said] == [
         "the start takes 12.0 s",
         "3.00 % of the energy is missing: a shorter run.step is needed.",

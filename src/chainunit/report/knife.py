@@ -12,7 +12,10 @@ from ..engines import numpy_
 from ..machines.knife_drive import JOINTS, Inputs, KnifeDrive
 from ..mechanism.machine import Mechanism
 from ..quantities import Layout
-from ..studies.knife import PINS, Answers, KnifeStudy, Reaction, Turn, Wheel, as_dict, turning
+from ..studies.cutting import PINS, Reaction, Turn, outputs
+from ..studies.flywheels import Wheel, WheelAnswers
+from ..studies.knife import KnifeStudy
+from ..studies.knife_answers import as_dict
 from ..text import number
 from . import blocks as b
 from . import figure as fig
@@ -79,7 +82,7 @@ def wheels(study: KnifeStudy) -> list[tuple[str, Wheel, str]]:
     runs = [(wheel, f"flywheels.{i}") for i, wheel in enumerate(study.wheels)]
     if study.least is not None and study.least not in study.wheels:
         runs.append((study.least, "least_flywheel"))
-    special = (("given", study.given), ("least", study.least))
+    special = (("given", study.own_wheel), ("least", study.least))
     return [
         (", ".join(word for word, which in special if wheel is which), wheel, path)
         for wheel, path in sorted(runs, key=lambda run: run[0].flywheel)
@@ -101,7 +104,7 @@ def _flywheels(s: b.Source, study: KnifeStudy) -> Iterator[b.Block]:
             (v.description, *(s.number(f"{path}.{v.name}") for _, _, path in found)),
             form="long" if v.name in _MINOR else "both",
         )
-        for v in Layout(Answers).variables
+        for v in Layout(WheelAnswers).variables
         if v.name != "flywheel"
     )
     columns = range(1, len(found) + 1)
@@ -326,7 +329,7 @@ def _motion(study: KnifeStudy) -> Animation:
     pins = {output: pin for output, (pin, _) in JOINTS.items()}
 
     def run(name: str, title: str, force: float) -> Clip:
-        out = turning(config, angle, force)
+        out = outputs(config.machine, angle, config.run.crank_speed, force)
         readings = (
             Reading("Crank angle", angle, "rad"),
             Reading("Crank torque", out.tau * config.machine.ratio, "N.m"),
