@@ -21,7 +21,7 @@ ROWS = reproduce()
 
 def shown(paper, item, quantity):
     (row,) = [r for r in ROWS if (r.paper, r.item, r.quantity) == (paper, item, quantity)]
-    return row.shown
+    return row.text
 
 
 # from an independent multibody solution of the same machine, not from this package
@@ -133,7 +133,7 @@ def test_the_verdict_follows_from_the_print():
 
 
 def test_what_the_authors_computed_explains_the_print():
-    rebuilt = {r.quantity: r.as_dict()["rebuilt"] for r in ROWS if r.rebuilt is not None}
+    rebuilt = {r.quantity: r.rebuilt_text for r in ROWS if r.rebuilt is not None}
     for quantity, text in {
         "R_t left organ, left extreme, 10 rad/s": "-12.47",
         "R_t left organ, left extreme, 50 rad/s": "-313.40",
@@ -197,6 +197,11 @@ def test_command_line(tmp_path):
         if r["printed"] is None:
             assert r["verdict"] == "not stated"
     assert len(list((tmp_path / "out").glob("*.png"))) == 11
+    page, text = ((tmp_path / "out" / name).read_text() for name in ("report.html", "reproduction.md"))
+    for r in rows:
+        assert r["shown"] in page and r["shown"] in text
+    assert all(f"({figure.name})" in text for figure in (tmp_path / "out").glob("*.png"))
+    assert "20 agree, 41 corrected, 78 that the papers should state." in done.stdout
 
 
 def test_the_documentation_shows_these_rows():

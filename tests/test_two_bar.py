@@ -63,7 +63,7 @@ def test_command(tmp_path):
     done = chainunit("two-bar-error", "-o", "out", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert {f.name for f in (tmp_path / "out").iterdir()} == {
-        "two_bar_error.json", "two_bar_error.md", "two_bar_error.png"
+        "two_bar_error.json", "two_bar_error.md", "two_bar_error.png", "report.html"
     }  # fmt: skip
     numbers = json.loads((tmp_path / "out" / "two_bar_error.json").read_text())
     assert numbers["error_t"]["unit"] == "1" and numbers["psi"]["unit"] == "rad"

@@ -288,18 +288,19 @@ def reproduce(
 ) -> None:
     """Compute every number that the papers print, right or wrong, with the reason; draw their figures.
 
-    Writes reproduction.json, reproduction.md and the figures into the output folder.
+    Writes report.html, reproduction.json, reproduction.md and the figures into the output folder.
     """
     with claimed(output):
-        from .papers import output as page
         from .papers import reproduce as compute
+        from .papers.output import report
+        from .report import files
 
-        console = _console()
         with _console(stderr=True).status("computing"):
-            rows = compute()
-            written = page.write(rows, output)
-        page.show(rows, console)
-        _show_written(written, console)
+            contents = report(compute())
+        _clear(output, *files.names("reproduction", tuple(figure.file for figure in contents.figures)))
+        unwritten = _leave(contents, files.writers(contents, output, "reproduction"))
+    if unwritten is not None:
+        raise unwritten
 
 
 @app.command("two-bar-error")
@@ -308,18 +309,20 @@ def two_bar_error(
 ) -> None:
     """The error of two rigid bars in place of a hanging chain, over zeta, mu and psi, and where they are good enough.
 
-    Writes two_bar_error.json, two_bar_error.md and two_bar_error.png into the output folder.
+    Writes report.html, two_bar_error.json, two_bar_error.md and two_bar_error.png into the output folder.
     """
     from .papers import two_bar
 
     with claimed(output):
-        _clear(output, *two_bar.NAMES)
-        console, errors = _console(), _console(stderr=True)
-        with _progress("bars and catenaries", errors) as report:
-            comparison = two_bar.two_bar_error(report=lambda done: report("bars and catenaries", done, 1.0))
-        written = two_bar.write(comparison, output)
-        two_bar.show(comparison, console)
-        _show_written(written, console)
+        from .report import files
+
+        _clear(output, *files.names(two_bar.NAME, (two_bar.PICTURE,)))
+        with _progress("bars and catenaries", _console(stderr=True)) as progress:
+            comparison = two_bar.two_bar_error(lambda done: progress("bars and catenaries", done, 1.0))
+        contents = two_bar.report(comparison)
+        unwritten = _leave(contents, files.writers(contents, output, two_bar.NAME))
+    if unwritten is not None:
+        raise unwritten
 
 
 @app.command()

@@ -5,14 +5,14 @@ the paper. An error of a paper stands here and nowhere else, for comparison; the
 """
 
 from . import paper000, paper001, paper002, paper003
-from .table import Row, rows
+from .table import PaperNumber, rows
 
-__all__ = ["PAPERS", "Row", "reproduce"]
+__all__ = ["PAPERS", "PaperNumber", "reproduce"]
 
 PAPERS = {"000": paper000, "001": paper001, "002": paper002, "003": paper003}
 """The module of each paper."""
 
 
-def reproduce() -> list[Row]:
+def reproduce() -> list[PaperNumber]:
     """Every row, by paper and item."""
     return [row for paper, functions in PAPERS.items() for row in rows(paper, functions)]

@@ -1,303 +1,325 @@
 """The papers' figures in their own axes, and five that the papers lack.
 
-Left organ: full lines, right organ: dashed, as in paper 000. Corrected curves are black; what the printed
-formulas or the authors' own calculation give is orange and thin.
+Left organ: full lines, right organ: dashed, as in paper 000. Corrected curves are black; those of the printed
+formulas or of the authors' own calculation are orange and thin.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
 
 from ..engines import numpy_
 from ..machines.crank_rocker import longest_crank, parallel_frame, pressure_angle_extremes, swing
-from ..report.style import LINES
+from ..report.figure import Axis, Between, Curve, Field, Figure, Item, Label, Mark, Panel
+from ..report.print_figures import contours
 from . import paper000 as p0
 from . import paper001 as p1
 
-LEFT = {"color": "#1b1b1b", "linestyle": "-", "linewidth": 1.8}
-RIGHT = {"color": "#1b1b1b", "linestyle": "--", "linewidth": 1.8}
-PRINTED_LEFT = {"color": "#c1440e", "linestyle": "-", "linewidth": 0.9}
-PRINTED_RIGHT = {"color": "#c1440e", "linestyle": "--", "linewidth": 0.9}
-_TEXT = {"X": "$X_{A2}$", "Y_A2": "$Y_{A2}$", "Y_A1": "$Y_{A1}$", "R_n": "$R^n$", "R_t": "$R^t$"}
+_PHI = Axis("crank angle", "rad", low=0.0, high=2.0 * math.pi, step=90.0)
+_LOAD = Axis("force / organ weight")
+_W = Axis("crank speed", "rad/s")
+_RHO, _MU, _ZETA = Axis("rho = r/l"), Axis("mu = e/l1"), Axis("zeta = z/z_max", low=0.0, high=1.0)
+_SIDES = (("left", 1.0, 0, "printed"), ("right", -1.0, "right", "printed right"))
+"""Name, hand, and looks of the corrected and of the printed curves of an organ."""
 
 
-def _fig_17_22() -> Any:
-    figure, axes = plt.subplots(2, 3, figsize=(12, 7), sharex=True)
-    degrees = np.linspace(-12.0, 12.0, 121)
-    psi = np.radians(degrees)
-    left, right = p0.statics(psi)
-    hinge = {1.0: p0.hinge_loading(psi), -1.0: p0.hinge_loading(-psi)}
-    panels = [("X", "17"), ("Y_A2", "18"), ("Y_A1", "20"), ("R_n", "21"), ("R_t", "22")]
-    for axis, (name, number) in zip(axes.flat, panels, strict=False):
-        axis.plot(degrees, getattr(left, name), label="left", **LEFT)
-        axis.plot(degrees, getattr(right, name), label="right", **RIGHT)
-        for hand, style, side in ((1.0, "-", "left"), (-1.0, "--", "right")):
-            axis.plot(degrees, getattr(hinge[hand], name), color="#0b6fa4", linestyle=style, linewidth=1.0,
-                      label=f"{side}, weights in B")  # fmt: skip
-        also = " and 19" if name == "X" else ""
-        axis.set_title(f"Fig {number}{also}: {_TEXT[name]}" + (" = $X_{A1}$" if also else ""))
-        axis.set_xlim(-12, 12)
-    for axis in axes[:, 0]:
-        axis.set_ylabel("force / organ weight")
-    for axis in (*axes[1, :2], axes[0, 2]):
-        axis.set_xlabel("rocker angle psi [deg]")
-    axes[0, 2].xaxis.set_tick_params(labelbottom=True)
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    axes[1, 2].axis("off")
-    axes[1, 2].legend(handles, labels, loc="center", fontsize=11, title="statics, zeta 0.5, mu 0.6")
-    return figure
+def _points(x: Any, y: Any, name: str = "printed") -> Curve:
+    return Curve(name, x, y, "printed", "o", joined=False)
 
 
-def _fig_23_29() -> Any:
-    figure, axes = plt.subplots(2, 3, figsize=(12, 7), sharex=True)
-    degrees = np.linspace(0.0, 360.0, 361)
-    phi = np.radians(degrees)
+def _single(name: str, title: str, seen: str, x: Axis, y: Axis, items: list[Item]) -> Figure:
+    return Figure(name, title, seen, ((Panel(x, y, tuple(items)),),), file=f"{name}.png")
+
+
+def statics() -> Figure:
+    """Figs 17-22 of paper 000."""
+    psi = np.radians(np.linspace(-12.0, 12.0, 121))
+    organs = dict(zip(("left", "right"), p0.statics(psi), strict=True))
+    angle = Axis("rocker angle psi", "rad", low=psi[0], high=psi[-1], step=4.0)
+    titles = {
+        "X": "Fig 17 and 19: X_A2 = X_A1",
+        "Y_A2": "Fig 18: Y_A2",
+        "Y_A1": "Fig 20: Y_A1",
+        "R_n": "Fig 21: R^n",
+        "R_t": "Fig 22: R^t",
+    }
+    panels: list[Panel | None] = []
+    for load, title in titles.items():
+        items = []
+        for side, hand, look, _ in _SIDES:
+            hinge = p0.hinge_loading(hand * psi)
+            items += [
+                Curve(side, psi, getattr(organs[side], load), look),
+                Curve(f"{side}, weights in B", psi, getattr(hinge, load), 2 if hand > 0.0 else 3),
+            ]
+        panels.append(Panel(angle, _LOAD, tuple(items), title))
+    return Figure(
+        "000-fig17-22-statics",
+        "Statics, zeta 0.5, mu 0.6",
+        "Loads of both organs at rest over the rocker angle, with the weights at the middles of the rods and in B.",
+        (tuple(panels[:3]), (*panels[3:], None)),
+        file="000-fig17-22-statics.png",
+    )
+
+
+def dynamics() -> Figure:
+    """Figs 23-29 of paper 000."""
+    phi = np.linspace(0.0, 2.0 * math.pi, 361)
     unit = p0.machine()
     out = unit.forces(phi, 1.0)
+    items: dict[str, list[Item]] = {name: [] for name in ("X", "Y_A2", "R_n", "R_t", "X_A1", "Y_A1")}
+    for side, hand, look, printed in _SIDES:
+        organ, psi = getattr(out, side), hand * out.rocker.psi
+        X, Y, R_t = p0.AUTHORS.forces(phi, 1.0, hand)
+        authors = {"X": X, "Y_A2": Y, "R_n": Y * np.cos(psi) - X * np.sin(psi), "R_t": R_t}
+        model = vars(p0.of_side(organ, hand, unit)) | {"X_A1": -hand * organ.support.fx / p0.weight(unit)}
+        for name, curves in items.items():
+            curves.append(Curve(f"{side}, corrected", phi, model[name], look))
+            if name in authors:
+                curves.append(Curve(f"{side}, as the authors computed it", phi, authors[name], printed))
+    titles = ("Fig 23: X_A2", "Fig 24: Y_A2", "Fig 25: R^n", "Fig 26: R^t", "Fig 28: X_A1", "Fig 29: Y_A1")
     panels = [
-        ("X", "23", 0),
-        ("Y_A2", "24", 1),
-        ("R_n", "25", None),
-        ("R_t", "26", 2),
-        ("X_A1", "28", None),
-        ("Y_A1", "29", None),
+        Panel(_PHI, _LOAD, tuple(curves), title) for curves, title in zip(items.values(), titles, strict=True)
     ]
-    for hand, side, line, thin in ((1.0, "left", LEFT, PRINTED_LEFT), (-1.0, "right", RIGHT, PRINTED_RIGHT)):
-        organ = getattr(out, side)
-        mine = p0.of_side(organ, hand, unit)
-        theirs = p0.AUTHORS.forces(phi, 1.0, hand)
-        psi = hand * out.rocker.psi
-        for axis, (name, number, column) in zip(axes.flat, panels, strict=True):
-            y = -hand * organ.support.fx / p0.weight(unit) if name == "X_A1" else getattr(mine, name)
-            axis.plot(degrees, y, label=f"{side}, corrected", **line)
-            old = theirs[1] * np.cos(psi) - theirs[0] * np.sin(psi) if name == "R_n" else None
-            if column is not None:
-                old = theirs[column]
-            if old is not None:
-                axis.plot(degrees, old, label=f"{side}, as the authors computed it", **thin)
-            axis.set_title(f"Fig {number}: " + _TEXT.get(name, "$X_{A1}$"))
-    for axis in axes[:, 0]:
-        axis.set_ylabel("force / organ weight")
-    for axis in axes[1]:
-        axis.set_xlabel("crank angle [deg]")
-        axis.set_xticks(range(0, 361, 90))
-        axis.set_xlim(0, 360)
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4)
-    return figure
+    return Figure(
+        "000-fig23-29-dynamics",
+        "The crank at 1 rad/s",
+        "Loads of both organs over a turn of the crank, corrected and as the authors computed them.",
+        (tuple(panels[:3]), tuple(panels[3:])),
+        file="000-fig23-29-dynamics.png",
+    )
 
 
-def _fig_27() -> Any:
-    figure, axis = plt.subplots(figsize=(7.5, 5))
-    (_, right), (_, left) = p0.machine().rocker_extremes()
-    phi = np.linspace(left - 2.0 * math.pi, right, 361)
-    x = np.degrees(p0.machine().forces(phi, 1.0).rocker.psi)
-    axis.plot(x, p0.resultant(p0.CORRECTED, phi, 1.0), label="corrected", **LEFT)
-    axis.plot(x, p0.resultant(p0.AUTHORS, phi, 1.0), label="as the authors computed it", **PRINTED_LEFT)
-    axis.axhline(0.63, label="printed: about 0.63", **LINES[3])
-    axis.set_xlabel("rocker angle psi, from the left to the right extreme [deg]")
-    axis.set_ylabel("resultant on the rocker / organ weight")
-    axis.set_title("Fig 27: both organs, crank at 1 rad/s")
-    axis.legend()
-    return figure
+def resultant() -> Figure:
+    """Fig 27 of paper 000."""
+    phi = np.linspace(p0.at_extreme("left") - 2.0 * math.pi, p0.at_extreme("right"), 361)
+    psi = p0.machine().forces(phi, 1.0).rocker.psi
+    return _single(
+        "000-fig27-resultant",
+        "Fig 27: both organs, crank at 1 rad/s",
+        "Resultant of both organs on the rocker from the left to the right extreme.",
+        Axis("rocker angle psi, from the left to the right extreme", "rad"),
+        Axis("resultant on the rocker / organ weight"),
+        [
+            Curve("corrected", psi, p0.resultant(p0.CORRECTED, phi, 1.0)),
+            Curve("as the authors computed it", psi, p0.resultant(p0.AUTHORS, phi, 1.0), "printed"),
+            Mark(0.63, "printed: about 0.63", axis="y", look=3),
+        ],
+    )
 
 
-def _fig_30_31() -> Any:
-    figure, axes = plt.subplots(1, 2, figsize=(12, 5))
-    (_, right), (_, left) = p0.machine().rocker_extremes()
+def speeds() -> Figure:
+    """Figs 30 and 31 of paper 000."""
     w = np.linspace(10.0, 50.0, 81)
-    places = (
-        ("30", "left extreme, psi = -8.19 deg", left, (12.5, 313.4)),
-        ("31", "right extreme, psi = 9.06 deg", right, (1.6, 35.4)),
+    panels = []
+    for title, place, printed in (
+        ("Fig 30: left extreme, psi = -8.19 deg", "left", (12.5, 313.4)),
+        ("Fig 31: right extreme, psi = 9.06 deg", "right", (1.6, 35.4)),
+    ):
+        phi = p0.at_extreme(place)
+        curves = [
+            Curve(name, w, np.abs(p0.loads(by, phi, w)["R_t"]), look)
+            for name, by, look in (
+                ("as the authors computed it", "authors", "printed"),
+                ("corrected, point masses", "model", 0),
+                ("corrected, uniform rods", "uniform rods", 2),
+            )
+        ]
+        items = (_points((10.0, 50.0), printed), *curves)
+        panels.append(Panel(_W, Axis("|R^t| of the left organ / organ weight", log=True), items, title))
+    return Figure(
+        "000-fig30-31-speed",
+        "R^t at the extremes of the rocker",
+        "Tangential load of the left organ at both extremes over the crank speed, corrected and as printed.",
+        (tuple(panels),),
+        file="000-fig30-31-speed.png",
     )
-    for axis, (number, title, phi, printed) in zip(axes, places, strict=True):
-        axis.plot([10, 50], printed, "o", color="#c1440e", label="printed")
-        axis.plot(
-            w, np.abs(p0.AUTHORS.forces(phi, w)[2]), label="as the authors computed it, |.|", **PRINTED_LEFT
+
+
+def overload() -> Figure:
+    """The papers' overload factor, and the ratios of cycle maxima that a drive needs."""
+    psi = np.radians(np.linspace(0.4, 12.0, 200))
+    left, right = p0.statics(psi)
+    speed = np.concatenate([np.linspace(0.05, 15.0, 90), np.linspace(15.5, 50.0, 30)])
+    ratios = [
+        Curve(
+            torque.replace("_", " "), speed, np.array([p0.cycle_factor(torque, float(w)) for w in speed]), k
         )
-        for inertia, line, text in (
-            (0.0, LEFT, "corrected, point masses, |.|"),
-            (1.0, LINES[2], "corrected, uniform rods, |.|"),
-        ):
-            out = p0.machine(inertia).forces(phi, w)
-            axis.plot(w, np.abs(out.left.tangential_load) / p0.weight(p0.machine()), label=text, **line)
-        axis.set_yscale("log")
-        axis.set_xlabel("crank speed [rad/s]")
-        axis.set_ylabel("|$R^t$| of the left organ / organ weight")
-        axis.set_title(f"Fig {number}: {title}")
-        axis.legend(loc="upper left", fontsize=9)
-    return figure
-
-
-def _overload() -> Any:
-    figure, (one, two) = plt.subplots(1, 2, figsize=(12, 5))
-    degrees = np.linspace(0.4, 12.0, 200)
-    left, right = p0.statics(np.radians(degrees))
-    one.plot(degrees, left.R_t / (left.R_t - right.R_t), **LEFT)
-    one.plot([12], [1.14], "o", color="#c1440e", label="printed as the maximum: 1.14 at 12 deg")
-    one.set_ylim(0, 18)
-    one.set_xlabel("rocker angle psi [deg]")
-    one.set_ylabel("$R^t_L/(R^t_L - R^t_R)$ at rest")
-    one.set_title("The papers' overload factor diverges at psi = 0")
-    one.legend()
-    speeds = np.concatenate([np.linspace(0.05, 15.0, 90), np.linspace(15.5, 50.0, 30)])
-    for torque, line in (("rocker_torque", LEFT), ("crank_torque", LINES[1])):
-        factors = [p0.cycle_factor(torque, float(w)) for w in speeds]
-        two.plot(speeds, factors, label=torque.replace("_", " "), **line)
-    two.axhline(1.0, color="#777777", linewidth=1.0)
-    two.set_xlabel("crank speed [rad/s]")
-    two.set_ylabel("left organ alone / both, cycle maxima")
-    two.set_title("Above 6.5 (8.5) rad/s both sides together are heavier")
-    two.legend()
-    return figure
-
-
-def _fig_7() -> Any:
-    figure, axis = plt.subplots(figsize=(8, 5.5))
-    degrees = np.linspace(0.0, 360.0, 721)
-    for line, rho in zip(LINES, (0.1, 0.3, 0.5), strict=False):
-        axis.plot(
-            degrees,
-            np.degrees(p1.pressure(rho, np.radians(degrees), p1.FROZEN)),
-            label=f"rho = {rho}",
-            **line,
-        )
-    axis.plot(
-        degrees,
-        np.degrees(p1.pressure(0.5, np.radians(degrees), p1.frame(0.5, "tracking"))),
-        label="rho = 0.5, frame follows rho",
-        **LINES[3],
+        for k, torque in enumerate(("rocker_torque", "crank_torque"))
+    ]
+    return Figure(
+        "000-overload-factor",
+        "Overload factors",
+        "The papers' factor over the rocker angle, and the ratio of cycle maxima over the crank speed.",
+        (
+            (
+                Panel(
+                    Axis("rocker angle psi", "rad"),
+                    Axis("R_L/(R_L - R_R) at rest", low=0.0, high=18.0),
+                    (
+                        Curve("at rest", psi, left.R_t / (left.R_t - right.R_t)),
+                        _points(psi[-1:], (1.14,), "printed as the maximum: 1.14 at 12 deg"),
+                    ),
+                    "It diverges at psi = 0",
+                ),
+                Panel(
+                    _W,
+                    Axis("left organ alone / both, cycle maxima"),
+                    (*ratios, Mark(1.0, axis="y", look="thin")),
+                    "Above 6.5 (8.5) rad/s both sides together are heavier",
+                ),
+            ),
+        ),
+        file="000-overload-factor.png",
     )
-    for limit in (45, 60):
-        for sign in (1, -1):
-            axis.axhline(sign * limit, color="#777777", linewidth=0.9, linestyle="--" if limit == 45 else "-")
-    axis.text(4, 61, "admissible: 45 (dashed) to 60 deg", fontsize=9, color="#444444")
-    axis.set_xlabel("crank angle [deg]")
-    axis.set_ylabel("pressure angle [deg]")
-    axis.set_xticks(range(0, 361, 45))
-    axis.set_xlim(0, 360)
-    axis.set_ylim(-90, 90)
-    axis.set_title("Fig 7: pressure angle, lam = 2/3, frame frozen at rho0 = 0.3")
-    axis.legend(loc="lower left")
-    return figure
 
 
-def _fig_9() -> Any:
-    figure, axis = plt.subplots(figsize=(7.5, 5))
+def pressure() -> Figure:
+    """Fig 7 of paper 001."""
+    phi = np.linspace(0.0, 2.0 * math.pi, 721)
+    items: list[Item] = [
+        Curve(f"rho = {rho}", phi, p1.pressure(rho, phi, p1.FROZEN), look)
+        for look, rho in enumerate((0.1, 0.3, 0.5))
+    ]
+    items.append(
+        Curve("rho = 0.5, frame follows rho", phi, p1.pressure(0.5, phi, p1.frame(0.5, "tracking")), 3)
+    )
+    for limit, look in ((45.0, "mark"), (60.0, "thin")):
+        name = f"admissible: {limit:g} deg"
+        items += [Mark(math.radians(sign * limit), name, axis="y", look=look) for sign in (1.0, -1.0)]
+    return _single(
+        "001-fig7-pressure-angle",
+        "Fig 7: pressure angle, lam = 2/3, frame frozen at rho0 = 0.3",
+        "Pressure angle over a turn of the crank for three rho, with the admissible limits.",
+        Axis("crank angle", "rad", low=0.0, high=2.0 * math.pi, step=45.0),
+        Axis("pressure angle", "rad", low=-0.5 * math.pi, high=0.5 * math.pi, step=30.0),
+        items,
+    )
+
+
+def speed_change() -> Figure:
+    """Fig 9 of paper 001."""
     rho = np.linspace(0.05, 0.5, 400)
-    axis.plot(rho, p1.K(rho), label="frame frozen at rho0 = 0.3 (Fig 9)", **LEFT)
-    axis.plot(rho, p1.K(rho, "tracking"), label="frame follows rho: K = 1", **LINES[1])
-    axis.plot([0.1, 0.5], [0.99, 1.26], "o", color="#c1440e", label="printed")
-    axis.set_xlabel("rho = r/l")
-    axis.set_ylabel("speed-change coefficient K")
-    axis.set_title("Fig 9: K, lam = 2/3")
-    axis.legend()
-    return figure
-
-
-def _map() -> Any:
-    """Swing and pressure angle over (rho, lam) in the frame with K = 1."""
-    xp = numpy_()
-    rho, lam = np.meshgrid(np.linspace(0.02, 0.7, 240), np.linspace(0.15, 2.0, 240))
-    b = parallel_frame(xp, rho, 1.0, lam)
-    turns = rho < longest_crank(xp, 1.0, lam, b)
-    with np.errstate(invalid="ignore"):
-        high, low = pressure_angle_extremes(xp, rho, 1.0, lam, b)
-        worst = np.where(turns, np.degrees(np.maximum(np.abs(high), np.abs(low))), np.nan)
-        eta = np.where(turns, np.degrees(swing(xp, rho, 1.0, lam, b)), np.nan)
-    figure, axis = plt.subplots(figsize=(8, 6))
-    axis.contourf(rho, lam, worst, levels=[0, 45, 60, 90], colors=["#ffffff", "#e3e3e3", "#b9b9b9"])
-    axis.clabel(
-        axis.contour(rho, lam, worst, levels=[10, 20, 30, 45, 60], colors="#1b1b1b", linewidths=1.3),
-        fmt="%d°",
+    return _single(
+        "001-fig9-speed-change",
+        "Fig 9: K, lam = 2/3",
+        "Speed-change coefficient over rho, in the frozen frame and in that which follows rho.",
+        _RHO,
+        Axis("speed-change coefficient K"),
+        [
+            Curve("frame frozen at rho0 = 0.3 (Fig 9)", rho, p1.K(rho)),
+            Curve("frame follows rho: K = 1", rho, p1.K(rho, "tracking"), 1),
+            _points((0.1, 0.5), (0.99, 1.26)),
+        ],
     )
-    lines = axis.contour(
-        rho, lam, eta, levels=[10, 17.25, 30, 60, 90, 120], colors="#c1440e", linestyles="--", linewidths=1.3
-    )
-    axis.clabel(lines, fmt="%g°")
-    axis.plot([0.1], [2 / 3], "o", color="#0b6fa4")
-    axis.annotate("papers' machine", (0.1, 2 / 3), (0.13, 0.36), arrowprops={"arrowstyle": "->"})
-    axis.plot([], [], color="#1b1b1b", label="largest pressure angle (grey: above 45, 60 deg)")
-    axis.plot([], [], color="#c1440e", linestyle="--", label="swing")
-    axis.set_xlabel("rho = r/l")
-    axis.set_ylabel("lam = h/l")
-    axis.set_title("Crank-rockers with K = 1 (b² = l² - r² + h²); they turn where rho < lam")
-    figure.legend(loc="outside lower center", ncols=2)
-    return figure
 
 
-def _existence() -> Any:
-    """Paper 001, (5), (6) and the third condition, over (b/l, rho) for three lam."""
-    figure, axes = plt.subplots(1, 3, figsize=(12, 4.5), sharey=True)
-    for axis, lam in zip(axes, (2.0 / 3.0, 1.0, 2.0), strict=True):
+def existence() -> Figure:
+    """Paper 001, (5), (6) and the third condition, over b/l and rho for three lam."""
+    panels = []
+    for lam in (2.0 / 3.0, 1.0, 2.0):
         b = np.linspace(max(0.0, abs(lam - 1.0) - 0.2), 1.0 + lam + 0.05, 400)
-        limit = longest_crank(numpy_(), 1.0, lam, b)
-        axis.fill_between(b, 0.0, np.maximum(limit, 0.0), color="#dcdcdc", label="the crank turns")
-        axis.plot(b, lam - (b - 1.0), label="(5)", **LINES[0])
-        axis.plot(b, lam + (b - 1.0), label="(6)", **LINES[1])
-        axis.plot(b, b - lam + 1.0, label="third: rho <= b/l - lam + 1", **LINES[2])
-        axis.set_ylim(0.0, 1.0)
-        axis.set_xlim(b[0], b[-1])
-        axis.set_xlabel("b/l")
-        axis.set_title(f"lam = {lam:.3g}")
-    axes[0].set_ylabel("rho = r/l")
-    handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4)
-    return figure
+        limit = np.maximum(longest_crank(numpy_(), 1.0, lam, b), 0.0)
+        items = (
+            Between("the crank turns", b, np.zeros_like(b), limit),
+            Curve("(5)", b, lam - (b - 1.0), 0),
+            Curve("(6)", b, lam + (b - 1.0), 1),
+            Curve("third: rho <= b/l - lam + 1", b, b - lam + 1.0, 2),
+        )
+        rho = Axis(_RHO.label, low=0.0, high=1.0)
+        panels.append(Panel(Axis("b/l", low=b[0], high=b[-1]), rho, items, f"lam = {lam:.3g}"))
+    return Figure(
+        "001-existence",
+        "Where the crank turns",
+        "The three conditions of existence over b/l and rho, for three lam.",
+        (tuple(panels),),
+        file="001-existence.png",
+        level=True,
+    )
 
 
-def _zeta_range() -> Any:
-    figure, axis = plt.subplots(figsize=(8, 5.5))
+def crank_rockers() -> Figure:
+    """Swing and pressure angle over rho and lam in the frame with K = 1."""
+    xp = numpy_()
+    rho, lam = np.linspace(0.02, 0.7, 240), np.linspace(0.15, 2.0, 240)
+    r, h = np.meshgrid(rho, lam)
+    b = parallel_frame(xp, r, 1.0, h)
+    turns = r < longest_crank(xp, 1.0, h, b)
+    with np.errstate(invalid="ignore"):
+        ends = pressure_angle_extremes(xp, r, 1.0, h, b)
+        worst = np.where(turns, np.degrees(np.max(np.abs(ends), axis=0)), np.nan)
+        eta = np.where(turns, np.degrees(swing(xp, r, 1.0, h, b)), np.nan)
+    field = Field(rho, lam, worst, (0.0, 45.0, 60.0, 90.0), ("admissible", "above 45 deg", "above 60 deg"))
+    return _single(
+        "001-map",
+        "Crank-rockers with K = 1 (b^2 = l^2 - r^2 + h^2); they turn where rho < lam",
+        "Lines of equal swing and of equal largest pressure angle over rho and lam.",
+        _RHO,
+        Axis("lam = h/l"),
+        [
+            field,
+            *_contours(rho, lam, worst, "largest pressure angle", (10.0, 20.0, 30.0, 45.0, 60.0), 0, 0.45),
+            *_contours(rho, lam, eta, "swing", (10.0, 17.25, 30.0, 60.0, 90.0, 120.0), 1, 0.25),
+            Curve("the papers' machine", np.array([0.1]), np.array([p1.LAM]), 2, "o", joined=False),
+        ],
+    )
+
+
+def _contours(
+    x: Any, y: Any, z: Any, name: str, levels: Sequence[float], look: int, place: float
+) -> Iterator[Item]:
+    """Lines of equal `z` [deg], with their level at a share of their length."""
+    for level in levels:
+        for k, line in enumerate(contours(x, y, z, level)):
+            yield Curve(name, line[:, 0], line[:, 1], look)
+            if k == 0:
+                at_x, at_y = line[int(place * len(line))]
+                yield Label(float(at_x), float(at_y), f"{level:g} deg")
+
+
+def closing() -> Figure:
+    """The range of zeta in which two-bar organs close, over mu."""
     mu = np.linspace(0.05, 0.95, 181)
-    for line, degrees in zip(LINES, (4.0, 8.0, 12.0), strict=False):
+    items: list[Item] = []
+    for look, degrees in enumerate((4.0, 8.0, 12.0)):
         ends = np.array([p0.zeta_range(math.radians(degrees), float(m)) for m in mu])
-        closed = ends[:, 0] < ends[:, 1]
-        axis.plot(mu[closed], ends[closed, 0], label=f"swing of +-{degrees:g} deg", **line)
-        axis.plot(mu[closed], ends[closed, 1], **line)
-    axis.plot([p0.MU], [p0.ZETA], "o", color="#c1440e", label="the papers' machine")
-    axis.set_xlabel("mu = e/l1")
-    axis.set_ylabel("zeta = z/z_max")
-    axis.set_ylim(0.0, 1.0)
-    axis.set_title("Two-bar organs close between the lines (l2 = l1 - e)")
-    axis.legend(loc="center left")
-    return figure
+        ends[ends[:, 0] >= ends[:, 1]] = np.nan
+        items += [Curve(f"swing of +-{degrees:g} deg", mu, end, look) for end in ends.T]
+    items.append(Curve("the papers' machine", (p0.MU,), (p0.ZETA,), "printed", "o", joined=False))
+    return _single(
+        "two-bar-range",
+        "Two-bar organs close between the lines (l2 = l1 - e)",
+        "Least and largest zeta over mu, for three swings.",
+        _MU,
+        _ZETA,
+        items,
+    )
 
 
-def _slack() -> Any:
-    figure, axis = plt.subplots(figsize=(8, 5.5))
-    for line, mu in zip(LINES, (0.45, 0.6, 0.75), strict=False):
+def slack() -> Figure:
+    """The crank speed at which a web loses its pull, over zeta."""
+    items: list[Item] = []
+    for look, mu in enumerate((0.45, 0.6, 0.75)):
         low, high = p0.zeta_range(math.radians(9.07), mu)
         zeta = np.linspace(low + 0.02, min(high, 1.0) - 0.02, 40)
-        speeds = [_slack_speed(float(z), mu) for z in zeta]
-        axis.plot(zeta, speeds, label=f"mu = {mu:g}", **line)
-    axis.set_xlabel("zeta = z/z_max")
-    axis.set_ylabel("crank speed / sqrt(g/l1)")
-    axis.set_ylim(bottom=0.0)
-    axis.set_title(
-        "Crank speed at which a web loses its pull\n(uniform rods without material, rho 0.1, lam 2/3)"
+        speed = [p0.machine(1.0, float(z), mu).slack_speed() / math.sqrt(p0.G / p0.L1) for z in zeta]
+        items.append(Curve(f"mu = {mu:g}", zeta, np.array(speed), look))
+    return _single(
+        "two-bar-slack-speed",
+        "Crank speed at which a web loses its pull (uniform rods without material, rho 0.1, lam 2/3)",
+        "The speed over zeta for three mu.",
+        Axis(_ZETA.label),
+        Axis("crank speed / sqrt(g/l1)", low=0.0),
+        items,
     )
-    axis.legend()
-    return figure
-
-
-def _slack_speed(zeta: float, mu: float) -> float:
-    return p0.machine(1.0, zeta, mu).slack_speed() / math.sqrt(p0.G / p0.L1)
 
 
 FIGURES = {
-    "000-fig17-22-statics.png": _fig_17_22,
-    "000-fig23-29-dynamics.png": _fig_23_29,
-    "000-fig27-resultant.png": _fig_27,
-    "000-fig30-31-speed.png": _fig_30_31,
-    "000-overload-factor.png": _overload,
-    "001-fig7-pressure-angle.png": _fig_7,
-    "001-fig9-speed-change.png": _fig_9,
-    "001-existence.png": _existence,
-    "001-map.png": _map,
-    "two-bar-range.png": _zeta_range,
-    "two-bar-slack-speed.png": _slack,
+    "000": (statics, dynamics, resultant, speeds, overload, closing, slack),
+    "001": (pressure, speed_change, existence, crank_rockers),
 }
+"""The makers of the figures of each paper."""

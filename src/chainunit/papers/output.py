@@ -1,77 +1,81 @@
-"""The output of ``chainunit reproduce``: reproduction.json, a table and the papers' figures."""
+"""The report of ``chainunit reproduce``: a table of each paper and its figures."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from pathlib import Path
-
-from rich.console import Console
-from rich.table import Table
+from types import ModuleType
 
 from .. import __version__
-from ..files import whole
-from ..report.style import draw
+from ..report.blocks import Column, Report, Section, Table, TableRow, Text
+from ..report.markdown import block_lines
+from ..text import DEFAULT_UNITS
 from . import PAPERS
 from .figures import FIGURES
-from .table import Row
+from .table import PaperNumber
+
+COLUMNS = (
+    Column(("item",)),
+    Column(("where",), form="long"),
+    Column(("quantity",)),
+    Column(("printed",)),
+    Column(("computed",)),
+    Column(("verdict",)),
+    Column(("why",), form="long"),
+)
 
 
-def markdown(rows: Sequence[Row]) -> str:
-    """The table of a paper's rows for the documentation."""
-    lines = [
-        "| item | where | quantity | printed | computed | verdict | why |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    for row in rows:
-        unit = "" if row.unit == "1" else f" {row.unit}"
-        shown = row.shown + unit
-        if row.shown_rebuilt is not None:
-            shown += f" (as the authors: {row.shown_rebuilt})"
-        printed = "-" if row.printed is None else row.printed
-        cells = (row.item, row.where, row.quantity, printed, shown, row.verdict, row.reason)
-        lines.append("| " + " | ".join(c.replace("|", "\\|") for c in cells) + " |")
-    return "\n".join(lines) + "\n"
+def table(rows: Sequence[PaperNumber], title: str = "") -> Table:
+    """The table of a paper's rows; in short those that the paper prints."""
+    return Table(tuple(_cells(row) for row in rows), COLUMNS, (title,) if title else (), numeric=False)
 
 
-def write(rows: Sequence[Row], folder: Path) -> list[Path]:
-    """Write reproduction.json, reproduction.md and every figure; returns the files."""
-    folder.mkdir(parents=True, exist_ok=True)
-    numbers = folder / "reproduction.json"
-    content = {"chainunit": __version__, "rows": [row.as_dict() for row in rows]}
-    with whole(numbers) as part:
-        part.write_text(json.dumps(content, indent=2, allow_nan=False) + "\n", "utf-8")
-    table = folder / "reproduction.md"
-    with whole(table) as part:
-        part.write_text(
-            "\n".join(
-                f"## Paper {paper}\n\n{markdown([r for r in rows if r.paper == paper])}" for paper in PAPERS
-            ),
-            "utf-8",
-        )
-    return [numbers, table, *draw(FIGURES, folder)]
+def _cells(row: PaperNumber) -> TableRow:
+    unit = "" if row.unit == "1" else f" {row.unit}"
+    authors = "" if row.rebuilt_text is None else f" (as the authors: {row.rebuilt_text})"
+    cells = (
+        row.item,
+        row.where,
+        row.quantity,
+        "-" if row.printed is None else row.printed,
+        f"{row.text}{unit}{authors}",
+        row.verdict,
+        row.reason,
+    )
+    return TableRow(tuple((cell,) for cell in cells), form="long" if row.printed is None else "both")
 
 
-def show(rows: Sequence[Row], console: Console) -> None:
-    """Print the rows that a paper prints, and count the rest."""
-    for paper in PAPERS:
-        table = Table(title=f"Paper {paper}: what it prints", title_justify="left")
-        for column, side in (
-            ("item", "left"),
-            ("quantity", "left"),
-            ("printed", "right"),
-            ("computed", "right"),
-        ):
-            table.add_column(column, justify=side)  # type: ignore[arg-type]
-        table.add_column("verdict")
-        for row in rows:
-            if row.paper == paper and row.printed is not None:
-                unit = "" if row.unit == "1" else f" {row.unit}"
-                mark = "bold" if row.verdict == "corrected" else ""
-                table.add_row(row.item, row.quantity, row.printed, row.shown + unit, row.verdict, style=mark)
-        console.print(table)
+def markdown(rows: Sequence[PaperNumber]) -> str:
+    """The table for the documentation."""
+    return "\n".join(block_lines(table(rows), DEFAULT_UNITS)).rstrip("\n") + "\n"
+
+
+def title(functions: ModuleType) -> str:
+    """The title of a paper: the first line of its module."""
+    return (functions.__doc__ or "").partition("\n")[0].rstrip(".")
+
+
+def report(rows: Sequence[PaperNumber]) -> Report:
+    """The report."""
     verdicts = [row.verdict for row in rows]
-    console.print(
+    count = (
         f"{verdicts.count('agrees')} agree, {verdicts.count('corrected')} corrected, "
         f"{verdicts.count('not stated')} that the papers should state."
+    )
+    sections = tuple(
+        Section(
+            f"paper-{paper}",
+            title(functions),
+            (
+                table([row for row in rows if row.paper == paper], f"Paper {paper}"),
+                *(make() for make in FIGURES.get(paper, ())),
+            ),
+        )
+        for paper, functions in PAPERS.items()
+    )
+    return Report(
+        "The papers, reproduced and corrected",
+        "Every number that the papers print, beside the computed one",
+        {"chainunit": __version__, "rows": [row.as_dict() for row in rows]},
+        (),
+        (*sections, Section("count", "Count", (Text((count,)),))),
     )

@@ -284,7 +284,7 @@ def printed_upward_load(degrees: float) -> float:
     return static_load("Y_A2", degrees) + printed_b2(degrees) / ORGAN
 
 
-def loads(by: str, phi: Any, crank_speed: float) -> Any:
+def loads(by: str, phi: Any, crank_speed: Any) -> Any:
     """X, Y_A2 and R_t by name: by the "model", by the model with "uniform rods", or by a scheme."""
     if by in SCHEMES:
         return dict(zip(("X", "Y_A2", "R_t"), SCHEMES[by].forces(phi, crank_speed), strict=True))

@@ -16,7 +16,7 @@ PICK: dict[str, Callable[[Any], Any]] = {"least": np.min, "largest": np.max, "me
 
 
 @dataclass(frozen=True)
-class Row:
+class PaperNumber:
     """A number of a paper.
 
     `printed` is the paper's text, with its digits, or the value of its formula as printed (None: the paper does not
@@ -38,22 +38,22 @@ class Row:
     reason: str
 
     @property
-    def shown(self) -> str:
+    def text(self) -> str:
         """The computed value with as many decimals as are worth comparing."""
         return _text(self.computed, self.digits)
 
     @property
-    def shown_rebuilt(self) -> str | None:
+    def rebuilt_text(self) -> str | None:
         """The rebuilt value with the same decimals."""
         return None if self.rebuilt is None else _text(self.rebuilt, self.digits)
 
     def as_dict(self) -> dict[str, Any]:
         """For reproduction.json."""
         own = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "digits"}
-        return own | {"shown": self.shown, "rebuilt": self.shown_rebuilt}
+        return own | {"shown": self.text, "rebuilt": self.rebuilt_text}
 
 
-def rows(paper: str, functions: ModuleType) -> list[Row]:
+def rows(paper: str, functions: ModuleType) -> list[PaperNumber]:
     """The rows of a paper, in the order of its items.
 
     The table has an ``[[item]]`` for each finding: its `number` in the list of errata, `where` in the paper it is,
@@ -74,7 +74,7 @@ def rows(paper: str, functions: ModuleType) -> list[Row]:
     ]
 
 
-def _row(paper: str, item: Mapping[str, Any], entry: Mapping[str, Any], functions: ModuleType) -> Row:
+def _row(paper: str, item: Mapping[str, Any], entry: Mapping[str, Any], functions: ModuleType) -> PaperNumber:
     def value(call: list[Any]) -> float:
         function, *arguments = call
         return float(getattr(functions, function)(*arguments))
@@ -82,7 +82,7 @@ def _row(paper: str, item: Mapping[str, Any], entry: Mapping[str, Any], function
     computed, printed, digits = value(entry["computed"]), entry.get("printed"), entry["digits"]
     if isinstance(printed, list):
         printed = _text(value(printed), digits)
-    return Row(
+    return PaperNumber(
         paper=paper,
         item=item["number"],
         where=item["where"],

@@ -6,33 +6,28 @@ shape depends on mu = e/l1, zeta = z/z_max and the rocker angle psi alone, its l
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 from .. import __version__
 from ..errors import GeometryError
-from ..files import whole
 from ..machines import hanging
-from ..report.style import LINES, draw
+from ..report.blocks import Column, Report, Section, Table, TableRow, Text
+from ..report.figure import Axis, Curve, Field, Figure, Item, Panel
+from ..report.print_figures import contours
 
-NUMBERS, TEXT, PLOT = "two_bar_error.json", "two_bar_error.md", "two_bar_error.png"
-NAMES = (NUMBERS, TEXT, PLOT)
+NAME, PICTURE = "two_bar_error", "two_bar_error.png"
 MU = tuple(np.round(np.arange(0.30, 0.801, 0.05), 2))
 ZETA = tuple(np.round(np.arange(0.15, 0.951, 0.05), 2))
 PSI = tuple(math.radians(x) for x in (-12.0, -6.0, 0.0, 6.0, 12.0))
 LIMITS = (0.02, 0.05, 0.10)
 """Errors in parts of the weight up to which two bars are said to be good."""
-_LEVELS = (2.0, 5.0, 10.0, 20.0)
+_LEVELS = (0.0, 2.0, 5.0, 10.0, 1000.0)
+_CLASSES = ("below 2 % of the weight", "2 to 5 %", "5 to 10 %", "above 10 %")
 _SHOWN = 2
 """every so many values of mu and zeta are in the tables"""
 
@@ -84,16 +79,16 @@ def loads(mu: float, zeta: float, psi: float, counts: tuple[int, int] | None) ->
 
 
 def two_bar_error(
+    progress: Callable[[float], None] = lambda done: None,
     mu: tuple[float, ...] = MU,
     zeta: tuple[float, ...] = ZETA,
     psi: tuple[float, ...] = PSI,
-    report: Callable[[float], None] = lambda done: None,
 ) -> TwoBarError:
-    """Compare over the grid; `report` is told the share that is done."""
+    """Compare over the grid; `progress` gets the share that is done."""
     shape = (len(mu), len(zeta), len(psi))
     error_t, error_n, load_t = (np.full(shape, np.nan) for _ in range(3))
     for i, m in enumerate(mu):
-        report(i / len(mu))
+        progress(i / len(mu))
         for j, z in enumerate(zeta):
             for k, angle in enumerate(psi):
                 try:
@@ -102,7 +97,7 @@ def two_bar_error(
                     continue
                 error_t[i, j, k], error_n[i, j, k] = bars[0] - chain[0], bars[1] - chain[1]
                 load_t[i, j, k] = chain[0]
-    report(1.0)
+    progress(1.0)
     return TwoBarError(np.array(mu), np.array(zeta), np.array(psi), error_t, error_n, load_t)
 
 
@@ -163,92 +158,64 @@ def as_dict(comparison: TwoBarError) -> dict[str, Any]:
     }
 
 
-def write(comparison: TwoBarError, folder: Path) -> list[Path]:
-    """Write numbers, text and plot; returns the files."""
-    numbers, text = folder / NUMBERS, folder / TEXT
-    with whole(numbers) as part:
-        part.write_text(json.dumps(as_dict(comparison), indent=1, allow_nan=False) + "\n", "utf-8")
-    drawn = draw({PLOT: partial(_plot, comparison)}, folder)
-    with whole(text) as part:
-        part.write_text(markdown(comparison), "utf-8")
-    return [numbers, text, *drawn]
+def report(comparison: TwoBarError) -> Report:
+    """The report: statement, table and figure."""
+    return Report(
+        "Two bars against a hanging chain",
+        "Errors of the loads R_t and R_n by two bars",
+        as_dict(comparison),
+        (),
+        (
+            Section("statement", "Statement", tuple(Text((line,)) for line in statement(comparison))),
+            Section("errors", "Errors", (_table(comparison), _figure(comparison))),
+        ),
+    )
 
 
-def _cells(comparison: TwoBarError) -> tuple[list[str], list[list[str]]]:
-    """Heads and rows of the larger error over the rocker angles [% of the weight]."""
-    heads = ["mu \\ zeta", *(f"{z:.2f}" for z in comparison.zeta[::_SHOWN])]
+def _table(comparison: TwoBarError) -> Table:
+    """The larger error over the rocker angles."""
+    columns = [Column(("mu \\ zeta",)), *(Column((f"{z:.2f}",)) for z in comparison.zeta[::_SHOWN])]
     rows = [
-        [f"{m:.2f}", *(f"{100.0 * x:.1f}" if np.isfinite(x) else "-" for x in row[::_SHOWN])]
-        for m, row in zip(comparison.mu[::_SHOWN], comparison.largest[::_SHOWN], strict=True)
+        TableRow(
+            ((f"{m:.2f}",), *((f"{100.0 * x:.1f}" if np.isfinite(x) else "-",) for x in errors[::_SHOWN]))
+        )
+        for m, errors in zip(comparison.mu[::_SHOWN], comparison.largest[::_SHOWN], strict=True)
     ]
-    return heads, rows
-
-
-def _title(comparison: TwoBarError) -> str:
-    return (
+    title = (
         "Largest error of R_t and R_n by two bars, % of the organ's weight, rocker within "
-        f"{math.degrees(comparison.psi.max()):.0f} deg"
+        f'{math.degrees(comparison.psi.max()):.0f} deg; "-": one of the two does not hang'
     )
+    return Table(tuple(rows), tuple(columns), (title,))
 
 
-def show(comparison: TwoBarError, console: Console) -> None:
-    """Print the table and where two bars are good enough."""
-    heads, rows = _cells(comparison)
-    table = Table(title=_title(comparison), title_justify="left")
-    for head in heads:
-        table.add_column(head, justify="right")
-    for row in rows:
-        table.add_row(*row)
-    console.print(table)
-    for line in statement(comparison):
-        console.print(line)
-
-
-def markdown(comparison: TwoBarError) -> str:
-    """Statement, table and plot."""
-    heads, rows = _cells(comparison)
-    lines = ["# Two bars against a hanging chain", "", *(f"- {line}" for line in statement(comparison)), ""]
-    lines += [_title(comparison) + '; "-": one of the two does not hang.', "", f"| {' | '.join(heads)} |"]
-    lines += [
-        "|---" * len(heads) + "|",
-        *(f"| {' | '.join(row)} |" for row in rows),
-        "",
-        f"![errors]({PLOT})",
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def _plot(comparison: TwoBarError) -> Any:
-    figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.8), width_ratios=(1.2, 1.0))
-    percent = 100.0 * comparison.largest
-    filled = left.contourf(
-        comparison.zeta,
-        comparison.mu,
-        percent,
-        levels=(0.0, *_LEVELS, 60.0),
-        cmap="Greys",
-        alpha=0.6,
-        extend="max",
+def _figure(comparison: TwoBarError) -> Figure:
+    mu, zeta, percent = comparison.mu, comparison.zeta, 100.0 * comparison.largest
+    errors: list[Item] = [Field(zeta, mu, percent, _LEVELS, _CLASSES)]
+    errors += [Curve("20 %", line[:, 0], line[:, 1], 1) for line in contours(zeta, mu, percent, 20.0)]
+    errors.append(Curve("the papers' organ", np.array([0.5]), np.array([0.6]), 1, "o", joined=False))
+    i, j = int(np.argmin(np.abs(mu - 0.6))), int(np.argmin(np.abs(zeta - 0.5)))
+    load, error_t, error_n = (x[i, j] for x in (comparison.load_t, comparison.error_t, comparison.error_n))
+    loads = (
+        Curve("R_t of the catenary", comparison.psi, load),
+        Curve("R_t of two bars", comparison.psi, load + error_t, 1),
+        Curve("error of R_n by two bars", comparison.psi, error_n, 2),
     )
-    lines = left.contour(
-        comparison.zeta, comparison.mu, percent, levels=_LEVELS, colors="#1b1b1b", linewidths=1.2
+    within = f"At rocker angles within {math.degrees(comparison.psi.max()):.0f} deg"
+    return Figure(
+        "two-bar-error",
+        "Errors of two bars in place of a hanging chain",
+        "The larger error of R_t and R_n over zeta and mu, and the loads of the papers' organ over the rocker angle.",
+        (
+            (
+                Panel(Axis("zeta = z/z_max"), Axis("mu = e/l1"), tuple(errors), within),
+                Panel(
+                    Axis("rocker angle psi", "rad"),
+                    Axis("share of the weight", kind="percent"),
+                    loads,
+                    f"mu = {mu[i]:g}, zeta = {zeta[j]:g}",
+                ),
+            ),
+        ),
+        file=PICTURE,
+        widths=(1.2, 1.0),
     )
-    left.clabel(lines, fmt="%g %%", fontsize=9)
-    figure.colorbar(filled, ax=left, label="larger error of R_t and R_n [% of the weight]")
-    left.plot(0.5, 0.6, "o", color="#c1440e", markersize=6)
-    left.annotate("the papers' organ", (0.5, 0.6), (7, 4), textcoords="offset points", fontsize=9)
-    left.set_xlabel("zeta = z/z_max [1]")
-    left.set_ylabel("mu = e/l1 [1]")
-    left.set_title(f"At rocker angles within {math.degrees(comparison.psi.max()):.0f} deg")
-    i, j = int(np.argmin(np.abs(comparison.mu - 0.6))), int(np.argmin(np.abs(comparison.zeta - 0.5)))
-    degrees = np.degrees(comparison.psi)
-    right.plot(degrees, 100.0 * comparison.load_t[i, j], label="R_t of the catenary", **LINES[0])
-    right.plot(
-        degrees, 100.0 * (comparison.load_t + comparison.error_t)[i, j], label="R_t of two bars", **LINES[1]
-    )
-    right.plot(degrees, 100.0 * comparison.error_n[i, j], label="error of R_n by two bars", **LINES[2])
-    right.set_xlabel("rocker angle psi [deg]")
-    right.set_ylabel("[% of the weight]")
-    right.set_title(f"mu = {comparison.mu[i]:g}, zeta = {comparison.zeta[j]:g}")
-    right.legend(loc="best", fontsize=9)
-    return figure

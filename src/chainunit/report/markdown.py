@@ -28,9 +28,11 @@ def markdown(report: Report, pictures: Collection[str]) -> str:
     if report.source:
         lines += [_line(report.source, units), ""]
     for block in report.opening:
-        lines += _block(block, units, pictures)
+        lines += block_lines(block, units, pictures)
     for section in report.sections:
-        inside = [text for each in of_form(section.blocks, "long") for text in _block(each, units, pictures)]
+        inside = [
+            text for each in of_form(section.blocks, "long") for text in block_lines(each, units, pictures)
+        ]
         if inside:
             lines += [f"## {section.heading}", "", *inside]
     return "\n".join(lines).rstrip("\n") + "\n"
@@ -49,7 +51,8 @@ def _grid(rows: Iterable[Iterable[str]], head: Iterable[str]) -> Iterator[str]:
     yield ""
 
 
-def _block(block: Block, units: Units, pictures: Collection[str]) -> list[str]:
+def block_lines(block: Block, units: Units, pictures: Collection[str] = ()) -> list[str]:
+    """The lines of one block."""
     match block:
         case Text():
             return [_line(block.line, units), ""]

@@ -32,6 +32,15 @@ def write(figures: Iterable[Figure], folder: Path, units: Units) -> list[Path]:
     return draw({each.file: partial(_figure, each, units) for each in figures if each.file}, folder)
 
 
+def contours(x: Any, y: Any, z: Any, level: float) -> list[Any]:
+    """The lines along which `z`, shape (len(y), len(x)), has the `level`, each as its points, shape (n, 2); the
+    longest first. NaN has no line."""
+    figure, axis = plt.subplots()
+    lines = axis.contour(x, y, np.ma.masked_invalid(z), levels=[level]).allsegs[0]
+    plt.close(figure)
+    return sorted(lines, key=len, reverse=True)
+
+
 def _figure(figure: Figure, units: Units) -> Any:
     rows, columns = len(figure.panels), len(figure.panels[0])
     heights, widths = figure.heights or (1.0,) * rows, figure.widths or (1.0,) * columns

@@ -40,6 +40,9 @@ LOOKS: dict[str, dict[str, Any]] = {
     "reference": {"color": "#777777", "linestyle": (0, (6, 2)), "linewidth": 1.2},
     "path": {"color": "#1b1b1b", "linestyle": "-", "linewidth": 1.0},
     "edge": {"color": "#1b1b1b", "linestyle": "-", "linewidth": 2.8},
+    "right": {"color": "#1b1b1b", "linestyle": "--", "linewidth": 1.8},
+    "printed": {"color": "#c1440e", "linestyle": "-", "linewidth": 0.9},
+    "printed right": {"color": "#c1440e", "linestyle": "--", "linewidth": 0.9},
 }
 """Lines that mean the same in every plot."""
 INK = "#1b1b1b"
