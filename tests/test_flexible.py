@@ -28,6 +28,7 @@ from chainunit.fmu.native.export import export as export_native
 from chainunit.fmu.native.platforms import compiler
 from chainunit.groups.loads import Pin, Processing, Stop
 from chainunit.machines import hanging
+from chainunit.machines.chain_organs import OrganLaw
 from chainunit.machines.chain_unit import (
     ChamberForces,
     Inputs,
@@ -36,7 +37,7 @@ from chainunit.machines.chain_unit import (
     drive,
     rocker_motion,
 )
-from chainunit.machines.flexible import OrganLaw, flexible
+from chainunit.machines.flexible import flexible, turning
 from chainunit.mechanism.machine import MachineState, Mechanism
 from chainunit.studies.chain import numbers_at, study_chain
 from chainunit.studies.drive import Drive
@@ -193,6 +194,90 @@ def test_dynamic_reference(case):
             for pin, name in (("support", "A1"), ("hinge", "B"), ("rocker_joint", "A2")):
                 force = [hand * found[f"{side}.{pin}.fx"], -found[f"{side}.{pin}.fy"]]
                 np.testing.assert_allclose(force, case[stored][name][k], atol=1e-10 * peak)
+
+
+# -- direct
+
+
+def direct_case(rng):
+    """A machine with chains in motion: both models, parameters of the direct one, and inputs and states of both."""
+    model, p, u, x = moving(rng)
+    walls, webs = model.organs.walls, model.organs.webs
+    direct = turning(walls, webs)
+    q = direct.parameter_layout.from_names(
+        model.parameter_layout.named(p)
+        | {"J_added": rng.uniform(0.1, 1.0), "phi_start": u.phi, "w_start": u.w}
+    )
+    tau = direct.Inputs(tau=rng.uniform(-50.0, 50.0), left=u.left, right=u.right, stop=u.stop)
+    return (model, p, u, x), direct, q, tau, [u.phi, u.w, *x]
+
+
+def test_the_direct_model_with_chains_is_the_inverse_of_the_inverse_one():
+    """The torque that the inverse model needs for the acceleration found is the torque given, rods move alike."""
+    rng = np.random.default_rng(35)
+    for _ in range(20):
+        (model, p, u, x), direct, q, given, y = direct_case(rng)
+        rates = direct.derivatives(MATH, q, given, direct.state_layout.instance(y))
+        moved = dataclasses.replace(u, a=rates[1])
+        state = model.state_layout.instance(x)
+        need = named(model, p, moved, state)
+        size = abs(given.tau) + abs(q.J_added * rates[1])
+        assert need["tau"] + q.J_added * rates[1] == pytest.approx(given.tau, abs=1e-9 * size)
+        wanted = model.derivatives(MATH, p, moved, state)
+        np.testing.assert_allclose(rates[2:], wanted, rtol=1e-9, atol=1e-9 * np.max(np.abs(wanted)))
+        out = named(direct, q, given, direct.state_layout.instance(y))
+        for name in ("left.support.fx", "right.hinge.fy", "frame.moment", "crank_bearing.fx"):
+            assert out[name] == pytest.approx(
+                need[name], rel=1e-9, abs=1e-9 * (1.0 + abs(need["crank_bearing.fx"]))
+            )
+
+
+def test_a_machine_with_chains_that_turns_by_itself_keeps_its_energy():
+    """From the hanging start, without losses or torque: kinetic energy of shaft, links and rods, and potential
+    energy; the chains stay closed."""
+    model = turning(2, 1)
+    p = model.check(
+        model.parameter_layout.from_names(
+            {
+                "pin.friction": 0.0, "organ.eta": 0.0, "organ.end_damping": 0.0, "organ.fold_stiffness": 0.0,
+                "w_start": 5.0, "J_added": 0.2,
+            }
+        )
+    )  # fmt: skip
+    u, layout = model.Inputs(), model.state_layout
+    start = layout.values(model.begin(p, u))
+    run = solve_ivp(
+        lambda _, y: model.derivatives(MATH, p, u, layout.instance([float(v) for v in y])), (0.0, 1.0), start,
+        rtol=1e-10, atol=1e-10, method="DOP853",
+    )  # fmt: skip
+    energies = []
+    for y in run.y.T[:: max(1, len(run.t) // 20)]:
+        out = named(model, p, u, layout.instance([float(v) for v in y]))
+        energies.append(out["kinetic_energy"] + out["potential_energy"] + 0.5 * p.J_added * y[1] ** 2)
+        assert max(out["left.drift"], out["right.drift"]) < 1e-7
+        assert abs(out["left.energy_residual"]) + abs(out["right.energy_residual"]) < 1e-6
+    assert np.ptp(run.y[1]) > 0.3
+    assert np.ptp(energies) < 1e-6 * np.max(np.abs(energies))
+
+
+@native
+@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
+def test_the_direct_fmu_runs_as_its_equations(kind, tmp_path):
+    model, values = turning(2, 1), {"w_start": 4.0, "tau": 30.0, "left.material_mass": 40.0}
+    file = export_native(model, tmp_path / "turning.fmu", {n: v for n, v in values.items() if n != "tau"})
+    p = model.check(model.parameter_layout.from_names({"w_start": 4.0}))
+    u, layout = model.input_layout.from_names({"tau": 30.0, "left.material_mass": 40.0}), model.state_layout
+    run = solve_ivp(
+        lambda _, y: model.derivatives(MATH, p, u, layout.instance([float(v) for v in y])), (0.0, 0.5),
+        layout.values(model.begin(p, u)), rtol=1e-10, atol=1e-10, method="DOP853",
+    )  # fmt: skip
+    names = ["phi", "w", "left.theta_2", "right.omega_3"]
+    end = fmpy.simulate_fmu(
+        str(file), fmi_type=kind, stop_time=0.5, output_interval=0.01, relative_tolerance=1e-9,
+        start_values=values, output=names,
+    )[-1]  # fmt: skip
+    wanted = [run.y[layout.names.index(name), -1] for name in names]
+    np.testing.assert_allclose(list(end)[1:], wanted, rtol=1e-4, atol=1e-4)
 
 
 # -- start

@@ -177,7 +177,7 @@ class Chain:
     """A chain at one state, its A2 end moved. `moment_at_start` and `moment_at_end` act on it in the pins A1 and A2
     [N m]; `folding` is the energy in the stops [J], `damped` what damping takes [W]."""
 
-    __slots__ = ("damped", "folding", "forces", "moment_at_end", "moment_at_start", "rates", "sweep")
+    __slots__ = ("_end", "_solution", "damped", "folding", "moment_at_end", "moment_at_start", "sweep")
 
     def __init__(
         self,
@@ -221,7 +221,23 @@ class Chain:
             [moments[k + 1] - moments[k] for k in range(N)],
             at_start,
         )
-        self.rates, self.forces = self.sweep.back(self.sweep.force(end))
+        self._end = end
+        self._solution: tuple[list[Any], list[Vec2]] | None = None
+
+    def _solved(self) -> tuple[list[Any], list[Vec2]]:
+        if self._solution is None:
+            self._solution = self.sweep.back(self.sweep.force(self._end))
+        return self._solution
+
+    @property
+    def rates(self) -> list[Any]:
+        """Angular accelerations of the rods [rad/s2]."""
+        return self._solved()[0]
+
+    @property
+    def forces(self) -> list[Vec2]:
+        """Forces f_0 .. f_N at the pins [N]."""
+        return self._solved()[1]
 
     @staticmethod
     def _stop(xp: Any, rods: Rods, fold: Any) -> tuple[Any, Any]:

@@ -18,8 +18,9 @@ from ..errors import InputError
 from ..fmu.backends import Backend
 from ..fmu.backends import export as export_fmu
 from ..machines.api import ChainUnit
+from ..machines.chain_organs import OrganLaw
 from ..machines.chain_unit import ChamberForces, DirectChainUnit
-from ..machines.flexible import OrganLaw, flexible
+from ..machines.flexible import flexible
 from ..machines.hanging import split
 from ..model import Model
 from ..quantities import Layout

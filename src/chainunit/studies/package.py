@@ -14,8 +14,9 @@ from ..drives.motor import Motor
 from ..errors import InputError, RunError
 from ..fmu.backends import Backend
 from ..machines.api import ChainUnit
+from ..machines.chain_organs import LEAST, MOST
 from ..machines.chain_unit import ChamberForces, DirectChainUnit
-from ..machines.flexible import LEAST, MOST, flexible
+from ..machines.flexible import flexible
 from ..machines.hanging import split
 from ..model import Model
 from ..quantities import Layout

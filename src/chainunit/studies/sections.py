@@ -14,8 +14,8 @@ from ..drives.driveline import Mounted
 from ..drives.gearing import KINDS, Transmission
 from ..drives.induction_motor import Inverter, SoftStart
 from ..drives.line_table import form, given_line
+from ..machines.chain_organs import LEAST, MOST, OrganLaw
 from ..machines.chain_unit import ChamberForces, SideLoads
-from ..machines.flexible import LEAST, MOST, OrganLaw
 from ..quantities import Value, declaration, group, quantity
 from ..reading import given_values, schema
 

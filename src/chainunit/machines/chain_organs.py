@@ -1,0 +1,328 @@
+"""The organs of the chain unit as chains of rods: their declarations, and their mechanics on the drive.
+
+Rods are numbered from the wall hinge A1, the first `walls` of them are the wall, the others the web; theta is the
+angle of a rod from the downward vertical, positive towards +x.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import Any
+
+from ..groups import hanging_chain
+from ..groups.chain import Rods
+from ..groups.hanging_chain import HangingChain, HeldChain, State
+from ..groups.loads import Resistance
+from ..integrate import Solver
+from ..mechanism.chains import ChainedState
+from ..mechanism.linkage import Linkage
+from ..mechanism.machine import Mechanism
+from ..mechanism.models import running
+from ..planar import Vec2
+from ..quantities import Layout, Value, declaration, group, quantity
+from . import chain_unit
+from .chain_unit import (
+    NAMES,
+    SIDES,
+    ChamberForces,
+    Rocker,
+    on_drive,
+    on_side,
+    rocker_load,
+    rocker_motion,
+)
+
+_CLOSED = 1e-6
+"""Gap at the start above which a chain does not hang [m]."""
+_NO_PULL = 1e-6  # N, over which a rod turns from pulled to slack
+LEAST, MOST = 2, 24
+"""Rods of an organ."""
+
+
+@declaration
+class OrganLaw:
+    """What damps and bounds the rods of a chain; alike on both sides."""
+
+    eta: Value = quantity(
+        "N.m2.s/rad",
+        "damping of the inner pins times the mean length of the rods beside each; assumed",
+        default=0.24,
+        min=0.0,
+        max=1e4,
+        tunable=True,
+    )
+    end_damping: Value = quantity(
+        "N.m.s/rad",
+        "damping of each of the pins A1 and A2; assumed",
+        default=1.0,
+        min=0.0,
+        max=1e5,
+        tunable=True,
+    )
+    fold_limit: Value = quantity(
+        "rad",
+        "angle between neighbouring rods at which they meet; assumed",
+        default=2.8,
+        above=0.0,
+        max=math.pi,
+    )
+    fold_stiffness: Value = quantity(
+        "N.m/rad2",
+        "stiffness of the stop behind it, whose moment grows with the square of the angle; assumed",
+        default=5e4,
+        min=0.0,
+        max=1e7,
+        tunable=True,
+    )
+
+
+@declaration
+class Parameters(chain_unit.Parameters):
+    """Parameters of the chain unit with chains."""
+
+    organ: OrganLaw = group(OrganLaw, "organs as chains", default=OrganLaw())
+    tolerance: Value = quantity(
+        "1",
+        "relative tolerance of the integrator in a Co-Simulation FMU",
+        default=1e-7,
+        min=1e-12,
+        max=1e-2,
+        tunable=True,
+    )
+    solver: Solver = group(Solver, "internal integrator", default=Solver(max_steps=1e5))
+
+
+@declaration
+class ChainSide(chain_unit.Side):
+    """Loads of one organ as a chain."""
+
+    slack_share: Value = quantity("1", "share of the rods whose mean axial pull is below zero")
+    fold_largest: Value = quantity("rad", "largest angle between neighbouring rods")
+    drift: Value = quantity(
+        "m",
+        "distance between the end of the chain and A2, in Co-Simulation behind the projection of each step",
+    )
+    kinetic_energy: Value = quantity("J", "kinetic energy")
+    potential_energy: Value = quantity(
+        "J", "potential energy, of weights zero at the level of C, and of folded rods", nominal=100.0
+    )
+    energy_residual: Value = quantity(
+        "J",
+        "energy that is there beyond that at the start and what came and went since",
+        nominal=1000.0,
+    )
+    energy_per_kg: Value = quantity("J/kg", "energy of a kilogram of material on its place")
+
+
+def _numbered(name: str, number: int, unit: str, words: str, nominal: float | None) -> list[Any]:
+    return [
+        (f"{name}_{k}", Value, quantity(unit, words.format(k, k + 1), nominal=nominal))
+        for k in range(1, number + 1)
+    ]
+
+
+def declared_class(name: str, bases: tuple[type, ...], fields: Sequence[Any]) -> Any:
+    """A declaration that is built from its fields."""
+    return dataclasses.make_dataclass(name, fields, bases=bases, frozen=True, kw_only=True)
+
+
+def both(of: type) -> list[Any]:
+    """Fields for the declaration `of` on each side."""
+    return [(name, of, group(of, f"{name} organ")) for name in SIDES]
+
+
+class Organs:
+    """Both organs as chains of `walls` + `webs` rods: their states and outputs as declared, and their mechanics from
+    the crank angle `q` and speed `w`, for the inverse and the direct model."""
+
+    def __init__(self, walls: int, webs: int) -> None:
+        self.walls, self.webs = walls, webs
+        self.number = N = walls + webs
+        words = "angle of rod {}, counted from A1, from the downward vertical, positive towards +x"
+        due = "energy at the start, and what came and went since by rocker, damping and processing"
+        self.States = declared_class(
+            "ChainStates",
+            (),
+            [
+                *_numbered("theta", N, "rad", words, None),
+                *_numbered("omega", N, "rad/s", "speed of rod {}", 10.0),
+                ("energy_due", Value, quantity("J", due, nominal=100.0)),
+            ],
+        )
+        self.Side = declared_class(
+            "ChainLoads",
+            (ChainSide,),
+            [
+                *_numbered("pull", N, "N", "mean axial pull in rod {}", 100.0),
+                *_numbered("fold", N - 1, "rad", "angle of rod {1} from rod {0}", None),
+            ],
+        )
+        self._layout = Layout(self.States)
+
+    def split(self, x: Any) -> list[State]:
+        """Angles and speeds of the rods, left and right."""
+        N, sides = self.number, (self._layout.values(x.left), self._layout.values(x.right))
+        return [(side[:N], side[N : 2 * N]) for side in sides]
+
+    def rods(self, p: Any, u: Any) -> list[Rods]:
+        """Wall and web of each side with the material on them, as uniform rods: paper 000's organ in more pieces."""
+        walls, webs = self.walls, self.webs
+        lengths = [p.l1 / walls] * walls + [p.l2 / webs] * webs
+        inner = [2.0 * p.organ.eta / (one + other) for one, other in pairwise(lengths)]
+        damping = [p.organ.end_damping, *inner, p.organ.end_damping]
+        sides = []
+        for masses, loads in ((p.left, u.left), (p.right, u.right)):
+            on_web = p.web_share * loads.material_mass
+            each = [(masses.wall_mass + (loads.material_mass - on_web)) / walls] * walls
+            each += [(masses.web_mass + on_web) / webs] * webs
+            law = p.organ
+            sides.append(Rods(lengths, each, damping, p.rod_inertia, law.fold_limit, law.fold_stiffness))
+        return sides
+
+    def linkage(self, p: Any, u: Any, states: Sequence[State]) -> Linkage:
+        """The drive with both chains in these states."""
+        chains: dict[str, Any] = {}
+        for side, rods, state in zip(SIDES, self.rods(p, u), states, strict=True):
+            names = NAMES[side]
+            resistance = Resistance(names.b, getattr(u, side).processing_force, p.processing)
+            chains[side] = HangingChain(names.a1, "A2", rods, state, p.g, resistance, self.walls)
+        return chain_unit.drive(p, u, (), chains)
+
+    def mechanism(self, xp: Any, p: Any, u: Any, states: Sequence[State], q: Any) -> Mechanism:
+        """The drive at the crank angle `q` with the chains in these states."""
+        return Mechanism(xp, self.linkage(p, u, states), q)
+
+    def held(self, xp: Any, m: Mechanism, w: Any) -> Iterator[HeldChain]:
+        """Both chains of the drive."""
+        for side in SIDES:
+            yield m.linkage.loads[side].held(xp, m, w)
+
+    def _shares(self, p: Any) -> list[Any]:
+        """How a kilogram of material lies on the rods."""
+        on_wall, on_web = (1.0 - p.web_share) / self.walls, p.web_share / self.webs
+        return [on_wall] * self.walls + [on_web] * self.webs
+
+    def _side(self, xp: Any, p: Any, s: ChainedState, a: Any, side: Any, due: Any) -> tuple[Any, Vec2]:
+        """The declared loads of a side at crank acceleration `a`, and the force at its support."""
+        h, hand, walls = s.chains[side], NAMES[side].hand, self.walls
+        _, forces = h.at(a)
+        theta = h.data.state[0]
+        axes = [Vec2(xp.sin(angle), -xp.cos(angle)) for angle in theta]
+        before = [u.dot(forces[k] - h.at_start[k]) for k, u in enumerate(axes)]
+        after = [u.dot(forces[k + 1]) for k, u in enumerate(axes)]
+        least = [xp.minimum(one, other) for one, other in zip(before, after, strict=True)]
+        pulls = [0.5 * (one + other) for one, other in zip(before, after, strict=True)]
+        folds = [outer - inner for inner, outer in pairwise(theta)]
+        slack = [xp.maximum(0.0, xp.minimum(1.0, -pull * (1.0 / _NO_PULL))) for pull in pulls]
+        kinetic, potential, per_kg = h.energies(xp, self._shares(p))
+        loads = self.Side(
+            **on_side(s.m.links["rocker"], hand, (-forces[0], forces[walls], forces[-1])),
+            web_pull=functools.reduce(xp.minimum, least[walls:]),
+            wall_pull=functools.reduce(xp.minimum, least[:walls]),
+            slack_share=sum(slack) * (1.0 / self.number),
+            fold_largest=_largest_fold(xp, theta),
+            drift=h.missing.length(xp),
+            kinetic_energy=kinetic,
+            potential_energy=potential,
+            energy_residual=kinetic + potential - due,
+            energy_per_kg=per_kg,
+            **{f"pull_{k + 1}": pull for k, pull in enumerate(pulls)},
+            **{f"fold_{k + 1}": fold for k, fold in enumerate(folds)},
+        )
+        return loads, -forces[0]
+
+    def loads(self, xp: Any, p: Any, x: Any, s: ChainedState, a: Any) -> dict[str, Any]:
+        """The fields of `Loads` at crank acceleration `a`."""
+        reactions = s.reactions(a)
+        sides: dict[str, Any] = {}
+        for side, names in NAMES.items():
+            sides[side], support = self._side(xp, p, s, a, side, getattr(x, side).energy_due)
+            reactions[names.a1, names.wall] = support
+        left, right = sides.values()
+        chains = s.chains.values()
+        at_a2, at_a1 = (
+            sum(getattr(h.chain, moment) for h in chains) for moment in ("moment_at_end", "moment_at_start")
+        )
+        fields = running(s, a)
+        fields["kinetic_energy"] += left.kinetic_energy + right.kinetic_energy
+        fields["potential_energy"] += left.potential_energy + right.potential_energy
+        fields["dissipated_power"] += sum(h.lost() for h in chains)
+        if self.number == LEAST:
+            for h in chains:
+                (wall, web), _ = h.data.state
+                fields["margin"] = xp.minimum(fields["margin"], xp.abs(xp.sin(web - wall)))
+        return {
+            **fields,
+            "rocker": Rocker(**rocker_motion(xp, s, a), **rocker_load(p, left, right, at_a2)),
+            **sides,
+            **on_drive(xp, p, s, a, reactions, at_a1),
+        }
+
+    def closed(self, xp: Any, p: Any, u: Any, x: Any, q: Any, w: Any) -> list[Any]:
+        """Both chains end at A2 and move with it, by the smallest change in the metric of the masses. Where the
+        drive has corrected its speed this is a jolt from the rocker, whose work counts."""
+        m = self.mechanism(xp, p, u, self.split(x), q)
+        values: list[Any] = []
+        for side in SIDES:
+            theta, omega, work = m.linkage.loads[side].closed(xp, m, w)
+            values += [*theta, *omega, getattr(x, side).energy_due + work]
+        return values
+
+    # -- start
+
+    @property
+    def unknowns(self) -> int:
+        """Of the chains at rest; two rods stand where the dyad does."""
+        return 0 if self.number == LEAST else 6
+
+    def _reaches(self, xp: Any, p: Any, u: Any, q: Any) -> Iterator[tuple[Any, Any]]:
+        """From A1 to A2 in parts of the length, the right organ mirrored."""
+        pins, whole = Mechanism(xp, chain_unit.drive(p, u, (), {}), q).pins, p.l1 + p.l2
+        for names in NAMES.values():
+            way = pins["A2"].p - pins[names.a1].p
+            yield way.x * names.hand / whole, way.y / whole
+
+    def guess(self, xp: Any, p: Any, u: Any, q: Any) -> list[Any]:
+        """First guess of the unknowns."""
+        if not self.unknowns:
+            return []
+        return [z for reach in self._reaches(xp, p, u, q) for z in hanging_chain.guess(xp, reach)]
+
+    def improved(self, xp: Any, p: Any, u: Any, q: Any, z: Sequence[Any]) -> list[Any]:
+        """The unknowns after one more round."""
+        sides = zip(self.rods(p, u), self._reaches(xp, p, u, q), (z[:3], z[3:]), strict=True)
+        return [value for rods, reach, own in sides for value in hanging_chain.hang(xp, rods, reach, own)]
+
+    def started(self, xp: Any, p: Any, u: Any, q: Any, w: Any, z: Sequence[Any]) -> dict[str, Any]:
+        """States of both sides: hanging at rest, and taken along by A2 where the crank turns."""
+        states: list[Any] = []
+        bars = None if self.unknowns else Mechanism(xp, ChamberForces.linkage(p, u), q).links
+        for k, (rods, names) in enumerate(zip(self.rods(p, u), NAMES.values(), strict=True)):
+            if bars is not None:
+                theta = hanging_chain.two_rods(xp, bars[names.wall], bars[names.web])
+            else:
+                theta = hanging_chain.resting(xp, rods, names.hand, z[3 * k : 3 * k + 3])
+            states.append((theta, [0.0 * theta[0]] * self.number))
+        m = self.mechanism(xp, p, u, states, q)
+        # once: of a chain that was not found to hang it leaves a gap, see `start_limits`
+        states = [m.linkage.loads[side].closed(xp, m, w)[:2] for side in SIDES]
+        m = self.mechanism(xp, p, u, states, q)
+        sides: dict[str, Any] = {}
+        for side, (theta, omega), h in zip(SIDES, states, self.held(xp, m, w), strict=True):
+            kinetic, potential, _ = h.energies(xp, self._shares(p))
+            sides[side] = self._layout.instance([*theta, *omega, kinetic + potential])
+        return sides
+
+    def start_limits(self, xp: Any, p: Any, u: Any, x: Any, q: Any) -> Iterator[tuple[Any, Any, Any]]:
+        """Of each side: the chain ends at A2, and no stop between rods is met."""
+        for h in self.held(xp, self.mechanism(xp, p, u, self.split(x), q), 0.0):
+            yield h.missing.length(xp), -math.inf, _CLOSED
+            yield _largest_fold(xp, h.data.state[0]), -math.inf, p.organ.fold_limit
+
+
+def _largest_fold(xp: Any, theta: Sequence[Any]) -> Any:
+    return functools.reduce(xp.maximum, [xp.abs(outer - inner) for inner, outer in pairwise(theta)])

@@ -1,0 +1,73 @@
+"""A linkage with chains, which have states of their own: slopes of its load port are taken along the motion.
+
+With a rate of change D at the present speed and a = 0,
+
+    tau_bias_dphi = D tau_bias w^3/(w^4 + W_SMALL^4),   dJ_dphi likewise (at the crank),
+
+which is the plain derivative by the angle for two rods, and
+
+    tau_bias_dw = d tau_bias/d w + (d tau_bias/d omega) . (d alpha/d a),
+
+as the rods follow a change of the speed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ..engines import Dual, dual, slope
+from ..groups.hanging_chain import HangingChain, HeldChain
+from .machine import MachineState, Mechanism
+
+W_SMALL = 0.01
+"""Speed of the crank [rad/s] below which the slopes by the angle tend to zero."""
+
+
+class ChainedState(MachineState):
+    """A linkage with chains at one point: the `chains` by the names of their loads."""
+
+    __slots__ = ("_slopes", "chains")
+
+    def __init__(self, xp: Any, m: Mechanism, w: Any, loads: Mapping[str, Any] | None = None) -> None:
+        super().__init__(xp, m, w, loads)
+        self.chains: dict[str, HeldChain] = {
+            name: self.effects[name].source
+            for name, load in self._loads.items()
+            if isinstance(load, HangingChain)
+        }
+        self._slopes: tuple[Any, Any, Any] | None = None
+
+    @property
+    def kinetic_energy(self) -> Any:
+        """Of the bodies, without the chains [J]."""
+        bodies = self.J - sum(chain.inertia() for chain in self.chains.values())
+        return 0.5 * bodies * (self.w * self.w)
+
+    def _moving(self, rates: Mapping[str, tuple[Sequence[Any] | None, Sequence[Any]]]) -> dict[str, Any]:
+        """The loads with chains whose angles (None: they stand) and speeds change at these rates."""
+        loads = dict(self._loads)
+        for name, (turning, faster) in rates.items():
+            theta, omega = loads[name].state
+            if turning is not None:
+                theta = [Dual(x, v) for x, v in zip(theta, turning, strict=True)]
+            omega = [Dual(v, a) for v, a in zip(omega, faster, strict=True)]
+            loads[name] = loads[name]._replace(state=(theta, omega))
+        return loads
+
+    def along(self, q: Any) -> tuple[Any, Any, Any]:
+        """tau_bias_dphi, tau_bias_dw and dJ_dphi at the crank angle `q`, along the motion."""
+        if self._slopes is None:
+            w, engine = self.w, dual(self._xp)
+            rates = {name: chain.chain.rates for name, chain in self.chains.items()}
+            moving = self._moving({name: (c.data.state[1], rates[name]) for name, c in self.chains.items()})
+            along = MachineState(engine, Mechanism(engine, self.m.linkage, Dual(q, w)), w, moving)
+            by_a = {}
+            for name, chain in self.chains.items():
+                pushed, _ = chain.at(1.0)
+                by_a[name] = None, [one - rate for one, rate in zip(pushed, rates[name], strict=True)]
+            quicker = MachineState(engine, self.m, Dual(w, 1.0), self._moving(by_a))
+            w2 = w * w
+            share = w * w2 / (w2 * w2 + W_SMALL * W_SMALL * W_SMALL * W_SMALL)
+            self._slopes = slope(along.bias) * share, slope(quicker.bias), slope(along.J) * share
+        return self._slopes
