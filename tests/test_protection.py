@@ -146,7 +146,7 @@ def test_one_sided_feed_and_a_loaded_soft_start_are_normal_duty(tmp_path, monkey
     assert study.sizing.best.duty_torque == pytest.approx(fed, rel=0.01)
     (warning,) = [warning for warning in study.warnings if warning.kind == "gear passed"]
     assert "the gear's permitted 450 N m" in warning.text and study.called("jam_right") in warning.text
-    assert warning.runs == ("jam_right",) and warning.quantities["limit"] == (450.0, "N.m")
+    assert warning.runs == ("jam_right",) and warning.quantities["passed"] == (450.0, "N.m")
 
 
 def test_an_insufficient_motor_gets_no_advice(tmp_path, monkeypatch):

@@ -365,7 +365,7 @@ def export(
     from .fmu.backends import export as write
     from .models import MODELS
     from .studies.package import start_of, with_rods
-    from .studies.sections import Chain
+    from .studies.sections import ChainOrgans
 
     if name not in MODELS:
         raise InputError(f"{name}: no such model; there are {', '.join(MODELS)}")
@@ -388,7 +388,7 @@ def export(
             if rods is None and loaded.chain:
                 rods = int(loaded.chain.rods)
         if name == "ChainUnitFlexible":
-            model = with_rods(int(Chain().rods) if rods is None else rods, start)
+            model = with_rods(int(ChainOrgans().rods) if rods is None else rods, start)
         made = write(
             model,
             file,

@@ -34,21 +34,21 @@ from .studies.sections import (
     ORGANS,
     SECTIONS,
     STARTS,
-    Chain,
+    ChainOrgans,
     Coupling,
     Driveline,
     Feed,
+    FileSection,
     MonteCarlo,
     Ratios,
     Run,
-    Section,
     Sizing,
     Starter,
 )
 from .system.signals import Profile
 
 
-def _table(name: str, section: Section) -> tuple[Any, Any]:
+def _table(name: str, section: FileSection) -> tuple[Any, Any]:
     table = section.form(section.declared, name, f"{name}.", **section.keys)
     return table, Field(default_factory=table)
 
@@ -90,7 +90,7 @@ class Config:
     """of the driveline, one of `PLACES`"""
     damping_ratio: float | None
     """of the driveline's torsion, in place of d2 and d3"""
-    chain: Chain | None
+    chain: ChainOrgans | None
     """the organs as chains, or None for two bars"""
     source: str
     given: frozenset[str]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 import xarray as xr
@@ -108,47 +109,41 @@ def coupling_sentence(study: Study) -> str:
 def remark_on_coupling(study: Study, trip: float) -> None:
     """Where the coupling that is given, set to `trip` [N m], does not do its work."""
     most, peaks = pull_out(study), peaks_on_coupling(study)
-    shocks = peaks_on_coupling(study, Role.SHOCK)
-    setting = {"trip_torque": (trip, "N.m")}
+    shocks, amounts = peaks_on_coupling(study, Role.SHOCK), {"trip": (trip, "N.m"), "motor": (most, "N.m")}
+    warn = partial(study.remark, "warning")
     if study.start_torque is not None and study.start_torque > trip:
-        study.remark(
-            "warning",
+        warn(
             "coupling held shut",
-            f"A start direct on line puts {_torque(study.start_torque)} on the safety coupling, which opens at "
-            f"{_torque(trip)}: it is taken to be held shut in the start.",
+            "A start direct on line puts {start} on the safety coupling, which opens at {trip}: it is taken to be "
+            "held shut in the start.",
             "start_up",
-            start_torque=(study.start_torque, "N.m"),
-            **setting,
+            start=(study.start_torque, "N.m"),
+            **amounts,
         )
     opened = [name for name in peaks if study.answers[name].coupling_trip_time is not None]
     if nuisances := [name for name in opened if name not in shocks]:
-        study.remark(
-            "warning",
+        warn(
             "nuisance trip",
-            f"The safety coupling, set to {_torque(trip)}, opens where no shock asks for it, a nuisance trip that "
-            f"protects nothing: {'; '.join(map(study.called, nuisances))}.",
+            "The safety coupling, set to {trip}, opens where no shock asks for it, a nuisance trip that protects "
+            "nothing: {where}.",
             *nuisances,
-            **setting,
+            where="; ".join(map(study.called, nuisances)),
+            **amounts,
         )
     if shocks and not set(opened) & set(shocks):
-        steady = on_coupling(study.drive, study.steady)
-        study.remark(
-            "warning",
+        warn(
             "coupling never opens",
-            f"The safety coupling opens in no jam, lump or block of this study: it is set to {_torque(trip)}, they "
-            f"put {_torque(max(shocks.values()))} on it at most, steady running {_torque(steady)}; the motor gives "
-            f"{_torque(most)} at most.",
+            "The safety coupling opens in no jam, lump or block of this study: it is set to {trip}, they put "
+            "{largest} on it at most, steady running {steady}; the motor gives {motor} at most.",
             *shocks,
             largest=(max(shocks.values()), "N.m"),
-            motor=(most, "N.m"),
-            **setting,
+            steady=(on_coupling(study.drive, study.steady), "N.m"),
+            **amounts,
         )
     elif trip > most:
-        study.remark(
-            "warning",
+        warn(
             "coupling above motor",
-            f"The safety coupling is set to {_torque(trip)} and the motor gives {_torque(most)} at most: what brakes "
-            "the machine slowly stalls the motor and does not open it.",
-            motor=(most, "N.m"),
-            **setting,
+            "The safety coupling is set to {trip} and the motor gives {motor} at most: what brakes the machine "
+            "slowly stalls the motor and does not open it.",
+            **amounts,
         )

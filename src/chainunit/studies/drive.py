@@ -42,7 +42,7 @@ class Drive:
     the motor's angle and speed and the acceleration that is asked for"""
 
     chain: Any = None
-    """the organs as chains, a `sections.Chain`; None for two bars"""
+    """the organs as chains, a `sections.ChainOrgans`; None for two bars"""
 
     line: Any = None
     """parameters of the driveline between motor and machine, if there is one; its `ratio` is the gear before it"""

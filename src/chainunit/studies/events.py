@@ -245,7 +245,7 @@ _LOADS = ("material_mass", "processing_force")
 
 
 @declaration
-class Shift:
+class FeedShift:
     """How fast material moves."""
 
     shift: Value = quantity(
@@ -259,7 +259,7 @@ class Shift:
 
 
 @declaration
-class Share:
+class FeedShare:
     """How much of the feed is on one side."""
 
     share: Value = quantity(
@@ -276,7 +276,7 @@ class Empties(Event):
     acts_on = tuple(f"{{side}}.{load}" for load in _LOADS)
 
     @declaration
-    class Parameters(Timing, Shift):
+    class Parameters(Timing, FeedShift):
         """Of the side that empties."""
 
     @property
@@ -305,7 +305,7 @@ class OneSidedFeed(Event):
     acts_on = tuple(f"{{{side}}}.{load}" for side in ("side", "other") for load in _LOADS)
 
     @declaration
-    class Parameters(Timing, Shift, Share):
+    class Parameters(Timing, FeedShift, FeedShare):
         """Of the feed that moves."""
 
     @property
@@ -339,7 +339,7 @@ class LoadedStart(OneSidedFeed):
     from_rest = True
 
     @declaration
-    class Parameters(Share):
+    class Parameters(FeedShare):
         """Of the feed in the start; it begins at rest and is followed as long as the start-up."""
 
     def signals(

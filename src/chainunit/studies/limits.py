@@ -39,7 +39,7 @@ class Limits:
 
 
 @dataclass(frozen=True)
-class Statics:
+class DriveStatics:
     """What is known of a machine and its drive before they run."""
 
     cycles: dict[str, Cycle]
@@ -54,7 +54,7 @@ class Statics:
     """of the driveline, if there is one"""
 
 
-def statics(config: Config, drive: Drive) -> Statics:
+def statics(config: Config, drive: Drive) -> DriveStatics:
     """Everything of a study that needs no co-simulation.
 
     Raises
@@ -73,7 +73,7 @@ def statics(config: Config, drive: Drive) -> Statics:
     both = cycles["both sides"].outputs
     (right, _), (left, _) = machine.rocker_extremes()
     modes = machine.chain_modes(feed.left, feed.right)
-    return Statics(
+    return DriveStatics(
         cycles=cycles,
         factors={side: overload_factors(machine, w, feed.left, feed.right, side) for side in SIDES},
         sides=sides_over_speed(machine, feed.left, feed.right),

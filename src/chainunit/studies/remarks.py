@@ -1,9 +1,10 @@
-"""What the reader has to know beside the numbers, and whether model and motor do what is asked of them."""
+"""What the reader has to know beside the numbers."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
@@ -15,42 +16,37 @@ from .coupling import peaks_on_coupling, remark_on_coupling
 from .judgement import model_verdict
 from .measures import Answers, reaches
 from .rig import CLOSED
-from .sections import Chain
+from .sections import ChainOrgans
 from .shaft import AMPLIFIED, NEAR
-from .study import LOAD_CYCLE, Study
+from .study import LOAD_CYCLE, Amount, Study
 from .verdict import RESIDUAL, STEADY
 
 
 def conclude(study: Study) -> None:
     """Judge the model, and add every remark to the study."""
-    config = study.config
-    if config.source == "packaged example":
-        study.remark("note", "assumed", "Masses, pins, feed and drive are assumed; the papers print none.")
-    else:
-        study.remark(
-            "note",
-            "assumed",
-            "What the study file does not name is the packaged example's, whose masses and drive are assumed.",
-        )
-    study.remark(
-        "note",
+    config, note = study.config, partial(study.remark, "note")
+    packaged = "Masses, pins, feed and drive are assumed; the papers print none."
+    own = "What the study file does not name is the packaged example's, whose masses and drive are assumed."
+    note("assumed", packaged if config.source == "packaged example" else own)
+    note(
         "smoothed friction",
-        "Friction is smoothed: at rest nothing sticks, so that the torque to break away from a loaded "
-        "stop is not in the start-up.",
+        "Friction is smoothed: at rest nothing sticks, so that the torque to break away from a loaded stop is not in "
+        "the start-up.",
     )
     if study.answers:
         study.verdict = model_verdict(study)
         for line in study.verdict.details(study.titles):
-            study.remark("warning", "model", line)
+            study.remark("warning", "model", "{line}", line=line)
     if config.chain is not None:
         _on_chains(study, config.chain)
     if STEADY in study.answers:
         _on_steady_running(study, study.answers[STEADY])
     if study.sizing is not None:
-        for note in study.sizing.notes:
-            study.remark("note", "sizing", note)
+        for text in study.sizing.notes:
+            note("sizing", "{text}", text=text)
         if study.insufficient:
-            study.remark("warning", "insufficient motor", f"{study.sizing.answer}. All runs are with it.")
+            answer = study.sizing.answer
+            study.remark("warning", "insufficient motor", "{answer}. All runs are with it.", answer=answer)
     if config.coupling is not None and STEADY in study.answers:
         remark_on_coupling(study, config.coupling.trip_torque)
     _on_runs(study)
@@ -61,44 +57,38 @@ def conclude(study: Study) -> None:
 
 
 def _on_steady_running(study: Study, steady: Answers) -> None:
-    asked, config = study.config.run.crank_speed, study.config
+    asked, warn = study.config.run.crank_speed, partial(study.remark, "warning")
     if not reaches(steady.speed_mean, asked):
-        why = (
-            "the motor's voltage or current is at its limit, or the run is too short to settle."
-            if study.drive.follows
-            else "a motor on the line takes the speed that gear ratio and slip give."
-        )
-        study.remark(
-            "warning",
+        limit = "the motor's voltage or current is at its limit, or the run is too short to settle."
+        slip = "a motor on the line takes the speed that gear ratio and slip give."
+        warn(
             "speed missed",
-            f"steady running: the crank turns at {number(steady.speed_mean, 'rad/s')} in place of "
-            f"{number(asked, 'rad/s', full=False)}; {why} Overloads are those of this state.",
+            "steady running: the crank turns at {speed_mean} in place of {wanted}; {why} Overloads are those of this "
+            "state.",
             STEADY,
             speed_mean=(steady.speed_mean, "rad/s"),
             asked=(asked, "rad/s"),
+            wanted=number(asked, "rad/s", full=False),
+            why=limit if study.drive.follows else slip,
         )
     if study.drive.whole_turns(study.steady) is None:
-        study.remark(
-            "warning",
+        warn(
             "no whole turn",
             "steady running: the crank does not make a whole turn; means are over all that was run, and there is no "
             f"{LOAD_CYCLE}.",
             STEADY,
         )
     elif steady.cycle_gap > CLOSED:
-        repeats = "chains do not repeat a turn" if config.chain else "the machine has not settled"
-        study.remark(
-            "warning",
+        warn(
             "turns do not close",
-            "steady running: the turns do not close, their ends differ by "
-            f"{number(steady.cycle_gap, '1', 'percent')} in speed or torque: {repeats}; raise run.settle_turns or "
-            "run.turns.",
+            "steady running: the turns do not close, their ends differ by {cycle_gap} in speed or torque: {repeats}; "
+            "raise run.settle_turns or run.turns.",
             STEADY,
-            cycle_gap=(steady.cycle_gap, "1"),
+            cycle_gap=(steady.cycle_gap, "1", "percent"),
+            repeats="chains do not repeat a turn" if study.config.chain else "the machine has not settled",
         )
     if not math.isfinite(steady.winding_temperature):
-        study.remark(
-            "warning",
+        warn(
             "no thermal steady state",
             "steady running: the winding has no thermal steady state, its loss grows faster than the cooling.",
             STEADY,
@@ -107,11 +97,10 @@ def _on_steady_running(study: Study, steady: Answers) -> None:
         study.remark(
             "note",
             "feed-forward",
-            "Feed-forward of the machine's torque brings the ripple of the speed from "
-            f"{number(study.ripple_without, '1', 'percent')} to {number(steady.speed_ripple, '1', 'percent')}.",
+            "Feed-forward of the machine's torque brings the ripple of the speed from {without} to {speed_ripple}.",
             STEADY,
-            without=(study.ripple_without, "1"),
-            speed_ripple=(steady.speed_ripple, "1"),
+            without=(study.ripple_without, "1", "percent"),
+            speed_ripple=(steady.speed_ripple, "1", "percent"),
         )
 
 
@@ -129,25 +118,27 @@ _HAPPENED = {
 
 def _on_runs(study: Study) -> None:
     """What happened in the runs, a remark for each kind of happening with all runs in which it did."""
-    limits: dict[str, tuple[float, str]] = {"gear passed": (study.config.gear.torque_limit, "N.m")}
+    limits: dict[str, Amount] = {"gear passed": (study.config.gear.torque_limit, "N.m")}
     if study.drive.motor is DcMotor:
         limits["current limit"] = study.motor.limit.i, "A"
     happenings = [(name, *each) for name in study.answers for each in _happenings(study, name)]
     for kind in dict.fromkeys(kind for _, kind, *_ in happenings):
-        runs = {name: (shown, sizes) for name, each, shown, sizes in happenings if each == kind}
-        limit = number(*limits[kind], full=False) if kind in limits else ""
+        runs = {name: (shown, amounts) for name, each, shown, amounts in happenings if each == kind}
         where = (f"{study.called(name)}{f' ({shown})' if shown else ''}" for name, (shown, _) in runs.items())
+        limit = {"passed": limits[kind]} if kind in limits else {}
         study.remark(
             "warning",
             kind,
-            f"{_HAPPENED[kind].format(limit=limit)}: {'; '.join(where)}.",
+            f"{_HAPPENED[kind]}: {{where}}.",
             *runs,
-            **({"limit": limits[kind]} if kind in limits else {}),
-            **{f"{name}.{size}": x for name, (_, sizes) in runs.items() for size, x in sizes.items()},
+            where="; ".join(where),
+            limit=number(*limits[kind], full=False) if limit else "",
+            **limit,
+            **{f"{name}.{size}": x for name, (_, amounts) in runs.items() for size, x in amounts.items()},
         )
 
 
-def _happenings(study: Study, name: str) -> Iterator[tuple[str, str, dict[str, tuple[float | None, str]]]]:
+def _happenings(study: Study, name: str) -> Iterator[tuple[str, str, dict[str, Amount]]]:
     """What happened in a run: kind, numbers in words, the same as data."""
     config, answers = study.config, study.answers[name]
     pushed = answers.web_pull_least < 0.0 or answers.wall_pull_least < 0.0
@@ -163,33 +154,25 @@ def _happenings(study: Study, name: str) -> Iterator[tuple[str, str, dict[str, t
         after = f"after {number(answers.stall_time, 's')}{'' if late else ', as it hardly turned before'}"
         yield "stall", after, {"stall_time": (answers.stall_time, "s")}
     if answers.coupling_trip_time is not None:
-        time, passed, behind = (
-            (answers.coupling_trip_time, "s"),
-            (answers.energy_after_trip, "J"),
-            (answers.energy_behind, "J"),
-        )
-        yield (
-            "trip",
-            f"after {number(*time)}; {number(*passed)} pass it while it opens, {number(*behind)} stay behind it",
-            {"coupling_trip_time": time, "energy_after_trip": passed, "energy_behind": behind},
-        )
-    elif name in config.events and answers.recovery_time is None and study.returns:
+        units = {"coupling_trip_time": "s", "energy_after_trip": "J", "energy_behind": "J"}
+        amounts: dict[str, Amount] = {each: (getattr(answers, each), unit) for each, unit in units.items()}
+        time, passed, behind = (number(*amount) for amount in amounts.values())
+        yield "trip", f"after {time}; {passed} pass it while it opens, {behind} stay behind it", amounts
+    elif name in config.events and answers.recovery_time is None:
         yield "not recovered", "", {}
 
 
 def _on_random_overloads(study: Study) -> None:
-    random = study.monte_carlo
-    if random is None:
-        return
-    if random.remark:
-        study.remark("note", "too few runs", f"overloads at random: {random.remark}")
-    if random.left_out:
-        study.remark(
-            "note",
+    random, note = study.monte_carlo, partial(study.remark, "note")
+    if random and random.remark:
+        note("too few runs", "overloads at random: {text}", text=random.remark)
+    if random and random.left_out:
+        note(
             "rows left out",
-            f"overloads at random: {random.left_out} lines of {random.file.name} were no rows of this study and are "
-            "left out; runs that they may have stood for were computed anew.",
-            rows=(random.left_out, "1"),
+            "overloads at random: {rows} lines of {file} were no rows of this study and are left out; runs that they "
+            "may have stood for were computed anew.",
+            rows=str(random.left_out),
+            file=random.file.name,
         )
 
 
@@ -198,124 +181,102 @@ def _on_assumptions(study: Study) -> None:
     coupling = study.config.coupling
     for name, spread in study.spreads.items():
         event = study.config.events[name]
-        text = f"{event.title}: {event.assumption(spread.peaks)}"
-        if coupling:
-            trip = number(coupling.trip_torque, "N.m")
-            text += f" These peaks are without the safety coupling, which opens at {trip}."
+        without = " These peaks are without the safety coupling, which opens at {trip}." if coupling else ""
         low, high = spread.peaks["crank_torque"]
         study.remark(
-            "note", "assumption", text, name, crank_torque_low=(low, "N.m"), crank_torque_high=(high, "N.m")
+            "note",
+            "assumption",
+            "{title}: {text}" + without,
+            name,
+            title=event.title,
+            text=event.assumption(spread.peaks),
+            trip=number(coupling.trip_torque, "N.m") if coupling else "",
+            crank_torque_low=(low, "N.m"),
+            crank_torque_high=(high, "N.m"),
         )
 
 
-def _on_chains(study: Study, chain: Chain) -> None:
+def _on_chains(study: Study, chain: ChainOrgans) -> None:
     """What the reader has to know of the chains."""
     (walls, webs), result = study.drive.rods, study.chain
-    study.remark(
-        "note",
+    warn, note = (partial(study.remark, severity) for severity in ("warning", "note"))
+    note(
         "chains",
         f"The organs are chains of {walls} + {webs} rods; their damping (eta {chain.eta:g} N m2 s, ends "
         f"{chain.end_damping:g} N m s), which a heavier organ wants larger, and folding are assumed.",
     )
-    for band in result.avoid if result else ():
-        if result and band.low <= result.own.speed <= band.high:
-            study.remark(
-                "warning",
-                "speed to avoid",
-                f"chains: the crank speed lies among those to avoid, {band}: {band.why}.",
-                speed=(result.own.speed, "rad/s"),
-            )
     if walls + webs < 4:
-        study.remark(
-            "note",
-            "few rods",
-            f"chains: {walls + webs} rods have {walls + webs - 2} natural frequencies; 8 rods show what a chain "
-            "does.",
+        few = (
+            f"{walls + webs} rods have {walls + webs - 2} natural frequencies; 8 rods show what a chain does."
         )
-    if result:
-        for speed, why in result.failed.items():
-            study.remark(
-                "warning",
-                "speed missing",
-                f"chains: {speed:.4g} rad/s is missing in the sweep: {why}",
-                speed=(speed, "rad/s"),
-            )
-        residual = max(n.energy_residual for n in result.sweep)
-        if not residual < RESIDUAL:
-            study.remark(
-                "warning",
-                "energy of chains",
-                f"chains: the energy residual reaches {number(residual, '1')} of the energy moved; lessen "
-                "chain.fold_stiffness.",
-                energy_residual=(residual, "1"),
-            )
+        note("few rods", f"chains: {few}")
     if any(name.endswith("_coasting") for name in study.runs):
-        study.remark(
-            "note", "coasting bars", "Behind the open coupling the machine is followed with two bars."
+        note("coasting bars", "Behind the open coupling the machine is followed with two bars.")
+    if result is None:
+        return
+    speed = result.own.speed
+    for band in result.avoid:
+        if band.low <= speed <= band.high:
+            text = "chains: the crank speed lies among those to avoid, {band}: {why}."
+            warn("speed to avoid", text, band=str(band), why=band.why, speed=(speed, "rad/s"))
+    for missing, why in result.failed.items():
+        text = "chains: {speed} is missing in the sweep: {why}"
+        warn("speed missing", text, why=str(why), speed=(missing, "rad/s"))
+    residual = max(n.energy_residual for n in result.sweep)
+    if not residual < RESIDUAL:
+        text = (
+            "chains: the energy residual reaches {residual} of the energy moved; lessen chain.fold_stiffness."
         )
+        warn("energy of chains", text, residual=(residual, "1"))
 
 
 def _on_shaft(study: Study) -> None:
     """What the reader has to know of the driveline."""
     line, modes = study.drive.line, study.statics.torsion
     assert modes is not None
+    warn, note = (partial(study.remark, severity) for severity in ("warning", "note"))
     if study.sizing is not None:
-        study.remark(
-            "note",
-            "sized without line",
-            "Sizing took the shafts for rigid and the driveline for massless; the runs have it.",
-        )
+        rigid = "Sizing took the shafts for rigid and the driveline for massless; the runs have it."
+        note("sized without line", rigid)
     if line.d2 == 0.0 and line.d3 == 0.0:
-        study.remark(
-            "note",
-            "undamped line",
-            "The driveline has no damping: a vibration that was set off goes on; give d2 and d3.",
-        )
+        undamped = "The driveline has no damping: a vibration that was set off goes on; give d2 and d3."
+        note("undamped line", undamped)
+    ends: dict[str, Amount] = {
+        "k_least": (modes.k_least, "rad/s"),
+        "k_largest": (modes.k_largest, "rad/s"),
+    }
     fastest = max((loop.crossover for loop in study.statics.loops.values()), default=0.0)
     if fastest > modes.k_least / 3.0:
-        study.remark(
-            "warning",
+        warn(
             "control near line",
-            f"The speed loop crosses over at {fastest:.3g} rad/s, near the line's natural frequency of "
-            f"{modes.k_least:.3g} rad/s: control and shaft disturb each other; lower the gains or stiffen the line.",
+            "The speed loop crosses over at {crossover}, near the line's natural frequency of {k_least}: control and "
+            "shaft disturb each other; lower the gains or stiffen the line.",
             crossover=(fastest, "rad/s"),
-            k_least=(modes.k_least, "rad/s"),
+            **ends,
         )
-    _on_joints(study)
-    for name, shaft in study.shaft.items():
-        if shaft.amplification is not None and shaft.amplification > AMPLIFIED:
-            study.remark(
-                "warning",
-                "amplification",
-                f"{study.called(name)}: the line's torque peaks at {shaft.amplification:.2f} times that of a rigid "
-                "drive.",
-                name,
-                amplification=(shaft.amplification, "1"),
-            )
-
-
-def _on_joints(study: Study) -> None:
-    """The unevenness of the joints, and where it meets a natural frequency."""
-    line, modes = study.drive.line, study.statics.torsion
-    assert modes is not None
     speed = study.config.run.crank_speed * study.drive.driven.p.ratio
     _, i, _ = two_joints(numpy_(), line, np.linspace(0.0, np.pi, 361))
     unevenness = float(np.ptp(i))
-    if unevenness <= 1e-6:
-        return
-    study.remark(
-        "note",
-        "uneven joints",
-        f"The joints turn unevenly: i23 varies by {100 * unevenness:.2g} % twice a turn of the shaft.",
-        unevenness=(unevenness, "1"),
-    )
-    for order in ORDERS:
+    if unevenness > 1e-6:
+        text = "The joints turn unevenly: i23 varies by {unevenness} twice a turn of the shaft."
+        note("uneven joints", text, unevenness=(unevenness, "1", "percent"))
+    for order in ORDERS if unevenness > 1e-6 else ():
         if (1.0 - NEAR) * modes.k_least < order * speed < (1.0 + NEAR) * modes.k_largest:
-            study.remark(
-                "warning",
+            warn(
                 "order near line",
-                f"The shaft turns at {speed:.3g} rad/s: order {order} of the joints, {order * speed:.3g} rad/s, "
-                f"lies near the line's natural frequency, {modes.k_least:.3g} to {modes.k_largest:.3g} rad/s.",
+                "The shaft turns at {speed}: order {order} of the joints, {excited}, lies near the line's natural "
+                "frequency, {k_least} to {k_largest}.",
+                order=str(order),
                 speed=(speed, "rad/s"),
                 excited=(order * speed, "rad/s"),
+                **ends,
+            )
+    for name, shaft in study.shaft.items():
+        if shaft.amplification is not None and shaft.amplification > AMPLIFIED:
+            warn(
+                "amplification",
+                "{title}: the line's torque peaks at {amplification} times that of a rigid drive.",
+                name,
+                title=study.called(name),
+                amplification=(shaft.amplification, "1"),
             )

@@ -169,7 +169,7 @@ class Driveline(Mounted):
 
 
 @declaration
-class Chain(OrganLaw):
+class ChainOrgans(OrganLaw):
     """The organs as chains, where `organ` is "chain", and the sweep over crank speeds with them."""
 
     rods: Value = quantity("1", "number of rods of an organ", default=8.0, min=float(LEAST), max=float(MOST))
@@ -204,7 +204,7 @@ STARTS = ("direct", "soft", "inverter")
 
 
 @dataclasses.dataclass(frozen=True)
-class Section:
+class FileSection:
     """A table of a study file. The study has its values, or None where it is `optional` and the file does not have
     it; what it does not name is of `default`."""
 
@@ -220,19 +220,19 @@ class Section:
     """what a checked table gives, by the name of the quantity"""
 
 
-SECTIONS: Mapping[str, Section] = {
-    "machine": Section(ChamberForces.Parameters),
-    "ratios": Section(Ratios),
-    "feed": Section(Feed),
-    "motor": Section(DcMotor.Parameters),
-    "run": Section(Run, whole=("turns",)),
-    "coupling": Section(Coupling, optional=True),
-    "monte_carlo": Section(MonteCarlo, whole=("runs", "seed"), keys={"event": (dict[str, Any], {})}),
-    "sizing": Section(Sizing, optional=True),
-    "gear": Section(Transmission, default=KINDS["gear"]),
-    "starter": Section(Starter),
-    "chain": Section(Chain, whole=("rods", "sweep_points", "starts", "turns")),
-    "driveline": Section(
+SECTIONS: Mapping[str, FileSection] = {
+    "machine": FileSection(ChamberForces.Parameters),
+    "ratios": FileSection(Ratios),
+    "feed": FileSection(Feed),
+    "motor": FileSection(DcMotor.Parameters),
+    "run": FileSection(Run, whole=("turns",)),
+    "coupling": FileSection(Coupling, optional=True),
+    "monte_carlo": FileSection(MonteCarlo, whole=("runs", "seed"), keys={"event": (dict[str, Any], {})}),
+    "sizing": FileSection(Sizing, optional=True),
+    "gear": FileSection(Transmission, default=KINDS["gear"]),
+    "starter": FileSection(Starter),
+    "chain": FileSection(ChainOrgans, whole=("rods", "sweep_points", "starts", "turns")),
+    "driveline": FileSection(
         Driveline,
         optional=True,
         keys={"place": (Literal[PLACES], "crank")},

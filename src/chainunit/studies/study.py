@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import xarray as xr
 
 from ..config import LENGTHS, Config
 from ..drives.speed_control import Tuning
 from ..errors import RunError
-from ..text import entry
+from ..text import entry, number
 from . import verdict
 from .chain import ChainResult
 from .drive import Drive
-from .limits import Statics
+from .limits import DriveStatics
 from .measures import Answers, Phase, Trip, Window, reaches, whole_turns
 from .monte_carlo import MonteCarloResult
 from .protection import Setting
@@ -25,6 +25,10 @@ from .verdict import STEADY, Verdict
 
 LOAD_CYCLE = "load_cycle.csv"
 """File with the steady turns as the motor's shaft sees them."""
+
+
+Amount: TypeAlias = tuple[float | None, str] | tuple[float | None, str, str]
+"""A number, its unit, and perhaps how people show it."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +41,8 @@ class Remark:
     text: str
     """the remark in words"""
     runs: tuple[str, ...] = ()
-    quantities: Mapping[str, tuple[float | None, str]] = field(default_factory=dict)
-    """numbers of the text with their units; what differs from run to run is named ``run.quantity``"""
+    quantities: Mapping[str, Amount] = field(default_factory=dict)
+    """numbers of the text; what differs from run to run is named ``run.quantity``"""
 
     def __str__(self) -> str:
         return self.text[:1].upper() + self.text[1:]
@@ -49,7 +53,7 @@ class Remark:
             "kind": self.kind,
             "text": str(self),
             "runs": list(self.runs),
-            "quantities": {name: entry(*number) for name, number in self.quantities.items()},
+            "quantities": {name: entry(*amount) for name, amount in self.quantities.items()},
         }
 
 
@@ -70,7 +74,7 @@ class Study:
 
     config: Config
     drive: Drive
-    statics: Statics
+    statics: DriveStatics
     tuning: Tuning | None = None
     sizing: SizingResult | None = None
     made: dict[str, str] = field(default_factory=dict)
@@ -122,11 +126,14 @@ class Study:
         severity: Literal["warning", "note"],
         kind: str,
         text: str,
+        /,
         *runs: str,
-        **quantities: tuple[float | None, str],
+        **parts: Amount | str,
     ) -> None:
-        """Add a remark."""
-        self.remarks.append(Remark(severity, kind, text, runs, quantities))
+        """Add a remark; in its `text` the names of the `parts`, amounts and words, stand in braces."""
+        amounts = {name: part for name, part in parts.items() if not isinstance(part, str)}
+        words = {name: part if isinstance(part, str) else number(*part) for name, part in parts.items()}
+        self.remarks.append(Remark(severity, kind, text.format_map(words), runs, amounts))
 
     @property
     def titles(self) -> dict[str, str]:
