@@ -39,6 +39,17 @@ def test_imports_run_downward():
     assert upward >= UPWARD, f"these are mended, take them out of UPWARD: {sorted(UPWARD - upward)}"
 
 
+def test_no_renderer_names_a_study_or_a_machine():
+    """Blocks, figures and lines, and the modules that draw and print them, serve any study."""
+    renderers = (
+        "blocks figure files html lines markdown motion page_figures print_figures style terminal".split()
+    )
+    assert {f"report.{name}" for name in renderers} <= {a for a, _ in HOUSE.imports()} | {"report.lines"}
+    found = {(a, b) for a, b in HOUSE.imports() if a.startswith("report.") and a.split(".")[1] in renderers}
+    assert {HOUSE.layer(b) for _, b in found} == {"core", "report"}
+    assert {b.split(".")[1] for _, b in found if HOUSE.layer(b) == "report"} <= set(renderers)
+
+
 def test_no_modules_import_each_other_in_a_circle():
     pairs = [(a, b) for a, b in HOUSE.imports() if a != b]
     names = sorted({name for pair in pairs for name in pair})

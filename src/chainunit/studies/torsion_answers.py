@@ -9,8 +9,8 @@ import numpy as np
 
 from ..drives.cardan import ORDERS, Cardan
 from ..drives.torsion import SteadyMotion
-from ..quantities import Layout
 from ..text import number
+from .result import entries
 from .torsion import DRIFT, LineAnalysis
 
 ROUNDOFF_TORQUE = 1e-6
@@ -157,90 +157,86 @@ def _even_running(line: Cardan, ratio: Any) -> list[str]:
     ]
 
 
+def _sizes(x: Any, unit: str, kind: str = "") -> dict[str, Any]:
+    array = np.asarray(x, dtype=float)
+    values = array.astype(object)
+    values[~np.isfinite(array)] = None
+    return {"value": values.tolist(), "unit": unit} | ({"kind": kind} if kind else {})
+
+
+def _speed(x: Any) -> dict[str, Any]:
+    return _sizes(x, "rad/s", "speed")
+
+
+def _frequency(x: Any) -> dict[str, Any]:
+    return _sizes(x, "rad/s", "frequency")
+
+
+def _motion(m: SteadyMotion) -> dict[str, Any]:
+    torques = {
+        f"{end}_torque{shaft}": getattr(m, f"{end}{shaft}")
+        for shaft in (2, 3)
+        for end in ("peak", "least", "largest")
+    }
+    return {
+        "found": m.exists.tolist(),
+        **{name: _sizes(np.where(np.abs(x) < ROUNDOFF_TORQUE, 0.0, x), "N.m") for name, x in torques.items()},
+        "drive_torque": _sizes(m.drive, "N.m"),
+        "growth": _sizes(m.growth, "1/s"),
+        "largest_multiplier": _sizes(m.multiplier, "1"),
+        "growth_with_constant_torque": _sizes(m.free_growth, "1/s"),
+        "frequency": _frequency(m.frequency),
+    }
+
+
 def as_dict(analysis: LineAnalysis) -> dict[str, Any]:
     """Ready for JSON, each number with its unit; null without a steady motion."""
-
-    def sizes(x: Any, unit: str, kind: str = "") -> dict[str, Any]:
-        array = np.asarray(x, dtype=float)
-        finite = array.astype(object)
-        finite[~np.isfinite(array)] = None
-        return {"value": finite.tolist(), "unit": unit} | ({"kind": kind} if kind else {})
-
-    def speed(x: Any) -> dict[str, Any]:
-        return sizes(x, "rad/s", "speed")
-
-    def frequency(x: Any) -> dict[str, Any]:
-        return sizes(x, "rad/s", "frequency")
-
-    def torque(x: Any) -> dict[str, Any]:
-        return sizes(np.where(np.abs(x) < ROUNDOFF_TORQUE, 0.0, x), "N.m")
-
-    def declared(instance: Any) -> dict[str, Any]:
-        layout = Layout(type(instance))
-        return {
-            v.name: sizes(x, v.unit, v.kind)
-            for v, x in zip(layout.variables, layout.values(instance), strict=True)
-        }
-
-    def motion(m: SteadyMotion) -> dict[str, Any]:
-        return {
-            "found": m.exists.tolist(),
-            "peak_torque2": torque(m.peak2),
-            "peak_torque3": torque(m.peak3),
-            "least_torque2": torque(m.least2),
-            "largest_torque2": torque(m.largest2),
-            "least_torque3": torque(m.least3),
-            "largest_torque3": torque(m.largest3),
-            "drive_torque": sizes(m.drive, "N.m"),
-            "growth": sizes(m.growth, "1/s"),
-            "largest_multiplier": sizes(m.multiplier, "1"),
-            "growth_with_constant_torque": sizes(m.free_growth, "1/s"),
-            "frequency": frequency(m.frequency),
-        }
-
     band, simulated = analysis.band, analysis.simulated
     return {
-        "driveline": declared(analysis.line),
-        "running": declared(analysis.rotation),
-        "damping_ratio": sizes(analysis.damping_ratio, "1"),
+        "driveline": entries(analysis.line),
+        "running": entries(analysis.rotation),
+        "damping_ratio": _sizes(analysis.damping_ratio, "1"),
         "natural_frequency": {
-            "even": frequency(analysis.at_even),
-            "least": frequency(band.least),
-            "largest": frequency(band.largest),
-            "at_ratio_zero": frequency(band.at_zero),
-            "at_ratio_infinite": frequency(band.at_infinity),
+            "even": _frequency(analysis.at_even),
+            "least": _frequency(band.least),
+            "largest": _frequency(band.largest),
+            "at_ratio_zero": _frequency(band.at_zero),
+            "at_ratio_infinite": _frequency(band.at_infinity),
         },
-        "sensitivity": {name: sizes(x, "1") for name, x in analysis.sensitivity.items()},
-        "ratio": {"least": sizes(np.min(analysis.ratio), "1"), "largest": sizes(np.max(analysis.ratio), "1")},
-        "excitation": {f"order {n}": sizes(x, "rad") for n, x in analysis.excitation.items()},
-        "crossings": {f"speed = k/{n}": speed(ends) for n, ends in analysis.crossings().items()},
-        "operating": {"static_torque2": sizes(analysis.static2, "N.m"), **motion(analysis.operating)},
+        "sensitivity": {name: _sizes(x, "1") for name, x in analysis.sensitivity.items()},
+        "ratio": {
+            "least": _sizes(np.min(analysis.ratio), "1"),
+            "largest": _sizes(np.max(analysis.ratio), "1"),
+        },
+        "excitation": {f"order {n}": _sizes(x, "rad") for n, x in analysis.excitation.items()},
+        "crossings": {f"speed = k/{n}": _speed(ends) for n, ends in analysis.crossings().items()},
+        "operating": {"static_torque2": _sizes(analysis.static2, "N.m"), **_motion(analysis.operating)},
         "resonance": {
-            "speed": speed(analysis.speed),
-            **motion(analysis.steady),
+            "speed": _speed(analysis.speed),
+            **_motion(analysis.steady),
             "peaks": {
-                "speed": speed([at for at, _ in analysis.resonances()]),
-                "torque2": sizes([peak for _, peak in analysis.resonances()], "N.m"),
+                "speed": _speed([at for at, _ in analysis.resonances()]),
+                "torque2": _sizes([peak for _, peak in analysis.resonances()], "N.m"),
             },
-            "rigid_torque2": sizes(analysis.rigid.peak2, "N.m"),
-            "rigid_torque3": sizes(analysis.rigid.peak3, "N.m"),
-            "unstable": speed(analysis.unstable_ranges()),
-            "no_steady_motion": speed(analysis.missing_ranges()),
+            "rigid_torque2": _sizes(analysis.rigid.peak2, "N.m"),
+            "rigid_torque3": _sizes(analysis.rigid.peak3, "N.m"),
+            "unstable": _speed(analysis.unstable_ranges()),
+            "no_steady_motion": _speed(analysis.missing_ranges()),
         },
         "simulation": None
         if simulated is None
         else {
-            "asked_speed": speed(analysis.simulated_speed),
-            "speed": speed(simulated.speed),
-            "peak_torque2": sizes(simulated.peak2, "N.m"),
-            "peak_torque3": sizes(simulated.peak3, "N.m"),
+            "asked_speed": _speed(analysis.simulated_speed),
+            "speed": _speed(simulated.speed),
+            "peak_torque2": _sizes(simulated.peak2, "N.m"),
+            "peak_torque3": _sizes(simulated.peak3, "N.m"),
         },
         "stability": {
             "joint": analysis.map.joint,
-            "speed": speed(analysis.map.speed),
-            "bend": sizes(analysis.map.bend, "rad"),
-            "damping_ratio": sizes(analysis.map.ratio, "1"),
-            "growth": sizes(analysis.map.growth, "1/s"),
+            "speed": _speed(analysis.map.speed),
+            "bend": _sizes(analysis.map.bend, "rad"),
+            "damping_ratio": _sizes(analysis.map.ratio, "1"),
+            "growth": _sizes(analysis.map.growth, "1/s"),
         },
         "warnings": warnings(analysis),
         "notes": notes(analysis),
