@@ -14,6 +14,7 @@ import pytest
 from rich.console import Console
 
 import chainunit.report
+from chainunit.config import Run
 from chainunit.report import blocks as b
 from chainunit.report import figure as fig
 from chainunit.report import html, page_figures, print_figures, terminal
@@ -33,7 +34,11 @@ RESULT = {
     "words": "the *motor* <b>",
     "warnings": ["too hot", {"text": "too slow"}],
     "notes": ["assumed"],
-    "given": ["speed"],
+    "run": {
+        "crank_speed": {"value": 3.0, "unit": "rad/s", "kind": "speed"},
+        "turns": {"value": 2.0, "unit": "1"},
+    },
+    "origins": {"run.crank_speed": "file", "run.ramp": "tuned"},
 }
 S = b.Source(RESULT)
 
@@ -66,6 +71,7 @@ def a_report(units=DEFAULT_UNITS):
         b.Text(S.estimate("band")),
         *S.said(),
         b.Text("fine", "fine", "long"),
+        b.Given((S.given("Run", Run, "run"),)),
         a_figure(),
     )
     sections = (b.Section("answer", "The answer", blocks), b.Section("none", "Empty", ()))
@@ -112,6 +118,19 @@ def test_each_number_of_a_page_names_its_place():
     for path, value in places:
         node = b.at(RESULT, path)
         assert json.loads(value) == (node["value"] if isinstance(node, dict) else node)
+
+
+def test_what_the_file_does_not_give_is_marked():
+    given = S.given("Run", Run, "run")[1]
+    assert [(value.name, value.origin) for value in given] == [
+        ("run.crank_speed", "file"),
+        ("run.turns", "example"),
+    ]
+    page, document = html.render(a_report()), markdown(a_report(), [])
+    assert page.count('<abbr class="from" title="the example&#x27;s">e</abbr>') == 1
+    assert "Not in the study file: e: the example's." in page and "t: tuned" not in page
+    rows = [line for line in document.splitlines() if line.startswith("| run.")]
+    assert rows[0].endswith("| file |") and rows[1].endswith("| example |")
 
 
 def test_a_remark_that_was_printed_before_is_not_repeated():

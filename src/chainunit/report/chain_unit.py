@@ -17,6 +17,7 @@ from ..studies.shaft import ShaftAnswers, Torsion
 from ..studies.study import Study
 from . import accessors as read
 from . import blocks as b
+from .chain_unit_figures import PICTURES as PICTURES
 from .chain_unit_figures import figures
 from .chain_unit_motion import motion
 from .chain_unit_parts import chains, sizing, spoken
@@ -24,10 +25,6 @@ from .lines import Line, Number, Strong, capital, joined, line
 from .terminal import plain_line
 
 KIND = "Chain unit: forces, torque and one-sided overload"
-PICTURES = (
-    *("torque_angle.png", "sides_over_speed.png", "speed_loop.png", "overload_time.png", "torque_speed.png"),
-    *("reactions.png", "start_up.png", "driveline.png", "chain_sweep.png"),
-)
 _KEY = ("crank_torque_peak", "motor_torque_peak", "power_peak", "current_peak", "winding_temperature")
 """The families of answers that are shown large, each by its first field."""
 _HOLDS: dict[str, b.Severity] = {"true": "good", "in part": "partly", "false": "bad"}

@@ -21,6 +21,10 @@ from . import blocks as b
 from . import figure as fig
 from .style import WIDE
 
+PICTURES = (
+    *("torque_angle.png", "sides_over_speed.png", "speed_loop.png", "overload_time.png", "torque_speed.png"),
+    *("reactions.png", "start_up.png", "driveline.png", "chain_sweep.png"),
+)
 _MOTION = ("phi", "w", "a")
 _LOADS = [
     *(f"machine.{name}" for name in ChamberForces.input_layout.names if name not in _MOTION),

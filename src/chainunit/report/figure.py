@@ -3,9 +3,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal, TypeAlias
 
+import numpy as np
+
+from ..text import Units, plain, scales, unit_text
 from .lines import Line
 
 
@@ -22,6 +26,8 @@ class Axis:
     log: bool = False
     names: tuple[str, ...] = ()
     """of places 0, 1, .. from the top down"""
+    second: tuple[str, float] | None = None
+    """label and factor of the unit beside the one that is shown"""
 
 
 @dataclass(frozen=True)
@@ -153,3 +159,63 @@ class Figure:
         return [
             r for r, panel in enumerate(panels) if panel is not None and own is not None and panel.x == own.x
         ]
+
+    def all_panels(self) -> Iterator[tuple[int, int, Panel]]:
+        """Row, column and panel of each."""
+        for r, row in enumerate(self.panels):
+            yield from ((r, c, panel) for c, panel in enumerate(row) if panel is not None)
+
+
+def along(item: Item) -> dict[str, str]:
+    """By the name of each field of an item that holds places on an axis, that axis."""
+    match item:
+        case Curve() | Label() | Field():
+            return {"x": "x", "y": "y"}
+        case Between():
+            return {"x": "x", "low": "y", "high": "y"}
+        case Shade():
+            return {"low": item.axis, "high": item.axis}
+        case Mark():
+            return {"at": item.axis}
+        case Bars():
+            return {"size": "x"}
+
+
+def in_units(figure: Figure, units: Units) -> Figure:
+    """The same with all values in the units in which they are shown; its axes name them."""
+    known: dict[tuple[int, float, float], Any] = {}
+
+    def values(axis: Axis, x: Any) -> Any:
+        """Values on an axis; the same object for the same object, so that curves over one x stay so."""
+        _, factor, offset = scales(axis.unit, axis.kind, units)[0]
+        key = (id(x), factor, offset)
+        if key not in known:
+            shown = factor * np.asarray(x, float) + offset
+            # x is kept, so that no other object gets its identity
+            known[key] = float(shown) if shown.ndim == 0 else shown, x
+        return known[key][0]
+
+    def panel(given: Panel) -> Panel:
+        axes = {"x": given.x, "y": given.y}
+        items = (
+            replace(item, **{name: values(axes[on], getattr(item, name)) for name, on in along(item).items()})
+            for item in given.items
+        )
+        ends = (
+            replace(axis, low=axis.low and values(axis, axis.low), high=axis.high and values(axis, axis.high))
+            for axis in axes.values()
+        )
+        x, y = (_named(axis, units) for axis in ends)
+        return replace(given, x=x, y=y, items=tuple(items))
+
+    return replace(figure, panels=tuple(tuple(each and panel(each) for each in row) for row in figure.panels))
+
+
+def _named(axis: Axis, units: Units) -> Axis:
+    """An axis whose label has its unit."""
+    if axis.names:
+        return axis
+    (unit, factor, _), *others = scales(axis.unit, axis.kind, units)
+    word = plain(unit_text(unit))
+    second = (f"{axis.label} [{others[0][0]}]", others[0][1] / factor) if others else None
+    return replace(axis, label=f"{axis.label} [{word or '1'}]", unit=word, second=second)

@@ -110,6 +110,13 @@ def _resource(name: str) -> str:
     return (resources.files(__package__) / name).read_text("utf-8")
 
 
+def _marks(given: b.Given) -> str:
+    """What the marks beside given values mean."""
+    origins = {value.origin for _, values in given.sections for value in values} - {"", "file"}
+    words = (f"{origin[0]}: {words}" for origin, words in _ORIGIN.items() if origin in origins)
+    return f'<p class="hint">Not in the study file: {"; ".join(words)}.</p>' if origins else ""
+
+
 def _kind(block: b.Block) -> str:
     """What makes blocks stand together."""
     if isinstance(block, b.Judgement) and block.severity == "warning":
@@ -192,7 +199,7 @@ class _Page:
                 return f'<div class="given whole">{"".join(map(self._table, block.tables))}</div>'
             case b.Given():
                 tables = "".join(self._given(title, values) for title, values in block.sections if values)
-                return f'<div class="given">{tables}</div>'
+                return f'{_marks(block)}<div class="given">{tables}</div>'
             case Figure():
                 return self._figure(block) if block.on_page else ""
             case motion.Animation():
@@ -277,7 +284,7 @@ class _Page:
         """A mark at what the file does not give."""
         if value.origin in ("", "file"):
             return ""
-        return f'<abbr class="from" title="{_ORIGIN[value.origin]}">{value.origin[0]}</abbr>'
+        return f'<abbr class="from" title="{escape(_ORIGIN[value.origin])}">{value.origin[0]}</abbr>'
 
     def _figure(self, figure: Figure) -> str:
         height = page_figures.height(figure)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go  # type: ignore[import-untyped]
 
-from ..text import Units, plain, scales, unit_text
-from .figure import Axis, Bars, Between, Curve, Field, Figure, Item, Label, Mark, Panel, Shade
+from ..text import Units
+from .figure import Axis, Bars, Between, Curve, Field, Figure, Item, Label, Mark, Panel, Shade, in_units
 from .style import BARS, CLASSES, FILLS, INK, look_of
 
 _AXIS = {
@@ -58,62 +58,46 @@ def height(figure: Figure) -> int:
     """Height on the page [px]."""
     row = _HALF_ROW if figure.half else _ROW
     heights = figure.heights or (1.0,) * len(figure.panels)
-    return round(_ENDS + _above(figure) + 18 * (_listed(figure) // 4) + row * sum(heights))
+    return round(_ENDS + _above(figure) + _legend_rows(figure) + row * sum(heights))
 
 
-def figure(figure: Figure, units: Units) -> Any:
+def figure(spec: Figure, units: Units) -> Any:
     """The figure as plotly has it."""
-    drawing = _Drawing(figure, units)
-    for r, row in enumerate(figure.panels):
-        for c, panel in enumerate(row):
-            if panel is not None:
-                drawing.panel(r, c, panel)
+    drawing = _Drawing(in_units(spec, units))
+    for place in drawing.spec.all_panels():
+        drawing.panel(*place)
+    pointed = any(_pointed(panel) for _, _, panel in spec.all_panels())
     drawing.figure.update_layout(
         drawing.axes,
         template=_TEMPLATE,
-        height=height(figure),
-        margin={"l": 64, "r": 16, "t": 34 + _above(figure), "b": 52 + 18 * (_listed(figure) // 4)},
+        height=height(spec),
+        margin={"l": 64, "r": 16, "t": 34 + _above(spec), "b": 52 + _legend_rows(spec)},
         barmode="overlay",
-        hovermode="closest" if any(map(_pointed, _panels(figure))) else "x unified",
+        hovermode="closest" if pointed else "x unified",
         hoversubplots="axis",
     )
     return drawing.figure
 
 
-def axis_title(axis: Axis, units: Units) -> str:
-    """What an axis shows, in which unit."""
-    unit = plain(unit_text(scales(axis.unit, axis.kind, units)[0][0]))
-    return f"{axis.label} [{unit or '1'}]" if not axis.names else axis.label
-
-
-def _panels(figure: Figure) -> Iterator[Panel]:
-    return (panel for row in figure.panels for panel in row if panel is not None)
-
-
 def _pointed(panel: Panel) -> bool:
     """Whether its points are told one by one, as x is no running variable."""
-    return (
-        panel.equal
-        or any(isinstance(item, Bars | Field) for item in panel.items)
-        or any(
-            isinstance(item, Curve) and item.joined and np.any(np.diff(item.x) < 0.0) for item in panel.items
-        )
-    )
+    curves = (item for item in panel.items if isinstance(item, Curve) and item.joined)
+    bars = any(isinstance(item, Bars | Field) for item in panel.items)
+    return panel.equal or bars or any(bool(np.any(np.diff(curve.x) < 0.0)) for curve in curves)
 
 
 def _above(figure: Figure) -> int:
     """Room for words above the panels [px]."""
-    marks = [
-        item for panel in _panels(figure) for item in panel.items if isinstance(item, Mark) and item.words
-    ]
-    titles = any(panel.title for panel in _panels(figure))
-    return max(18 if marks else 0, 82 if any(m.upright for m in marks) else 0) + (18 if titles else 0)
+    panels = [panel for _, _, panel in figure.all_panels()]
+    marks = [item for panel in panels for item in panel.items if isinstance(item, Mark) and item.words]
+    words = 82 if any(mark.upright for mark in marks) else 18 if marks else 0
+    return words + (18 if any(panel.title for panel in panels) else 0)
 
 
-def _listed(figure: Figure) -> int:
-    """How many names the legend has."""
-    names = {getattr(item, "name", "") for panel in _panels(figure) for item in panel.items}
-    return len(names - {""})
+def _legend_rows(figure: Figure) -> int:
+    """Room for the second and further rows of the legend [px]."""
+    items = (item for _, _, panel in figure.all_panels() for item in panel.items)
+    return 18 * (len({getattr(item, "name", "") for item in items} - {""}) // 4)
 
 
 def _small(x: Any) -> Any:
@@ -126,109 +110,57 @@ def _domains(sizes: Iterable[float], gap: float) -> list[tuple[float, float]]:
     shares = np.array(list(sizes), float)
     shares *= (1.0 - gap * (len(shares) - 1)) / shares.sum()
     begins = np.concatenate([[0.0], np.cumsum(shares + gap)])[:-1]
-    return [
-        (float(begin), float(min(1.0, begin + share))) for begin, share in zip(begins, shares, strict=True)
-    ]
+    return [(float(x), float(min(1.0, x + share))) for x, share in zip(begins, shares, strict=True)]
 
 
 class _Drawing:
-    """A plotly figure that panels are drawn into."""
+    """A plotly figure that panels are drawn into; the values of `spec` are in the units that are shown."""
 
-    def __init__(self, figure: Figure, units: Units) -> None:
-        self.spec, self.units, self.figure = figure, units, go.Figure()
-        rows, columns = len(figure.panels), len(figure.panels[0])
-        shared = all(
-            panel is None or len(figure.sharing(r, c)) == rows
-            for r, row in enumerate(figure.panels)
-            for c, panel in enumerate(row)
-        )
-        inner = height(figure) - _ENDS
-        self.columns = _domains(figure.widths or (1.0,) * columns, 0.09 if columns > 2 else 0.1)
-        heights = figure.heights or (1.0,) * rows
-        titles = any(panel.title for panel in _panels(figure))
-        self.rows = [
-            (1.0 - last, 1.0 - first)
-            for first, last in _domains(
-                heights, ((22.0 if shared else 66.0) + (22.0 if titles else 0.0)) / inner
-            )
-        ]
-        self.kept = _thin_groups(figure)
+    def __init__(self, spec: Figure) -> None:
+        self.spec, self.figure = spec, go.Figure()
+        rows, columns = len(spec.panels), len(spec.panels[0])
+        panels = list(spec.all_panels())
+        shared = all(len(spec.sharing(r, c)) == rows for r, c, _ in panels)
+        gap = (22.0 if shared else 66.0) + (22.0 if any(panel.title for _, _, panel in panels) else 0.0)
+        self.columns = _domains(spec.widths or (1.0,) * columns, 0.09 if columns > 2 else 0.1)
+        domains = _domains(spec.heights or (1.0,) * rows, gap / (height(spec) - _ENDS))
+        self.rows = [(1.0 - last, 1.0 - first) for first, last in domains]
+        self.kept = _thin_groups(spec)
         self.x_axes: dict[tuple[int, Axis], str] = {}
-        self.y_count = 0
-        self.first: dict[int, str] = {}
+        self.y_axes: dict[int, list[str]] = {}
         self.axes: dict[str, dict[str, Any]] = {}
         self.listed: set[str] = set()
 
     def panel(self, r: int, c: int, panel: Panel) -> None:
         """Draw a panel into its place."""
-        self.y_count += 1
-        y = f"y{self.y_count if self.y_count > 1 else ''}"
+        count = sum(map(len, self.y_axes.values())) + 1
+        y = f"y{count if count > 1 else ''}"
+        self.y_axes.setdefault(r, []).append(y)
         x = self.x_axes.setdefault((c, panel.x), f"x{len(self.x_axes) + 1 if self.x_axes else ''}")
-        layout = self.axes
-        layout.setdefault(_long(x), {}).update(domain=self.columns[c], **self._axis(panel.x, panel, "x"))
+        across = self.axes.setdefault(_long(x), {"domain": self.columns[c], **_axis(panel.x)})
         if r == self.spec.sharing(r, c)[-1]:
-            layout.setdefault(_long(x), {}).update(anchor=y, title={"text": axis_title(panel.x, self.units)})
-        layout.setdefault(_long(y), {}).update(
-            domain=self.rows[r], anchor=x, **self._axis(panel.y, panel, "y")
+            across |= {"anchor": y, "title": {"text": panel.x.label}}
+        self.axes[_long(y)] = {"domain": self.rows[r], "anchor": x, **_axis(panel.y)}
+        self.axes[_long(y)] |= {"title": {"text": panel.y.label}} | (
+            {"scaleanchor": x} if panel.equal else {}
         )
-        layout.setdefault(_long(y), {}).update(title={"text": axis_title(panel.y, self.units)})
-        if panel.equal:
-            layout.setdefault(_long(y), {}).update(scaleanchor=x)
-        first = self.first.setdefault(r, y)
-        if self.spec.level and first != y:
-            layout.setdefault(_long(y), {}).update(matches=first)
+        if self.spec.level and self.y_axes[r][0] != y:
+            self.axes[_long(y)]["matches"] = self.y_axes[r][0]
         if panel.title:
-            self._words(
-                f"{x} domain",
-                f"{y} domain",
-                0.0,
-                1.0,
-                f"<b>{panel.title}</b>",
-                xanchor="left",
-                yanchor="bottom",
-            )
+            corner = {"xanchor": "left", "yanchor": "bottom"}
+            self._words(f"{x} domain", f"{y} domain", 0.0, 1.0, f"<b>{panel.title}</b>", **corner)
         for item in panel.items:
             self._draw(item, panel, x, y)
 
-    def _axis(self, axis: Axis, panel: Panel, side: str) -> dict[str, Any]:
-        made: dict[str, Any] = {}
-        if axis.names:
-            return {
-                "tickvals": list(range(len(axis.names))), "ticktext": list(axis.names), "showgrid": False,
-                "ticks": "", "range": [len(axis.names) - 0.45, -0.55],
-            }  # fmt: skip
-        if axis.log:
-            made |= {"type": "log", "dtick": "D2"}
-        if axis.low is not None and axis.high is not None:
-            ends = [float(self._values(axis, end)) for end in (axis.low, axis.high)]
-            made |= {"range": [float(np.log10(end)) for end in ends] if axis.log else ends}
-        elif axis.low == 0.0 and not axis.log:
-            made |= {"rangemode": "tozero"}
-        elif axis.high is not None or axis.low is not None:
-            made |= {
-                f"{'max' if axis.low is None else 'min'}allowed": self._values(axis, axis.high or axis.low)
-            }
-        if axis.step is not None:
-            made |= {"dtick": axis.step}
-        return made
-
-    def _values(self, axis: Axis, x: Any) -> Any:
-        _, factor, offset = scales(axis.unit, axis.kind, self.units)[0]
-        return factor * np.asarray(x, float) + offset
-
     def _words(self, xref: str, yref: str, x: float, y: float, text: str, **more: Any) -> None:
-        self.figure.add_annotation(
-            x=x, y=y, xref=xref, yref=yref, text=text, showarrow=False, font={"size": 12}, **more
-        )
+        at = {"x": x, "y": y, "xref": xref, "yref": yref}
+        self.figure.add_annotation(**at, text=text, showarrow=False, font={"size": 12}, **more)
 
-    def _legend(self, name: str) -> dict[str, Any]:
-        new = bool(name) and name not in self.listed
-        self.listed.add(name)
+    def _legend(self, name: str, listed: bool = True) -> dict[str, Any]:
+        """What tells a name in the legend, once."""
+        new = listed and bool(name) and name not in self.listed
+        self.listed |= {name} if new else set()
         return {"name": name or " ", "legendgroup": name, "showlegend": new}
-
-    def _hover(self, axis: Axis) -> str:
-        unit = plain(unit_text(scales(axis.unit, axis.kind, self.units)[0][0]))
-        return f"%{{y:.4g}} {unit}"
 
     def _draw(self, item: Item, panel: Panel, x: str, y: str) -> None:
         place = {"xaxis": x, "yaxis": y}
@@ -236,131 +168,123 @@ class _Drawing:
             case Curve():
                 self._curve(item, panel, place)
             case Between():
-                for values, legend in (
-                    (item.low, {"name": " ", "showlegend": False}),
-                    (item.high, self._legend(item.name)),
-                ):
+                line = {"color": INK, "width": 0.8, "dash": "dot"}
+                for values, name, fill in ((item.low, "", None), (item.high, item.name, "tonexty")):
                     self.figure.add_scatter(
-                        x=_small(self._values(panel.x, item.x)), y=_small(self._values(panel.y, values)),
-                        mode="lines", line={"color": INK, "width": 0.8, "dash": "dot"},
-                        fill="tonexty" if values is item.high else None, fillcolor=FILLS[item.look],
-                        hovertemplate=self._hover(panel.y), **legend, **place,
+                        x=_small(item.x), y=_small(values), mode="lines", line=line, fill=fill,
+                        fillcolor=FILLS[item.look], hovertemplate=_hover(panel.y), **self._legend(name), **place,
                     )  # fmt: skip
             case Shade():
-                self._band(item, panel, x, y)
+                colour = FILLS[item.look]
+                style = {
+                    "type": "rect",
+                    "fillcolor": colour,
+                    "opacity": 0.6,
+                    "line_width": 0,
+                    "layer": "below",
+                }
+                self.figure.add_shape(**style, **_across(item.axis, item.low, item.high, x, y))
+                self._sample(item.name, place, mode="markers", marker=_square(colour))
             case Mark():
-                self._mark(item, panel, x, y)
+                self._mark(item, place)
             case Bars():
                 self._bars(item, panel, place)
             case Label():
-                ends = (float(self._values(panel.x, item.x)), float(self._values(panel.y, item.y)))
-                if panel.x.log:
-                    ends = (float(np.log10(ends[0])), ends[1])
-                if panel.y.log:
-                    ends = (ends[0], float(np.log10(ends[1])))
-                self._words(
-                    x, y, *ends, item.words, bgcolor="rgba(255, 255, 255, 0.8)", **_PLACES[item.place]
+                at_x, at_y = (
+                    float(np.log10(v)) if axis.log else float(v)
+                    for axis, v in ((panel.x, item.x), (panel.y, item.y))
                 )
+                white = {"bgcolor": "rgba(255, 255, 255, 0.8)"}
+                self._words(x, y, at_x, at_y, item.words, **white, **_PLACES[item.place])
             case Field():
-                self._field(item, panel, place)
+                self._field(item, place)
 
     def _curve(self, curve: Curve, panel: Panel, place: dict[str, Any]) -> None:
         kept = self.kept[id(curve.x)] if curve.joined and not curve.marker else slice(None)
         look = look_of(curve.look)
         mode = "+".join(name for name, there in (("lines", curve.joined), ("markers", curve.marker)) if there)
-        legend = (
-            self._legend(curve.name) if curve.listed else {"name": curve.name or " ", "showlegend": False}
-        )
+        symbol, edge = _MARKERS.get(curve.marker, "circle"), {"width": 1.4, "color": look["color"]}
         self.figure.add_scatter(
-            x=_small(self._values(panel.x, np.asarray(curve.x)[kept])),
-            y=_small(self._values(panel.y, np.asarray(curve.y)[kept])),
+            x=_small(np.asarray(curve.x)[kept]),
+            y=_small(np.asarray(curve.y)[kept]),
             mode=mode,
             line={"color": look["color"], "width": look["linewidth"] + 0.2, "dash": _dash(look["linestyle"])},
-            marker={
-                "symbol": _MARKERS.get(curve.marker, "circle"),
-                "size": 7,
-                "line": {"width": 1.4, "color": look["color"]},
-            },
-            hovertemplate=(
-                f"%{{x:.4g}}, {self._hover(panel.y)}" if _pointed(panel) else self._hover(panel.y)
-            ),
-            **legend,
+            marker={"symbol": symbol, "size": 7, "line": edge},
+            hovertemplate=("%{x:.4g}, " if _pointed(panel) else "") + _hover(panel.y),
+            **self._legend(curve.name, curve.listed),
             **place,
         )
 
-    def _band(self, band: Shade, panel: Panel, x: str, y: str) -> None:
-        axis = panel.x if band.axis == "x" else panel.y
-        low, high = (float(self._values(axis, end)) for end in (band.low, band.high))
-        across = {"x0": low, "x1": high, "y0": 0, "y1": 1, "xref": x, "yref": f"{y} domain"}
-        if band.axis == "y":
-            across = {"y0": low, "y1": high, "x0": 0, "x1": 1, "yref": y, "xref": f"{x} domain"}
-        self.figure.add_shape(
-            type="rect", fillcolor=FILLS[band.look], opacity=0.6, line_width=0, layer="below", **across
-        )
-        if band.name:
-            self._sample(band.name, FILLS[band.look], x, y)
-
-    def _sample(self, name: str, colour: str, x: str, y: str) -> None:
-        """A name of a shade in the legend."""
+    def _sample(self, name: str, place: dict[str, Any], **style: Any) -> None:
+        """A name in the legend of what is no trace."""
         legend = self._legend(name)
         if legend["showlegend"]:
-            marker = {"symbol": "square", "size": 12, "color": colour, "line": {"width": 0.8, "color": INK}}
-            self.figure.add_scatter(
-                x=[None], y=[None], mode="markers", marker=marker, **legend, xaxis=x, yaxis=y
-            )
+            self.figure.add_scatter(x=[None], y=[None], **style, **legend, **place)
 
-    def _mark(self, mark: Mark, panel: Panel, x: str, y: str) -> None:
-        axis, look = (panel.x if mark.axis == "x" else panel.y), look_of(mark.look)
-        at = float(self._values(axis, mark.at))
-        across = {"x0": at, "x1": at, "y0": 0, "y1": 1, "xref": x, "yref": f"{y} domain"}
-        if mark.axis == "y":
-            across = {"y0": at, "y1": at, "x0": 0, "x1": 1, "yref": y, "xref": f"{x} domain"}
+    def _mark(self, mark: Mark, place: dict[str, Any]) -> None:
+        x, y = place["xaxis"], place["yaxis"]
+        look = look_of(mark.look)
         style = {"color": look["color"], "width": look["linewidth"], "dash": _dash(look["linestyle"])}
-        self.figure.add_shape(type="line", line=style, **across)
+        self.figure.add_shape(type="line", line=style, **_across(mark.axis, mark.at, mark.at, x, y))
         if mark.words and mark.axis == "x":
-            turned = {"textangle": -90} if mark.upright else {}
-            self._words(x, f"{y} domain", at, 1.0, mark.words, xanchor="center", yanchor="bottom", **turned)
-        if mark.name:
-            legend = self._legend(mark.name)
-            if legend["showlegend"]:
-                self.figure.add_scatter(
-                    x=[None], y=[None], mode="lines", line=style, **legend, xaxis=x, yaxis=y
-                )
+            turned = {"textangle": -90 if mark.upright else 0, "xanchor": "center", "yanchor": "bottom"}
+            self._words(x, f"{y} domain", mark.at, 1.0, mark.words, **turned)
+        self._sample(mark.name, place, mode="lines", line=style)
 
     def _bars(self, bars: Bars, panel: Panel, place: dict[str, Any]) -> None:
-        look, unit = (
-            BARS[bars.look % len(BARS)],
-            plain(unit_text(scales(panel.x.unit, panel.x.kind, self.units)[0][0])),
-        )
+        look = BARS[bars.look % len(BARS)]
         pattern = {"shape": look["pattern"], "fgcolor": "#666666", "size": 6} if not bars.slim else {}
         colour = INK if bars.slim else look["color"]
         self.figure.add_bar(
-            y=np.asarray(bars.at, float), x=_small(self._values(panel.x, bars.size)), orientation="h",
-            width=bars.height, marker={"color": colour, "line": {"color": INK, "width": 0.8}, "pattern": pattern},
+            y=np.asarray(bars.at, float), x=_small(bars.size), orientation="h", width=bars.height,
+            marker={"color": colour, "line": {"color": INK, "width": 0.8}, "pattern": pattern},
             text=list(bars.words) or None, textposition="outside" if bars.words else None, cliponaxis=False,
-            hovertemplate=f"{bars.name}: %{{x:.4g}} {unit}<extra></extra>",
+            hovertemplate=f"{bars.name}: %{{x:.4g}} {panel.x.unit}<extra></extra>",
             **self._legend(bars.name), **place,
         )  # fmt: skip
 
-    def _field(self, field: Field, panel: Panel, place: dict[str, Any]) -> None:
-        count = len(field.names)
+    def _field(self, field: Field, place: dict[str, Any]) -> None:
+        count, z = len(field.names), _small(classes(field))
         shades = [[i / (count - 1), colour] for i, colour in enumerate(CLASSES[:count])]
-        common = {
-            "x": _small(self._values(panel.x, field.x)), "y": _small(self._values(panel.y, field.y)),
-            "z": _small(classes(field)), "showscale": False, "hoverinfo": "skip", **place,
-        }  # fmt: skip
-        levels = {"start": 1, "end": count - 1, "size": 1}
-        self.figure.add_contour(
-            **common, colorscale=shades, contours=levels | {"coloring": "fill"}, line={"width": 0}
-        )
+        common = {"x": _small(field.x), "y": _small(field.y), "z": z, "showscale": False, "hoverinfo": "skip"}
+        levels = {"start": 1, "end": count - 1, "size": 1, "coloring": "fill"}
+        self.figure.add_contour(**common, **place, colorscale=shades, contours=levels, line={"width": 0})
         if field.bold is not None and np.nanmax(field.z) > field.bold:
             k = field.levels.index(field.bold)
-            self.figure.add_contour(
-                **common, contours={"start": k, "end": k, "size": 1, "coloring": "none"},
-                line={"width": 1.5, "color": INK}, showlegend=False,
-            )  # fmt: skip
+            edge = {"start": k, "end": k, "size": 1, "coloring": "none"}
+            line = {"width": 1.5, "color": INK}
+            self.figure.add_contour(**common, **place, contours=edge, line=line, showlegend=False)
         for name, colour in zip(field.names, CLASSES, strict=False):
-            self._sample(name, colour, place["xaxis"], place["yaxis"])
+            self._sample(name, place, mode="markers", marker=_square(colour))
+
+
+def _axis(axis: Axis) -> dict[str, Any]:
+    """Range and ticks of an axis."""
+    if axis.names:
+        ticks = {"tickvals": list(range(len(axis.names))), "ticktext": list(axis.names), "ticks": ""}
+        return {**ticks, "showgrid": False, "range": [len(axis.names) - 0.45, -0.55]}
+    made: dict[str, Any] = {"type": "log", "dtick": "D2"} if axis.log else {}
+    if axis.low is not None and axis.high is not None:
+        ends = [axis.low, axis.high]
+        made["range"] = [float(np.log10(end)) for end in ends] if axis.log else ends
+    elif axis.low == 0.0 and not axis.log:
+        made["rangemode"] = "tozero"
+    return made | ({} if axis.step is None else {"dtick": axis.step})
+
+
+def _across(axis: str, low: float, high: float, x: str, y: str) -> dict[str, Any]:
+    """Where a shape lies that spans a panel across an axis."""
+    if axis == "x":
+        return {"x0": low, "x1": high, "y0": 0, "y1": 1, "xref": x, "yref": f"{y} domain"}
+    return {"y0": low, "y1": high, "x0": 0, "x1": 1, "yref": y, "xref": f"{x} domain"}
+
+
+def _square(colour: str) -> dict[str, Any]:
+    return {"symbol": "square", "size": 12, "color": colour, "line": {"width": 0.8, "color": INK}}
+
+
+def _hover(axis: Axis) -> str:
+    return f"%{{y:.4g}} {axis.unit}"
 
 
 def classes(field: Field) -> Any:
@@ -383,7 +307,7 @@ def _dash(style: Any) -> str:
 def _thin_groups(figure: Figure) -> dict[int, Any]:
     """By the identity of x, which samples to draw of the curves over it."""
     groups: dict[int, list[Curve]] = {}
-    for panel in _panels(figure):
+    for _, _, panel in figure.all_panels():
         for item in panel.items:
             if isinstance(item, Curve) and item.joined and not item.marker:
                 groups.setdefault(id(item.x), []).append(item)

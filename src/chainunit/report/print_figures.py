@@ -11,10 +11,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.ticker import FuncFormatter
 
-from ..text import Units, scales
-from .figure import Axis, Bars, Between, Curve, Field, Figure, Item, Label, Mark, Panel, Shade
+from ..text import Units
+from .figure import Axis, Bars, Between, Curve, Field, Figure, Item, Label, Mark, Panel, Shade, in_units
 from .lines import capital
-from .page_figures import axis_title, classes
+from .page_figures import classes
 from .style import BARS, CLASSES, FILLS, INK, draw, look_of
 
 _ROW, _COLUMN = 2.5, 4.3  # of a panel [in]
@@ -41,28 +41,27 @@ def contours(x: Any, y: Any, z: Any, level: float) -> list[Any]:
     return sorted(lines, key=len, reverse=True)
 
 
-def _figure(figure: Figure, units: Units) -> Any:
+def _figure(spec: Figure, units: Units) -> Any:
+    figure = in_units(spec, units)
     rows, columns = len(figure.panels), len(figure.panels[0])
     heights, widths = figure.heights or (1.0,) * rows, figure.widths or (1.0,) * columns
-    titled = any(panel is not None and panel.title for row in figure.panels for panel in row)
-    size = (
-        8.2 if columns == 1 else 1.0 + _COLUMN * columns,
-        1.2 + (_ROW if rows > 1 else 3.2) * sum(heights) + (0.3 * rows if titled else 0.0),
-    )
+    titled = any(panel.title for _, _, panel in figure.all_panels())
+    width = 8.2 if columns == 1 else 1.0 + _COLUMN * columns
+    tall = 1.2 + (_ROW if rows > 1 else 3.2) * sum(heights) + (0.3 * rows if titled else 0.0)
     drawing, axes = plt.subplots(
-        rows, columns, figsize=size, squeeze=False, height_ratios=heights, width_ratios=widths
+        rows, columns, figsize=(width, tall), squeeze=False, height_ratios=heights, width_ratios=widths
     )
-    for r, row in enumerate(figure.panels):
-        for c, panel in enumerate(row):
-            if panel is None:
-                axes[r, c].remove()
-                continue
-            sharing = figure.sharing(r, c)
-            if r > sharing[0]:
-                axes[r, c].sharex(axes[sharing[0], c])
-            if figure.level and c and row[0] is not None:
-                axes[r, c].sharey(axes[r, 0])
-            _panel(axes[r, c], panel, units, last=r == sharing[-1], first=r == sharing[0])
+    filled = {(r, c) for r, c, _ in figure.all_panels()}
+    for place in np.ndindex(rows, columns):
+        if place not in filled:
+            axes[place].remove()
+    for r, c, panel in figure.all_panels():
+        sharing = figure.sharing(r, c)
+        if r > sharing[0]:
+            axes[r, c].sharex(axes[sharing[0], c])
+        if figure.level and c and (r, 0) in filled:
+            axes[r, c].sharey(axes[r, 0])
+        _panel(axes[r, c], panel, last=r == sharing[-1], first=r == sharing[0])
     _legend(drawing, axes, columns)
     drawing.suptitle(capital(figure.title))
     return drawing
@@ -81,62 +80,43 @@ def _legend(drawing: Any, axes: Any, columns: int) -> None:
         drawing.legend(found.values(), found.keys(), loc="outside lower center", ncols=count, fontsize=9)
 
 
-def _panel(axis: Any, panel: Panel, units: Units, *, last: bool, first: bool) -> None:
+def _panel(axis: Any, panel: Panel, *, last: bool, first: bool) -> None:
     for item in panel.items:
-        _draw(axis, item, panel, units)
-    _scale(axis, panel.x, "x", units)
-    _scale(axis, panel.y, "y", units)
+        _draw(axis, item)
+    _scale(axis, panel.x, "x")
+    _scale(axis, panel.y, "y")
     if last:
-        axis.set_xlabel(axis_title(panel.x, units))
+        axis.set_xlabel(panel.x.label)
     else:
         axis.tick_params(labelbottom=False)
-    axis.set_ylabel(axis_title(panel.y, units) if not panel.y.names else "")
+    axis.set_ylabel("" if panel.y.names else panel.y.label)
     if panel.equal:
         axis.set_aspect("equal", adjustable="datalim")
     if panel.title:
         axis.set_title(panel.title, fontsize=10)
-    if first:
-        _second_scale(axis, panel.x, units)
-
-
-def _second_scale(axis: Any, x: Axis, units: Units) -> None:
-    """The unit that is shown beside the first one, above."""
-    (_, first, _), *others = scales(x.unit, x.kind, units)
-    if others:
-        unit, second, _ = others[0]
-        ratio = second / first
+    if first and panel.x.second is not None:
+        label, ratio = panel.x.second
         above = axis.secondary_xaxis("top", functions=(lambda v: v * ratio, lambda v: v / ratio))
-        above.set_xlabel(f"{x.label} [{unit}]")
+        above.set_xlabel(label)
 
 
-def _scale(axis: Any, spec: Axis, side: str, units: Units) -> None:
-    setter = getattr(axis, f"set_{side}lim")
+def _scale(axis: Any, spec: Axis, side: str) -> None:
+    which = getattr(axis, f"{side}axis")
     if spec.names:
-        getattr(axis, f"set_{side}ticks")(range(len(spec.names)), list(spec.names))
-        axis.set_ylim(len(spec.names) - 0.45, -0.55)
+        which.set_ticks(range(len(spec.names)), list(spec.names))
+        getattr(axis, f"set_{side}lim")(len(spec.names) - 0.45, -0.55)
         axis.grid(axis=side, visible=False)
         return
-    which = getattr(axis, f"{side}axis")
     if spec.log:
         getattr(axis, f"set_{side}scale")("log")
         which.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
         which.set_minor_formatter(FuncFormatter(lambda v, _: f"{v:g}" if f"{v:e}"[0] in "25" else ""))
     else:
         axis.ticklabel_format(axis=side, useOffset=False)
-    ends = {
-        name: float(_values(spec, end, units))
-        for name, end in (("low", spec.low), ("high", spec.high))
-        if end is not None
-    }
-    if ends:
-        setter(ends.get("low"), ends.get("high"))
-    if spec.step is not None and len(ends) == 2:
-        which.set_ticks(np.arange(ends["low"], ends["high"] + 0.5 * spec.step, spec.step))
-
-
-def _values(axis: Axis, x: Any, units: Units) -> Any:
-    _, factor, offset = scales(axis.unit, axis.kind, units)[0]
-    return factor * np.asarray(x, float) + offset
+    if spec.low is not None or spec.high is not None:
+        getattr(axis, f"set_{side}lim")(spec.low, spec.high)
+    if spec.step is not None and spec.low is not None and spec.high is not None:
+        which.set_ticks(np.arange(spec.low, spec.high + 0.5 * spec.step, spec.step))
 
 
 def _name(axis: Any, name: str) -> str | None:
@@ -144,56 +124,43 @@ def _name(axis: Any, name: str) -> str | None:
     return name if name and name not in axis.get_legend_handles_labels()[1] else None
 
 
-def _draw(axis: Any, item: Item, panel: Panel, units: Units) -> None:
-    def x(values: Any) -> Any:
-        return _values(panel.x, values, units)
-
-    def y(values: Any) -> Any:
-        return _values(panel.y, values, units)
-
+def _draw(axis: Any, item: Item) -> None:
     match item:
         case Curve():
             look = look_of(item.look) | ({} if item.joined else {"linestyle": ""})
             hollow = (
                 {"marker": item.marker, "markersize": 5.0, "markerfacecolor": "white"} if item.marker else {}
             )
-            axis.plot(x(item.x), y(item.y), label=item.name if item.listed else None, **look, **hollow)
+            axis.plot(item.x, item.y, label=item.name if item.listed else None, **look, **hollow)
         case Between():
-            axis.fill_between(
-                x(item.x), y(item.low), y(item.high), facecolor=FILLS[item.look], edgecolor=INK, linewidth=0.5,
-                hatch="--" if item.look == "hatched" else None, label=item.name or None,
-            )  # fmt: skip
+            hatch = "--" if item.look == "hatched" else None
+            style = {"facecolor": FILLS[item.look], "edgecolor": INK, "linewidth": 0.5, "hatch": hatch}
+            axis.fill_between(item.x, item.low, item.high, label=item.name or None, **style)
         case Shade():
-            span, of = (axis.axvspan, x) if item.axis == "x" else (axis.axhspan, y)
-            span(
-                float(of(item.low)), float(of(item.high)), facecolor=FILLS[item.look], linewidth=0.0, zorder=0,
-                label=_name(axis, item.name),
-            )  # fmt: skip
+            span = axis.axvspan if item.axis == "x" else axis.axhspan
+            style = {"facecolor": FILLS[item.look], "linewidth": 0.0, "zorder": 0}
+            span(item.low, item.high, label=_name(axis, item.name), **style)
         case Mark():
-            ruled, of = (axis.axvline, x) if item.axis == "x" else (axis.axhline, y)
-            ruled(float(of(item.at)), label=_name(axis, item.name), **look_of(item.look))
+            ruled = axis.axvline if item.axis == "x" else axis.axhline
+            ruled(item.at, label=_name(axis, item.name), **look_of(item.look))
             if item.words and item.axis == "x":
-                axis.annotate(
-                    item.words, (float(of(item.at)), 1.0), (0.0, 3.0), xycoords=("data", "axes fraction"),
-                    textcoords="offset points", rotation=90 if item.upright else 0, fontsize=8, ha="center",
-                    va="bottom",
-                )  # fmt: skip
+                above = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points"}
+                style = {"rotation": 90 if item.upright else 0, "fontsize": 8, "ha": "center", "va": "bottom"}
+                axis.annotate(item.words, (item.at, 1.0), (0.0, 3.0), **above, **style)
         case Bars():
-            _bars(axis, item, x)
+            _bars(axis, item)
         case Label():
             offset, ha, va = _PLACES[item.place]
-            axis.annotate(
-                item.words, (float(x(item.x)), float(y(item.y))), offset, textcoords="offset points", ha=ha, va=va,
-                fontsize=9, bbox=_WHITE, zorder=6,
-            )  # fmt: skip
+            style = {"ha": ha, "va": va, "fontsize": 9, "bbox": _WHITE, "zorder": 6}
+            axis.annotate(item.words, (item.x, item.y), offset, textcoords="offset points", **style)
         case Field():
-            _field(axis, item, x(item.x), y(item.y))
+            _field(axis, item)
 
 
-def _bars(axis: Any, bars: Bars, x: Any) -> None:
+def _bars(axis: Any, bars: Bars) -> None:
     look = BARS[bars.look % len(BARS)]
     drawn = axis.barh(
-        bars.at, x(bars.size), bars.height, label=bars.name or None, edgecolor=INK, linewidth=0.6,
+        bars.at, bars.size, bars.height, label=bars.name or None, edgecolor=INK, linewidth=0.6,
         color=INK if bars.slim else look["color"], hatch=None if bars.slim else look["hatch"],
     )  # fmt: skip
     if bars.words:
@@ -201,11 +168,11 @@ def _bars(axis: Any, bars: Bars, x: Any) -> None:
         axis.margins(x=0.22)
 
 
-def _field(axis: Any, field: Field, x: Any, y: Any) -> None:
+def _field(axis: Any, field: Field) -> None:
     shades = CLASSES[: len(field.names)]
     z = np.ma.masked_invalid(classes(field))
-    axis.contourf(x, y, z, levels=range(len(field.levels)), colors=shades)
+    axis.contourf(field.x, field.y, z, levels=range(len(field.levels)), colors=shades)
     if field.bold is not None and np.nanmax(field.z) > field.bold:
-        axis.contour(x, y, z, levels=[field.levels.index(field.bold)], colors=INK, linewidths=1.3)
+        axis.contour(field.x, field.y, z, levels=[field.levels.index(field.bold)], colors=INK, linewidths=1.3)
     for name, shade in zip(field.names, shades, strict=True):
         axis.scatter([], [], marker="s", s=80, facecolor=shade, edgecolor=INK, label=name)
