@@ -164,6 +164,14 @@ def test_random_overloads_draw_what_the_event_declares():
     assert (event.side, event.p.pause, event.p.force, event.p.number) == ("right", 0.15, 9.0, 2.0)
 
 
+def test_random_overloads_that_the_drive_has_no_input_for_are_refused(tmp_path):
+    text = QUICK + '[monte_carlo]\nruns = 3\nevent = { type = "dip", depth = [0.2, 0.9] }\n'
+    with pytest.raises(
+        InputError, match=r'monte_carlo\.event\.type = "dip": this motor\'s drive has no line'
+    ):
+        run_study(config.parse(text), tmp_path)
+
+
 def test_sizing_takes_the_studys_own_one_sided_feed():
     text = event_line("feed_right", shift=0.7)
     assert config.parse(text).one_sided("right").p.shift == 0.7

@@ -88,7 +88,8 @@ class Event:
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
-        TYPES[cls.kind] = cls
+        if "kind" in vars(cls):
+            TYPES[cls.kind] = cls
 
     @classmethod
     def on(cls, side: SideName | Literal[""] = "", p: Any = None, name: str = "") -> Event:

@@ -12,7 +12,7 @@ from pathlib import Path
 import xarray as xr
 
 from ..config import Config
-from ..errors import InterruptedRunError, RunError
+from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
 from ..system import CoSimulation
 from . import verdict
@@ -48,11 +48,19 @@ def run_study(
 
     With `check`, every run is also compared with the monolithic solution.
     A run that fails ends the study early: what was computed is in it, and `failure` says why.
+
+    Raises
+    ------
+    InputError
+        for a communication step that is too long for the driveline, a catalogue that sizing cannot use, and random
+        overloads that the drive has no inputs for.
     """
     report = report or (lambda what, done, todo: None)
     choice = choose(config, folder / "fmu", report, backend)
     drive = choice.drive
     study = Study(config, drive, statics(config, drive), choice.tuning, choice.sizing)
+    if config.monte_carlo.runs:
+        _check_random(config, Rig(config, drive, {}))
     files, study.made = drive.export(folder / "fmu", backend)
     runner = Runner(study, Rig(config, drive, files), report)
     try:
@@ -72,6 +80,13 @@ def run_study(
         _chains(study, files["machine"], report)
     conclude(study)
     return study
+
+
+def _check_random(config: Config, rig: Rig) -> None:
+    """Refuse random overloads that the drive has no inputs for."""
+    for event in config.random.hardest():
+        if not rig.takes(event):
+            raise InputError(f'monte_carlo.event.type = "{event.kind}": {event.without}')
 
 
 def _chains(study: Study, file: Path, report: Report) -> None:
