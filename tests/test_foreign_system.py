@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -15,8 +16,12 @@ from systems import component, pair
 from test_foreign import changed
 
 from chainunit import InputError, config
+from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.motor import Motor
 from chainunit.model import Terminal
+from chainunit.report import chain_unit, files
+from chainunit.studies import run
+from chainunit.studies.choice import Choice, with_motor
 from chainunit.studies.drive import Drive
 from chainunit.system import (
     CoSimulation,
@@ -304,11 +309,11 @@ def test_a_drive_with_a_motor_of_somebody_else(file, tmp_path):
     given = config.load()
     drive = Drive(Motor, None, given.machine, foreign=foreign_component(file, "motor"))
     assert drive.follows
-    files, made = drive.export(tmp_path, "python")
-    assert set(made) == {"machine"} and files["motor"] == file
+    fmus, made = drive.export(tmp_path, "python")
+    assert set(made) == {"machine"} and fmus["motor"] == file
     speed = given.run.crank_speed
     with CoSimulation(
-        drive.system(files), {**drive.loads(given.feed), **drive.reference(speed, 0.3)}
+        drive.system(fmus), {**drive.loads(given.feed), **drive.reference(speed, 0.3)}
     ) as simulation:
         start = simulation.run(1.0, 0.002)
         simulation.save()
@@ -332,6 +337,62 @@ def test_a_drive_with_a_motor_of_somebody_else(file, tmp_path):
             InputError, match=r"ForeignMotor\.fmu: .* is not known of an FMU of somebody else"
         ):
             unknown()
+
+
+STUDY = """
+[run]
+ramp = 0.3
+turns = 1
+settle_turns = 1
+step = 0.002
+crank_speed = 6
+[machine]
+ratio = 25
+[[event]]
+type = "jam"
+side = "left"
+"""
+
+
+def test_a_study_with_a_motor_of_somebody_else(file, tmp_path, monkeypatch):
+    """Its answers are those of our motor of the same parameters; what only that tells is absent, and said so."""
+    given = config.parse(STUDY)
+    own = Choice(Drive(DcMotor, DcMotor.Parameters(), given.machine))
+    studies = []
+    for choice in (with_motor(given, file), own):
+        monkeypatch.setattr(run, "choose", lambda *_, choice=choice: choice)
+        studies.append(run.run_study(given, tmp_path))
+        assert studies[-1].failure is None
+    foreign, ours = studies
+    absent = set()
+    for name, answers in ours.answers.items():
+        for quantity, value in vars(answers).items():
+            other = getattr(foreign.answers[name], quantity)
+            if value is not None and other is None:
+                absent.add(quantity)
+            elif value is not None:
+                assert other == pytest.approx(value, rel=1e-5, abs=1e-6), (name, quantity)
+    assert absent == {
+        *("motor_torque_peak", "motor_torque_rms", "supply_power_mean", "current_peak", "current_rms"),
+        *("winding_temperature", "shaft_share", "torque_reserve"),
+    }
+    for shares in foreign.certificate.values():
+        assert shares["energy_residual_share"] < 1e-2
+    report = chain_unit.report(foreign)
+    for write in files.writers(report, tmp_path, "result"):
+        write()
+    result = json.loads((tmp_path / "result.json").read_text())
+    assert result["motor"] == {"kind": "ForeignMotor.fmu"}
+    assert "its reserve of torque is not known" in result["verdict"]["motor"]["text"]
+
+
+def test_a_study_that_asks_for_more_is_refused(file):
+    with pytest.raises(InputError, match=r"ForeignMotor\.fmu: the inertia of its rotor is not known; leave"):
+        with_motor(config.parse(STUDY + "[driveline]\nJ4 = 2\n"), file)
+    with pytest.raises(
+        InputError, match=r"ForeignMotor\.fmu: has no input tau_ff in N\.m; leave feed_forward out"
+    ):
+        with_motor(config.parse("feed_forward = true\n" + STUDY), file)
 
 
 def test_no_twin_without_a_rotor(file, machine, fmus):

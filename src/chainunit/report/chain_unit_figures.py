@@ -42,7 +42,7 @@ _SERIES = {
 def figures(s: b.Source, study: Study) -> Iterator[fig.Figure]:
     """Every figure that the study has data for."""
     driven = read.driven(study)
-    if driven:
+    if driven and study.drive.foreign is None:
         yield _torque_speed(study, driven)
     if study.statics.cycles:
         yield _turn(s, study)
@@ -258,14 +258,16 @@ def _transient(s: b.Source, study: Study, name: str) -> fig.Figure:
     items: dict[str, list[fig.Item]] = {
         of: [fig.Curve(_SERIES[of].label, time, series[of], listed=False)]
         for of in ("torque", "speed", "current")
+        if of in series
     }
     if drive.line is not None:
         items["shaft"] = _shaft_torque(run, time)
     if event is None and drive.follows:
         items["speed"].append(fig.Curve("speed asked for", time, run["motor.w_ref"].values / drive.ratio, 1))
-    limit = drive.parameters.limit.i if drive.motor is DcMotor else math.inf
-    if np.max(np.abs(series["current"])) > 0.5 * limit:
-        items["current"].append(fig.Mark(limit, "current limit", axis="y", look="limit"))
+    if drive.motor is DcMotor:
+        limit = drive.parameters.limit.i
+        if np.max(np.abs(series["current"])) > 0.5 * limit:
+            items["current"].append(fig.Mark(limit, "current limit", axis="y", look="limit"))
     low, high = float(time[0]), float(time[-1])
     behind = study.runs.get(name + read.COASTING)
     if behind is not None:
@@ -363,7 +365,7 @@ def _overloads(groups: list[list[fig.Figure]]) -> fig.Figure:
     widest = max(map(len, groups))
     rows: list[tuple[fig.Panel | None, ...]] = []
     for group in groups:
-        for k in range(3):
+        for k in range(min(3, *(len(each.panels) for each in group))):
             row = [
                 replace(panel, title="" if k else each.title)
                 for each in group

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,10 +12,13 @@ from ..config import Config
 from ..drives.cardan import Cardan
 from ..drives.dc_motor import DcMotor
 from ..drives.driveline import CardanDriveline
+from ..drives.motor import Motor
 from ..drives.speed_control import Tuning, tune
 from ..drives.torsion import with_damping_ratio
+from ..errors import InputError
 from ..fmu.backends import Backend
 from ..quantities import Layout
+from ..system import foreign_component
 from .cycle import cycle
 from .drive import Drive
 from .sizing import SizingResult, size
@@ -45,6 +48,38 @@ def choose(
         return Choice(*tuned(config, with_line(config, drive)))
     sized = size(config, folder, report, backend)
     return Choice(with_line(config, sized.best.drive), sizing=sized)
+
+
+def with_motor(config: Config, file: Path, names: Mapping[str, str] | None = None) -> Choice:
+    """The machine of a study, driven by a motor of somebody else.
+
+    Parameters
+    ----------
+    file : the FMU
+    names : of our names those that it calls otherwise, see `chainunit.system.foreign_component`
+
+    Raises
+    ------
+    InputError
+        where the FMU does not fit, or the study asks for what only a motor of this package can tell.
+    """
+    motor = foreign_component(file, "motor", names)
+    if config.driveline is not None:
+        raise InputError(f"{file}: the inertia of its rotor is not known; leave [driveline] out")
+    if config.feed_forward and "tau_ff" not in motor.connectors:
+        raise InputError(f"{file}: has no input tau_ff in N.m; leave feed_forward out")
+    follows = "w_ref" in motor.connectors
+    return Choice(
+        Drive(
+            Motor,
+            None,
+            config.machine,
+            follows,
+            feed_forward=config.feed_forward,
+            chain=config.chain,
+            foreign=motor,
+        )
+    )
 
 
 def with_line(config: Config, drive: Drive) -> Drive:

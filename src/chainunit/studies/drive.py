@@ -27,6 +27,10 @@ from ..quantities import Layout
 from ..system import Component, FmuComponent, ModelComponent, Profile, System, export, shaft_joints
 
 
+class AbsentError(InputError):
+    """A quantity that an FMU of somebody else does not give."""
+
+
 @dataclass(frozen=True)
 class Drive:
     """`motor` with its `parameters` turns `machine`; `follows` says whether it follows the reference `w_ref`."""
@@ -64,13 +68,32 @@ class Drive:
     @property
     def rotor_inertia(self) -> float:
         """Inertia of the rotor, and of the driveline where there is one, at the motor [kg m2]."""
-        self._needs_own("the inertia of its rotor")
+        self.needs_own("the inertia of its rotor")
         line = 0.0 if self.line is None else self.line.J4 / self.line.ratio**2
         return float(self.parameters.rotor.J + line)
 
-    def _needs_own(self, what: str) -> None:
+    def needs_own(self, quantity: str) -> None:
+        """Refuse what only a motor of this package can tell.
+
+        Raises
+        ------
+        AbsentError
+            where the motor is an FMU of somebody else.
+        """
         if self.foreign is not None:
-            raise InputError(f"{self.foreign.title}: {what} is not known of an FMU of somebody else")
+            raise AbsentError(f"{self.foreign.title}: {quantity} is not known of an FMU of somebody else")
+
+    def series(self, run: xr.Dataset, name: str) -> Any:
+        """A variable of a run, shape (time,).
+
+        Raises
+        ------
+        AbsentError
+            where the motor is an FMU of somebody else, which does not give it.
+        """
+        if name.startswith("motor.") and name not in run:
+            self.needs_own(name)
+        return run[name].values
 
     def load_inertia(self, run: xr.Dataset) -> Any:
         """Inertia at the motor's shaft beside the rotor [kg m2], shape (time,); with a driveline that of its even
@@ -206,7 +229,7 @@ class Drive:
     def largest_torque(self, run: xr.Dataset, T: float) -> Any:
         """Largest air-gap torque that the motor can give at each instant of a run [N m], shape (time,), with its
         winding at `T` [K]; see `Motor.largest_torque`."""
-        self._needs_own("the largest torque")
+        self.needs_own("the largest torque")
         braking = run["motor.air_gap_tau"].values * run["motor.w"].values < 0.0
         columns = []
         for name, resolution in self.motor.limited_by.items():
@@ -222,7 +245,7 @@ class Drive:
     def pull_out(self, run: xr.Dataset, T: float) -> float:
         """Largest torque at the crank [N m] that a load meets which slows the motor down from the mean of a run until
         it stalls, with the winding at `T` [K]; see `Motor.pull_out`."""
-        self._needs_own("the pull-out torque")
+        self.needs_own("the pull-out torque")
         at = (float(np.mean(run[f"motor.{name}"].values)) for name in self.motor.limited_by)
         return self.motor.pull_out(self.parameters, T, *at) * self.ratio
 

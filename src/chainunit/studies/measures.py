@@ -18,7 +18,7 @@ import xarray as xr
 
 from ..quantities import Layout, Value, Variable, declaration, quantity
 from . import protection
-from .drive import Drive
+from .drive import AbsentError, Drive
 
 BURNT = 2000.0
 """Temperature that stands for a winding without a thermal steady state [K]."""
@@ -68,7 +68,7 @@ class Window:
 
     def value(self, name: str) -> Any:
         """A variable of the run, shape (time,)."""
-        return self.run[name].values
+        return self.drive.series(self.run, name)
 
     @cached_property
     def turns(self) -> xr.Dataset:
@@ -98,6 +98,7 @@ class Window:
     @property
     def current(self) -> str:
         """Name of the motor's current."""
+        self.drive.needs_own("the current")
         return f"motor.{self.drive.motor.current}"
 
     @property
@@ -117,6 +118,7 @@ class Window:
     def settled_temperature(self) -> float:
         """At which the winding comes to rest if the turns go on for ever [K]; infinite where it does not."""
         drive = self.drive
+        drive.needs_own("the temperature of the winding")
         names = ("heat", drive.motor.temperature, "w")
         heat, temperature, w = (self.mean(f"motor.{name}") for name in names)
         return drive.motor.settled_temperature(drive.parameters, heat, temperature, w)
@@ -128,11 +130,13 @@ class Window:
 
     def mean(self, of: str | Callable[[xr.Dataset], Any]) -> float:
         """Mean over the time of whole turns, of a variable or of what is read from them."""
-        return mean(self.turns, of(self.turns) if callable(of) else self.turns[of].values)
+        return mean(self.turns, of(self.turns) if callable(of) else self.drive.series(self.turns, of))
 
     def rms(self, of: str | Callable[[xr.Dataset], Any]) -> float:
         """RMS over the time of whole turns."""
-        return math.sqrt(self.mean(lambda run: (of(run) if callable(of) else run[of].values) ** 2))
+        return math.sqrt(
+            self.mean(lambda run: (of(run) if callable(of) else self.drive.series(run, of)) ** 2)
+        )
 
     def largest(self, name: str) -> float:
         """Largest size of a variable."""
@@ -372,10 +376,17 @@ def same_measure(name: str) -> Any:
 def read_answers(window: Window) -> Answers:
     """All measures of a window; None where one means nothing there, or there is no such thing."""
     values = {
-        each.name: each.metadata["read"](window) if window.phase in each.metadata["during"] else None
+        each.name: _read(each.metadata["read"], window) if window.phase in each.metadata["during"] else None
         for each in dataclasses.fields(Answers)
     }
     return Answers(**values)
+
+
+def _read(read: Read, window: Window) -> float | None:
+    try:
+        return read(window)
+    except AbsentError:
+        return None
 
 
 def read_measure(name: str, window: Window) -> Any:

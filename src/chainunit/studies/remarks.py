@@ -87,7 +87,7 @@ def _on_steady_running(study: Study, steady: Answers) -> None:
             cycle_gap=(steady.cycle_gap, "1", "percent"),
             repeats="chains do not repeat a turn" if study.config.chain else "the machine has not settled",
         )
-    if not math.isfinite(steady.winding_temperature):
+    if steady.winding_temperature is not None and not math.isfinite(steady.winding_temperature):
         warn(
             "no thermal steady state",
             "steady running: the winding has no thermal steady state, its loss grows faster than the cooling.",

@@ -25,6 +25,12 @@ def entries(declared: Any) -> dict[str, Any]:
     }
 
 
+def _motor(study: Study) -> dict[str, Any]:
+    kind = {"kind": study.drive.graph.components["motor"].title}
+    # of an FMU of somebody else no parameters are known
+    return kind if study.motor is None else kind | entries(study.motor)
+
+
 def as_dict(study: Study) -> dict[str, Any]:
     """Everything but the time series, ready for JSON: each number with its unit."""
     config = study.config
@@ -66,7 +72,7 @@ def _given(study: Study) -> dict[str, Any]:
     return {
         "origins": {name: origin for name in names if (origin := study.origin(name)) != "example"},
         "machine": entries(study.drive.machine.p),
-        "motor": {"kind": study.drive.motor.name, **entries(study.motor)},
+        "motor": _motor(study),
         "feed": entries(config.feed),
         "run": entries(config.run),
         "event": {name: entries(event.p) for name, event in config.events.items()},
