@@ -66,7 +66,7 @@ def _root(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and stop.")
     ] = False,
     no_cache: Annotated[
-        bool, typer.Option("--no-cache", help="Compile FMUs anew, and keep nothing of what was compiled.")
+        bool, typer.Option("--no-cache", help="Compile FMUs anew, and keep no compiled code.")
     ] = False,
 ) -> None:
     if no_cache:
@@ -76,12 +76,12 @@ def _root(
 
 
 def _console(**options: Any) -> Console:
-    # titles and paths are the user's: they may hold what rich takes for markup
+    # titles and paths are the user's: they may hold text that rich takes for markup
     return Console(markup=False, highlight=False, **options)
 
 
 def _study_file(file: Path | None) -> Any:
-    """A study from its file; what looks like a slip of a unit is said before anything is run."""
+    """A study from its file; a value that looks like a slip of a unit is named before anything is run."""
     from . import config as configuration
 
     loaded = configuration.load(file)
@@ -103,7 +103,8 @@ def study(
         Backend | None, typer.Option("--backend", help="Of the FMUs; native where a C compiler is found.")
     ] = None,
     example: Annotated[
-        bool, typer.Option("--example", help="Print the packaged study file, to start one's own, and stop.")
+        bool,
+        typer.Option("--example", help="Print the packaged study file, as a start for your own, and stop."),
     ] = False,
 ) -> None:
     """Run the machine with its motor: start-up, steady running, one-sided overloads.
@@ -173,7 +174,7 @@ def _show_written(written: list[Path], console: Console) -> None:
 
 @contextmanager
 def _progress(begin: str, console: Console) -> Iterator[Callable[[str, float, float], None]]:
-    """A bar, and what to tell it: what is done, how much of it, of how much."""
+    """A progress bar; yields its report: the present task, how much of all is done, and all."""
     bar = Progress(
         TextColumn("{task.description}"),
         BarColumn(),
@@ -191,7 +192,7 @@ def _progress(begin: str, console: Console) -> Iterator[Callable[[str, float, fl
 
 
 def _clear(folder: Path, *names: str) -> None:
-    """Take away what an earlier run left."""
+    """Remove the files of an earlier run."""
     for stale in (folder / name for name in names):
         if stale.exists() and not stale.is_file():
             raise InputError(f"{stale}: is not a regular file; name another folder")
@@ -208,7 +209,9 @@ def driveline(
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path("driveline"),
     example: Annotated[
         bool,
-        typer.Option("--example", help="Print the packaged driveline file, to start one's own, and stop."),
+        typer.Option(
+            "--example", help="Print the packaged driveline file, as a start for your own, and stop."
+        ),
     ] = False,
 ) -> None:
     """A machine behind a cardan shaft: natural frequency, resonance and stability in rotation.
@@ -245,7 +248,7 @@ def knife(
     ] = None,
     example: Annotated[
         bool,
-        typer.Option("--example", help="Print the packaged knife file, to start one's own, and stop."),
+        typer.Option("--example", help="Print the packaged knife file, as a start for your own, and stop."),
     ] = False,
 ) -> None:
     """A paper cutter's knife drive with motor and flywheel: blade, reactions, cut, speed fluctuation.
@@ -275,8 +278,8 @@ def knife(
 
 
 def _stopped_early(failure: RunError, output: Path, errors: Console) -> None:
-    said = f"The run stopped early: {failure}. What was computed before is in {output}."
-    errors.print(printable(said, 2000), soft_wrap=True)
+    sentence = f"The run stopped early: {failure}. What was computed before is in {output}."
+    errors.print(printable(sentence, 2000), soft_wrap=True)
     raise typer.Exit(_status(failure))
 
 

@@ -1,4 +1,4 @@
-"""Study files: what they hold, and what must fit together in them; `reading` says how they are read."""
+"""Study files: their contents, and the values that must fit together; `reading` says how they are read."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ def load(file: Path | None = None) -> Config:
     Raises
     ------
     InputError
-        in one line: the file, the field, its value and what is allowed.
+        in one line: the file, the field, its value and the allowed range.
     """
     return read(file, example, parse)
 
@@ -165,7 +165,7 @@ def parse(text: str, source: str = "config") -> Config:
             unusual += tuple(slips(kinds, {"event": tables}))
         return _config(data, checked, events, source, unusual)
     except InputError as error:
-        # what does not fit together may be a slip of the unit
+        # values that do not fit together may be a slip of the unit
         hints = [f'was {slip.variable.name} = "{slip.meant}" meant?' for slip in unusual if slip.meant]
         raise type(error)("; ".join([str(error), *hints])) from error
 
@@ -268,7 +268,7 @@ def _taken_over(error: InputError, given: Mapping[str, float]) -> str:
 
 
 def _check_company(data: Mapping[str, Any]) -> None:
-    """Refuse what would be passed over in silence."""
+    """Refuse values that would be passed over in silence."""
     if "sizing" in data:
         for name in ("motor", "feed_forward"):
             if data.get(name):
@@ -370,7 +370,7 @@ LENGTHS = ("r", "l", "h", "c", "hy", "e", "l1", "l2", "z")
 
 
 def _over_example(data: Mapping[str, Any]) -> dict[str, Any]:
-    """A study file laid over the packaged example: what is not named is the example's. Its ratios give way to
+    """A study file laid over the packaged example: a value that is not named is the example's. Its ratios give way to
     lengths of the user's own."""
     base = toml(example())
     if any(name in data.get("machine", {}) for name in LENGTHS) and "ratios" not in data:

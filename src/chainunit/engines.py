@@ -59,7 +59,7 @@ def casadi_() -> SimpleNamespace:
 class Dual:
     """``v + d*epsilon``: a value with its derivative in one direction.
 
-    `v` and `d` are whatever the engine below computes with (floats, arrays, symbols). Values are computed in the same
+    `v` and `d` are the numbers of the engine below (floats, arrays, symbols). Values are computed in the same
     order as without duals, so that equal symbols are found to be equal.
     """
 

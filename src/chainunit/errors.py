@@ -9,7 +9,7 @@ from typing import Any
 
 
 class InputError(ValueError):
-    """A value given by the user is outside what is allowed; the message is one line."""
+    """A value of the user is outside its allowed range; the message is one line."""
 
 
 class GeometryError(InputError):

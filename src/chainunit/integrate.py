@@ -1,4 +1,4 @@
-"""The internal integrators of models with states in a co-simulation FMU, and what a time may be off there. Native
+"""The internal integrators of models with states in a co-simulation FMU, and the tolerances of times there. Native
 code has the same methods; its numbers are generated from these (`chainunit.fmu.native.generate.rules`).
 
 `rk4`, the classical Runge-Kutta method with equal steps: its cost is known beforehand, it needs no error control
@@ -35,7 +35,7 @@ MAX_STEPS = "solver.max_steps"
 
 
 SAME_TIME, ROUNDED, ADDED_UP = 1e-9, 4.0 * 2.0**-52, 1e6 * 2.0**-53
-"""What a time may be off: in parts of the step or the experiment, and by rounding in parts of the time itself.
+"""The tolerance of a time: in parts of the step or the experiment, and by rounding in parts of the time itself.
 Rounding is some units of its last place at a communication point, which the FMU takes over from the host, and half a
 unit for each of a million steps where a host adds up its steps to the stop time."""
 

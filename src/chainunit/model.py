@@ -1,4 +1,4 @@
-"""What a model is: declarations, and equations written for any engine `xp`.
+"""A model: declarations, and equations written for any engine `xp`.
 
 Standard library only: FMUs carry this file.
 """
@@ -19,12 +19,12 @@ from .quantities import Layout, bounded, violations
 
 @dataclass(frozen=True)
 class Requirement:
-    """What the parameters must meet beyond their own bounds: `subject` in `unit` lies strictly between two
+    """A condition on the parameters beyond their own bounds: `subject` in `unit` lies strictly between two
     limits that depend on the others.
 
-    `why` says what fails otherwise, with the parameters `given` named beside it; `depends` are further ones that the
-    limits come from; `remedy` what to do where no value fits. The words are declared once; the limits come from the
-    model's `requirements`.
+    `why` tells the consequence otherwise, with the parameters `given` named beside it; `depends` are further ones
+    that the limits come from; `remedy` what to do where no value fits. The words are declared once; the limits come
+    from the model's `requirements`.
     """
 
     subject: str
@@ -56,7 +56,7 @@ class Requirement:
 @dataclass(frozen=True)
 class Terminal:
     """Variables that connect as one. `members` maps the name that both sides know to the model's own; `flows` says
-    which of them flow, and whereto ("inflow", "outflow"); `kind` says what it may be connected with."""
+    which of them flow, and whereto ("inflow", "outflow"); `kind` tells its possible partners."""
 
     name: str
     kind: str
@@ -111,7 +111,7 @@ class Model:
     start_rounds: ClassVar[int] = 0
     """Rounds of that iteration."""
     start_required: ClassVar[tuple[Requirement, ...]] = ()
-    """What the states at the start must meet; see `start_limits`."""
+    """A condition on the states at the start; see `start_limits`."""
     controlled: ClassVar[bool] = False
     """Whether a co-simulation FMU integrates with control of the error, to `tolerance`, and closes the states by
     `closed` after each of its steps; else in equal steps."""
@@ -123,7 +123,7 @@ class Model:
     state_layout: ClassVar[Layout | None]
 
     def __init_subclass__(cls) -> None:
-        if not hasattr(cls, "Parameters"):  # what several models share
+        if not hasattr(cls, "Parameters"):  # a common base of several models
             return
         cls.parameter_layout = Layout(cls.Parameters)
         cls.input_layout = Layout(cls.Inputs)
@@ -137,12 +137,12 @@ class Model:
 
     @staticmethod
     def derive(xp: Any, p: Any) -> list[Any]:
-        """What is computed once from the fixed parameters; the equations find it as ``p.derived``."""
+        """Values computed once from the fixed parameters; the equations find them as ``p.derived``."""
         return []
 
     @classmethod
     def prepared(cls, xp: Any, p: Any, derived: list[Any] | None = None) -> Any:
-        """Parameters with what `derive` finds, or with those values of it."""
+        """Parameters with the values of `derive`, or with these values in their place."""
         if not cls.derived:
             return p
         ready = copy.copy(p)
@@ -157,7 +157,7 @@ class Model:
         Raises
         ------
         InputError
-            for a value outside its own bounds, in one line with what is allowed.
+            for a value outside its own bounds, in one line with the allowed range.
         GeometryError
             where a requirement is not met, in one line with the allowed range.
         """
@@ -228,7 +228,7 @@ class Model:
         Raises
         ------
         GeometryError
-            where they do not meet what is required, in one line.
+            where they do not meet a condition, in one line.
         """
         x = cls.start(MATH, p, u)
         cls._meets(p, cls.start_required, cls.start_limits(MATH, p, u, x))
@@ -236,7 +236,7 @@ class Model:
 
     @classmethod
     def start(cls, xp: Any, p: Any, u: Any, rounds: int | None = None) -> Any:
-        """States at the start with the inputs `u`; a few `rounds` show what they depend on."""
+        """States at the start with the inputs `u`; a few `rounds` show their dependencies."""
         z = cls.start_guess(xp, p, u)
         for _ in range(cls.start_rounds if rounds is None else rounds):
             z = cls.start_improved(xp, p, u, z)
@@ -264,7 +264,7 @@ class Model:
 
     @staticmethod
     def shared(xp: Any, p: Any, u: Any, x: Any) -> Any:
-        """What the parts have in common, computed once per point."""
+        """The common values of the parts, computed once per point."""
         return None
 
     @classmethod

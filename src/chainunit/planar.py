@@ -8,7 +8,7 @@ angle). A `Motion` holds a point and its first and second derivative *by q*, so 
     velocity = p1 * w,     acceleration = p1 * a + p2 * w**2,     w = dq/dt, a = dw/dt.
 
 Kinetics are then linear in `a` and quadratic in `w` by construction.
-Components are whatever the engine computes with: floats, arrays, symbols, dual numbers.
+Components are the numbers of the engine: floats, arrays, symbols, dual numbers.
 """
 
 from __future__ import annotations

@@ -54,14 +54,14 @@ class Start:
 
 @declaration
 class LoadInput:
-    """What loads a shaft."""
+    """The load of a shaft."""
 
     load: LoadPort = group(LoadPort, "load", default=NO_LOAD)
 
 
 @declaration
 class LoadState:
-    """What a shaft has given to its load."""
+    """The energy that a shaft has given to its load."""
 
     load_energy: Value = quantity("J", "energy given to the load since the start", nominal=1000.0)
 

@@ -148,7 +148,7 @@ USUAL: dict[str, tuple[float, float]] = {"m": (1e-4, 30.0), "kg": (1e-3, 2e4), "
 """Sizes that machines of this kind have, by unit, where a declaration names none of its own; 0 is always one."""
 
 ROUNDING = 1e-9
-"""in parts of a quantity's nominal size: what is beyond a bound by no more counts as the bound"""
+"""in parts of a quantity's nominal size: a value beyond a bound by no more counts as the bound"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,7 +184,7 @@ class Quantity:
 
     @property
     def slack(self) -> float:
-        """How far beyond a bound a value counts as the bound: what rounding makes of the typical size."""
+        """How far beyond a bound a value counts as the bound: the rounding of its typical size."""
         return ROUNDING * (self.nominal or 1.0)
 
     def admits(self, x: float) -> bool:
@@ -198,7 +198,7 @@ class Quantity:
 
 
 Value: TypeAlias = Any
-"""What a declared scalar holds: a float, an array, a symbol or a dual number."""
+"""The number of a declared scalar: a float, an array, a symbol or a dual number."""
 
 
 def quantity(
@@ -215,8 +215,8 @@ def quantity(
     kind: str = "",
 ) -> Any:
     """A field that declares one scalar; `default` is its start value (outputs have none), `above` a
-    lower bound that is itself forbidden. Without `max`, what has a lower bound has the upper one of `MOST`; without
-    `usual`, its sizes are those of `USUAL`. `kind` says how people show it (see `chainunit.text`)."""
+    lower bound that is itself forbidden. Without `max`, a quantity with a lower bound has the upper one of `MOST`;
+    without `usual`, its sizes are those of `USUAL`. `kind` says how people show it (see `chainunit.text`)."""
     base_units(unit)
     low = min if above is None else above
     high = MOST.get(unit, math.inf) if math.isinf(max) and math.isfinite(low) else max
@@ -361,7 +361,7 @@ def _build(plan: tuple[type, list[tuple[str, Any]]], values: Any) -> Any:
 
 
 def violations(layout: Layout, instance: Any) -> Iterator[str]:
-    """One line for each value of `instance` outside its bounds: name, value, what is allowed."""
+    """One line for each value of `instance` outside its bounds: name, value, allowed range."""
     for variable, x in zip(layout.variables, layout.values(instance), strict=True):
         if not variable.quantity.admits(x):
             yield complaint(variable, x)

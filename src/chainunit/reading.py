@@ -1,7 +1,7 @@
 """TOML tables read by declarations, through pydantic models that are generated from them.
 
 A number is in the declared SI unit; a text may carry a unit ("150 mm", "30 rev/min", "20 degC") and is
-converted. Every refusal is one line that names the field, its value and what is allowed.
+converted. Every refusal is one line that names the field, its value and the allowed range.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def to_number(variable: Variable, given: Any) -> float:
     Raises
     ------
     ValueError
-        for what is no number, a unit of another kind, or a value out of bounds.
+        for a text that is no number, a unit of another kind, or a value out of bounds.
     """
     if isinstance(given, bool) or not isinstance(given, int | float | str):
         raise ValueError(f"{variable.name} = {shown(given)}: must be {_kind(variable)}")
@@ -122,7 +122,7 @@ _TAKEN_FOR = {
 
 @dataclass(frozen=True)
 class Slip:
-    """A value that no machine of this kind has: likely a slip of the unit. `meant` is what was probably meant, as a
+    """A value that no machine of this kind has: likely a slip of the unit. `meant` is the probable value, as a
     study file takes it, or empty."""
 
     variable: Variable
@@ -153,7 +153,7 @@ class Slip:
 
 
 def slips(declared: Mapping[str, type], data: Mapping[str, Any]) -> Iterator[Slip]:
-    """The unusual values among what the sections of a checked file give, `declared` by the name of the section."""
+    """The unusual values in the sections of a checked file, `declared` by the name of the section."""
     for section, of in declared.items():
         for variable in variables(of, f"{section}."):
             given: Any = data
@@ -238,7 +238,7 @@ def first_line(error: ValidationError, file: type[BaseModel], prefix: str = "") 
 
 
 def merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """The table `over` laid over `base`: what it does not name is the base's."""
+    """The table `over` laid over `base`: a value that it does not name is the base's."""
     result = dict(base)
     for name, value in over.items():
         below = result.get(name)
@@ -278,7 +278,7 @@ def toml(text: str) -> dict[str, Any]:
 
 
 def read(file: Path | None, example: Callable[[], str], parse: Callable[[str, str], T]) -> T:
-    """What `parse` makes of the text of a file and its name; without a file, of the packaged `example`.
+    """The result of `parse` for the text of a file and its name; without a file, of the packaged `example`.
 
     Raises
     ------

@@ -4,7 +4,7 @@ Kinds, beside the unit (see `quantities.quantity`):
 
 ``percent``      a share, shown in %
 ``dip``          the share of a speed that is lost: where all or more is lost, the shaft stands or turns back
-``used``         how much of what is permitted, in % up to ten times of it
+``used``         the share of a limit that is used, in % up to ten times of it
 ``difference``   of temperatures: it stays in K
 ``speed``        of a shaft, in rad/s and rev/min
 ``frequency``    an angular one, in rad/s and Hz
@@ -27,11 +27,11 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _THIN = "\u202f"  # between thousands
 _SPACE = "\u00a0"  # before a unit
 _PERCENT = 10.0
-"""Up to there a share is shown in %, beyond as "over 1000 %", or what is used as so many times of it."""
+"""Up to there a share is shown in %, beyond as "over 1000 %", or a used share as so many times of it."""
 _NOTHING = 5e-5
 """A share below that is none."""
 _TIMES = 1000.0
-"""Beyond, what is used is "over 1000 times" of what is permitted: its size says nothing any more."""
+"""Beyond, a used share is "over 1000 times" the limit: its size says nothing any more."""
 _SHARES = ("percent", "dip", "used")
 
 Units: TypeAlias = Mapping[str, tuple[str, ...]]

@@ -73,7 +73,7 @@ def hooke(xp: Any, bend: Any, angle: Any) -> tuple[Any, Any, Any]:
     """A Hooke joint: angle of the driven yoke [rad], ratio and its derivative by the driving angle.
 
     `angle` is that of the driving yoke's pin from the plane of the two shafts. tan(driven) = tan(angle)/cos(bend), on
-    the branch that stays within half a right angle of `angle`; without a jump, whatever the angle.
+    the branch that stays within half a right angle of `angle`; without a jump, at any angle.
     """
     s, c, k = xp.sin(angle), xp.cos(angle), xp.cos(bend)
     below = k + (1.0 - k) * s * s  # = s^2 + k c^2

@@ -82,7 +82,7 @@ def catalogue(extra: Path | None = None) -> list[CatalogueMotor]:
     Raises
     ------
     InputError
-        in one line: the file, the row, the field, its value and what is allowed.
+        in one line: the file, the row, the field, its value and the allowed range.
     """
     motors = list(_packaged())
     if extra is not None:

@@ -47,7 +47,7 @@ class Armature:
 
 @declaration
 class Limit:
-    """What the converter can give."""
+    """The limits of the converter."""
 
     i: Value = quantity("A", "largest armature current", default=4.4, above=0.0, tunable=True)
     v: Value = quantity("V", "largest armature voltage", default=240.0, above=0.0, tunable=True)
@@ -81,7 +81,7 @@ class Parameters(MotorParameters):
 
 @declaration
 class Inputs(LoadInput):
-    """The load and what is asked of the motor."""
+    """The load and the references of the motor."""
 
     w_ref: Value = quantity("rad/s", "speed reference", default=0.0)
     tau_ff: Value = quantity("N.m", "torque that the speed control is told of beforehand", default=0.0)
@@ -113,7 +113,7 @@ class States(ShaftStates):
 
 @declaration
 class Outputs(MotorOutputs):
-    """What follows from the states."""
+    """Quantities that follow from the states."""
 
     i_ref: Value = quantity("A", "current reference after the limit")
     v: Value = quantity("V", "armature voltage", nominal=100.0)
@@ -179,14 +179,14 @@ class DcMotor(Motor):
 
     @staticmethod
     def limit(xp: Any, p: Any, w: Any, T: float = T_RATED) -> Any:
-        """By the current limit, or what the voltage leaves with the winding at `T` [K], cold where left out."""
+        """By the current limit, or by the voltage with the winding at `T` [K], cold where left out."""
         arm = p.armature
         R = arm.R * (1.0 + arm.alpha * (T - T_RATED))
         return arm.k * xp.minimum(p.limit.i, (p.limit.v - arm.k * w) / R)
 
     @staticmethod
     def largest_torque(p: Any, T: float, *at: float) -> float:
-        """By the current limit, or what the voltage leaves at this speed."""
+        """By the current limit, or by the voltage at this speed."""
         (w,) = at
         return float(DcMotor.limit(MATH, p, w, T))
 

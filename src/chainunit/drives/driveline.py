@@ -42,7 +42,7 @@ W_SMALL = 0.1
 
 @declaration
 class Mounted(ShaftLine):
-    """A line with what turns on its driven side, as it is mounted."""
+    """A line with the inertia on its driven side, as it is mounted."""
 
     J4: Value = quantity("kg.m2", "inertia on shaft 3, beside the machine's", default=0.5, above=0.0)
     gamma1: Value = quantity(
@@ -88,7 +88,7 @@ class States(LoadState):
 
 @declaration
 class Driven:
-    """What follows from the states, at the driven shaft."""
+    """Quantities that follow from the states, at the driven shaft."""
 
     a: Value = quantity("rad/s2", "acceleration", nominal=100.0)
     tau: Value = quantity("N.m", "torque given to the load")

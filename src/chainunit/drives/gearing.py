@@ -43,7 +43,7 @@ def motor_side(xp: Any, t: Transmission, torque: Any, w: Any) -> Any:
     """Torque at the motor's shaft [N m] for the torque `torque` that the machine takes at the output, at the
     speed `w` of the motor [rad/s], without the torque that speeds up `t.J`.
 
-    The teeth or the belt lose a share of the torque, in whatever direction the power flows:
+    The teeth or the belt lose a share of the torque, in either direction of the power:
 
         tau = (torque + (1/efficiency - 1) |torque| sign(w))/ratio + d w
 

@@ -188,7 +188,7 @@ class States(ShaftStates):
 
 @declaration
 class Outputs(MotorOutputs):
-    """What follows from the states."""
+    """Quantities that follow from the states."""
 
     i: Value = quantity("A", "current of a phase, RMS")
     v: Value = quantity("V", "line-to-line voltage, RMS", nominal=100.0)
@@ -220,8 +220,8 @@ def volts_per_hertz(xp: Any, p: Any, f: Any) -> Any:
 
 
 class Steady(NamedTuple):
-    """Steady running at one speed. What is also an output of the model has its name and unit; `psi` and `psi_r` are
-    the states."""
+    """Steady running at one speed. A value that is also an output of the model has its name and unit; `psi` and
+    `psi_r` are the states."""
 
     air_gap_tau: Any
     tau: Any
@@ -423,7 +423,7 @@ class InductionMotor(Motor):
 
     @staticmethod
     def limit(xp: Any, p: Any, w: Any) -> Any:
-        """On the line what a cold motor gives at this speed; on an inverter the most that any frequency gives, to
+        """On the line the torque of a cold motor at this speed; on an inverter the largest at any frequency, to
         about 1 % (the inverter's own current limit is not in the model)."""
         on_line = steady(xp, p, w).air_gap_tau
         most = on_line * 0.0

@@ -1,4 +1,4 @@
-"""What every electric motor shares."""
+"""The common parts of all electric motors."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class ShaftStates(LoadState):
 
 @declaration
 class MotorOutputs:
-    """What every motor shows beside its states."""
+    """The common outputs of motors beside their states."""
 
     a: Value = quantity("rad/s2", "rotor acceleration", nominal=100.0)
     tau: Value = quantity("N.m", "torque given to the load at the shaft")

@@ -169,7 +169,7 @@ def check(nameplate: Nameplate, assumptions: Assumptions = TYPICAL) -> None:
     Raises
     ------
     InputError
-        in one line: the quantity, its value, what is allowed.
+        in one line: the quantity, its value, the allowed range.
     """
     for line in (*violations(LAYOUT, nameplate), *violations(Layout(Assumptions), assumptions)):
         raise InputError(line)

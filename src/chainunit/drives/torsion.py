@@ -145,7 +145,7 @@ class SteadyMotion(NamedTuple):
     frequency: Any
     """of the damped torsional vibration [rad/s], (n,): the branch next to k at i23 = 1"""
     free_growth: Any
-    """the same with constant torques, of whatever grows fastest but the shift along the orbit [1/s], (n,)"""
+    """the same with constant torques, of the fastest growth but the shift along the orbit [1/s], (n,)"""
     monodromy: Any
     """of phi1, w1, phi4, w4 over half a turn, free, (4, 4, n)"""
 

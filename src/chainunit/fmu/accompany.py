@@ -1,4 +1,4 @@
-"""What an FMU carries beside its model: documentation, licences, icon and terminals, reference results.
+"""The files of an FMU beside its model: documentation, licences, icon and terminals, reference results.
 
 Reference results are those of a Co-Simulation master that holds its inputs over a step, from the Python kernels; and
 they are written twice, as masters differ in when they read. They lie in the folder of the layered standard FMI-LS-REF

@@ -38,7 +38,7 @@ class Bar(NamedTuple):
 
 
 Load = tuple[Vec2, Any]
-"""What acts on a link: force [N], and moment about the link's pin [N m]."""
+"""The action on a link: force [N], and moment about the link's pin [N m]."""
 
 UNLOADED: Load = (ZERO, 0.0)
 

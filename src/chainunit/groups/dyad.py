@@ -22,7 +22,7 @@ from .group import Group, SolvedGroup, Third
 class Dyad(Group):
     """A dyad as data: two bars whose pins move in a known way, and the inner pin at the ends of both. `side` is +1
     where the inner pin lies to the left of the ray from the first bar's pin to the second one's, -1 where to the
-    right. Of two links in the inner pin the second one carries what else hangs on it."""
+    right. Of two links in the inner pin the second one carries all else that hangs on it."""
 
     inner: str
     first: Bar

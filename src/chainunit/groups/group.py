@@ -44,7 +44,7 @@ class Group:
 
     @property
     def pins(self) -> dict[str, str]:
-        """Pins that it adds, each with the link that carries what else hangs on it."""
+        """Pins that it adds, each with the link that carries all else that hangs on it."""
         raise NotImplementedError
 
     @property

@@ -1,4 +1,4 @@
-"""Loads of a linkage: weight, what resists the motion of a point, a stop, the losses of the pins.
+"""Loads of a linkage: weight, resistance to the motion of a point, a stop, the losses of the pins.
 
 Each has declared parameters or inputs, and answers one question by `effect`: the forces on links, the torque at the
 coordinate that overcomes them by virtual work, and the energy that is held. A force that does not only depend on the
@@ -45,7 +45,7 @@ _TINY = 1e-60
 
 
 class Wrench(NamedTuple):
-    """What a load does to a link: force [N], and moment about the link's pin [N m]."""
+    """The effect of a load on a link: force [N], and moment about the link's pin [N m]."""
 
     link: str
     force: Vec2
@@ -102,7 +102,7 @@ class Weight(NamedTuple):
 
 
 class Push(NamedTuple):
-    """A force on a point [N], whatever its motion; its power counts as lost."""
+    """A force on a point [N], independent of its motion; its power counts as lost."""
 
     point: str
     force: Vec2
@@ -200,7 +200,8 @@ class Stop:
 
 
 class Block(NamedTuple):
-    """What blocks a link (`Stop`), whose angle counts from the downward vertical and never reaches the horizontal."""
+    """The obstacle of a link (`Stop`), whose angle counts from the downward vertical and never reaches the
+    horizontal."""
 
     link: str
     stop: Any

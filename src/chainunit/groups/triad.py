@@ -17,8 +17,8 @@ and a mode is followed from one position to the next by `corrected`.
 In a linkage with one crank the pose is a smooth periodic function of the crank angle: it is followed once around,
 from the mode that `Triad.assembly` leads to at q = 0, and kept as a Fourier series (`Triad.derive`). At any angle the
 series gives a pose that is nearly right, and Newton's method makes it exact. So the pose depends on the crank angle
-alone, whatever the step or the history; the branch cannot jump, and parameters with which it ends within the turn
-are refused (`requirements`).
+alone, independent of the step and the history; the branch cannot jump, and parameters with which it ends within the
+turn are refused (`requirements`).
 """
 
 from __future__ import annotations

@@ -40,12 +40,12 @@ class ChainUnit:
     Angles and speeds are the motor's, as at the FMU; with ``ratio`` 1 they are the crank's.
     Every argument may be a float or an array; shapes broadcast, and outputs have the common shape. A value that
     is not finite, or a load outside its declared bounds, is an `InputError` that names it, in an array as well as
-    alone; what is beyond a bound by rounding only counts as the bound.
+    alone; a value beyond a bound by rounding only counts as the bound.
 
     Parameters
     ----------
     parameters : Parameters, or names of `ChamberForces` parameters with their values (SI), e.g.
-        ``{"r": 0.2, "crank.m": 35.0}``; what is not named is the packaged machine's.
+        ``{"r": 0.2, "crank.m": 35.0}``; a value that is not named is the packaged machine's.
     **values : the same for names without a dot.
 
     Raises
@@ -218,7 +218,7 @@ class ChainUnit:
         self, psi: Any, w: Any = 0.0, a: Any = 0.0, left: SideLoads = EMPTY, right: SideLoads = EMPTY
     ) -> Chamber:
         """Loads of the organs at a rocker angle `psi` [rad] (speed `w`, acceleration `a` of the
-        rocker), whatever drives it: the papers' statics at +-12 degrees, beyond this drive's swing.
+        rocker), independent of the drive: the papers' statics at +-12 degrees, beyond this drive's swing.
 
         Where a side cannot be assembled an array of angles has NaN in the loads of that side and in those of the
         rocker: a sweep may pass the limit.
@@ -376,9 +376,12 @@ _STOP_NAMES = Layout(Stop).names
 
 
 def _admitted(variable: Variable, given: Any) -> Any:
-    """A float or an array whose every value the declaration admits, what is beyond a bound by rounding on it."""
+    """A float or an array whose every value the declaration admits; a value beyond a bound by rounding is set on
+    it."""
     q, x = variable.quantity, _array(given)
-    for extreme in (np.min(x), np.max(x)) if np.size(x) else ():  # NaN is the extreme of what it is in
+    for extreme in (
+        (np.min(x), np.max(x)) if np.size(x) else ()
+    ):  # NaN is the extreme of any array that holds it
         if not q.admits(float(extreme)):
             raise InputError(complaint(variable, float(extreme)))
     return q.bounded(x) if isinstance(x, float) else np.clip(x, q.low, q.high)

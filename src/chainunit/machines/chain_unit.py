@@ -117,7 +117,7 @@ class Parameters:
 
 @declaration
 class SideLoads:
-    """What the material does to one organ."""
+    """The material on one organ."""
 
     material_mass: Value = quantity("kg", "material that lies on the organ", default=30.0, min=0.0)
     processing_force: Value = quantity(
@@ -160,7 +160,7 @@ class Side:
 
 @declaration
 class RockerLoad:
-    """What both organs ask of the rocker."""
+    """The loads of both organs on the rocker."""
 
     tau: Value = quantity(
         "N.m", "torque along psi that the drive must apply to the rocker to carry both organs", nominal=100.0
@@ -200,7 +200,7 @@ class Frame(Force):
 
 @declaration
 class Loads:
-    """Motion of the rocker, and what every part of the machine carries."""
+    """Motion of the rocker, and the forces on every part of the machine."""
 
     rocker: Rocker = group(Rocker, "rocker")
     left: Side = group(Side, "left organ")
@@ -335,8 +335,8 @@ def rocker_load(p: Any, left: Side, right: Side, at_a2: Any = 0.0) -> dict[str, 
 
 
 def chamber(xp: Any, p: Any, u: Any, psi: Any, psi_w: Any, psi_a: Any) -> Chamber:
-    """Both organs on a rocker at angle `psi` with speed `psi_w` and acceleration `psi_a`, whatever drives it: the
-    rocker is the crank of this linkage, whose angle from the upward vertical falls as psi rises."""
+    """Both organs on a rocker at angle `psi` with speed `psi_w` and acceleration `psi_a`, independent of the drive:
+    the rocker is the crank of this linkage, whose angle from the upward vertical falls as psi rises."""
     linkage = Linkage(
         {"C": ZERO, **supports(p)},
         Crank(Bar("rocker", "C", p.e), "A2"),

@@ -2,7 +2,7 @@
 
 `r` crank, `l` coupler, `h` rocker, `b` frame O1-C; ``rho = r/l``, ``lam = h/l`` (paper 001). Angles in radians.
 `b` is free: the papers' frame, with crank and rocker parallel at the start, has b^2 = l^2 - r^2 + h^2
-(`parallel_frame`). It is the frame in which both strokes take the same time, whatever rho and lam: at the
+(`parallel_frame`). It is the frame in which both strokes take the same time, for any rho and lam: at the
 extremes the rocker's end lies at l + r and l - r from O1 on its circle about C, and b^2 - h^2 = (l + r)(l - r)
 says that these two points lie on one line through O1 (the power of the point O1). The crank then turns by half
 a revolution between them, and K = 1.

@@ -1,9 +1,9 @@
 """Statics of a hanging chain between two pins: N rods, and the catenary that they tend to.
 
 Frame x right, y up. `p` is the force on the chain at A1 from the support; going along the chain the force that a
-piece receives from what lies before it is p less the weight of that, and a rod lies along the mean of the forces at
-its ends: u = -m/|m|, m = p - (0, weight before its middle). So two unknowns are left. The length of the way from A1
-to A2 is the gradient of a convex function of p,
+piece receives from the part before it is p less the weight of that part, and a rod lies along the mean of the
+forces at its ends: u = -m/|m|, m = p - (0, weight before its middle). So two unknowns are left. The length of the
+way from A1 to A2 is the gradient of a convex function of p,
 
     d/dp sum of l |m(p)| = -(A2 - A1),
 
@@ -11,7 +11,7 @@ whose minimum is unique where the chain is longer than the distance: the hanging
 has the integral of |p - (0, w s)| along it in place of l |m|: the catenary, piece by piece, in closed form.
 
 A trust-region method finds it, as near a crossing of m = 0, where a rod would turn over, plain steps of Newton's
-method fail; those polish what it found.
+method fail; those polish its result.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ _POLISH = 30
 
 @dataclass(frozen=True)
 class Hanging:
-    """A chain at rest. Forces [N], shape (2,): `first` on it at A1 from the support, `last` at A2 from what holds it
-    there; `theta` the angles of the rods from the downward vertical, positive towards +x [rad], shape (N,), empty for
-    a catenary; `pull` the mean pull in each rod [N], the least one of a catenary."""
+    """A chain at rest. Forces [N], shape (2,): `first` on it at A1 from the support, `last` at A2 from the part
+    that holds it there; `theta` the angles of the rods from the downward vertical, positive towards +x [rad], shape
+    (N,), empty for a catenary; `pull` the mean pull in each rod [N], the least one of a catenary."""
 
     first: Any
     last: Any

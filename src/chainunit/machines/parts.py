@@ -1,4 +1,4 @@
-"""What machines declare alike: links as bodies, forces."""
+"""The common declarations of machines: links as bodies, forces."""
 
 from __future__ import annotations
 

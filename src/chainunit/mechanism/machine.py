@@ -5,7 +5,7 @@ point load on the link that carries its pin. All reactions are
 
     R = R0(q) + R1(q) a + R2(q) w^2 + loads,
 
-so that one pass gives them at constant speed, one by the acceleration, and one, with the slopes of what acts, by the
+so that one pass gives them at constant speed, one by the acceleration, and one, with the slopes of the loads, by the
 speed. By the angle the passes run in dual numbers whose parts are known from the motion; the third derivatives alone
 are new.
 """
@@ -89,7 +89,7 @@ class Mechanism:
         return thirds
 
     def turning(self, reactions: Mapping[Joint, Vec2]) -> Iterator[Wrench]:
-        """What the reactions add to the moments on the links as their arms turn with q."""
+        """The part of the reactions in the moments on the links as their arms turn with q."""
         for _, connections in self._groups:
             for joint, carrier, _ in connections.joints:
                 (pin, name), force = joint, reactions[joint]
@@ -136,7 +136,7 @@ class Mechanism:
         return torque, reactions
 
     def acting(self, at: Callable[[str, Body], Load], wrenches: Iterable[Wrench]) -> dict[str, Load]:
-        """What acts on each link: of its body by `at`, from the name of the link and the body, and of the loads."""
+        """The action on each link: of its body by `at`, from the name of the link and the body, and of the loads."""
         loads = {name: at(name, body) for name, body in self.bodies.items()}
         for link, force, moment in wrenches:
             before, moment0 = loads.get(link, UNLOADED)
@@ -166,7 +166,7 @@ def _pins(xp: Any, linkage: Linkage, derived: Sequence[Any], q: float) -> dict[s
 
 
 def derived_numbers(xp: Any, linkage: Linkage) -> list[Any]:
-    """What the groups derive from the lengths, once before a run."""
+    """Values that the groups derive from the lengths, once before a run."""
     numbers: list[Any] = []
     for k, group in enumerate(linkage.groups):
         numbers += group.derive(xp, partial(_pins, xp, linkage.before(k), tuple(numbers)))

@@ -43,7 +43,7 @@ class LinkageModel(Model):
 
     @classmethod
     def derive(cls, xp: Any, p: Any) -> list[Any]:
-        """What the groups derive from the lengths."""
+        """Values that the groups derive from the lengths."""
         return derived_numbers(xp, cls.linkage(p, cls.Inputs()))
 
     @classmethod
@@ -110,7 +110,7 @@ def slopes(xp: Any, p: Any, u: Any, x: Any, s: MachineState) -> PortSlopes:
 
 @declaration
 class AddedInertia:
-    """What is on the shaft of a machine that turns by itself."""
+    """The inertia on the shaft of a machine that turns by itself."""
 
     J_added: Value = quantity(
         "kg.m2", "inertia on the motor shaft beside the machine's", default=0.0, min=0.0, tunable=True
@@ -134,7 +134,7 @@ class DrivingTorque:
 
 @declaration
 class Turning:
-    """Acceleration, and what the shaft feels."""
+    """Acceleration, and the torque on the shaft."""
 
     a: Value = quantity("rad/s2", "motor acceleration", nominal=100.0)
     tau_bias: Value = quantity("N.m", "torque needed at constant speed of the shaft", nominal=100.0)

@@ -1,4 +1,4 @@
-"""What a report consists of. A study is told in these blocks; renderers know nothing but them.
+"""The blocks of a report. A study is told in them; renderers know nothing but them.
 
 A block, a row or a column is in the ``short`` form of a report (the terminal), the ``long`` one (page and Markdown),
 or in both.
@@ -24,7 +24,7 @@ Origin = Literal["", "file", "example", "tuned", "sizing", "default"]
 
 @dataclass(frozen=True)
 class Text:
-    """A paragraph; a lead comes before what it explains, a note after it."""
+    """A paragraph; a lead comes before the block that it explains, a note after it."""
 
     line: Line
     role: Literal["plain", "lead", "note", "fine"] = "plain"

@@ -1,4 +1,4 @@
-"""The organs as chains at constant crank speed: what they ask beside two bars, and which speeds to avoid.
+"""The organs as chains at constant crank speed: their torques beside two bars, and the speeds to avoid.
 
 Above a certain speed the motion is chaotic: no single peak is a prediction. At each speed several starts, the crank
 at other angles, are followed over many turns; of the peak of each turn medians and quantiles over all turns of all
@@ -114,7 +114,7 @@ class Band:
 
 @dataclass(frozen=True)
 class ChainResult:
-    """The study's own speed, the sweep in rising order, and what follows from it."""
+    """The study's own speed, the sweep in rising order, and its conclusions."""
 
     own: SpeedNumbers
     sweep: tuple[SpeedNumbers, ...]
@@ -151,7 +151,7 @@ class ChainResult:
         return kept
 
     def rod_name(self, k: int) -> str:
-        """What rod `k`, counted from 0 at A1, is called."""
+        """The name of rod `k`, counted from 0 at A1."""
         wall, _ = self.rods
         return f"wall {k + 1}" if k < wall else f"web {k - wall + 1}"
 
@@ -278,7 +278,7 @@ def run_turns(
 
 def duty(fmu: Fmu, drive: Drive, crank_speed: float, left: SideLoads, right: SideLoads) -> Cycle:
     """The machine with chains over all turns of all starts, of shape (turns, points), where `cycle` gives the one
-    turn of two bars: what sizing begins with."""
+    turn of two bars: the begin of sizing."""
     chain = drive.chain
     found = run_turns(
         fmu, drive, crank_speed, left, right, ("tau", "J"), starts=int(chain.starts), turns=int(chain.turns)
@@ -419,7 +419,7 @@ def study_chain(
             critical += [(mode, order, float(frequency) / order) for order in (1, 2)]
     speeds = np.linspace(chain.sweep_lowest, chain.sweep_highest, int(chain.sweep_points)).tolist()
     if speeds:
-        # the resonance itself, whatever the grid
+        # the resonance itself, beside the grid
         speeds += [w for _, _, w in critical[:1] if chain.sweep_lowest < w < chain.sweep_highest]
     spacing = (chain.sweep_highest - chain.sweep_lowest) / max(1, len(speeds) - 2)
     others = sorted({w for w in speeds if abs(w - own) > 1e-9 * own})
@@ -434,7 +434,7 @@ def study_chain(
             told(0.0)
             return numbers_at(fmu, drive, config, w, told, stopped)
 
-        # first what the study asks, so that an early end costs the sweep alone
+        # first the study's own speed, so that an early end costs the sweep alone
         mine, by_rod = at(0, own)
         rows = [mine]
         for k, w in enumerate(others, 1):

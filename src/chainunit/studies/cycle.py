@@ -1,4 +1,4 @@
-"""One crank turn at constant speed: what the mechanism asks of the drive, by inverse dynamics."""
+"""One crank turn at constant speed: the torque that the mechanism takes, by inverse dynamics."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def cycle(
 
 
 def all_on_one(side: SideName, left: SideLoads, right: SideLoads) -> tuple[SideLoads, SideLoads]:
-    """Loads of the left and of the right organ where that of `side` has what both carry."""
+    """Loads of the left and of the right organ where that of `side` has the load of both."""
     whole = SideLoads(
         material_mass=left.material_mass + right.material_mass,
         processing_force=left.processing_force + right.processing_force,
@@ -79,7 +79,7 @@ class OverloadFactors:
 
 
 def factors_for(factors: Mapping[SideName, OverloadFactors]) -> dict[str, str]:
-    """What each overload factor is for, by its name; of the first, which feed sizes the drive."""
+    """The use of each overload factor, by its name; of the first, the feed that sizes the drive."""
     side = max(factors, key=lambda name: factors[name].feed_crank_torque)
     feed = f"all on the {side}" if factors[side].feed_crank_torque > 1.0 else "on both sides"
     return {
@@ -96,7 +96,7 @@ def overload_factors(
 ) -> OverloadFactors:
     """The overload factors of the machine on its `side` against both.
 
-    What one-sided feed asks are the first two: ratios of cycle maxima at `crank_speed`, all feed on that side to feed
+    The first two are for one-sided feed: ratios of cycle maxima at `crank_speed`, all feed on that side to feed
     on both, with both organs in place. The others are of a machine with its organ of `side` alone, as the papers'.
 
     `static_at_extreme` is, of the left organ, the papers' R_left/(R_left - R_right) at the right extreme of the

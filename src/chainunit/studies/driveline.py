@@ -78,7 +78,7 @@ def load(file: Path | None = None) -> DrivelineConfig:
     Raises
     ------
     InputError
-        in one line: the file, the field, its value and what is allowed.
+        in one line: the file, the field, its value and the allowed range.
     """
     return read(file, example, parse)
 
@@ -89,8 +89,8 @@ def example() -> str:
 
 
 def _over_example(data: Mapping[str, Any]) -> dict[str, Any]:
-    """A driveline file laid over the packaged example: what is not named is the example's. Its shafts and its damping
-    give way whole to the user's own."""
+    """A driveline file laid over the packaged example: a value that is not named is the example's. Its shafts and
+    its damping give way whole to the user's own."""
     base = toml(example())
     base["title"] = ""
     mine = data.get("driveline", {})

@@ -1,4 +1,4 @@
-"""What a machine asks of any drive: turns at constant speed, and the inertia that evens the speed.
+"""The duty of any drive of a machine: turns at constant speed, and the inertia that evens the speed.
 
 The turns are by inverse dynamics, of chains by their FMU."""
 
@@ -34,7 +34,7 @@ def rms(*parts: tuple[float, Any]) -> float:
 def flywheel(torque: Any, speed: float, fluctuation: float) -> float:
     """Inertia [kg m2] on the shaft that keeps (largest - least)/mean of its speed at `fluctuation`.
 
-    `torque` [N m] is what the shaft needs over a turn at constant `speed` [rad/s], evenly spaced in angle, shape
+    `torque` [N m] is that of the shaft over a turn at constant `speed` [rad/s], evenly spaced in angle, shape
     (n,), against a drive that gives its mean: J = (E_max - E_min)/(fluctuation w^2), with E the energy that runs
     ahead of the mean (Wittenbauer's method with the torque at constant speed).
     """
@@ -45,7 +45,7 @@ def flywheel(torque: Any, speed: float, fluctuation: float) -> float:
 
 @declaration
 class CycleNumbers:
-    """What the machine asks over a turn at constant crank speed; at the crank."""
+    """The torque of a machine over a turn at constant crank speed; at the crank."""
 
     power_mean: Value = quantity("W", "mean power")
     torque_mean: Value = quantity("N.m", "mean torque, both sides loaded")
@@ -63,7 +63,7 @@ class CycleNumbers:
 
 @dataclass(frozen=True)
 class Duty:
-    """What the machine asks of any drive, at constant speed of the crank: the turn with both sides loaded, those with
+    """The duty of any drive, at constant speed of the crank: the turn with both sides loaded, those with
     all feed on one side, and which of these asks the larger RMS torque with two bars, as the rocker swings farther to
     one side than to the other; with chains of many turns."""
 

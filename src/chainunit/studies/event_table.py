@@ -37,7 +37,7 @@ def read_events(tables: Sequence[Any]) -> dict[str, Event]:
     Raises
     ------
     InputError
-        in one line that names the event, the key, its value and what is allowed.
+        in one line that names the event, the key, its value and the allowed range.
     """
     events: dict[str, Event] = {}
     for k, table in enumerate(tables, 1):

@@ -1,4 +1,4 @@
-"""What needs no co-simulation: turns at constant speed, overload factors, and where the model ends."""
+"""Results without co-simulation: turns at constant speed, overload factors, and where the model ends."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class DriveStatics:
-    """What is known of a machine and its drive before they run."""
+    """Results on a machine and its drive before they run."""
 
     cycles: dict[str, Cycle]
     """turns at constant speed, by how the organs are loaded"""

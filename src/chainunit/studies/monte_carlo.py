@@ -58,7 +58,7 @@ class Sample:
 
 
 def _row_form() -> type[BaseModel]:
-    """The form of a row, from the declaration of a sample. What a run that failed does not have is null; so is the
+    """The form of a row, from the declaration of a sample. A number that a failed run lacks is null; so is the
     trip torque without a coupling."""
     number = float | None
     fields: dict[str, Any] = {v.name: (number, Field(allow_inf_nan=False)) for v in Layout(Sample).variables}
@@ -92,7 +92,7 @@ class Task:
         return Rig(self.config, self.drive, self.files)
 
     def digest(self) -> str:
-        """Name of what the results depend on: every parameter, and the content of the FMUs."""
+        """Name of all that the results depend on: every parameter, and the content of the FMUs."""
         config, drive = self.config, self.drive
         relevant = {
             "chainunit": __version__,
@@ -147,7 +147,7 @@ def _prepared(task: Task, digest: str) -> CoSimulation:
 
 @dataclass(frozen=True)
 class Draw:
-    """What is left to chance in one run."""
+    """The random quantities of one run."""
 
     event: Event
     values: dict[str, float]
@@ -159,7 +159,7 @@ class Draw:
 
 
 def draw(config: Config, number: int) -> Draw:
-    """The event of the run of that number: the same whoever draws it, and in whatever order."""
+    """The event of the run of that number: the same by any process, and in any order."""
     random = np.random.default_rng([int(config.monte_carlo.seed), number])
     offset = random.uniform(0.0, config.turn)
     values = config.random.draw(random)
@@ -251,7 +251,7 @@ def _checked(line: bytes) -> dict[str, Any] | None:
 
 @dataclass(frozen=True)
 class MonteCarloResult:
-    """What the runs found: rows as in the file, and the file."""
+    """The results of the runs: rows as in the file, and the file."""
 
     rows: list[dict[str, Any]]
     file: Path
@@ -315,13 +315,13 @@ class MonteCarloResult:
 def run(
     task: Task, folder: Path, report: Callable[[str, float, float], None], workers: int | None = None
 ) -> MonteCarloResult:
-    """Run what is missing of the task's runs, on all processors, and append each row to the file in `folder` when its
-    run ends.
+    """Run the missing ones of the task's runs, on all processors, and append each row to the file in `folder` when
+    its run ends.
 
     Raises
     ------
     RunError
-        where an FMU fails, or the file cannot be written; what was computed before is in the file.
+        where an FMU fails, or the file cannot be written; earlier results are in the file.
     InterruptedRunError
         after Ctrl-C; likewise.
     """
@@ -336,7 +336,7 @@ def run(
     done = wanted - len(missing)
     report(what, done, wanted)
     if left_out or (file.exists() and not file.read_bytes().endswith(b"\n")):
-        # what is no row, or was cut off by a kill, must not run into the next line
+        # a line that is no row, or was cut off by a kill, must not run into the next one
         with whole(file) as part:
             part.write_text("".join(_line(row) for row in rows.values()), "utf-8")
     with writing(file):

@@ -33,7 +33,7 @@ def study_system(config: Config, drive: Drive) -> System:
     start = {"motor.w_ref": config.run.crank_speed * drive.ratio}
     for name, machine in (("machine", drive.driven), ("model", drive.machine)):
         if name in drive.graph.components:
-            # what is connected needs no start value, but an FMU that runs alone has one
+            # a connected input needs no start value, but an FMU that runs alone has one
             values = _machine(config, drive, ChamberForces, machine)
             start |= {f"{name}.{variable}": x for variable, x in values.items()}
     return replace(drive.graph, start=start)

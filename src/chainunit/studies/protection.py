@@ -1,4 +1,4 @@
-"""What protects a drive: thermal relay and safety coupling; and the stall that they protect from."""
+"""The protection of a drive: thermal relay and safety coupling; and the stall that they protect from."""
 
 from __future__ import annotations
 
@@ -69,10 +69,11 @@ class Obstacle(StrEnum):
 class Setting:
     """A safety coupling between motor and gear, judged by the torques in a study; all at the crank [N m].
 
-    The setting is `MARGIN` times the largest torque of `normal` duty: below what the `motor` gives at most in steady
-    running, so that it opens before the motor stalls, below what the `gear` may carry, and below what at least one of
-    the `overloads` gives, by name their peaks: the shocks that a coupling is for. Otherwise `obstacle` says why there
-    is none. `disturbances` are the peaks of what it has to ride out, by name, such as a dip of the voltage.
+    The setting is `MARGIN` times the largest torque of `normal` duty: below the largest torque of the `motor` in
+    steady running, so that it opens before the motor stalls, below the limit of the `gear`, and below the torque of
+    at least one of the `overloads`, by name their peaks: the shocks that a coupling is for. Otherwise
+    `obstacle` says why there is none. `disturbances` are the peaks that it has to ride out, by name, such as a dip
+    of the voltage.
     """
 
     normal: float

@@ -1,6 +1,6 @@
-"""Quantiles and shares of random runs, with what their number can tell of them: binomial intervals.
+"""Quantiles and shares of random runs, as exactly as their number allows: binomial intervals.
 
-Whatever the distribution, the number of runs below its quantile q is binomial. So an interval of two of the ordered
+For any distribution, the number of runs below its quantile q is binomial. So an interval of two of the ordered
 values holds the quantile with a known confidence. Where too few runs are there, even the largest of them may lie
 below it, and the interval has no end: such a quantile is left out.
 

@@ -78,7 +78,7 @@ class Rig:
 
     @property
     def guards(self) -> dict[str, float]:
-        """What a safety coupling opens at, at the motor."""
+        """The torque at which a safety coupling opens, at the motor."""
         coupling = self.config.coupling
         return {"motor.tau": coupling.trip_torque / self.drive.ratio} if coupling else {}
 
@@ -102,7 +102,7 @@ class Rig:
         return set(event.inputs(event.side)) <= set(self._inputs)
 
     def event_signals(self, event: Event, begin: float, state: Mapping[str, float]) -> dict[str, OverTime]:
-        """What the event gives, by full name, where it begins at `begin` [s] with the outputs `state`."""
+        """The signals of the event, by full name, where it begins at `begin` [s] with the outputs `state`."""
         normal = {name: value for name, (_, value) in self._inputs.items()}
         given = event.signals(normal, begin, state)
         return {self._inputs[name][0]: signal for name, signal in given.items()}

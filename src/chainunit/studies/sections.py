@@ -1,4 +1,4 @@
-"""The tables of a study file: what each declares, and with which values."""
+"""The tables of a study file: their declarations and values."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ class MonteCarlo:
 
 @declaration
 class Sizing:
-    """What is asked of a motor from the catalogue."""
+    """The demands on a motor from the catalogue."""
 
     one_sided_share: Value = quantity(
         "1", "share of the running time with all feed on one side", default=0.1, min=0.0, max=1.0
@@ -206,7 +206,7 @@ STARTS = ("direct", "soft", "inverter")
 @dataclasses.dataclass(frozen=True)
 class FileSection:
     """A table of a study file. The study has its values, or None where it is `optional` and the file does not have
-    it; what it does not name is of `default`."""
+    it; a value that it does not name is of `default`."""
 
     declared: type
     default: Any = None
@@ -217,7 +217,7 @@ class FileSection:
     """other keys than quantities, as pydantic fields"""
     form: Callable[..., type[BaseModel]] = schema
     values: Callable[[Any], dict[str, Any]] = given_values
-    """what a checked table gives, by the name of the quantity"""
+    """the values of a checked table, by the name of the quantity"""
 
 
 SECTIONS: Mapping[str, FileSection] = {

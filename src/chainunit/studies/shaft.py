@@ -1,4 +1,4 @@
-"""What a shaft line between motor and machine carries in a study: peaks, amplification, cycles for fatigue.
+"""The load of a shaft line between motor and machine in a study: peaks, amplification, cycles for fatigue.
 
 `tau2` is the torque in shaft 2, which the motor turns, `tau3` that in shaft 3, on the machine's side.
 """
@@ -31,7 +31,7 @@ CLASSES = 10
 
 @declaration
 class ShaftAnswers:
-    """What a run asks of the shaft line. The rigid drive is the same without elasticity and uneven ratio, inertia
+    """The load of the shaft line in a run. The rigid drive is the same without elasticity and uneven ratio, inertia
     kept. `amplification` is the peak torque over that of the rigid drive. `range_equivalent` does, once a turn of
     the crank, the damage of steady running by Woehler's line with the exponent `driveline.exponent`;
     `turns_of_steady` is the number of turns of steady running that do the damage of an event."""
@@ -87,7 +87,7 @@ def rainflow(torque: Any) -> Cycles:
 
 def from_peak(torque: Any) -> Any:
     """A torque that repeats, turned so that it begins and ends at its largest value: then no cycle stays open,
-    whatever the phase of the window."""
+    for any phase of the window."""
     first = int(np.argmax(torque))
     return np.concatenate([torque[first:], torque[: first + 1]])
 
@@ -133,9 +133,9 @@ def shaft_answers(
     exponent: float,
     steady_damage_per_turn: float | None = None,
 ) -> tuple[ShaftAnswers, Cycles, float]:
-    """What a `run` asks of the line, beside the same run of the rigid drive; its cycles, and their damage per turn of
-    the crank, in the unit (N m)^exponent. Without the damage of steady running it is steady running itself: then its
-    cycles close."""
+    """The load of the line in a `run`, beside the same run of the rigid drive; its cycles, and their damage per
+    turn of the crank, in the unit (N m)^exponent. Without the damage of steady running it is steady running itself:
+    then its cycles close."""
     tau2 = run["driveline.tau2"].values
     peak2, peak_rigid = float(np.max(np.abs(tau2))), float(np.max(np.abs(rigid_torque(drive, rigid))))
     steady = steady_damage_per_turn is None

@@ -56,7 +56,7 @@ _WORSE_WITH_INERTIA = ("start", "starts", "inertia")
 
 @dataclass
 class Candidate:
-    """A motor behind a gear, with what its runs gave."""
+    """A motor behind a gear, with the results of its runs."""
 
     motor: CatalogueMotor
     drive: Drive
@@ -115,7 +115,7 @@ class SizingResult:
 
     @property
     def answer(self) -> str:
-        """What sizing found, in a sentence; with the words of `rank`."""
+        """The result of sizing, in a sentence; with the words of `rank`."""
         tried = f"{len(self.candidates)} of {self.motors} were tried"
         if self.weak:
             tried += f", {self.weak} {'is' if self.weak == 1 else 'are'} too weak by the nameplate"

@@ -1,4 +1,4 @@
-"""What a study has: its drive, its runs, and what was read from them."""
+"""A study: its drive, its runs, and the numbers read from them."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ DENSER = (*TONGUES, 6)
 MOST_STEPS = 200_000
 """of a time simulation"""
 LOST = 0.01
-"""share of the speed by which a time simulation may have left what was asked"""
+"""share of the speed by which a time simulation may be off"""
 LEAST_DAMPING = 0.003
 """below which time simulation would take too long"""
 DRIFT = 0.01

@@ -117,8 +117,8 @@ def _at_operation(analysis: LineAnalysis) -> list[str]:
     ):
         if static > 0.0 and peak > rotation.factor * static:
             lines.append(
-                f"Shaft {shaft} carries {_torque(peak)} at {speed_text(at)}, {number(peak / static, '1')} times what "
-                f"the load alone asks; permitted is {rotation.factor:g}."
+                f"Shaft {shaft} carries {_torque(peak)} at {speed_text(at)}, {number(peak / static, '1')} times "
+                f"the torque of the load alone; permitted is {rotation.factor:g}."
             )
     least = float(motion.least2[0])
     if rotation.load > 0.0 and least < 0.0:

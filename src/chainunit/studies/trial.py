@@ -1,4 +1,4 @@
-"""A motor on trial: what its runs with the machine use of what is permitted."""
+"""A motor on trial: the share of each limit that its runs with the machine use."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def start_time(time: Any, speed: Any, share: float = 0.95) -> float | None:
 
 @dataclass(frozen=True)
 class Check:
-    """What is used of what is permitted, in one unit."""
+    """A value beside its limit, in one unit."""
 
     title: str
     value: float | None
@@ -181,7 +181,7 @@ class Trial:
         return float(self.config.sizing.one_sided_share)
 
     def checks(self) -> dict[str, Check]:
-        """What is used of what is permitted, by name; without a value where the machine does not get up to speed."""
+        """Each value beside its limit, by name; without a value where the machine does not get up to speed."""
         asked, plate, p = self.config.sizing, self.motor.nameplate, self.drive.parameters
         assert asked is not None
 
@@ -247,7 +247,8 @@ def try_motor(
     """
     plate, turn = motor.nameplate, config.turn
     ramp = config.run.ramp if drive.follows else 0.0
-    # three times what the rated torque needs to bring everything up to speed, and at least the ramp of the start
+    # three times as long as the rated torque takes to bring everything up to speed, and at least the ramp of the
+    # start
     inertia = drive.parameters.rotor.J + duty.numbers.inertia_mean / drive.ratio**2
     rise = config.starter.soft_start.time if config.start == "soft" else ramp
     window = max(1.0, 3.0 * inertia * plate.speed / plate.torque, 1.5 * rise)

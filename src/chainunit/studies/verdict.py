@@ -156,7 +156,7 @@ class Verdict:
             if runs:
                 why.append(short + _where(runs))
                 remedies.append(remedy)
-        # what helps against several is said once
+        # a remedy against several is named once
         return "; ".join((line, *why, *dict.fromkeys(filter(None, remedies)))) + "."
 
     def details(self, called: Mapping[str, str]) -> list[str]:

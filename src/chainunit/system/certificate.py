@@ -1,8 +1,8 @@
 """The energy residual of a power bond: the certificate that every run carries.
 
-What the driver gave to the load inside its own steps must be what the machine stored and dissipated, less what
-the feed brought. The two are computed on different sides of the coupling, from different equations. An FMU of
-somebody else may not count its energies: then only what the coupling itself loses is known."""
+The energy that the driver gave to the load inside its own steps must be stored and dissipated by the machine, less
+that which the feed brought. The two are computed on different sides of the coupling, from different equations. An
+FMU of somebody else may not count its energies: then only what the coupling itself loses is known."""
 
 from __future__ import annotations
 

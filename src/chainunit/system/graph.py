@@ -110,7 +110,7 @@ class Bond:
 
 @dataclass(frozen=True)
 class System:
-    """Components, and what connects them.
+    """Components and their connections.
 
     Parameters
     ----------

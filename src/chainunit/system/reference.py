@@ -1,7 +1,7 @@
 """The monolithic reference: the models' own equations as one ODE under an error-controlled solver.
 
 No communication step and no linearised load: each evaluation gives the driver the machine's load at exactly the
-present angle and speed. It is what a co-simulation converges to. The equations are traced in casadi once, which is
+present angle and speed. A co-simulation converges to it. The equations are traced in casadi once, which is
 several times as fast as the kernels themselves.
 """
 

@@ -87,7 +87,7 @@ class Rows:
         self._written, self._filled = end, 0
 
     def dataset(self) -> xr.Dataset:
-        """What is in memory. Its variables share it."""
+        """The rows in memory. Their variables share it."""
         rows = {
             name: ("time", values[: self._filled], attributes)
             for values, (name, attributes) in zip(self._values, self._attributes().items(), strict=True)

@@ -1,4 +1,4 @@
-"""What every run of a system of FMUs has, whoever takes the steps: set-up, transfer of values, rows, branches.
+"""The common parts of every run of a system of FMUs: set-up, transfer of values, rows, branches.
 
 At each communication point the connected variables are transferred in the order that the FMUs' true dependencies
 allow (states first, then what follows from them), so that every recorded row belongs to one instant.
@@ -355,7 +355,7 @@ class Simulation(ABC):
         return InterruptedRunError(f"interrupted at t = {self.time:g} s")
 
     def _recorders(self, names: Iterable[str] | None) -> list[rows.Recorder]:
-        """What is kept of each instance, in declared order."""
+        """The outputs to be kept of each instance, in declared order."""
         there: list[str] = []
         for name, fmu in self._fmus.items():
             driven = sorted(full for full in self.signals if full.startswith(f"{name}."))
@@ -368,7 +368,7 @@ class Simulation(ABC):
         return self._handles(there)
 
     def _watched(self, guards: Mapping[str, float]) -> list[tuple[Instance, Any, list[float]]]:
-        """Handles and limits of what is watched, by instance."""
+        """Handles and limits of the guards, by instance."""
         for full in guards:
             self.system.connector(full, "output")
         return [

@@ -20,7 +20,7 @@ from ...files import whole
 
 VARIABLE, OFF = "CHAINUNIT_CACHE", "off"
 _MOST = 256 * 2**20
-"""bytes in the folder; what was not used for longest goes first"""
+"""bytes in the folder; the code that was not used for longest goes first"""
 _ABANDONED = 3600.0  # s, after which the part of a file belongs to a process that was killed
 
 
@@ -40,7 +40,7 @@ def folder() -> Path | None:
 
 
 def entry(key: bytes, make: Callable[[], bytes]) -> bytes:
-    """What `make` gives, or gave for this `key` before."""
+    """The result of `make`, or its earlier one for this `key`."""
     place = folder()
     if place is None:
         return make()

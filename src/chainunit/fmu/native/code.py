@@ -2,7 +2,7 @@
 
 CasADi writes a function for each group of outputs, with all its operations. Here the groups share them: a `Program`
 is cut into parts, each of the operations that the same groups need, and calls the parts that a wanted group needs.
-What a part hands on to others lies in memory. No part is longer than a compiler is fast with.
+Values that a part hands on to others lie in memory. No part is longer than a compiler is fast with.
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ class Program:
                 alike.setdefault(groups, []).append(place)
         self._parts: list[list[int]] = []
         self._needed_by: list[int] = []
-        # what more groups need comes first: it depends on nothing that fewer need
+        # values that more groups need come first: they depend on none that fewer need
         for groups in sorted(alike, key=lambda g: (-g.bit_count(), g)):
             places = alike[groups]
             count = -(-len(places) // _LONGEST)

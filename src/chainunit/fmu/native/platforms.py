@@ -183,7 +183,7 @@ def _compile(
     own = ("-target", target) if compiler.zig else ("-Wl,--build-id=none", "-DCHAINUNIT_OLD_GLIBC")
     math = () if "windows" in target else ("-lm",)
     flags = (*own, *_FLAGS)
-    # the kernels take almost all of the time, and are the same for whatever start values
+    # the kernels take almost all of the time, and are the same for any start values
     kernels = {name: sources[name] for name in (KERNELS, HEADER)}
     object_code = compile_code(
         compiler, (*flags, "-c", KERNELS, "-o", KERNELS_OBJECT), kernels, KERNELS_OBJECT
