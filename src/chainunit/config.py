@@ -8,8 +8,6 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import ConfigDict, Field, ValidationError, create_model
-
 from .drives.cardan import check
 from .drives.dc_motor import DcMotor
 from .drives.gearing import Transmission
@@ -19,12 +17,12 @@ from .machines.chain_unit import ChamberForces, SideLoads, SideName
 from .quantities import Layout
 from .reading import (
     Slip,
-    Title,
+    file_form,
     filled,
-    first_line,
     merged,
     packaged,
     read,
+    read_table,
     slips,
     toml,
 )
@@ -38,7 +36,6 @@ from .studies.sections import (
     Coupling,
     Driveline,
     Feed,
-    FileSection,
     MonteCarlo,
     Ratios,
     Run,
@@ -47,23 +44,18 @@ from .studies.sections import (
 )
 from .system.signals import Profile
 
-
-def _table(name: str, section: FileSection) -> tuple[Any, Any]:
-    table = section.form(section.declared, name, f"{name}.", **section.keys)
-    return table, Field(default_factory=table)
-
-
-_File = create_model(
+_File = file_form(
     "Config",
-    __config__=ConfigDict(extra="forbid"),
-    title=(Title, ""),
-    **{name: _table(name, section) for name, section in SECTIONS.items()},
+    {
+        name: section.form(section.declared, name, f"{name}.", **section.keys)
+        for name, section in SECTIONS.items()
+    },
     feed_forward=(bool, False),
     start=(Literal[STARTS], "direct"),
     organ=(Literal[ORGANS], "two-bar"),
     catalogue=(str, ""),
     event=(list[Any], []),
-)  # type: ignore[call-overload]
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -150,11 +142,8 @@ def parse(text: str, source: str = "config") -> Config:
         see `load`.
     """
     data = toml(text)
-    try:
-        _File.model_validate(data)
-        checked: Any = _File.model_validate(_over_example(data))
-    except ValidationError as error:
-        raise InputError(first_line(error, _File)) from error
+    read_table(_File, data)
+    checked = read_table(_File, _over_example(data))
     declared = {name: section.declared for name, section in SECTIONS.items()}
     unusual = tuple(slips(declared, data))
     try:

@@ -208,6 +208,26 @@ def schema(declared: type, title: str, prefix: str, **more: Any) -> type[BaseMod
     return create_model(title, __config__=ConfigDict(extra="forbid"), **fields, **more)
 
 
+def file_form(name: str, tables: Mapping[str, type[BaseModel]], **keys: Any) -> type[BaseModel]:
+    """The form of a whole file: its title, tables, none of which is required, and other `keys`."""
+    fields: dict[str, Any] = {table: (form, Field(default_factory=form)) for table, form in tables.items()}
+    return create_model(name, __config__=ConfigDict(extra="forbid"), title=(Title, ""), **fields, **keys)
+
+
+def read_table(form: type[BaseModel], table: Mapping[str, Any], prefix: str = "") -> Any:
+    """A table in its form; `prefix` goes before the names of its keys in a refusal.
+
+    Raises
+    ------
+    InputError
+        in one line, for a key that is not known or a value that is not allowed.
+    """
+    try:
+        return form.model_validate(dict(table))
+    except ValidationError as error:
+        raise InputError(first_line(error, form, prefix)) from error
+
+
 def given_values(section: BaseModel) -> dict[str, float]:
     """Names and values that were set in a section."""
     flat: dict[str, float] = {}

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, ConfigDict, Field, ValidationError, create_model
+from pydantic import BeforeValidator, Field
 
 from .. import __version__
 from ..drives.cardan import Cardan, check, frequency_band, frozen_frequency
@@ -16,13 +16,13 @@ from ..engines import numpy_
 from ..errors import InputError
 from ..quantities import Layout, variables
 from ..reading import (
-    Title,
-    first_line,
+    file_form,
     given_values,
     instance,
     merged,
     packaged,
     read,
+    read_table,
     schema,
     to_number,
     toml,
@@ -50,14 +50,7 @@ _Stability = schema(
         [0.02],
     ),
 )
-_File: Any = create_model(
-    "Driveline",
-    __config__=ConfigDict(extra="forbid"),
-    title=(Title, ""),
-    driveline=(_Line, Field(default_factory=_Line)),
-    running=(_Rotation, Field(default_factory=_Rotation)),
-    stability=(_Stability, Field(default_factory=_Stability)),
-)
+_File = file_form("Driveline", {"driveline": _Line, "running": _Rotation, "stability": _Stability})
 
 
 @dataclasses.dataclass(frozen=True)
@@ -111,11 +104,8 @@ def parse(text: str, source: str = "driveline") -> DrivelineConfig:
         see `load`.
     """
     data = toml(text)
-    try:
-        _File.model_validate(data)
-        checked: Any = _File.model_validate(_over_example(data))
-    except ValidationError as error:
-        raise InputError(first_line(error, _File)) from error
+    read_table(_File, data)
+    checked = read_table(_File, _over_example(data))
     line = instance(Cardan, values(checked.driveline, "driveline."))
     try:
         check(line)

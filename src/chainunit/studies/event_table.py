@@ -15,16 +15,15 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 
 from ..errors import InputError, shown
-from ..machines.chain_unit import SIDES, SideName
+from ..machines.chain_unit import SIDES
 from ..quantities import Layout, variables
-from ..reading import first_line, given_values, instance, schema, to_number
-from .events import TYPES, Event
+from ..reading import given_values, instance, read_table, schema, to_number
+from .events import TYPES, AnySide, Event
 
 RESERVED = ("start_up", "steady", "constant", "unfinished")
 """Names of other runs of a study."""
@@ -57,7 +56,7 @@ class RandomEvent:
     one is drawn, too."""
 
     of: type[Event]
-    side: SideName | Literal[""]
+    side: AnySide
     p: Any
     ranges: Mapping[str, tuple[float, float]]
 
@@ -65,7 +64,7 @@ class RandomEvent:
         """Values of the quantities that are drawn, evenly from their ranges."""
         return {name: float(random.uniform(low, high)) for name, (low, high) in self.ranges.items()}
 
-    def event(self, side: SideName | Literal[""], values: Mapping[str, float]) -> Event:
+    def event(self, side: AnySide, values: Mapping[str, float]) -> Event:
         """The event on that side with these values of the quantities that are drawn."""
         return self.of.on(side, replace(self.p, **values))
 
@@ -129,7 +128,7 @@ def _type(table: Any, where: str) -> type[Event]:
     return of
 
 
-def _side(of: type[Event], table: Mapping[str, Any], where: str) -> SideName | Literal[""]:
+def _side(of: type[Event], table: Mapping[str, Any], where: str) -> AnySide:
     if "side" not in table:
         return ""
     if not of.sided:
@@ -157,11 +156,8 @@ def _name(table: Mapping[str, Any], usual: str, others: Mapping[str, Event], whe
 def _parameters(of: type[Event], table: Mapping[str, Any], prefix: str) -> Any:
     texts: dict[str, Any] = dict.fromkeys(("type", "side", "name"), (str, ""))
     form = schema(of.Parameters, "event", prefix, **texts)
-    try:
-        checked = form.model_validate(dict(table))
-    except ValidationError as error:
-        raise InputError(first_line(error, form, prefix)) from error
-    values = {name: x for name, x in given_values(checked).items() if name not in texts}
+    given = given_values(read_table(form, table, prefix))
+    values = {name: x for name, x in given.items() if name not in texts}
     p = instance(of.Parameters, values)
     for name in of.counts:
         if getattr(p, name) != int(getattr(p, name)):

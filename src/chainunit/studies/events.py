@@ -21,6 +21,8 @@ from ..text import number
 
 OverTime: TypeAlias = float | Profile
 """Value of an input, or its values over time."""
+AnySide: TypeAlias = SideName | Literal[""]
+"""A side, or none."""
 
 
 class Role(StrEnum):
@@ -83,7 +85,7 @@ class Event:
     Parameters: ClassVar[type] = Timing
 
     name: str
-    side: SideName | Literal[""]
+    side: AnySide
     p: Any
 
     def __init_subclass__(cls) -> None:
@@ -92,33 +94,33 @@ class Event:
             TYPES[cls.kind] = cls
 
     @classmethod
-    def on(cls, side: SideName | Literal[""] = "", p: Any = None, name: str = "") -> Event:
+    def on(cls, side: AnySide = "", p: Any = None, name: str = "") -> Event:
         """The event on that side, its quantities at their defaults where none are given."""
-        return cls(name or _said(cls.run, side), side, cls.Parameters() if p is None else p)
+        return cls(name or _on_side(cls.run, side), side, cls.Parameters() if p is None else p)
 
     @classmethod
-    def inputs(cls, side: SideName | Literal[""]) -> tuple[str, ...]:
+    def inputs(cls, side: AnySide) -> tuple[str, ...]:
         """Inputs that it changes on that side."""
-        return tuple(_said(name, side) for name in cls.acts_on)
+        return tuple(_on_side(name, side) for name in cls.acts_on)
 
     @property
     def _mark(self) -> str:
         """The name of the run, where the side and the type alone do not tell it from others."""
-        usual = _said(self.run, self.side)
+        usual = _on_side(self.run, self.side)
         return "" if self.name == usual else self.name.removeprefix(f"{usual}_").replace("_", " ")
 
     @property
     def title(self) -> str:
         """What happens, as in a sentence."""
-        return _said(self.words, self.side) + (f" ({self._mark})" if self._mark else "")
+        return _on_side(self.words, self.side) + (f" ({self._mark})" if self._mark else "")
 
     @property
     def short(self) -> str:
         """The same as a heading of a narrow column."""
-        return " ".join(filter(None, (_said(self.heading, self.side), self._mark)))
+        return " ".join(filter(None, (_on_side(self.heading, self.side), self._mark)))
 
     @property
-    def loaded_side(self) -> SideName | Literal[""]:
+    def loaded_side(self) -> AnySide:
         """The side that has to carry it; none where both do."""
         return self.side
 
@@ -155,7 +157,7 @@ class Event:
         return ""
 
 
-def _said(text: str, side: SideName | Literal[""]) -> str:
+def _on_side(text: str, side: AnySide) -> str:
     return text.format(side=side, other=other(side)) if side else text
 
 
@@ -281,7 +283,7 @@ class Empties(Event):
         """Of the side that empties."""
 
     @property
-    def loaded_side(self) -> SideName | Literal[""]:
+    def loaded_side(self) -> AnySide:
         """The one across."""
         return other(self.side) if self.side else ""
 
@@ -318,7 +320,7 @@ class OneSidedFeed(Event):
         """What each side carries in the end."""
         ends, share = {}, self.p.share
         for load in _LOADS:
-            here, there = (_said(f"{{{side}}}.{load}", self.side) for side in ("side", "other"))
+            here, there = (_on_side(f"{{{side}}}.{load}", self.side) for side in ("side", "other"))
             ends[there] = (1.0 - share) * normal[there]
             ends[here] = normal[here] + share * normal[there]
         return ends

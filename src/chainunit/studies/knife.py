@@ -15,7 +15,7 @@ from typing import Annotated, Any
 
 import numpy as np
 import xarray as xr
-from pydantic import BeforeValidator, ConfigDict, Field, ValidationError, create_model
+from pydantic import BeforeValidator, Field
 
 from ..drives.catalogue import CatalogueMotor, catalogue
 from ..drives.induction_motor import InductionMotor
@@ -23,7 +23,17 @@ from ..errors import InputError, RunError, shown
 from ..fmu.backends import Backend
 from ..machines.knife_drive import KnifeDrive, Parameters
 from ..quantities import Layout, Value, declaration, quantity, variables
-from ..reading import Title, first_line, given_values, instance, packaged, read, schema, to_number, toml
+from ..reading import (
+    file_form,
+    given_values,
+    instance,
+    packaged,
+    read,
+    read_table,
+    schema,
+    to_number,
+    toml,
+)
 from ..system import Bond, CoSimulation, ModelComponent, System, energy_residual, export, shaft_joints
 from ..text import number
 from .cutting import TurnCurves, statics, stored_shares
@@ -113,15 +123,7 @@ _Train = schema(
     ),
 )
 _Run = schema(CuttingRun, "run", "run.")
-_File: Any = create_model(
-    "Knife",
-    __config__=ConfigDict(extra="forbid"),
-    title=(Title, ""),
-    machine=(_Machine, Field(default_factory=_Machine)),
-    cut=(_Cut, Field(default_factory=_Cut)),
-    drive=(_Train, Field(default_factory=_Train)),
-    run=(_Run, Field(default_factory=_Run)),
-)
+_File = file_form("Knife", {"machine": _Machine, "cut": _Cut, "drive": _Train, "run": _Run})
 
 
 @dataclasses.dataclass(frozen=True)
@@ -173,10 +175,7 @@ def parse(text: str, source: str = "knife") -> KnifeConfig:
     InputError
         see `load`.
     """
-    try:
-        checked: Any = _File.model_validate(toml(text))
-    except ValidationError as error:
-        raise InputError(first_line(error, _File)) from error
+    checked = read_table(_File, toml(text))
     given = given_values(checked.machine)
     if "ratio" in given:
         raise InputError(

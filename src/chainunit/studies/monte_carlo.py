@@ -20,7 +20,7 @@ from dataclasses import asdict, dataclass, fields
 from itertools import islice
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
@@ -35,7 +35,7 @@ from ..system import CoSimulation
 from ..system.instance import remove_unpacked
 from ..text import entry
 from .drive import Drive
-from .events import Event
+from .events import AnySide, Event
 from .measures import Phase, Window, read_measure, same_measure
 from .quantiles import CONFIDENCE, Estimate, quantile, runs_needed, share
 from .rig import Rig
@@ -169,7 +169,7 @@ def draw(config: Config, number: int) -> Draw:
         if config.coupling
         else math.inf
     )
-    side: SideName | Literal[""] = config.random.side
+    side: AnySide = config.random.side
     if config.random.of.sided and not side:
         side = SIDES[random.integers(len(SIDES))]
     return Draw(config.random.event(side, values), values, offset, trip)

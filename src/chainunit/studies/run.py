@@ -307,8 +307,7 @@ class Runner:
                 runs[event.name] = rig.follow(simulation, event, begin, stop, guards=rig.guards).run
         for event in self.starts:
             with rig.from_rest(event) as simulation:
-                guards = {} if self.study.start_apart else rig.guards
-                runs[event.name] = simulation.run(self.stop, rig.step, guards=guards)
+                runs[event.name] = simulation.run(self.stop, rig.step, guards=self.start_guards)
         return runs
 
     def _line(self, rigid: dict[str, xr.Dataset]) -> None:
