@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cached_property
@@ -176,50 +176,35 @@ def model_description(
     derivatives of the states are variables, too. `sources` are the files that the FMU can be compiled from.
     `identifier` is the name of its library, where that is not the model's.
     """
-    model = interface.model
-    root = _root(model, version, {"fmiVersion": "2.0", "guid": guid})
+    exchange = "ModelExchange" in kinds
+    root = _root(interface.model, version, {"fmiVersion": "2.0", "guid": guid})
     root.set("numberOfEventIndicators", "0")
     for kind, options in kinds.items():
-        element = SubElement(root, kind, {"modelIdentifier": identifier or model.name, **options})
+        element = SubElement(root, kind, {"modelIdentifier": identifier or interface.model.name, **options})
         if sources:
             files = SubElement(element, "SourceFiles")
             for name in sources:
                 SubElement(files, "File", name=name)
-    exchange = "ModelExchange" in kinds
-    units = {s.variable.unit for s in interface.signals}
-    if exchange:
-        units |= {_per_second(v.unit) for v in interface.states}
-    _definitions(
-        root,
-        units,
-        lambda types, name, of: SubElement(SubElement(types, "SimpleType", name=name), "Real", of),
-    )
-    _log_categories(root)
-    _experiment(root, model)
+
+    def add_type(types: Element, name: str, attributes: dict[str, str]) -> None:
+        SubElement(SubElement(types, "SimpleType", name=name), "Real", attributes)
+
+    _definitions(root, interface, exchange, set(), add_type)
     variables = SubElement(root, "ModelVariables")
-    for signal in interface.signals:
-        _scalar(variables, signal)
-    first_state, first_derivative = len(interface.parameters) + len(interface.inputs), len(interface.signals)
-    if exchange:
-        for i, v in enumerate(interface.states):
-            _derivative(variables, v, first_state + i, first_derivative + i)
+    for attributes, real, state in _variables(interface, exchange):
+        # FMI 2.0 counts variables from 1
+        derivative = {} if state is None else {"derivative": str(state + 1)}
+        SubElement(SubElement(variables, "ScalarVariable", attributes), "Real", {**real, **derivative})
     structure = SubElement(root, "ModelStructure")
-    outputs = interface.of("output")
-    known = interface.dependencies
-    listed = SubElement(structure, "Outputs")
-    for signal, (in_run, _) in zip(outputs, known, strict=False):
-        used = in_run if exchange else [i for i in in_run if i < first_state]
-        _unknown(listed, signal.reference, used)
-    if exchange and interface.states:
-        listed = SubElement(structure, "Derivatives")
-        for i, (in_run, _) in enumerate(known[len(outputs) :]):
-            _unknown(listed, first_derivative + i, in_run)
-    listed = SubElement(structure, "InitialUnknowns")
-    for signal, (_, at_start) in zip(outputs, known, strict=False):
-        _unknown(listed, signal.reference, at_start)
-    if exchange:
-        for i, (_, at_start) in enumerate(known[len(outputs) :]):
-            _unknown(listed, first_derivative + i, at_start)
+    lists = {name: Element(name) for name in ("Outputs", "Derivatives", "InitialUnknowns")}
+    first_state = len(interface.parameters) + len(interface.inputs)
+    for kind, reference, influences in _structure(interface, exchange):
+        # in Co-Simulation alone no state is among the knowns
+        used = [i for i in influences if exchange or kind == "InitialUnknown" or i < first_state]
+        where = {"Output": "Outputs", "InitialUnknown": "InitialUnknowns"}.get(kind, "Derivatives")
+        unknown = {"index": str(reference + 1), **_dependencies([i + 1 for i in used])}
+        SubElement(lists[where], "Unknown", unknown)
+    structure.extend(element for name, element in lists.items() if len(element) or name != "Derivatives")
     return root
 
 
@@ -227,57 +212,67 @@ def model_description_3(
     interface: Interface, token: str, kinds: Mapping[str, Mapping[str, str]], version: str
 ) -> Element:
     """The XML tree of an FMI 3.0 FMU, with the same value references as that of FMI 2.0 and, behind them, time."""
-    model = interface.model
-    root = _root(model, version, {"fmiVersion": "3.0", "instantiationToken": token})
+    root = _root(interface.model, version, {"fmiVersion": "3.0", "instantiationToken": token})
     for kind, options in kinds.items():
-        SubElement(root, kind, {"modelIdentifier": model.name, **options})
-    _definitions(
-        root,
-        {
-            "s",
-            *(s.variable.unit for s in interface.signals),
-            *(_per_second(v.unit) for v in interface.states),
-        },
-        lambda types, name, of: SubElement(types, "Float64Type", {"name": name, **of}),
-    )
-    _log_categories(root)
-    _experiment(root, model)
+        SubElement(root, kind, {"modelIdentifier": interface.model.name, **options})
+
+    def add_type(types: Element, name: str, attributes: dict[str, str]) -> None:
+        SubElement(types, "Float64Type", {"name": name, **attributes})
+
+    _definitions(root, interface, True, {"s"}, add_type)
     variables = SubElement(root, "ModelVariables")
-    for signal in interface.signals:
-        SubElement(variables, "Float64", {**_attributes(signal), **_real(signal)})
-    first_state, first_derivative = len(interface.parameters) + len(interface.inputs), len(interface.signals)
-    for i, v in enumerate(interface.states):
-        attributes = _derivative_attributes(v, first_derivative + i)
-        SubElement(
-            variables,
-            "Float64",
-            {**attributes, **_unit(_per_second(v.unit))},
-            derivative=str(first_state + i),
-        )
+    for attributes, real, state in _variables(interface, True):
+        derivative = {} if state is None else {"derivative": str(state)}
+        SubElement(variables, "Float64", {**attributes, **real, **derivative})
     time = {
         "name": "time",
-        "valueReference": str(first_derivative + len(interface.states)),
+        "valueReference": str(len(variables)),
         "description": "time",
         "causality": "independent",
         "variability": "continuous",
     }
     SubElement(variables, "Float64", time | _unit("s"))
     structure = SubElement(root, "ModelStructure")
-    known = interface.dependencies
-    references = [s.reference for s in interface.of("output")]
-    derivatives = [first_derivative + i for i in range(len(interface.states))]
-
-    def listed(kind: str, reference: int, used: Sequence[int]) -> None:
-        attributes = {"valueReference": str(reference), "dependencies": " ".join(map(str, sorted(used)))}
-        SubElement(structure, kind, attributes, dependenciesKind=" ".join("dependent" for _ in used))
-
-    for reference, (in_run, _) in zip(references, known, strict=False):
-        listed("Output", reference, in_run)
-    for reference, (in_run, _) in zip(derivatives, known[len(references) :], strict=True):
-        listed("ContinuousStateDerivative", reference, in_run)
-    for reference, (_, at_start) in zip([*references, *derivatives], known, strict=True):
-        listed("InitialUnknown", reference, at_start)
+    for kind, reference, influences in _structure(interface, True):
+        SubElement(structure, kind, {"valueReference": str(reference), **_dependencies(influences)})
     return root
+
+
+def _variables(
+    interface: Interface, derivatives: bool
+) -> Iterator[tuple[dict[str, str], dict[str, str], int | None]]:
+    """Of each variable, in the order of their value references: its attributes, those of its type, and the value
+    reference of the state that it is the derivative of."""
+    for signal in interface.signals:
+        yield _attributes(signal), _real(signal), None
+    first = len(interface.parameters) + len(interface.inputs)
+    for i, state in enumerate(interface.states if derivatives else ()):
+        attributes = {
+            "name": f"der({state.name})",
+            "valueReference": str(len(interface.signals) + i),
+            "description": f"derivative by time: {state.description}",
+            "causality": "local",
+            "variability": "continuous",
+            "initial": "calculated",
+        }
+        yield attributes, _unit(_per_second(state.unit)), first + i
+
+
+def _structure(interface: Interface, derivatives: bool) -> Iterator[tuple[str, int, list[int]]]:
+    """What FMI 3.0 calls each unknown, its value reference, and the value references that it depends on."""
+    outputs = [s.reference for s in interface.of("output")]
+    rates = [len(interface.signals) + i for i in range(len(interface.states) if derivatives else 0)]
+    kinds = ["Output"] * len(outputs) + ["ContinuousStateDerivative"] * len(rates)
+    unknowns = list(zip(kinds, [*outputs, *rates], interface.dependencies, strict=False))
+    for kind, reference, (in_run, _) in unknowns:
+        yield kind, reference, in_run
+    for _, reference, (_, at_start) in unknowns:
+        yield "InitialUnknown", reference, at_start
+
+
+def _dependencies(references: Iterable[int]) -> dict[str, str]:
+    texts = [str(i) for i in sorted(references)]
+    return {"dependencies": " ".join(texts), "dependenciesKind": " ".join("dependent" for _ in texts)}
 
 
 def _root(model: type[Model], version: str, own: Mapping[str, str]) -> Element:
@@ -333,12 +328,6 @@ def generated() -> str:
         ) from error
 
 
-def _experiment(root: Element, model: type[Model]) -> None:
-    e = experiment(model)
-    attributes = {"startTime": 0.0, "stopTime": e.stop, "tolerance": e.tolerance, "stepSize": e.step}
-    SubElement(root, "DefaultExperiment", {name: f"{value:g}" for name, value in attributes.items()})
-
-
 def _per_second(unit: str) -> str:
     """The unit of a derivative by time, in base units where it has no name of its own."""
     if unit == "1":
@@ -350,32 +339,17 @@ def _per_second(unit: str) -> str:
     return (top or "1") + (f"/({'.'.join(below)})" if len(below) > 1 else "".join(f"/{b}" for b in below))
 
 
-def _log_categories(root: Element) -> None:
-    categories = SubElement(root, "LogCategories")
-    for name in ("logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal", "logAll"):
-        SubElement(categories, "Category", name=name)
-
-
-def _derivative_attributes(state: Variable, reference: int) -> dict[str, str]:
-    return {
-        "name": f"der({state.name})",
-        "valueReference": str(reference),
-        "description": f"derivative by time: {state.description}",
-        "causality": "local",
-        "variability": "continuous",
-        "initial": "calculated",
-    }
-
-
-def _derivative(variables: Element, state: Variable, of: int, reference: int) -> None:
-    node = SubElement(variables, "ScalarVariable", _derivative_attributes(state, reference))
-    SubElement(node, "Real", _unit(_per_second(state.unit)), derivative=str(of + 1))
-
-
 def _definitions(
-    root: Element, units: Iterable[str], add_type: Callable[[Element, str, dict[str, str]], Element]
+    root: Element,
+    interface: Interface,
+    derivatives: bool,
+    more: set[str],
+    add_type: Callable[[Element, str, dict[str, str]], None],
 ) -> None:
-    """Definitions of the units, and a declared type for each that has a name of its kind."""
+    """Definitions of the units, of those in `more`, too; a declared type for each that has a name of its kind;
+    categories of messages; and the default experiment."""
+    units = more | {s.variable.unit for s in interface.signals}
+    units |= {_per_second(v.unit) for v in interface.states if derivatives}
     definitions = SubElement(root, "UnitDefinitions")
     for unit in sorted(units):
         node = SubElement(definitions, "Unit", name=unit)
@@ -390,6 +364,12 @@ def _definitions(
     for unit in sorted(units):
         if unit in TYPES:
             add_type(types, TYPES[unit], {"quantity": TYPES[unit], **_shown(unit)})
+    categories = SubElement(root, "LogCategories")
+    for name in ("logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal", "logAll"):
+        SubElement(categories, "Category", name=name)
+    e = experiment(interface.model)
+    values = {"startTime": 0.0, "stopTime": e.stop, "tolerance": e.tolerance, "stepSize": e.step}
+    SubElement(root, "DefaultExperiment", {name: f"{value:g}" for name, value in values.items()})
 
 
 def _shown(unit: str) -> dict[str, str]:
@@ -428,21 +408,6 @@ def _real(signal: Signal) -> dict[str, str]:
     if signal.start is not None:
         real["start"] = repr(float(signal.start))
     return real
-
-
-def _scalar(variables: Element, signal: Signal) -> None:
-    SubElement(SubElement(variables, "ScalarVariable", _attributes(signal)), "Real", _real(signal))
-
-
-def _unknown(listed: Element, reference: int, known: Sequence[int]) -> None:
-    # FMI 2.0 counts variables from 1
-    SubElement(
-        listed,
-        "Unknown",
-        index=str(reference + 1),
-        dependencies=" ".join(str(i + 1) for i in sorted(known)),
-        dependenciesKind=" ".join("dependent" for _ in known),
-    )
 
 
 def terminals(interface: Interface) -> Element:
