@@ -35,7 +35,7 @@ from chainunit.fmu.export import export as export_python
 from chainunit.fmu.native.cache import OFF, VARIABLE
 from chainunit.fmu.native.export import export
 from chainunit.fmu.native.platforms import compile_code, compiler
-from chainunit.fmu.recipe import excitation, experiment
+from chainunit.fmu.recipe import Experiment, excitation, script
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.models import MODELS
 from chainunit.quantities import TYPES
@@ -703,7 +703,7 @@ def test_inputs_that_run_meet_the_reference_results_in_model_exchange(native, na
 def test_euler_keeps_near_at_the_declared_step(native, name):
     """In a second of the reference inputs it errs by less than a fifth of a state's size; at 100 times the step by
     more than half of one: the models need a step, and the declared one is short enough."""
-    model, wanted = MODELS[name], experiment(MODELS[name])
+    model, wanted = MODELS[name], Experiment(**script(MODELS[name]).experiment)
     for fmi in (2, 3):
         default = fmpy.read_model_description(str(native[name, fmi][0])).defaultExperiment
         given = (default.stepSize, default.stopTime, default.tolerance)

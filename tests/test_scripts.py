@@ -137,6 +137,7 @@ def test_a_script_with_a_class_and_imports_of_its_own(tmp_path):
             "import chainunit.integrate as steps\nfrom chainunit.drives import cardan, dc_motor, driveline\n"
             "from chainunit.machines import chain_unit",
         )
+        + '    experiment = {"stop": 3.0}\n'
         + '    start = {"crank.m": len(driveline.CardanDriveline.name) + float(steps.Solver is not None)}\n'
     )
     file = build(script, tmp_path)
@@ -144,6 +145,7 @@ def test_a_script_with_a_class_and_imports_of_its_own(tmp_path):
     description = fmpy.read_model_description(str(file))
     assert description.coSimulation.modelIdentifier == "MyChamber"
     assert {v.name: v.start for v in description.modelVariables}["crank.m"] == "16.0"
+    assert (description.defaultExperiment.stopTime, description.defaultExperiment.stepSize) == ("3", "0.001")
     plain = tmp_path / "plain"
     plain.mkdir()
     other = build(FOLDER / "ChamberForces.py", plain)

@@ -15,7 +15,8 @@ from ..engines import casadi_
 from ..errors import InputError
 from ..model import Model
 from ..quantities import DISPLAY_UNITS, TYPES, Variable, base_units
-from .recipe import experiment
+from .recipe import Experiment, script
+from .slave import ModelSlave
 
 RELEASED = "2026-11-21"
 """The day of this version's release, as CITATION.cff has it."""
@@ -40,14 +41,22 @@ class Interface:
     """The variables of a model's FMU in the order of their value references: parameters, inputs, states
     (each an output), other outputs part by part."""
 
-    def __init__(self, model: type[Model], start: dict[str, float]) -> None:
+    def __init__(
+        self, model: type[Model], start: dict[str, float], own: type[ModelSlave] | None = None
+    ) -> None:
         """
+        Parameters
+        ----------
+        start : start values that replace the declared ones
+        own : the class of a script of the user's; else that of the model's script in `fmu/`
+
         Raises
         ------
         KeyError
             for a name in `start` that is neither parameter nor input.
         """
         self.model = model
+        self.script = own or script(model)
         self.parameters = model.parameter_layout.variables
         self.inputs = model.input_layout.variables
         self.states = model.state_layout.variables if model.state_layout else ()
@@ -367,7 +376,7 @@ def _definitions(
     categories = SubElement(root, "LogCategories")
     for name in ("logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal", "logAll"):
         SubElement(categories, "Category", name=name)
-    e = experiment(interface.model)
+    e = Experiment(**interface.script.experiment)
     values = {"startTime": 0.0, "stopTime": e.stop, "tolerance": e.tolerance, "stepSize": e.step}
     SubElement(root, "DefaultExperiment", {name: f"{value:g}" for name, value in values.items()})
 

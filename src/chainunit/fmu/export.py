@@ -87,7 +87,7 @@ def complete(slave: type[ModelSlave], resources: Path) -> Element:
     KeyError, InputError
         see `export`; also for an import of the script that cannot be carried.
     """
-    interface = checked(slave.model, slave.start)
+    interface = checked(slave.model, slave.start, slave)
     script = resources / f"{slave.__module__}.py"
     text = script.read_text("utf-8")
     files = _imported(text)

@@ -11,11 +11,14 @@ from ..errors import InputError
 from ..model import Model
 from ..quantities import complaint
 from .description import Interface
+from .slave import ModelSlave
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the oldest time that a zip entry can bear
 
 
-def checked(model: type[Model], start: Mapping[str, float] | None) -> Interface:
+def checked(
+    model: type[Model], start: Mapping[str, float] | None, own: type[ModelSlave] | None = None
+) -> Interface:
     """The interface of `model` with its start values, which must make a model.
 
     Raises
@@ -25,7 +28,7 @@ def checked(model: type[Model], start: Mapping[str, float] | None) -> Interface:
     InputError
         where the start values are out of bounds or make no machine.
     """
-    interface = Interface(model, {name: float(value) for name, value in (start or {}).items()})
+    interface = Interface(model, {name: float(value) for name, value in (start or {}).items()}, own)
     for signal in interface.of("input"):
         if not signal.variable.quantity.admits(signal.start or 0.0):
             raise InputError(complaint(signal.variable, signal.start))

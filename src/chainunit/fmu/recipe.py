@@ -56,11 +56,6 @@ def _script(name: str) -> type[ModelSlave]:
     return runpy.run_path(str(file))[name] if file.is_file() else ModelSlave
 
 
-def experiment(model: type[Model]) -> Experiment:
-    """The default experiment."""
-    return Experiment(**script(model).experiment)
-
-
 def often(model: type[Model]) -> set[str]:
     """Outputs that a driver asks for at every step: those that connect."""
     return {name for terminal in model.terminals for name in terminal.members.values()}
@@ -91,7 +86,7 @@ def excitation(interface: Interface) -> Callable[[float], dict[str, float]]:
     about its start value, or about its usual size where that is 0.
     """
     model = interface.model
-    sizes = script(model).sizes
+    sizes = interface.script.sizes
     courses: dict[str, Callable[[float], float]] = {}
     for terminal in model.terminals:
         if terminal.kind == LOAD and terminal.members["tau_bias"] in model.input_layout.names:
