@@ -23,7 +23,7 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi
                                           fmi3Boolean logging, fmi3InstanceEnvironment environment,
                                           fmi3LogMessageCallback log) {
     (void)resources, (void)visible, (void)logging;
-    return instantiate(name, "token", token, model.token, 1, environment, (void (*)(void))log);
+    return instantiate(name, "token", token, model.guid, 1, environment, (void (*)(void))log);
 }
 
 fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
@@ -33,7 +33,7 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
                                          fmi3IntermediateUpdateCallback update) {
     (void)resources, (void)visible, (void)logging, (void)events, (void)early, (void)required, (void)n_required;
     (void)update;
-    return instantiate(name, "token", token, model.token, 0, environment, (void (*)(void))log);
+    return instantiate(name, "token", token, model.guid, 0, environment, (void (*)(void))log);
 }
 
 fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token, fmi3String resources,

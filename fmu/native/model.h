@@ -92,8 +92,7 @@ typedef struct {
 
 typedef struct {
     const char *name;
-    const char *guid;  /* of the FMI 2.0 description */
-    const char *token; /* of the FMI 3.0 description */
+    const char *guid; /* of the description; FMI 3.0 calls it instantiation token */
     int n_p, n_u, n_x, n_y, n_k, n_z, n_w, n_groups, n_required, n_start_required;
     unsigned differenced;        /* groups whose directional derivatives are taken by central differences */
     const double *start;         /* parameters, inputs */

@@ -30,6 +30,7 @@ class _Version:
     """What one FMI version needs."""
 
     layer: str
+    guid: str
     headers: tuple[str, ...]
     kinds: Mapping[str, Mapping[str, str]]
 
@@ -51,11 +52,13 @@ _STEP = {"canHandleVariableCommunicationStepSize": "true", "maxOutputDerivativeO
 _VERSIONS = {
     2: _Version(
         "fmi2.c",
+        "guid",
         ("fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h"),
         {"ModelExchange": _COMMON_2, "CoSimulation": _COMMON_2 | _STEP | {"canInterpolateInputs": "true"}},
     ),
     3: _Version(
         "fmi3.c",
+        "instantiationToken",
         ("fmi3FunctionTypes.h", "fmi3Functions.h", "fmi3PlatformTypes.h"),
         {"ModelExchange": _COMMON_3, "CoSimulation": _COMMON_3 | _STEP},
     ),
@@ -101,32 +104,23 @@ def export(
         # FMI 2.0 expects the call from every importer
         kinds["ModelExchange"] = {**kinds["ModelExchange"], "needsCompletedIntegratorStep": "true"}
 
-    def description(token: str) -> bytes:
-        if fmi == 2:
-            return written(model_description(interface, token, kinds, version, compiled))
-        return written(model_description_3(interface, token, kinds, version))
-
     report("generating C")
+    if fmi == 2:
+        description = model_description(interface, "", kinds, version, compiled)
+    else:
+        description = model_description_3(interface, "", kinds, version)
     functions, room = kernels(interface)
-    layer_texts = {name: (recipes() / "native" / name).read_bytes() for name in layer}
-    digest = hashlib.sha256(description(""))
-    for text in (
-        functions.encode(),
-        tables(interface, "", "", room).encode(),
-        rules().encode(),
-        *layer_texts.values(),
-    ):
+    sources = {name: (recipes() / "native" / name).read_bytes() for name in layer}
+    sources |= {"kernels.c": functions.encode(), "rules.h": rules().encode()}
+    digest = hashlib.sha256(written(description))
+    for text in (*sources.values(), tables(interface, "", room).encode()):
         digest.update(text + b"\0")
-    token = f"{{{uuid.UUID(digest.hexdigest()[:32])}}}"
-    sources = {
-        "kernels.c": functions.encode(),
-        "model.c": tables(interface, token, token, room).encode(),
-        "rules.h": rules().encode(),
-        **layer_texts,
-        **{name: (_headers() / name).read_bytes() for name in of_version.headers},
-    }
+    guid = f"{{{uuid.UUID(digest.hexdigest()[:32])}}}"
+    description.set(of_version.guid, guid)
+    sources["model.c"] = tables(interface, guid, room).encode()
+    sources |= {name: (_headers() / name).read_bytes() for name in of_version.headers}
     contents = {f"sources/{name}": text for name, text in sources.items()}
-    contents["modelDescription.xml"] = description(token)
+    contents["modelDescription.xml"] = written(description)
     contents |= accompanying(interface, version, fmi)
     if fmi == 3:
         contents["sources/buildDescription.xml"] = _build_description(model.name, compiled)

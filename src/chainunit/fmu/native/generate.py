@@ -165,9 +165,9 @@ def _numbers(name: str, values: tuple[Any, ...]) -> str:
     return f"static const double {name}[{len(values)}][{max(map(len, values))}] = {{\n{rows},\n}};"
 
 
-def tables(interface: Interface, guid: str, token: str, room: int) -> str:
-    """``model.c``: what model.h asks for, with the FMI 2.0 GUID and the FMI 3.0 instantiation token given, and
-    the `room` that kernels need."""
+def tables(interface: Interface, guid: str, room: int) -> str:
+    """``model.c``: what model.h asks for, with the GUID, which FMI 3.0 calls instantiation token, and the `room`
+    that kernels need."""
     model = interface.model
 
     def quantity(v: Variable) -> str:
@@ -218,7 +218,6 @@ def tables(interface: Interface, guid: str, token: str, room: int) -> str:
     fields = {
         "name": _text(model.name),
         "guid": _text(guid),
-        "token": _text(token),
         "n_p": len(interface.parameters),
         "n_u": len(interface.inputs),
         "n_x": len(interface.states),
