@@ -53,7 +53,7 @@ int main(int argc, char **argv) {
         case 0:
             if (!alive) {
                 const int wrong = !random_below(20);
-                const char *token = wrong ? random_below(2) ? "no" : NULL : model.token;
+                const char *token = wrong ? random_below(2) ? "no" : NULL : model.guid;
                 const char *name = random_below(20) ? "unit" : random_below(2) ? "" : NULL;
                 hears[i] = random_below(10) > 0;
                 const fmi3LogMessageCallback log = hears[i] ? logger : NULL;

@@ -10,8 +10,9 @@ import subprocess
 import sys
 import zipfile
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from string import Formatter
 
 import casadi
 import fmpy
@@ -27,13 +28,14 @@ from scipy.integrate import solve_ivp
 from test_fmu import Running
 from test_reference import POINTS, deviation
 
-from chainunit import ChainUnit, GeometryError, InputError, RunError
+from chainunit import ChainUnit, GeometryError, InputError, RunError, integrate, refusals
 from chainunit.engines import MATH
 from chainunit.fmu.accompany import INPUTS, READ, REFERENCE, STANDARD, STEPPED
 from chainunit.fmu.description import Interface
 from chainunit.fmu.export import export as export_python
 from chainunit.fmu.native.cache import OFF, VARIABLE
 from chainunit.fmu.native.export import export
+from chainunit.fmu.native.generate import rules
 from chainunit.fmu.native.platforms import compile_code, compiler
 from chainunit.fmu.recipe import Experiment, excitation, script
 from chainunit.machines.chain_unit import ChamberForces
@@ -387,6 +389,49 @@ def test_a_geometry_that_cannot_turn_fails_the_initialisation_in_the_same_words(
     with pytest.raises(RunError, match=r"rotor\.J = -1 kg\.m2: must be > 0 kg\.m2"):
         with running(native, "DcMotor", {"rotor.J": -1.0}):
             pass
+
+
+def test_python_and_native_code_refuse_in_the_same_words(native, fmus):
+    """A Python FMU adds what it did, and what the variable is."""
+    lines = []
+    for file in (native["DcMotor", 2][0], fmus["DcMotor"]):
+        fmu, said = Fmu(file), []
+        with Running(fmu, {"solver.max_steps": 20.0}) as unit:
+            for call, *arguments in (
+                (unit.step, 0.5, 0.1),
+                (unit.step, 0.0, -0.1),
+                (unit.step, 0.0, 10.0),
+                (unit.set, ["armature.L"], [1.0]),
+                (unit.set, ["armature.R"], [-1.0]),
+                (unit.set, ["w"], [1.0]),
+            ):
+                with suppress(RunError):
+                    call(*arguments)
+                said.append(unit.messages[-1])
+        fmu.close()
+        lines.append(said)
+    assert len(set(lines[0])) == 6
+    for of_native, of_python in zip(*lines, strict=True):
+        assert of_native in of_python
+    parameters = {"r": 1.0}
+    with pytest.raises(GeometryError) as refused:
+        ChainUnit(parameters)
+    with pytest.raises(RunError) as failed, running(native, "ChamberForces", parameters):
+        pass
+    assert str(refused.value) in str(failed.value)
+
+
+def test_every_word_of_python_is_in_native_code():
+    text = rules()
+    for name, value in vars(refusals).items():
+        if name.isupper():
+            pieces = [piece for piece, *_ in Formatter().parse(value) if piece]
+            (line,) = (x for x in text.splitlines() if x.startswith(f"#define {name} "))
+            assert pieces and all(piece in line for piece in pieces), name
+    assert "%" not in re.sub(r"%[sgu]", "", text)
+    numbers = re.findall(r"STAGES\[7\]\[6\] = {(.*?)};", text, re.DOTALL)[0]
+    rows = [[float(x) for x in re.findall(r"[-\d.e]+", row)] for row in numbers.strip().splitlines()]
+    assert [row or [0.0] for row in map(list, integrate.STAGES)] == rows
 
 
 def test_bad_calls_end_in_an_error_and_one_line(native):
