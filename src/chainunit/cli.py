@@ -31,6 +31,12 @@ class Backend(StrEnum):
     python = "python"
 
 
+_BackendOption = Annotated[
+    Backend | None,
+    typer.Option("--backend", help="Of the FMUs: native where a C compiler is found, else python."),
+]
+
+
 class _Commands(typer.core.TyperGroup):
     """The commands. Ctrl-C and SIGTERM leave them as an error of this package: typer would make a bare exit status of
     a KeyboardInterrupt."""
@@ -52,8 +58,8 @@ app = typer.Typer(
 )
 
 
-def _version(wanted: bool) -> None:
-    if wanted:
+def _version(choice: bool) -> None:
+    if choice:
         from . import __version__
 
         print(f"chainunit {__version__}")
@@ -99,9 +105,7 @@ def study(
     check: Annotated[
         bool, typer.Option("--check", help="Also compare every run with the monolithic solution.")
     ] = False,
-    backend: Annotated[
-        Backend | None, typer.Option("--backend", help="Of the FMUs; native where a C compiler is found.")
-    ] = None,
+    backend: _BackendOption = None,
     example: Annotated[
         bool,
         typer.Option("--example", help="Print the packaged study file, as a start for your own, and stop."),
@@ -164,12 +168,16 @@ def _leave(
             unwritten = unwritten or error
     console = _console()
     terminal.show(report, console, remarks=remarks or not console.is_terminal)
-    _show_written(written, console)
+    console.print("Written: " + ", ".join(printable(str(path), 500) for path in written), soft_wrap=True)
     return unwritten
 
 
-def _show_written(written: list[Path], console: Console) -> None:
-    console.print("Written: " + ", ".join(printable(str(path), 500) for path in written), soft_wrap=True)
+def _finish(report: Report, output: Path, name: str) -> None:
+    """Write and show a report whose run is complete."""
+    from .report import files
+
+    if (unwritten := _leave(report, files.writers(report, output, name))) is not None:
+        raise unwritten
 
 
 @contextmanager
@@ -232,9 +240,7 @@ def driveline(
         with _progress("steady motion", _console(stderr=True)) as progress:
             result = lines.run_driveline(loaded, progress)
         report = contents.report(result)
-        unwritten = _leave(report, files.writers(report, output, "driveline"))
-    if unwritten is not None:
-        raise unwritten
+        _finish(report, output, "driveline")
 
 
 @app.command()
@@ -243,9 +249,7 @@ def knife(
         Path | None, typer.Argument(help="Knife file (TOML); without one, the packaged example.")
     ] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path("knife"),
-    backend: Annotated[
-        Backend | None, typer.Option("--backend", help="Of the FMUs; native where a C compiler is found.")
-    ] = None,
+    backend: _BackendOption = None,
     example: Annotated[
         bool,
         typer.Option("--example", help="Print the packaged knife file, as a start for your own, and stop."),
@@ -301,9 +305,7 @@ def reproduce(
         with _console(stderr=True).status("computing"):
             contents = report(compute())
         _clear(output, *files.names("reproduction", tuple(figure.file for figure in contents.figures)))
-        unwritten = _leave(contents, files.writers(contents, output, "reproduction"))
-    if unwritten is not None:
-        raise unwritten
+        _finish(contents, output, "reproduction")
 
 
 @app.command("two-bar-error")
@@ -323,9 +325,7 @@ def two_bar_error(
         with _progress("bars and catenaries", _console(stderr=True)) as progress:
             comparison = two_bar.two_bar_error(lambda done: progress("bars and catenaries", done, 1.0))
         contents = two_bar.report(comparison)
-        unwritten = _leave(contents, files.writers(contents, output, two_bar.NAME))
-    if unwritten is not None:
-        raise unwritten
+        _finish(contents, output, two_bar.NAME)
 
 
 @app.command()
@@ -346,9 +346,7 @@ def export(
             "--config", help="Study file (or knife file) whose machine, feed or motor gives the start values."
         ),
     ] = None,
-    backend: Annotated[
-        Backend | None, typer.Option("--backend", help="native where a C compiler is found, else python.")
-    ] = None,
+    backend: _BackendOption = None,
     fmi: Annotated[int, typer.Option("--fmi", help="Version of FMI: 2, or 3 (native only).")] = 2,
     platforms: Annotated[
         str | None,
@@ -410,9 +408,7 @@ def export_ssp(
         Path | None, typer.Argument(help="Study file (TOML); without one, the packaged example.")
     ] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="SSP file.")] = Path("ChainUnitDrive.ssp"),
-    backend: Annotated[
-        Backend | None, typer.Option("--backend", help="native where a C compiler is found, else python.")
-    ] = None,
+    backend: _BackendOption = None,
 ) -> None:
     """Write motor and machine, connected, with their parameter sets, as an SSP 1.0 package of FMUs 2.0."""
     from .studies.package import export_study
@@ -425,26 +421,26 @@ def export_ssp(
     print(f"{output}: {made}")
 
 
-def _platforms(wanted: str | None, fmi: int) -> list[str]:
+def _platforms(choice: str | None, fmi: int) -> list[str]:
     from .fmu.native.platforms import PLATFORMS
 
-    if wanted == "all":
+    if choice == "all":
         return [name for name, platform in PLATFORMS.items() if fmi in platform.folders]
-    if wanted is None:
+    if choice is None:
         return []
-    names = [name.strip() for name in wanted.split(",") if name.strip()]
+    names = [name.strip() for name in choice.split(",") if name.strip()]
     if not names:
         raise InputError(f"--platforms: name at least one of {', '.join(PLATFORMS)}, or all")
     return names
 
 
-_told_to_end: list[int] = []
+_end_signals: list[int] = []
 """Signals that told this process to end, apart from Ctrl-C."""
 
 
 def _end_in_order(number: int, frame: Any) -> None:
     """Take a signal to end as Ctrl-C is taken: what was computed is written, temporary folders are taken away."""
-    _told_to_end.append(number)
+    _end_signals.append(number)
     raise KeyboardInterrupt
 
 
@@ -454,7 +450,7 @@ def _ending_in_order() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    _told_to_end.clear()
+    _end_signals.clear()
     before = signal.signal(signal.SIGTERM, _end_in_order)
     try:
         yield
@@ -464,8 +460,8 @@ def _ending_in_order() -> Iterator[None]:
 
 def _status(error: BaseException) -> int:
     """Exit status of a run that failed with `error`."""
-    if _told_to_end:
-        return 128 + _told_to_end[0]
+    if _end_signals:
+        return 128 + _end_signals[0]
     if isinstance(error, InterruptedRunError | KeyboardInterrupt | typer.Abort):
         return 130
     return 2 if isinstance(error, InputError) else 1

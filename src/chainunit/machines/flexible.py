@@ -35,7 +35,7 @@ CLOSING = 20.0
 
 
 @declaration
-class DirectParameters(Start, AddedInertia, Parameters):
+class DirectChainParameters(Start, AddedInertia, Parameters):
     """Parameters of the chain unit with chains that turns by itself."""
 
     solver: Solver = group(Solver, "internal integrator", default=Solver(max_steps=1e5))
@@ -245,7 +245,7 @@ def _turning(chains: Organs) -> type[ChainedModel]:
             "speed, acceleration and every support reaction"
         )
         organs = chains
-        Parameters = DirectParameters
+        Parameters = DirectChainParameters
         Inputs = DirectInputs
         States = declared_class("States", (TurningStates,), both(chains.States))
         terminals = DirectChainUnit.terminals
