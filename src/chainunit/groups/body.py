@@ -54,18 +54,12 @@ class Body:
         self.I = I
         self.c = c
 
-    @classmethod
-    def on(cls, link: Link, mass: Any) -> Body:
-        """The body `mass` on `link`."""
-        t = mass.t if isinstance(mass, Mass) else None
-        return cls(link, mass.m, link.at(mass.s) if t is None else link.beside(mass.s, t), mass.I)
-
     def inertia(self) -> tuple[Any, Any]:
         """Reflected inertia J [kg m2] and its derivative dJ/dq by the coordinate."""
-        c, k = self.c, self.link
+        p1, p2, k = self.c.p1, self.c.p2, self.link
         return (
-            self.m * c.p1.squared() + self.I * (k.t1 * k.t1),
-            2.0 * (self.m * c.p1.dot(c.p2) + self.I * (k.t1 * k.t2)),
+            self.m * (p1.x * p1.x + p1.y * p1.y) + self.I * (k.t1 * k.t1),
+            2.0 * (self.m * (p1.x * p2.x + p1.y * p2.y) + self.I * (k.t1 * k.t2)),
         )
 
     # in components: this runs for each body in each force pass, and a vector costs `math` ten times a number
@@ -95,10 +89,20 @@ class Body:
         return self._resists(self.c.p1.x, self.c.p1.y, self.link.t1)
 
 
+def body_on(link: Link, mass: Any) -> Body:
+    """The body `mass` on `link`."""
+    beside = mass.t if isinstance(mass, Mass) else None
+    c = link.at(mass.s) if beside is None else link.beside(mass.s, beside)
+    return Body(link, mass.m, c, mass.I)
+
+
 def reflected(bodies: Iterable[Body]) -> tuple[Any, Any]:
     """Reflected inertia of several bodies J [kg m2] and its derivative dJ/dq."""
-    parts = [body.inertia() for body in bodies]
-    return sum(j for j, _ in parts), sum(j1 for _, j1 in parts)
+    J, dJ = 0.0, 0.0
+    for body in bodies:
+        own, slope = body.inertia()
+        J, dJ = J + own, dJ + slope
+    return J, dJ
 
 
 def point_load(at: Motion, pin: Motion, force: Vec2) -> Load:

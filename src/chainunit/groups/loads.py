@@ -249,9 +249,10 @@ class PinLosses(NamedTuple):
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Mapping[Joint, Vec2]) -> Effect:
         """See `Acting`."""
         per_newton, smooth2, w2, lost = *self._law(), w * w, 0.0
+        turns, damping = m.turns, self.damping
         for joint, force in reactions.items():
-            k2, _, rubbed = _rubbed(xp, force, m.turns[joint], w2, smooth2)
-            lost = lost + k2 * (per_newton * rubbed + self.damping)
+            k2, _, rubbed = _rubbed(xp, force, turns[joint], w2, smooth2)
+            lost = lost + k2 * (per_newton * rubbed + damping)
         return Effect(lost=lost * w)
 
     def slope(
@@ -288,4 +289,4 @@ def _rubbed(xp: Any, force: Vec2, turn: Any, w2: Any, smooth2: Any) -> tuple[Any
     zero, too; one root of the ratio of squares is cheaper than two."""
     k2 = turn * turn
     minus_per = -1.0 / (k2 * w2 + smooth2)
-    return k2, minus_per, xp.sqrt(_TINY - force.squared() * minus_per)
+    return k2, minus_per, xp.sqrt(_TINY - (force.x * force.x + force.y * force.y) * minus_per)

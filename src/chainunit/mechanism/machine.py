@@ -12,13 +12,12 @@ are new.
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
 from ..engines import Dual, dual, slope
-from ..groups.body import UNLOADED, Body, Load, reflected
+from ..groups.body import UNLOADED, Body, Load, body_on, reflected
 from ..groups.group import SolvedGroup, Third
 from ..groups.loads import Effect, Joint, Moving, Wrench
 from ..planar import ZERO, Link, Motion, Vec2, growth
@@ -62,10 +61,11 @@ class Mechanism:
             pins.update(zip(connections.pins, solved.pins, strict=True))
             for bar, link in zip(group.bars, solved.links, strict=True):
                 links[bar.name] = link
-                for point, (s, t) in bar.points.items():
-                    pins[point] = link.beside(s, t)
+                if bar.points:
+                    for point, (s, t) in bar.points.items():
+                        pins[point] = link.beside(s, t)
                 if bar.mass is not None:
-                    self.bodies[bar.name] = Body.on(link, bar.mass)
+                    self.bodies[bar.name] = body_on(link, bar.mass)
             for joint, carrier, _ in connections.joints:
                 turn = links[joint[1]].t1
                 self.turns[joint] = turn if carrier is None else turn - links[carrier].t1
@@ -135,13 +135,13 @@ class Mechanism:
         _, torque = loads.get(self.linkage.crank.bar.name, UNLOADED)
         return torque, reactions
 
-    def acting(self, at: Callable[[str, Body], Load], wrenches: Iterable[Wrench]) -> dict[str, Load]:
-        """The action on each link: of its body by `at`, from the name of the link and the body, and of the loads."""
-        loads = {name: at(name, body) for name, body in self.bodies.items()}
-        for link, force, moment in wrenches:
-            before, moment0 = loads.get(link, UNLOADED)
-            loads[link] = before + force, moment0 + moment
-        return loads
+
+def loaded(loads: dict[str, Load], wrenches: Iterable[Wrench]) -> dict[str, Load]:
+    """The action on each link by its name, with the wrenches of loads."""
+    for link, force, moment in wrenches:
+        before, moment0 = loads.get(link, UNLOADED)
+        loads[link] = before + force, moment0 + moment
+    return loads
 
 
 class LiftedMechanism:
@@ -183,8 +183,8 @@ class Steadiness:
         w2 = w * w
         self.effects = _effects(xp, m, w, loads)
         field = self.field = sum(effect.field for effect in self.effects.values())
-        acting = m.acting(lambda _, body: body.centrifugal(w2, field), _wrenches(self.effects))
-        self.torque, self.reactions = m.reactions(acting)
+        acting = {name: body.centrifugal(w2, field) for name, body in m.bodies.items()}
+        self.torque, self.reactions = m.reactions(loaded(acting, _wrenches(self.effects)))
         self.losses = _effects(xp, m, w, loads, self.reactions)
 
 
@@ -243,7 +243,8 @@ class MachineState:
     def _inertial(self) -> tuple[Any, dict[Joint, Vec2]]:
         if self._by_acceleration is None:
             wrenches = (k for effect in self.effects.values() for k in effect.inertial)
-            self._by_acceleration = self.m.reactions(self.m.acting(lambda _, body: body.inertial(), wrenches))
+            acting = {name: body.inertial() for name, body in self.m.bodies.items()}
+            self._by_acceleration = self.m.reactions(loaded(acting, wrenches))
         return self._by_acceleration
 
     def reactions(self, a: Any) -> dict[Joint, Vec2]:
@@ -293,33 +294,23 @@ class MachineState:
 
     def _by_angle(self) -> Any:
         m, w2, field, third = self.m, self.w * self.w, self.steady.field, self.m.third()
-        return self._slope(
-            m.lifted(),
-            self.w,
-            lambda name, body: body.centrifugal_slope(w2, field, third[name]),
-            m.turning(self.steady.reactions),
-            m.turns2(),
-        )
+        acting = {name: body.centrifugal_slope(w2, field, third[name]) for name, body in m.bodies.items()}
+        loaded(acting, m.turning(self.steady.reactions))
+        return self._slope(m.lifted(), self.w, acting, m.turns2())
 
     def _by_speed(self) -> Any:
-        return self._slope(
-            self.m, Dual(self.w, 1.0), lambda _, body: body.centrifugal(2.0 * self.w), (), None
-        )
+        acting = {name: body.centrifugal(2.0 * self.w) for name, body in self.m.bodies.items()}
+        return self._slope(self.m, Dual(self.w, 1.0), acting, None)
 
     def _slope(
-        self,
-        moving: Any,
-        w: Any,
-        at: Callable[[str, Body], Load],
-        wrenches: Iterable[Wrench],
-        turning: Mapping[Joint, Any] | None,
+        self, moving: Any, w: Any, acting: dict[str, Load], turning: Mapping[Joint, Any] | None
     ) -> Any:
-        """The slope of `bias` in the direction of the dual parts of `moving` and `w`, with the slopes of what acts on
-        the bodies and of the rotations in the joints, and further wrenches."""
+        """The slope of `bias` in the direction of the dual parts of `moving` and `w`, with the slopes of the action on
+        the bodies and of the rotations in the joints."""
         m, reactions = self.m, self.steady.reactions
         effects = _effects(dual(self._xp), moving, w, self._loads)
         growing = (Wrench(k.link, growth(k.force), slope(k.moment)) for k in _wrenches(effects))
-        torque, more = m.reactions(m.acting(at, itertools.chain(wrenches, growing)))
+        torque, more = m.reactions(loaded(acting, growing))
         for load in self._loads.values():
             if load.by_reactions:
                 torque = torque + load.slope(self._xp, m, self.w, reactions, more, turning)
