@@ -305,8 +305,8 @@ class MachineState:
     def _slope(
         self, moving: Any, w: Any, acting: dict[str, Load], turning: Mapping[Joint, Any] | None
     ) -> Any:
-        """The slope of `bias` in the direction of the dual parts of `moving` and `w`, with the slopes of the action on
-        the bodies and of the rotations in the joints."""
+        """The slope of `bias` in the direction of the dual parts of `moving` and `w`, with the slopes of the action
+        on the bodies and of the rotations in the joints."""
         m, reactions = self.m, self.steady.reactions
         effects = _effects(dual(self._xp), moving, w, self._loads)
         growing = (Wrench(k.link, growth(k.force), slope(k.moment)) for k in _wrenches(effects))
