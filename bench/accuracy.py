@@ -26,7 +26,7 @@ from chainunit.system import (
     System,
     certify,
     export,
-    held,
+    hold_loads,
     monolithic,
     shaft_joints,
 )
@@ -86,7 +86,7 @@ def main() -> None:
                 for slopes in (True, False):
                     before = None
                     for step in STEPS:
-                        system = linear if slopes else held(linear)
+                        system = linear if slopes else hold_loads(linear)
                         with CoSimulation(system, signals) as simulation:
                             run = simulation.run(STOP, step)
                         _, energy = certify(run, system)["machine"]

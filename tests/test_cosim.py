@@ -19,7 +19,7 @@ from chainunit.fmu.native.export import export as export_native
 from chainunit.fmu.native.platforms import compiler
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.models import MODELS
-from chainunit.system import CoSimulation, Profile, System, energy_residual, held, monolithic
+from chainunit.system import CoSimulation, Profile, System, energy_residual, hold_loads, monolithic
 from chainunit.system.instance import Fmu
 from chainunit.system.simulation import stoppable
 
@@ -44,7 +44,7 @@ def parts(fmus):
 
 def system(fmus, *, slopes=True, **start):
     graph = joined(fmus, START | start)
-    return graph if slopes else held(graph)
+    return graph if slopes else hold_loads(graph)
 
 
 (BOND,) = joined().bonds

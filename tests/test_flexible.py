@@ -41,7 +41,7 @@ from chainunit.machines.flexible import flexible, turning
 from chainunit.mechanism.machine import MachineState, Mechanism
 from chainunit.studies.chain import numbers_at, study_chain
 from chainunit.studies.drive import Drive
-from chainunit.system import CoSimulation, held, monolithic
+from chainunit.system import CoSimulation, hold_loads, monolithic
 from chainunit.system.instance import Fmu, Instance
 
 FREE = OrganLaw(eta=0.0, end_damping=0.0, fold_stiffness=0.0)
@@ -564,7 +564,7 @@ def test_coupling_is_of_second_order_with_slopes_of_first_without(files, tmp_pat
     found = {}
     for slopes in (True, False):
         for step in (0.004, 0.002, 0.001):
-            with CoSimulation(linear if slopes else held(linear), speed) as simulation:
+            with CoSimulation(linear if slopes else hold_loads(linear), speed) as simulation:
                 run = simulation.run(stop, step)
             for name in ("machine.tau", "machine.left.tangential_load", "motor.w"):
                 wanted = exact[name].values

@@ -12,8 +12,8 @@ from chainunit.drives.driveline import CardanDriveline
 from chainunit.ports import LoadPort, PortSlopes
 from chainunit.quantities import Layout
 from chainunit.studies.drive import Drive
-from chainunit.system import Jump, Profile, System, export, held, rigid, shaft_joints, without
-from chainunit.system.graph import direct_inputs, ordered
+from chainunit.system import Jump, Profile, System, export, hold_loads, rigid, shaft_joints, without
+from chainunit.system.graph import direct_inputs, order
 from chainunit.system.signals import at_time, corners
 
 
@@ -61,7 +61,7 @@ def test_twins_are_systems():
     )
     assert stiff.values["machine.ratio"] == drive.ratio == 25.0 * graph.values["machine.ratio"]
     slopes = Layout(PortSlopes).names
-    lost = set(graph.connections) - set(held(graph).connections)
+    lost = set(graph.connections) - set(hold_loads(graph).connections)
     assert len(lost) == 2 * len(slopes) and all(source.endswith(slopes) for source, _ in lost)
     with pytest.raises(InputError, match=r'gear: there is no component "gear"'):
         without(graph, ("gear",))
@@ -97,7 +97,7 @@ def test_values_are_known_in_the_order_of_their_true_dependencies():
         "motor": {"phi": set(), "w": set(), "a": {"load.tau_bias", "load.J"}},
         "machine": {"tau_bias": {"phi", "w"}, "J": {"phi"}},
     }
-    steps = ordered(system.connections, direct)
+    steps = order(system.connections, direct)
     place = {f"{name}.{output}": k for k, (name, outputs) in enumerate(steps) for output in outputs}
     assert (
         place["motor.phi"]

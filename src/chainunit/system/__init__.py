@@ -3,7 +3,7 @@
 `System` is the graph. From it come the FMUs (`export`), the co-simulation (`CoSimulation`), the whole as one ODE of
 Model Exchange FMUs (`ModelExchange`), the reference of the models' own equations (`monolithic`), the certificate of
 a run (`energy_residual` of every power bond), the SSP package (`chainunit.system.ssp`), and twins with a part left
-out (`without`, `rigid`, `held`). An FMU of somebody else is a component, too: `foreign_component`."""
+out (`without`, `rigid`, `hold_loads`). An FMU of somebody else is a component, too: `foreign_component`."""
 
 from .certificate import certify, energy_residual
 from .fmus import export
@@ -14,7 +14,7 @@ from .graph import (
     FmuComponent,
     ModelComponent,
     System,
-    held,
+    hold_loads,
     rigid,
     shaft_joints,
     without,
@@ -39,7 +39,7 @@ __all__ = [
     "export",
     "fmu_component",
     "foreign_component",
-    "held",
+    "hold_loads",
     "monolithic",
     "rigid",
     "shaft_joints",

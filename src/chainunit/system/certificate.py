@@ -30,25 +30,25 @@ def energy_residual(run: xr.Dataset, bond: Bond, feed: Feed | None = None) -> tu
     """
     time = run["time"].values
     tau, w = _through(run, bond)
-    given = _given(run, bond, tau, w)
-    stored, dissipated = _taken(run, bond)
-    if stored is None:
+    supply = _supply(run, bond, tau, w)
+    storage, loss_power = _storage(run, bond)
+    if storage is None:
         # what the machine does with the energy is not known: its own torque against that of the driver
-        stored, dissipated = np.zeros_like(given), _shaft_power(run, bond.machine, bond.flanges[1], tau, w)
-    brought = np.zeros_like(given)
+        storage, loss_power = np.zeros_like(supply), _shaft_power(run, bond.machine, bond.flanges[1], tau, w)
+    feed_energy = np.zeros_like(supply)
     for mass, per_kg in (feed or {}).items():
         if mass.partition(".")[0] == bond.machine:
-            brought += _stieltjes(per_kg(run), run[mass].values)
-    lost = cumulative_simpson(dissipated, x=time, initial=0.0)
-    missing = (given - given[0]) - (stored - stored[0]) - lost + brought
+            feed_energy += _stieltjes(per_kg(run), run[mass].values)
+    losses = cumulative_simpson(loss_power, x=time, initial=0.0)
+    gap = (supply - supply[0]) - (storage - storage[0]) - losses + feed_energy
     residual = xr.DataArray(
-        missing,
+        gap,
         dims="time",
         attrs={"units": "J", "long_name": f"energy residual of the bond {bond.driver} - {bond.machine}"},
     )
-    moved = float(np.trapezoid(np.abs(tau * w), time))
-    moved = max(moved, 1e-6 * float(np.max(np.abs(stored))), 1e-300)
-    return residual, float(np.max(np.abs(missing))) / moved
+    throughput = float(np.trapezoid(np.abs(tau * w), time))
+    throughput = max(throughput, 1e-6 * float(np.max(np.abs(storage))), 1e-300)
+    return residual, float(np.max(np.abs(gap))) / throughput
 
 
 def certify(
@@ -77,7 +77,7 @@ def _shaft_power(run: xr.Dataset, name: str, terminal: Any, tau: Any, w: Any) ->
     return (run[full].values if full in run else tau) * w
 
 
-def _given(run: xr.Dataset, bond: Bond, tau: Any, w: Any) -> Any:
+def _supply(run: xr.Dataset, bond: Bond, tau: Any, w: Any) -> Any:
     """The energy that the driver has given to the load [J], shape (time,)."""
     full = f"{bond.driver}.load_energy"
     if full in run:
@@ -86,16 +86,16 @@ def _given(run: xr.Dataset, bond: Bond, tau: Any, w: Any) -> Any:
     return cumulative_simpson(power, x=run["time"].values, initial=0.0)
 
 
-def _taken(run: xr.Dataset, bond: Bond) -> tuple[Any, Any]:
+def _storage(run: xr.Dataset, bond: Bond) -> tuple[Any, Any]:
     """The energy that the machine holds or has passed on [J] and the power that it dissipates [W], shape (time,);
     None twice where it does not count them."""
     names = [f"{bond.machine}.{x}" for x in ("kinetic_energy", "potential_energy", "dissipated_power")]
     if any(full not in run for full in names):
         return None, None
-    kinetic, potential, dissipated = (run[full].values for full in names)
-    passed = f"{bond.machine}.load_energy"
-    stored = kinetic + potential
-    return (stored + run[passed].values if passed in run else stored), dissipated
+    kinetic, potential, loss_power = (run[full].values for full in names)
+    onward = f"{bond.machine}.load_energy"
+    storage = kinetic + potential
+    return (storage + run[onward].values if onward in run else storage), loss_power
 
 
 def _stieltjes(y: Any, m: Any) -> Any:

@@ -25,7 +25,7 @@ def export(
     the system of these files, and how each component's was made, in words.
     """
     components: dict[str, Component] = {}
-    made: dict[str, str] = {}
+    origins: dict[str, str] = {}
     files: dict[object, Path] = {}
     for name, component in system.components.items():
         if isinstance(component, ModelComponent) and component.file is None:
@@ -34,8 +34,8 @@ def export(
                 file = folder / f"{model.name}.fmu"
                 if file in files.values():
                     file = folder / f"{model.name}_{name}.fmu"
-                made[name] = export_fmu(model, file, component.start, backend=backend, report=report)
+                origins[name] = export_fmu(model, file, component.start, backend=backend, report=report)
                 files[model] = file
             component = replace(component, file=files[model])
         components[name] = component
-    return replace(system, components=components), made
+    return replace(system, components=components), origins

@@ -86,25 +86,25 @@ def foreign_component(file: Path, role: Role, names: Mapping[str, str] | None = 
     InputError
         also where a variable is missing, or stands on the wrong side: in one line, with what to do.
     """
-    found = fmu_component(file, names)
+    outsider = fmu_component(file, names)
     motor = role == "motor"
-    wanted = {"flange": FLANGE, "load": LOAD}
+    kinds = {"flange": FLANGE, "load": LOAD}
     gives = {FLANGE: "output" if motor else "input", LOAD: "input" if motor else "output"}
-    for name, kind in wanted.items():
-        terminal = found.terminals.get(name)
+    for name, kind in kinds.items():
+        terminal = outsider.terminals.get(name)
         prefix = "load." if kind == LOAD and motor else ""
         for member in _NEEDED[kind]:
             variable = terminal.members.get(member, "") if terminal else prefix + member
-            connector = found.connectors.get(variable)
-            called = found.names.get(variable, variable) or prefix + member
+            connector = outsider.connectors.get(variable)
+            label = outsider.names.get(variable, variable) or prefix + member
             needs = f"a {role} needs the {gives[kind]} {prefix + member} in {_UNITS[member]}"
             if connector is None:
                 raise InputError(
                     f"{file}: has no variable {prefix + member}; {needs}, or a name for it among `names`"
                 )
             if connector.causality != gives[kind]:
-                raise InputError(f"{file}: {called} is of the kind {connector.causality}; {needs}")
-    return found
+                raise InputError(f"{file}: {label} is of the kind {connector.causality}; {needs}")
+    return outsider
 
 
 def _dimension(unit: str | None, definitions: Mapping[str, Any]) -> Mapping[str, Any] | None:
@@ -126,7 +126,7 @@ def _dimension(unit: str | None, definitions: Mapping[str, Any]) -> Mapping[str,
 
 def _with_units(file: Path, terminal: Terminal, connectors: Mapping[str, Connector]) -> dict[str, Connector]:
     """The terminal's variables with the units that they must have."""
-    checked = {}
+    variables = {}
     for member, name in terminal.members.items():
         unit, connector = _UNITS.get(member), connectors[name]
         if unit is None:
@@ -135,25 +135,25 @@ def _with_units(file: Path, terminal: Terminal, connectors: Mapping[str, Connect
             raise InputError(
                 f"{file}: {name} is in {printable(connector.unit)}; must be in {unit} to be joined"
             )
-        checked[name] = replace(connector, unit=unit, dimension=base_units(unit))
-    return checked
+        variables[name] = replace(connector, unit=unit, dimension=base_units(unit))
+    return variables
 
 
 def _by_names(connectors: Mapping[str, Connector]) -> list[Terminal]:
     """Terminals, by the names of variables as ours have them."""
     ends = {name for name, c in connectors.items() if c.causality != "parameter"}
-    found = []
+    terminals = []
     for prefix in _prefixes(ends, _NEEDED[FLANGE]):
         shaft = flange("outflow")
-        found.append(_of(ends, shaft, prefix.rstrip(".") or shaft.name, prefix))
+        terminals.append(_of(ends, shaft, prefix.rstrip(".") or shaft.name, prefix))
     prefixes = _prefixes(ends, _NEEDED[LOAD])
     for prefix in prefixes:
         # beside a load that it shows itself, the one that it takes is that of the machine behind it
         name = "load" if prefix in ("", "load.") else prefix.rstrip(".")
         if prefix == "load." and "" in prefixes:
             name = "machine"
-        found.append(_of(ends, load_terminal(), name, prefix))
-    return found
+        terminals.append(_of(ends, load_terminal(), name, prefix))
+    return terminals
 
 
 def _prefixes(names: Iterable[str], members: Iterable[str]) -> list[str]:
@@ -174,7 +174,7 @@ def _declared(file: Path, ours: Mapping[str, str]) -> list[Terminal]:
         if _TERMINALS not in archive.namelist():
             return []
         root = ElementTree.fromstring(archive.read(_TERMINALS))
-    found = []
+    terminals = []
     for node in root.iter("Terminal"):
         kind, name = node.get("terminalKind", ""), node.get("name", "")
         if kind in (FLANGE, LOAD):
@@ -182,5 +182,5 @@ def _declared(file: Path, ours: Mapping[str, str]) -> list[Terminal]:
                 m.get("memberName", ""): ours.get(m.get("variableName", ""), m.get("variableName", ""))
                 for m in node.iter("TerminalMemberVariable")
             }
-            found.append(Terminal(name, kind, node.get("description", ""), members))
-    return found
+            terminals.append(Terminal(name, kind, node.get("description", ""), members))
+    return terminals

@@ -56,14 +56,14 @@ class ModelComponent:
         model = self.model
         outputs = [v for part in model.parts for v in part.layout.variables]
         states = model.state_layout.variables if model.state_layout else ()
-        listed = {
+        variables_of = {
             "parameter": model.parameter_layout.variables,
             "input": model.input_layout.variables,
             "output": (*states, *outputs),
         }
         return {
             v.name: Connector(v.name, causality, v.unit, base_units(v.unit), float(v.quantity.start or 0.0))
-            for causality, variables in listed.items()
+            for causality, variables in variables_of.items()
             for v in variables
         }
 
@@ -138,12 +138,12 @@ class System:
             # these become names of files, and full names are cut at the first dot
             if not re.fullmatch(r"[A-Za-z_]\w*", name, re.ASCII):
                 raise InputError(f"{shown(name)}: a component's name must be of letters, digits and _")
-        joined: dict[str, str] = {}
+        partners: dict[str, str] = {}
         for joint in self.joints:
             for one, other in (joint, joint[::-1]):
-                if one in joined:
-                    raise InputError(f"{one}: is joined to {joined[one]} and to {other}")
-                joined[one] = other
+                if one in partners:
+                    raise InputError(f"{one}: is joined to {partners[one]} and to {other}")
+                partners[one] = other
         sources: dict[str, str] = {}
         for source, target in self.connections:
             if target in sources:
@@ -192,11 +192,11 @@ class System:
     def connections(self) -> list[Connection]:
         """All connections between variables, those of the joints first."""
         held = () if self.slopes else Layout(PortSlopes).names
-        listed = [c for joint in self.joints for member, c in self._joined(*joint) if member not in held]
+        connections = [c for joint in self.joints for member, c in self._joined(*joint) if member not in held]
         for source, target in self.wires:
             self.connector(source, "output")
             self.connector(target, "input")
-        return [*listed, *self.wires]
+        return [*connections, *self.wires]
 
     def _joined(self, one: str, other: str) -> list[tuple[str, Connection]]:
         """Connections of a joint, by the name of the member."""
@@ -297,7 +297,7 @@ def direct_inputs(component: Component, declared: Mapping[str, set[str] | None])
     return {output: promised(output) if known is None else known for output, known in declared.items()}
 
 
-def ordered(connections: Sequence[Connection], direct: Direct) -> list[tuple[str, list[str]]]:
+def order(connections: Sequence[Connection], direct: Direct) -> list[tuple[str, list[str]]]:
     """Groups of connected outputs, each of one component, in an order in which each follows from those before.
 
     Raises
@@ -352,12 +352,12 @@ def without(system: System, names: Collection[str]) -> System:
     )
 
 
-def held(system: System) -> System:
+def hold_loads(system: System) -> System:
     """The system with every load held constant over a step: the coupling is of first order only."""
     return replace(system, slopes=False)
 
 
-def bridged(system: System, name: str) -> System:
+def bridge(system: System, name: str) -> System:
     """The system without the component `name`, with what drives it joined to what it drives."""
     rest = without(system, (name,))
     ends: dict[str, list[str]] = {}
@@ -389,6 +389,6 @@ def rigid(system: System, line: str) -> System:
         if full not in values:
             raise InputError(f"{full}: is not known, so that there is no twin with a rigid shaft")
     J, ratio, rotor, gear = (values[full] for full in needed)
-    return bridged(system, line).with_values(
+    return bridge(system, line).with_values(
         {f"{driver}.rotor.J": rotor + J / ratio**2, f"{machine}.ratio": gear * ratio}
     )

@@ -182,8 +182,8 @@ class Instance:
         try:
             self._fmi.instantiate(callbacks=self._callbacks, loggingOn=True)
         except Exception as error:
-            said = f": {self.messages[-1]}" if self.messages else ""
-            raise RunError(f"{name}: cannot be instantiated{said}") from error
+            complaint = f": {self.messages[-1]}" if self.messages else ""
+            raise RunError(f"{name}: cannot be instantiated{complaint}") from error
         self._alive = True
         # the functions that a run calls at every step, without fmpy's layer around them, which takes twice their time
         self._library, self._component = self._fmi.dll, self._fmi.component
@@ -200,9 +200,9 @@ class Instance:
     def _failure(self, what: str, status: int) -> RunError:
         if status == _FATAL:
             self._alive = False
-        said = f": {self.messages[-1]}" if self.messages else ""
+        complaint = f": {self.messages[-1]}" if self.messages else ""
         kind = DiscardError if status == _DISCARD else RunError
-        return kind(f"{self.name}: {what} ended with status {status}{said}")
+        return kind(f"{self.name}: {what} ended with status {status}{complaint}")
 
     def _check(self, status: int, what: str) -> None:
         if status > _WARNING:

@@ -122,12 +122,12 @@ class ModelExchange(Simulation):
         self._inputs = self._driven()
         for _ in range(_ROUNDS):
             self._set_inputs(np.nextafter(t, math.inf))
-            asked = [unit.update() for unit in self._units]
-            if not any(again for again, _ in asked):
+            answers = [unit.update() for unit in self._units]
+            if not any(again for again, _ in answers):
                 break
         else:
             raise RunError(f"the event at t = {t:g} s finds no end in {_ROUNDS} rounds")
-        self._next_event = min((time for _, time in asked), default=math.inf)
+        self._next_event = min((time for _, time in answers), default=math.inf)
         for unit, own in zip(self._units, self._slices, strict=True):
             unit.leave_event()
             self._x[own] = unit.states()
@@ -172,10 +172,10 @@ class ModelExchange(Simulation):
         if self._dense is not None:
             self._complete()
         before = float(self._solver.t)
-        said = self._solver.step()
+        message = self._solver.step()
         if self._solver.status == "failed":
             why = f": {self._refused}" if self._refused else ""
-            raise RunError(f"step at t = {before:g} s: the solver gives up ({said}){why}")
+            raise RunError(f"step at t = {before:g} s: the solver gives up ({message}){why}")
         self._dense = self._solver.dense_output()
         self._reached, self._crossed = float(self._solver.t), False
         if self._signs.size:
@@ -185,8 +185,8 @@ class ModelExchange(Simulation):
         """End the last step of the solver, with the events at its end."""
         t, x = self._reached, self._dense(self._reached)
         self._put(t, x, self._within(t))
-        wanted = [unit.completed() for unit in self._units]
-        if self._crossed or any(wanted) or t >= self._until:
+        events = [unit.completed() for unit in self._units]
+        if self._crossed or any(events) or t >= self._until:
             self._pace = getattr(self._solver, "h_abs", None)
             self.events += 1
             self._event(t)

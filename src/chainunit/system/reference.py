@@ -20,7 +20,7 @@ from scipy.integrate import solve_ivp
 from ..engines import MATH, casadi_
 from ..errors import InputError, RunError
 from ..model import Model
-from .graph import ModelComponent, System, held, ordered
+from .graph import ModelComponent, System, hold_loads, order
 from .signals import at_time, corners
 
 
@@ -131,7 +131,7 @@ class _Equations:
 
     def __init__(self, system: System, signals: Mapping[str, Any]) -> None:
         self._units = {name: _traced(name, c) for name, c in system.components.items()}
-        self._connections = held(system).connections
+        self._connections = hold_loads(system).connections
         self._sources = {target: source for source, target in self._connections}
         self.states = [f"{name}.{x}" for name, unit in self._units.items() for x in unit.state_names]
         values = system.values
@@ -153,20 +153,20 @@ class _Equations:
         values = dict(zip(self._outside, casadi.vertsplit(symbols[0]), strict=True))
         values |= zip(self.states, casadi.vertsplit(symbols[1]), strict=True)
         direct = {name: unit.direct for name, unit in self._units.items()}
-        for name, outputs in ordered(self._connections, direct):
+        for name, outputs in order(self._connections, direct):
             missing = [output for output in outputs if f"{name}.{output}" not in values]
             if missing:
                 known, _ = self._call(name, values)
                 values |= {f"{name}.{output}": known[output] for output in missing}
         rates: list[Any] = []
-        shown: dict[str, Any] = {}
+        all_outputs: dict[str, Any] = {}
         for name in self._units:
             known, dx = self._call(name, values)
-            shown |= {f"{name}.{output}": y for output, y in known.items()}
+            all_outputs |= {f"{name}.{output}": y for output, y in known.items()}
             rates.append(dx)
-        self._outputs = list(shown)
+        self._outputs = list(all_outputs)
         self._rates = casadi.Function("rates", symbols, [casadi.cse(casadi.vertcat(*rates))])
-        self._all = casadi.Function("outputs", symbols, [casadi.cse(casadi.vertcat(*shown.values()))])
+        self._all = casadi.Function("outputs", symbols, [casadi.cse(casadi.vertcat(*all_outputs.values()))])
 
     def _call(self, name: str, values: Mapping[str, Any]) -> tuple[dict[str, Any], Any]:
         """Outputs by name and derivatives of a model; inputs that are not known yet are undefined."""
@@ -201,12 +201,12 @@ class _Equations:
             before, x = x, []
             for name, unit in self._units.items():
                 if unit.model.state_layout:
-                    given = {
+                    inputs = {
                         v: known[self._sources.get(f"{name}.{v}", f"{name}.{v}")]
                         for v in unit.model.input_layout.names
                         if self._sources.get(f"{name}.{v}", f"{name}.{v}") in known
                     }
-                    u = unit.model.input_layout.from_names(given)
+                    u = unit.model.input_layout.from_names(inputs)
                     x += unit.model.state_layout.values(unit.model.start(MATH, unit.p, u))
             known |= zip(self.states, x, strict=True)
             outputs = self._all(self._inputs(t), x).full().ravel()

@@ -22,7 +22,7 @@ import xarray as xr
 from ..errors import InputError, InterruptedRunError, RunError
 from ..files import whole
 from . import rows
-from .graph import FmuComponent, System, direct_inputs, ordered
+from .graph import FmuComponent, System, direct_inputs, order
 from .instance import Fmu, Instance, Kind
 from .signals import Profile, at_time
 
@@ -35,8 +35,8 @@ def stoppable() -> Iterator[Callable[[], bool]]:
     """Whether Ctrl-C was pressed, asked between steps: a KeyboardInterrupt inside an FMU would be a fatal error. So
     it is with SIGTERM, where somebody handles it by a KeyboardInterrupt. The KeyboardInterrupt of which nobody was
     told, since nobody asked any more, comes at the end."""
-    caught: list[KeyboardInterrupt] = []
-    told: list[bool] = []
+    interrupts: list[KeyboardInterrupt] = []
+    reports: list[bool] = []
     if threading.current_thread() is not threading.main_thread():
         yield lambda: False
         return
@@ -45,11 +45,11 @@ def stoppable() -> Iterator[Callable[[], bool]]:
         try:
             previous[number](number, frame)
         except KeyboardInterrupt as error:
-            caught.append(error)
+            interrupts.append(error)
 
     def stopped() -> bool:
-        told.extend([True] * len(caught))
-        return bool(told)
+        reports.extend([True] * len(interrupts))
+        return bool(reports)
 
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     previous: dict[int, Any] = {number: handler for number, handler in handlers.items() if callable(handler)}
@@ -60,8 +60,8 @@ def stoppable() -> Iterator[Callable[[], bool]]:
     finally:
         for number, handler in previous.items():
             signal.signal(number, handler)
-        if caught and not told:
-            raise caught[0]
+        if interrupts and not reports:
+            raise interrupts[0]
 
 
 class Simulation(ABC):
@@ -123,19 +123,19 @@ class Simulation(ABC):
 
     def _open(self) -> None:
         """Unpack the FMUs, each file once, and instantiate the components."""
-        opened: dict[Any, Fmu] = {}
+        archives: dict[Any, Fmu] = {}
         for name, component in self.system.components.items():
             if component.file is None:
                 raise InputError(f"{name} ({component.title}): has no FMU yet; export the system first")
             names = component.names if isinstance(component, FmuComponent) else {}
             key = (component.file, *sorted(names.items()))
-            if key not in opened:
-                opened[key] = Fmu(component.file, self.kind, names)
-                for variable in opened[key].variables.values():
+            if key not in archives:
+                archives[key] = Fmu(component.file, self.kind, names)
+                for variable in archives[key].variables.values():
                     connector = component.connectors.get(variable.name)
                     variable.unit = variable.unit or (connector.unit if connector else None)
-            self._fmus[name] = opened[key]
-            self._instances[name] = self.instances(opened[key], name, self._journal)
+            self._fmus[name] = archives[key]
+            self._instances[name] = self.instances(archives[key], name, self._journal)
 
     def _schedule(self) -> list[tuple[Instance, Any, list[tuple[Instance, Any, list[int]]]]]:
         """Groups of connected outputs in an order in which each is final when it is read: of each the instance, the
@@ -145,7 +145,7 @@ class Simulation(ABC):
             for name, component in self.system.components.items()
         }
         transfers = []
-        for name, outputs in ordered(self.system.connections, direct):
+        for name, outputs in order(self.system.connections, direct):
             targets: dict[str, list[tuple[str, int]]] = {}
             for source, target in self.system.connections:
                 giver, _, output = source.partition(".")
@@ -225,8 +225,8 @@ class Simulation(ABC):
     def _transfer(self) -> None:
         for source, outputs, targets in self._transfers:
             values = source.read(outputs)
-            for target, inputs, order in targets:
-                target.write(inputs, [values[i] for i in order])
+            for target, inputs, places in targets:
+                target.write(inputs, [values[i] for i in places])
 
     # -- running
 
@@ -285,26 +285,26 @@ class Simulation(ABC):
         if every < 1 or every != int(every):
             raise InputError(f"every = {every:g}: must be a whole number >= 1")
         n = max(1, math.ceil((stop - start) / step - 1e-9))
-        recorders, watched = self._recorders(names), self._watched(guards or {})
+        recorders, watches = self._recorders(names), self._watched(guards or {})
         room = n // every + 2 if file is None else rows.BLOCK
         failure: RunError | None = None
         try:
             with (
                 stoppable() as stopped,
                 nullcontext() if file is None else whole(file) as part,
-                rows.Rows(recorders, room, part) as kept,
+                rows.Rows(recorders, room, part) as table,
             ):
-                said = _Said(self._journal)
+                complaints = _Complaints(self._journal)
                 try:
-                    self._record(kept, stop, step, n, every, watched, progress, stopped, said)
+                    self._record(table, stop, step, n, every, watches, progress, stopped, complaints)
                 except RunError as error:
-                    failure = said.explained(error)
+                    failure = complaints.explained(error)
         except KeyboardInterrupt:
             # after the last step: the rows are there
             if self.time == start:
                 raise
             failure = self._interrupted()
-        run = kept.dataset() if file is None else xr.open_dataset(file, decode_times=False)
+        run = table.dataset() if file is None else xr.open_dataset(file, decode_times=False)
         if failure is not None:
             failure.partial = run
             raise failure
@@ -314,42 +314,42 @@ class Simulation(ABC):
 
     def _record(
         self,
-        kept: rows.Rows,
+        table: rows.Rows,
         stop: float,
         step: float,
         n: int,
         every: int,
-        watched: Sequence[tuple[Instance, Any, list[float]]],
+        watches: Sequence[tuple[Instance, Any, list[float]]],
         progress: Progress | None,
         stopped: Callable[[], bool],
-        said: _Said,
+        complaints: _Complaints,
     ) -> None:
         """Take `n` steps, or fewer where a guard or an interrupt ends the run."""
         start, often, done = self.time, max(1, n // 200), 0
         self._begin(stop)
-        kept.add(start)
-        said.step()
+        table.add(start)
+        complaints.step()
         for first in range(0, n, rows.BLOCK):
             # the last step is shorter where the end is no multiple of the step
             times = np.minimum(start + step * np.arange(first, min(first + rows.BLOCK, n) + 1), stop)
             for _ in self._steps(times):
                 done += 1
-                passed = any(
+                beyond = any(
                     abs(value) > limit
-                    for instance, handle, limits in watched
+                    for instance, handle, limits in watches
                     for value, limit in zip(instance.read(handle), limits, strict=True)
                 )
                 interrupted = stopped()
-                ended = passed or interrupted or done == n
-                if ended or done % every == 0:
-                    kept.add(self.time)
+                ends = beyond or interrupted or done == n
+                if ends or done % every == 0:
+                    table.add(self.time)
                 if progress and done % often == 0:
                     progress(self.time)
                 if interrupted:
                     raise self._interrupted()
-                if ended:
+                if ends:
                     return
-                said.step()
+                complaints.step()
 
     def _interrupted(self) -> InterruptedRunError:
         return InterruptedRunError(f"interrupted at t = {self.time:g} s")
@@ -361,10 +361,10 @@ class Simulation(ABC):
             driven = sorted(full for full in self.signals if full.startswith(f"{name}."))
             there += [*(f"{name}.{v}" for v in fmu.outputs()), *driven]
         if names is not None:
-            wanted = set(names)
-            for full in sorted(wanted - set(there)):
+            selection = set(names)
+            for full in sorted(selection - set(there)):
                 raise InputError(f"{full}: cannot be kept; must be an output or an input with a signal")
-            there = [full for full in there if full in wanted]
+            there = [full for full in there if full in selection]
         return self._handles(there)
 
     def _watched(self, guards: Mapping[str, float]) -> list[tuple[Instance, Any, list[float]]]:
@@ -406,7 +406,7 @@ class Simulation(ABC):
         self.time = self._saved_at
 
 
-class _Said:
+class _Complaints:
     """What FMUs say in the course of a run, to explain its failure: the call that fails may only pass on what another
     FMU complained of before, or while the values for its step were set."""
 

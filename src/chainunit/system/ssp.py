@@ -75,19 +75,19 @@ def export(
     folder(file.parent)
     contents: dict[str, bytes] = {}
     sources: dict[str, str] = {}
-    made: list[str] = []
-    packed: dict[tuple[object, ...], str] = {}
+    origins: list[str] = []
+    paths: dict[tuple[object, ...], str] = {}
     with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
         for component, interface in interfaces.items():
             model, start = interface.model, _start(interface)
             alike = (model, *sorted(start.items()))
-            if alike not in packed:
+            if alike not in paths:
                 source = f"resources/{model.name}.fmu"
-                packed[alike] = f"resources/{model.name}_{component}.fmu" if source in contents else source
+                paths[alike] = f"resources/{model.name}_{component}.fmu" if source in contents else source
                 fmu = Path(scratch) / f"{model.name}.fmu"
-                made.append(export_fmu(model, fmu, start, backend=backend, report=report))
-                contents[packed[alike]] = fmu.read_bytes()
-            sources[component] = packed[alike]
+                origins.append(export_fmu(model, fmu, start, backend=backend, report=report))
+                contents[paths[alike]] = fmu.read_bytes()
+            sources[component] = paths[alike]
     for component, interface in interfaces.items():
         free = [s for s in interface.of("input") if f"{component}.{s.name}" not in driven]
         contents[_parameter_file(component)] = written(_parameter_set([*interface.of("parameter"), *free]))
@@ -96,7 +96,7 @@ def export(
     with whole(file) as part:
         pack(contents, part)
     parts = ", ".join(f"{component} ({i.model.name})" for component, i in interfaces.items())
-    return f"SSP 1.0, {parts}, {len(system.connections)} connections; {'; '.join(dict.fromkeys(made))}"
+    return f"SSP 1.0, {parts}, {len(system.connections)} connections; {'; '.join(dict.fromkeys(origins))}"
 
 
 def _interfaces(system: System) -> dict[str, Interface]:
@@ -137,18 +137,18 @@ def _root(tag: str, name: str, prefixes: Iterable[str], description: str = "") -
 
 
 def _units(parent: Element, prefix: str, signals: Iterable[Signal]) -> None:
-    listed = SubElement(parent, f"{prefix}:Units")
+    group = SubElement(parent, f"{prefix}:Units")
     for unit in sorted({s.variable.unit for s in signals}):
-        node = SubElement(listed, "ssc:Unit", name=unit)
+        node = SubElement(group, "ssc:Unit", name=unit)
         SubElement(node, "ssc:BaseUnit", {base: str(power) for base, power in base_units(unit).items()})
 
 
 def _parameter_set(signals: Sequence[Signal]) -> Element:
     """The XML tree of an SSV file with the start values of `signals`."""
     root = _root("ssv:ParameterSet", PARAMETER_SET, ("ssv", "ssc"))
-    listed = SubElement(root, "ssv:Parameters")
+    group = SubElement(root, "ssv:Parameters")
     for s in signals:
-        node = SubElement(listed, "ssv:Parameter", name=s.name, description=s.variable.description)
+        node = SubElement(group, "ssv:Parameter", name=s.name, description=s.variable.description)
         SubElement(node, "ssv:Real", value=repr(float(s.start or 0.0)), unit=s.variable.unit)
     _units(root, "ssv", signals)
     return root
