@@ -17,7 +17,7 @@ import pytest
 from event_tables import event_line
 from reports import page_of, pictures, said_of, write
 
-from chainunit import EMPTY, RunError, config
+from chainunit import EMPTY, InputError, RunError, config
 from chainunit.drives.induction_motor import SoftStart
 from chainunit.report import chain_unit, chain_unit_motion, html, page_figures
 from chainunit.report.blocks import at
@@ -442,6 +442,26 @@ def test_a_speed_that_is_not_reached_does_not_head_the_table(study):
     assert all(words in lead(slow) for words in ("answers.steady.speed_mean", "asked for", "▲"))
     assert "crank at 6 rad/s" in said_of(study)
     assert "run.crank_speed" in lead(study) and "asked for" not in lead(study)
+
+
+def test_the_study_file_chooses_the_units(study):
+    """The data stay in SI units."""
+    chosen = config.parse(SHORT + '[report]\nunits = { speed = "rev/min", power = "W" }\n')
+    other = dataclasses.replace(study, config=dataclasses.replace(study.config, units=chosen.units))
+    text = said_of(other)
+    assert "crank at 57.2958 rev/min" in text and "crank at 6 rad/s (57.3 rev/min)" in said_of(study)
+    power = study.answers["steady"].power_peak
+    assert told_as(power, "W", units=chosen.units) in text and told_as(
+        power, "W", units=chosen.units
+    ).endswith(" W")
+    assert as_dict(other) == as_dict(study)
+    for table, words in (
+        ('units = { speed = "rpm" }', 'report.units.speed = "rpm": must be "rad/s" or "rev/min"'),
+        ("unit = 1", "report.unit: unknown key; known here: units"),
+    ):
+        with pytest.raises(InputError) as refused:
+            config.parse(f"{SHORT}[report]\n{table}\n")
+        assert str(refused.value) == words
 
 
 def test_each_overload_factor_says_its_use(study, written):

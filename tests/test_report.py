@@ -212,6 +212,18 @@ def test_a_figure_is_drawn_for_page_and_print_from_one_description(tmp_path, mon
     assert legends == [wanted]
 
 
+def test_a_scale_that_panels_share_holds_all_of_them(tmp_path, monkeypatch):
+    """One end of it given: the other is that of the largest panel, not of the first."""
+    axes = fig.Axis("x"), fig.Axis("y", low=0.0)
+    small, large = (fig.Panel(*axes, (fig.Curve("c", [0.0, 1.0], [0.0, top]),)) for top in (1.0, 10.0))
+    seen = []
+    monkeypatch.setattr(print_figures, "_legend", lambda drawing, axes, columns: seen.extend(axes.flat))
+    figure = fig.Figure("two", "", "", ((small, large),), file="two.png", level=True)
+    print_figures.write([figure], tmp_path, DEFAULT_UNITS)
+    assert [axis.get_ylim() for axis in seen] == [(0.0, pytest.approx(10.5))] * 2
+    assert page_figures.figure(figure, DEFAULT_UNITS).layout.yaxis2.matches == "y"
+
+
 def test_curves_over_the_same_points_are_thinned_together():
     x = np.linspace(0.0, 1.0, 5001)
     straight, bent = fig.Curve("straight", x, x), fig.Curve("bent", x, np.abs(x - 0.3))

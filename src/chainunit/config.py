@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
+from pydantic import BaseModel, ConfigDict
+
 from .drives.cardan import check
 from .drives.dc_motor import DcMotor
 from .drives.gearing import Transmission
@@ -43,13 +45,23 @@ from .studies.sections import (
     Starter,
 )
 from .system.signals import Profile
+from .text import DEFAULT_UNITS, Units, chosen_units
+
+
+class ReportTable(BaseModel):
+    """How the report on a study shows it."""
+
+    model_config = ConfigDict(extra="forbid")
+    units: dict[str, str] = {}
+
 
 _File = file_form(
     "Config",
     {
         name: section.form(section.declared, name, f"{name}.", **section.keys)
         for name, section in SECTIONS.items()
-    },
+    }
+    | {"report": ReportTable},
     feed_forward=(bool, False),
     start=(Literal[STARTS], "direct"),
     organ=(Literal[ORGANS], "two-bar"),
@@ -89,6 +101,8 @@ class Config:
     """names of all that the file sets, such as "machine.crank.m"; everything else is the example's"""
     slips: tuple[Slip, ...] = ()
     """values that look like a slip of the unit"""
+    units: Units = dataclasses.field(default_factory=lambda: DEFAULT_UNITS)
+    """that the report shows numbers in"""
 
     @property
     def turn(self) -> float:
@@ -199,6 +213,7 @@ def _config(
         source=source,
         given=frozenset(_names(data, events)),
         slips=unusual,
+        units=chosen_units(checked.report.units),
         **parts,
     )
     if config.driveline is not None:

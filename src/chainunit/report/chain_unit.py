@@ -51,6 +51,7 @@ def report(study: Study, result: Mapping[str, Any] | None = None) -> b.Report:
         ),
         source=s.line("Study file: {source} · chainunit {chainunit}"),
         failure=s.words("failure") if study.failure is not None else (),
+        units=study.config.units,
     )
 
 
@@ -288,7 +289,7 @@ def _table_of_runs(s: b.Source, study: Study) -> b.Table:
     if not study.reaches:
         asked = "crank at {answers.steady.speed_mean}; {=run.crank_speed} NOT reached"
     title = f"What each run asks of the drive{'; the motor is insufficient' if study.insufficient else ''}"
-    return _over_runs(study, runs, rows, title, plain_line(s.line(asked)))
+    return _over_runs(study, runs, rows, title, plain_line(s.line(asked), study.config.units))
 
 
 def _pins(s: b.Source, study: Study) -> b.Table:

@@ -61,7 +61,12 @@ def _figure(spec: Figure, units: Units) -> Any:
             axes[r, c].sharex(axes[sharing[0], c])
         if figure.level and c and (r, 0) in filled:
             axes[r, c].sharey(axes[r, 0])
-        _panel(axes[r, c], panel, last=r == sharing[-1], first=r == sharing[0])
+        for item in panel.items:
+            _draw(axes[r, c], item)
+    # axes that share a scale have all that is drawn on it by now
+    for r, c, panel in figure.all_panels():
+        sharing = figure.sharing(r, c)
+        _dress(axes[r, c], panel, last=r == sharing[-1], first=r == sharing[0])
     _legend(drawing, axes, columns)
     drawing.suptitle(capital(figure.title))
     return drawing
@@ -80,9 +85,8 @@ def _legend(drawing: Any, axes: Any, columns: int) -> None:
         drawing.legend(found.values(), found.keys(), loc="outside lower center", ncols=count, fontsize=9)
 
 
-def _panel(axis: Any, panel: Panel, *, last: bool, first: bool) -> None:
-    for item in panel.items:
-        _draw(axis, item)
+def _dress(axis: Any, panel: Panel, *, last: bool, first: bool) -> None:
+    """Scales and words of a panel."""
     _scale(axis, panel.x, "x")
     _scale(axis, panel.y, "y")
     if last:

@@ -158,7 +158,7 @@ def _happenings(study: Study, name: str) -> Iterator[tuple[str, str, dict[str, A
         amounts: dict[str, Amount] = {each: (getattr(answers, each), unit) for each, unit in units.items()}
         time, passed, behind = (number(*amount) for amount in amounts.values())
         yield "trip", f"after {time}; {passed} pass it while it opens, {behind} stay behind it", amounts
-    elif name in config.events and answers.recovery_time is None:
+    elif name in config.events and answers.recovery_time is None and study.returns:
         yield "not recovered", "", {}
 
 
