@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +15,16 @@ from scipy.integrate import solve_ivp
 
 from chainunit.engines import MATH, Dual, casadi_, dual, numpy_, slope
 from chainunit.groups.body import Bar, Mass
+from chainunit.groups.chain import Rods
 from chainunit.groups.driver import Crank
 from chainunit.groups.dyad import Dyad
+from chainunit.groups.hanging_chain import HangingChain
 from chainunit.groups.loads import Pin, PinLosses, Processing, Push, Resistance, Weight
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.machines.parts import Force, force
+from chainunit.mechanism.chains import ChainedState
 from chainunit.mechanism.linkage import Linkage
+from chainunit.mechanism.machine import Mechanism
 from chainunit.mechanism.models import (
     AddedInertia,
     DirectMachine,
@@ -256,6 +261,45 @@ def test_the_direct_model_is_the_inverse_of_the_inverse_one(seed):
     assert rates == [u.w, out.a]
     assert need.tau + 0.02 * out.a == pytest.approx(7.0, rel=1e-11)
     assert out.output_bearing.fx == pytest.approx(need.output_bearing.fx, rel=1e-11)
+
+
+def test_a_chain_hangs_on_any_linkage():
+    """Four rods from a ground pin to a point of the output link: power is what bodies and chain store and lose, with
+    any acceleration, by dual numbers along the motion; the torque by the forces is that of virtual work."""
+    p, u, _ = case(3)
+    rods = Rods([0.2, 0.15, 0.2, 0.15], [2.0, 1.0, 1.5, 3.0], [0.3, 0.1, 0.2, 0.1, 0.4])
+    bars = SixBar.linkage(p, u)
+    q, w, a = 2.0, 5.0, 20.0
+
+    def chain(state):
+        resistance = Resistance("", 12.0, p.processing)
+        return HangingChain("wall", "W", rods, state, p.g, resistance, 2)
+
+    def linkage(state):
+        ground = {**bars.ground, "wall": Vec2(-0.6, 0.7)}
+        return replace(bars, ground=ground, loads={**bars.loads, "chain": chain(state)})
+
+    state = [0.5, 0.9, 1.4, 2.0], [0.0, 1.0, -1.0, 0.5]
+    for _ in range(30):
+        m = Mechanism(MATH, linkage(state), q)
+        state = m.linkage.loads["chain"].closed(MATH, m, w)[:2]
+    s = ChainedState(MATH, Mechanism(MATH, linkage(state), q), w)
+    held = s.chains["chain"]
+    assert held.missing.length(MATH) < 1e-12
+    accelerations, _ = held.at(a)
+    theta, omega = state
+    moving = (
+        [Dual(x, v) for x, v in zip(theta, omega, strict=True)],
+        [Dual(v, rate) for v, rate in zip(omega, accelerations, strict=True)],
+    )
+    engine = dual(MATH)
+    along = ChainedState(engine, Mechanism(engine, linkage(moving), Dual(q, w)), Dual(w, a))
+    kinetic, potential, _ = along.chains["chain"].energies(engine, [0.0] * 4)
+    stored = slope(along.kinetic_energy + along.held_energy + kinetic + potential)
+    lost, power = s.lost * w + held.lost(), s.torque(a) * w
+    assert abs(held.torque(held.chain.forces)) > 0.5 and held.lost() > 0.0
+    assert power == pytest.approx(stored + lost, abs=1e-9 * (abs(stored) + abs(lost)))
+    assert s.torque_by_reactions(a) == pytest.approx(s.torque(a) - s.effects["pins"].lost, rel=1e-11)
 
 
 def test_names_follow_from_the_description():

@@ -103,17 +103,3 @@ def reflected(bodies: Iterable[Body]) -> tuple[Any, Any]:
         own, slope = body.inertia()
         J, dJ = J + own, dJ + slope
     return J, dJ
-
-
-def point_load(at: Motion, pin: Motion, force: Vec2) -> Load:
-    """A force at a point of a link, as force and moment about the link's pin."""
-    return force, (at.p - pin.p).cross(force)
-
-
-def total(*loads: Load) -> Load:
-    """The sum of loads about one pin."""
-    force, moment = loads[0]
-    for f, m in loads[1:]:
-        force = force + f
-        moment = moment + m
-    return force, moment

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Protocol
 
 from ..planar import ZERO, Link, Motion, Vec2
 from ..quantities import Value, declaration, quantity
-from .body import Body, point_load
+from .body import Body
 
 Joint = tuple[str, str]
 """A joint of a linkage by the names of its pin and of the link on which its reaction acts."""
@@ -84,7 +84,7 @@ class Acting(Protocol):
 def wrench_at(m: Moving, pin: str, force: Vec2) -> Wrench:
     """The wrench of a force at a pin or point, on the link that carries it."""
     name = m.carrier(pin)
-    return Wrench(name, *point_load(m.pins[pin], m.links[name].pin, force))
+    return Wrench(name, force, (m.pins[pin].p - m.links[name].pin.p).cross(force))
 
 
 class Weight(NamedTuple):
