@@ -14,7 +14,7 @@ from ..engines import numpy_
 from ..text import number
 from .coupling import peaks_on_coupling, remark_on_coupling
 from .judgement import model_verdict
-from .measures import Answers, reaches
+from .measures import Answers
 from .rig import CLOSED
 from .sections import ChainOrgans
 from .shaft import AMPLIFIED, NEAR
@@ -58,7 +58,7 @@ def conclude(study: Study) -> None:
 
 def _on_steady_running(study: Study, steady: Answers) -> None:
     asked, warn = study.config.run.crank_speed, partial(study.remark, "warning")
-    if not reaches(steady.speed_mean, asked):
+    if not study.reaches:
         limit = "the motor's voltage or current is at its limit, or the run is too short to settle."
         slip = "a motor on the line takes the speed that gear ratio and slip give."
         warn(
