@@ -284,10 +284,10 @@ def jolted(
         at = end_motion(rods, theta, omega, xp)
         sweep = Sweep(xp, rods, theta, *nothing)
         # the end's speed at the angles before they change, which is as near as they are
-        turned, _ = sweep.back(sweep.force(end.p - at.p))
+        turns, _ = sweep.back(sweep.force(end.p - at.p))
         jolt = sweep.force(end.p1 - at.p1)
         faster, _ = sweep.back(jolt)
         work = work + 0.5 * jolt.dot(end.p1 + at.p1)
-        theta = [a + d for a, d in zip(theta, turned, strict=True)]
+        theta = [a + d for a, d in zip(theta, turns, strict=True)]
         omega = [w + d for w, d in zip(omega, faster, strict=True)]
     return list(theta), list(omega), work

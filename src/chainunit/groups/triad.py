@@ -68,8 +68,8 @@ class _Rows:
         """The rows of the arms as they lie in the ternary link, at its pose."""
         c, s = xp.cos(pose.theta), xp.sin(pose.theta)
         origin = Vec2(pose.x, pose.y)
-        turned = tuple(Vec2(c * a.x - s * a.y, s * a.x + c * a.y) for a in arms)
-        return cls(turned, tuple(origin + a - p for a, p in zip(turned, pins, strict=True)))
+        arms_now = tuple(Vec2(c * a.x - s * a.y, s * a.x + c * a.y) for a in arms)
+        return cls(arms_now, tuple(origin + a - p for a, p in zip(arms_now, pins, strict=True)))
 
     def solve(self, b: tuple[Any, ...]) -> tuple[Any, Any, Any]:
         """z with row_i . z = b_i."""
@@ -310,8 +310,8 @@ class SolvedTriad(SolvedGroup):
         spin, mixed = t1 * t1 * t1, 3.0 * (t1 * t2)
         b = []
         for r, a, k, leg, p in zip(rows.r, rows.arms, self.pins, legs, outer, strict=True):
-            moved = 3.0 * (k.p1 - leg.pin.p1).dot(k.p2 - leg.pin.p2)
-            b.append(r.dot(p + a.turned() * spin + a * mixed) - moved)
+            centripetal = 3.0 * (k.p1 - leg.pin.p1).dot(k.p2 - leg.pin.p2)
+            b.append(r.dot(p + a.turned() * spin + a * mixed) - centripetal)
         x, y, t3 = rows.solve(tuple(b))
         origin = Vec2(x, y)
         pins = [ternary.third(a, origin, t3) for a in rows.arms]
@@ -371,7 +371,7 @@ def assembly_modes(pins: tuple[Vec2, ...], lengths: tuple[float, ...], arms: tup
     f = (v * a - u * b).squared() - l2 * l2 * det * det
     spectrum = np.fft.fft(f / size**6) / samples
     coefficients = [spectrum[k % samples] for k in range(-order, order + 1)]
-    found: list[Pose] = []
+    modes: list[Pose] = []
     for z in np.roots(coefficients[::-1]):
         if not abs(abs(z) - 1.0) < 1e-4:
             continue
@@ -394,14 +394,14 @@ def assembly_modes(pins: tuple[Vec2, ...], lengths: tuple[float, ...], arms: tup
                 rows = _Rows.at(MATH, pins, arms, pose)
             except (ArithmeticError, ValueError):
                 continue
-            turned = math.remainder(pose.theta, 2.0 * math.pi)
+            angle = math.remainder(pose.theta, 2.0 * math.pi)
             closes = all(
                 abs(r.squared() - l * l) < 1e-9 * size * size for r, l in zip(rows.r, lengths, strict=True)
             )
             if closes and not any(
-                abs(math.remainder(turned - other.theta, 2.0 * math.pi)) < 1e-7
+                abs(math.remainder(angle - other.theta, 2.0 * math.pi)) < 1e-7
                 and math.hypot(pose.x - other.x, pose.y - other.y) < 1e-7 * size
-                for other in found
+                for other in modes
             ):
-                found.append(Pose(pose.x, pose.y, turned))
-    return sorted(found, key=lambda pose: (pose.theta, pose.x, pose.y))
+                modes.append(Pose(pose.x, pose.y, angle))
+    return sorted(modes, key=lambda pose: (pose.theta, pose.x, pose.y))

@@ -197,11 +197,11 @@ class ChainUnit:
         m = self._state(self._inputs(phi, 0.0, 0.0, EMPTY, EMPTY)).m
         per_turn = [m.turns[joint] for joint in PINS]
         step = np.diff(phi / self.p.ratio)
-        turned = []
+        angles = []
         for rate in per_turn:
             rate = np.broadcast_to(rate, phi.shape)
-            turned.append(np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * step)]))
-        return turned
+            angles.append(np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * step)]))
+        return angles
 
     def energy_per_kg(self, side: str, phi: Any, w: Any) -> Any:
         """Kinetic and potential energy of a kilogram of material on the `side` ("left" or "right") [J/kg]:
@@ -280,7 +280,7 @@ class ChainUnit:
     ) -> Modes | None:
         """Small vibration of the organs as chains of `number` rods, the rocker held in the middle: of the loaded side
         with the lowest frequency. None where no side is loaded, weighs anything or hangs."""
-        found = []
+        candidates = []
         for side, loads in (("left", left), ("right", right)):
             lengths, masses = self.organ_rods(side, loads, number)
             if self.p.g > 0.0 and np.all(masses > 0.0):
@@ -288,8 +288,8 @@ class ChainUnit:
                     rest = self.hanging(side, 0.0, loads, number)
                 except GeometryError:
                     continue
-                found.append(modes(lengths, masses * self.p.g, rest, self.p.g))
-        return min(found, key=lambda each: float(each.frequency[0]), default=None)
+                candidates.append(modes(lengths, masses * self.p.g, rest, self.p.g))
+        return min(candidates, key=lambda each: float(each.frequency[0]), default=None)
 
     def rocker_extremes(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """(psi, phi_crank) [rad] at the right and at the left extreme of the rocker."""
@@ -337,9 +337,9 @@ class ChainUnit:
         while low < highest:
             # the pull may fall and rise again with the speed: look for the first loss, not for any
             speeds = np.linspace(low, high, 33)
-            lost = np.flatnonzero(pull(speeds) <= 0.0)
-            if lost.size:
-                i = int(lost[0])
+            losses = np.flatnonzero(pull(speeds) <= 0.0)
+            if losses.size:
+                i = int(losses[0])
                 return float(brentq(pull, speeds[i - 1], speeds[i], xtol=1e-9))
             low, high = high, 2.0 * high
         return math.inf

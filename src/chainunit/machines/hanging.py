@@ -143,11 +143,11 @@ def _least(parts: Any, reach: Any, length: float, weight: float) -> Any:
         # near the minimum values differ by less than rounding; the gradient still tells
         wrong = gradient(x)
         for _ in range(_POLISH):
-            tried = x - np.linalg.solve(curvature(x), wrong)
-            after = gradient(tried)
+            trial = x - np.linalg.solve(curvature(x), wrong)
+            after = gradient(trial)
             if not np.hypot(*after) < np.hypot(*wrong):
                 break
-            x, wrong = tried, after
+            x, wrong = trial, after
     if not np.hypot(*wrong) < 1e-11:
         raise GeometryError(
             f"a chain of {length:g} m between pins {distance:g} m apart: no hanging position was found; must be "
@@ -180,8 +180,8 @@ def modes(lengths: Any, weights: Any, rest: Hanging, g: float) -> Modes:
     along = np.stack([l * np.cos(rest.theta), l * np.sin(rest.theta)])
     free = null_space(along)
     k2, shapes = eigh(free.T @ (free * (l * rest.pull)[:, None]), free.T @ inertia @ free)
-    turned = (free @ shapes).T
-    return Modes(np.sqrt(np.maximum(k2, 0.0)), turned / np.max(np.abs(turned), axis=1, keepdims=True))
+    rotations = (free @ shapes).T
+    return Modes(np.sqrt(np.maximum(k2, 0.0)), rotations / np.max(np.abs(rotations), axis=1, keepdims=True))
 
 
 def split(parts: Sequence[float], number: int) -> tuple[int, ...]:
@@ -189,6 +189,6 @@ def split(parts: Sequence[float], number: int) -> tuple[int, ...]:
     length."""
     first, second = parts
     most = number - 1
-    wanted = round(number * first / (first + second))
-    mine = min(max(1, wanted), most)
+    share = round(number * first / (first + second))
+    mine = min(max(1, share), most)
     return mine, number - mine

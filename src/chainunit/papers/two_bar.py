@@ -104,7 +104,7 @@ def two_bar_error(
 def statement(comparison: TwoBarError) -> list[str]:
     """Where two bars are good enough, in words."""
     lines = []
-    known = np.isfinite(comparison.largest)
+    both_hang = np.isfinite(comparison.largest)
     for limit in LIMITS:
         good = comparison.good(limit)
         if not good.any():
@@ -112,7 +112,7 @@ def statement(comparison: TwoBarError) -> list[str]:
                 f"Nowhere in the range are two bars good to {100 * limit:.0f} % of the organ's weight."
             )
             continue
-        share = 100.0 * good.sum() / known.sum()
+        share = 100.0 * good.sum() / both_hang.sum()
         zetas = [comparison.zeta[row].min() for row in good if row.any()]
         lines.append(
             f"Two bars are good to {100 * limit:.0f} % of the organ's weight, at rocker angles within "

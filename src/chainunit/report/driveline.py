@@ -93,13 +93,13 @@ def _running(analysis: LineAnalysis) -> fig.Mark:
 def _campbell(analysis: LineAnalysis) -> fig.Figure:
     band, running = analysis.band, analysis.rotation
     ends = np.array([0.0, running.speed_high])
-    seen = np.flatnonzero(analysis.steady.exists & ~analysis.steady.unstable)[::4]
+    places = np.flatnonzero(analysis.steady.exists & ~analysis.steady.unstable)[::4]
     damped, frequency = "damped frequency in rotation (Floquet)", analysis.steady.frequency
     middle = 0.5 * (band.least + band.largest)
     crossed = {n: 0.5 * (low + high) for n, (low, high) in analysis.crossings().items()}
     items: tuple[fig.Item, ...] = (
         fig.Shade(band.least, band.largest, "natural frequency over a turn, frozen angle", "y", "band"),
-        fig.Curve(damped, analysis.speed[seen], frequency[seen], 2, "+", joined=False),
+        fig.Curve(damped, analysis.speed[places], frequency[places], 2, "+", joined=False),
         *(fig.Curve(f"order {n}", ends, n * ends, look) for look, n in enumerate(ORDERS)),
         fig.Curve("order 1: parametric resonance at speed = k", ends, ends, 3),
         _running(analysis),
@@ -135,8 +135,8 @@ def _stability(analysis: LineAnalysis) -> fig.Figure:
         items: list[fig.Item] = [fig.Field(grid.speed, grid.bend, z, levels, names, bold), _running(analysis)]
         rows, columns = np.nonzero(~np.isfinite(growth))
         if rows.size:
-            missing = grid.speed[columns], grid.bend[rows]
-            items.append(fig.Curve("no steady motion found", *missing, 1, "x", joined=False))
+            gaps = grid.speed[columns], grid.bend[rows]
+            items.append(fig.Curve("no steady motion found", *gaps, 1, "x", joined=False))
         if grid.joint != "both":
             items.append(fig.Mark(getattr(analysis.line, grid.joint), "bend as given", axis="y", look=3))
         title = f"damping ratio {number(ratio, '1', full=False)}"

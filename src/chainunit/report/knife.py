@@ -94,21 +94,21 @@ def _flywheels(s: b.Source, study: KnifeStudy) -> Iterator[b.Block]:
         return
     rated = ", ".join(f"{{drive.rated_{name}}}" for name in ("power", "speed", "torque", "current"))
     yield b.Text(s.line(f"Motor: {{drive.motor}}, rated {rated}; ratio {{machine.ratio:4}}."))
-    found = wheels(study)
+    runs = wheels(study)
     heads = (
         s.line(f"{{{path}.flywheel}}{f' ({what})' if what else ''}{' stalls' if wheel.stalled else ''}")
-        for what, wheel, path in found
+        for what, wheel, path in runs
     )
     rows = (
         b.TableRow(
-            (v.description, *(s.number(f"{path}.{v.name}") for _, _, path in found)),
+            (v.description, *(s.number(f"{path}.{v.name}") for _, _, path in runs)),
             form="long" if v.name in _MINOR else "both",
         )
         for v in Layout(WheelAnswers).variables
         if v.name != "flywheel"
     )
-    columns = range(1, len(found) + 1)
-    groups = (tuple(columns[i : i + _TABLE_WIDTH]) for i in range(0, len(found), _TABLE_WIDTH))
+    columns = range(1, len(runs) + 1)
+    groups = (tuple(columns[i : i + _TABLE_WIDTH]) for i in range(0, len(runs), _TABLE_WIDTH))
     yield b.Table(tuple(rows), b.heads("flywheel", *heads), title="Flywheels", groups=tuple(groups))
 
 
@@ -285,7 +285,7 @@ def _flywheel(study: KnifeStudy) -> fig.Figure:
             y = factor * run[f"motor.{name}"].values[first:]
             items[axis].append(fig.Curve(number(wheel.flywheel, "kg.m2"), after, y, look))
     x = _angle_axis("crank angle after the blade's top")
-    panels = [fig.Panel(x, axis, tuple(drawn)) for axis, drawn in items.items()]
+    panels = [fig.Panel(x, axis, tuple(curves)) for axis, curves in items.items()]
     return fig.Figure(
         "flywheel",
         "A cut with each flywheel, and the fluctuation of the speed over the inertia",

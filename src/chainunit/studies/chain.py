@@ -234,7 +234,7 @@ def run_turns(
     names = [*outputs, *rods]
     ratio = drive.driven.p.ratio
     step = 2.0 * math.pi / crank_speed / points
-    given = model.parameter_layout.named(p) | {
+    parameters = model.parameter_layout.named(p) | {
         f"{side}.{name}": value
         for side, loads in zip(SIDES, (left, right), strict=True)
         for name, value in Layout(SideLoads).named(loads).items()
@@ -246,7 +246,7 @@ def run_turns(
         try:
             # inside the FMU the angle runs on along the speed: nothing is set any more
             phi = 2.0 * math.pi * start / starts
-            unit.initialize(given | {"phi": phi * ratio, "w": crank_speed * ratio, "a": 0.0}, 0.0)
+            unit.initialize(parameters | {"phi": phi * ratio, "w": crank_speed * ratio, "a": 0.0}, 0.0)
             unit.finish_initialization()
             handle = unit.handle(names)
             rows = np.empty((turns * points, len(names)))
@@ -263,16 +263,16 @@ def run_turns(
             done[0] += 1
             progress(done[0] / starts)
 
-    asked = nullcontext(stopped) if stopped else stoppable()
-    with asked as stop, ThreadPoolExecutor(min(starts, os.cpu_count() or 1)) as pool:
+    guard = nullcontext(stopped) if stopped else stoppable()
+    with guard as stop, ThreadPoolExecutor(min(starts, os.cpu_count() or 1)) as pool:
         rows = list(pool.map(one, range(starts), [stop] * starts))
-    found = np.array(rows).reshape(starts, turns, points, len(names))
+    series = np.array(rows).reshape(starts, turns, points, len(names))
     first = len(outputs)
     each = len(rods) // 2
     return Turns(
         2.0 * math.pi * np.arange(1, points + 1) / points,
-        {name: found[..., k] for k, name in enumerate(outputs)},
-        {side: found[..., first + each * k : first + each * (k + 1)] for k, side in enumerate(SIDES)},
+        {name: series[..., k] for k, name in enumerate(outputs)},
+        {side: series[..., first + each * k : first + each * (k + 1)] for k, side in enumerate(SIDES)},
     )
 
 
@@ -280,11 +280,11 @@ def duty(fmu: Fmu, drive: Drive, crank_speed: float, left: SideLoads, right: Sid
     """The machine with chains over all turns of all starts, of shape (turns, points), where `cycle` gives the one
     turn of two bars: the begin of sizing."""
     chain = drive.chain
-    found = run_turns(
+    sample = run_turns(
         fmu, drive, crank_speed, left, right, ("tau", "J"), starts=int(chain.starts), turns=int(chain.turns)
     )
-    tau, J = (found.values[name].reshape(-1, POINTS) for name in ("tau", "J"))
-    return Cycle(found.angle, tau * drive.driven.p.ratio, SimpleNamespace(J=J, tau=tau))
+    tau, J = (sample.values[name].reshape(-1, POINTS) for name in ("tau", "J"))
+    return Cycle(sample.angle, tau * drive.driven.p.ratio, SimpleNamespace(J=J, tau=tau))
 
 
 def two_bar_pulls(
@@ -319,7 +319,7 @@ def numbers_at(
     others = [f"{side}.{name}" for side in SIDES for name in ("fold_largest", "energy_residual")]
     outputs = ("tau", "power", "rocker.tau", *others, *forces)
     starts, turns = int(chain.starts), int(chain.turns)
-    found = run_turns(
+    sample = run_turns(
         fmu,
         drive,
         crank_speed,
@@ -331,7 +331,7 @@ def numbers_at(
         progress=progress,
         stopped=stopped,
     )
-    values, ratio = found.values, drive.driven.p.ratio
+    values, ratio = sample.values, drive.driven.p.ratio
 
     def peaks(x: Any) -> Any:
         return np.max(np.abs(x), axis=2)
@@ -347,18 +347,18 @@ def numbers_at(
     snatched = np.maximum(*snatch)
     pushed = two_bar_pulls(drive.machine, two.angle, crank_speed, feed.left, feed.right) < 0.0
     duration = 2.0 * math.pi / crank_speed * turns
-    moved = float(np.min(np.mean(np.abs(values["power"]), axis=(1, 2)))) * duration
-    missing = max(float(np.max(np.ptp(values[f"{side}.energy_residual"], axis=(1, 2)))) for side in SIDES)
-    slack = {side: found.pulls[side] < 0.0 for side in SIDES}
+    energy = float(np.min(np.mean(np.abs(values["power"]), axis=(1, 2)))) * duration
+    gap = max(float(np.max(np.ptp(values[f"{side}.energy_residual"], axis=(1, 2)))) for side in SIDES)
+    slack = {side: sample.pulls[side] < 0.0 for side in SIDES}
     all_rods = np.concatenate([slack[side] for side in SIDES], axis=-1)
     crank, rocker = values["tau"] * ratio, values["rocker.tau"]
     medians = np.median(snatched, axis=1)
     of_turns = {"crank_torque": peaks(crank), "rocker_torque": peaks(rocker), "snatch": snatched}
     ends: dict[str, float] = {}
     for name, sizes in of_turns.items():
-        told = quantile(sizes, HIGH)
-        ends |= {f"{name}_high_from": told.low if told else math.nan}
-        ends |= {f"{name}_high_to": told.high if told else math.nan}
+        estimate = quantile(sizes, HIGH)
+        ends |= {f"{name}_high_from": estimate.low if estimate else math.nan}
+        ends |= {f"{name}_high_to": estimate.high if estimate else math.nan}
     return (
         SpeedNumbers(
             speed=crank_speed,
@@ -378,7 +378,7 @@ def numbers_at(
             two_bar_rocker_torque=float(np.max(np.abs(two.outputs.rocker.tau))),
             two_bar_snatch=float(max(two_bar_snatch)),
             two_bar_slack_time=float(np.mean(np.any(pushed, axis=0))),
-            energy_residual=missing / max(moved, 1e-300),
+            energy_residual=gap / max(energy, 1e-300),
             independent_turns=float(min(counted(sizes, HIGH) for sizes in of_turns.values())),
             **ends,
         ),
@@ -428,11 +428,11 @@ def study_chain(
     with stoppable() as stopped, closing(Fmu(file)) as fmu:
 
         def at(k: int, w: float) -> tuple[SpeedNumbers, dict[str, Any]]:
-            def told(share: float) -> None:
+            def report_share(share: float) -> None:
                 report(f"chains at {w:.3g} rad/s", k + share, float(len(others) + 1))
 
-            told(0.0)
-            return numbers_at(fmu, drive, config, w, told, stopped)
+            report_share(0.0)
+            return numbers_at(fmu, drive, config, w, report_share, stopped)
 
         # first the study's own speed, so that an early end costs the sweep alone
         mine, by_rod = at(0, own)
@@ -482,17 +482,17 @@ def bands(rows: Sequence[SpeedNumbers], at_rest: float, reach: float = math.inf)
         return ", and ".join(reasons)
 
     speeds = [n.speed for n in rows]
-    found: list[Band] = []
-    begun: int | None = None
+    critical: list[Band] = []
+    begin: int | None = None
     for k in range(len(rows) + 1):
         now = why(rows[k]) if k < len(rows) else ""
-        if begun is not None and now != why(rows[begun]):
-            low = speeds[begun] - (
-                0.0 if begun == 0 else min(reach, 0.5 * (speeds[begun] - speeds[begun - 1]))
+        if begin is not None and now != why(rows[begin]):
+            low = speeds[begin] - (
+                0.0 if begin == 0 else min(reach, 0.5 * (speeds[begin] - speeds[begin - 1]))
             )
             high = speeds[k - 1] + (0.0 if k == len(rows) else min(reach, 0.5 * (speeds[k] - speeds[k - 1])))
-            found.append(Band(low, high, why(rows[begun])))
-            begun = None
-        if begun is None and now:
-            begun = k
-    return found
+            critical.append(Band(low, high, why(rows[begin])))
+            begin = None
+        if begin is None and now:
+            begin = k
+    return critical

@@ -142,18 +142,18 @@ class Sides:
     def crossings(self) -> dict[str, dict[SideName, list[float]]]:
         """Crank speeds at which one side alone and both ask the same [rad/s], linear between the points, by torque
         ("rocker", "crank") and side."""
-        found: dict[str, dict[SideName, list[float]]] = {}
+        speeds: dict[str, dict[SideName, list[float]]] = {}
         for torque in _TORQUES:
-            found[torque] = {}
+            speeds[torque] = {}
             for side in SIDES:
                 excess = getattr(self, f"{torque}_{side}") - getattr(self, f"{torque}_both")
                 at = np.flatnonzero(np.diff(np.sign(excess)) != 0)
                 slope = np.diff(excess)[at]
-                found[torque][side] = [
+                speeds[torque][side] = [
                     float(self.speed[k] - excess[k] * (self.speed[k + 1] - self.speed[k]) / d)
                     for k, d in zip(at, slope, strict=True)
                 ]
-        return found
+        return speeds
 
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON, with units."""

@@ -125,8 +125,8 @@ class Drive:
         """What the model with chains has beside the parameters of the one with two bars."""
         if self.chain is None:
             return {}
-        given = Layout(type(self.chain)).named(self.chain)
-        return {f"organ.{name}": given[name] for name in Layout(OrganLaw).names}
+        law = Layout(type(self.chain)).named(self.chain)
+        return {f"organ.{name}": law[name] for name in Layout(OrganLaw).names}
 
     @cached_property
     def graph(self) -> System:
@@ -190,8 +190,8 @@ class Drive:
 
     def export(self, folder: Path, backend: Backend | None = None) -> tuple[dict[str, Path], dict[str, str]]:
         """Write the FMUs, with these start values; returns files by component, and how they were made."""
-        exported, made = export(self.graph, folder, backend)
-        return {name: c.file for name, c in exported.components.items() if c.file}, made
+        exported, backends = export(self.graph, folder, backend)
+        return {name: c.file for name, c in exported.components.items() if c.file}, backends
 
     def export_machine(self, folder: Path, backend: Backend | None = None) -> tuple[Path, str]:
         """Write the machine's FMU alone; the same as `export` writes."""
@@ -219,8 +219,8 @@ class Drive:
     def loads(self, feed: Any) -> dict[str, Any]:
         """Signals of the loads in normal running: of the machine, and of the one that the control asks."""
         named = Layout(type(feed)).named(feed)
-        told = {f"model.{name}": value for name, value in named.items()} if self.feed_forward else {}
-        return {f"machine.{name}": value for name, value in named.items()} | told
+        model = {f"model.{name}": value for name, value in named.items()} if self.feed_forward else {}
+        return {f"machine.{name}": value for name, value in named.items()} | model
 
     def machine_parameters(self) -> dict[str, float]:
         """Parameters of the machine by name."""

@@ -176,10 +176,11 @@ def parse(text: str, source: str = "knife") -> KnifeConfig:
         see `load`.
     """
     checked = read_table(_File, toml(text))
-    given = given_values(checked.machine)
-    if "ratio" in given:
+    machine_values = given_values(checked.machine)
+    if "ratio" in machine_values:
         raise InputError(
-            f"machine.ratio = {given['ratio']:g}: the gear belongs to the drive; must be left out, give drive.ratio"
+            f"machine.ratio = {machine_values['ratio']:g}: the gear belongs to the drive; must be left out, give "
+            "drive.ratio"
         )
     train = instance(
         Train, {k: v for k, v in given_values(checked.drive).items() if k in Layout(Train).names}
@@ -187,15 +188,15 @@ def parse(text: str, source: str = "knife") -> KnifeConfig:
     run = instance(CuttingRun, given_values(checked.run))
     _consistent(run)
     motor = _motor(checked.drive.motor)
-    wanted = motor.nameplate.speed / run.crank_speed
-    ratio = train.ratio or wanted
-    if not abs(ratio / wanted - 1.0) < FAR:
+    nominal = motor.nameplate.speed / run.crank_speed
+    ratio = train.ratio or nominal
+    if not abs(ratio / nominal - 1.0) < FAR:
         raise InputError(
             f"drive.ratio = {ratio:g}: with {motor.designation} the crank would turn at "
             f"{motor.nameplate.speed / ratio:.3g} rad/s, run.crank_speed asks for {run.crank_speed:.3g} rad/s; must "
-            f"be > {wanted * (1.0 - FAR):.4g} and < {wanted * (1.0 + FAR):.4g}, or change run.crank_speed"
+            f"be > {nominal * (1.0 - FAR):.4g} and < {nominal * (1.0 + FAR):.4g}, or change run.crank_speed"
         )
-    machine = KnifeDrive.parameter_layout.from_names({**given, "ratio": ratio})
+    machine = KnifeDrive.parameter_layout.from_names({**machine_values, "ratio": ratio})
     try:
         machine = KnifeDrive.check(machine)
     except InputError as error:
@@ -268,8 +269,8 @@ class KnifeStudy:
     @property
     def flywheel_by_hand(self) -> float:
         """Flywheel that keeps the permitted fluctuation by the hand formula [kg m2]; 0 where none is needed."""
-        needed = self.inertia(0.0) * (self.by_hand(0.0) / self.config.run.fluctuation - 1.0)
-        return max(0.0, needed)
+        lack = self.inertia(0.0) * (self.by_hand(0.0) / self.config.run.fluctuation - 1.0)
+        return max(0.0, lack)
 
     @property
     def own_wheel(self) -> Wheel | None:
@@ -389,8 +390,8 @@ def _until_top(
     there."""
     ratio, turn = study.config.machine.ratio, _TURN / study.config.run.crank_speed
     # the last row of a run before lies just behind the top
-    passed = math.floor((phi / ratio - study.statics.top) / _TURN + 1e-9)
-    until = (study.statics.top + (passed + turns) * _TURN) * ratio
+    tops = math.floor((phi / ratio - study.statics.top) / _TURN + 1e-9)
+    until = (study.statics.top + (tops + turns) * _TURN) * ratio
     patience = simulation.time + 2.0 * (turns + 1) * turn
     run = simulation.run(patience, study.config.run.step, guards={"motor.phi": until})
     return run, float(run["motor.phi"][-1]) >= until
@@ -410,14 +411,14 @@ def _measured(study: KnifeStudy, simulation: CoSimulation, wheel: float, phi: fl
 
 
 def _unanswered(study: KnifeStudy, wheel: float, start_time: float | None, residual: float) -> WheelAnswers:
-    known = {
+    numbers = {
         "flywheel": wheel,
         "inertia": study.inertia(wheel),
         "start_time": start_time,
         "fluctuation_by_hand": study.by_hand(wheel),
         "residual": residual,
     }
-    return WheelAnswers(**{name: known.get(name) for name in Layout(WheelAnswers).names})
+    return WheelAnswers(**{name: numbers.get(name) for name in Layout(WheelAnswers).names})
 
 
 def _answers(study: KnifeStudy, wheel: float, run: xr.Dataset, residual: float) -> WheelAnswers:

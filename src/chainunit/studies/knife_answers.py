@@ -107,17 +107,17 @@ def notes(study: KnifeStudy) -> list[str]:
             least.answers,
             f"the hand formula asks for {_kg_m2(by_hand)}" if by_hand else "nor is it by hand",
         )
-        said = (
+        sentence = (
             f"A fluctuation of {_percent(permitted)} takes a flywheel of {_kg_m2(least.flywheel)} at least, found "
             f"to {_percent(CLOSE)} of the fluctuation; {hand}"
             if least.flywheel
             else f"For a fluctuation of {_percent(permitted)} no flywheel is needed; {hand}"
         )
         if by_hand:
-            said += ", as it leaves out that the motor's torque rises where the speed falls"
+            sentence += ", as it leaves out that the motor's torque rises where the speed falls"
         if a.fluctuation is None:
             lines.append(
-                f"{said}. But the motor does not come up to speed with it, or stalls in the first cut."
+                f"{sentence}. But the motor does not come up to speed with it, or stalls in the first cut."
             )
         else:
             lent = a.stored_share_most
@@ -128,7 +128,7 @@ def notes(study: KnifeStudy) -> list[str]:
                 f"the RMS current is {_percent(a.current_share)} of the rated",
                 f"the start takes {number(a.start_time, 's')}",
             ]
-            lines.append(f"{said}. {'With it' if least.flywheel else 'Without'} {', '.join(words)}.")
+            lines.append(f"{sentence}. {'With it' if least.flywheel else 'Without'} {', '.join(words)}.")
     if turn.cut_path > 0.0:
         lines.append(
             f"Work of a cut {number(turn.cut_work, 'J')}; force times path through the stack "

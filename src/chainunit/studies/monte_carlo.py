@@ -177,16 +177,16 @@ def draw(config: Config, number: int) -> Draw:
 
 def one(task: Task, number: int, simulation: CoSimulation) -> Sample:
     """Run the overload of that number from the steady state that `simulation` has saved."""
-    config, drive, drawn = task.config, task.drive, draw(task.config, number)
-    run, trip = config.run, drawn.trip_torque
-    event = task.steady + drawn.offset
+    config, drive, chance = task.config, task.drive, draw(task.config, number)
+    run, trip = config.run, chance.trip_torque
+    event = task.steady + chance.offset
     stop = event + config.monte_carlo.duration
     guards = {"motor.tau": trip / drive.ratio} if config.coupling else None
-    done = task.rig.follow(simulation, drawn.event, event, stop, guards=guards).run
-    angle = float(np.interp(event, done["time"].values, drive.crank_motion(done)[0]))
+    series = task.rig.follow(simulation, chance.event, event, stop, guards=guards).run
+    angle = float(np.interp(event, series["time"].values, drive.crank_motion(series)[0]))
     tripped = simulation.time < stop - 0.5 * run.step
     # from the saved state on: a lump may come in the middle of a step
-    window = Window(Phase.EVENT, done, drive, (), run.crank_speed)
+    window = Window(Phase.EVENT, series, drive, (), run.crank_speed)
     stalls = not tripped and read_measure("stall_time", window) is not None
     return Sample(
         crank_angle=angle % (2.0 * math.pi),
@@ -202,8 +202,8 @@ def row_of(task: Task, digest: str, number: int) -> dict[str, Any]:
     """The result of the run of that number, as a row of the file."""
     simulation = _prepared(task, digest)
     layout = Layout(Sample)
-    drawn = draw(task.config, number)
-    named = {"run": number, "side": drawn.event.side or None, "drawn": drawn.values}
+    chance = draw(task.config, number)
+    named = {"run": number, "side": chance.event.side or None, "drawn": chance.values}
     try:
         return {**named, "failed": None, **layout.named(one(task, number, simulation))}
     except InterruptedRunError:
@@ -226,27 +226,25 @@ def read(file: Path) -> tuple[dict[int, dict[str, Any]], int]:
         return rows, left_out
     with file.open("rb") as lines:
         for line in lines:
-            found = _checked(line)
-            if found is None:
+            row = _checked(line)
+            if row is None:
                 left_out += line.endswith(b"\n")
-            elif rows.setdefault(found["run"], found) is not found:
+            elif rows.setdefault(row["run"], row) is not row:
                 left_out += 1
-                if rows[found["run"]] != found:
-                    twice.add(found["run"])
+                if rows[row["run"]] != row:
+                    twice.add(row["run"])
     return {number: row for number, row in rows.items() if number not in twice}, left_out + len(twice)
 
 
 def _checked(line: bytes) -> dict[str, Any] | None:
     """The row of a line, or None where it is none."""
     try:
-        found = _Row.model_validate_json(line).model_dump()
+        row = _Row.model_validate_json(line).model_dump()
     except ValidationError:
         return None
-    missing = {name for name in Layout(Sample).names if found[name] is None}
-    whole_row = (
-        missing <= {"trip_torque"} if found["failed"] is None else len(missing) == len(Layout(Sample).names)
-    )
-    return found if whole_row else None
+    gaps = {name for name in Layout(Sample).names if row[name] is None}
+    whole_row = gaps <= {"trip_torque"} if row["failed"] is None else len(gaps) == len(Layout(Sample).names)
+    return row if whole_row else None
 
 
 @dataclass(frozen=True)
@@ -263,27 +261,27 @@ class MonteCarloResult:
     def quantiles(self) -> dict[str, dict[str, Estimate]]:
         """Quantiles of every answer, and shares of runs that stall or trip, each with its interval; a quantile of
         which the number of runs tells nothing is left out."""
-        found: dict[str, dict[str, Estimate]] = {}
+        estimates_of: dict[str, dict[str, Estimate]] = {}
         for v in Layout(Sample).variables:
             values = [row[v.name] for row in self.rows if row[v.name] is not None]
             if not values or v.name in ("event", "crank_angle"):
                 continue
             if v.name in ("stalls", "trips"):
-                found[v.name] = {"share": share(sum(x > 0.5 for x in values), len(values))}
+                estimates_of[v.name] = {"share": share(sum(x > 0.5 for x in values), len(values))}
                 continue
             estimates = {f"q{100 * q:.0f}": quantile(values, q) for q in QUANTILES}
-            found[v.name] = {name: each for name, each in estimates.items() if each is not None}
-        return found
+            estimates_of[v.name] = {name: each for name, each in estimates.items() if each is not None}
+        return estimates_of
 
     @property
     def remark(self) -> str:
         """Which quantiles the runs do not tell, in words; empty where they tell all."""
-        done = len(self.rows) - self.failed
-        missing = [q for q in QUANTILES if done < runs_needed(q)]
-        if not missing:
+        count = len(self.rows) - self.failed
+        omitted = [q for q in QUANTILES if count < runs_needed(q)]
+        if not omitted:
             return ""
-        each = ", ".join(f"the {100 * q:.0f} % quantile takes {runs_needed(q)}" for q in missing)
-        return f"{done} runs are too few for some quantiles: {each} (monte_carlo.runs)."
+        each = ", ".join(f"the {100 * q:.0f} % quantile takes {runs_needed(q)}" for q in omitted)
+        return f"{count} runs are too few for some quantiles: {each} (monte_carlo.runs)."
 
     @property
     def sides(self) -> dict[SideName, int]:
@@ -329,12 +327,12 @@ def run(
     file = folder / f"monte_carlo_{digest}.jsonl"
     rows, left_out = read(file)
     resumed = len(rows)
-    wanted = int(task.config.monte_carlo.runs)
-    missing = [k for k in range(wanted) if k not in rows]
+    count = int(task.config.monte_carlo.runs)
+    open_runs = [k for k in range(count) if k not in rows]
     workers = workers or os.cpu_count() or 1
     what = "overloads at random"
-    done = wanted - len(missing)
-    report(what, done, wanted)
+    complete = count - len(open_runs)
+    report(what, complete, count)
     if left_out or (file.exists() and not file.read_bytes().endswith(b"\n")):
         # a line that is no row, or was cut off by a kill, must not run into the next one
         with whole(file) as part:
@@ -343,7 +341,7 @@ def run(
         out = file.open("a", encoding="utf-8")
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_begin) as pool, out:
         waiting: set[Future[dict[str, Any]]] = set()
-        numbers = iter(missing)
+        numbers = iter(open_runs)
         try:
             while True:
                 # a few at a time: a study may have a million
@@ -357,24 +355,22 @@ def run(
                 with writing(file):
                     out.writelines(_line(row) for row in new)
                     out.flush()
-                done += len(ended)
-                report(what, done, wanted)
+                complete += len(ended)
+                report(what, complete, count)
         except BrokenProcessPool as error:
             raise RunError(
-                f"a process of the random overloads was ended from outside after {len(rows)} of {wanted} runs; "
+                f"a process of the random overloads was ended from outside after {len(rows)} of {count} runs; "
                 "run the study again to go on"
             ) from error
         except OSError as error:
             raise RunError(
-                f"a process of the random overloads failed after {len(rows)} of {wanted} runs "
+                f"a process of the random overloads failed after {len(rows)} of {count} runs "
                 f"({error.strerror or error}); run the study again to go on"
             ) from error
         except KeyboardInterrupt as error:
             pool.shutdown(wait=False, cancel_futures=True)
-            raise InterruptedRunError(
-                f"interrupted after {len(rows)} of {wanted} random overloads"
-            ) from error
-    return MonteCarloResult([rows[k] for k in sorted(rows) if k < wanted], file, resumed, left_out)
+            raise InterruptedRunError(f"interrupted after {len(rows)} of {count} random overloads") from error
+    return MonteCarloResult([rows[k] for k in sorted(rows) if k < count], file, resumed, left_out)
 
 
 def _line(row: Mapping[str, Any]) -> str:

@@ -104,8 +104,8 @@ class Rig:
     def event_signals(self, event: Event, begin: float, state: Mapping[str, float]) -> dict[str, OverTime]:
         """The signals of the event, by full name, where it begins at `begin` [s] with the outputs `state`."""
         normal = {name: value for name, (_, value) in self._inputs.items()}
-        given = event.signals(normal, begin, state)
-        return {self._inputs[name][0]: signal for name, signal in given.items()}
+        signals = event.signals(normal, begin, state)
+        return {self._inputs[name][0]: signal for name, signal in signals.items()}
 
     def signals(
         self, given: Mapping[str, OverTime] | None = None, *, ramp: bool = False
@@ -143,11 +143,11 @@ class Rig:
         steady_from = self.config.settled
         run = simulation.run(stop, self.step, progress, guards=guards)
         while stop - 0.5 * self.step <= simulation.time < longest:
-            missing, steady_from = self._missing(run, steady_from)
-            if missing is None:
+            lack, steady_from = self._missing(run, steady_from)
+            if lack is None:
                 break
             # at the speed that is asked at most; what is still missing then is seen in the next round
-            stop = min(longest, stop + max(missing * self.config.turn, self.step))
+            stop = min(longest, stop + max(lack * self.config.turn, self.step))
             run = joined([run, simulation.run(stop, self.step, progress, guards=guards)])
         return run, steady_from, stop
 
@@ -184,15 +184,15 @@ class Rig:
             simulation.signals = self.signals(before)
             pieces.append(simulation.run(begin, self.step, progress))
             state = {name: float(pieces[0][f"machine.{name}"][-1]) for name in event.reads}
-        given = self.event_signals(event, begin, state)
-        simulation.signals = self.signals(given)
+        signals = self.event_signals(event, begin, state)
+        simulation.signals = self.signals(signals)
         pieces.append(simulation.run(stop, self.step, progress, guards=guards))
         jumps = {
             full: Jump(begin, value, after)
             for full, value in before.items()
-            if not isinstance(after := given[full], Profile)
+            if not isinstance(after := signals[full], Profile)
         }
-        return Transient(event, begin, joined(pieces), given, jumps)
+        return Transient(event, begin, joined(pieces), signals, jumps)
 
     def coast(self, transient: Transient, run: xr.Dataset, stop: float, file: Path) -> xr.Dataset:
         """The machine of the FMU `file` behind the coupling that opened at the end of the `run`, with the loads that
@@ -230,8 +230,8 @@ class Rig:
     ) -> tuple[dict[str, float], dict[str, float]]:
         """Compare a run with the monolithic solution of the same signals, from the states `start` on or from rest:
         the differences of torque and speed in parts of their peaks, and the states at its end."""
-        given = transient.signals if transient else {}
-        signals: dict[str, Any] = dict(self.signals(given, ramp=start is None))
+        profiles = transient.signals if transient else {}
+        signals: dict[str, Any] = dict(self.signals(profiles, ramp=start is None))
         if transient:
             signals |= transient.jumps
         rows = np.unique(np.append(np.arange(0, run.sizes["time"], 10), run.sizes["time"] - 1))
@@ -248,8 +248,8 @@ class Rig:
         if time <= 0.0:
             return run, 0.0
         release = simulation.run(simulation.time + time, min(self.step, time))
-        passed = float(np.trapezoid(release["motor.tau"] * release["motor.w"], release["time"]))
-        return joined([run, release]), passed
+        energy = float(np.trapezoid(release["motor.tau"] * release["motor.w"], release["time"]))
+        return joined([run, release]), energy
 
 
 DIFFERENCE = "_difference_to_monolithic"
@@ -258,5 +258,5 @@ DIFFERENCE = "_difference_to_monolithic"
 
 def joined(pieces: list[xr.Dataset]) -> xr.Dataset:
     """One run from pieces that follow each other; of the instant that two share the later holds."""
-    kept = [piece.isel(time=slice(None, -1)) for piece in pieces[:-1]]
-    return xr.concat([*kept, pieces[-1]], "time", data_vars="all") if kept else pieces[-1]
+    shortened = [piece.isel(time=slice(None, -1)) for piece in pieces[:-1]]
+    return xr.concat([*shortened, pieces[-1]], "time", data_vars="all") if shortened else pieces[-1]

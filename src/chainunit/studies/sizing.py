@@ -116,13 +116,13 @@ class SizingResult:
     @property
     def answer(self) -> str:
         """The result of sizing, in a sentence; with the words of `rank`."""
-        tried = f"{len(self.candidates)} of {self.motors} were tried"
+        count = f"{len(self.candidates)} of {self.motors} were tried"
         if self.weak:
-            tried += f", {self.weak} {'is' if self.weak == 1 else 'are'} too weak by the nameplate"
+            count += f", {self.weak} {'is' if self.weak == 1 else 'are'} too weak by the nameplate"
         if self.chosen:
-            return f"{self.best.motor.designation} is {self.best.reason} ({tried})"
+            return f"{self.best.motor.designation} is {self.best.reason} ({count})"
         return (
-            f"no motor of the catalogue fits ({tried}); {self.best.motor.designation} is {self.best.reason}"
+            f"no motor of the catalogue fits ({count}); {self.best.motor.designation} is {self.best.reason}"
         )
 
     def as_dict(self) -> dict[str, Any]:
@@ -172,8 +172,8 @@ def size(
     InputError
         for a catalogue that cannot be read, or that has no motor with the poles that are asked.
     """
-    asked = config.sizing
-    assert asked is not None
+    limits = config.sizing
+    assert limits is not None
     report("the machine at constant speed", 0.0, 1.0)
     duty = duty_of(config, folder, backend)
     numbers = duty.numbers
@@ -187,35 +187,35 @@ def size(
             "turns of all starts of the chains."
         )
     motors = [
-        m for m in catalogue(config.catalogue) if asked.poles_least <= m.nameplate.poles <= asked.poles_most
+        m for m in catalogue(config.catalogue) if limits.poles_least <= m.nameplate.poles <= limits.poles_most
     ]
     # from below what the mean power and RMS torque need, so that the first that fits is the smallest
-    needed = max(numbers.power_mean, numbers.torque_rms * config.run.crank_speed)
+    power = max(numbers.power_mean, numbers.torque_rms * config.run.crank_speed)
     motors.sort(key=lambda m: (m.nameplate.power, abs(m.nameplate.poles - 4.0)))
     if not motors:
         raise InputError(
-            f"sizing.poles_least = {asked.poles_least:g}, sizing.poles_most = {asked.poles_most:g}: the catalogue "
+            f"sizing.poles_least = {limits.poles_least:g}, sizing.poles_most = {limits.poles_most:g}: the catalogue "
             "has no motor with so many poles"
         )
-    strong = [m for m in motors if m.nameplate.power >= 0.7 * needed]
+    strong = [m for m in motors if m.nameplate.power >= 0.7 * power]
     if not strong:
         notes.append(
-            f"No motor of the catalogue has 0.7 times the power of the cycle, {0.7 * needed:.3g} W: the largest were "
+            f"No motor of the catalogue has 0.7 times the power of the cycle, {0.7 * power:.3g} W: the largest were "
             "tried."
         )
         strong = [m for m in motors if m.nameplate.power == motors[-1].nameplate.power]
-    found: list[Candidate] = []
+    candidates: list[Candidate] = []
     files: Mapping[str, Path] = {}
     for k, motor in enumerate(strong):
-        if len(found) >= asked.candidates and any(c.fits for c in found):
+        if len(candidates) >= limits.candidates and any(c.fits for c in candidates):
             break
         report(f"co-simulating {motor.designation}", float(k), float(len(strong)))
         candidate = proposed(config, motor, duty)
         if not files:
             files, _ = candidate.drive.export(folder, backend)
-        found.append(with_flywheel(config, candidate, duty, files))
-    rank(found)
-    return SizingResult(config, duty, found, notes, len(motors), len(motors) - len(strong))
+        candidates.append(with_flywheel(config, candidate, duty, files))
+    rank(candidates)
+    return SizingResult(config, duty, candidates, notes, len(motors), len(motors) - len(strong))
 
 
 def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[str, Path]) -> Candidate:
@@ -226,7 +226,7 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
     it, too."""
     whole = max(0.0, duty.numbers.inertia_wanted / bare.drive.ratio**2 - bare.drive.parameters.rotor.J)
 
-    def tried(share: float) -> Candidate:
+    def trial_with(share: float) -> Candidate:
         p = bare.drive.parameters
         p = dataclasses.replace(p, rotor=dataclasses.replace(p.rotor, J=p.rotor.J + share * whole))
         drive = dataclasses.replace(bare.drive, parameters=p)
@@ -239,11 +239,11 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
         hopeless = any(sizes.get(name, 0.0) > 1.0 for name in _WORSE_WITH_INERTIA)
         return hopeless or not 1.0 < sizes.get("speed", 0.0) < math.inf
 
-    best, below = tried(0.0), 0.0
+    best, below = trial_with(0.0), 0.0
     if even(best):
         return best
     for share in (0.03, 0.1, 0.3, 1.0):
-        best = tried(share)
+        best = trial_with(share)
         if even(best):
             break
         below = share
@@ -251,7 +251,7 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
         return best
     for _ in range(3):
         middle = 0.5 * (below + share)
-        candidate = tried(middle)
+        candidate = trial_with(middle)
         if even(candidate):
             best, share = candidate, middle
         else:
@@ -261,8 +261,8 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
 
 def proposed(config: Config, motor: CatalogueMotor, duty: Duty) -> Candidate:
     """A motor with the gear ratio at which the crank has its speed, without a flywheel."""
-    asked, gear = config.sizing, config.gear
-    assert asked is not None
+    limits, gear = config.sizing, config.gear
+    assert limits is not None
     plate = motor.nameplate
     p = motor.identify().parameters
     synchronous, rated_speed, rated_torque = plate.synchronous, plate.speed, plate.torque
@@ -282,14 +282,14 @@ def proposed(config: Config, motor: CatalogueMotor, duty: Duty) -> Candidate:
     slip_hz = (synchronous - rated_speed) * plate.poles / (4.0 * math.pi)
     inverter = config.starter.inverter
     if follows:
-        given = inverter.slip or slip_hz / rated_torque
-        inverter = dataclasses.replace(inverter, on=1.0, slip=given)
+        slip = inverter.slip or slip_hz / rated_torque
+        inverter = dataclasses.replace(inverter, on=1.0, slip=slip)
     p = dataclasses.replace(
         p,
         rotor=dataclasses.replace(p.rotor, J=p.rotor.J + gear.J, d=p.rotor.d + drag),
         soft_start=soft,
         inverter=inverter,
-        ambient=dataclasses.replace(p.ambient, T=asked.ambient),
+        ambient=dataclasses.replace(p.ambient, T=limits.ambient),
     )
     machine = config.machine.replace({"ratio": ratio})
     drive = Drive(InductionMotor, p, machine, follows, rated_current=plate.rated_current, chain=config.chain)

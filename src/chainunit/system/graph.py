@@ -384,11 +384,11 @@ def rigid(system: System, line: str) -> System:
     values = system.values
     driver = next((bond.driver for bond in system.bonds if bond.machine == line), "what drives it")
     machine = next((bond.machine for bond in system.bonds if bond.driver == line), "what it drives")
-    needed = (f"{line}.J4", f"{line}.ratio", f"{driver}.rotor.J", f"{machine}.ratio")
-    for full in needed:
+    names = (f"{line}.J4", f"{line}.ratio", f"{driver}.rotor.J", f"{machine}.ratio")
+    for full in names:
         if full not in values:
             raise InputError(f"{full}: is not known, so that there is no twin with a rigid shaft")
-    J, ratio, rotor, gear = (values[full] for full in needed)
+    J, ratio, rotor, gear = (values[full] for full in names)
     return bridge(system, line).with_values(
         {f"{driver}.rotor.J": rotor + J / ratio**2, f"{machine}.ratio": gear * ratio}
     )
