@@ -9,6 +9,7 @@ import logging
 import math
 import os
 import re
+import secrets
 import shutil
 import tempfile
 import threading
@@ -62,9 +63,10 @@ class Fmu:
         self.file, self.kind = file, kind
         if not Path(file).is_file():
             raise InputError(f"{file}: no such FMU")
-        self.folder = tempfile.mkdtemp(prefix="chainunit_fmu_")
-        _unpacked.add(self.folder)
+        self.folder = str(Path(tempfile.gettempdir()) / f"chainunit_fmu_{secrets.token_hex(8)}")
+        _unpacked.add(self.folder)  # before it is there: a signal may end the process between any two lines
         try:
+            os.mkdir(self.folder, 0o700)
             extract(str(file), unzipdir=self.folder)
             self.description = read_model_description(self.folder, validate=False)
             self.interface = self._interface()
