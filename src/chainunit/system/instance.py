@@ -66,7 +66,7 @@ class Fmu:
         self.folder = str(Path(tempfile.gettempdir()) / f"chainunit_fmu_{secrets.token_hex(8)}")
         _unpacked.add(self.folder)  # before it is there: a signal may end the process between any two lines
         try:
-            os.mkdir(self.folder, 0o700)
+            Path(self.folder).mkdir(0o700)
             extract(str(file), unzipdir=self.folder)
             self.description = read_model_description(self.folder, validate=False)
             self.interface = self._interface()
