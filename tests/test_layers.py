@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import re
 import xml.etree.ElementTree as ET
@@ -61,6 +62,18 @@ def test_no_modules_import_each_other_in_a_circle():
     added = [circle for circle in circles if not any(circle <= known for known in CIRCLES)]
     assert not added
     assert len(circles) == len(CIRCLES), "a circle is mended: take it out of CIRCLES"
+
+
+def test_no_two_classes_share_a_name():
+    """A model's own parameters, inputs, states and outputs apart."""
+    places: dict[str, list[str]] = {}
+    for file in sorted(HOUSE.PACKAGE.rglob("*.py")):
+        for node in ast.walk(ast.parse(file.read_text("utf-8"))):
+            if isinstance(node, ast.ClassDef):
+                places.setdefault(node.name, []).append(file.relative_to(HOUSE.PACKAGE).as_posix())
+    own = {"Parameters", "Inputs", "States", "Outputs"}
+    assert {name: files for name, files in places.items() if len(files) > 1 and name not in own} == {}
+    assert own <= set(places)
 
 
 def test_the_scan_sees_every_way_of_importing(tmp_path, monkeypatch):

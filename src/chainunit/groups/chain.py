@@ -63,7 +63,7 @@ class Sweep:
     """One pass over a chain at given angles: accelerations and pin forces from the acceleration of A2.
 
     Carried from A1 rod by rod is the acceleration of each pin as a_k = Phi_k f_k + beta_k, with Phi symmetric and
-    positive: the articulated compliance of what hangs before the pin. At A2, where the acceleration is known, f_N
+    positive: the articulated compliance of the part before the pin. At A2, where the acceleration is known, f_N
     follows, and a pass back gives all forces and angular accelerations. The cost grows with N, not with its cube,
     and the chain stays closed at the level of accelerations, to rounding.
 

@@ -75,7 +75,7 @@ def heads(*titles: Line) -> tuple[Column, ...]:
 
 @dataclass(frozen=True)
 class Share:
-    """A cell: how much of a limit is used, and of what."""
+    """A cell: how much of a limit is used, and of which."""
 
     used: Number
     of: Line = ()
@@ -208,7 +208,7 @@ def _matches(node: Any, path: str) -> Iterator[Any]:
 
 @dataclass(frozen=True)
 class Source:
-    """Makes numbers and words of what stands in a `result`."""
+    """Makes numbers and words of the entries of a `result`."""
 
     result: Mapping[str, Any]
 

@@ -216,7 +216,7 @@ class _Drawing:
         )
 
     def _sample(self, name: str, place: dict[str, Any], **style: Any) -> None:
-        """A name in the legend of what is no trace."""
+        """A name in the legend for an item that is no trace."""
         legend = self._legend(name)
         if legend["showlegend"]:
             self.figure.add_scatter(x=[None], y=[None], **style, **legend, **place)

@@ -129,7 +129,7 @@ class Window:
         return min(BURNT, (self.steady or self).settled_temperature)
 
     def mean(self, of: str | Callable[[xr.Dataset], Any]) -> float:
-        """Mean over the time of whole turns, of a variable or of what is read from them."""
+        """Mean over the time of whole turns, of a variable or of a value read from them."""
         return mean(self.turns, of(self.turns) if callable(of) else self.drive.series(self.turns, of))
 
     def rms(self, of: str | Callable[[xr.Dataset], Any]) -> float:

@@ -107,5 +107,5 @@ def share(count: int, runs: int) -> Estimate:
 
 def runs_needed(q: float) -> int:
     """The least number of independent runs of which the quantile `q` has an interval: all of n lie on one side of it
-    with a probability of q^n or (1 - q)^n, which must be within half of what `CONFIDENCE` leaves."""
+    with a probability of q^n or (1 - q)^n, which must be within half of the rest of `CONFIDENCE`."""
     return math.ceil(math.log(0.5 * (1.0 - CONFIDENCE)) / math.log(max(q, 1.0 - q)))
