@@ -16,6 +16,7 @@ from ..ports import PortSlopes
 from ..quantities import Layout, Quantity, Variable, complaint
 from . import chain_unit
 from .chain_unit import PINS, Chamber, ChamberForces, Inputs, Outputs, Parameters, SideLoads
+from .crank_rocker import rocker_extremes
 from .hanging import Hanging, Modes, modes, rods, split
 
 _XP = numpy_()
@@ -295,7 +296,7 @@ class ChainUnit:
         """(psi, phi_crank) [rad] at the right and at the left extreme of the rocker."""
         p = self.p
         extremes = []
-        for psi, sense in zip(chain_unit.rocker_extremes(MATH, p), (1.0, -1.0), strict=True):
+        for psi, sense in zip(rocker_extremes(MATH, p), (1.0, -1.0), strict=True):
             x, y = p.h * math.sin(psi) + p.c, -p.h * math.cos(psi) + p.hy
             extremes.append((psi, math.atan2(sense * x, sense * y) % (2.0 * math.pi)))
         return extremes[0], extremes[1]

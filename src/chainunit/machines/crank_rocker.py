@@ -70,6 +70,38 @@ def speed_change(xp: Any, r: Any, l: Any, h: Any, b: Any) -> Any:
     return (math.pi + theta) / (math.pi - theta)
 
 
+def rocker_extremes(xp: Any, p: Any) -> tuple[Any, Any]:
+    """Largest and smallest rocker angle psi [rad], where crank and coupler lie on one line.
+
+    Eqs. (14), (15) of paper 001, for any frame.
+    """
+    b, to_bearing = xp.sqrt(p.c * p.c + p.hy * p.hy), xp.atan2(p.c, p.hy)
+    right, left = (angle_at_pivot(xp, p.h, b, reach) - to_bearing for reach in (p.l + p.r, p.l - p.r))
+    return right, left
+
+
+_FAR = 1e300  # more than any length; times a length of either sign it picks one of two limits
+
+
+def half_width_range(xp: Any, e: Any, l1: Any, l2: Any, swing: Any, z: Any = math.inf) -> tuple[Any, Any]:
+    """Least and largest half width [m] at which both organs close wherever the rocker stands within +-`swing` [rad];
+    both ends are singular, but for 0. Empty where the least is not below the largest.
+
+    The distance of A2 from A1 must stay above |l1 - l2| and below l1 + l2; over the swing its square is within
+    (z -+ e sin(swing))^2 + (e cos(swing))^2. Above e cos(swing), |l1 - l2| leaves out half widths about e sin(swing):
+    then it is the range on the side of these on which `z` lies. With l2 = l1 - e the range begins at 2 e sin(swing).
+    """
+    reach = e * xp.sin(swing)
+    drop2 = e * e - reach * reach
+    short2 = (l1 - l2) * (l1 - l2) - drop2
+    left_out = xp.sqrt(xp.maximum(short2, 0.0))
+    whole = _FAR * xp.maximum(-short2, 0.0)
+    low = reach + left_out - whole - _FAR * xp.maximum(reach - z, 0.0)
+    high = reach - left_out + whole + _FAR * xp.maximum(z - reach, 0.0)
+    longest = xp.sqrt(xp.maximum((l1 + l2) * (l1 + l2) - drop2, 0.0)) - reach
+    return xp.maximum(low, 0.0), xp.minimum(high, longest)
+
+
 TURNS = Requirement(
     "r", "m", "the crank cannot turn", ("l", "h", "b"), "|O1 C| must be > |l - h| and < l + h for any crank"
 )

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..engines import MATH
 from ..machines.api import EMPTY, ChainUnit
-from ..machines.chain_unit import half_width_range
+from ..machines.crank_rocker import half_width_range
 from ..studies.cycle import overload_factors
 from .table import PICK
 
