@@ -23,7 +23,7 @@ from typing import Any
 from ..errors import InputError
 from ..integrate import Solver
 from ..mechanism.chains import ChainedState
-from ..mechanism.models import AddedInertia, Turning, TurningStates, acceleration
+from ..mechanism.models import AddedInertia, LinkageModel, Turning, TurningStates, acceleration
 from ..model import Model, Part, Requirement
 from ..ports import PortSlopes, Start
 from ..quantities import Layout, declaration, group
@@ -68,18 +68,33 @@ _MASSES = tuple(
 )
 
 
-def _masses(p: Any) -> Iterator[tuple[Any, Any, Any]]:
-    for masses in (p.left, p.right):
-        yield masses.wall_mass, 0.0, math.inf
-        yield masses.web_mass, 0.0, math.inf
-
-
 class ChainedModel(Model):
-    """A model of the chain unit with chains. Its own integrator controls its error to `tolerance`."""
+    """A model of the chain unit with chains. Its own integrator controls its error to `tolerance`.
 
+    `bars` is the model with two bars that has the same shaft; `shaft` names the states of the shaft, none where its
+    motion is given.
+    """
+
+    bars: type[LinkageModel]
     organs: Organs
+    shaft: tuple[str, ...] = ()
     controlled = True
     start_required = _HANGS
+
+    def __init_subclass__(cls) -> None:
+        cls.required = (*cls.bars.required, *_MASSES)
+        cls.terminals = cls.bars.terminals
+        cls.start_unknowns = cls.organs.unknowns
+        cls.start_rounds = 100 if cls.start_unknowns else 0
+        super().__init_subclass__()
+
+    @classmethod
+    def requirements(cls, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
+        """Those of two bars, and masses that move."""
+        yield from cls.bars.requirements(xp, p)
+        for masses in (p.left, p.right):
+            yield masses.wall_mass, 0.0, math.inf
+            yield masses.web_mass, 0.0, math.inf
 
     @staticmethod
     def internal_step(xp: Any, p: Any) -> Any:
@@ -92,9 +107,11 @@ class ChainedModel(Model):
         return p.tolerance
 
     @classmethod
-    def at_crank(cls, p: Any, u: Any, x: Any) -> tuple[Any, Any]:
-        """Angle [rad] and speed [rad/s] of the crank; at the start, without states, those that it starts with."""
-        raise NotImplementedError
+    def at_crank(cls, p: Any, u: Any, x: Any = None) -> tuple[Any, Any]:
+        """Angle [rad] and speed [rad/s] of the crank; without states those at the start."""
+        if not cls.shaft:
+            return u.phi / p.ratio, u.w / p.ratio
+        return (p.phi_start / p.ratio, p.w_start / p.ratio) if x is None else (x.phi / p.ratio, x.w / p.ratio)
 
     @classmethod
     def start_limits(cls, xp: Any, p: Any, u: Any, x: Any) -> Iterator[tuple[Any, Any, Any]]:
@@ -104,12 +121,25 @@ class ChainedModel(Model):
     @classmethod
     def start_guess(cls, xp: Any, p: Any, u: Any) -> list[Any]:
         """See `Organs.guess`."""
-        return cls.organs.guess(xp, p, u, cls.at_crank(p, u, None)[0])
+        return cls.organs.guess(xp, p, u, cls.at_crank(p, u)[0])
 
     @classmethod
     def start_improved(cls, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> list[Any]:
         """See `Organs.improved`."""
-        return cls.organs.improved(xp, p, u, cls.at_crank(p, u, None)[0], z)
+        return cls.organs.improved(xp, p, u, cls.at_crank(p, u)[0], z)
+
+    @classmethod
+    def started(cls, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> Any:
+        """See `Organs.started`."""
+        shaft = {name: getattr(p, f"{name}_start") for name in cls.shaft}
+        assert cls.States is not None
+        return cls.States(**shaft, **cls.organs.started(xp, p, u, *cls.at_crank(p, u), z))
+
+    @classmethod
+    def closed(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+        """See `Organs.closed`."""
+        shaft = [getattr(x, name) for name in cls.shaft]
+        return [*shaft, *cls.organs.closed(xp, p, u, x, *cls.at_crank(p, u, x))]
 
     @classmethod
     def shared(cls, xp: Any, p: Any, u: Any, x: Any) -> ChainedState:
@@ -171,35 +201,11 @@ def _flexible(walls: int, webs: int) -> type[ChainedModel]:
             f"Forces in a chain unit whose organs are chains of {chains.number} rods, {walls} in the wall and {webs} "
             "in the web: from motor angle and speed to torque, load port and every support reaction"
         )
-        organs = chains
+        bars, organs = ChamberForces, chains
         Parameters = Parameters
         Inputs = Inputs
         States = declared_class("States", (), both(chains.States))
-        terminals = ChamberForces.terminals
         input_rates = MappingProxyType({"phi": "w", "w": "a"})
-        start_unknowns, start_rounds = chains.unknowns, 100 if chains.unknowns else 0
-        required = (*ChamberForces.required, *_MASSES)
-
-        @staticmethod
-        def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
-            """Those of two bars, and masses that move."""
-            yield from ChamberForces.requirements(xp, p)
-            yield from _masses(p)
-
-        @classmethod
-        def at_crank(cls, p: Any, u: Any, x: Any) -> tuple[Any, Any]:
-            """As the motor says."""
-            return u.phi / p.ratio, u.w / p.ratio
-
-        @classmethod
-        def started(cls, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> Any:
-            """See `Organs.started`."""
-            return cls.States(**chains.started(xp, p, u, *cls.at_crank(p, u, None), z))
-
-        @classmethod
-        def closed(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
-            """See `Organs.closed`."""
-            return chains.closed(xp, p, u, x, *cls.at_crank(p, u, x))
 
         @classmethod
         def derivatives(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
@@ -244,39 +250,10 @@ def _turning(chains: Organs) -> type[ChainedModel]:
             f"A chain unit that turns by itself, with organs of {chains.number} rods: from motor torque to angle, "
             "speed, acceleration and every support reaction"
         )
-        organs = chains
+        bars, organs, shaft = DirectChainUnit, chains, ("phi", "w")
         Parameters = DirectChainParameters
         Inputs = DirectInputs
         States = declared_class("States", (TurningStates,), both(chains.States))
-        terminals = DirectChainUnit.terminals
-        start_unknowns, start_rounds = chains.unknowns, 100 if chains.unknowns else 0
-        required = (*DirectChainUnit.required, *_MASSES)
-
-        @staticmethod
-        def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
-            """Those of two bars, and masses that move."""
-            yield from DirectChainUnit.requirements(xp, p)
-            yield from _masses(p)
-
-        @classmethod
-        def at_crank(cls, p: Any, u: Any, x: Any) -> tuple[Any, Any]:
-            """As the states say."""
-            return (
-                (p.phi_start / p.ratio, p.w_start / p.ratio)
-                if x is None
-                else (x.phi / p.ratio, x.w / p.ratio)
-            )
-
-        @classmethod
-        def started(cls, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> Any:
-            """See `Organs.started`."""
-            sides = chains.started(xp, p, u, *cls.at_crank(p, u, None), z)
-            return cls.States(phi=p.phi_start, w=p.w_start, **sides)
-
-        @classmethod
-        def closed(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
-            """See `Organs.closed`."""
-            return [x.phi, x.w, *chains.closed(xp, p, u, x, *cls.at_crank(p, u, x))]
 
         @classmethod
         def derivatives(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
