@@ -69,7 +69,7 @@ def a_report(units=DEFAULT_UNITS):
             note_title="why",
         ),
         b.Text(S.estimate("band")),
-        *S.said(),
+        *S.conclusions(),
         b.Text("fine", "fine", "long"),
         b.Given((S.given("Run", Run, "run"),)),
         a_figure(),

@@ -63,13 +63,13 @@ def minor(variable: Variable) -> bool:
 
 
 def series(study: Study, run: str) -> dict[str, Any]:
-    """Time after the event, crank torque and speed, motor current of a run where it is known, each of the shape
+    """Time after the event, crank torque and speed, motor current of a run where it is current, each of the shape
     (time,)."""
     rows, drive = study.runs[run], study.drive
-    known = {} if drive.foreign else {"current": rows[f"motor.{drive.motor.current}"].values}
+    current = {} if drive.foreign else {"current": rows[f"motor.{drive.motor.current}"].values}
     return {
         "time": rows["time"].values - (event_time(study, run) or 0.0),
         "torque": drive.crank_torque(rows),
         "speed": drive.crank_motion(rows)[1],
-        **known,
+        **current,
     }

@@ -267,7 +267,7 @@ class Source:
         items = enumerate(at(self.result, path))
         return [self.words(f"{path}.{i}.text" if isinstance(x, Mapping) else f"{path}.{i}") for i, x in items]
 
-    def said(self) -> Iterator[Text | Judgement]:
+    def conclusions(self) -> Iterator[Text | Judgement]:
         """The warnings and the notes."""
         yield from (Judgement("warning", each) for each in self.lines("warnings"))
         yield from (Text(each, "note") for each in self.lines("notes"))

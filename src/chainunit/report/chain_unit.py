@@ -59,7 +59,7 @@ def report(study: Study, result: Mapping[str, Any] | None = None) -> b.Report:
 
 
 def _opening(s: b.Source, study: Study) -> Iterator[b.Block]:
-    asked = s.line(
+    question = s.line(
         "Which motor, gear and flywheel does this chain unit need? Its crank turns at "
         if "sizing" in s.result
         else "What does the drive of this chain unit have to give? A motor turns the crank through a gear of ratio "
@@ -70,15 +70,15 @@ def _opening(s: b.Source, study: Study) -> Iterator[b.Block]:
         "{=feed.right.processing_force}."
     )
     if study.answers:
-        asked += s.line(
+        question += s.line(
             " The machine starts from rest{ramp} and is evaluated over {=run.turns} {turns} when steady.",
             ramp=s.line(" in {=run.ramp}") if study.drive.follows else "",
             turns="turn" if study.config.run.turns == 1.0 else "turns",
         )
     if names := study.overloads:
         words = "; ".join(read.title(study, name) for name in names)
-        asked += line(f" Then come overloads, each by itself: {words}.")
-    yield b.Text(asked, form="long")
+        question += line(f" Then come overloads, each by itself: {words}.")
+    yield b.Text(question, form="long")
     ratio = () if "sizing" in s.result else ("machine.ratio",)
     feed = (f"feed.{name}" for name in Layout(type(study.config.feed)).names)
     rows = (
@@ -132,8 +132,8 @@ def _answer(s: b.Source, study: Study) -> Iterator[b.Block]:
     nearest = s.result["sizing"].get("nearest") if "sizing" in s.result else None
     if nearest is not None:
         best = f"sizing.candidates.{nearest}"
-        said = f" All runs are with {{{best}.motor}}, which is insufficient: {{{best}.reason}}."
-        yield b.Judgement("alarm", line(Strong("No motor of the catalogue fits."), s.line(said)), form="long")
+        rest = f" All runs are with {{{best}.motor}}, which is insufficient: {{{best}.reason}}."
+        yield b.Judgement("alarm", line(Strong("No motor of the catalogue fits."), s.line(rest)), form="long")
     answers = s.result["answers"]
     if answers:
         reference = "steady" if "steady" in answers else next(iter(answers))
@@ -183,9 +183,9 @@ def _card(s: b.Source, study: Study, family: str, members: list[tuple[str, Varia
     lines = [joined(line(f"{kind} ", _number(s, study, run, v)) for kind, v in small)] if small else []
     kind, v = large[0]
     sizes = {name: s.value(f"answers.{name}.{v.name}") for name in study.overloads}
-    known = {name: abs(size) for name, size in sizes.items() if size is not None}
-    if known:
-        worst = max(known, key=lambda name: known[name])
+    magnitudes = {name: abs(size) for name, size in sizes.items() if size is not None}
+    if magnitudes:
+        worst = max(magnitudes, key=lambda name: magnitudes[name])
         peak = Strong(_number(s, study, worst, v))
         lines.append(line(f"overload: {kind} ", peak, f", {read.title(study, worst)}"))
     numbers = ((_number(s, study, run, v), kind or read.title(study, run)) for kind, v in large)
@@ -285,11 +285,11 @@ def _table_of_runs(s: b.Source, study: Study) -> b.Table:
         if any(answers[run][v.name]["value"] is not None for run in runs)
         or (v.name == "recovery_time" and study.returns and study.overloads)
     )
-    asked = "crank at {=run.crank_speed}"
+    head = "crank at {=run.crank_speed}"
     if not study.reaches:
-        asked = "crank at {answers.steady.speed_mean}; {=run.crank_speed} NOT reached"
+        head = "crank at {answers.steady.speed_mean}; {=run.crank_speed} NOT reached"
     title = f"What each run asks of the drive{'; the motor is insufficient' if study.insufficient else ''}"
-    return _over_runs(study, runs, rows, title, plain_line(s.line(asked), study.config.units))
+    return _over_runs(study, runs, rows, title, plain_line(s.line(head), study.config.units))
 
 
 def _pins(s: b.Source, study: Study) -> b.Table:
@@ -383,11 +383,11 @@ def _basis(s: b.Source, study: Study) -> Iterator[b.Block]:
         else s.words("control")
     )
     versions = {"Python": platform.python_version()} | {name: _version(name) for name in _VERSIONS}
-    made = "".join(f", {name} {version}" for name, version in versions.items())
+    libraries = "".join(f", {name} {version}" for name, version in versions.items())
     rows = (
         *(b.TableRow((f"{name} FMU", s.words(f"fmus.{name}"))) for name in s.result["fmus"]),
         b.TableRow(("speed control", control)),
-        b.TableRow(("versions", s.line("chainunit {chainunit}{made}", made=made))),
+        b.TableRow(("versions", s.line("chainunit {chainunit}{libraries}", libraries=libraries))),
     )
     yield b.Table(rows, title="How it was made", numeric=False, form="long")
     traced = (

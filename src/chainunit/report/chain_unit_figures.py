@@ -111,8 +111,8 @@ def _turn(s: b.Source, study: Study) -> fig.Figure:
     }
     for look, (name, c) in enumerate(study.statics.cycles.items()):
         angle = np.append(c.angle, 2.0 * math.pi)
-        for drawn, y in zip(items.values(), (c.crank_torque, c.outputs.rocker.tau), strict=True):
-            drawn.append(fig.Curve(name, angle, np.append(y, y[0]), look))
+        for curves, y in zip(items.values(), (c.crank_torque, c.outputs.rocker.tau), strict=True):
+            curves.append(fig.Curve(name, angle, np.append(y, y[0]), look))
     return fig.Figure(
         "turn",
         "Torque over a crank turn at constant speed",
@@ -198,9 +198,9 @@ def _speed_loop(study: Study) -> fig.Figure:
 
 
 def _chains(study: Study) -> fig.Figure:
-    found = study.chain
-    assert found is not None
-    rows = found.sweep
+    result = study.chain
+    assert result is not None
+    rows = result.sweep
     speed = np.array([n.speed for n in rows])
     x = fig.Axis("crank speed", "rad/s", "speed", low=float(speed[0]), high=float(speed[-1]))
     # on a narrow screen, too, no label covers another
@@ -208,12 +208,12 @@ def _chains(study: Study) -> fig.Figure:
         fig.Mark(
             at, words=f"mode {mode}" + (f", order {order}" if order > 1 else ""), look="thin", upright=True
         )
-        for mode, order, at in found.within_sweep(0.05)
+        for mode, order, at in result.within_sweep(0.05)
     ]
     marks: list[fig.Item] = [
-        *(fig.Shade(band.low, band.high, "to avoid") for band in found.avoid),
-        *(fig.Mark(at, look="thin") for _, _, at in found.within_sweep()),
-        fig.Mark(found.own.speed, "the study's speed", look=2),
+        *(fig.Shade(band.low, band.high, "to avoid") for band in result.avoid),
+        *(fig.Mark(at, look="thin") for _, _, at in result.within_sweep()),
+        fig.Mark(result.own.speed, "the study's speed", look=2),
     ]
 
     def compared(median: Any, two: Any) -> list[fig.Item]:
@@ -236,7 +236,7 @@ def _chains(study: Study) -> fig.Figure:
     panels.append((fig.Axis("time slack", "1", "percent", low=-0.04, high=1.04), slack))
     return fig.Figure(
         "chains",
-        f"Chains and two bars over the crank speed: {found.starts} starts of {found.turns} turns",
+        f"Chains and two bars over the crank speed: {result.starts} starts of {result.turns} turns",
         "Peaks of rocker torque and crank torque in a turn over the crank speed, chains and two bars, and below the "
         "share of the time in which a rod is slack; speeds to avoid are shaded, critical speeds are lines.",
         _stacked(x, panels),
@@ -287,7 +287,7 @@ def _transient(s: b.Source, study: Study, name: str) -> fig.Figure:
         + ("" if event is None else " The event is marked by a dashed line; the loads change in the shade."),
         _stacked(
             fig.Axis("time" if event is None else "time after the event", "s", low=low, high=high),
-            ((_SERIES[of], (*drawn, *marks(of == "torque"))) for of, drawn in items.items()),
+            ((_SERIES[of], (*curves, *marks(of == "torque"))) for of, curves in items.items()),
         ),
         s.line(_after(s, study, name)) if event is not None else (),
         "start_up.png" if name == "start_up" else "",

@@ -105,8 +105,8 @@ def _positions(
     for side in SIDES if study.drive.chain is not None else ():
         a1, b, a2 = (joints[name] for name in (f"A1 {side}", f"B {side}", "A2"))
         if f"machine.{side}.theta_1" in part:
-            moving = _chain(p, part, side, rods)
-            between, v = [a1 + pin.p for pin in moving[1:-1]], moving[walls].p1
+            chain = _chain(p, part, side, rods)
+            between, v = [a1 + pin.p for pin in chain[1:-1]], chain[walls].p1
             law = Resistance(f"B {side}", loads[side].processing_force, p.processing)
             processing[side] = v * -law.per_speed(numpy_(), v.squared())
         else:
@@ -120,8 +120,8 @@ def _positions(
 def _run(study: Study, name: str, interval: float, rods: tuple[int, int]) -> Clip:
     run, share = study.runs[name], study.drive.machine.p.web_share
     time = run["time"].values
-    wanted = np.arange(time[0], time[-1] + 0.5 * interval, interval)
-    part = run.isel(time=np.unique(np.minimum(np.searchsorted(time, wanted), len(time) - 1)))
+    instants = np.arange(time[0], time[-1] + 0.5 * interval, interval)
+    part = run.isel(time=np.unique(np.minimum(np.searchsorted(time, instants), len(time) - 1)))
 
     def value(series: str) -> Any:
         return part[f"machine.{series}"].values

@@ -28,11 +28,11 @@ def spoken(name: str) -> str:
 
 def sizing(s: b.Source, study: Study) -> Iterator[b.Block]:
     """What a drive was sized for, its candidates with how much of each limit they take, and which was chosen."""
-    found = s.result["sizing"]
-    chosen, nearest, candidates = (found.get(name) for name in ("chosen", "nearest", "candidates"))
-    best = nearest if chosen is None else chosen
+    section = s.result["sizing"]
+    choice, nearest, candidates = (section.get(name) for name in ("chosen", "nearest", "candidates"))
+    best = nearest if choice is None else choice
     ranked = _ranked(candidates, best) if candidates else []
-    if chosen is None and candidates:
+    if choice is None and candidates:
         reasons = (
             line(
                 Strong(s.words(f"sizing.candidates.{i}.motor")),
@@ -45,13 +45,13 @@ def sizing(s: b.Source, study: Study) -> Iterator[b.Block]:
         yield b.Judgement("alarm", words, items=tuple(reasons), form="long")
     if best is not None:
         yield from _best(
-            s, f"sizing.candidates.{best}", "Motor" if chosen is not None else "Insufficient motor"
+            s, f"sizing.candidates.{best}", "Motor" if choice is not None else "Insufficient motor"
         )
-    if "coupling" in found.get("protection", {}):
+    if "coupling" in section.get("protection", {}):
         yield b.Text(s.words("sizing.protection.coupling"))
     yield from (b.Text(each, form="long") for each in s.lines("sizing.notes"))
     if candidates:
-        if "tried" in found:
+        if "tried" in section:
             weak = "; too weak by the nameplate: {=sizing.weak}" if s.value("sizing.weak") else ""
             tried = "Tried: {=sizing.tried} of {=sizing.motors} motors of the catalogue"
             yield b.Text(s.line(f"{tried}{weak}."), form="long")
@@ -64,7 +64,7 @@ def sizing(s: b.Source, study: Study) -> Iterator[b.Block]:
         # the sentence on the coupling stands above, and is no cell of a narrow table
         leaves = [
             leaf
-            for key, below in (found.get(name) or {}).items()
+            for key, below in (section.get(name) or {}).items()
             if not isinstance(below, str)
             for leaf in _leaves(below, f"sizing.{name}.{key}", spoken(key))
         ]
@@ -126,7 +126,7 @@ def _leaf(s: b.Source, path: str) -> Line:
     return s.number(path, given=path.startswith("sizing.asked."), none="none")
 
 
-def _ranked(candidates: list[Any], chosen: int | None) -> list[int]:
+def _ranked(candidates: list[Any], choice: int | None) -> list[int]:
     """The chosen candidate, the ones that fit, then the rest by how much it fails."""
 
     def utilisation(candidate: Any) -> float:
@@ -135,7 +135,7 @@ def _ranked(candidates: list[Any], chosen: int | None) -> list[int]:
 
     return sorted(
         range(len(candidates)),
-        key=lambda i: (i != chosen, _RANK.get(candidates[i]["verdict"], 9), utilisation(candidates[i])),
+        key=lambda i: (i != choice, _RANK.get(candidates[i]["verdict"], 9), utilisation(candidates[i])),
     )
 
 

@@ -26,7 +26,7 @@ _JOINTS = {
 def report(study: DrivelineStudy) -> b.Report:
     """The report."""
     s, analysis = b.Source(as_dict(study)), study.analysis
-    answer = (b.Table(tuple(b.TableRow(row) for row in _rows(s, analysis))), *s.said())
+    answer = (b.Table(tuple(b.TableRow(row) for row in _rows(s, analysis))), *s.conclusions())
     figures = (_campbell(analysis), _stability(analysis), _resonance(analysis), _ratio(analysis))
     given = b.Given(
         (s.given("Driveline", analysis.line, "driveline"), s.given("Running", analysis.rotation, "running"))

@@ -135,12 +135,12 @@ class Figure:
     """Panels in rows. Those of a column with the same x axis share it, and their cursor; with `level`, those of a row
     share the scale of y.
 
-    `file` names the picture in print. `seen` tells the figure to who does not see it.
+    `file` names the picture in print. `alt` tells the figure to a reader who does not see it.
     """
 
     name: str
     title: str
-    seen: str
+    alt: str
     panels: tuple[tuple[Panel | None, ...], ...]
     caption: Line = ()
     file: str = ""
@@ -183,30 +183,30 @@ def along(item: Item) -> dict[str, str]:
 
 def in_units(figure: Figure, units: Units) -> Figure:
     """The same with all values in the units in which they are shown; its axes name them."""
-    known: dict[tuple[int, float, float], Any] = {}
+    cache: dict[tuple[int, float, float], Any] = {}
 
     def values(axis: Axis, x: Any) -> Any:
         """Values on an axis; the same object for the same object, so that curves over one x stay so."""
         _, factor, offset = scales(axis.unit, axis.kind, units)[0]
         key = (id(x), factor, offset)
-        if key not in known:
-            shown = factor * np.asarray(x, float) + offset
+        if key not in cache:
+            scaled = factor * np.asarray(x, float) + offset
             # x is kept, so that no other object gets its identity
-            known[key] = float(shown) if shown.ndim == 0 else shown, x
-        return known[key][0]
+            cache[key] = float(scaled) if scaled.ndim == 0 else scaled, x
+        return cache[key][0]
 
-    def panel(given: Panel) -> Panel:
-        axes = {"x": given.x, "y": given.y}
+    def panel(original: Panel) -> Panel:
+        axes = {"x": original.x, "y": original.y}
         items = (
             replace(item, **{name: values(axes[on], getattr(item, name)) for name, on in along(item).items()})
-            for item in given.items
+            for item in original.items
         )
         ends = (
             replace(axis, low=axis.low and values(axis, axis.low), high=axis.high and values(axis, axis.high))
             for axis in axes.values()
         )
         x, y = (_named(axis, units) for axis in ends)
-        return replace(given, x=x, y=y, items=tuple(items))
+        return replace(original, x=x, y=y, items=tuple(items))
 
     return replace(figure, panels=tuple(tuple(each and panel(each) for each in row) for row in figure.panels))
 

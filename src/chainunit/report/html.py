@@ -1,7 +1,7 @@
 """A report as one page that needs nothing else, neither files nor a network.
 
 Every number in its text is an element that names its place in the result, which the page carries whole
-(``<script id="result">``). Curves and the moving machine are of the series, thinned out.
+(``<script id="result">``). Curves and the animation machine are of the series, thinned out.
 """
 
 from __future__ import annotations
@@ -58,17 +58,17 @@ def render(report: b.Report) -> str:
         if (content := page.blocks(b.of_form(section.blocks, "long")))
     ]
     title = report.title or report.kind
-    drawn = ",".join(
+    figures = ",".join(
         f"{json.dumps(figure.name)}:{page_figures.figure(figure, report.units).to_json()}"
         for figure in report.figures
         if figure.on_page
     )
-    moving = next((block for block in report.blocks("long") if isinstance(block, motion.Animation)), None)
+    animation = next((block for block in report.blocks("long") if isinstance(block, motion.Animation)), None)
     embedded = {
         "result": json.dumps(report.result, allow_nan=False, ensure_ascii=False),
-        "figures": f"{{{drawn}}}",
+        "figures": f"{{{figures}}}",
         "pictures": json.dumps(
-            moving and motion.pictures(moving, report.units), allow_nan=False, separators=(",", ":")
+            animation and motion.pictures(animation, report.units), allow_nan=False, separators=(",", ":")
         ),
     }
     return "\n".join(
@@ -110,9 +110,9 @@ def _resource(name: str) -> str:
     return (resources.files(__package__) / name).read_text("utf-8")
 
 
-def _marks(given: b.Given) -> str:
+def _marks(block: b.Given) -> str:
     """What the marks beside given values mean."""
-    origins = {value.origin for _, values in given.sections for value in values} - {"", "file"}
+    origins = {value.origin for _, values in block.sections for value in values} - {"", "file"}
     words = (f"{origin[0]}: {words}" for origin, words in _ORIGIN.items() if origin in origins)
     return f'<p class="hint">Not in the study file: {"; ".join(words)}.</p>' if origins else ""
 
@@ -141,10 +141,10 @@ class _Page:
             first, *others = forms(n.value, n.unit, n.kind, digits, full=not n.given, units=self.units)
             words = ("▲ " if n.over else "") + self._form(*first)
             words += "".join(f' <span class="beside">{self._form(*other)}</span>' for other in others)
-        known = "no value" if n.value is None else f"{n.value:.9g}" + ("" if n.unit == "1" else f" {n.unit}")
+        exact = "no value" if n.value is None else f"{n.value:.9g}" + ("" if n.unit == "1" else f" {n.unit}")
         element = (
             f'<data class="n" data-path="{escape(n.path)}" value="{json.dumps(n.value)}" '
-            f'title="{escape(f"{n.path}: {known}")}">{words}</data>'
+            f'title="{escape(f"{n.path}: {exact}")}">{words}</data>'
         )
         return f"<strong>{element}</strong>" if n.over else element
 
@@ -292,7 +292,7 @@ class _Page:
             f'<figure class="plot-box{" half" if figure.half else ""}">'
             f'<h3 id="{figure.name}-title">{escape(figure.title)}</h3>'
             f'<div class="plot" id="plot-{figure.name}" data-figure="{figure.name}" role="img" '
-            f'aria-label="{escape(figure.seen)}" style="height:{height}px"></div>'
+            f'aria-label="{escape(figure.alt)}" style="height:{height}px"></div>'
             f"<figcaption>{self.line(figure.caption)}</figcaption></figure>"
         )
 
@@ -321,7 +321,7 @@ class _Page:
 
 
 _PLOTS = (
-    "<noscript><p>Plots and the moving machine need JavaScript; the numbers of this page do not.</p></noscript>"
+    "<noscript><p>Plots and the animation machine need JavaScript; the numbers of this page do not.</p></noscript>"
     '<div class="plots">{}</div>'
     '<p class="hint">Drag to zoom, double-click to zoom out, click a name in a legend to hide its line.</p>'
 )

@@ -50,7 +50,7 @@ def report(study: KnifeStudy) -> b.Report:
         s.given("Machine", config.machine, "machine"),
     )
     sections = (
-        b.Section("answer", "The answer", tuple(s.said())),
+        b.Section("answer", "The answer", tuple(s.conclusions())),
         b.Section("turn", "A turn at constant speed", (_turn(s), _pins(s))),
         b.Section("flywheels", "Flywheels, co-simulated", tuple(_flywheels(s, study))),
         b.Section("plots", "Plots", tuple(_figures(study))),

@@ -71,12 +71,12 @@ def block_lines(block: Block, units: Units, pictures: Collection[str] = ()) -> l
         case Tables():
             return [text for table in block.tables for text in _table(table, units)]
         case Given():
-            given = [
+            entries = [
                 (value.name, _line((value.value,), units), markdown_text(value.description), value.origin)
                 for _, values in block.sections
                 for value in values
             ]
-            return list(_grid(given, ("name", "value", "meaning", "from")))
+            return list(_grid(entries, ("name", "value", "meaning", "from")))
         case Figure():
             return [f"![{block.title}]({block.file})", ""] if block.file in pictures else []
         case _:

@@ -120,12 +120,12 @@ class _Drawing:
         self.spec, self.figure = spec, go.Figure()
         rows, columns = len(spec.panels), len(spec.panels[0])
         panels = list(spec.all_panels())
-        shared = all(len(spec.sharing(r, c)) == rows for r, c, _ in panels)
-        gap = (22.0 if shared else 66.0) + (22.0 if any(panel.title for _, _, panel in panels) else 0.0)
+        one_axis = all(len(spec.sharing(r, c)) == rows for r, c, _ in panels)
+        gap = (22.0 if one_axis else 66.0) + (22.0 if any(panel.title for _, _, panel in panels) else 0.0)
         self.columns = _domains(spec.widths or (1.0,) * columns, 0.09 if columns > 2 else 0.1)
         domains = _domains(spec.heights or (1.0,) * rows, gap / (height(spec) - _ENDS))
         self.rows = [(1.0 - last, 1.0 - first) for first, last in domains]
-        self.kept = _thin_groups(spec)
+        self.samples = _thin_groups(spec)
         self.x_axes: dict[tuple[int, Axis], str] = {}
         self.y_axes: dict[int, list[str]] = {}
         self.axes: dict[str, dict[str, Any]] = {}
@@ -200,13 +200,13 @@ class _Drawing:
                 self._field(item, place)
 
     def _curve(self, curve: Curve, panel: Panel, place: dict[str, Any]) -> None:
-        kept = self.kept[id(curve.x)] if curve.joined and not curve.marker else slice(None)
+        samples = self.samples[id(curve.x)] if curve.joined and not curve.marker else slice(None)
         look = look_of(curve.look)
         mode = "+".join(name for name, there in (("lines", curve.joined), ("markers", curve.marker)) if there)
         symbol, edge = _MARKERS.get(curve.marker, "circle"), {"width": 1.4, "color": look["color"]}
         self.figure.add_scatter(
-            x=_small(np.asarray(curve.x)[kept]),
-            y=_small(np.asarray(curve.y)[kept]),
+            x=_small(np.asarray(curve.x)[samples]),
+            y=_small(np.asarray(curve.y)[samples]),
             mode=mode,
             line={"color": look["color"], "width": look["linewidth"] + 0.2, "dash": _dash(look["linestyle"])},
             marker={"symbol": symbol, "size": 7, "line": edge},
@@ -263,13 +263,13 @@ def _axis(axis: Axis) -> dict[str, Any]:
     if axis.names:
         ticks = {"tickvals": list(range(len(axis.names))), "ticktext": list(axis.names), "ticks": ""}
         return {**ticks, "showgrid": False, "range": [len(axis.names) - 0.45, -0.55]}
-    made: dict[str, Any] = {"type": "log", "dtick": "D2"} if axis.log else {}
+    layout: dict[str, Any] = {"type": "log", "dtick": "D2"} if axis.log else {}
     if axis.low is not None and axis.high is not None:
         ends = [axis.low, axis.high]
-        made["range"] = [float(np.log10(end)) for end in ends] if axis.log else ends
+        layout["range"] = [float(np.log10(end)) for end in ends] if axis.log else ends
     elif axis.low == 0.0 and not axis.log:
-        made["rangemode"] = "tozero"
-    return made | ({} if axis.step is None else {"dtick": axis.step})
+        layout["rangemode"] = "tozero"
+    return layout | ({} if axis.step is None else {"dtick": axis.step})
 
 
 def _across(axis: str, low: float, high: float, x: str, y: str) -> dict[str, Any]:
@@ -319,17 +319,17 @@ def thin(*signals: Any) -> Any:
     values = np.array([np.nan_to_num(np.asarray(s, float)) for s in signals])
     values = values / np.array([[np.ptp(s) or 1.0] for s in values])
     tolerance = 1e-3
-    kept = _corners(values, tolerance)
-    while len(kept) > _MOST:
+    samples = _corners(values, tolerance)
+    while len(samples) > _MOST:
         tolerance *= 2.0
-        kept = _corners(values, tolerance)
-    return kept
+        samples = _corners(values, tolerance)
+    return samples
 
 
 def _corners(values: Any, tolerance: float) -> Any:
     """Samples of `values`, shape (signals, samples), that a polyline needs to stay within `tolerance` of all."""
     last = values.shape[1] - 1
-    kept, todo = {0, last}, [(0, last)]
+    samples, todo = {0, last}, [(0, last)]
     while todo:
         start, stop = todo.pop()
         if stop - start < 2:
@@ -340,6 +340,6 @@ def _corners(values: Any, tolerance: float) -> Any:
         furthest = int(np.argmax(off))
         if off[furthest] > tolerance:
             corner = start + 1 + furthest
-            kept.add(corner)
+            samples.add(corner)
             todo += [(start, corner), (corner, stop)]
-    return np.array(sorted(kept))
+    return np.array(sorted(samples))

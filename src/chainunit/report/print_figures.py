@@ -51,15 +51,15 @@ def _figure(spec: Figure, units: Units) -> Any:
     drawing, axes = plt.subplots(
         rows, columns, figsize=(width, tall), squeeze=False, height_ratios=heights, width_ratios=widths
     )
-    filled = {(r, c) for r, c, _ in figure.all_panels()}
+    places = {(r, c) for r, c, _ in figure.all_panels()}
     for place in np.ndindex(rows, columns):
-        if place not in filled:
+        if place not in places:
             axes[place].remove()
     for r, c, panel in figure.all_panels():
         sharing = figure.sharing(r, c)
         if r > sharing[0]:
             axes[r, c].sharex(axes[sharing[0], c])
-        if figure.level and c and (r, 0) in filled:
+        if figure.level and c and (r, 0) in places:
             axes[r, c].sharey(axes[r, 0])
         for item in panel.items:
             _draw(axes[r, c], item)
@@ -74,15 +74,15 @@ def _figure(spec: Figure, units: Units) -> Any:
 
 def _legend(drawing: Any, axes: Any, columns: int) -> None:
     """One legend below all panels, each name once."""
-    found: dict[str, Any] = {}
+    entries: dict[str, Any] = {}
     for axis in axes.flat:
         if axis.figure is not None:
             handles, labels = axis.get_legend_handles_labels()
             for handle, label in zip(handles, labels, strict=True):
-                found.setdefault(label, handle)
-    if found:
-        count = min(len(found), 3 if columns == 1 else 2 + columns)
-        drawing.legend(found.values(), found.keys(), loc="outside lower center", ncols=count, fontsize=9)
+                entries.setdefault(label, handle)
+    if entries:
+        count = min(len(entries), 3 if columns == 1 else 2 + columns)
+        drawing.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=count, fontsize=9)
 
 
 def _dress(axis: Any, panel: Panel, *, last: bool, first: bool) -> None:
@@ -163,12 +163,12 @@ def _draw(axis: Any, item: Item) -> None:
 
 def _bars(axis: Any, bars: Bars) -> None:
     look = BARS[bars.look % len(BARS)]
-    drawn = axis.barh(
+    lying = axis.barh(
         bars.at, bars.size, bars.height, label=bars.name or None, edgecolor=INK, linewidth=0.6,
         color=INK if bars.slim else look["color"], hatch=None if bars.slim else look["hatch"],
     )  # fmt: skip
     if bars.words:
-        axis.bar_label(drawn, bars.words, padding=4, fontsize=8)
+        axis.bar_label(lying, bars.words, padding=4, fontsize=8)
         axis.margins(x=0.22)
 
 

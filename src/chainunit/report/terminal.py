@@ -92,11 +92,11 @@ def _show_table(table: Table, console: Console, units: Units) -> None:
         console.print(_grid(table, [i for i in range(count) if i not in grouped or i in group], units, title))
 
 
-def _grid(table: Table, chosen: Sequence[int], units: Units, title: str) -> Grid:
+def _grid(table: Table, places: Sequence[int], units: Units, title: str) -> Grid:
     if table.columns:
-        chosen = [i for i in chosen if table.columns[i].form != "long"]
+        places = [i for i in places if table.columns[i].form != "long"]
     grid = Grid(title=Styled(title) if title else None, title_justify="left", show_header=bool(table.columns))
-    for i in chosen:
+    for i in places:
         head = (table.columns[i].short or plain_line(table.columns[i].title, units)) if table.columns else ""
         grid.add_column(head, justify="right" if i and table.numeric else "left")
     notes = bool(table.note_title)
@@ -105,5 +105,5 @@ def _grid(table: Table, chosen: Sequence[int], units: Units, title: str) -> Grid
     for row in table.rows:
         if row.form != "long":
             note = [plain_line(row.note, units)] if notes else []
-            grid.add_row(*(plain_cell(row.cells[i], units) for i in chosen), *note)
+            grid.add_row(*(plain_cell(row.cells[i], units) for i in places), *note)
     return grid
