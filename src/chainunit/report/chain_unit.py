@@ -411,7 +411,7 @@ def _certificate(
         have = [run for run, shares in certificate.items() if name in shares]
         run = max(have, key=lambda run: s.value(f"certificate.{run}.{name}") or 0.0)
         most = f"{{certificate.{run}.{name}}}"
-        text = f"{spoken(name).capitalize()}: at most {most} of the energy moved."
+        text = f"{spoken(name.removesuffix('_share')).capitalize()}: at most {most} of the energy moved."
         if name.endswith(read.DIFFERENCE):
             text = (
                 f"Difference of {name.removesuffix(read.DIFFERENCE)} to the monolithic solution, in parts of its "

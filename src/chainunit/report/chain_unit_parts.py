@@ -54,7 +54,7 @@ def sizing(s: b.Source, study: Study) -> Iterator[b.Block]:
         if "tried" in section:
             weak = "; too weak by the nameplate: {=sizing.weak}" if s.value("sizing.weak") else ""
             tried = "Tried: {=sizing.tried} of {=sizing.motors} motors of the catalogue"
-            yield b.Text(s.line(f"{tried}{weak}."), form="long")
+            yield b.Text(s.line(f"{tried}{weak}."))
         listed = int(study.config.sizing.candidates) if study.config.sizing else len(candidates)
         yield _candidates(s, ranked, listed)
         if len(candidates) > listed:
@@ -94,7 +94,7 @@ def _best(s: b.Source, path: str, word: str) -> Iterator[b.Block]:
     yield b.Cards(tuple(cards))
     model = s.result["verdict"]["model"]
     doubt = s.line(" ({verdict.model.caveat})") if model is not None and model["caveat"] else ()
-    why = "Chosen because " if word == "Motor" else "Insufficient, and shown because "
+    why = "Chosen: " if word == "Motor" else "Insufficient: "
     yield b.Text(line(sentence, doubt, "."), form="short")
     yield b.Text(line(why, s.words(f"{path}.reason"), doubt, "."))
 

@@ -148,9 +148,12 @@ def _draw(axis: Any, item: Item) -> None:
             ruled = axis.axvline if item.axis == "x" else axis.axhline
             ruled(item.at, label=_name(axis, item.name), **look_of(item.look))
             if item.words and item.axis == "x":
-                above = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points"}
-                style = {"rotation": 90 if item.upright else 0, "fontsize": 8, "ha": "center", "va": "bottom"}
-                axis.annotate(item.words, (item.at, 1.0), (0.0, 3.0), **above, **style)
+                top = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "fontsize": 8}
+                if item.upright:  # inside: above there may be a second scale
+                    style = {"rotation": 90, "ha": "right", "va": "top", "zorder": 6}
+                    axis.annotate(item.words, (item.at, 1.0), (-1.0, -3.0), **top, **style)
+                else:
+                    axis.annotate(item.words, (item.at, 1.0), (0.0, 3.0), **top, ha="center", va="bottom")
         case Bars():
             _bars(axis, item)
         case Label():

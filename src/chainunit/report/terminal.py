@@ -98,7 +98,8 @@ def _grid(table: Table, places: Sequence[int], units: Units, title: str) -> Grid
     grid = Grid(title=Styled(title) if title else None, title_justify="left", show_header=bool(table.columns))
     for i in places:
         head = (table.columns[i].short or plain_line(table.columns[i].title, units)) if table.columns else ""
-        grid.add_column(head, justify="right" if i and table.numeric else "left")
+        # a column of names that rich makes as narrow as it can loses the ends of long words
+        grid.add_column(head, justify="right" if i and table.numeric else "left", min_width=None if i else 14)
     notes = bool(table.note_title)
     if notes:
         grid.add_column(table.note_title)
