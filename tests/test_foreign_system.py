@@ -12,6 +12,8 @@ from types import MappingProxyType
 
 import numpy as np
 import pytest
+import xarray as xr
+from command import chainunit
 from systems import component, pair
 from test_foreign import changed
 
@@ -19,9 +21,8 @@ from chainunit import InputError, config
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.motor import Motor
 from chainunit.model import Terminal
-from chainunit.report import chain_unit, files
 from chainunit.studies import run
-from chainunit.studies.choice import Choice, with_motor
+from chainunit.studies.choice import with_motor
 from chainunit.studies.drive import Drive
 from chainunit.system import (
     CoSimulation,
@@ -352,38 +353,169 @@ ratio = 25
 type = "jam"
 side = "left"
 """
+OWN_MOTOR = "[motor]\n" + "".join(
+    f"{name} = {value!r}\n"
+    for name, value in DcMotor.parameter_layout.named(DcMotor.Parameters()).items()
+    if "." in name
+)
+OTHER_NAMES = 'names = { w = "rotor_speed", phi = "rotor_angle", load.J = "inertia_behind" }\n'
 
 
-def test_a_study_with_a_motor_of_somebody_else(file, tmp_path, monkeypatch):
-    """Its answers are those of our motor of the same parameters; what only that tells is absent, and said so."""
-    given = config.parse(STUDY)
-    own = Choice(Drive(DcMotor, DcMotor.Parameters(), given.machine))
-    studies = []
-    for choice in (with_motor(given, file), own):
-        monkeypatch.setattr(run, "choose", lambda *_, choice=choice: choice)
-        studies.append(run.run_study(given, tmp_path))
-        assert studies[-1].failure is None
-    foreign, ours = studies
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Studies beside the FMU: with the FMU, and with our motor of the same parameters."""
+    folder = tmp_path_factory.mktemp("studies") / "mine"
+    folder.mkdir()
+    build(folder, OTHER)
+    system = f'[system]\nmotor = "ForeignMotor.fmu"\n{OTHER_NAMES}'
+    (folder / "foreign.toml").write_text(f"{STUDY}{system}")
+    (folder / "own.toml").write_text(f"{STUDY}{OWN_MOTOR}")
+    for name in ("foreign", "own"):
+        # from elsewhere: the path of the FMU is relative to the study file
+        done = chainunit("study", f"mine/{name}.toml", "-o", name, cwd=folder.parent)
+        assert done.returncode == 0, done.stderr
+        (folder / f"{name}.txt").write_text(done.stdout)
+    return folder
+
+
+def test_a_study_with_a_motor_of_somebody_else(folder):
+    """Its answers are those of our motor of the same parameters; what only that tells is null, shown as a dash."""
+    foreign, own = (
+        json.loads((folder.parent / name / "result.json").read_text()) for name in ("foreign", "own")
+    )
+    assert foreign["status"] == own["status"] == "complete"
+    assert set(foreign["answers"]) == set(own["answers"]) == {"steady", "jam_left"}
     absent = set()
-    for name, answers in ours.answers.items():
-        for quantity, value in vars(answers).items():
-            other = getattr(foreign.answers[name], quantity)
-            if value is not None and other is None:
+    for name, answers in own["answers"].items():
+        for quantity, answer in answers.items():
+            other = foreign["answers"][name][quantity]
+            assert other["unit"] == answer["unit"]
+            if answer["value"] is not None and other["value"] is None:
                 absent.add(quantity)
-            elif value is not None:
-                assert other == pytest.approx(value, rel=1e-5, abs=1e-6), (name, quantity)
+            elif answer["value"] is not None:
+                assert other["value"] == pytest.approx(answer["value"], rel=1e-5, abs=1e-6), (name, quantity)
     assert absent == {
         *("motor_torque_peak", "motor_torque_rms", "supply_power_mean", "current_peak", "current_rms"),
         *("winding_temperature", "shaft_share", "torque_reserve"),
     }
-    for shares in foreign.certificate.values():
-        assert shares["energy_residual_share"] < 1e-2
-    report = chain_unit.report(foreign)
-    for write in files.writers(report, tmp_path, "result"):
-        write()
-    result = json.loads((tmp_path / "result.json").read_text())
-    assert result["motor"] == {"kind": "ForeignMotor.fmu"}
-    assert "its reserve of torque is not known" in result["verdict"]["motor"]["text"]
+    assert set(foreign["certificate"]) == {"start_up", "jam_left"}
+    for shares in foreign["certificate"].values():
+        assert shares["energy_residual_share"]["value"] < 1e-2
+    assert foreign["motor"] == {"kind": "ForeignMotor.fmu"}
+    assert "its reserve of torque is not known" in foreign["verdict"]["motor"]["text"]
+    for text in ((folder / "foreign.txt").read_text(), (folder.parent / "foreign/result.md").read_text()):
+        for title in ("motor torque, peak", "motor current, RMS", "reserve of torque"):
+            (cells,) = (
+                [cell.strip() for cell in re.split(r"[│|]", line)[2:-1]]
+                for line in text.splitlines()
+                if re.match(rf"[│|] {title}", line)
+            )
+            assert cells == ["-", "-"], title
+
+
+def test_its_speeds_and_torques_are_those_of_ours(folder):
+    runs = [xr.open_datatree(folder.parent / name / "result.nc") for name in ("foreign", "own")]
+    assert set(runs[0].children) == set(runs[1].children) >= {"start_up", "jam_left"}
+    for name, ours in runs[1].children.items():
+        for quantity in ("motor.w", "machine.tau"):
+            error = np.max(np.abs(runs[0][name][quantity].values - ours[quantity].values))
+            assert error < 1e-6 * np.max(np.abs(ours[quantity].values)), (name, quantity)
+
+
+@pytest.mark.parametrize(
+    "change, said",
+    [
+        (("ForeignMotor.fmu", "none.fmu"), r"system\.motor: mine.none\.fmu: no such FMU"),
+        (
+            (OTHER_NAMES, ""),
+            r"system\.motor: .*ForeignMotor\.fmu: has no variable phi; a motor needs the output phi",
+        ),
+        (("rotor_speed", "speed"), r"system\.motor: .*has no variable speed, which was given for w"),
+        (
+            ('w = "rotor_speed"', 'omega = "x"'),
+            r"system\.names\.omega: unknown key; known here: phi, w, a, tau, ",
+        ),
+        (("load.J", "load.mass"), r"system\.names\.load\.mass: unknown key; known here: tau_bias, J, "),
+        (('"rotor_speed"', "3"), r"system\.names\.w = 3: input should be a valid string"),
+        (('"ForeignMotor.fmu"', '""'), r'system\.motor = "": string should have at least 1 character'),
+        (('motor = "ForeignMotor.fmu"', ""), r"system: names no motor; add motor"),
+        (
+            ("[run]", "[motor]\nrotor.J = 0.01\n[run]"),
+            r'motor: given beside system\.motor = "ForeignMotor\.fmu", .*',
+        ),
+        (("[run]", "[sizing]\n[run]"), r"sizing: given beside system\.motor = .*; leave out one of the two"),
+        (
+            ("[run]", "[driveline]\nJ4 = 2\n[run]"),
+            r"system\.motor: .*inertia of its rotor is not known; leave",
+        ),
+        (
+            ("[run]", "[monte_carlo]\nruns = 9\n[run]"),
+            r"system\.motor: .*current and torque are not known.*; leave",
+        ),
+        (("[run]", "[starter]\n[run]"), r"starter: is of the motor that \[sizing\] picks"),
+    ],
+)
+def test_a_study_file_that_does_not_fit_is_refused_in_a_line(change, said, folder):
+    text = (folder / "foreign.toml").read_text()
+    assert change[0] in text
+    (folder / "changed.toml").write_text(text.replace(*change))
+    done = chainunit("study", "mine/changed.toml", "-o", "foreign", cwd=folder.parent)
+    assert done.returncode == 2 and re.search(said, done.stderr), done.stderr
+    assert done.stderr.count("\n") == 1
+    # the results of an earlier run are still there
+    assert (folder.parent / "foreign" / "result.json").is_file()
+
+
+@pytest.mark.parametrize(
+    "command, said",
+    [
+        (
+            ["export-ssp", "foreign.toml"],
+            r"system\.motor: ForeignMotor\.fmu is an FMU of somebody else, and only",
+        ),
+        (
+            ["study", "--check", "foreign.toml", "-o", "check"],
+            r"--check: the equations of ForeignMotor\.fmu are not",
+        ),
+        (
+            ["export", "DcMotor", "--config", "foreign.toml"],
+            r"the study's motor is ForeignMotor\.fmu, not DcMotor",
+        ),
+    ],
+)
+def test_what_needs_a_model_of_the_motor_is_refused(command, said, folder):
+    done = chainunit(*command, cwd=folder)
+    assert done.returncode == 2 and re.search(said, done.stderr), done.stderr
+    assert done.stderr.splitlines()[-1].startswith("chainunit: ")
+
+
+def test_the_machine_of_such_a_study_can_be_exported(folder):
+    done = chainunit("export", "ChamberForces", "--config", "foreign.toml", "--backend", "python", cwd=folder)
+    assert done.returncode == 0 and (folder / "ChamberForces.fmu").is_file(), done.stderr
+
+
+def test_a_block_has_no_peaks_of_what_is_not_known(folder):
+    """The range of an assumption is told of the torques that there are."""
+    text = (folder / "foreign.toml").read_text().replace('type = "jam"\nside = "left"', 'type = "blocked"')
+    study = run.run_study(config.parse(text, str(folder / "x.toml")), folder / "block")
+    (spread,) = study.spreads.values()
+    assert study.failure is None and set(spread.peaks) == {"crank_torque", "rocker_torque"}
+
+
+def test_a_state_that_cannot_be_saved_is_refused_before_anything_is_run(folder, tmp_path, monkeypatch):
+    build(tmp_path, canGetAndSetFMUstate="false")
+    monkeypatch.setattr(CoSimulation, "run", lambda *_, **__: pytest.fail("a run began"))
+    given = config.parse(STUDY + '[system]\nmotor = "ForeignMotor.fmu"\n', str(tmp_path / "x.toml"))
+    with pytest.raises(InputError, match=r"cannot save its state \(canGetAndSetFMUstate\)"):
+        run.run_study(given, tmp_path)
+
+
+def test_a_reference_in_another_unit_is_refused(file, tmp_path):
+    other = changed(
+        file, tmp_path / "x.fmu", description=units("w_ref", "rpm", 'rad="1" s="-1" factor="0.1"')
+    )
+    with pytest.raises(InputError, match=r"x\.fmu: w_ref is in rpm; must be in rad/s to be joined"):
+        foreign_component(other, "motor")
 
 
 def test_a_study_that_asks_for_more_is_refused(file):

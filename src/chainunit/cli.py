@@ -121,11 +121,10 @@ def study(
         print(configuration.example(), end="")
         return
     loaded = _study_file(config)
-    if loaded.sizing is not None:
-        from .drives.catalogue import check_own
+    from .studies.choice import check_files
 
-        # before anything of an earlier run is taken away
-        check_own(loaded.catalogue)
+    # before anything of an earlier run is taken away
+    check_files(loaded)
     with claimed(output):
         from .report import chain_unit, files, series
         from .studies.run import run_study

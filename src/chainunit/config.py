@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict
 from .drives.cardan import check
 from .drives.dc_motor import DcMotor
 from .drives.gearing import Transmission
-from .errors import GeometryError, InputError
+from .errors import GeometryError, InputError, shown
 from .machines.api import ChainUnit, ratios
 from .machines.chain_unit import ChamberForces, SideLoads, SideName
 from .quantities import Layout
@@ -21,6 +21,7 @@ from .reading import (
     Slip,
     file_form,
     filled,
+    given_values,
     merged,
     packaged,
     read,
@@ -38,11 +39,13 @@ from .studies.sections import (
     Coupling,
     Driveline,
     Feed,
+    ForeignMotor,
     MonteCarlo,
     Ratios,
     Run,
     Sizing,
     Starter,
+    SystemTable,
 )
 from .system.signals import Profile
 from .text import DEFAULT_UNITS, Units, chosen_units
@@ -61,7 +64,7 @@ _File = file_form(
         name: section.form(section.declared, name, f"{name}.", **section.keys)
         for name, section in SECTIONS.items()
     }
-    | {"report": ReportTable},
+    | {"report": ReportTable, "system": SystemTable},
     feed_forward=(bool, False),
     start=(Literal[STARTS], "direct"),
     organ=(Literal[ORGANS], "two-bar"),
@@ -96,6 +99,8 @@ class Config:
     """of the driveline's torsion, in place of d2 and d3"""
     chain: ChainOrgans | None
     """the organs as chains, or None for two bars"""
+    foreign: ForeignMotor | None
+    """the motor, where it is an FMU of somebody else; `motor` is then of no meaning"""
     source: str
     given: frozenset[str]
     """names of all that the file sets, such as "machine.crank.m"; everything else is the example's"""
@@ -210,6 +215,7 @@ def _config(
         place=checked.driveline.place,
         damping_ratio=checked.driveline.damping_ratio,
         chain=values["chain"] if checked.organ == "chain" else None,
+        foreign=_foreign(checked.system, source),
         source=source,
         given=frozenset(_names(data, events)),
         slips=unusual,
@@ -273,6 +279,15 @@ def _taken_over(error: InputError, given: Mapping[str, float]) -> str:
 
 def _check_company(data: Mapping[str, Any]) -> None:
     """Refuse values that would be passed over in silence."""
+    if "system" in data:
+        file = data["system"].get("motor")
+        if file is None:
+            raise InputError('system: names no motor; add motor = "file.fmu", or leave [system] out')
+        for name in ("motor", "sizing"):
+            if name in data:
+                raise InputError(
+                    f"{name}: given beside system.motor = {shown(file)}, which is the motor; leave out one of the two"
+                )
     if "sizing" in data:
         for name in ("motor", "feed_forward"):
             if data.get(name):
@@ -368,6 +383,12 @@ def _check_steps(config: Config) -> None:
 def _beside(name: str, source: str) -> Path | None:
     """A file that a study file names, relative to the study file."""
     return (Path(source).parent / name) if name else None
+
+
+def _foreign(table: Any, source: str) -> ForeignMotor | None:
+    """The motor of somebody else that a study file names."""
+    file = _beside(table.motor, source)
+    return None if file is None else ForeignMotor(file, given_values(table.names))
 
 
 LENGTHS = ("r", "l", "h", "c", "hy", "e", "l1", "l2", "z")

@@ -228,9 +228,9 @@ def read_table(form: type[BaseModel], table: Mapping[str, Any], prefix: str = ""
         raise InputError(first_line(error, form, prefix)) from error
 
 
-def given_values(section: BaseModel) -> dict[str, float]:
+def given_values(section: BaseModel) -> dict[str, Any]:
     """Names and values that were set in a section."""
-    flat: dict[str, float] = {}
+    flat: dict[str, Any] = {}
     for name in section.model_fields_set:
         value = getattr(section, name)
         if isinstance(value, BaseModel):

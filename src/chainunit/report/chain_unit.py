@@ -273,7 +273,7 @@ def _over_runs(
 
 
 def _table_of_runs(s: b.Source, study: Study) -> b.Table:
-    answers = s.result["answers"]
+    answers, unknown = s.result["answers"], study.not_known
     runs = _ordered(study, answers)
     rows = (
         b.TableRow(
@@ -281,8 +281,9 @@ def _table_of_runs(s: b.Source, study: Study) -> b.Table:
             form="long" if read.minor(v) else "both",
         )
         for v in Layout(Answers).variables
-        # nothing to say of a coupling that is not there, or that did not open
-        if any(answers[run][v.name]["value"] is not None for run in runs)
+        # nothing to say of a coupling that is not there, or that did not open; a dash for what a motor does not tell
+        if v.name in unknown
+        or any(answers[run][v.name]["value"] is not None for run in runs)
         or (v.name == "recovery_time" and study.returns and study.overloads)
     )
     head = "crank at {=run.crank_speed}"

@@ -1,4 +1,5 @@
-"""The drive of a study: the DC motor that it gives, tuned, or the motor that sizing chooses."""
+"""The drive of a study: the DC motor that it gives, tuned, the motor that sizing chooses, or the FMU of somebody else
+that it names."""
 
 from __future__ import annotations
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from ..config import Config
 from ..drives.cardan import Cardan
+from ..drives.catalogue import check_own
 from ..drives.dc_motor import DcMotor
 from ..drives.driveline import CardanDriveline
 from ..drives.motor import Motor
@@ -41,6 +43,8 @@ def choose(
 ) -> Choice:
     """The drive of a study, with the nearest motor where sizing finds none that fits; FMUs that sizing needs are
     written to `folder`."""
+    if config.foreign is not None:
+        return _with_foreign(config)
     if config.sizing is None:
         drive = Drive(
             DcMotor, config.motor, config.machine, feed_forward=config.feed_forward, chain=config.chain
@@ -48,6 +52,29 @@ def choose(
         return Choice(*tuned(config, with_line(config, drive)))
     sized = size(config, folder, report, backend)
     return Choice(with_line(config, sized.best.drive), sizing=sized)
+
+
+def check_files(config: Config) -> None:
+    """Refuse a file that the study names and cannot use.
+
+    Raises
+    ------
+    InputError
+        see `chainunit.drives.catalogue.check_own` and `with_motor`.
+    """
+    if config.sizing is not None:
+        check_own(config.catalogue)
+    if config.foreign is not None:
+        _with_foreign(config)
+
+
+def _with_foreign(config: Config) -> Choice:
+    """The drive of a study that names its motor."""
+    assert config.foreign is not None
+    try:
+        return with_motor(config, config.foreign.file, config.foreign.names)
+    except InputError as error:
+        raise InputError(f"system.motor: {error}") from error
 
 
 def with_motor(config: Config, file: Path, names: Mapping[str, str] | None = None) -> Choice:
@@ -66,6 +93,11 @@ def with_motor(config: Config, file: Path, names: Mapping[str, str] | None = Non
     motor = foreign_component(file, "motor", names)
     if config.driveline is not None:
         raise InputError(f"{file}: the inertia of its rotor is not known; leave [driveline] out")
+    if config.monte_carlo.runs:
+        raise InputError(
+            f"{file}: its current and torque are not known, of which random overloads tell the quantiles; leave "
+            "monte_carlo.runs out"
+        )
     if config.feed_forward and "tau_ff" not in motor.connectors:
         raise InputError(f"{file}: has no input tau_ff in N.m; leave feed_forward out")
     follows = "w_ref" in motor.connectors

@@ -382,6 +382,18 @@ def read_answers(window: Window) -> Answers:
     return Answers(**values)
 
 
+def not_known(window: Window) -> frozenset[str]:
+    """Names of the measures of a window that the motor does not tell, as an FMU of somebody else."""
+    names = set()
+    for each in dataclasses.fields(Answers):
+        if window.phase in each.metadata["during"]:
+            try:
+                each.metadata["read"](window)
+            except AbsentError:
+                names.add(each.name)
+    return frozenset(names)
+
+
 def _read(read: Read, window: Window) -> float | None:
     try:
         return read(window)
@@ -390,9 +402,9 @@ def _read(read: Read, window: Window) -> float | None:
 
 
 def read_measure(name: str, window: Window) -> Any:
-    """One measure of a window."""
+    """One measure of a window; None where there is no such thing."""
     (declared,) = (each for each in dataclasses.fields(Answers) if each.name == name)
-    return declared.metadata["read"](window)
+    return _read(declared.metadata["read"], window)
 
 
 def measures_of(phase: Phase) -> tuple[Variable, ...]:

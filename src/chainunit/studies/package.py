@@ -65,7 +65,8 @@ def start_of(
         given = _machine(config, drive, model, drive.driven)
         return given | (drive.organ() if model.name == "ChainUnitFlexible" else {})
     if drive.motor is not model:
-        raise InputError(f"the study's motor is {drive.motor.name}, not {model.name}")
+        title = drive.graph.components["motor"].title
+        raise InputError(f"the study's motor is {title}, not {model.name}")
     return model.parameter_layout.named(drive.parameters)
 
 
@@ -116,8 +117,13 @@ def export_study(
     Raises
     ------
     InputError, RunError
-        see `chainunit.system.ssp.export`; also where sizing finds no motor.
+        see `chainunit.system.ssp.export`; also where sizing finds no motor, or it is an FMU of somebody else.
     """
+    if config.foreign is not None:
+        raise InputError(
+            f"system.motor: {config.foreign.file} is an FMU of somebody else, and only models of this package are "
+            "packaged; leave [system] out"
+        )
     drive = _drive(config, backend, report)
     run = config.run
     stop = config.settled + run.turns * 2.0 * math.pi / run.crank_speed

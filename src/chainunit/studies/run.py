@@ -52,12 +52,15 @@ def run_study(
     Raises
     ------
     InputError
-        for a communication step that is too long for the driveline, a catalogue that sizing cannot use, and random
-        overloads that the drive has no inputs for.
+        for a communication step that is too long for the driveline, a catalogue that sizing cannot use, random
+        overloads that the drive has no inputs for, and a motor of somebody else that does not fit or cannot save its
+        state.
     """
     report = report or (lambda what, done, todo: None)
     choice = choose(config, folder / "fmu", report, backend)
     drive = choice.drive
+    if check and drive.foreign is not None:
+        raise InputError(f"--check: the equations of {drive.foreign.title} are not known; leave --check out")
     study = Study(config, drive, statics(config, drive), choice.tuning, choice.sizing)
     if config.monte_carlo.runs:
         _check_random(config, Rig(config, drive, {}))
@@ -129,6 +132,7 @@ class Runner:
         self._export_coasting = coasting
         self._leave_out()
         with self.rig.from_rest() as simulation:
+            simulation.check_states()
             self._start_up(simulation)
             begin, speed = simulation.save(), self.study.answers["steady"].speed_mean
             angle = float(self.rig.drive.crank_motion(self.study.runs["start_up"])[0][-1])
@@ -267,7 +271,8 @@ class Runner:
         }
         self.study.spreads[event.name] = Spread(
             {name: (min(x), max(x)) for name, x in ranges.items()},
-            {name: (min(x), max(x)) for name, x in peaks.items()},
+            # of a motor of somebody else no torque is known
+            {name: (min(x), max(x)) for name, x in peaks.items() if None not in x},
         )
 
     def _check(self, transients: list[Transient]) -> None:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from ..drives.dc_motor import DcMotor
 from ..drives.driveline import Mounted
@@ -18,6 +19,7 @@ from ..machines.chain_organs import LEAST, MOST, OrganLaw
 from ..machines.chain_unit import ChamberForces, SideLoads
 from ..quantities import Value, declaration, group, quantity
 from ..reading import given_values, schema
+from ..system import MOTOR_NAMES
 
 
 @declaration
@@ -201,6 +203,36 @@ PLACES = ("crank", "motor")
 """Where a driveline is: on the crank's shaft, behind the gear, or on the motor's, before it."""
 
 STARTS = ("direct", "soft", "inverter")
+
+
+def _names_form(title: str, names: Sequence[str]) -> type[BaseModel]:
+    """The form of a table with a text for each of the `names`; dotted ones stand in tables of their own."""
+    fields: dict[str, Any] = {name: (str, Field("", min_length=1)) for name in names if "." not in name}
+    for table in dict.fromkeys(name.split(".")[0] for name in names if "." in name):
+        inside = [name.removeprefix(f"{table}.") for name in names if name.startswith(f"{table}.")]
+        inner = _names_form(f"{title}_{table}", inside)
+        fields[table] = (inner, Field(default_factory=inner))
+    return create_model(title, __config__=ConfigDict(extra="forbid"), **fields)
+
+
+_MotorNames = _names_form("names", MOTOR_NAMES)
+
+SystemTable = create_model(
+    "system",
+    __config__=ConfigDict(extra="forbid"),
+    motor=(str, Field("", min_length=1)),
+    names=(_MotorNames, Field(default_factory=_MotorNames)),
+)
+"""Parts of the system that are FMUs of somebody else."""
+
+
+@dataclasses.dataclass(frozen=True)
+class ForeignMotor:
+    """A motor that is an FMU of somebody else."""
+
+    file: Path
+    names: Mapping[str, str]
+    """names of the FMU by ours, where they differ"""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -16,7 +16,7 @@ from . import verdict
 from .chain import ChainResult
 from .drive import Drive
 from .limits import DriveStatics
-from .measures import Answers, Phase, Trip, Window, reaches, whole_turns
+from .measures import Answers, Phase, Trip, Window, not_known, reaches, whole_turns
 from .monte_carlo import MonteCarloResult
 from .protection import Setting
 from .shaft import Cycles, ShaftAnswers
@@ -190,6 +190,13 @@ class Study:
         """Whether the start is judged apart: switched on to the line, a motor gives more for a moment than it ever
         does in running, and a coupling has to be held shut."""
         return self.config.sizing is not None and self.config.start == "direct"
+
+    @property
+    def not_known(self) -> frozenset[str]:
+        """Names of the measures that the motor, an FMU of somebody else, does not tell in steady running."""
+        if self.drive.foreign is None or verdict.STEADY not in self.answers:
+            return frozenset()
+        return not_known(self.window(Phase.STEADY, self.steady))
 
     @property
     def steady(self) -> xr.Dataset:

@@ -7,7 +7,7 @@ out (`without`, `rigid`, `hold_loads`). An FMU of somebody else is a component, 
 
 from .certificate import certify, energy_residual
 from .fmus import export
-from .foreign import fmu_component, foreign_component
+from .foreign import MOTOR_NAMES, fmu_component, foreign_component
 from .graph import (
     Bond,
     Component,
@@ -25,6 +25,7 @@ from .reference import monolithic
 from .signals import Jump, Profile
 
 __all__ = [
+    "MOTOR_NAMES",
     "Bond",
     "CoSimulation",
     "Component",

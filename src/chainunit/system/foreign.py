@@ -34,6 +34,14 @@ _UNITS = {"phi": "rad", "w": "rad/s", "a": "rad/s2", "tau": "N.m"} | {
 }
 """Unit of each member of a terminal."""
 _NEEDED = {FLANGE: ("phi", "w"), LOAD: ("tau_bias", "J")}
+_MOTOR = {"w_ref": "rad/s", "tau_ff": "N.m", "load_energy": "J", "air_gap_tau": "N.m", "supply_power": "W"}
+"""Unit of each signal that a system reads or sets at a motor beside its terminals, where it has it."""
+MOTOR_NAMES = (
+    *flange("outflow").members.values(),
+    *load_terminal("load.").members.values(),
+    *_MOTOR,
+)
+"""Names of a motor's variables that a system knows."""
 _TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
 
 
@@ -74,7 +82,8 @@ def fmu_component(
     finally:
         fmu.close()
     for terminal in terminals:
-        connectors |= _with_units(file, terminal, connectors)
+        units = {v: _UNITS[member] for member, v in terminal.members.items() if member in _UNITS}
+        connectors |= _with_units(file, units, connectors)
     return FmuComponent(file, connectors, {t.name: t for t in terminals}, names)
 
 
@@ -104,7 +113,10 @@ def foreign_component(file: Path, role: Role, names: Mapping[str, str] | None = 
                 )
             if connector.causality != gives[kind]:
                 raise InputError(f"{file}: {label} is of the kind {connector.causality}; {needs}")
-    return outsider
+    signals = {name: unit for name, unit in _MOTOR.items() if motor and name in outsider.connectors}
+    return replace(
+        outsider, connectors={**outsider.connectors, **_with_units(file, signals, outsider.connectors)}
+    )
 
 
 def _dimension(unit: str | None, definitions: Mapping[str, Any]) -> Mapping[str, Any] | None:
@@ -124,13 +136,13 @@ def _dimension(unit: str | None, definitions: Mapping[str, Any]) -> Mapping[str,
     return {base: n for base, n in powers.items() if n} | {k: x for k, x in scale.items() if x != plain[k]}
 
 
-def _with_units(file: Path, terminal: Terminal, connectors: Mapping[str, Connector]) -> dict[str, Connector]:
-    """The terminal's variables with the units that they must have."""
+def _with_units(
+    file: Path, units: Mapping[str, str], connectors: Mapping[str, Connector]
+) -> dict[str, Connector]:
+    """The variables among `units`, by name, with the units that they must have."""
     variables = {}
-    for member, name in terminal.members.items():
-        unit, connector = _UNITS.get(member), connectors[name]
-        if unit is None:
-            continue
+    for name, unit in units.items():
+        connector = connectors[name]
         if connector.unit and connector.dimension != base_units(unit):
             raise InputError(
                 f"{file}: {name} is in {printable(connector.unit)}; must be in {unit} to be joined"

@@ -386,18 +386,28 @@ class Simulation(ABC):
         InputError
             where an FMU cannot give its state.
         """
-        for name, fmu in self._fmus.items():
-            if not fmu.interface.canGetAndSetFMUstate:
-                raise InputError(
-                    f"{name} ({fmu.file.name}): cannot save its state (canGetAndSetFMUstate), so that no event can "
-                    "branch from steady running; ask its maker for an FMU that can"
-                )
+        self.check_states()
         for name, instance in self._instances.items():
             if name in self._state:
                 instance.forget(self._state[name])
             self._state[name] = instance.state()
         self._saved_at = self.time
         return self.time
+
+    def check_states(self) -> None:
+        """Refuse a system whose state cannot be saved.
+
+        Raises
+        ------
+        InputError
+            where an FMU cannot give its state.
+        """
+        for name, fmu in self._fmus.items():
+            if not fmu.interface.canGetAndSetFMUstate:
+                raise InputError(
+                    f"{name} ({fmu.file.name}): cannot save its state (canGetAndSetFMUstate), so that no event can "
+                    "branch from steady running; ask its maker for an FMU that can"
+                )
 
     def restore(self) -> None:
         """Return to the state that `save` kept, from which another branch can run."""
