@@ -287,3 +287,29 @@ def test_nothing_that_renders_knows_a_study(name):
     assert own <= set(RENDERERS)
     assert beyond <= {"text", "quantities", "files", "__version__", "mechanism"}
     assert ("mechanism" in beyond) == (name == "linkage")
+
+
+@pytest.mark.parametrize("grouped", [False, True])
+@pytest.mark.parametrize("width", [66, 80, 100, 120])
+def test_a_table_on_a_narrow_terminal_keeps_its_right_edge_and_its_numbers_whole(grouped, width):
+    source = b.Source({name: {"value": 0.00431, "unit": "kg.m2"} for name in "abc"})
+    rows = (
+        b.TableRow((f"inertia {n} of the machine", *[source.number(n)] * 3), note="in the start-up")
+        for n in "abc"
+    )
+    table = b.Table(
+        tuple(rows),
+        b.heads("inertia", *["a head of many words"] * 3),
+        "Inertias",
+        note_title="because of it",
+        groups=((1, 2), (3,)) if grouped else (),
+    )
+    report = b.Report("A title", "kind", {}, (), (b.Section("answer", "The answer", (table,)),))
+    out = io.StringIO()
+    terminal.show(report, Console(file=out, width=width, markup=False))
+    drawn = [line for line in out.getvalue().splitlines() if line[0] in "┏┃┡│└"]
+    assert drawn and all(line[-1] in "┓┃┩│┘" and len(line) <= width for line in drawn), out.getvalue()
+    # at 66 letters three numbers with their units do not stand beside each other: a unit goes to the next line
+    text = out.getvalue()
+    assert (width == 66 and not grouped) or text.count("0.00431 kg m2") == 9, text
+    assert text.count("0.00431") == 9 and text.count("machine") == (3 if text.count("Inertias") == 1 else 6)

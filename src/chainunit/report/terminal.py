@@ -9,7 +9,7 @@ from rich.table import Table as Grid
 from rich.text import Text as Styled
 
 from ..text import DEFAULT_UNITS, Units, number
-from .blocks import Block, Cell, Judgement, Report, Share, Table, Text
+from .blocks import Block, Cell, Column, Judgement, Report, Share, Table, Text
 from .lines import Aside, Line, Number, Piece, Strong, Words, pieces
 
 _LAST = {"warning": "Warning: ", "note": "Note: "}
@@ -84,27 +84,66 @@ def _show_table(table: Table, console: Console, units: Units) -> None:
     title = plain_line(table.title, units)
     count = len(table.columns) or len(table.rows[0].cells)
     whole = _grid(table, range(count), units, title)
-    if console.measure(whole, options=widest).maximum <= console.width or len(table.groups) < 2:
+    if console.measure(whole, options=widest).maximum <= console.width:
         console.print(whole)
         return
     grouped = {i for group in table.groups for i in group}
-    for group in table.groups:
-        console.print(_grid(table, [i for i in range(count) if i not in grouped or i in group], units, title))
+    for group in table.groups if len(table.groups) > 1 else [range(count)]:
+        places = [i for i in range(count) if i not in grouped or i in group or len(table.groups) < 2]
+        console.print(_grid(table, places, units, title, console.width))
 
 
-def _grid(table: Table, places: Sequence[int], units: Units, title: str) -> Grid:
+def _grid(table: Table, places: Sequence[int], units: Units, title: str, room: int | None = None) -> Grid:
+    """The table with its columns at `places`; where a `room` in letters is given, narrowed to that."""
     if table.columns:
         places = [i for i in places if table.columns[i].form != "long"]
+    rows = [row for row in table.rows if row.form != "long"]
+    heads = [_head(table.columns[i], units) if table.columns else "" for i in places]
+    columns: list[list[Cell]] = [
+        [head, *(row.cells[i] for row in rows)] for i, head in zip(places, heads, strict=True)
+    ]
+    if table.note_title:
+        heads.append(table.note_title)
+        columns.append([table.note_title, *(row.note for row in rows)])
     grid = Grid(title=Styled(title) if title else None, title_justify="left", show_header=bool(table.columns))
-    for i in places:
-        head = (table.columns[i].short or plain_line(table.columns[i].title, units)) if table.columns else ""
-        # a column of names that rich makes as narrow as it can loses the ends of long words
-        grid.add_column(head, justify="right" if i and table.numeric else "left", min_width=None if i else 14)
-    notes = bool(table.note_title)
-    if notes:
-        grid.add_column(table.note_title)
-    for row in table.rows:
-        if row.form != "long":
-            note = [plain_line(row.note, units)] if notes else []
-            grid.add_row(*(plain_cell(row.cells[i], units) for i in places), *note)
+    widths = _widths(columns, units, room) if room else [None] * len(columns)
+    for k, (head, width) in enumerate(zip(heads, widths, strict=True)):
+        right = table.numeric and 0 < k < len(places)
+        grid.add_column(head, justify="right" if right else "left", width=width)
+    for cells in zip(*(column[1:] for column in columns), strict=True):
+        grid.add_row(*(plain_cell(cell, units) for cell in cells))
     return grid
+
+
+def _head(column: Column, units: Units) -> str:
+    return column.short or plain_line(column.title, units)
+
+
+def _widths(columns: Sequence[Sequence[Cell]], units: Units, room: int) -> list[int]:
+    """Widths of columns in a table of the width `room`. The widest gives first: down to where its longest word, or
+    number with its unit, just fits; only where that is not enough are numbers parted from their units."""
+    texts = [[plain_cell(cell, units) for cell in column] for column in columns]
+    widths = [max(map(len, column)) for column in texts]
+    whole = [max(len(part) for cell in column for part in _parts(cell, units)) for column in columns]
+    words = [max(len(word) for text in column for word in text.split() or [""]) for column in texts]
+    borders = 3 * len(columns) + 1
+    for least in (whole, words):
+        while sum(widths) + borders > room:
+            wide = [k for k, width in enumerate(widths) if width > least[k]]
+            if not wide:
+                break
+            widths[max(wide, key=lambda k: widths[k])] -= 1
+    return widths
+
+
+def _parts(cell: Cell, units: Units) -> list[str]:
+    """A cell in parts that stay on one line: words, and numbers with their units."""
+    parts = [""]
+    for piece in pieces((cell.used,) if isinstance(cell, Share) else cell):
+        if isinstance(piece, Number):
+            parts += _plain(piece, units).replace(" (", "\n(").split("\n")
+        elif isinstance(piece, Strong | Aside):
+            parts += _parts(piece.line, units)
+        else:
+            parts += plain_line(piece, units).split()
+    return parts
