@@ -325,7 +325,7 @@ def test_a_damping_ratio_sets_both_dampings():
         ("[driveline]\nc2 = 1\nshaft2 = { section = 'round' }", "driveline.c2: given beside driveline.shaft2"),
         ("[driveline]\nd3 = 1\ndamping_ratio = 0.1", "driveline.d3: given beside driveline.damping_ratio"),
         ("[driveline]\ndamping_ratio = -0.1", "driveline.damping_ratio = -0.1: must be >= 0 and <= 0.5"),
-        ("[driveline]\nshaft2 = { section = 'tube' }", 'driveline.shaft2.section = "tube": input should be'),
+        ("[driveline]\nshaft2 = { section = 'tube' }", 'driveline.shaft2.section = "tube": must be "round"'),
         ("[driveline]\nshaft2 = { outer = 1 }", "driveline.shaft2.section: missing; one of round, hollow"),
         ("[driveline]\nshaft3 = { section = 'round', outer = 1 }", "driveline.shaft3.length: missing"),
         (
@@ -343,7 +343,7 @@ def test_a_damping_ratio_sets_both_dampings():
         ("[running]\npoints = 20.5", "running.points = 20.5: must be a whole number"),
         ('[running]\nload = "3 N"', 'running.load = "3 N": must be a number in N.m'),
         ("[stability]\nbend_low = 0.5\nbend_high = 0.2", "stability.bend_high = 0.2 rad: must be > 0.5 rad"),
-        ("[stability]\njoint = 'beta'", "stability.joint = \"beta\": input should be 'alpha1', 'alpha2' or 'both'"),
+        ("[stability]\njoint = 'beta'", 'stability.joint = "beta": must be "alpha1", "alpha2" or "both"'),
         ("[stability]\ndamping_ratios = []", "stability.damping_ratios = []: list should have at least 1 item"),
         ("[stability]\ndamping_ratios = [0.9]", "stability.damping_ratios = 0.9: must be >= 0 and <= 0.5"),
         ("[stability]\nspeeds = 3.5", "stability.speeds = 3.5: must be a whole number"),

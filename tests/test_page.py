@@ -234,7 +234,7 @@ def test_every_axis_says_what_it_shows_in_which_unit(study, written):
             k: v["title"]["text"] for k, v in figure["layout"].items() if k[1:5] == "axis" and "title" in v
         }
         for axis, title in axes.items():
-            assert re.fullmatch(r".+ \[(N m|N|rad/s|A|s|deg|1|rad s-1/N m)\]|pin", title), (name, axis)
+            assert re.fullmatch(r".+ \[(N m|N|rad/s|A|s|deg|1|rad/\(N m s\))\]|pin", title), (name, axis)
         columns = {"torque-speed": 2, "speed-loop": 3}.get(name, 1)
         assert sum(axis.startswith("x") for axis in axes) == columns
         drawn = {trace.get("yaxis", "y") for trace in figure["data"]}

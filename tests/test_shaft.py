@@ -246,7 +246,7 @@ def test_the_speed_loop_is_tuned_and_shown_with_the_line(tmp_path):
         ("[driveline]\nd2 = 1\ndamping_ratio = 0.1", "driveline.d2: given beside driveline.damping_ratio"),
         ("[driveline]\nshaft3 = { section = \"round\", outer = \"40 mm\" }", "driveline.shaft3.length"),
         ("[driveline]\nexponent = 0", "driveline.exponent = 0: must be >= 1"),
-        ('[driveline]\nplace = "roof"', "driveline.place = \"roof\": input should be 'crank' or 'motor'"),
+        ('[driveline]\nplace = "roof"', 'driveline.place = "roof": must be "crank" or "motor"'),
     ],
 )  # fmt: skip
 def test_bad_tables_are_refused(text, line):

@@ -26,6 +26,7 @@ from pydantic import (
     ValidationError,
     create_model,
 )
+from pydantic_core import ErrorDetails
 
 from .errors import InputError, printable, shown
 from .quantities import Layout, Variable, base_units, complaint, variables
@@ -254,7 +255,26 @@ def first_line(error: ValidationError, file: type[BaseModel], prefix: str = "") 
         return f"{where} = {shown(first['input'])}: must be a table"
     if first["type"] == "value_error":
         return str(first["ctx"]["error"])
-    return f"{where} = {shown(first['input'])}: {first['msg'].lower()}"
+    return f"{where} = {shown(first['input'])}: {_allowed(first, where.removeprefix(prefix))}"
+
+
+_KINDS = {
+    "string_type": "a text",
+    "bool_type": "true or false",
+    "bool_parsing": "true or false",
+    "dict_type": "a table",
+}
+"""What a value must be, by the kind of pydantic's error."""
+
+
+def _allowed(error: ErrorDetails, key: str) -> str:
+    """What a value must be that pydantic refuses, in the words of a file."""
+    kind, value = error["type"], error["input"]
+    if kind == "literal_error":
+        return "must be " + error["ctx"]["expected"].replace("'", '"')
+    if kind == "list_type":
+        return "must be a list" + (f" of tables, each below [[{key}]]" if isinstance(value, Mapping) else "")
+    return f"must be {_KINDS[kind]}" if kind in _KINDS else error["msg"].lower()
 
 
 def merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:

@@ -301,7 +301,9 @@ def _pins(s: b.Source, study: Study) -> b.Table:
     def row(pin: str) -> b.TableRow:
         worst = max(tables, key=lambda run: tables[run][pin]["peak"]["value"])
         own = (s.number(f"pins.{reference}.{pin}.{size}") for size in sizes)
-        return b.TableRow((pin, *own, s.number(f"pins.{worst}.{pin}.peak"), study.called(worst)))
+        return b.TableRow(
+            (pin, *own, s.number(f"pins.{worst}.{pin}.peak"), study.called(worst), read.short(study, worst))
+        )
 
     columns = (
         b.Column(f"{read.title(study, reference)}, {spoken(size)}", f"{reference}, {spoken(size)}")
@@ -309,7 +311,13 @@ def _pins(s: b.Source, study: Study) -> b.Table:
     )
     return b.Table(
         tuple(map(row, tables[reference])),
-        (b.Column("pin"), *columns, b.Column("largest peak", "largest"), b.Column("in")),
+        (
+            b.Column("pin"),
+            *columns,
+            b.Column("largest peak", "largest"),
+            b.Column("in", form="long"),
+            b.Column("in", form="short"),
+        ),
         title="What the bearings carry (equivalent: ISO 281)",
     )
 

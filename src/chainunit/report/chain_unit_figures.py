@@ -172,7 +172,7 @@ def _speed_loop(study: Study) -> fig.Figure:
         (frequency, fig.Axis("phase", "deg", low=-270.0, high=0.0, step=45.0), "frequency", "phase", "Phase"),
         (
             time,
-            fig.Axis("deviation of the motor speed", "rad.s-1/N.m"),
+            fig.Axis("deviation of the motor speed", "rad/(N.m.s)"),
             "time",
             "deviation",
             "Disturbance step",

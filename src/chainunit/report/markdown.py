@@ -85,10 +85,12 @@ def block_lines(block: Block, units: Units, pictures: Collection[str] = ()) -> l
 
 def _table(table: Table, units: Units) -> list[str]:
     count = len(table.columns) or len(table.rows[0].cells)
-    heads = [_line(column.title, units) for column in table.columns] or ["quantity", *[""] * (count - 1)]
+    places = [i for i, column in enumerate(table.columns) if column.form != "short"] or range(count)
+    heads = [_line(table.columns[i].title, units) for i in places if table.columns]
+    heads = heads or ["quantity", *[""] * (count - 1)]
     notes = any(row.note for row in table.rows)
     rows = [
-        [markdown_text(plain_cell(cell, units)) for cell in row.cells]
+        [markdown_text(plain_cell(cell, units)) for cell in (row.cells[i] for i in places)]
         + ([_line(row.note, units)] if notes else [])
         for row in table.rows
         if row.form != "short"

@@ -120,14 +120,15 @@ def _head(column: Column, units: Units) -> str:
 
 
 def _widths(columns: Sequence[Sequence[Cell]], units: Units, room: int) -> list[int]:
-    """Widths of columns in a table of the width `room`. The widest gives first: down to where its longest word, or
-    number with its unit, just fits; only where that is not enough are numbers parted from their units."""
+    """Widths of columns, each with its head first, in a table of the width `room`. Heads wrap first, then words in
+    cells, and only where that is not enough are numbers parted from their units; the widest column gives first."""
     texts = [[plain_cell(cell, units) for cell in column] for column in columns]
     widths = [max(map(len, column)) for column in texts]
     whole = [max(len(part) for cell in column for part in _parts(cell, units)) for column in columns]
     words = [max(len(word) for text in column for word in text.split() or [""]) for column in texts]
+    heads = [max(len(each) for each in (*column[0].split(), *column[1:], "")) for column in texts]
     borders = 3 * len(columns) + 1
-    for least in (whole, words):
+    for least in (heads, whole, words):
         while sum(widths) + borders > room:
             wide = [k for k, width in enumerate(widths) if width > least[k]]
             if not wide:
