@@ -502,6 +502,21 @@ def test_a_block_has_no_peaks_of_what_is_not_known(folder):
     assert study.failure is None and set(spread.peaks) == {"crank_torque", "rocker_torque"}
 
 
+@pytest.mark.parametrize("trip, opens", [(120, True), (400, False)])
+def test_a_safety_coupling_behind_it(trip, opens, folder):
+    """It opens in the jam or is said not to; the torque at which the motor stalls is not compared."""
+    text = (folder / "foreign.toml").read_text() + f"[coupling]\ntrip_torque = {trip}\n"
+    study = run.run_study(config.parse(text, str(folder / "x.toml")), folder / "coupling")
+    assert study.failure is None
+    assert (study.answers["jam_left"].coupling_trip_time is not None) == opens
+    told = [remark for remark in study.warnings if remark.kind == "coupling never opens"]
+    assert len(told) == (not opens)
+    for remark in told:
+        assert set(remark.quantities) == {"trip", "largest", "steady"} and remark.text.endswith("N m.")
+    if opens:
+        assert study.certificate["jam_left"]["energy_residual_share"] < 1e-2
+
+
 def test_a_state_that_cannot_be_saved_is_refused_before_anything_is_run(folder, tmp_path, monkeypatch):
     build(tmp_path, canGetAndSetFMUstate="false")
     monkeypatch.setattr(CoSimulation, "run", lambda *_, **__: pytest.fail("a run began"))

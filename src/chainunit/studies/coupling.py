@@ -108,8 +108,10 @@ def coupling_sentence(study: Study) -> str:
 
 def remark_on_coupling(study: Study, trip: float) -> None:
     """Where the coupling that is given, set to `trip` [N m], does not do its work."""
-    most, peaks = pull_out(study), peaks_on_coupling(study)
-    shocks, amounts = peaks_on_coupling(study, Role.SHOCK), {"trip": (trip, "N.m"), "motor": (most, "N.m")}
+    # of a motor of somebody else it is not known
+    most = None if study.drive.foreign else pull_out(study)
+    peaks, shocks = peaks_on_coupling(study), peaks_on_coupling(study, Role.SHOCK)
+    amounts = {"trip": (trip, "N.m")} | ({} if most is None else {"motor": (most, "N.m")})
     warn = partial(study.remark, "warning")
     if study.start_torque is not None and study.start_torque > trip:
         warn(
@@ -134,13 +136,14 @@ def remark_on_coupling(study: Study, trip: float) -> None:
         warn(
             "coupling never opens",
             "The safety coupling opens in no jam, lump or block of this study: it is set to {trip}, they put "
-            "{largest} on it at most, steady running {steady}; the motor gives {motor} at most.",
+            "{largest} on it at most, steady running {steady}"
+            + ("." if most is None else "; the motor gives {motor} at most."),
             *shocks,
             largest=(max(shocks.values()), "N.m"),
             steady=(on_coupling(study.drive, study.steady), "N.m"),
             **amounts,
         )
-    elif trip > most:
+    elif most is not None and trip > most:
         warn(
             "coupling above motor",
             "The safety coupling is set to {trip} and the motor gives {motor} at most: what brakes the machine "
