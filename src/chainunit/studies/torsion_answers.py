@@ -31,7 +31,7 @@ def _percent(value: float) -> str:
 
 
 def _ratio(value: float) -> str:
-    return number(float(value), "1", digits=4)
+    return number(float(value), "1", digits=5)
 
 
 def _degrees(value: float) -> str:
