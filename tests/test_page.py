@@ -615,6 +615,11 @@ def test_paths_numbers_and_units():
     assert {unit: unit_text(unit) for unit in units} == units
 
 
+def test_factors_of_two_bars_are_not_passed_for_those_of_chains(chains, study):
+    words = "of two bars in place of the chains"
+    assert words in said_of(chains) and words not in said_of(study)
+
+
 def test_chains_stand_beside_two_bars(chains, tmp_path):
     result = json.loads(json.dumps(as_dict(chains)))
     found = result["chain"]

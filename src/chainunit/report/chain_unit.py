@@ -152,7 +152,7 @@ def _answer(s: b.Source, study: Study) -> Iterator[b.Block]:
     else:
         yield b.Text("The study ended before any run could be evaluated.", "lead", "long")
     if s.result["overload_factors"]:
-        yield _factors(s)
+        yield _factors(s, study)
     yield from (b.Judgement("warning", each) for each in s.lines("warnings"))
     if answers and not s.result["warnings"]:
         yield b.Text("No run gives cause for a warning.", "fine", "long")
@@ -198,7 +198,7 @@ def _number(s: b.Source, study: Study, run: str, v: Variable) -> Number:
     return s.number(f"answers.{run}.{v.name}", none="not reached" if back else "-")
 
 
-def _factors(s: b.Source) -> b.Table:
+def _factors(s: b.Source, study: Study) -> b.Table:
     sides = s.result["overload_factors"]
     described = {v.name: v.description for v in Layout(OverloadFactors).variables}
     first = next(iter(sides))
@@ -212,7 +212,9 @@ def _factors(s: b.Source) -> b.Table:
         )
         for name in sides[first]
     )
-    title = s.line("Overload factor, one side against both, at {=run.crank_speed}")
+    # chains have no cycle at constant speed: the factors are those of two bars in every study
+    by = "" if study.drive.chain is None else ", of two bars in place of the chains"
+    title = s.line("Overload factor, one side against both, at {=run.crank_speed}" + by)
     return b.Table(tuple(rows), b.heads("way", *sides, "is for"), title=title, numeric=False)
 
 

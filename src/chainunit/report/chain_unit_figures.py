@@ -119,7 +119,7 @@ def _turn(s: b.Source, study: Study) -> fig.Figure:
         "Crank torque and, below, the torque that both organs ask of the rocker, over the crank angle: both sides "
         "loaded, one side empty, all feed on one side.",
         _stacked(_ANGLE, items.items()),
-        s.line("Inverse dynamics at {=run.crank_speed} of the crank, without a motor."),
+        s.line("Inverse dynamics of two bars at {=run.crank_speed} of the crank, without a motor."),
         "torque_angle.png",
     )
 
@@ -136,7 +136,10 @@ def _sides(s: b.Source, study: Study) -> fig.Figure:
 
     x = fig.Axis("crank speed", "rad/s", "speed", low=0.0, high=float(sides.speed[-1]))
     axes = {of: fig.Axis(f"{of} torque, peak", "N.m", low=0.0) for of in ("crank", "rocker")}
-    caption = "Largest torques of a turn by inverse dynamics. Where lines cross, one side alone asks as much as both"
+    caption = (
+        "Largest torques of a turn by inverse dynamics of two bars. Where lines cross, one side alone asks as much "
+        "as both"
+    )
     return fig.Figure(
         "sides",
         "One side alone against both, over the speed",
