@@ -29,9 +29,8 @@ ARGUMENTS = ("-O1", "-c", "a.c", "-o", "a.o")
 
 @pytest.fixture
 def store(tmp_path, monkeypatch):
-    folder = tmp_path / "store"
-    monkeypatch.setenv(VARIABLE, str(folder))
-    return folder
+    monkeypatch.setenv(VARIABLE, str(tmp_path / "named"))
+    return tmp_path / "named" / "chainunit"
 
 
 @pytest.fixture
@@ -110,13 +109,14 @@ def test_off_keeps_nothing(store, monkeypatch, tmp_path):
     for _ in range(2):
         assert entry(b"key", lambda: calls.append(1) or b"code") == b"code"
     assert len(calls) == 2 and cache.folder() is None and not store.exists()
-    environment = os.environ | {VARIABLE: str(store)}
+    environment = os.environ | {VARIABLE: str(store.parent)}
     command = [sys.executable, "-m", "chainunit.cli", "--no-cache", "export", "DcMotor"]
     subprocess.run(command, cwd=tmp_path, env=environment, check=True, capture_output=True)
     assert (tmp_path / "DcMotor.fmu").exists() and not store.exists()
 
 
 def test_a_folder_that_takes_nothing_costs_only_the_cache(store, monkeypatch, tmp_path):
+    store.parent.mkdir()
     store.write_text("a file in its place")
     assert entry(b"key", lambda: b"code") == b"code"
     store.unlink()
@@ -158,12 +158,32 @@ def test_it_is_bounded_and_keeps_what_was_used_last(store, monkeypatch):
     entry(b"1", lambda: calls.append(1) or b"")
     assert calls == [1], "the one that was not used for longest"
     # what a killed process left, and what another one is at
-    old, new = store / "x.1234.part", store / "y.1234.part"
+    old, new = store / f"{'a' * 64}.1234.part", store / f"{'b' * 64}.1234.part"
     for file in (old, new):
         file.write_bytes(b"x")
     os.utime(old, (time.time() - 1e5,) * 2)
     entry(b"6", lambda: b"code")
     assert not old.exists() and new.exists()
+
+
+def test_files_of_others_stay(store, monkeypatch):
+    """A user may name a folder in which other files lie; nothing but entries counts or goes."""
+    monkeypatch.setattr(cache, "_MOST", 1000)
+    store.mkdir(parents=True)
+    others = [folder / name for folder in (store, store.parent) for name in ("study.toml", "data.part", "x")]
+    for file in others:
+        file.write_bytes(bytes(2000))
+        os.utime(file, (1.0, 1.0))
+    for n in range(3):
+        entry(b"%d" % n, lambda: bytes(500))
+    assert all(file.exists() for file in others)
+    assert len(list(store.iterdir())) == 3 + 1
+
+
+@pytest.mark.parametrize("word", ["off", "OFF", "0", "no", "False"])
+def test_words_that_switch_it_off(monkeypatch, word):
+    monkeypatch.setenv(VARIABLE, word)
+    assert cache.folder() is None
 
 
 def test_many_at_once(store):

@@ -108,3 +108,10 @@ def test_dual_functions_against_differences():
     assert engines.slope(xp.abs(-d)) == 1.0
     assert engines.slope(2.0 / d) == pytest.approx(-2.0 / x**2)
     assert engines.slope(3.0 - d * d) == pytest.approx(-2.0 * x)
+
+
+@pytest.mark.parametrize(("a", "b"), [(1e17, 1.0), (0.1, 1e6), (float("inf"), 1.0), (-3.0, 2.0)])
+def test_the_lesser_of_two_duals_is_one_of_them(a, b):
+    xp = engines.dual(engines.MATH)
+    lesser = xp.minimum(engines.Dual(a, 5.0), engines.Dual(b, 7.0))
+    assert (engines.value(lesser), engines.slope(lesser)) == ((a, 5.0) if a < b else (b, 7.0))

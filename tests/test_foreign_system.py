@@ -176,6 +176,15 @@ def test_what_does_not_fit_is_refused_in_a_line(change, said, file, tmp_path):
     assert "\n" not in str(refused.value)
 
 
+def test_a_name_that_the_fmu_uses_for_another_variable_is_refused(file):
+    """Else one of two variables of one name would be taken, in silence."""
+    with pytest.raises(
+        InputError, match=r"has a variable a of its own, beside w, which was given for a; leave"
+    ):
+        foreign_component(file, "motor", {"a": "w"})
+    assert foreign_component(file, "motor", {"a": "w", "w": "a"}).names == {"a": "w", "w": "a"}
+
+
 def test_a_unit_that_is_ours_by_another_name_fits(file, machine, tmp_path):
     other = changed(file, tmp_path / "x.fmu", description=units("w", "radians_per_second"))
     assert driven(machine, foreign_component(other, "motor")).connections
@@ -436,7 +445,7 @@ def test_its_speeds_and_torques_are_those_of_ours(folder):
             r"system\.names\.omega: unknown key; known here: phi, w, a, tau, ",
         ),
         (("load.J", "load.mass"), r"system\.names\.load\.mass: unknown key; known here: tau_bias, J, "),
-        (('"rotor_speed"', "3"), r"system\.names\.w = 3: input should be a valid string"),
+        (('"rotor_speed"', "3"), r"system\.names\.w = 3: must be a text"),
         (('"ForeignMotor.fmu"', '""'), r'system\.motor = "": string should have at least 1 character'),
         (('motor = "ForeignMotor.fmu"', ""), r"system: names no motor; add motor"),
         (

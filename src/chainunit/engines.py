@@ -149,7 +149,7 @@ def dual(xp: Any) -> SimpleNamespace:
     def minimum(a: Any, b: Any) -> Any:
         if not (isinstance(a, Dual) or isinstance(b, Dual)):
             return xp.minimum(a, b)
-        return a + b - maximum(a, b)
+        return -maximum(-a, -b)
 
     def maximum(a: Any, b: Any) -> Any:
         if not (isinstance(a, Dual) or isinstance(b, Dual)):

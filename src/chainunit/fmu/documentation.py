@@ -15,10 +15,8 @@ td.number { text-align: right; font-variant-numeric: tabular-nums; white-space: 
 code { font-family: ui-monospace, monospace; }
 """
 
-_NOT_CONNECTED = (
-    "<p>An input that is not connected keeps its start value. Inputs phi, w and a belong together: give all of "
-    "them. As declared, the shaft stands at phi = 0.</p>\n"
-)
+_NOT_CONNECTED = "An input that is not connected keeps its start value."
+_MOTION = " Inputs phi, w and a belong together: give all of them. As declared, the shaft stands at phi = 0."
 
 
 def page(interface: Interface, version: str) -> str:
@@ -29,10 +27,12 @@ def page(interface: Interface, version: str) -> str:
         f"<h2>{title}</h2>\n{_table(interface.of(causality), causality)}"
         for title, causality in (("Parameters", "parameter"), ("Inputs", "input"), ("Outputs", "output"))
     )
+    driven = {"phi", "w", "a"} <= {signal.variable.name for signal in interface.of("input")}
+    inputs = _NOT_CONNECTED + (_MOTION if driven else "")
     return (
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{model.name}</title>'
         f"<style>{_STYLE}</style></head>\n<body><h1>{model.name}</h1>\n<p>{escape(model.description)}</p>\n"
-        f"<p>{text}</p>\n{_NOT_CONNECTED}{tables}<p>Made by chainunit {version}, MIT licence.</p></body></html>\n"
+        f"<p>{text}</p>\n<p>{inputs}</p>\n{tables}<p>Made by chainunit {version}, MIT licence.</p></body></html>\n"
     )
 
 

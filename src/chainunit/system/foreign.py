@@ -70,6 +70,11 @@ def fmu_component(
         for name, theirs in names.items():
             if theirs not in known:
                 raise InputError(f"{file}: has no variable {printable(theirs)}, which was given for {name}")
+            if name != theirs and name in known and name not in names.values():
+                raise InputError(
+                    f"{file}: has a variable {printable(name)} of its own, beside {printable(theirs)}, which was "
+                    f"given for {name}; leave that name out, or name its own otherwise: other = {name!r}"
+                )
         ours = {theirs: name for name, theirs in names.items()}
         units = {unit.name: unit.baseUnit for unit in fmu.description.unitDefinitions}
         connectors = {
@@ -83,6 +88,12 @@ def fmu_component(
         fmu.close()
     for terminal in terminals:
         units = {v: _UNITS[member] for member, v in terminal.members.items() if member in _UNITS}
+        for variable in units:
+            if variable not in connectors:
+                raise InputError(
+                    f"{file}: terminal {terminal.name} has the member {printable(variable)}, which is no Real "
+                    "parameter, input or output of the FMU"
+                )
         connectors |= _with_units(file, units, connectors)
     return FmuComponent(file, connectors, {t.name: t for t in terminals}, names)
 

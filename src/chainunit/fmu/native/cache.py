@@ -1,8 +1,8 @@
 """Compiled code that is kept: the same files by the same command of the same compiler are compiled once.
 
 It lies in the folder ``chainunit`` of the user's cache folder, under the hash of all that it was made of. Deleting
-the folder empties the cache. The environment variable CHAINUNIT_CACHE names another folder, or is ``off``. A folder
-that cannot be read or written costs the cache and nothing else.
+the folder empties the cache. The environment variable CHAINUNIT_CACHE names another folder to lie in, or is ``off``.
+A folder that cannot be read or written costs the cache and nothing else; files that are not the cache's own stay.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
+import re
 import sys
 import time
 from collections.abc import Callable
@@ -28,7 +29,7 @@ def folder() -> Path | None:
     """Where compiled code is kept; None where it is not."""
     setting = os.environ.get(VARIABLE, "")
     if setting:
-        return None if setting == OFF else Path(setting)
+        return None if setting.lower() in (OFF, "0", "no", "false") else Path(setting) / "chainunit"
     name = "LOCALAPPDATA" if sys.platform == "win32" else "XDG_CACHE_HOME"
     try:
         home = Path.home()
@@ -60,10 +61,15 @@ def entry(key: bytes, make: Callable[[], bytes]) -> bytes:
     return content
 
 
+def _is_ours(file: Path) -> bool:
+    """Whether a file is an entry of the cache, or a part of one that a process is writing or left behind."""
+    return re.fullmatch(r"[0-9a-f]{64}(\.[0-9a-f]+\.part)?", file.name) is not None
+
+
 def _shrink(place: Path) -> None:
     """Leave the newest files, as many as there is room for."""
     files = []
-    for file in place.iterdir():
+    for file in filter(_is_ours, place.iterdir()):
         with contextlib.suppress(FileNotFoundError):  # another process is at it, too
             files.append((file.stat().st_mtime, file.stat().st_size, file))
     room, now = _MOST, time.time()
