@@ -21,7 +21,7 @@ from types import MappingProxyType
 from typing import Any, TypeAlias
 
 from .errors import InputError
-from .quantities import DISPLAY_UNITS, finite
+from .quantities import DISPLAY_UNITS, Layout, finite
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _THIN = "\u202f"  # between thousands
@@ -155,6 +155,15 @@ def forms(
 def entry(value: float | None, unit: str, kind: str = "") -> dict[str, Any]:
     """A number as it stands in a result: with its unit, and its kind if it has one; null where it is not finite."""
     return {"value": finite(value), "unit": unit} | ({"kind": kind} if kind else {})
+
+
+def entries(declared: Any, *, titled: bool = False) -> dict[str, Any]:
+    """The declared values of an instance as ``{name: entry}``; with their descriptions where `titled`."""
+    layout = Layout(type(declared))
+    return {
+        v.name: entry(value, v.unit, v.kind) | ({"title": v.description} if titled else {})
+        for v, value in zip(layout.variables, layout.values(declared), strict=True)
+    }
 
 
 def number(

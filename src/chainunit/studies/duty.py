@@ -16,9 +16,9 @@ from ..config import Config
 from ..drives.induction_motor import InductionMotor
 from ..fmu.backends import Backend
 from ..machines.chain_unit import SIDES, SideName
-from ..quantities import Layout, Value, declaration, quantity
+from ..quantities import Value, declaration, quantity
 from ..system.instance import Fmu
-from ..text import entry
+from ..text import entries
 from .chain import HIGH
 from .chain import duty as chain_duty
 from .cycle import Cycle, all_on_one, cycle
@@ -76,7 +76,7 @@ class Duty:
         """Ready for JSON."""
         peaks = {side: _peak(turn) for side, turn in self.one_sided.items()}
         return {
-            "cycle": titled_entries(self.numbers),
+            "cycle": entries(self.numbers, titled=True),
             "one_sided": {
                 "larger_rms": self.heavier,
                 "larger_peak": max(SIDES, key=lambda side: peaks[side]),
@@ -135,12 +135,3 @@ def cycle_numbers(
             )
         ),
     )
-
-
-def titled_entries(declared: Any) -> dict[str, Any]:
-    """The values of an instance with unit, kind and description, ready for JSON."""
-    layout = Layout(type(declared))
-    return {
-        v.name: entry(value, v.unit, v.kind) | {"title": v.description}
-        for v, value in zip(layout.variables, layout.values(declared), strict=True)
-    }

@@ -38,6 +38,7 @@ from ..system import Bond, CoSimulation, ModelComponent, System, energy_residual
 from ..text import number
 from .cutting import TurnCurves, statics, stored_shares
 from .flywheels import Wheel, WheelAnswers, least_flywheel
+from .measures import mean, peak
 
 STARTED = 0.95
 """Share of the rated speed at which a start is over."""
@@ -424,28 +425,24 @@ def _unanswered(study: KnifeStudy, wheel: float, start_time: float | None, resid
 def _answers(study: KnifeStudy, wheel: float, run: xr.Dataset, residual: float) -> WheelAnswers:
     """The numbers of whole turns."""
     config = study.config
-    time, w, i, tau = (run[name].values for name in ("time", "motor.w", "motor.i", "motor.air_gap_tau"))
-
-    def mean(x: Any) -> float:
-        return float(np.trapezoid(x, time) / (time[-1] - time[0]))
-
+    w, i, tau = (run[name].values for name in ("motor.w", "motor.i", "motor.air_gap_tau"))
     swing = float(np.ptp(w))
-    current = math.sqrt(mean(i * i))
+    current = math.sqrt(mean(run, i * i))
     net, most = stored_shares(run, study.motor.rotor.J + wheel)
     return WheelAnswers(
         flywheel=wheel,
         inertia=study.inertia(wheel),
         start_time=None,
-        speed_mean=mean(w) / config.machine.ratio,
+        speed_mean=mean(run, w) / config.machine.ratio,
         speed_least=float(np.min(w)) / config.machine.ratio,
-        fluctuation=swing / mean(w),
+        fluctuation=swing / mean(run, w),
         fluctuation_by_hand=study.by_hand(wheel),
-        motor_torque_peak=float(np.max(np.abs(tau))),
-        motor_torque_rms=math.sqrt(mean(tau * tau)),
+        motor_torque_peak=peak(tau),
+        motor_torque_rms=math.sqrt(mean(run, tau * tau)),
         current_peak=float(np.max(i)),
         current_rms=current,
         current_share=current / config.motor.nameplate.rated_current,
-        supply_power_mean=mean(run["motor.supply_power"].values),
+        supply_power_mean=mean(run, run["motor.supply_power"].values),
         stored_share=net,
         stored_share_most=most,
         drift=abs(float(w[-1] - w[0])) / max(swing, 1e-12),

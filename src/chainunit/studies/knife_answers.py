@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from .. import __version__
-from ..text import number
+from ..text import entries, number
 from .flywheels import CLOSE
 from .knife import RESIDUAL, START_LONG, START_LONGEST, STARTED, KnifeStudy
-from .result import entries
+from .result import array_entry
 
 
 def _kg_m2(inertia: float) -> str:
@@ -144,9 +142,6 @@ def notes(study: KnifeStudy) -> list[str]:
 def as_dict(study: KnifeStudy) -> dict[str, Any]:
     """Ready for JSON, each number with its unit; null for a number that does not exist."""
 
-    def sizes(x: Any, unit: str, kind: str = "") -> dict[str, Any]:
-        return {"value": np.asarray(x, dtype=float).tolist(), "unit": unit} | ({"kind": kind} if kind else {})
-
     config, s, plate = study.config, study.statics, study.config.motor.nameplate
     return {
         "chainunit": __version__,
@@ -156,27 +151,27 @@ def as_dict(study: KnifeStudy) -> dict[str, Any]:
         "drive": {
             **entries(config.train),
             "motor": config.motor.designation,
-            "rated_power": sizes(plate.power, "W"),
-            "rated_current": sizes(plate.rated_current, "A"),
-            "rated_torque": sizes(plate.torque, "N.m"),
-            "rated_speed": sizes(plate.speed, "rad/s", "speed"),
-            "rotor_inertia": sizes(study.motor.rotor.J, "kg.m2"),
+            "rated_power": array_entry(plate.power, "W"),
+            "rated_current": array_entry(plate.rated_current, "A"),
+            "rated_torque": array_entry(plate.torque, "N.m"),
+            "rated_speed": array_entry(plate.speed, "rad/s", "speed"),
+            "rotor_inertia": array_entry(study.motor.rotor.J, "kg.m2"),
         },
         "run": entries(config.run),
         "turn": entries(s.turn),
         "pins": {title: entries(reaction) for title, reaction in s.pins.items()},
         "over_turn": {
-            "angle": sizes(s.angle[::10], "rad"),
-            "torque": sizes(s.torque[::10], "N.m"),
-            "torque_free": sizes(s.torque_free[::10], "N.m"),
-            "inertia": sizes(s.inertia[::10], "kg.m2"),
-            "blade_x": sizes(s.x[::10], "m"),
-            "blade_y": sizes(s.y[::10], "m"),
-            "tilt": sizes(s.tilt[::10], "rad"),
+            "angle": array_entry(s.angle[::10], "rad"),
+            "torque": array_entry(s.torque[::10], "N.m"),
+            "torque_free": array_entry(s.torque_free[::10], "N.m"),
+            "inertia": array_entry(s.inertia[::10], "kg.m2"),
+            "blade_x": array_entry(s.x[::10], "m"),
+            "blade_y": array_entry(s.y[::10], "m"),
+            "tilt": array_entry(s.tilt[::10], "rad"),
         },
         "flywheels": [{**entries(w.answers), "stalled": w.stalled} for w in study.wheels],
         "least_flywheel": None if study.least is None else entries(study.least.answers),
-        "flywheel_by_hand": sizes(study.flywheel_by_hand, "kg.m2"),
+        "flywheel_by_hand": array_entry(study.flywheel_by_hand, "kg.m2"),
         "fmus": study.backends,
         "warnings": warnings(study),
         "notes": notes(study),

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from .. import __version__
 from ..drives.dc_motor import DcMotor
-from ..quantities import Layout, variables
-from ..text import entry
+from ..quantities import variables
+from ..text import entries, entry
 from .coupling import coupling_sentence
 from .cycle import factors_for
 from .judgement import motor_verdict
@@ -16,13 +18,12 @@ from .measures import Phase, measures_of
 from .study import Study
 
 
-def entries(declared: Any) -> dict[str, Any]:
-    """The declared values of an instance as ``{name: {"value": .., "unit": ..}}``; what is not finite is null."""
-    layout = Layout(type(declared))
-    return {
-        v.name: entry(value, v.unit, v.kind)
-        for v, value in zip(layout.variables, layout.values(declared), strict=True)
-    }
+def array_entry(x: Any, unit: str, kind: str = "") -> dict[str, Any]:
+    """An array as `entry` gives a number; null where it is not finite."""
+    array = np.asarray(x, dtype=float)
+    values = array.astype(object)
+    values[~np.isfinite(array)] = None
+    return {"value": values.tolist(), "unit": unit} | ({"kind": kind} if kind else {})
 
 
 def _motor(study: Study) -> dict[str, Any]:

@@ -25,10 +25,10 @@ from ..engines import numpy_
 from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
 from ..quantities import Value, declaration, quantity
-from ..text import number
+from ..text import entries, number
 from .chain import HIGH
 from .drive import Drive
-from .duty import Duty, duty_of, titled_entries
+from .duty import Duty, duty_of
 from .trial import Check, try_motor
 
 
@@ -130,9 +130,9 @@ class SizingResult:
         best = self.best
         assert self.config.sizing is not None
         return {
-            "asked": titled_entries(self.config.sizing),
+            "asked": entries(self.config.sizing, titled=True),
             **self.duty.as_dict(),
-            "flywheel": titled_entries(Flywheel(J=best.flywheel, fluctuation=best.fluctuation)),
+            "flywheel": entries(Flywheel(J=best.flywheel, fluctuation=best.fluctuation), titled=True),
             "tried": {"value": len(self.candidates), "unit": "1"},
             "motors": {"value": self.motors, "unit": "1"},
             "weak": {"value": self.weak, "unit": "1"},

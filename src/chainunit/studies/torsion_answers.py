@@ -9,8 +9,8 @@ import numpy as np
 
 from ..drives.cardan import ORDERS, Cardan
 from ..drives.torsion import SteadyMotion
-from ..text import number
-from .result import entries
+from ..text import entries, number
+from .result import array_entry
 from .torsion import DRIFT, LineAnalysis
 
 ROUNDOFF_TORQUE = 1e-6
@@ -157,19 +157,12 @@ def _even_running(line: Cardan, ratio: Any) -> list[str]:
     ]
 
 
-def _sizes(x: Any, unit: str, kind: str = "") -> dict[str, Any]:
-    array = np.asarray(x, dtype=float)
-    values = array.astype(object)
-    values[~np.isfinite(array)] = None
-    return {"value": values.tolist(), "unit": unit} | ({"kind": kind} if kind else {})
-
-
 def _speed(x: Any) -> dict[str, Any]:
-    return _sizes(x, "rad/s", "speed")
+    return array_entry(x, "rad/s", "speed")
 
 
 def _frequency(x: Any) -> dict[str, Any]:
-    return _sizes(x, "rad/s", "frequency")
+    return array_entry(x, "rad/s", "frequency")
 
 
 def _motion(m: SteadyMotion) -> dict[str, Any]:
@@ -180,11 +173,14 @@ def _motion(m: SteadyMotion) -> dict[str, Any]:
     }
     return {
         "found": m.exists.tolist(),
-        **{name: _sizes(np.where(np.abs(x) < ROUNDOFF_TORQUE, 0.0, x), "N.m") for name, x in torques.items()},
-        "drive_torque": _sizes(m.drive, "N.m"),
-        "growth": _sizes(m.growth, "1/s"),
-        "largest_multiplier": _sizes(m.multiplier, "1"),
-        "growth_with_constant_torque": _sizes(m.free_growth, "1/s"),
+        **{
+            name: array_entry(np.where(np.abs(x) < ROUNDOFF_TORQUE, 0.0, x), "N.m")
+            for name, x in torques.items()
+        },
+        "drive_torque": array_entry(m.drive, "N.m"),
+        "growth": array_entry(m.growth, "1/s"),
+        "largest_multiplier": array_entry(m.multiplier, "1"),
+        "growth_with_constant_torque": array_entry(m.free_growth, "1/s"),
         "frequency": _frequency(m.frequency),
     }
 
@@ -195,7 +191,7 @@ def as_dict(analysis: LineAnalysis) -> dict[str, Any]:
     return {
         "driveline": entries(analysis.line),
         "running": entries(analysis.rotation),
-        "damping_ratio": _sizes(analysis.damping_ratio, "1"),
+        "damping_ratio": array_entry(analysis.damping_ratio, "1"),
         "natural_frequency": {
             "even": _frequency(analysis.at_even),
             "least": _frequency(band.least),
@@ -203,23 +199,23 @@ def as_dict(analysis: LineAnalysis) -> dict[str, Any]:
             "at_ratio_zero": _frequency(band.at_zero),
             "at_ratio_infinite": _frequency(band.at_infinity),
         },
-        "sensitivity": {name: _sizes(x, "1") for name, x in analysis.sensitivity.items()},
+        "sensitivity": {name: array_entry(x, "1") for name, x in analysis.sensitivity.items()},
         "ratio": {
-            "least": _sizes(np.min(analysis.ratio), "1"),
-            "largest": _sizes(np.max(analysis.ratio), "1"),
+            "least": array_entry(np.min(analysis.ratio), "1"),
+            "largest": array_entry(np.max(analysis.ratio), "1"),
         },
-        "excitation": {f"order {n}": _sizes(x, "rad") for n, x in analysis.excitation.items()},
+        "excitation": {f"order {n}": array_entry(x, "rad") for n, x in analysis.excitation.items()},
         "crossings": {f"speed = k/{n}": _speed(ends) for n, ends in analysis.crossings().items()},
-        "operating": {"static_torque2": _sizes(analysis.static2, "N.m"), **_motion(analysis.operating)},
+        "operating": {"static_torque2": array_entry(analysis.static2, "N.m"), **_motion(analysis.operating)},
         "resonance": {
             "speed": _speed(analysis.speed),
             **_motion(analysis.steady),
             "peaks": {
                 "speed": _speed([at for at, _ in analysis.resonances()]),
-                "torque2": _sizes([peak for _, peak in analysis.resonances()], "N.m"),
+                "torque2": array_entry([peak for _, peak in analysis.resonances()], "N.m"),
             },
-            "rigid_torque2": _sizes(analysis.rigid.peak2, "N.m"),
-            "rigid_torque3": _sizes(analysis.rigid.peak3, "N.m"),
+            "rigid_torque2": array_entry(analysis.rigid.peak2, "N.m"),
+            "rigid_torque3": array_entry(analysis.rigid.peak3, "N.m"),
             "unstable": _speed(analysis.unstable_ranges()),
             "no_steady_motion": _speed(analysis.missing_ranges()),
         },
@@ -228,15 +224,15 @@ def as_dict(analysis: LineAnalysis) -> dict[str, Any]:
         else {
             "asked_speed": _speed(analysis.simulated_speed),
             "speed": _speed(simulated.speed),
-            "peak_torque2": _sizes(simulated.peak2, "N.m"),
-            "peak_torque3": _sizes(simulated.peak3, "N.m"),
+            "peak_torque2": array_entry(simulated.peak2, "N.m"),
+            "peak_torque3": array_entry(simulated.peak3, "N.m"),
         },
         "stability": {
             "joint": analysis.map.joint,
             "speed": _speed(analysis.map.speed),
-            "bend": _sizes(analysis.map.bend, "rad"),
-            "damping_ratio": _sizes(analysis.map.ratio, "1"),
-            "growth": _sizes(analysis.map.growth, "1/s"),
+            "bend": array_entry(analysis.map.bend, "rad"),
+            "damping_ratio": array_entry(analysis.map.ratio, "1"),
+            "growth": array_entry(analysis.map.growth, "1/s"),
         },
         "warnings": warnings(analysis),
         "notes": notes(analysis),
