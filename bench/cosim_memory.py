@@ -15,8 +15,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from chainunit.config import load
-from chainunit.studies.choice import choose
+from chainunit.study.choice import choose
+from chainunit.study.config import load
 from chainunit.system import CoSimulation
 
 CHOSEN = ("motor.w", "motor.tau", "machine.tau")

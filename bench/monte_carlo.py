@@ -11,10 +11,10 @@ import tempfile
 import time
 from pathlib import Path
 
-from chainunit.config import parse
 from chainunit.drives.dc_motor import DcMotor
-from chainunit.studies import monte_carlo
-from chainunit.studies.drive import Drive
+from chainunit.study import monte_carlo
+from chainunit.study.config import parse
+from chainunit.study.drive import Drive
 from chainunit.system.instance import Fmu, Instance
 
 STUDY = "[monte_carlo]\nruns = 1000\nduration = 2\n[coupling]\ntrip_torque = 1000\n"

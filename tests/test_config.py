@@ -6,11 +6,11 @@ import math
 
 import pytest
 
-from chainunit.config import example, load, parse
 from chainunit.errors import InputError
 from chainunit.machines.chain_unit import Parameters
 from chainunit.models import MODELS
 from chainunit.reading import to_number
+from chainunit.study.config import example, load, parse
 
 
 def test_the_packaged_example_is_the_packaged_machine():

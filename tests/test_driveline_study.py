@@ -19,8 +19,8 @@ from chainunit.drives.cardan import Cardan, Twist, frozen_frequency, two_joints
 from chainunit.drives.torsion import rigid, settling_time, simulate, steady, with_damping_ratio
 from chainunit.engines import MATH
 from chainunit.report.driveline import PICTURES
-from chainunit.studies import driveline, torsion_answers
-from chainunit.studies.driveline import example, load, parse, run_driveline
+from chainunit.study import driveline, torsion_answers
+from chainunit.study.driveline import example, load, parse, run_driveline
 from chainunit.text import number
 
 

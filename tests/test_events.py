@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 from event_tables import STANDARD, event_line
 
-from chainunit import config
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor
 from chainunit.errors import InputError
 from chainunit.quantities import Layout, Value, declaration, quantity
-from chainunit.studies.drive import Drive
-from chainunit.studies.events import TYPES, Event, Role, Timing, in_groups
-from chainunit.studies.result import as_dict
-from chainunit.studies.rig import Rig
-from chainunit.studies.run import run_study
+from chainunit.study import config
+from chainunit.study.drive import Drive
+from chainunit.study.events import TYPES, Event, Role, Timing, in_groups
+from chainunit.study.result import as_dict
+from chainunit.study.rig import Rig
+from chainunit.study.run import run_study
 from chainunit.system import Profile
 
 QUICK = "[run]\nramp = 0.3\nsettle_turns = 1\nstep = 0.004\ncrank_speed = 6\n[machine]\nratio = 25\n"

@@ -82,7 +82,7 @@ def test_a_lump_swings_the_cardan_shaft(result):
 def test_chains_run_near_their_resonance():
     """As its title says, and the sweep passes through it. The run itself, of a minute, is that of
     tests/test_study.py."""
-    from chainunit import config
+    from chainunit.study import config
 
     loaded = config.load(EXAMPLES / "chains_near_resonance.toml")
     resonance = float(loaded.machine.chain_modes(loaded.feed.left, loaded.feed.right).frequency[0])

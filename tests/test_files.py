@@ -138,7 +138,7 @@ def test_a_full_disk_is_named_and_costs_no_more_than_the_file(tmp_path):
         """
         import resource, sys
         from chainunit.cli import main
-        from chainunit.studies import run
+        from chainunit.study import run
 
         study = run.run_study
 

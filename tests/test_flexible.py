@@ -19,7 +19,7 @@ from scipy.integrate import cumulative_simpson, solve_ivp
 from systems import pair
 from test_chain import DATA, M
 
-from chainunit import ChainUnit, GeometryError, InputError, RunError, config
+from chainunit import ChainUnit, GeometryError, InputError, RunError
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.engines import MATH
 from chainunit.errors import InterruptedRunError
@@ -39,8 +39,9 @@ from chainunit.machines.chain_unit import (
 )
 from chainunit.machines.flexible import flexible, turning
 from chainunit.mechanism.machine import MachineState, Mechanism
-from chainunit.studies.chain import numbers_at, study_chain
-from chainunit.studies.drive import Drive
+from chainunit.study import config
+from chainunit.study.chain import numbers_at, study_chain
+from chainunit.study.drive import Drive
 from chainunit.system import CoSimulation, hold_loads, monolithic
 from chainunit.system.instance import Fmu, Instance
 

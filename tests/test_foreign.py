@@ -13,11 +13,11 @@ from pathlib import Path
 import pytest
 from reports import said_of
 
-from chainunit import config
 from chainunit.errors import InputError, RunError, printable, shown
 from chainunit.fmu.native.export import export
 from chainunit.fmu.native.platforms import compiler
 from chainunit.models import MODELS
+from chainunit.study import config
 from chainunit.system.instance import Fmu, Instance
 
 ESCAPE, RIGHT_TO_LEFT, ISOLATE = "\x1b[31m", "\u202e", "\u2067"
@@ -107,10 +107,10 @@ def test_titles_are_harmless_wherever_they_go():
     """Terminal, page and Markdown, of each study that has a title."""
     from chainunit.drives.dc_motor import DcMotor
     from chainunit.report.markdown import markdown_text
-    from chainunit.studies import driveline, knife
-    from chainunit.studies.drive import Drive
-    from chainunit.studies.limits import statics
-    from chainunit.studies.study import Study
+    from chainunit.study import driveline, knife
+    from chainunit.study.drive import Drive
+    from chainunit.study.limits import statics
+    from chainunit.study.study import Study
 
     for module in (config, driveline, knife):
         parsed = module.parse(f"title = {toml_text(EVIL)}")

@@ -17,13 +17,13 @@ from command import chainunit
 from systems import component, pair
 from test_foreign import changed
 
-from chainunit import InputError, config
+from chainunit import InputError
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.motor import Motor
 from chainunit.model import Terminal
-from chainunit.studies import run
-from chainunit.studies.choice import with_motor
-from chainunit.studies.drive import Drive
+from chainunit.study import config, run
+from chainunit.study.choice import with_motor
+from chainunit.study.drive import Drive
 from chainunit.system import (
     CoSimulation,
     ModelExchange,

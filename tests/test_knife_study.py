@@ -19,9 +19,9 @@ from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.quantities import Layout
 from chainunit.report import files as report_files
 from chainunit.report import knife as page
-from chainunit.studies import cutting, knife, knife_answers
-from chainunit.studies.flywheels import Wheel, WheelAnswers
-from chainunit.studies.knife import KnifeStudy, example, load, parse, run_knife
+from chainunit.study import cutting, knife, knife_answers
+from chainunit.study.flywheels import Wheel, WheelAnswers
+from chainunit.study.knife import KnifeStudy, example, load, parse, run_knife
 from chainunit.system import CoSimulation, energy_residual, monolithic
 from chainunit.text import entry, number
 

@@ -12,8 +12,8 @@ import xarray as xr
 from chainunit import ChainUnit
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.quantities import Layout
-from chainunit.studies.drive import Drive
-from chainunit.studies.measures import (
+from chainunit.study.drive import Drive
+from chainunit.study.measures import (
     BURNT,
     Answers,
     Phase,

@@ -17,11 +17,11 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from chainunit.config import parse
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.errors import RunError, WriteError
-from chainunit.studies import monte_carlo, quantiles
-from chainunit.studies.drive import Drive
+from chainunit.study import monte_carlo, quantiles
+from chainunit.study.config import parse
+from chainunit.study.drive import Drive
 from chainunit.system import CoSimulation
 
 STUDY = """
@@ -40,10 +40,10 @@ scatter = 0.2
 SCRIPT = """
     import sys
     from pathlib import Path
-    from chainunit.config import parse
+    from chainunit.study.config import parse
     from chainunit.drives.dc_motor import DcMotor
-    from chainunit.studies import monte_carlo, quantiles
-    from chainunit.studies.drive import Drive
+    from chainunit.study import monte_carlo, quantiles
+    from chainunit.study.drive import Drive
 
     if __name__ == "__main__":
         config = parse(Path("study.toml").read_text())

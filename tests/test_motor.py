@@ -9,13 +9,13 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from chainunit import engines
-from chainunit.config import load
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.speed_control import loop, tune
 from chainunit.errors import InputError
 from chainunit.integrate import rk4
-from chainunit.studies.choice import tuned as tuned_motor
-from chainunit.studies.drive import Drive
+from chainunit.study.choice import tuned as tuned_motor
+from chainunit.study.config import load
+from chainunit.study.drive import Drive
 
 LAYOUT = DcMotor.state_layout
 

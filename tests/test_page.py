@@ -17,15 +17,16 @@ import pytest
 from event_tables import event_line
 from reports import page_of, pictures, said_of, write
 
-from chainunit import EMPTY, InputError, RunError, config
+from chainunit import EMPTY, InputError, RunError
 from chainunit.drives.induction_motor import SoftStart
 from chainunit.report import chain_unit, chain_unit_motion, html, page_figures
 from chainunit.report.blocks import at
-from chainunit.studies.chain import rest_forces
-from chainunit.studies.cycle import cycle
-from chainunit.studies.result import as_dict
-from chainunit.studies.run import run_study
-from chainunit.studies.sections import Feed, Starter
+from chainunit.study import config
+from chainunit.study.chain import rest_forces
+from chainunit.study.cycle import cycle
+from chainunit.study.result import as_dict
+from chainunit.study.run import run_study
+from chainunit.study.sections import Feed, Starter
 from chainunit.text import DEFAULT_UNITS, digits_text, forms, scales, unit_text
 from chainunit.text import number as told_as
 

@@ -10,14 +10,14 @@ import pytest
 from machines import random_machine
 from reports import page_of, said_of
 
-from chainunit import config
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.errors import InputError
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.models import MODELS
 from chainunit.quantities import Layout
 from chainunit.reading import slips
-from chainunit.studies.sections import Feed
+from chainunit.study import config
+from chainunit.study.sections import Feed
 
 MM = {"r": 150, "l": 1500, "h": 1000, "c": 1492.48, "hy": 1000, "e": 810, "l1": 1350, "l2": 540, "z": 853.815}
 
@@ -167,10 +167,10 @@ def test_what_is_refused_for_a_slip_says_so(text, told):
 
 
 def test_the_remark_stands_on_terminal_page_and_in_json():
-    from chainunit.studies.drive import Drive
-    from chainunit.studies.limits import statics
-    from chainunit.studies.result import as_dict
-    from chainunit.studies.study import Study
+    from chainunit.study.drive import Drive
+    from chainunit.study.limits import statics
+    from chainunit.study.result import as_dict
+    from chainunit.study.study import Study
 
     given = config.parse("[machine]\npin = { diameter = 60 }")
     drive = Drive(DcMotor, given.motor, given.machine)

@@ -10,18 +10,17 @@ import xarray as xr
 from event_tables import HEAVY_MACHINE, event_line
 from reports import said_of
 
-from chainunit import config
 from chainunit.drives.induction_motor import InductionMotor, steady
 from chainunit.drives.motor import T_RATED
 from chainunit.engines import MATH
-from chainunit.studies import sizing
-from chainunit.studies.bearings import mean_load
-from chainunit.studies.coupling import coupling_sentence
-from chainunit.studies.drive import Drive
-from chainunit.studies.judgement import motor_verdict
-from chainunit.studies.protection import Obstacle, Setting, relay_trip, stall
-from chainunit.studies.result import as_dict
-from chainunit.studies.run import run_study
+from chainunit.study import config, sizing
+from chainunit.study.bearings import mean_load
+from chainunit.study.coupling import coupling_sentence
+from chainunit.study.drive import Drive
+from chainunit.study.judgement import motor_verdict
+from chainunit.study.protection import Obstacle, Setting, relay_trip, stall
+from chainunit.study.result import as_dict
+from chainunit.study.run import run_study
 
 
 def test_a_relay_of_class_10_trips_when_its_class_says():

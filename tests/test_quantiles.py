@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import beta, norm, quantile_test
 
-from chainunit.studies.quantiles import Estimate, counted, quantile, runs_needed, share
+from chainunit.study.quantiles import Estimate, counted, quantile, runs_needed, share
 
 
 @pytest.mark.parametrize("q", [0.05, 0.5, 0.95, 0.99])

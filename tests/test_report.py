@@ -14,13 +14,13 @@ import pytest
 from rich.console import Console
 
 import chainunit.report
-from chainunit.config import Run
 from chainunit.report import blocks as b
 from chainunit.report import figure as fig
 from chainunit.report import html, page_figures, print_figures, terminal
 from chainunit.report.lines import Aside, Number, Strong, Words, joined, line
 from chainunit.report.markdown import markdown
 from chainunit.report.motion import Animation, Arrow, Clip, DrawnLink, Reading, pictures
+from chainunit.study.config import Run
 from chainunit.text import DEFAULT_UNITS, chosen_units
 
 RESULT = {

@@ -12,15 +12,16 @@ from reports import write
 from scipy.linalg import eigh
 from test_page import Reader, check_traced
 
-from chainunit import InputError, config
+from chainunit import InputError
 from chainunit.drives.shafts import hollow, stiffness
 from chainunit.models import MODELS
-from chainunit.studies.choice import choose
-from chainunit.studies.cycle import cycle
-from chainunit.studies.package import export_study, start_of
-from chainunit.studies.result import as_dict
-from chainunit.studies.run import run_study
-from chainunit.studies.shaft import RIGID, Cycles, rainflow, shaft_answers, torsion
+from chainunit.study import config
+from chainunit.study.choice import choose
+from chainunit.study.cycle import cycle
+from chainunit.study.package import export_study, start_of
+from chainunit.study.result import as_dict
+from chainunit.study.run import run_study
+from chainunit.study.shaft import RIGID, Cycles, rainflow, shaft_answers, torsion
 
 JAM, BLOCKED = (event_line(name, turns=1) for name in ("jam_left", "blocked"))
 SHORT = f"""

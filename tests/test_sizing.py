@@ -14,7 +14,6 @@ from event_tables import HEAVY_MACHINE, event_line
 from systems import component
 from typer.testing import CliRunner
 
-from chainunit.config import parse
 from chainunit.drives.catalogue import catalogue
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.induction_motor import InductionMotor, breakdown, steady
@@ -23,13 +22,14 @@ from chainunit.engines import MATH
 from chainunit.errors import InputError, InterruptedRunError
 from chainunit.fmu.backends import export
 from chainunit.machines.chain_unit import SideLoads
-from chainunit.studies import sizing
-from chainunit.studies.cycle import cycle
-from chainunit.studies.drive import Drive
-from chainunit.studies.duty import flywheel, rms
-from chainunit.studies.rig import Rig
-from chainunit.studies.sizing import Standing
-from chainunit.studies.trial import Check, permitted_starts, start_time
+from chainunit.study import sizing
+from chainunit.study.config import parse
+from chainunit.study.cycle import cycle
+from chainunit.study.drive import Drive
+from chainunit.study.duty import flywheel, rms
+from chainunit.study.rig import Rig
+from chainunit.study.sizing import Standing
+from chainunit.study.trial import Check, permitted_starts, start_time
 from chainunit.system import CoSimulation, Profile, System
 
 ANGLE = np.linspace(0.0, 2.0 * math.pi, 7200, endpoint=False)

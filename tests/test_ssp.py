@@ -20,13 +20,13 @@ from command import chainunit
 from fmpy.ssp.ssd import read_ssd, read_ssv
 from systems import component, pair
 
-from chainunit import InputError, RunError, cli, config
+from chainunit import InputError, RunError, cli
 from chainunit.drives.catalogue import catalogue
 from chainunit.errors import WriteError
 from chainunit.models import MODELS
-from chainunit.studies import sizing
-from chainunit.studies.choice import choose
-from chainunit.studies.package import export_study, start_of
+from chainunit.study import config, sizing
+from chainunit.study.choice import choose
+from chainunit.study.package import export_study, start_of
 from chainunit.system import CoSimulation, System, fmu_component, shaft_joints, ssp
 
 MINE = """

@@ -18,7 +18,7 @@ from reports import write
 
 from chainunit import EMPTY, ChainUnit, SideLoads
 from chainunit.report import chain_unit
-from chainunit.studies.cycle import alone, cycle, factors_for, overload_factors, sides_over_speed
+from chainunit.study.cycle import alone, cycle, factors_for, overload_factors, sides_over_speed
 
 SHORT = """
 [run]
@@ -136,9 +136,9 @@ step = 0.002
 
 def test_what_blocks_the_rocker_decides_the_peak(tmp_path):
     """Peaks over a decade of the stop's stiffness, as studies with these stops give them; and --check of a stop."""
-    from chainunit import config
-    from chainunit.studies.result import as_dict
-    from chainunit.studies.run import run_study
+    from chainunit.study import config
+    from chainunit.study.result import as_dict
+    from chainunit.study.run import run_study
 
     study = run_study(config.parse(event_line("blocked", turns=1) + BLOCKED), tmp_path, check=True)
     assert study.failure is None
@@ -201,16 +201,16 @@ def test_bad_input_ends_with_2_in_one_line_and_writes_nothing(tmp_path):
     ],
 )
 def test_what_chains_are_refused(text, told):
-    from chainunit import config
     from chainunit.errors import InputError
+    from chainunit.study import config
 
     with pytest.raises(InputError, match=re.escape(told)):
         config.parse(text)
 
 
 def test_a_run_that_fails_keeps_what_it_computed(tmp_path, monkeypatch):
-    from chainunit import config
-    from chainunit.studies.run import run_study
+    from chainunit.study import config
+    from chainunit.study.run import run_study
     from chainunit.system.instance import Instance
 
     step = Instance.step
@@ -332,8 +332,8 @@ def test_every_number_has_its_unit(done):
 
 
 def test_gains_that_are_not_given_are_tuned(tmp_path):
-    from chainunit import config
-    from chainunit.studies.choice import choose
+    from chainunit.study import config
+    from chainunit.study.choice import choose
 
     given = config.parse("[motor]\nspeed_control = { kp = 0.2 }\narmature = { L = 0.22 }")
     motor = choose(given, tmp_path, lambda *_: None).drive.parameters
@@ -510,9 +510,9 @@ step = 0.002
 
 def ran(text, folder):
     """A study that was run in this process, with its files in `folder`."""
-    from chainunit import config
-    from chainunit.studies.result import as_dict
-    from chainunit.studies.run import run_study
+    from chainunit.study import config
+    from chainunit.study.result import as_dict
+    from chainunit.study.run import run_study
 
     study = run_study(config.parse(text), folder)
     write(study, folder)
@@ -553,7 +553,7 @@ def test_a_slow_motor_still_makes_its_turns(tmp_path):
 
 
 def test_whole_turns_of_whole_turns_are_the_same():
-    from chainunit.studies.drive import Drive
+    from chainunit.study.drive import Drive
 
     drive = Drive(None, None, ChainUnit(ratio=100.0))
     for start in np.linspace(0.0, 700.0, 200):
@@ -592,7 +592,7 @@ def test_the_study_waits_until_the_turns_close(tmp_path):
     ],
 )
 def test_a_cycle_that_does_not_close_is_told(text, told, there, tmp_path, monkeypatch):
-    from chainunit.studies import rig
+    from chainunit.study import rig
 
     monkeypatch.setattr(rig, "_PATIENCE", 0.0)
     study, _ = ran(text, tmp_path)
@@ -616,11 +616,11 @@ def test_the_winding_temperature_is_that_of_the_duty_for_ever(tmp_path):
 
 def test_each_overload_has_its_mirror_on_the_other_side():
     """What happens to the left of a feed happens to the right of the mirrored feed."""
-    from chainunit import config
     from chainunit.drives.dc_motor import DcMotor
-    from chainunit.studies.drive import Drive
-    from chainunit.studies.events import TYPES
-    from chainunit.studies.rig import Rig
+    from chainunit.study import config
+    from chainunit.study.drive import Drive
+    from chainunit.study.events import TYPES
+    from chainunit.study.rig import Rig
 
     lopsided = "[feed]\n%s = { material_mass = 30, processing_force = 10 }\n%s = { material_mass = 70 }\n"
     rigs = [
@@ -675,10 +675,10 @@ def test_the_overloads_of_both_sides_are_readable(columns, tables):
 
     from rich.console import Console
 
-    from chainunit import config
     from chainunit.report import terminal
     from chainunit.report.blocks import Column, Table, TableRow
-    from chainunit.studies.events import in_groups
+    from chainunit.study import config
+    from chainunit.study.events import in_groups
 
     runs, events = ["steady", *STANDARD], config.load().events
     groups = tuple(tuple(runs.index(run) + 1 for run in group) for group in in_groups(events, runs))

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from systems import component, pair
 
-from chainunit import InputError, config
+from chainunit import InputError
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.driveline import CardanDriveline
 from chainunit.ports import LoadPort, PortSlopes
 from chainunit.quantities import Layout
-from chainunit.studies.drive import Drive
+from chainunit.study import config
+from chainunit.study.drive import Drive
 from chainunit.system import Jump, Profile, System, export, hold_loads, rigid, shaft_joints, without
 from chainunit.system.graph import direct_inputs, order
 from chainunit.system.signals import at_time, corners

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from chainunit.errors import InputError
-from chainunit.studies.measures import torque_reserve
+from chainunit.study.measures import torque_reserve
 from chainunit.text import chosen_units, entry, forms, number
 
 

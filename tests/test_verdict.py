@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from chainunit.studies.verdict import CRANK_GOOD, RESIDUAL, ROCKER_GOOD, ROCKER_GOOD_EMPTY, chains, two_bars
+from chainunit.study.verdict import CRANK_GOOD, RESIDUAL, ROCKER_GOOD, ROCKER_GOOD_EMPTY, chains, two_bars
 
 PULLED = {"steady": (20.0, 50.0), "jam_left": (5.0, 0.0)}
 KEPT = {"steady": 1e-6, "jam_left": 1e-5}

@@ -88,7 +88,7 @@ def _console(**options: Any) -> Console:
 
 def _study_file(file: Path | None) -> Any:
     """A study from its file; a value that looks like a slip of a unit is named before anything is run."""
-    from . import config as configuration
+    from .study import config as configuration
 
     loaded = configuration.load(file)
     for slip in loaded.slips:
@@ -115,20 +115,20 @@ def study(
 
     Writes report.html, result.json, result.md, result.nc, plots and the FMUs into the output folder.
     """
-    from . import config as configuration
+    from .study import config as configuration
 
     if example:
         print(configuration.example(), end="")
         return
     loaded = _study_file(config)
-    from .studies.choice import check_files
+    from .study.choice import check_files
 
     # before anything of an earlier run is taken away
     check_files(loaded)
     with claimed(output):
         from .report import chain_unit, files, series
-        from .studies.run import run_study
-        from .studies.study import LOAD_CYCLE
+        from .study.run import run_study
+        from .study.study import LOAD_CYCLE
 
         _clear(output, *files.names("result", chain_unit.PICTURES), series.SERIES, LOAD_CYCLE)
         errors = _console(stderr=True)
@@ -225,7 +225,7 @@ def driveline(
 
     Writes report.html, driveline.json, driveline.md and plots into the output folder.
     """
-    from .studies import driveline as lines
+    from .study import driveline as lines
 
     if example:
         print(lines.example(), end="")
@@ -258,7 +258,7 @@ def knife(
 
     Writes report.html, knife.json, knife.md, plots and the FMUs into the output folder.
     """
-    from .studies import knife as knives
+    from .study import knife as knives
 
     if example:
         print(knives.example(), end="")
@@ -364,8 +364,8 @@ def export(
     """Write a model as an FMU."""
     from .fmu.backends import export as write
     from .models import MODELS
-    from .studies.package import start_of, with_rods
-    from .studies.sections import ChainOrgans
+    from .study.package import start_of, with_rods
+    from .study.sections import ChainOrgans
 
     if name not in MODELS:
         raise InputError(f"{name}: no such model; there are {', '.join(MODELS)}")
@@ -379,7 +379,7 @@ def export(
         start = {}
         model = MODELS[name]
         if config and name == "KnifeDrive":
-            from .studies import knife as knives
+            from .study import knife as knives
 
             start = knives.start_of(knives.load(config))
         elif config:
@@ -410,7 +410,7 @@ def export_ssp(
     backend: _BackendOption = None,
 ) -> None:
     """Write motor and machine, connected, with their parameter sets, as an SSP 1.0 package of FMUs 2.0."""
-    from .studies.package import export_study
+    from .study.package import export_study
 
     if output.suffix != ".ssp":
         raise InputError(f"-o {output}: must be a file name that ends in .ssp")

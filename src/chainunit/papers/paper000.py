@@ -17,7 +17,7 @@ import numpy as np
 from ..engines import MATH
 from ..machines.api import EMPTY, ChainUnit
 from ..machines.crank_rocker import half_width_range
-from ..studies.cycle import overload_factors
+from ..study.cycle import overload_factors
 from .table import PICK
 
 RHO, LAM, MU, ZETA = 0.1, 2.0 / 3.0, 0.6, 0.5

@@ -6,11 +6,11 @@ from collections.abc import Collection
 from typing import Any
 
 from ..quantities import Variable
-from ..studies.bearings import PINS as PINS
-from ..studies.events import in_groups
-from ..studies.measures import Phase, measures_of
-from ..studies.rig import DIFFERENCE as DIFFERENCE
-from ..studies.study import Study
+from ..study.bearings import PINS as PINS
+from ..study.events import in_groups
+from ..study.measures import Phase, measures_of
+from ..study.rig import DIFFERENCE as DIFFERENCE
+from ..study.study import Study
 
 COASTING = "_coasting"
 """Ends the name of a run of the machine alone, behind the safety coupling that opened in the run named before it."""

@@ -8,13 +8,13 @@ from importlib import metadata
 from typing import Any
 
 from ..quantities import Layout, Variable
-from ..studies.cycle import OverloadFactors
-from ..studies.limits import Limits
-from ..studies.measures import Answers
-from ..studies.monte_carlo import Sample
-from ..studies.result import as_dict
-from ..studies.shaft import ShaftAnswers, Torsion
-from ..studies.study import Study
+from ..study.cycle import OverloadFactors
+from ..study.limits import Limits
+from ..study.measures import Answers
+from ..study.monte_carlo import Sample
+from ..study.result import as_dict
+from ..study.shaft import ShaftAnswers, Torsion
+from ..study.study import Study
 from . import accessors as read
 from . import blocks as b
 from .chain_unit_figures import PICTURES as PICTURES

@@ -12,9 +12,9 @@ import numpy as np
 from ..drives.dc_motor import DcMotor
 from ..engines import numpy_
 from ..machines.chain_unit import SIDES, ChamberForces
-from ..studies.chain import HIGH
-from ..studies.shaft import RIGID
-from ..studies.study import Study
+from ..study.chain import HIGH
+from ..study.shaft import RIGID
+from ..study.study import Study
 from ..text import forms
 from . import accessors as read
 from . import blocks as b

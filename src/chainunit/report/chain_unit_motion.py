@@ -14,7 +14,7 @@ from ..groups.chain import pins
 from ..groups.loads import Resistance
 from ..machines.chain_unit import SIDES, ChamberForces, Inputs, SideLoads, SideName
 from ..planar import Motion
-from ..studies.study import Study
+from ..study.study import Study
 from . import accessors as read
 from . import linkage
 from .motion import Animation, Arrow, Clip, Reading

@@ -7,8 +7,8 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from ..studies.sizing import Standing
-from ..studies.study import Study
+from ..study.sizing import Standing
+from ..study.study import Study
 from . import blocks as b
 from .lines import Aside, Line, Strong, capital, joined, line
 

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..drives.cardan import ORDERS
-from ..studies.driveline import DrivelineStudy, as_dict
-from ..studies.torsion import LineAnalysis
+from ..study.driveline import DrivelineStudy, as_dict
+from ..study.torsion import LineAnalysis
 from ..text import number
 from . import blocks as b
 from . import figure as fig

@@ -12,10 +12,10 @@ from ..engines import numpy_
 from ..machines.knife_drive import JOINTS, Inputs, KnifeDrive
 from ..mechanism.machine import Mechanism
 from ..quantities import Layout
-from ..studies.cutting import PINS, Reaction, Turn, outputs
-from ..studies.flywheels import Wheel, WheelAnswers
-from ..studies.knife import KnifeStudy
-from ..studies.knife_answers import as_dict
+from ..study.cutting import PINS, Reaction, Turn, outputs
+from ..study.flywheels import Wheel, WheelAnswers
+from ..study.knife import KnifeStudy
+from ..study.knife_answers import as_dict
 from ..text import number
 from . import blocks as b
 from . import figure as fig

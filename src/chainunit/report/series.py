@@ -9,7 +9,7 @@ import xarray as xr
 
 from .. import __version__
 from ..files import netcdf, whole
-from ..studies.study import LOAD_CYCLE, Study
+from ..study.study import LOAD_CYCLE, Study
 from .accessors import title
 
 SERIES = "result.nc"

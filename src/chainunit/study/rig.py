@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..config import Config
 from ..machines.chain_unit import SIDES, DirectChainUnit
 from ..system import CoSimulation, Jump, ModelComponent, Profile, System, certify, monolithic, rigid, without
+from .config import Config
 from .drive import Drive
 from .events import Event, OverTime
 from .measures import end_gap, whole_turns

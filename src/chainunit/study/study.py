@@ -8,12 +8,12 @@ from typing import Any, Literal, TypeAlias
 
 import xarray as xr
 
-from ..config import LENGTHS, Config
 from ..drives.speed_control import Tuning
 from ..errors import RunError
 from ..text import entry, number
 from . import verdict
 from .chain import ChainResult
+from .config import LENGTHS, Config
 from .drive import Drive
 from .limits import DriveStatics
 from .measures import Answers, Phase, Trip, Window, not_known, reaches, whole_turns

@@ -8,7 +8,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from ..config import Config
 from ..drives.driveline import CardanDriveline
 from ..drives.motor import Motor
 from ..errors import InputError, RunError
@@ -23,6 +22,7 @@ from ..quantities import Layout
 from ..system import System
 from ..system.ssp import export
 from .choice import choose
+from .config import Config
 from .drive import Drive
 
 

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import xarray as xr
 
-from ..config import Config
 from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
 from ..system import CoSimulation
@@ -19,6 +18,7 @@ from . import verdict
 from .bearings import pin_loads
 from .chain import study_chain
 from .choice import choose
+from .config import Config
 from .coupling import on_coupling, recommended
 from .events import Event
 from .limits import statics

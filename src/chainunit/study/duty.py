@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from ..config import Config
 from ..drives.induction_motor import InductionMotor
 from ..fmu.backends import Backend
 from ..machines.chain_unit import SIDES, SideName
@@ -21,6 +20,7 @@ from ..system.instance import Fmu
 from ..text import entries
 from .chain import HIGH
 from .chain import duty as chain_duty
+from .config import Config
 from .cycle import Cycle, all_on_one, cycle
 from .drive import Drive
 

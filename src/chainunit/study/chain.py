@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 
-from ..config import Config
 from ..engines import numpy_
 from ..errors import InterruptedRunError, RunError
 from ..machines.api import ChainUnit
@@ -29,6 +28,7 @@ from ..quantities import Layout, Value, declaration, quantity
 from ..system.instance import Fmu, Instance
 from ..system.simulation import stoppable
 from ..text import entry
+from .config import Config
 from .cycle import Cycle, cycle
 from .drive import Drive
 from .quantiles import CONFIDENCE, counted, quantile

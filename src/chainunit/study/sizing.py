@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from ..config import Config
 from ..drives.catalogue import CatalogueMotor, catalogue
 from ..drives.gearing import motor_side
 from ..drives.induction_motor import InductionMotor
@@ -27,6 +26,7 @@ from ..fmu.backends import Backend
 from ..quantities import Value, declaration, quantity
 from ..text import entries, number
 from .chain import HIGH
+from .config import Config
 from .drive import Drive
 from .duty import Duty, duty_of
 from .trial import Check, try_motor
@@ -165,7 +165,7 @@ def size(
     ----------
     config : a study with `sizing`
     folder : where the FMUs are written
-    report, backend : see `chainunit.studies.run.run_study`
+    report, backend : see `chainunit.study.run.run_study`
 
     Raises
     ------

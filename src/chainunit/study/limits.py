@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from ..config import Config
 from ..drives.dc_motor import DcMotor
 from ..drives.speed_control import Loop, loop
 from ..errors import InputError
 from ..machines.api import EMPTY
 from ..machines.chain_unit import SIDES, SideName
 from ..quantities import Value, declaration, quantity
+from .config import Config
 from .cycle import Cycle, OverloadFactors, Sides, all_on_one, cycle, overload_factors, sides_over_speed
 from .drive import Drive
 from .shaft import Torsion, torsion

@@ -10,14 +10,14 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict
 
-from .drives.cardan import check
-from .drives.dc_motor import DcMotor
-from .drives.gearing import Transmission
-from .errors import GeometryError, InputError, shown
-from .machines.api import ChainUnit, ratios
-from .machines.chain_unit import ChamberForces, SideLoads, SideName
-from .quantities import Layout
-from .reading import (
+from ..drives.cardan import check
+from ..drives.dc_motor import DcMotor
+from ..drives.gearing import Transmission
+from ..errors import GeometryError, InputError, shown
+from ..machines.api import ChainUnit, ratios
+from ..machines.chain_unit import ChamberForces, SideLoads, SideName
+from ..quantities import Layout
+from ..reading import (
     Slip,
     file_form,
     filled,
@@ -29,9 +29,11 @@ from .reading import (
     slips,
     toml,
 )
-from .studies.event_table import RandomEvent, read_events, read_random_event
-from .studies.events import Event, OneSidedFeed
-from .studies.sections import (
+from ..system.signals import Profile
+from ..text import DEFAULT_UNITS, Units, chosen_units
+from .event_table import RandomEvent, read_events, read_random_event
+from .events import Event, OneSidedFeed
+from .sections import (
     ORGANS,
     SECTIONS,
     STARTS,
@@ -47,8 +49,6 @@ from .studies.sections import (
     Starter,
     SystemTable,
 )
-from .system.signals import Profile
-from .text import DEFAULT_UNITS, Units, chosen_units
 
 
 class ReportTable(BaseModel):

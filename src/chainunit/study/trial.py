@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..config import Config
 from ..drives.catalogue import CatalogueMotor
 from ..drives.induction_motor import volts_per_hertz
 from ..drives.motor import T_RATED
 from ..engines import MATH
 from ..machines.chain_unit import SIDES, SideName
 from ..text import entry, number
+from .config import Config
 from .drive import Drive
 from .duty import Duty, rms
 from .measures import BURNT, peak

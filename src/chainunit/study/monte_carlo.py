@@ -26,7 +26,6 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from .. import __version__
-from ..config import Config
 from ..errors import InterruptedRunError, RunError
 from ..files import whole, writing
 from ..machines.chain_unit import SIDES, SideName
@@ -34,6 +33,7 @@ from ..quantities import Layout, Value, declaration, quantity
 from ..system import CoSimulation
 from ..system.instance import remove_unpacked
 from ..text import entry
+from .config import Config
 from .drive import Drive
 from .events import AnySide, Event
 from .measures import Phase, Window, read_measure, same_measure

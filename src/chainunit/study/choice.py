@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ..config import Config
 from ..drives.cardan import Cardan
 from ..drives.catalogue import check_own
 from ..drives.dc_motor import DcMotor
@@ -21,6 +20,7 @@ from ..errors import InputError
 from ..fmu.backends import Backend
 from ..quantities import Layout
 from ..system import foreign_component
+from .config import Config
 from .cycle import cycle
 from .drive import Drive
 from .sizing import SizingResult, size
