@@ -13,7 +13,7 @@ from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.speed_control import loop, tune
 from chainunit.errors import InputError
 from chainunit.integrate import rk4
-from chainunit.study.choice import tuned as tuned_motor
+from chainunit.study.choice import tune as tune_motor
 from chainunit.study.config import load
 from chainunit.study.drive import Drive
 
@@ -101,7 +101,7 @@ def test_internal_integrator_against_an_error_controlled_solver():
 
 def test_declared_gains_are_the_tuned_ones_of_the_packaged_drive():
     config = load()
-    drive, tuning = tuned_motor(config, Drive(DcMotor, config.motor, config.machine))
+    drive, tuning = tune_motor(config, Drive(DcMotor, config.motor, config.machine))
     tuned = drive.parameters
     declared = DcMotor.Parameters()
     for name in ("kp", "ki"):

@@ -1,22 +1,18 @@
 """The models that become FMUs, by name."""
 
-from .drives.dc_motor import DcMotor
 from .drives.driveline import CardanDriveline
-from .drives.induction_motor import InductionMotor
+from .drives.motors import MOTORS
 from .machines.chain_unit import ChamberForces, DirectChainUnit
 from .machines.flexible import ChainUnitFlexible
 from .machines.knife_drive import KnifeDrive
 from .model import Model
 
-MODELS: dict[str, type[Model]] = {
-    model.name: model
-    for model in (
-        ChamberForces,
-        DirectChainUnit,
-        DcMotor,
-        InductionMotor,
-        CardanDriveline,
-        KnifeDrive,
-        ChainUnitFlexible,
-    )
-}
+_MODELS: tuple[type[Model], ...] = (
+    ChamberForces,
+    DirectChainUnit,
+    *MOTORS.values(),
+    CardanDriveline,
+    KnifeDrive,
+    ChainUnitFlexible,
+)
+MODELS = {model.name: model for model in _MODELS}

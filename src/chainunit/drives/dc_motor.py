@@ -17,14 +17,17 @@ cut at the supply. A cut-off integrator is led back (back-calculation), so that 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar
+from collections.abc import Container, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..engines import MATH
 from ..model import Part, Requirement
 from ..ports import LoadInput
 from ..quantities import Value, declaration, group, quantity
 from .motor import T_RATED, Motor, MotorOutputs, MotorParameters, MotorPoint, ShaftStates, braked
+
+if TYPE_CHECKING:
+    from .speed_control import Loop, Tuning
 
 
 @declaration
@@ -176,6 +179,29 @@ class DcMotor(Motor):
             ("armature.R", "current_control.kp"),
         ),
     )
+
+    control = "all gains are given"
+
+    @staticmethod
+    def current_limit(p: Any) -> float | None:
+        """Of the converter."""
+        return float(p.limit.i)
+
+    @classmethod
+    def tune(cls, p: Any, inertia: float, fixed: Container[str] = ()) -> tuple[Any, Tuning | None]:
+        """See `chainunit.drives.speed_control.tune`."""
+        from .speed_control import tune
+
+        tuning = tune(p.armature, inertia)
+        gains = {name: gain for name, gain in tuning.parameters.items() if name not in fixed}
+        return cls.parameter_layout.from_names(gains, p), tuning if gains else None
+
+    @staticmethod
+    def speed_loop(p: Any, inertia: float) -> Loop | None:
+        """See `chainunit.drives.speed_control.loop`."""
+        from .speed_control import loop
+
+        return loop(p, inertia)
 
     @staticmethod
     def limit(xp: Any, p: Any, w: Any, T: float = T_RATED) -> Any:

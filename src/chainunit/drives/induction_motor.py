@@ -421,6 +421,13 @@ class InductionMotor(Motor):
         ),
     )
 
+    control = "an inverter, which follows the speed asked for by its frequency"
+
+    @staticmethod
+    def follows(p: Any) -> bool:
+        """On an inverter."""
+        return bool(p.inverter.on)
+
     @staticmethod
     def limit(xp: Any, p: Any, w: Any) -> Any:
         """On the line the torque of a cold motor at this speed; on an inverter the largest at any frequency, to

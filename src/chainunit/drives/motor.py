@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from collections.abc import Container, Mapping
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..engines import MATH
 from ..model import Model
 from ..ports import LoadState, Start, carried, flanges, load_terminal
 from ..quantities import Value, declaration, group, quantity
+
+if TYPE_CHECKING:
+    from .speed_control import Loop, Tuning
 
 T_RATED = 293.15
 """Temperature at which resistances are given [K]."""
@@ -81,7 +84,11 @@ class MotorPoint:
 
 class Motor(Model):
     """A motor that owns the shaft: states and outputs as in `ShaftStates` and `MotorOutputs`, and the two that each
-    kind calls its own."""
+    kind calls its own.
+
+    The base itself stands for an FMU of somebody else, of which no more is known than its terminals: its parameters
+    are None, and it has neither a speed loop nor limits that could be told.
+    """
 
     terminals = (*flanges("outflow"), load_terminal("load."))
     Point: ClassVar[Any]
@@ -132,6 +139,37 @@ class Motor(Model):
     def limit(xp: Any, p: Any, w: Any) -> Any:
         """Largest air-gap torque at the speed `w` [rad/s] that the supply allows in steady running [N m]."""
         raise NotImplementedError
+
+    control: ClassVar[str] = "its own, which follows the speed asked for"
+    """How its speed is controlled, in words, where it `follows`."""
+
+    @staticmethod
+    def follows(p: Any) -> bool:
+        """Whether it follows the speed reference `w_ref`; else it takes the speed that its supply and the load
+        give."""
+        return True
+
+    @staticmethod
+    def current_limit(p: Any) -> float | None:
+        """Largest current that its converter gives [A], None where it has no such limit."""
+        return None
+
+    @classmethod
+    def tune(cls, p: Any, inertia: float, fixed: Container[str] = ()) -> tuple[Any, Tuning | None]:
+        """The parameters with the gains of the speed control tuned to the total `inertia` at the shaft [kg m2], but
+        for those whose names are `fixed`; and the tuning, None where no gain was left to it.
+
+        Raises
+        ------
+        InputError
+            where no gains make a loop that is stable enough.
+        """
+        return p, None
+
+    @staticmethod
+    def speed_loop(p: Any, inertia: float) -> Loop | None:
+        """The linearised speed loop at the total `inertia` at the shaft [kg m2]; None where the motor has none."""
+        return None
 
     limited_by: ClassVar[Mapping[str, float]]
     """Outputs that set the largest torque at an instant, each with its resolution in parts of its largest value."""

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from ..drives.dc_motor import DcMotor
 from ..engines import numpy_
 from ..machines.chain_unit import SIDES, ChamberForces
 from ..study.chain import HIGH
@@ -267,10 +266,9 @@ def _transient(s: b.Source, study: Study, name: str) -> fig.Figure:
         items["shaft"] = _shaft_torque(run, time)
     if event is None and drive.follows:
         items["speed"].append(fig.Curve("speed asked for", time, run["motor.w_ref"].values / drive.ratio, 1))
-    if drive.motor is DcMotor:
-        limit = drive.parameters.limit.i
-        if np.max(np.abs(series["current"])) > 0.5 * limit:
-            items["current"].append(fig.Mark(limit, "current limit", axis="y", look="limit"))
+    limit = drive.motor.current_limit(drive.parameters)
+    if limit is not None and np.max(np.abs(series["current"])) > 0.5 * limit:
+        items["current"].append(fig.Mark(limit, "current limit", axis="y", look="limit"))
     low, high = float(time[0]), float(time[-1])
     behind = study.runs.get(name + read.COASTING)
     if behind is not None:

@@ -1,4 +1,4 @@
-"""The drive of a study: the DC motor that it gives, tuned, the motor that sizing chooses, or the FMU of somebody else
+"""The drive of a study: the motor that it gives, tuned, the motor that sizing chooses, or the FMU of somebody else
 that it names."""
 
 from __future__ import annotations
@@ -11,10 +11,10 @@ import numpy as np
 
 from ..drives.cardan import Cardan
 from ..drives.catalogue import check_own
-from ..drives.dc_motor import DcMotor
 from ..drives.driveline import CardanDriveline
 from ..drives.motor import Motor
-from ..drives.speed_control import Tuning, tune
+from ..drives.motors import motor_of
+from ..drives.speed_control import Tuning
 from ..drives.torsion import with_damping_ratio
 from ..errors import InputError
 from ..fmu.backends import Backend
@@ -46,10 +46,16 @@ def choose(
     if config.foreign is not None:
         return _with_foreign(config)
     if config.sizing is None:
+        motor, p = motor_of(config.motor), config.motor
         drive = Drive(
-            DcMotor, config.motor, config.machine, feed_forward=config.feed_forward, chain=config.chain
+            motor,
+            p,
+            config.machine,
+            motor.follows(p),
+            feed_forward=config.feed_forward,
+            chain=config.chain,
         )
-        return Choice(*tuned(config, with_line(config, drive)))
+        return Choice(*tune(config, with_line(config, drive)))
     sized = size(config, folder, report, backend)
     return Choice(with_line(config, sized.best.drive), sizing=sized)
 
@@ -130,10 +136,10 @@ def with_line(config: Config, drive: Drive) -> Drive:
     return replace(drive, line=CardanDriveline.parameter_layout.from_names(values | {"ratio": gear}))
 
 
-def tuned(config: Config, drive: Drive) -> tuple[Drive, Tuning | None]:
+def tune(config: Config, drive: Drive) -> tuple[Drive, Tuning | None]:
     """The drive with controller gains tuned to its inertia, where the config does not give them."""
     both = cycle(config.machine, config.run.crank_speed, config.feed.left, config.feed.right)
-    tuning = tune(config.motor.armature, drive.rotor_inertia + float(np.mean(both.outputs.J)))
-    own = {name: gain for name, gain in tuning.parameters.items() if f"motor.{name}" not in config.given}
-    parameters = DcMotor.parameter_layout.from_names(own, config.motor)
-    return replace(drive, parameters=parameters), tuning if own else None
+    fixed = {name.removeprefix("motor.") for name in config.given if name.startswith("motor.")}
+    inertia = drive.rotor_inertia + float(np.mean(both.outputs.J))
+    parameters, tuning = drive.motor.tune(drive.parameters, inertia, fixed)
+    return replace(drive, parameters=parameters), tuning

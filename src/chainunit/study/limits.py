@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..drives.dc_motor import DcMotor
-from ..drives.speed_control import Loop, loop
+from ..drives.speed_control import Loop
 from ..errors import InputError
 from ..machines.api import EMPTY
 from ..machines.chain_unit import SIDES, SideName
@@ -85,19 +84,23 @@ def statics(config: Config, drive: Drive) -> DriveStatics:
             rocker_extreme_left=left,
             margin=float(np.min(both.margin)),
         ),
-        loops=_loops(drive, both.J) if drive.motor is DcMotor else {},
+        loops={} if drive.foreign else _loops(drive, both.J),
         torsion=None if drive.line is None else _torsion(config, drive, both.J),
     )
 
 
 def _loops(drive: Drive, inertia: Any) -> dict[str, Loop]:
-    """The speed loop with the mean, the least and the largest inertia of the turn."""
+    """The speed loop with the mean, the least and the largest inertia of the turn, where the motor has one."""
     sizes = {
         "mean inertia": np.mean(inertia),
         "least inertia": np.min(inertia),
         "largest inertia": np.max(inertia),
     }
-    return {name: loop(drive.parameters, drive.rotor_inertia + float(size)) for name, size in sizes.items()}
+    loops = {
+        name: drive.motor.speed_loop(drive.parameters, drive.rotor_inertia + float(size))
+        for name, size in sizes.items()
+    }
+    return {name: loop for name, loop in loops.items() if loop is not None}
 
 
 def _torsion(config: Config, drive: Drive, inertia: Any) -> Torsion:

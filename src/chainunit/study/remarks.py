@@ -9,7 +9,6 @@ from functools import partial
 import numpy as np
 
 from ..drives.cardan import ORDERS, two_joints
-from ..drives.dc_motor import DcMotor
 from ..engines import numpy_
 from ..text import number
 from .coupling import peaks_on_coupling, remark_on_coupling
@@ -119,8 +118,8 @@ _HAPPENED = {
 def _on_runs(study: Study) -> None:
     """What happened in the runs, a remark for each kind of happening with all runs in which it did."""
     limits: dict[str, Amount] = {"gear passed": (study.config.gear.torque_limit, "N.m")}
-    if study.drive.motor is DcMotor:
-        limits["current limit"] = study.motor.limit.i, "A"
+    if (largest := study.drive.motor.current_limit(study.motor)) is not None:
+        limits["current limit"] = largest, "A"
     happenings = [(name, *each) for name in study.answers for each in _happenings(study, name)]
     for kind in dict.fromkeys(kind for _, kind, *_ in happenings):
         runs = {name: (shown, amounts) for name, each, shown, amounts in happenings if each == kind}
@@ -144,7 +143,8 @@ def _happenings(study: Study, name: str) -> Iterator[tuple[str, str, dict[str, A
     pushed = answers.web_pull_least < 0.0 or answers.wall_pull_least < 0.0
     if answers.slack_time == 0.0 and pushed:
         yield "rod end pushed", "", {}
-    if study.drive.motor is DcMotor and answers.current_peak > 0.999 * study.motor.limit.i:
+    largest = study.drive.motor.current_limit(study.motor)
+    if largest is not None and answers.current_peak > 0.999 * largest:
         yield "current limit", "", {}
     peak = peaks_on_coupling(study).get(name, 0.0)
     if "gear.torque_limit" in config.given and peak > config.gear.torque_limit:

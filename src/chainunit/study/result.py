@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
-from ..drives.dc_motor import DcMotor
 from ..quantities import variables
 from ..text import entries, entry
 from .coupling import coupling_sentence
@@ -108,9 +107,7 @@ def _statics(study: Study) -> dict[str, Any]:
             "current_crossover": entry(study.tuning.current_crossover, "rad/s"),
         }
         if study.tuning
-        else "all gains are given"
-        if study.drive.motor is DcMotor
-        else "an inverter, which follows the speed asked for by its frequency"
+        else study.drive.motor.control
         if study.drive.follows
         else "none: the motor takes the speed that its supply and the load give",
     }
