@@ -12,6 +12,7 @@ declared SI unit, and a text may carry a unit ("1455 rev/min"). Columns that hav
 from __future__ import annotations
 
 import csv
+import difflib
 import io
 import re
 from collections.abc import Iterator, Mapping
@@ -23,6 +24,8 @@ from typing import Any
 
 from ..errors import InputError, shown
 from ..quantities import DISPLAY_UNITS, Layout, Value, Variable, declaration, quantity
+from .induction_motor import InductionMotor
+from .motor import Motor
 from .nameplate import Identification, Nameplate, check, identify
 
 
@@ -69,6 +72,16 @@ class CatalogueMotor:
         except InputError as error:
             raise InputError(f"{self.origin}: {self.designation}: {error}") from error
 
+    def model(self) -> tuple[type[Motor], Any]:
+        """The model of the motor, and its parameters.
+
+        Raises
+        ------
+        InputError
+            see `identify`.
+        """
+        return InductionMotor, self.identify().parameters
+
 
 def heading(variable: Variable) -> str:
     """Name and unit of a column, in the unit that engineers read."""
@@ -95,6 +108,24 @@ def catalogue(extra: Path | None = None) -> list[CatalogueMotor]:
         rows = _toml_rows if extra.suffix.lower() == ".toml" else _csv_rows
         motors += _motors(rows(text, str(extra)), {m.designation for m in motors})
     return motors
+
+
+def motor_of_catalogue(designation: str, extra: Path | None = None) -> CatalogueMotor:
+    """The motor with this `designation`, of the packaged ones and those of the file `extra`.
+
+    Raises
+    ------
+    InputError
+        in one line, with the nearest designations, where there is none; and see `catalogue`.
+    """
+    motors = {m.designation: m for m in catalogue(extra)}
+    if designation not in motors:
+        near = difflib.get_close_matches(designation, motors, n=3, cutoff=0.0)
+        raise InputError(
+            f"{shown(designation)}: not in the catalogue; must be one of its designations, such as "
+            + ", ".join(f'"{name}"' for name in near)
+        )
+    return motors[designation]
 
 
 def check_own(extra: Path | None) -> None:

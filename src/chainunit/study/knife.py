@@ -7,7 +7,6 @@ co-simulated by the FMUs of machine and motor, once for each flywheel.
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -17,9 +16,9 @@ import numpy as np
 import xarray as xr
 from pydantic import BeforeValidator, Field
 
-from ..drives.catalogue import CatalogueMotor, catalogue
+from ..drives.catalogue import CatalogueMotor, motor_of_catalogue
 from ..drives.induction_motor import InductionMotor
-from ..errors import InputError, RunError, shown
+from ..errors import InputError, RunError
 from ..fmu.backends import Backend
 from ..machines.knife_drive import KnifeDrive, Parameters
 from ..quantities import Layout, Value, declaration, quantity, variables
@@ -188,7 +187,10 @@ def parse(text: str, source: str = "knife") -> KnifeConfig:
     )
     run = instance(CuttingRun, given_values(checked.run))
     _consistent(run)
-    motor = _motor(checked.drive.motor)
+    try:
+        motor = motor_of_catalogue(checked.drive.motor)
+    except InputError as error:
+        raise InputError(f"drive.motor = {error}") from error
     nominal = motor.nameplate.speed / run.crank_speed
     ratio = train.ratio or nominal
     if not abs(ratio / nominal - 1.0) < FAR:
@@ -227,17 +229,6 @@ def _consistent(run: CuttingRun) -> None:
         raise InputError(
             f"run.step = {run.step:g} s: must be <= {longest:.3g} s, a 300th of a turn at this crank_speed"
         )
-
-
-def _motor(designation: str) -> CatalogueMotor:
-    motors = {m.designation: m for m in catalogue()}
-    if designation not in motors:
-        near = difflib.get_close_matches(designation, motors, n=3, cutoff=0.0)
-        raise InputError(
-            f"drive.motor = {shown(designation)}: not in the catalogue; must be one of its designations, such as "
-            + ", ".join(f'"{name}"' for name in near)
-        )
-    return motors[designation]
 
 
 @dataclasses.dataclass
