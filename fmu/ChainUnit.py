@@ -6,5 +6,5 @@ from chainunit.machines import chain_unit
 
 @hold(globals())
 class ChainUnit(ModelSlave):
-    model = chain_unit.DirectChainUnit
+    model = chain_unit.ChamberForces.direct()
     sizes = {"stop.stiffness": 100.0, "stop.damping": 5.0}  # a stop that blocks nothing

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import pytest
 
 from chainunit.errors import InputError
@@ -9,6 +12,19 @@ from chainunit.fmu.description import Interface, model_description
 from chainunit.models import MODELS
 from chainunit.quantities import Layout, Quantity, base_units, bounded, variables
 from chainunit.reading import to_number
+
+NAMES = Path(__file__).parent / "data" / "variables.json"
+
+
+def variables_of(model):
+    """The variables of the model's FMU by causality, in their order, each with its unit."""
+    root = model_description(Interface(model, {}), "", {"ModelExchange": {}}, "0")
+    found: dict[str, list[str]] = {}
+    for variable in root.iter("ScalarVariable"):
+        unit = variable.find("Real").get("unit")
+        words = variable.get("name") if unit is None else f"{variable.get('name')} [{unit}]"
+        found.setdefault(variable.get("causality"), []).append(words)
+    return found
 
 
 def test_units_are_parsed():
@@ -40,6 +56,12 @@ def test_every_quantity_is_declared_once_and_whole(model):
     for layout in layouts[:2]:
         for v in layout.variables:
             assert v.quantity.start is not None and v.quantity.admits(v.quantity.start), v.name
+
+
+@pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
+def test_the_variables_of_an_fmu_are_a_contract(model):
+    """Names, units, causality and order, as others have connected them."""
+    assert variables_of(model) == json.loads(NAMES.read_text("utf-8"))[model.name]
 
 
 @pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)

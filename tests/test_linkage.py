@@ -7,6 +7,7 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -25,18 +26,9 @@ from chainunit.machines.parts import Force, force
 from chainunit.mechanism.chains import ChainedState
 from chainunit.mechanism.linkage import Linkage
 from chainunit.mechanism.machine import Mechanism
-from chainunit.mechanism.models import (
-    AddedInertia,
-    DirectMachine,
-    DrivingTorque,
-    InverseMachine,
-    ShaftMotion,
-    Turning,
-    direct_parts,
-    inverse_parts,
-)
+from chainunit.mechanism.models import InverseMachine, ShaftMotion
 from chainunit.planar import Vec2
-from chainunit.ports import PortValues, Start
+from chainunit.ports import PortValues
 from chainunit.quantities import Value, declaration, group, quantity
 
 DATA = json.loads((Path(__file__).parent / "data" / "stephenson.json").read_text())
@@ -58,21 +50,16 @@ class Parameters:
 
 
 @declaration
-class Loads:
-    """On the output link."""
+class Inputs(ShaftMotion):
+    """Motion, and loads on the output link."""
 
     load: Force = group(Force, "load", default=Force(fx=LOAD.x, fy=LOAD.y))
     resistance: Value = quantity("N", "resistance to the coupler point", default=0.0, min=0.0)
 
 
 @declaration
-class Inputs(Loads, ShaftMotion):
-    """Motion and loads."""
-
-
-@declaration
-class Carried:
-    """What the machine carries."""
+class Outputs(PortValues):
+    """Torque, load port and reactions."""
 
     output_bearing: Force = group(Force, "on the output link at O3")
     angle: Value = quantity("rad", "angle of the output link")
@@ -81,21 +68,7 @@ class Carried:
     potential_energy: Value = quantity("J", "potential energy")
     dissipated_power: Value = quantity("W", "dissipated power")
     margin: Value = quantity("1", "margin")
-
-
-@declaration
-class Outputs(Carried, PortValues):
-    """Torque and load port."""
-
     tau: Value = quantity("N.m", "torque")
-
-
-def probes(xp, p, u, s, a):
-    output = s.m.links["output"].u
-    return {
-        "output_bearing": force(s.reactions(a)["O3", "output"]),
-        "angle": xp.atan2(output.y, output.x),
-    }
 
 
 def bar(name: str, pin: str, end: str, points: Any = None) -> Bar:
@@ -112,7 +85,8 @@ class SixBar(InverseMachine):
     description = "Stephenson six-bar"
     Parameters = Parameters
     Inputs = Inputs
-    parts = inverse_parts(Outputs, probes)
+    Outputs = Outputs
+    joints = MappingProxyType({"output_bearing": ("O3", "output")})
 
     @staticmethod
     def linkage(p, u):
@@ -132,33 +106,17 @@ class SixBar(InverseMachine):
             },
         )
 
-
-@declaration
-class DirectParameters(Start, AddedInertia, Parameters):
-    """Of the six-bar that turns by itself."""
-
-
-@declaration
-class DirectInputs(Loads, DrivingTorque):
-    """Torque and loads."""
-
-
-@declaration
-class DirectOutputs(Turning, Carried):
-    """Motion and reactions."""
+    @classmethod
+    def probes(cls, xp, p, u, s, a):
+        """Bearing and angle of the output link."""
+        output = s.m.links["output"].u
+        return {
+            "output_bearing": force(s.reactions(a)[cls.joints["output_bearing"]]),
+            "angle": xp.atan2(output.y, output.x),
+        }
 
 
-class TurningSixBar(DirectMachine):
-    """The same linkage, driven by a torque."""
-
-    name = "TurningSixBar"
-    description = "Stephenson six-bar that turns by itself"
-    inverse = SixBar
-    Parameters = DirectParameters
-    Inputs = DirectInputs
-    parts = direct_parts(DirectOutputs, probes)
-
-
+TurningSixBar = SixBar.direct()
 LOSSY = {"ratio": 3.0, "pin.friction": 0.15, "joint_damping": 0.3}
 
 
@@ -311,26 +269,9 @@ def test_names_follow_from_the_description():
     assert {pin for pin, _ in topology.joints} == {joint["name"] for joint in DATA["description"]["joints"]}
 
 
-class TurningKnifeDrive(DirectMachine):
-    """The knife drive as a machine that turns by itself: declarations, and not a line of mechanics."""
-
-    inverse = KnifeDrive
-
-    @declaration
-    class Parameters(Start, AddedInertia, KnifeDrive.Parameters):
-        """Of the drive."""
-
-    @declaration
-    class Inputs(DrivingTorque):
-        """Torque, and forces on the blade."""
-
-        cut_force: Value = quantity("N", "resistance of the stack", default=0.0)
-        blade: Force = group(Force, "force on the blade", default=Force(fx=0.0, fy=0.0))
-
-
 def test_a_knife_drive_without_losses_keeps_its_energy():
     """A turn under its own weight and momentum, through the triad's branch, by an error-controlled solver."""
-    model = TurningKnifeDrive
+    model = KnifeDrive.direct()
     p = model.check(model.parameter_layout.from_names({"w_start": 12.0, "J_added": 0.5}))
     u, layout = model.Inputs(), model.state_layout
     run = solve_ivp(

@@ -3,28 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, Self
 
 import numpy as np
 
 from ..engines import MATH, numpy_
-from ..errors import GeometryError, InputError
+from ..errors import GeometryError
 from ..groups.loads import Stop
-from ..mechanism.machine import MachineState
+from ..mechanism.models import InverseMachine
 from ..ports import PortSlopes
-from ..quantities import Layout, Quantity, Variable, complaint
+from ..quantities import Quantity, Variable
 from . import chain_unit
-from .chain_unit import PINS, Chamber, ChamberForces, Inputs, Outputs, Parameters, SideLoads
+from .chain_unit import SIDES, Chamber, ChamberForces, Feed, Inputs, Outputs, Parameters, SideLoads
 from .crank_rocker import rocker_extremes
 from .hanging import Hanging, Modes, modes, rods, split
+from .machine import Machine, admitted
 
 _XP = numpy_()
 CHAIN_RODS = 32
 """Rods of an organ with which its lowest frequency is that of a chain to a thousandth."""
 EMPTY = SideLoads(material_mass=0.0, processing_force=0.0)
 FREE = Stop()
-_INPUTS = {v.name: v for v in ChamberForces.input_layout.variables}
 _ROCKER = {
     name: Variable(name, f"{what} of the rocker", Quantity(unit, what))
     for name, what, unit in (
@@ -35,13 +36,8 @@ _ROCKER = {
 }
 
 
-class ChainUnit:
-    """A chain unit with its parameters checked.
-
-    Angles and speeds are the motor's, as at the FMU; with ``ratio`` 1 they are the crank's.
-    Every argument may be a float or an array; shapes broadcast, and outputs have the common shape. A value that
-    is not finite, or a load outside its declared bounds, is an `InputError` that names it, in an array as well as
-    alone; a value beyond a bound by rounding only counts as the bound.
+class ChainUnit(Machine):
+    """A chain unit with its parameters checked, see `Machine`.
 
     Parameters
     ----------
@@ -51,10 +47,8 @@ class ChainUnit:
 
     Raises
     ------
-    KeyError
-        for a name that is not declared.
-    InputError, GeometryError
-        for values out of bounds and lengths that cannot turn, in one line.
+    KeyError, InputError, GeometryError
+        see `Machine`.
 
     Examples
     --------
@@ -63,17 +57,12 @@ class ChainUnit:
     -10.53
     """
 
+    p: Parameters
+
     def __init__(
         self, parameters: Parameters | Mapping[str, float] | None = None, /, **values: float
     ) -> None:
-        base = parameters if isinstance(parameters, Parameters) else Parameters()
-        given = {} if isinstance(parameters, Parameters) else dict(parameters or {})
-        self.p: Parameters = ChamberForces.parameter_layout.from_names({**given, **values}, base)
-        ChamberForces.check(self.p)
-
-    def replace(self, parameters: Mapping[str, float] | None = None, /, **values: float) -> ChainUnit:
-        """The same machine with some parameters changed, given as to the constructor."""
-        return ChainUnit(ChamberForces.parameter_layout.from_names({**(parameters or {}), **values}, self.p))
+        super().__init__(ChamberForces, parameters, **values)
 
     @classmethod
     def from_ratios(
@@ -87,7 +76,7 @@ class ChainUnit:
         l: float = 1.5,
         l1: float = 1.35,
         **values: float,
-    ) -> ChainUnit:
+    ) -> Self:
         """The machine in the papers' ratios and frame.
 
         rho = r/l, lam = h/l, mu = e/l1, zeta = z/z_max with z_max = 2 l1 sqrt(1 - mu), l2 = l1 - e;
@@ -99,19 +88,9 @@ class ChainUnit:
     def _inputs(
         self, phi: Any, w: Any, a: Any, left: SideLoads, right: SideLoads, stop: Stop = FREE
     ) -> Inputs:
-        return Inputs(
-            phi=_admitted(_INPUTS["phi"], phi),
-            w=_admitted(_INPUTS["w"], w),
-            a=_admitted(_INPUTS["a"], a),
-            left=_loads("left", left),
-            right=_loads("right", right),
-            stop=Stop(
-                **{name: _admitted(_INPUTS[f"stop.{name}"], getattr(stop, name)) for name in _STOP_NAMES}
-            ),
-        )
-
-    def _state(self, u: Inputs) -> MachineState:
-        return ChamberForces.shared(_XP, self.p, u, None)
+        given = Inputs(phi=phi, w=w, a=a, left=left, right=right, stop=stop)
+        inputs: Inputs = self.inputs(ChamberForces.input_layout.named(given))
+        return inputs
 
     def forces(
         self,
@@ -130,10 +109,8 @@ class ChainUnit:
         InputError
             see the class.
         """
-        u = self._inputs(phi, w, a, left, right, stop)
-        part = ChamberForces.parts[0]
-        out = part.equations(_XP, self.p, u, None, self._state(u))
-        return part.layout.instance(np.broadcast_arrays(*part.layout.values(out)))
+        out: Outputs = self._outputs(self._inputs(phi, w, a, left, right, stop))
+        return out
 
     def slopes(
         self,
@@ -145,26 +122,7 @@ class ChainUnit:
     ) -> PortSlopes:
         """Exact derivatives of `tau_bias` by motor angle and speed."""
         u = self._inputs(phi, w, 0.0, left, right, stop)
-        return ChamberForces.parts[1].equations(_XP, self.p, u, None, self._state(u))
-
-    def evaluate(self, inputs: Mapping[str, Any]) -> dict[str, Any]:
-        """All outputs of the FMU by name, from inputs by name; an input not named is 0.
-
-        Raises
-        ------
-        KeyError
-            for a name that is not an input.
-        InputError
-            see the class.
-        """
-        layout = ChamberForces.input_layout
-        u = layout.from_names({**dict.fromkeys(layout.names, 0.0), **inputs})
-        u = layout.instance([_admitted(_INPUTS[n], v) for n, v in layout.named(u).items()])
-        outputs = ChamberForces.evaluate(_XP, self.p, u)
-        named: dict[str, Any] = {}
-        for part, instance in zip(ChamberForces.parts, outputs, strict=True):
-            named |= part.layout.named(instance)
-        return dict(zip(named, np.broadcast_arrays(*named.values()), strict=True))
+        return ChamberForces.parts[1].equations(_XP, self.p, u, None, self.state(u))
 
     def torque_by_reactions(
         self,
@@ -177,7 +135,7 @@ class ChainUnit:
     ) -> Any:
         """The motor torque without friction [N m], from the reactions, group by group: the second route."""
         u = self._inputs(phi, w, a, left, right, stop)
-        return self._state(u).torque_by_reactions(u.a / self.p.ratio) / self.p.ratio
+        return self.state(u).torque_by_reactions(u.a / self.p.ratio) / self.p.ratio
 
     def friction_torque(
         self,
@@ -188,21 +146,8 @@ class ChainUnit:
         stop: Stop = FREE,
     ) -> Any:
         """The part of `tau` that pin friction and joint damping take [N m]."""
-        state = self._state(self._inputs(phi, w, 0.0, left, right, stop))
+        state = self.state(self._inputs(phi, w, 0.0, left, right, stop))
         return state.effects["pins"].lost / self.p.ratio
-
-    def pin_turns(self, phi: Any) -> list[Any]:
-        """Angle through which each of the ten pins O1, A, Bd, C, A2, B, A1 (left, then right) has turned [rad], from
-        the first of the motor angles `phi`, shape (n,); the sum of all turning to and fro is left to the reader."""
-        phi = _array(phi)
-        m = self._state(self._inputs(phi, 0.0, 0.0, EMPTY, EMPTY)).m
-        per_turn = [m.turns[joint] for joint in PINS]
-        step = np.diff(phi / self.p.ratio)
-        angles = []
-        for rate in per_turn:
-            rate = np.broadcast_to(rate, phi.shape)
-            angles.append(np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * step)]))
-        return angles
 
     def energy_per_kg(self, side: str, phi: Any, w: Any) -> Any:
         """Kinetic and potential energy of a kilogram of material on the `side` ("left" or "right") [J/kg]:
@@ -214,6 +159,11 @@ class ChainUnit:
             return out.kinetic_energy + out.potential_energy
 
         return energy(**{side: kilogram}) - energy()
+
+    @property
+    def stored_per_unit(self) -> Mapping[str, Callable[[Any, Any], Any]]:
+        """See `Machine`: the material of both organs."""
+        return {f"{side}.material_mass": partial(self.energy_per_kg, side) for side in SIDES}
 
     def chamber(
         self, psi: Any, w: Any = 0.0, a: Any = 0.0, left: SideLoads = EMPTY, right: SideLoads = EMPTY
@@ -231,8 +181,8 @@ class ChainUnit:
         InputError
             see the class.
         """
-        loads = Inputs(left=_loads("left", left), right=_loads("right", right))
-        psi, w, a = (_admitted(_ROCKER[n], x) for n, x in (("psi", psi), ("w", w), ("a", a)))
+        loads = self._inputs(0.0, 0.0, 0.0, left, right)
+        psi, w, a = (admitted(_ROCKER[n], x) for n, x in (("psi", psi), ("w", w), ("a", a)))
         if np.ndim(psi) == 0:
             self._assembled(float(psi))
         with np.errstate(invalid="ignore"):
@@ -252,7 +202,8 @@ class ChainUnit:
     def organ_rods(self, side: str, loads: SideLoads = EMPTY, number: int = CHAIN_RODS) -> tuple[Any, Any]:
         """Lengths [m] and masses [kg] of an organ as `number` rods, shape (number,), wall first, with the material on
         it: as many in wall and web as brings them nearest to equal length."""
-        p, own, loads = self.p, getattr(self.p, side), _loads(side, loads)
+        p, own = self.p, getattr(self.p, side)
+        loads = getattr(self._inputs(0.0, 0.0, 0.0, loads, loads), side)
         on_web = p.web_share * loads.material_mass
         masses = own.wall_mass + loads.material_mass - on_web, own.web_mass + on_web
         counts = split((p.l1, p.l2), number)
@@ -308,19 +259,19 @@ class ChainUnit:
         each speed given; infinite where no side is loaded."""
         phi = np.linspace(0.0, 2.0 * math.pi * self.p.ratio, points, endpoint=False)
         out = self.forces(phi, np.asarray(w, float)[..., None], 0.0, left, right)
-        pulls = [getattr(out, side).web_pull for side in self.loaded_sides(left, right)]
+        pulls = [getattr(out, side).web_pull for side in self.loaded_sides(Feed(left=left, right=right))]
         return np.min(pulls, axis=(0, -1)) if pulls else np.full(np.shape(w), np.inf)
 
-    def loaded_sides(self, left: SideLoads = EMPTY, right: SideLoads = EMPTY) -> list[str]:
+    def loaded_sides(self, feed: Feed) -> tuple[str, ...]:
         """The sides whose organ has any mass or load: a web that is not there cannot go slack."""
         present = []
-        for side, loads in (("left", left), ("right", right)):
-            masses = getattr(self.p, side)
+        for side in SIDES:
+            masses, loads = getattr(self.p, side), getattr(feed, side)
             if np.any(
                 masses.wall_mass + masses.web_mass + loads.material_mass + loads.processing_force > 0.0
             ):
                 present.append(side)
-        return present
+        return tuple(present)
 
     def slack_speed(
         self, left: SideLoads = EMPTY, right: SideLoads = EMPTY, highest: float = 1000.0
@@ -366,27 +317,8 @@ def ratios(rho: float, lam: float, mu: float, zeta: float, l: float, l1: float) 
     }
 
 
-def _loads(side: str, loads: SideLoads) -> SideLoads:
-    return SideLoads(
-        **{name: _admitted(_INPUTS[f"{side}.{name}"], getattr(loads, name)) for name in _LOAD_NAMES}
-    )
-
-
-_LOAD_NAMES = Layout(SideLoads).names
-_STOP_NAMES = Layout(Stop).names
-
-
-def _admitted(variable: Variable, given: Any) -> Any:
-    """A float or an array whose every value the declaration admits; a value beyond a bound by rounding is set on
-    it."""
-    q, x = variable.quantity, _array(given)
-    for extreme in (
-        (np.min(x), np.max(x)) if np.size(x) else ()
-    ):  # NaN is the extreme of any array that holds it
-        if not q.admits(float(extreme)):
-            raise InputError(complaint(variable, float(extreme)))
-    return q.bounded(x) if isinstance(x, float) else np.clip(x, q.low, q.high)
-
-
-def _array(x: Any) -> Any:
-    return x if isinstance(x, float) else np.asarray(x, float)
+def machine_of(model: type[InverseMachine], parameters: Any = None, /, **values: float) -> Machine:
+    """The machine of a model with what its kind has beside others; arguments and errors as of `Machine`."""
+    if model is ChamberForces:
+        return ChainUnit(parameters, **values)
+    return Machine(model, parameters, **values)

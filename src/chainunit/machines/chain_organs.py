@@ -6,7 +6,6 @@ angle of a rod from the downward vertical, positive towards +x.
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import math
 from collections.abc import Iterator, Sequence
@@ -21,7 +20,7 @@ from ..integrate import Solver
 from ..mechanism.chains import ChainedState
 from ..mechanism.linkage import Linkage
 from ..mechanism.machine import Mechanism
-from ..mechanism.models import running
+from ..mechanism.models import declared_class, running
 from ..planar import Vec2
 from ..quantities import Layout, Value, declaration, group, quantity
 from . import chain_unit
@@ -123,11 +122,6 @@ def _numbered(name: str, number: int, unit: str, words: str, nominal: float | No
         (f"{name}_{k}", Value, quantity(unit, words.format(k, k + 1), nominal=nominal))
         for k in range(1, number + 1)
     ]
-
-
-def declared_class(name: str, bases: tuple[type, ...], fields: Sequence[Any]) -> Any:
-    """A declaration that is built from its fields."""
-    return dataclasses.make_dataclass(name, fields, bases=bases, frozen=True, kw_only=True)
 
 
 def both(of: type) -> list[Any]:
@@ -236,7 +230,7 @@ class Organs:
         return loads, -forces[0]
 
     def loads(self, xp: Any, p: Any, x: Any, s: ChainedState, a: Any) -> dict[str, Any]:
-        """The fields of `Loads` at crank acceleration `a`."""
+        """The fields of `Outputs` at crank acceleration `a`."""
         reactions = s.reactions(a)
         sides: dict[str, Any] = {}
         for side, names in NAMES.items():

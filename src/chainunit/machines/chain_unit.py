@@ -22,19 +22,10 @@ from ..groups.dyad import Dyad
 from ..groups.loads import Block, Pin, PinLosses, Processing, Resistance, Stop, Weight
 from ..mechanism.linkage import Linkage
 from ..mechanism.machine import MachineState, Mechanism
-from ..mechanism.models import (
-    AddedInertia,
-    DirectMachine,
-    DrivingTorque,
-    InverseMachine,
-    ShaftMotion,
-    Turning,
-    direct_parts,
-    inverse_parts,
-)
+from ..mechanism.models import InverseMachine, ShaftMotion
 from ..model import Requirement
 from ..planar import ZERO, Link, Vec2
-from ..ports import PortValues, Start
+from ..ports import PortValues
 from ..quantities import Value, declaration, group, quantity
 from .crank_rocker import TURNS, half_width_range, longest_crank, pressure_angle, rocker_extremes
 from .parts import Force, Rod, force
@@ -126,17 +117,18 @@ class SideLoads:
 
 
 @declaration
-class OrganLoads:
-    """Loads of both organs, and the stop."""
+class Feed:
+    """The material on both organs in normal running."""
 
     left: SideLoads = group(SideLoads, "left organ", default=SideLoads())
     right: SideLoads = group(SideLoads, "right organ", default=SideLoads())
-    stop: Stop = group(Stop, "stop that blocks the rocker", default=Stop())
 
 
 @declaration
-class Inputs(OrganLoads, ShaftMotion):
-    """Motion of the motor shaft and loads of the organs."""
+class Inputs(Feed, ShaftMotion):
+    """Motion of the motor shaft, loads of the organs, and the stop."""
+
+    stop: Stop = group(Stop, "stop that blocks the rocker", default=Stop())
 
 
 @declaration
@@ -199,8 +191,8 @@ class Frame(Force):
 
 
 @declaration
-class Loads:
-    """Motion of the rocker, and the forces on every part of the machine."""
+class Outputs(PortValues):
+    """Torque, load port, motion of the rocker, and the forces on every part of the machine."""
 
     rocker: Rocker = group(Rocker, "rocker")
     left: Side = group(Side, "left organ")
@@ -220,28 +212,7 @@ class Loads:
         "W", "power that friction, damping, processing and the stop's damper take", nominal=100.0
     )
     margin: Value = quantity("1", "least |sin| of the three transmission angles; 0 is a dead position")
-
-
-@declaration
-class Outputs(Loads, PortValues):
-    """Torque, load port, motion and every reaction."""
-
     tau: Value = quantity("N.m", "torque needed at the motor shaft, J a + tau_bias", nominal=100.0)
-
-
-@declaration
-class DirectParameters(Start, AddedInertia, Parameters):
-    """Parameters of the machine that turns by itself."""
-
-
-@declaration
-class DirectInputs(OrganLoads, DrivingTorque):
-    """Torque of the motor and loads of the organs."""
-
-
-@declaration
-class DirectOutputs(Turning, Loads):
-    """Acceleration and everything the machine carries."""
 
 
 def supports(p: Any) -> dict[str, Vec2]:
@@ -347,29 +318,46 @@ def chamber(xp: Any, p: Any, u: Any, psi: Any, psi_w: Any, psi_a: Any) -> Chambe
     return _on_sides(xp, p, s, s.reactions(-psi_a), s.m.links["rocker"])
 
 
-JOINTS = {
+ON_DRIVE = {
     "crank_bearing": ("O1", "crank"),
     "crank_pin": ("A", "coupler"),
     "coupler_pin": ("Bd", "coupler"),
     "pivot": ("C", "rocker"),
 }
-"""Output and joint of each reaction of the drive."""
-PINS = (
-    *JOINTS.values(),
-    *(
-        joint
-        for side in NAMES.values()
-        for joint in (("A2", side.web), (side.b, side.wall), (side.a1, side.wall))
-    ),
-)
-"""All joints: O1, A, Bd, C, then A2, B, A1 of each side."""
+ON_SIDE = {
+    f"{side}.{output}": joint
+    for side, names in NAMES.items()
+    for output, joint in (
+        ("rocker_joint", ("A2", names.web)),
+        ("hinge", (names.b, names.wall)),
+        ("support", (names.a1, names.wall)),
+    )
+}
+JOINTS = {**ON_DRIVE, **ON_SIDE}
+"""Joint of each reaction, by output."""
+PINS = {
+    "O1 crank bearing": "crank_bearing",
+    "A crank pin": "crank_pin",
+    "Bd coupler pin": "coupler_pin",
+    "C rocker pivot": "pivot",
+    **{
+        title: f"{side}.{output}"
+        for side in SIDES
+        for title, output in (
+            (f"A2 {side} web at rocker", "rocker_joint"),
+            (f"B {side} hinge", "hinge"),
+            (f"A1 {side} support", "support"),
+        )
+    },
+}
+"""Output of each bearing, by title."""
 
 
 def on_drive(
     xp: Any, p: Any, s: Any, a: Any, reactions: Mapping[Any, Vec2], at_a1: Any = 0.0
 ) -> dict[str, Any]:
-    """The fields of `Loads` that do not depend on the kind of organ, at crank acceleration `a`; `at_a1` is the moment
-    on both organs at their walls, from the frame [N m]."""
+    """The fields of `Outputs` that do not depend on the kind of organ, at crank acceleration `a`; `at_a1` is the
+    moment on both organs at their walls, from the frame [N m]."""
     at_frame, moment = ZERO, at_a1
     for (pin, _), f in reactions.items():
         if pin in s.m.linkage.ground:
@@ -379,7 +367,7 @@ def on_drive(
     friction = s.effects["pins"].lost
     a_to_c = s.m.pins["A"].p
     return {
-        **{name: force(reactions[joint]) for name, joint in JOINTS.items()},
+        **{name: force(reactions[joint]) for name, joint in ON_DRIVE.items()},
         "pressure_angle": pressure_angle(xp, p.l, p.h, a_to_c.squared()),
         "frame": Frame(fx=-at_frame.x, fy=-at_frame.y, moment=s.torque(a) - friction - moment - stop.moment),
     }
@@ -430,8 +418,18 @@ class ChamberForces(InverseMachine):
         "Forces in a chain unit: crank, coupler, rocker and two working organs; "
         "from motor angle and speed to torque, load port and every support reaction"
     )
+    direct_name = "ChainUnit"
+    direct_description = (
+        "A chain unit that turns by itself: crank, coupler, rocker and two working organs; "
+        "from motor torque to angle, speed, acceleration and every support reaction"
+    )
     Parameters = Parameters
     Inputs = Inputs
+    Outputs = Outputs
+    Feed = Feed
+    joints = JOINTS
+    pins = PINS
+    probes = staticmethod(_probes)
 
     required = (
         Requirement("c", "m", "the crank circle must stay left of the pivot C", depends=("r",)),
@@ -468,18 +466,6 @@ class ChamberForces(InverseMachine):
         """Crank, dyad, and an organ on each side."""
         return drive(p, u, tuple(organ(p, u, side) for side in SIDES), resistances(p, u))
 
-    parts = inverse_parts(Outputs, _probes)
 
-
-class DirectChainUnit(DirectMachine):
-    """The direct model: motor torque in, motion out. As an FMU it is called ChainUnit."""
-
-    name = "ChainUnit"
-    description = (
-        "A chain unit that turns by itself: crank, coupler, rocker and two working organs; "
-        "from motor torque to angle, speed, acceleration and every support reaction"
-    )
-    Parameters = DirectParameters
-    Inputs = DirectInputs
-    inverse = ChamberForces
-    parts = direct_parts(DirectOutputs, _probes)
+DirectChainUnit = ChamberForces.direct()
+"""As an FMU it is called ChainUnit."""

@@ -23,12 +23,21 @@ from typing import Any
 from ..errors import InputError
 from ..integrate import Solver
 from ..mechanism.chains import ChainedState
-from ..mechanism.models import AddedInertia, LinkageModel, Turning, TurningStates, acceleration
+from ..mechanism.models import (
+    AddedInertia,
+    LinkageModel,
+    Turning,
+    TurningStates,
+    acceleration,
+    declared_class,
+    fields_of,
+    names_of,
+)
 from ..model import Model, Part, Requirement
-from ..ports import PortSlopes, Start
+from ..ports import PortSlopes, PortValues, Start
 from ..quantities import Layout, declaration, group
-from .chain_organs import MOST, Organs, Parameters, both, declared_class
-from .chain_unit import SIDES, ChamberForces, DirectChainUnit, DirectInputs, Inputs, Loads, Outputs
+from .chain_organs import MOST, Organs, Parameters, both
+from .chain_unit import SIDES, ChamberForces, DirectChainUnit, Inputs, Outputs
 
 CLOSING = 20.0
 """Rate at which a chain that has drifted off A2 is drawn back [1/s]."""
@@ -202,10 +211,16 @@ def _flexible(walls: int, webs: int) -> type[ChainedModel]:
             "in the web: from motor angle and speed to torque, load port and every support reaction"
         )
         bars, organs = ChamberForces, chains
+        Feed, joints, pins = ChamberForces.Feed, ChamberForces.joints, ChamberForces.pins
         Parameters = Parameters
         Inputs = Inputs
         States = declared_class("States", (), both(chains.States))
         input_rates = MappingProxyType({"phi": "w", "w": "a"})
+
+        @classmethod
+        def direct(cls) -> type[ChainedModel]:
+            """The direct model of the same machine."""
+            return _turning(chains)
 
         @classmethod
         def derivatives(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
@@ -229,7 +244,10 @@ def turning(walls: int, webs: int) -> type[ChainedModel]:
 
 @functools.cache
 def _turning(chains: Organs) -> type[ChainedModel]:
-    declared = declared_class("DirectChainOutputs", (Turning, Loads), both(chains.Side))
+    carried = fields_of(
+        declared_class("_", (Outputs,), both(chains.Side)), without=("tau", *names_of(PortValues))
+    )
+    declared = declared_class("DirectChainOutputs", (), [*carried, *fields_of(Turning)])
 
     def results(xp: Any, p: Any, u: Any, x: Any, s: ChainedState) -> Any:
         a = acceleration(p, u, s)
@@ -252,7 +270,7 @@ def _turning(chains: Organs) -> type[ChainedModel]:
         )
         bars, organs, shaft = DirectChainUnit, chains, ("phi", "w")
         Parameters = DirectChainParameters
-        Inputs = DirectInputs
+        Inputs = DirectChainUnit.Inputs
         States = declared_class("States", (TurningStates,), both(chains.States))
 
         @classmethod

@@ -20,7 +20,7 @@ from ..groups.loads import Cut, Pin, PinLosses, Push, Stack, Weight
 from ..groups.triad import Pose, Triad
 from ..mechanism.linkage import Linkage
 from ..mechanism.machine import MachineState, Mechanism
-from ..mechanism.models import InverseMachine, ShaftMotion, inverse_parts
+from ..mechanism.models import InverseMachine, ShaftMotion
 from ..planar import Vec2
 from ..ports import PortValues
 from ..quantities import Value, declaration, group, quantity
@@ -99,12 +99,18 @@ class Parameters(Lengths):
 
 
 @declaration
-class Inputs(ShaftMotion):
-    """Motion of the motor shaft and forces on the blade."""
+class CutForce:
+    """The cut in normal running."""
 
     cut_force: Value = quantity(
         "N", "resistance of the stack to the blade on its way down", default=0.0, min=0.0, nominal=1e4
     )
+
+
+@declaration
+class Inputs(CutForce, ShaftMotion):
+    """Motion of the motor shaft and forces on the blade."""
+
     blade: Force = group(Force, "further force on the blade", default=Force(fx=0.0, fy=0.0))
 
 
@@ -162,7 +168,20 @@ JOINTS = {
     "o3_bearing": ("O3", "leg_3"),
     "o4_bearing": ("O4", "leg_4"),
 }
-"""Output and joint of each reaction."""
+"""Joint of each reaction, by output."""
+PINS = {
+    "O1 crank bearing": "crank_bearing",
+    "A crank pin": "crank_pin",
+    "B coupler AB": "coupler_pin",
+    "B leg BC": "leg_pin",
+    "O2 rocker bearing": "rocker_bearing",
+    "C": "c_pin",
+    "D": "d_pin",
+    "E": "e_pin",
+    "O3 bearing": "o3_bearing",
+    "O4 bearing": "o4_bearing",
+}
+"""Output of each bearing, by title."""
 
 
 def _probes(xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
@@ -192,6 +211,11 @@ class KnifeDrive(InverseMachine):
     )
     Parameters = Parameters
     Inputs = Inputs
+    Outputs = Outputs
+    Feed = CutForce
+    joints = JOINTS
+    pins = PINS
+    probes = staticmethod(_probes)
     derived = Triad.derived
 
     required = (
@@ -239,8 +263,6 @@ class KnifeDrive(InverseMachine):
         between = _vector(p.o1) - _vector(p.o2)
         yield p.r, 0.0, longest_crank(xp, p.ab, p.bo2, xp.sqrt(between.squared()))
         yield from triad.limits(p.derived)
-
-    parts = inverse_parts(Outputs, _probes)
 
 
 def modes(p: Any, q: float = 0.0) -> list[Pose]:

@@ -7,19 +7,40 @@ one of the crank.
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
-from typing import Any
+from typing import Any, ClassVar
 
+from ..groups.loads import Joint
 from ..model import Model, Part, Requirement
-from ..ports import PortSlopes, flanges, load_terminal
-from ..quantities import Value, declaration, quantity
+from ..ports import PortSlopes, PortValues, Start, flanges, load_terminal
+from ..quantities import Layout, Value, declaration, quantity
 from .linkage import Linkage, Topology
 from .machine import MachineState, Mechanism, derived_numbers
 
-Probes = Callable[[Any, Any, Any, MachineState, Any], dict[str, Any]]
-"""Called with engine, parameters, inputs, state and crank acceleration; gives the machine's own outputs."""
+Fields = list[tuple[str, Any, Any]]
+"""Name, type and field of each quantity or group of a declaration that is built from others."""
+
+
+def declared_class(name: str, bases: tuple[type, ...], fields: Sequence[tuple[str, Any, Any]] = ()) -> Any:
+    """A declaration that is built from its fields."""
+    return dataclasses.make_dataclass(name, fields, bases=bases, frozen=True, kw_only=True)
+
+
+def fields_of(declared: type, *, without: Sequence[str] = ()) -> Fields:
+    """The fields of a declaration, those `without` left out, for another one."""
+    return [
+        (f.name, f.type, dataclasses.field(default=f.default, metadata=f.metadata))
+        for f in dataclasses.fields(declared)
+        if f.name not in without
+    ]
+
+
+def names_of(declared: type) -> tuple[str, ...]:
+    """The names of the fields of a declaration."""
+    return tuple(f.name for f in dataclasses.fields(declared))
 
 
 @declaration
@@ -60,23 +81,56 @@ class LinkageModel(Model):
 
 
 class InverseMachine(LinkageModel):
-    """Motion of the motor shaft in, torque, load port and every reaction out."""
+    """Motion of the motor shaft in, torque, load port and every reaction out.
+
+    A machine states its `Parameters`, `Inputs` (with those of `ShaftMotion`), `Outputs` (with `tau`, `PortValues` and
+    those of `running`), its `linkage` and its `probes`; all else follows.
+    """
+
+    Outputs: ClassVar[type]
+    Feed: ClassVar[type]
+    """Its loads in normal running: inputs beside `ShaftMotion`, all of them where a machine states none."""
+    feed_layout: ClassVar[Layout]
+    joints: ClassVar[Mapping[str, Joint]] = {}
+    """Joint of each reaction by the name of the output."""
+    pins: ClassVar[Mapping[str, str]] = {}
+    """Output of each bearing by its title, which is the name of pin and link where a machine states none."""
+    direct_name: ClassVar[str]
+    """Name of the direct model, ``<name>Direct`` where a machine states none."""
+    direct_description: ClassVar[str] = ""
 
     terminals = (*flanges("inflow"), load_terminal())
+
+    def __init_subclass__(cls) -> None:
+        own = vars(cls)
+        if "Inputs" in own and "Feed" not in own:
+            cls.Feed = declared_class("Feed", (), fields_of(cls.Inputs, without=names_of(ShaftMotion)))
+            # where pickle finds it
+            cls.Feed.__module__, cls.Feed.__qualname__ = cls.__module__, f"{cls.__qualname__}.Feed"
+        if hasattr(cls, "Feed"):
+            cls.feed_layout = Layout(cls.Feed)
+        if "joints" in own and "pins" not in own:
+            cls.pins = {f"{pin} {link}": output for output, (pin, link) in cls.joints.items()}
+        if "name" in own and "direct_name" not in own:
+            cls.direct_name = f"{cls.name}Direct"
+        if "Outputs" in own and "parts" not in own:
+            cls.parts = Part(cls.Outputs, cls._outputs), Part(PortSlopes, slopes)
+        super().__init_subclass__()
+
+    @staticmethod
+    def probes(xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
+        """The machine's own outputs, of a state at crank acceleration `a`."""
+        raise NotImplementedError
 
     @classmethod
     def shared(cls, xp: Any, p: Any, u: Any, x: Any) -> MachineState:
         """The machine at the crank angle and speed that belong to the motor's."""
         return cls.state(xp, p, u, u.phi / p.ratio, u.w / p.ratio)
 
-
-def inverse_parts(declared: type, probes: Probes) -> tuple[Part, Part]:
-    """The parts of an `InverseMachine` with the outputs `declared`, among them those of the load port, and those that
-    `running` gives."""
-
-    def outputs(xp: Any, p: Any, u: Any, x: Any, s: MachineState) -> Any:
+    @classmethod
+    def _outputs(cls, xp: Any, p: Any, u: Any, x: Any, s: MachineState) -> Any:
         a = u.a / p.ratio
-        return declared(
+        return cls.Outputs(
             tau=s.torque(a) / p.ratio,
             tau_bias=s.bias / p.ratio,
             J=s.J / (p.ratio * p.ratio),
@@ -84,10 +138,33 @@ def inverse_parts(declared: type, probes: Probes) -> tuple[Part, Part]:
             phi0=u.phi,
             w0=u.w,
             **running(s, a),
-            **probes(xp, p, u, s, a),
+            **cls.probes(xp, p, u, s, a),
         )
 
-    return Part(declared, outputs), Part(PortSlopes, slopes)
+    @classmethod
+    @cache
+    def direct(cls) -> type[DirectMachine]:
+        """The direct model of the same machine: torque in, motion out.
+
+        Its parameters are those of the machine, the inertia on its shaft and the start; its inputs the torque and the
+        loads; its outputs those of the machine without `tau` and load port, and `Turning`.
+        """
+        carried = fields_of(cls.Outputs, without=("tau", *names_of(PortValues)))
+        members = {
+            "__module__": cls.__module__,
+            "__doc__": f"The direct model of {cls.__name__}: motor torque in, motion out.",
+            "name": cls.direct_name,
+            "description": cls.direct_description
+            or f"{cls.name} that turns by itself: from motor torque to angle, speed, acceleration and every reaction",
+            "built_by": f"{cls.__qualname__}.direct()",
+            "inverse": cls,
+            "Parameters": declared_class("DirectParameters", (Start, AddedInertia, cls.Parameters)),
+            "Inputs": declared_class(
+                "DirectInputs", (DrivingTorque,), fields_of(cls.Inputs, without=names_of(ShaftMotion))
+            ),
+            "Outputs": declared_class("DirectOutputs", (), [*carried, *fields_of(Turning)]),
+        }
+        return type(f"Direct{cls.__name__}", (DirectMachine,), members)
 
 
 def running(s: MachineState, a: Any) -> dict[str, Any]:
@@ -142,10 +219,11 @@ class Turning:
 
 
 class DirectMachine(LinkageModel):
-    """Torque of the motor in, motion and every reaction out. `inverse` is the model of the same machine with the
-    motion given."""
+    """Torque of the motor in, motion and every reaction out, see `InverseMachine.direct`. `inverse` is the model of
+    the same machine with the motion given."""
 
-    inverse: type[InverseMachine]
+    inverse: ClassVar[type[InverseMachine]]
+    Outputs: ClassVar[type]
     States = TurningStates
     terminals = flanges("inflow")
     _carried = Requirement(
@@ -157,6 +235,7 @@ class DirectMachine(LinkageModel):
     def __init_subclass__(cls) -> None:
         cls.required = (*cls.inverse.required, cls._carried)
         cls.derived = cls.inverse.derived
+        cls.parts = (Part(cls.Outputs, cls._outputs),)
         super().__init_subclass__()
 
     @classmethod
@@ -192,25 +271,19 @@ class DirectMachine(LinkageModel):
         """Time derivatives of the states, in declared order."""
         return [x.w, acceleration(p, u, cls.shared(xp, p, u, x))]
 
-
-def acceleration(p: Any, u: Any, s: MachineState) -> Any:
-    """Motor acceleration [rad/s2]: (J_added + J) a = tau - tau_bias, all at the motor shaft."""
-    return (u.tau - s.bias / p.ratio) / (p.J_added + s.J / (p.ratio * p.ratio))
-
-
-def direct_parts(declared: type, probes: Probes) -> tuple[Part]:
-    """The part of a `DirectMachine` with the outputs `declared`, among them `Turning` and those that `running`
-    gives."""
-
-    def outputs(xp: Any, p: Any, u: Any, x: Any, s: MachineState) -> Any:
+    @classmethod
+    def _outputs(cls, xp: Any, p: Any, u: Any, x: Any, s: MachineState) -> Any:
         a = acceleration(p, u, s)
         at_crank = a / p.ratio
-        return declared(
+        return cls.Outputs(
             a=a,
             tau_bias=s.bias / p.ratio,
             J=s.J / (p.ratio * p.ratio),
             **running(s, at_crank),
-            **probes(xp, p, u, s, at_crank),
+            **cls.inverse.probes(xp, p, u, s, at_crank),
         )
 
-    return (Part(declared, outputs),)
+
+def acceleration(p: Any, u: Any, s: MachineState) -> Any:
+    """Motor acceleration [rad/s2]: (J_added + J) a = tau - tau_bias, all at the motor shaft."""
+    return (u.tau - s.bias / p.ratio) / (p.J_added + s.J / (p.ratio * p.ratio))

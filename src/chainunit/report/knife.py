@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..engines import numpy_
-from ..machines.knife_drive import JOINTS, Inputs, KnifeDrive
+from ..machines.knife_drive import Inputs, KnifeDrive
 from ..mechanism.machine import Mechanism
 from ..quantities import Layout
 from ..study.cutting import PINS, Reaction, Turn, outputs
@@ -326,7 +326,7 @@ def _motion(study: KnifeStudy) -> Animation:
     angle = np.linspace(0.0, 2.0 * math.pi, _PICTURES + 1)
     m = _mechanism(study, angle)
     places = _places(study, m)
-    pins = {output: pin for output, (pin, _) in JOINTS.items()}
+    pins = {output: pin for output, (pin, _) in KnifeDrive.joints.items()}
 
     def run(name: str, title: str, force: float) -> Clip:
         out = outputs(config.machine, angle, config.run.crank_speed, force)

@@ -8,21 +8,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ..machines.chain_unit import ChamberForces
 from .drive import Drive
 from .measures import mean, whole_turns
 
-PINS = {
-    "O1 crank bearing": "crank_bearing",
-    "A crank pin": "crank_pin",
-    "Bd coupler pin": "coupler_pin",
-    "C rocker pivot": "pivot",
-    "A2 left web at rocker": "left.rocker_joint",
-    "B left hinge": "left.hinge",
-    "A1 left support": "left.support",
-    "A2 right web at rocker": "right.rocker_joint",
-    "B right hinge": "right.hinge",
-    "A1 right support": "right.support",
-}
+PINS = ChamberForces.pins
 
 
 def pin_loads(drive: Drive, run: xr.Dataset) -> dict[str, dict[str, float]]:
@@ -35,7 +25,7 @@ def pin_loads(drive: Drive, run: xr.Dataset) -> dict[str, dict[str, float]]:
     def size(name: str, of: xr.Dataset) -> Any:
         return np.hypot(of[f"machine.{name}.fx"].values, of[f"machine.{name}.fy"].values)
 
-    for (title, name), angle in zip(PINS.items(), turned, strict=True):
+    for (title, name), angle in zip(drive.driven.model.pins.items(), turned, strict=True):
         evaluated = size(name, turns)
         table[title] = {
             "peak": float(np.max(size(name, run))),

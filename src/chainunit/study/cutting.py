@@ -17,18 +17,7 @@ from ..machines.knife_drive import KnifeDrive, Parameters
 from ..quantities import Value, declaration, quantity
 from .duty import flywheel
 
-PINS = {
-    "O1 crank bearing": "crank_bearing",
-    "A crank pin": "crank_pin",
-    "B coupler AB": "coupler_pin",
-    "B leg BC": "leg_pin",
-    "O2 rocker bearing": "rocker_bearing",
-    "C": "c_pin",
-    "D": "d_pin",
-    "E": "e_pin",
-    "O3 bearing": "o3_bearing",
-    "O4 bearing": "o4_bearing",
-}
+PINS = KnifeDrive.pins
 POINTS = 3600
 """Crank angles of the turn at constant speed."""
 _TURN = 2.0 * math.pi

@@ -16,18 +16,11 @@ from ..drives.gearing import KINDS, Transmission
 from ..drives.induction_motor import Inverter, SoftStart
 from ..drives.line_table import form, given_line
 from ..machines.chain_organs import LEAST, MOST, OrganLaw
-from ..machines.chain_unit import ChamberForces, SideLoads
+from ..machines.chain_unit import ChamberForces
+from ..machines.chain_unit import Feed as Feed
 from ..quantities import Value, declaration, group, quantity
 from ..reading import given_values, schema
 from ..system import MOTOR_NAMES
-
-
-@declaration
-class Feed:
-    """The material on both organs in normal running."""
-
-    left: SideLoads = group(SideLoads, "left organ", default=SideLoads())
-    right: SideLoads = group(SideLoads, "right organ", default=SideLoads())
 
 
 @declaration

@@ -208,7 +208,7 @@ class Study:
     def window(self, phase: Phase, run: xr.Dataset, begin: float = 0.0, trip: Trip | None = None) -> Window:
         """The rows of a run to read measures from."""
         feed = self.config.feed
-        sides = tuple(self.drive.machine.loaded_sides(feed.left, feed.right))
+        sides = self.drive.machine.loaded_sides(feed)
         asked = self.config.run.crank_speed
         steady = None
         if phase in (Phase.EVENT, Phase.LOADED_START):

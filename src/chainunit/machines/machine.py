@@ -1,0 +1,164 @@
+"""`Machine`: any linkage machine for Python - arrays in, arrays out."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Mapping
+from typing import Any, Self
+
+import numpy as np
+
+from ..engines import numpy_
+from ..errors import InputError
+from ..mechanism.machine import MachineState
+from ..mechanism.models import InverseMachine
+from ..quantities import Variable, complaint
+
+_XP = numpy_()
+
+
+class Machine:
+    """A machine with its parameters checked: `model`, and the parameters `p`.
+
+    Angles and speeds are the motor's, as at the FMU; with ``ratio`` 1 they are the crank's.
+    Every argument may be a float or an array; shapes broadcast, and outputs have the common shape. A value that
+    is not finite, or a load outside its declared bounds, is an `InputError` that names it, in an array as well as
+    alone; a value beyond a bound by rounding only counts as the bound.
+
+    Parameters
+    ----------
+    model : the inverse model of the machine
+    parameters : its `Parameters`, or names of parameters with their values (SI), e.g.
+        ``{"r": 0.2, "crank.m": 35.0}``; a value that is not named is the packaged machine's.
+    **values : the same for names without a dot.
+
+    Raises
+    ------
+    KeyError
+        for a name that is not declared.
+    InputError, GeometryError
+        for values out of bounds and lengths that cannot turn, in one line.
+
+    Examples
+    --------
+    >>> from chainunit.machines.knife_drive import KnifeDrive
+    >>> knife = Machine(KnifeDrive, ratio=10.0)
+    >>> round(float(knife.outputs(phi=0.5, w=30.0, feed=KnifeDrive.Feed(cut_force=2000.0)).margin), 3)
+    0.522
+    """
+
+    def __init__(self, model: type[InverseMachine], parameters: Any = None, /, **values: float) -> None:
+        base = parameters if isinstance(parameters, model.Parameters) else model.Parameters()
+        given = {} if isinstance(parameters, model.Parameters) else dict(parameters or {})
+        self.model = model
+        self.p: Any = model.check(model.parameter_layout.from_names({**given, **values}, base))
+
+    def replace(self, parameters: Mapping[str, float] | None = None, /, **values: float) -> Self:
+        """The same machine with some parameters changed, given as to the constructor."""
+        changed = copy.copy(self)
+        layout = self.model.parameter_layout
+        changed.p = self.model.check(layout.from_names({**(parameters or {}), **values}, self.p))
+        return changed
+
+    @property
+    def ratio(self) -> float:
+        """Motor turns per crank turn."""
+        return float(self.p.ratio)
+
+    def inputs(self, named: Mapping[str, Any]) -> Any:
+        """Inputs from values by name, each as its declaration admits it; one that is not named is at its start.
+
+        Raises
+        ------
+        KeyError
+            for a name that is not an input.
+        InputError
+            see the class.
+        """
+        layout = self.model.input_layout
+        values = layout.values(layout.from_names(dict(named)))
+        return layout.instance([admitted(v, x) for v, x in zip(layout.variables, values, strict=True)])
+
+    def state(self, u: Any) -> MachineState:
+        """The linkage with the `inputs`."""
+        return self.model.shared(_XP, self.p, u, None)
+
+    def outputs(self, phi: Any, w: Any = 0.0, a: Any = 0.0, feed: Any = None) -> Any:
+        """Torque, load port (without slopes), energies and every reaction at motor angle `phi` [rad], speed `w`
+        [rad/s] and acceleration `a` [rad/s2], with the loads `feed`, an instance of `model.Feed`: an instance of
+        `model.Outputs`.
+
+        Raises
+        ------
+        InputError
+            see the class.
+        """
+        return self._outputs(self.inputs({"phi": phi, "w": w, "a": a, **self._named(feed)}))
+
+    def _named(self, feed: Any) -> dict[str, Any]:
+        return self.model.feed_layout.named(self.model.Feed() if feed is None else feed)
+
+    def _outputs(self, u: Any) -> Any:
+        part = self.model.parts[0]
+        out = part.equations(_XP, self.p, u, None, self.state(u))
+        return part.layout.instance(np.broadcast_arrays(*part.layout.values(out)))
+
+    def evaluate(self, inputs: Mapping[str, Any]) -> dict[str, Any]:
+        """All outputs of the FMU by name, from inputs by name; an input not named is 0.
+
+        Raises
+        ------
+        KeyError
+            for a name that is not an input.
+        InputError
+            see the class.
+        """
+        u = self.inputs({**dict.fromkeys(self.model.input_layout.names, 0.0), **inputs})
+        named: dict[str, Any] = {}
+        for part, out in zip(self.model.parts, self.model.evaluate(_XP, self.p, u), strict=True):
+            named |= part.layout.named(out)
+        return dict(zip(named, np.broadcast_arrays(*named.values()), strict=True))
+
+    def pin_turns(self, phi: Any) -> list[Any]:
+        """Angle through which each of the model's `pins` has turned [rad], from the first of the motor angles `phi`,
+        shape (n,); the sum of all turning to and fro is left to the reader."""
+        phi = array(phi)
+        turns = self.state(self.inputs({"phi": phi})).m.turns
+        step = np.diff(phi / self.p.ratio)
+        angles = []
+        for output in self.model.pins.values():
+            rate = np.broadcast_to(turns[self.model.joints[output]], phi.shape)
+            angles.append(np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * step)]))
+        return angles
+
+    @property
+    def stored_per_unit(self) -> Mapping[str, Callable[[Any, Any], Any]]:
+        """By the name of an input, the energy that a unit of it holds on its place [J per unit], a function of motor
+        angle [rad] and speed [rad/s]: dE/du, with which the input enters an energy balance as it changes."""
+        return {}
+
+    def loaded_sides(self, feed: Any) -> tuple[str, ...]:
+        """The sides of the machine on which there is any mass or load, where it has sides."""
+        return ()
+
+
+def admitted(variable: Variable, given: Any) -> Any:
+    """A float or an array whose every value the declaration admits; a value beyond a bound by rounding is set on
+    it.
+
+    Raises
+    ------
+    InputError
+        for any other value.
+    """
+    q, x = variable.quantity, array(given)
+    # NaN is the extreme of any array that holds it
+    for extreme in (np.min(x), np.max(x)) if np.size(x) else ():
+        if not q.admits(float(extreme)):
+            raise InputError(complaint(variable, float(extreme)))
+    return q.bounded(x) if isinstance(x, float) else np.clip(x, q.low, q.high)
+
+
+def array(x: Any) -> Any:
+    """A float as it is, anything else as an array of floats."""
+    return x if isinstance(x, float) else np.asarray(x, float)

@@ -1,0 +1,90 @@
+"""Any linkage machine for Python, from its model class alone: feed, pins, direct model, outputs."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+from test_linkage import SixBar
+
+from chainunit import ChainUnit, InputError
+from chainunit.engines import MATH
+from chainunit.machines.api import machine_of
+from chainunit.machines.machine import Machine
+from chainunit.models import MACHINES
+from chainunit.quantities import Layout
+
+MODELS = {**MACHINES, "SixBar": SixBar}
+
+
+@pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
+def test_a_machine_follows_from_its_model(model):
+    machine = machine_of(model, ratio=3.0)
+    assert machine.model is model and machine.ratio == 3.0 and machine.replace(ratio=2.0).ratio == 2.0
+    assert type(machine.replace(ratio=2.0)) is type(machine) and machine.ratio == 3.0
+    feed = Layout(model.Feed)
+    assert set(feed.names) <= set(model.input_layout.names) - {"phi", "w", "a"}
+    phi = np.linspace(0.0, 2.0 * np.pi * 3.0, 5)
+    out = machine.outputs(phi, 9.0, 4.0, model.Feed())
+    assert isinstance(out, model.Outputs) and out.tau.shape == phi.shape
+    named = machine.evaluate({"phi": phi, "w": 9.0, "a": 4.0, **feed.named(model.Feed())})
+    np.testing.assert_array_equal(named["tau"], out.tau)
+    with pytest.raises(InputError, match="w = nan"):
+        machine.outputs(0.0, float("nan"))
+
+
+@pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
+def test_each_bearing_has_an_output_and_a_joint(model):
+    names = [name for part in model.parts for name in part.layout.names]
+    assert list(model.pins.values()) == list(model.joints) and len(model.pins) == len(model.joints)
+    assert set(model.joints.values()) <= set(model.topology().joints)
+    for output in model.pins.values():
+        assert {f"{output}.fx", f"{output}.fy"} <= set(names)
+    turned = Machine(model).pin_turns(np.linspace(0.0, 1.0, 20))
+    assert len(turned) == len(model.pins) and all(angle.shape == (20,) for angle in turned)
+
+
+@pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
+def test_the_direct_model_follows_from_the_inverse_one(model):
+    direct = model.direct()
+    assert direct is model.direct() and direct.inverse is model
+    inputs, outputs = (direct.input_layout.names, direct.parts[0].layout.names)
+    assert inputs == ("tau", *(n for n in model.input_layout.names if n not in ("phi", "w", "a")))
+    assert outputs[-3:] == ("a", "tau_bias", "J") and set(outputs[:-3]) < set(model.parts[0].layout.names)
+    p = direct.check(direct.parameter_layout.from_names({"w_start": 4.0, "J_added": 0.3, "ratio": 2.0}))
+    x, u = direct.initial_states(MATH, p), direct.Inputs(tau=5.0)
+    a = direct.derivatives(MATH, p, u, x)[1]
+    feed = {name: value for name, value in direct.input_layout.named(u).items() if name != "tau"}
+    need = machine_of(model, ratio=2.0).evaluate({"phi": 0.0, "w": 4.0, "a": a, **feed})
+    assert float(need["tau"]) + 0.3 * a == pytest.approx(5.0, rel=1e-9)
+
+
+def test_names_of_direct_models():
+    """As their FMUs are called."""
+    assert [model.direct().name for model in MODELS.values()] == [
+        "ChainUnit",
+        "KnifeDriveDirect",
+        "SixBarDirect",
+    ]
+
+
+def test_a_feed_can_be_sent_to_another_process():
+    for model in MODELS.values():
+        feed = model.Feed()
+        assert pickle.loads(pickle.dumps(feed)) == feed
+
+
+def test_what_a_chain_unit_has_beside_others():
+    machine, other = machine_of(MACHINES["ChamberForces"]), machine_of(MACHINES["KnifeDrive"])
+    assert isinstance(machine, ChainUnit) and type(other) is Machine
+    assert other.loaded_sides(None) == () and other.stored_per_unit == {}
+    feed = machine.model.Feed()
+    assert machine.loaded_sides(feed) == ("left", "right")
+    energy = machine.stored_per_unit["left.material_mass"](0.4, 3.0)
+    more = machine.model.Feed(left=type(feed.left)(material_mass=32.0))
+    stored = [
+        out.kinetic_energy + out.potential_energy
+        for out in (machine.outputs(0.4, 3.0, feed=f) for f in (feed, more))
+    ]
+    assert 2.0 * energy == pytest.approx(float(stored[1] - stored[0]), rel=1e-9)
