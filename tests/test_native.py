@@ -30,14 +30,14 @@ from test_reference import POINTS, deviation
 
 from chainunit import ChainUnit, GeometryError, InputError, RunError, integrate, refusals
 from chainunit.engines import MATH
-from chainunit.fmu.accompany import INPUTS, READ, REFERENCE, STANDARD, STEPPED
 from chainunit.fmu.description import Interface
 from chainunit.fmu.export import export as export_python
 from chainunit.fmu.native.cache import OFF, VARIABLE
 from chainunit.fmu.native.export import export
 from chainunit.fmu.native.generate import rules
 from chainunit.fmu.native.platforms import compile_code, compiler
-from chainunit.fmu.recipe import Experiment, excitation, script
+from chainunit.fmu.recipe import Experiment, script_of
+from chainunit.fmu.reference import INPUTS, READ, REFERENCE, STANDARD, STEPPED, excitation
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.models import MODELS
 from chainunit.quantities import TYPES
@@ -748,7 +748,7 @@ def test_inputs_that_run_meet_the_reference_results_in_model_exchange(native, na
 def test_euler_keeps_near_at_the_declared_step(native, name):
     """In a second of the reference inputs it errs by less than a fifth of a state's size; at 100 times the step by
     more than half of one: the models need a step, and the declared one is short enough."""
-    model, wanted = MODELS[name], Experiment(**script(MODELS[name]).experiment)
+    model, wanted = MODELS[name], Experiment(**script_of(MODELS[name]).experiment)
     for fmi in (2, 3):
         default = fmpy.read_model_description(str(native[name, fmi][0])).defaultExperiment
         given = (default.stepSize, default.stopTime, default.tolerance)
@@ -827,7 +827,7 @@ def test_a_stiff_motor_is_exported_and_runs(tmp_path, name):
 
 def test_an_export_does_not_follow_states_without_end(tmp_path, caplog, monkeypatch):
     """Shafts that nothing made is as stiff as: the FMU comes without reference results, and the log says why."""
-    monkeypatch.setattr("chainunit.fmu.accompany._MOST_STEPS", 300)
+    monkeypatch.setattr("chainunit.fmu.reference._MOST_STEPS", 300)
     file = export_python(MODELS["CardanDriveline"], tmp_path / "x.fmu", {"c2": 1e12, "c3": 1e12})
     assert not [n for n in zipfile.ZipFile(file).namelist() if n.startswith("extra/")]
     assert "CardanDriveline: no reference results inside: the states are too fast" in caplog.text
@@ -835,7 +835,7 @@ def test_an_export_does_not_follow_states_without_end(tmp_path, caplog, monkeypa
 
 def test_the_command_says_where_an_fmu_comes_without_reference_results(tmp_path):
     """With a budget that nothing meets, as states without end would take minutes."""
-    small = "import chainunit.fmu.accompany as a, chainunit.cli as c; a._MOST_STEPS = 1; c.main()"
+    small = "import chainunit.fmu.reference as a, chainunit.cli as c; a._MOST_STEPS = 1; c.main()"
     command = [sys.executable, "-c", small, "export", "DcMotor", "--backend", "python"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

@@ -10,8 +10,9 @@ import pytest
 
 from chainunit.fmu import export as python
 from chainunit.fmu.description import Interface
-from chainunit.fmu.recipe import excitation, icon, often, script
-from chainunit.fmu.slave import ModelSlave
+from chainunit.fmu.recipe import icon, often, script_of
+from chainunit.fmu.reference import excitation
+from chainunit.fmu.script import Script
 from chainunit.model import Model, Part, Terminal
 from chainunit.models import MODELS
 from chainunit.ports import NO_LOAD, LoadPort, PortSlopes, PortValues, flanges, load_terminal
@@ -103,11 +104,11 @@ def test_icons_follow_from_the_terminals():
 
 
 def test_values_that_do_not_follow_stand_in_the_script():
-    assert script(Gear) is ModelSlave and script(Gear).experiment == {}
-    assert script(MODELS["InductionMotor"]).experiment == {"step": 5e-5, "stop": 2.0}
-    assert script(MODELS["InductionMotor"]).model is MODELS["InductionMotor"]
+    assert script_of(Gear) is Script and script_of(Gear).experiment == {}
+    assert script_of(MODELS["InductionMotor"]).experiment == {"step": 5e-5, "stop": 2.0}
+    assert script_of(MODELS["InductionMotor"]).model is MODELS["InductionMotor"]
     for name in MODELS:
-        assert set(script(MODELS[name]).sizes) <= set(MODELS[name].input_layout.names)
+        assert set(script_of(MODELS[name]).sizes) <= set(MODELS[name].input_layout.names)
 
 
 @pytest.mark.parametrize("name", ["DcMotor", "ChainUnitFlexible"])

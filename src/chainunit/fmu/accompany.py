@@ -1,37 +1,14 @@
-"""The files of an FMU beside its model: documentation, licences, icon and terminals, reference results.
-
-Reference results are those of a Co-Simulation master that holds its inputs over a step, from the Python kernels; and
-they are written twice, as masters differ in when they read. They lie in the folder of the layered standard FMI-LS-REF
-(1.0.0-alpha.1), whose manifest says what each file is.
-"""
+"""The files of an FMU beside its model: documentation, licences, icon and terminals, reference results."""
 
 from __future__ import annotations
 
-import csv
-import io
-import logging
 from collections.abc import Sequence
-from typing import Any
-from xml.etree.ElementTree import Element, SubElement, register_namespace
 
-import numpy as np
-
-from ..engines import MATH
 from .description import Interface, licence_text, terminals
 from .documentation import page
 from .pack import written
-from .recipe import excitation, icon
-
-STANDARD = "org.fmi-standard.fmi-ls-ref"
-REFERENCE = f"extra/{STANDARD}"
-INPUTS, STEPPED, READ = "in", "co_simulation", "set_then_read"
-"""Endings of the names of the files: inputs; outputs at the end of each step; outputs at its beginning."""
-STEP, ROWS = 0.04, 26  # s
-_MANIFEST = "http://fmi-standard.org/fmi-ls-manifest"
-_MOST_STEPS = 100_000
-"""of the integrator for one step of the file; the models take some hundred at their start values"""
-
-log = logging.getLogger("chainunit.fmu")
+from .recipe import icon
+from .reference import reference_results
 
 
 def accompanying(
@@ -52,142 +29,9 @@ def accompanying(
             "terminalsAndIcons/icon.png": png,
             "terminalsAndIcons/icon.svg": svg,
         }
-    return files | _reference(interface)
+    return files | reference_results(interface)
 
 
 def licence(*packages: str) -> str:
     """Licences of installed packages, one after the other."""
     return "\n\n".join(f"{name}\n\n{licence_text(name)}" for name in packages)
-
-
-def _reference(interface: Interface) -> dict[str, bytes]:
-    """The files of reference results; none, and a warning, where the start values let the states run away, or so
-    fast that following them would take too long."""
-    name = interface.model.name
-    try:
-        tables = _tables(interface)
-    except ArithmeticError as reason:
-        log.warning("%s: no reference results inside: %s", name, reason)
-        return {}
-    words = {
-        INPUTS: f"inputs, set at each time and held for {STEP * 1e3:g} ms",
-        STEPPED: "outputs at the end of each step, before the inputs of that time are set",
-        READ: "outputs after the inputs of the time are set, before an event there and the step from it: of "
-        "Model Exchange, and of Co-Simulation masters that read there, which the FMI standard does not allow",
-    }
-    files = {f"{REFERENCE}/{name}_{end}.csv": _csv(*table) for end, table in tables.items()}
-    register_namespace("fmi-ls", _MANIFEST)
-    root = Element("fmiReferences")
-    root.set(f"{{{_MANIFEST}}}fmi-ls-name", STANDARD)
-    root.set(f"{{{_MANIFEST}}}fmi-ls-version", "1.0.0-alpha.1")
-    root.set(
-        f"{{{_MANIFEST}}}fmi-ls-description",
-        "Layered Standard providing information on related files included in an FMU.",
-    )
-    for end in tables:
-        role = "testcase" if end == INPUTS else "result"
-        SubElement(
-            root, "Related", type="text/csv", source=f"{name}_{end}.csv", role=role, description=words[end]
-        )
-    return files | {f"{REFERENCE}/fmi-ls-manifest.xml": written(root)}
-
-
-def _tables(interface: Interface) -> dict[str, tuple[list[str], list[list[float]]]]:
-    """Head and rows of each file.
-
-    Raises
-    ------
-    ArithmeticError
-        where a value is no finite number, or the states take more than `_MOST_STEPS` for one of the file's.
-    """
-    model = interface.model
-    p = model.prepared(MATH, model.parameter_layout.instance([s.start for s in interface.of("parameter")]))
-    inputs = excitation(interface)
-    layout = model.state_layout
-    tables: dict[str, list[list[float]]] = {INPUTS: [], STEPPED: [], READ: []}
-
-    def outputs(t: float, u: Sequence[float], x: Sequence[float]) -> list[float]:
-        states = layout.instance(list(x)) if layout else None
-        parts = model.evaluate(MATH, p, model.input_layout.instance(list(u)), states)
-        values = [v for part, out in zip(model.parts, parts, strict=True) for v in part.layout.values(out)]
-        if not np.isfinite(values).all():
-            raise ArithmeticError(f"an output is no finite number at t = {t:g} s")
-        return [t, *x, *values]
-
-    march = _march(interface, p) if layout else None
-    u: list[float] = []
-    x: list[float] = []
-    for k in range(ROWS):
-        t = k * STEP
-        given = model.input_layout.values(model.input_layout.from_names(inputs(t)))
-        if k == 0:
-            u = given
-            x = layout.values(model.begin(p, model.input_layout.instance(given))) if layout else []
-        tables[INPUTS].append([t, *given])
-        tables[STEPPED].append(outputs(t, u, x))
-        tables[READ].append(outputs(t, given, x))
-        if march:
-            x = march(t, given, x)
-        u = list(given)
-        for place, rate, half in model.course(given):
-            u[place] += STEP * (rate + STEP * half)
-    heads = {kind: ["time", *(s.name for s in interface.of(kind))] for kind in ("input", "output")}
-    return {end: (heads["input" if end == INPUTS else "output"], rows) for end, rows in tables.items()}
-
-
-def _march(interface: Interface, p: Any) -> Any:
-    """A function of time, inputs and states that gives the states a step later, by an integrator for stiff and other
-    equations that is accurate to 1e-9 or so; it carries nothing from call to call."""
-    import casadi
-
-    model = interface.model
-    layout = model.state_layout
-    assert layout is not None
-    (of_p, of_u, of_x, of_derived), *_, derivatives = interface.traced
-    given, since = casadi.SX.sym("given", len(model.input_layout.names)), casadi.SX.sym("since")
-    moved = [given[k] for k in range(given.numel())]
-    for place, rate, half in model.course(moved):
-        moved[place] += since * (rate + since * half)
-    # in units of their nominal size, so that one tolerance does for all states
-    nominal = casadi.DM([v.quantity.nominal or 1.0 for v in layout.variables])
-    scaled = casadi.SX.sym("scaled", nominal.numel())
-    fixed = casadi.DM([*model.parameter_layout.values(p), *getattr(p, "derived", [])])
-    rates = casadi.substitute(
-        [casadi.vertcat(*derivatives) / nominal],
-        [of_p, of_derived, of_u, of_x],
-        [fixed[: of_p.numel()], fixed[of_p.numel() :], casadi.vertcat(*moved), scaled * nominal],
-    )
-    solver = casadi.integrator(
-        "march",
-        "cvodes",
-        {"x": scaled, "u": given, "t": since, "ode": casadi.cse(rates[0])},
-        0.0,
-        STEP,
-        {"reltol": 1e-12, "abstol": 1e-14, "max_num_steps": _MOST_STEPS, "disable_internal_warnings": True},
-    )
-
-    def march(t: float, given: Sequence[float], x: Sequence[float]) -> list[float]:
-        if model.controlled:
-            for _ in range(2):
-                inputs, states = model.input_layout.instance(list(given)), layout.instance(list(x))
-                x = model.closed(MATH, p, inputs, states)
-        try:
-            later = solver(x0=casadi.DM(x) / nominal, u=given)["xf"] * nominal
-        except RuntimeError as error:
-            raise ArithmeticError(
-                f"the states are too fast to be followed from t = {t:g} s on, or run away"
-            ) from error
-        states = [float(v) for v in later.full().ravel()]
-        if not np.isfinite(states).all():
-            raise ArithmeticError(f"the states run away behind t = {t:g} s")
-        return states
-
-    return march
-
-
-def _csv(head: Sequence[str], rows: Sequence[Sequence[float]]) -> bytes:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(head)
-    writer.writerows([repr(float(v)) for v in row] for row in rows)
-    return text.getvalue().encode()

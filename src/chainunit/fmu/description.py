@@ -15,8 +15,8 @@ from ..engines import casadi_
 from ..errors import InputError
 from ..model import Model
 from ..quantities import DISPLAY_UNITS, TYPES, Variable, base_units
-from .recipe import Experiment, script
-from .slave import ModelSlave
+from .recipe import Experiment, script_of
+from .script import Script
 
 RELEASED = "2026-11-21"
 """The day of this version's release, as CITATION.cff has it."""
@@ -41,9 +41,7 @@ class Interface:
     """The variables of a model's FMU in the order of their value references: parameters, inputs, states
     (each an output), other outputs part by part."""
 
-    def __init__(
-        self, model: type[Model], start: dict[str, float], own: type[ModelSlave] | None = None
-    ) -> None:
+    def __init__(self, model: type[Model], start: dict[str, float], own: type[Script] | None = None) -> None:
         """
         Parameters
         ----------
@@ -56,7 +54,7 @@ class Interface:
             for a name in `start` that is neither parameter nor input.
         """
         self.model = model
-        self.script = own or script(model)
+        self.script = own or script_of(model)
         self.parameters = model.parameter_layout.variables
         self.inputs = model.input_layout.variables
         self.states = model.state_layout.variables if model.state_layout else ()

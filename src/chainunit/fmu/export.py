@@ -28,7 +28,7 @@ from .accompany import accompanying
 from .description import Interface, model_description
 from .pack import checked, pack
 from .recipe import recipes
-from .slave import ModelSlave
+from .script import Script
 
 _PACKAGE = Path(__file__).parents[1]
 _KINDS = {
@@ -73,7 +73,7 @@ def export(model: type[Model], file: Path, start: dict[str, float] | None = None
     return file
 
 
-def complete(slave: type[ModelSlave], resources: Path) -> Element:
+def complete(slave: type[Script], resources: Path) -> Element:
     """Describe the FMU that pythonfmu is building from a script, and put beside that script the part of this package
     that it imports, so that the FMU needs no installed chainunit.
 

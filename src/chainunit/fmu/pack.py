@@ -11,13 +11,13 @@ from ..errors import InputError
 from ..model import Model
 from ..quantities import complaint
 from .description import Interface
-from .slave import ModelSlave
+from .script import Script
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the oldest time that a zip entry can bear
 
 
 def checked(
-    model: type[Model], start: Mapping[str, float] | None, own: type[ModelSlave] | None = None
+    model: type[Model], start: Mapping[str, float] | None, own: type[Script] | None = None
 ) -> Interface:
     """The interface of `model` with its start values, which must make a model.
 

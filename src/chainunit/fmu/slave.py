@@ -18,7 +18,7 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, ClassVar, TypeVar
+from typing import Any, TypeVar
 from xml.etree.ElementTree import Element
 
 from pythonfmu.enums import Fmi2Status
@@ -28,8 +28,8 @@ from .. import refusals
 from ..engines import MATH
 from ..errors import InputError
 from ..integrate import ADDED_UP, MAX_STEPS, ROUNDED, SAME_TIME, BudgetError, controlled, rk4
-from ..model import Model
 from ..quantities import complaint
+from .script import Script
 
 _NAN = float("nan")
 _Slave = TypeVar("_Slave")
@@ -76,16 +76,8 @@ _IDENTITY = __name__.partition(".")[0]
 """inside an FMU the name of its package, which holds a hash of all that it is made of"""
 
 
-class ModelSlave(Fmi2Slave):  # type: ignore[misc]
+class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
     """A model as pythonfmu's slave; a script in `fmu/` derives one class with `model` and perhaps `start`."""
-
-    model: ClassVar[type[Model]]
-    start: ClassVar[dict[str, float]] = {}
-    """Start values of parameters and inputs, by name, that replace the declared ones."""
-    experiment: ClassVar[dict[str, float]] = {}
-    """``step``, ``stop`` [s] or ``tolerance`` of the default experiment, where the usual do not suit the model."""
-    sizes: ClassVar[dict[str, float]] = {}
-    """Sizes of inputs in the reference results, by name, where the usual ones do not suit the model."""
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
