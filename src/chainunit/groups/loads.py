@@ -143,6 +143,31 @@ class Resistance(NamedTuple):
 
 
 @declaration
+class BrakeLaw:
+    """The law of a torque against the rotation."""
+
+    w_smooth: Value = quantity(
+        "rad/s", "speed below which the torque is smoothed", default=0.02, min=1e-9, tunable=True
+    )
+
+
+class Brake(NamedTuple):
+    """A torque on a link against its rotation in the frame [N m], smoothed near rest by the law (`BrakeLaw`)."""
+
+    link: str
+    torque: Any
+    law: Any
+    by_reactions: bool = False
+
+    def effect(self, xp: Any, m: Moving, w: Any, reactions: Any) -> Effect:
+        """See `Acting`."""
+        k, small = m.links[self.link].t1, self.law.w_smooth
+        turning = k * w
+        moment = self.torque * turning / xp.sqrt(turning * turning + small * small)
+        return Effect((Wrench(self.link, ZERO, -moment),), lost=k * moment)
+
+
+@declaration
 class Stack:
     """The stack of paper, and how it resists."""
 

@@ -12,8 +12,8 @@ are new.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import partial
 from typing import Any
 
 from ..engines import Dual, dual, slope
@@ -169,7 +169,7 @@ def derived_numbers(xp: Any, linkage: Linkage) -> list[Any]:
     """Values that the groups derive from the lengths, once before a run."""
     numbers: list[Any] = []
     for k, group in enumerate(linkage.groups):
-        numbers += group.derive(xp, partial(_pins, xp, linkage.before(k), tuple(numbers)))
+        numbers += group.derive(xp, functools.partial(_pins, xp, linkage.before(k), tuple(numbers)))
     return numbers
 
 
@@ -276,12 +276,10 @@ class MachineState:
         return sum(effect.lost for effect in self.effects.values())
 
     def margin(self) -> Any:
-        """The least margin of all groups in size."""
-        xp, (first, *others) = self._xp, self.m.margins()
-        least = xp.abs(first)
-        for margin in others:
-            least = xp.minimum(least, xp.abs(margin))
-        return least
+        """The least margin of all groups in size; 1 of a crank alone, which has no dead position."""
+        xp = self._xp
+        sizes = [xp.abs(margin) for margin in self.m.margins()]
+        return functools.reduce(xp.minimum, sizes) if sizes else 1.0
 
     def slopes(self) -> tuple[Any, Any]:
         """Derivatives of `bias` by the crank angle [N m/rad] and the crank speed [N m s/rad].
