@@ -7,7 +7,7 @@ formulas or of the authors' own calculation are orange and thin.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -31,8 +31,12 @@ def _points(x: Any, y: Any, name: str = "printed") -> Curve:
     return Curve(name, x, y, "printed", "o", joined=False)
 
 
-def _single(name: str, title: str, seen: str, x: Axis, y: Axis, items: list[Item]) -> Figure:
-    return Figure(name, title, seen, ((Panel(x, y, tuple(items)),),), file=f"{name}.png")
+def _figure(name: str, title: str, alt: str, *rows: Iterable[Panel | None], level: bool = False) -> Figure:
+    return Figure(name, title, alt, tuple(map(tuple, rows)), file=f"{name}.png", level=level)
+
+
+def _single(name: str, title: str, alt: str, x: Axis, y: Axis, items: Iterable[Item]) -> Figure:
+    return _figure(name, title, alt, (Panel(x, y, tuple(items)),))
 
 
 def statics() -> Figure:
@@ -57,12 +61,12 @@ def statics() -> Figure:
                 Curve(f"{side}, weights in B", psi, getattr(hinge, load), 2 if hand > 0.0 else 3),
             ]
         panels.append(Panel(angle, _LOAD, tuple(items), title))
-    return Figure(
+    return _figure(
         "000-fig17-22-statics",
         "Statics, zeta 0.5, mu 0.6",
         "Loads of both organs at rest over the rocker angle, with the weights at the middles of the rods and in B.",
-        (tuple(panels[:3]), (*panels[3:], None)),
-        file="000-fig17-22-statics.png",
+        panels[:3],
+        (*panels[3:], None),
     )
 
 
@@ -75,7 +79,7 @@ def dynamics() -> Figure:
     for side, hand, look, printed in _SIDES:
         organ, psi = getattr(out, side), hand * out.rocker.psi
         X, Y, R_t = p0.AUTHORS.forces(phi, 1.0, hand)
-        authors = {"X": X, "Y_A2": Y, "R_n": Y * np.cos(psi) - X * np.sin(psi), "R_t": R_t}
+        authors = {"X": X, "Y_A2": Y, "R_n": p0.on_rocker(X, Y, psi)[0], "R_t": R_t}
         model = vars(p0.of_side(organ, hand, unit)) | {"X_A1": -hand * organ.support.fx / p0.weight(unit)}
         for name, curves in items.items():
             curves.append(Curve(f"{side}, corrected", phi, model[name], look))
@@ -85,12 +89,12 @@ def dynamics() -> Figure:
     panels = [
         Panel(_PHI, _LOAD, tuple(curves), title) for curves, title in zip(items.values(), titles, strict=True)
     ]
-    return Figure(
+    return _figure(
         "000-fig23-29-dynamics",
         "The crank at 1 rad/s",
         "Loads of both organs over a turn of the crank, corrected and as the authors computed them.",
-        (tuple(panels[:3]), tuple(panels[3:])),
-        file="000-fig23-29-dynamics.png",
+        panels[:3],
+        panels[3:],
     )
 
 
@@ -131,12 +135,11 @@ def speeds() -> Figure:
         ]
         items = (_points((10.0, 50.0), printed), *curves)
         panels.append(Panel(_W, Axis("|R^t| of the left organ / organ weight", log=True), items, title))
-    return Figure(
+    return _figure(
         "000-fig30-31-speed",
         "R^t at the extremes of the rocker",
         "Tangential load of the left organ at both extremes over the crank speed, corrected and as printed.",
-        (tuple(panels),),
-        file="000-fig30-31-speed.png",
+        panels,
     )
 
 
@@ -147,34 +150,30 @@ def overload() -> Figure:
     speed = np.concatenate([np.linspace(0.05, 15.0, 90), np.linspace(15.5, 50.0, 30)])
     ratios = [
         Curve(
-            torque.replace("_", " "), speed, np.array([p0.cycle_factor(torque, float(w)) for w in speed]), k
+            f"{of} torque", speed, np.array([p0.cycle_factor(f"{of}_torque", w) for w in speed.tolist()]), k
         )
-        for k, torque in enumerate(("rocker_torque", "crank_torque"))
+        for k, of in enumerate(("rocker", "crank"))
     ]
-    return Figure(
+    at_rest = Panel(
+        Axis("rocker angle psi", "rad"),
+        Axis("R_L/(R_L - R_R) at rest", low=0.0, high=18.0),
+        (
+            Curve("at rest", psi, left.R_t / (left.R_t - right.R_t)),
+            _points(psi[-1:], (1.14,), "printed as the maximum: 1.14 at 12 deg"),
+        ),
+        "It diverges at psi = 0",
+    )
+    cycles = Panel(
+        _W,
+        Axis("left organ alone / both, cycle maxima"),
+        (*ratios, Mark(1.0, axis="y", look="thin")),
+        "Above 6.5 (8.5) rad/s both sides together are heavier",
+    )
+    return _figure(
         "000-overload-factor",
         "Overload factors",
         "The papers' factor over the rocker angle, and the ratio of cycle maxima over the crank speed.",
-        (
-            (
-                Panel(
-                    Axis("rocker angle psi", "rad"),
-                    Axis("R_L/(R_L - R_R) at rest", low=0.0, high=18.0),
-                    (
-                        Curve("at rest", psi, left.R_t / (left.R_t - right.R_t)),
-                        _points(psi[-1:], (1.14,), "printed as the maximum: 1.14 at 12 deg"),
-                    ),
-                    "It diverges at psi = 0",
-                ),
-                Panel(
-                    _W,
-                    Axis("left organ alone / both, cycle maxima"),
-                    (*ratios, Mark(1.0, axis="y", look="thin")),
-                    "Above 6.5 (8.5) rad/s both sides together are heavier",
-                ),
-            ),
-        ),
-        file="000-overload-factor.png",
+        (at_rest, cycles),
     )
 
 
@@ -232,12 +231,11 @@ def existence() -> Figure:
         )
         rho = Axis(_RHO.label, low=0.0, high=1.0)
         panels.append(Panel(Axis("b/l", low=b[0], high=b[-1]), rho, items, f"lam = {lam:.3g}"))
-    return Figure(
+    return _figure(
         "001-existence",
         "Where the crank turns",
         "The three conditions of existence over b/l and rho, for three lam.",
-        (tuple(panels),),
-        file="001-existence.png",
+        panels,
         level=True,
     )
 

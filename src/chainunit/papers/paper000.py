@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,13 +31,10 @@ _BARE = {f"{body}.{x}": 0.0 for body in ("crank", "coupler", "rocker") for x in 
 @cache
 def machine(rod_inertia: float = 0.0, zeta: float = ZETA, mu: float = MU) -> ChainUnit:
     """The papers' machine: organs alone, uniform mass per length, no losses; point masses unless asked."""
-    wall = 10.0
-    masses = {f"{side}.wall_mass": wall for side in ("left", "right")} | {
-        f"{side}.web_mass": (1.0 - mu) * wall for side in ("left", "right")
-    }
-    return ChainUnit.from_ratios(
-        RHO, LAM, mu, zeta, _BARE | masses | {"rod_inertia": rod_inertia, "pin.friction": 0.0, "g": G}, l1=L1
-    )
+    organ = {"wall_mass": 10.0, "web_mass": (1.0 - mu) * 10.0}
+    masses = {f"{side}.{rod}": mass for side in ("left", "right") for rod, mass in organ.items()}
+    others = {"rod_inertia": rod_inertia, "pin.friction": 0.0, "g": G}
+    return ChainUnit.from_ratios(RHO, LAM, mu, zeta, _BARE | masses | others, l1=L1)
 
 
 def weight(unit: ChainUnit) -> float:
@@ -74,8 +71,7 @@ def statics(psi: Any) -> tuple[Components, Components]:
     return of_side(chamber.left, 1.0, machine()), of_side(chamber.right, -1.0, machine())
 
 
-@dataclass(frozen=True)
-class Angles:
+class Angles(NamedTuple):
     """The paper's angles of the left organ at rocker angle psi, eqs. (6), (7) and those after them; in l1."""
 
     gam: Any
@@ -96,14 +92,17 @@ def angles(psi: Any, zeta: float = ZETA, mu: float = MU) -> Angles:
 
 def hinge_loading(psi: Any) -> Components:
     """Both weights in the hinge B, the second way of loading: two-force rods, eq. (35)."""
-    o = angles(psi)
-    lean = o.al2 - psi
-    s = np.sin(o.al1) * np.cos(lean) + np.cos(o.al1) * np.sin(lean)
-    at_a1, at_a2 = np.sin(lean) / s, np.sin(o.al1) / s
+    _, al1, al2 = angles(psi)
+    lean = al2 - psi
+    s = np.sin(al1) * np.cos(lean) + np.cos(al1) * np.sin(lean)
+    at_a1, at_a2 = np.sin(lean) / s, np.sin(al1) / s
     X, Y = at_a2 * np.sin(lean), at_a2 * np.cos(lean)
-    return Components(
-        X, Y, at_a1 * np.cos(o.al1), Y * np.cos(psi) - X * np.sin(psi), X * np.cos(psi) + Y * np.sin(psi)
-    )
+    return Components(X, Y, at_a1 * np.cos(al1), *on_rocker(X, Y, psi))
+
+
+def on_rocker(X: Any, Y: Any, psi: Any) -> tuple[Any, Any]:
+    """R^n and R^t of a load X, Y on the rocker at psi."""
+    return Y * np.cos(psi) - X * np.sin(psi), X * np.cos(psi) + Y * np.sin(psi)
 
 
 @dataclass(frozen=True)
@@ -124,9 +123,7 @@ class Scheme:
         """X, Y_A2 and R_t of the left (`hand` = 1) or right organ, in parts of its weight."""
         rocker = machine().forces(phi, w_crank).rocker
         psi, w, eps = hand * rocker.psi, hand * rocker.w, -self.eps * hand * rocker.a
-        mu = MU
-        o = angles(psi)
-        gam, al1, al2 = o.gam, o.al1, o.al2
+        mu, (gam, al1, al2) = MU, angles(psi)
         # (40): velocities; accelerations are in l1 rad/s2
         lam, theta = al1 - psi, gam - al1
         v = w * mu
@@ -159,7 +156,7 @@ class Scheme:
         D = i1 * j2 + i2 * j1
         X = (big * j1 - small * j2) / D / (2.0 - mu)
         Y = (small * i2 + big * i1) / D / (2.0 - mu)
-        return X, Y, X * np.cos(psi) + Y * np.sin(psi)
+        return X, Y, on_rocker(X, Y, psi)[1]
 
 
 CORRECTED = Scheme()
@@ -179,8 +176,8 @@ def resultant(scheme: Scheme, phi: Any, w_crank: float) -> Any:
 def d2(zeta: Any, mu: float, *, grouped: bool) -> Any:
     """The zeta form of d2 = Y_A2/G1 at psi = 0: as printed, or with the factor in front of both brackets."""
     z = 2.0 * np.sqrt(1.0 - mu) * zeta
-    o = angles(0.0, zeta, mu)
-    S, C = np.sin(o.al2), np.cos(o.al2)
+    al2 = angles(0.0, zeta, mu).al2
+    S, C = np.sin(al2), np.cos(al2)
     first = 0.5 * (z - (1.0 - mu) * S)
     second = (1.0 - mu) * (z - 0.5 * (1.0 - mu) * S)
     third = 0.5 * mu * (1.0 - mu) ** 2 * S
@@ -189,19 +186,22 @@ def d2(zeta: Any, mu: float, *, grouped: bool) -> Any:
     return top / ((1.0 - mu) * (mu * S + z * C))
 
 
-def b2(psi: Any) -> Any:
-    """b2 = Y_A2/G1 of the right organ, as printed."""
-    o = angles(-psi)
+def b2(by: str, degrees: float) -> float:
+    """Item 6b: b2 = Y_A2/G1 of the right organ, of the "model" or as "printed"."""
+    psi = math.radians(degrees)
+    if by == "model":
+        return float(statics(psi)[1].Y_A2) * ORGAN
+    gam, al1, _ = angles(-psi)
     z = 2.0 * math.sqrt(1.0 - MU) * ZETA
-    brace = (1.0 - MU) * (0.5 * (1.0 - MU) * np.cos(o.gam) + np.sin(o.al1)) + 0.5 * np.sin(o.al1)
-    top = -0.5 * (1.0 - MU) ** 2 * np.cos(o.gam) * MU * np.cos(psi) - brace * (1.0 - MU) * np.sin(o.gam)
-    return top / ((1.0 - MU) * (z * np.sin(o.gam) + MU * np.cos(psi + o.gam)))
+    brace = (1.0 - MU) * (0.5 * (1.0 - MU) * np.cos(gam) + np.sin(al1)) + 0.5 * np.sin(al1)
+    top = -0.5 * (1.0 - MU) ** 2 * np.cos(gam) * MU * np.cos(psi) - brace * (1.0 - MU) * np.sin(gam)
+    return float(top / ((1.0 - MU) * (z * np.sin(gam) + MU * np.cos(psi + gam))))
 
 
 def zeta_range(psi: float, mu: float = MU) -> tuple[float, float]:
     """The zeta at which both organs follow a swing of +-psi [rad], l2 = l1 - e."""
-    low, high = half_width_range(MATH, mu, 1.0, 1.0 - mu, psi)
-    return low / (2.0 * math.sqrt(1.0 - mu)), high / (2.0 * math.sqrt(1.0 - mu))
+    low, high = (z / (2.0 * math.sqrt(1.0 - mu)) for z in half_width_range(MATH, mu, 1.0, 1.0 - mu, psi))
+    return low, high
 
 
 # The functions of the table, item by item; loads are those of the left organ in parts of its weight.
@@ -209,15 +209,14 @@ def zeta_range(psi: float, mu: float = MU) -> tuple[float, float]:
 
 def fitting_mu(end: str) -> float:
     """Item 1: the mu, in steps of 0.001, at which all five numbers printed for Figs 17-22 come out after rounding."""
-    printed = {"R_n": (0.36, 0.28), "R_t": (0.03, 0.24)}
-    fits = []
-    for mu in np.arange(0.5, 0.7, 0.001):
-        unit = machine(0.0, ZETA, float(mu))
+
+    def loads(mu: float) -> Any:
+        unit = machine(0.0, ZETA, mu)
         left = of_side(unit.chamber(np.radians([-12.0, 12.0])).left, 1.0, unit)
-        ends = all(tuple(np.round(getattr(left, n), 2)) == pair for n, pair in printed.items())
-        if ends and round(float(left.X[1]), 2) == 0.17:
-            fits.append(float(mu))
-    return float(PICK[end](fits))
+        return np.round([*left.R_n, *left.R_t, left.X[1]], 2).tolist()
+
+    mus = np.arange(0.5, 0.7, 0.001).tolist()
+    return float(PICK[end]([mu for mu in mus if loads(mu) == [0.36, 0.28, 0.03, 0.24, 0.17]]))
 
 
 def arcsine_limit() -> float:
@@ -259,29 +258,14 @@ def printed_d2_error() -> float:
     return 100.0 * float(np.max(np.abs(d2(zeta, MU, grouped=False) / d2(zeta, MU, grouped=True) - 1.0)))
 
 
-def model_b2(degrees: float) -> float:
-    """Item 6b: b2 = Y_A2/G1 of the right organ of the model."""
-    return float(statics(math.radians(degrees))[1].Y_A2) * ORGAN
-
-
-def printed_b2(degrees: float) -> float:
-    """Item 6b: b2 as printed."""
-    return float(b2(math.radians(degrees)))
-
-
 def b2_sum(degrees: float) -> float:
-    """Item 6b: size of the sum of both: 0 where they differ by their sign alone."""
-    return abs(printed_b2(degrees) + model_b2(degrees))
+    """Item 6b: size of the sum of both b2: 0 where they differ by their sign alone."""
+    return abs(b2("printed", degrees) + b2("model", degrees))
 
 
-def upward_load(degrees: float) -> float:
-    """Item 6b: Y' + Y^p of both organs."""
-    return static_load("Y_A2", degrees) + model_b2(degrees) / ORGAN
-
-
-def printed_upward_load(degrees: float) -> float:
-    """Item 6b: the same with b2 as printed."""
-    return static_load("Y_A2", degrees) + printed_b2(degrees) / ORGAN
+def upward_load(by: str, degrees: float) -> float:
+    """Item 6b: Y' + Y^p of both organs, with b2 of the "model" or as "printed"."""
+    return static_load("Y_A2", degrees) + b2(by, degrees) / ORGAN
 
 
 def loads(by: str, phi: Any, crank_speed: Any) -> Any:
@@ -369,10 +353,14 @@ def hinge_growth(name: str) -> float:
     return 100.0 * (hinge_load(name) / static_load(name, 0.0) - 1.0)
 
 
+def extreme(place: str) -> tuple[float, float]:
+    """psi and phi at the left or right extreme of the rocker [rad]."""
+    return dict(zip(("right", "left"), machine().rocker_extremes(), strict=True))[place]
+
+
 def at_extreme(place: str) -> float:
-    """The crank angle at the left or right extreme of the rocker [rad]."""
-    (_, right), (_, left) = machine().rocker_extremes()
-    return {"left": left, "right": right}[place]
+    """The crank angle there [rad]."""
+    return extreme(place)[1]
 
 
 def load_at_extreme(by: str, place: str, crank_speed: float) -> float:
@@ -391,15 +379,9 @@ def resultant_in_middle(by: str, pick: str) -> float:
     return float(PICK[pick](resultant(SCHEMES[by], TURN, 1.0)[near]))
 
 
-def rocker_angle(place: str) -> float:
-    """Item 18: psi at an extreme [deg]."""
-    (right, _), (left, _) = machine().rocker_extremes()
-    return math.degrees({"left": left, "right": right}[place])
-
-
-def crank_angle(place: str) -> float:
-    """Item 18: phi at an extreme [deg]."""
-    return math.degrees(at_extreme(place))
+def angle_at_extreme(name: str, place: str) -> float:
+    """Item 18: "psi" or "phi" at an extreme [deg]."""
+    return math.degrees(extreme(place)[("psi", "phi").index(name)])
 
 
 def inertia_to_gravity(place: str, crank_speed: float) -> float:

@@ -6,6 +6,8 @@ shape depends on mu = e/l1, zeta = z/z_max and the rocker angle psi alone, its l
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,6 +21,7 @@ from ..machines import hanging
 from ..report.blocks import Column, Report, Section, Table, TableRow, Text
 from ..report.figure import Axis, Curve, Field, Figure, Item, Panel
 from ..report.print_figures import contours
+from ..study.result import array_entry
 
 NAME, PICTURE = "two_bar_error", "two_bar_error.png"
 MU = tuple(np.round(np.arange(0.30, 0.801, 0.05), 2))
@@ -70,10 +73,7 @@ def loads(mu: float, zeta: float, psi: float, counts: tuple[int, int] | None) ->
     if counts is None:
         x, y = hanging.catenary((wall, web), weights, reach).last
     else:
-        lengths, shares = (
-            np.repeat([a / n for a, n in zip(pair, counts, strict=True)], counts)
-            for pair in ((wall, web), weights)
-        )
+        lengths, shares = (np.repeat(np.divide(pair, counts), counts) for pair in ((wall, web), weights))
         x, y = hanging.rods(lengths, shares, reach).last
     return x * math.cos(psi) + y * math.sin(psi), y * math.cos(psi) - x * math.sin(psi)
 
@@ -85,20 +85,15 @@ def two_bar_error(
     psi: tuple[float, ...] = PSI,
 ) -> TwoBarError:
     """Compare over the grid; `progress` gets the share that is done."""
-    shape = (len(mu), len(zeta), len(psi))
-    error_t, error_n, load_t = (np.full(shape, np.nan) for _ in range(3))
+    found = np.full((3, len(mu), len(zeta), len(psi)), np.nan)
     for i, m in enumerate(mu):
         progress(i / len(mu))
-        for j, z in enumerate(zeta):
-            for k, angle in enumerate(psi):
-                try:
-                    bars, chain = loads(m, z, angle, (1, 1)), loads(m, z, angle, None)
-                except GeometryError:
-                    continue
-                error_t[i, j, k], error_n[i, j, k] = bars[0] - chain[0], bars[1] - chain[1]
-                load_t[i, j, k] = chain[0]
+        for (j, z), (k, angle) in itertools.product(enumerate(zeta), enumerate(psi)):
+            with contextlib.suppress(GeometryError):
+                bars, chain = loads(m, z, angle, (1, 1)), loads(m, z, angle, None)
+                found[:, i, j, k] = bars[0] - chain[0], bars[1] - chain[1], chain[0]
     progress(1.0)
-    return TwoBarError(np.array(mu), np.array(zeta), np.array(psi), error_t, error_n, load_t)
+    return TwoBarError(np.array(mu), np.array(zeta), np.array(psi), *found)
 
 
 def statement(comparison: TwoBarError) -> list[str]:
@@ -130,13 +125,7 @@ def statement(comparison: TwoBarError) -> list[str]:
 
 def as_dict(comparison: TwoBarError) -> dict[str, Any]:
     """Every number with its unit, ready for JSON."""
-
-    def rows(values: Any) -> Any:
-        return (
-            [rows(v) for v in values] if np.ndim(values) else (float(values) if np.isfinite(values) else None)
-        )
-
-    axes = {"mu": ("1", comparison.mu), "zeta": ("1", comparison.zeta), "psi": ("rad", comparison.psi)}
+    axes = {"mu": "1", "zeta": "1", "psi": "rad"}
     tables = {
         "error_t": "R_t of two bars less that of the catenary, over the weight",
         "error_n": "R_n of two bars less that of the catenary, over the weight",
@@ -144,14 +133,9 @@ def as_dict(comparison: TwoBarError) -> dict[str, Any]:
     }
     return {
         "chainunit": __version__,
-        **{name: {"value": rows(x), "unit": unit} for name, (unit, x) in axes.items()},
+        **{name: array_entry(getattr(comparison, name), unit) for name, unit in axes.items()},
         **{
-            name: {
-                "value": rows(getattr(comparison, name)),
-                "unit": "1",
-                "description": text,
-                "axes": list(axes),
-            }
+            name: array_entry(getattr(comparison, name), "1") | {"description": text, "axes": list(axes)}
             for name, text in tables.items()
         },
         "statement": statement(comparison),
@@ -175,11 +159,10 @@ def report(comparison: TwoBarError) -> Report:
 def _table(comparison: TwoBarError) -> Table:
     """The larger error over the rocker angles."""
     columns = [Column(("mu \\ zeta",)), *(Column((f"{z:.2f}",)) for z in comparison.zeta[::_SHOWN])]
+    errors = comparison.largest[::_SHOWN, ::_SHOWN]
     rows = [
-        TableRow(
-            ((f"{m:.2f}",), *((f"{100.0 * x:.1f}" if np.isfinite(x) else "-",) for x in errors[::_SHOWN]))
-        )
-        for m, errors in zip(comparison.mu[::_SHOWN], comparison.largest[::_SHOWN], strict=True)
+        TableRow(((f"{m:.2f}",), *((f"{100.0 * x:.1f}" if np.isfinite(x) else "-",) for x in row)))
+        for m, row in zip(comparison.mu[::_SHOWN], errors, strict=True)
     ]
     title = (
         "Largest error of R_t and R_n by two bars, % of the organ's weight, rocker within "
@@ -201,21 +184,16 @@ def _figure(comparison: TwoBarError) -> Figure:
         Curve("error of R_n by two bars", comparison.psi, error_n, 2),
     )
     within = f"At rocker angles within {math.degrees(comparison.psi.max()):.0f} deg"
+    psi, share = Axis("rocker angle psi", "rad"), Axis("share of the weight", kind="percent")
+    panels = (
+        Panel(Axis("zeta = z/z_max"), Axis("mu = e/l1"), tuple(errors), within),
+        Panel(psi, share, loads, f"mu = {mu[i]:g}, zeta = {zeta[j]:g}"),
+    )
     return Figure(
         "two-bar-error",
         "Errors of two bars in place of a hanging chain",
         "The larger error of R_t and R_n over zeta and mu, and the loads of the papers' organ over the rocker angle.",
-        (
-            (
-                Panel(Axis("zeta = z/z_max"), Axis("mu = e/l1"), tuple(errors), within),
-                Panel(
-                    Axis("rocker angle psi", "rad"),
-                    Axis("share of the weight", kind="percent"),
-                    loads,
-                    f"mu = {mu[i]:g}, zeta = {zeta[j]:g}",
-                ),
-            ),
-        ),
+        (panels,),
         file=PICTURE,
         widths=(1.2, 1.0),
     )
