@@ -87,7 +87,7 @@ def test_each_operation_stands_once():
 def test_groups_of_a_model_share_their_operations(name):
     """Less than a tenth more than all outputs in one function, in parts that a compiler is fast with."""
     program = next(iter(generate._programs(Interface(MODELS[name], {}))))
-    symbols, *_, outputs, _ = Interface(MODELS[name], {}).traced
+    symbols, *_, outputs, _ = Interface(MODELS[name], {}).trace
     single = casadi.Function("f", symbols, [casadi.cse(casadi.vertcat(*outputs))]).n_instructions()
     parts = re.split(r"static void values_", program.text)[1:]
     operations = sum(len(part) for part in program._parts)

@@ -123,7 +123,7 @@ def test_native_and_pythonfmu_agree(native, fmus):
 def jacobian(model, values):
     """Outputs, and derivatives of the states, by inputs and states, by CasADi from the same kernels."""
     interface = Interface(model, {})
-    symbols, _, _, x, outputs, derivatives = interface.traced
+    symbols, _, _, x, outputs, derivatives = interface.trace
     _, us, xs, _ = symbols
     states = model.state_layout.values(x) if model.state_layout else []
     rows = casadi.vertcat(*states, *outputs, *derivatives)

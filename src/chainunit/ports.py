@@ -76,7 +76,7 @@ def load_inertia(load: LoadPort, phi: Any) -> Any:
     return load.J + load.dJ_dphi * (phi - load.phi0)
 
 
-def carried(load: LoadPort, phi: Any, w: Any, J: Any, tau: Any) -> tuple[Any, Any]:
+def shaft_motion(load: LoadPort, phi: Any, w: Any, J: Any, tau: Any) -> tuple[Any, Any]:
     """Acceleration [rad/s2] of a shaft of the inertia `J` [kg m2] that the torque `tau` [N m] speeds up and the load
     holds back, and the torque [N m] that it gives to the load."""
     torque, inertia = load_torque(load, phi, w), load_inertia(load, phi)

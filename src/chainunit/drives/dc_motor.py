@@ -24,7 +24,7 @@ from ..engines import MATH
 from ..model import Part, Requirement
 from ..ports import LoadInput
 from ..quantities import Value, declaration, group, quantity
-from .motor import T_RATED, Motor, MotorOutputs, MotorParameters, MotorPoint, ShaftStates, braked
+from .motor import T_RATED, Motor, MotorOutputs, MotorParameters, MotorPoint, ShaftStates, friction_time
 
 if TYPE_CHECKING:
     from .speed_control import Loop, Tuning
@@ -232,7 +232,7 @@ class DcMotor(Motor):
         alone that friction brakes, and at most 0.25 ms: the Runge-Kutta method is stable up to 2.8 of a time
         constant, which leaves room for a winding that heats up."""
         by_current = 0.25 * p.armature.L / (p.armature.R + p.current_control.kp)
-        return xp.minimum(xp.minimum(2.5e-4, by_current), braked(xp, p.rotor))
+        return xp.minimum(xp.minimum(2.5e-4, by_current), friction_time(xp, p.rotor))
 
     @staticmethod
     def initial_states(xp: Any, p: Any) -> Any:

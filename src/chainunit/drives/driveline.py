@@ -28,10 +28,10 @@ from ..ports import (
     PortSlopes,
     PortValues,
     Start,
-    carried,
     flange,
     flanges,
     load_terminal,
+    shaft_motion,
 )
 from ..quantities import Value, declaration, group, quantity
 from .cardan import BENDS, RIGHT, ShaftLine, Twist, two_joints
@@ -138,7 +138,7 @@ class _Point:
             x.driven.w,
         )
         self.twist = Twist(xp, p, *self.ends)
-        self.a4, self.tau4 = carried(u.load, x.driven.phi, x.driven.w, p.J4, self.twist.tau4)
+        self.a4, self.tau4 = shaft_motion(u.load, x.driven.phi, x.driven.w, p.J4, self.twist.tau4)
 
 
 def _outputs(xp: Any, p: Any, u: Any, x: Any, s: _Point) -> Outputs:

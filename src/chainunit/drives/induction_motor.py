@@ -28,7 +28,16 @@ from ..model import Part, Requirement
 from ..planar import Vec2
 from ..ports import LoadInput
 from ..quantities import Value, declaration, group, quantity
-from .motor import T_RATED, Motor, MotorOutputs, MotorParameters, MotorPoint, Rotor, ShaftStates, braked
+from .motor import (
+    T_RATED,
+    Motor,
+    MotorOutputs,
+    MotorParameters,
+    MotorPoint,
+    Rotor,
+    ShaftStates,
+    friction_time,
+)
 
 _TURN = 2.0 * math.pi
 
@@ -322,11 +331,6 @@ def breakdown(p: Any, voltage_share: float = 1.0, f: float | None = None, T: flo
     return max(at_left, at_right, at(high), key=lambda s: s.tau)
 
 
-def _cooling(xp: Any, p: Any, w: Any) -> Any:
-    turning = xp.minimum(xp.abs(w) * p.pole_pairs / (_TURN * p.supply.f), 1.0)
-    return p.cooling.still + (1.0 - p.cooling.still) * turning
-
-
 class InductionMotorPoint(MotorPoint):
     """Everything at one state: supply, circuit, shaft."""
 
@@ -354,7 +358,7 @@ class InductionMotorPoint(MotorPoint):
             self.R_s * (self.i_d * self.i_d + self.i_q * self.i_q)
             + self.R_r * (self.ir_d * self.ir_d + self.ir_q * self.ir_q)
         )
-        self.cooling = _cooling(xp, p, x.w)
+        self.cooling = InductionMotor.cooling(xp, p, x.w)
         self.turn(p, u, x)
 
     def rates(self, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
@@ -442,7 +446,8 @@ class InductionMotor(Motor):
     @staticmethod
     def cooling(xp: Any, p: Any, w: Any) -> Any:
         """The fan turns with the shaft: least at rest, whole at synchronous speed and above."""
-        return _cooling(xp, p, w)
+        turning = xp.minimum(xp.abs(w) * p.pole_pairs / (_TURN * p.supply.f), 1.0)
+        return p.cooling.still + (1.0 - p.cooling.still) * turning
 
     @staticmethod
     def largest_torque(p: Any, T: float, *at: float) -> float:
@@ -467,7 +472,7 @@ class InductionMotor(Motor):
         constant of the rotor alone that friction brakes, and at most 0.25 ms."""
         by_flux = 0.25 * p.cage.L * (1.0 - p.cage.skin_L) / _resistance(p)
         longest = xp.minimum(xp.minimum(2.5e-4, 1.0 / (12.0 * _TURN * p.supply.f)), by_flux)
-        return xp.minimum(longest, braked(xp, p.rotor))
+        return xp.minimum(longest, friction_time(xp, p.rotor))
 
     @staticmethod
     def initial_states(xp: Any, p: Any) -> Any:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..engines import MATH
 from ..model import Model
-from ..ports import LoadState, Start, carried, flanges, load_terminal
+from ..ports import LoadState, Start, flanges, load_terminal, shaft_motion
 from ..quantities import Value, declaration, group, quantity
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ class MotorPoint:
     def turn(self, p: Any, u: Any, x: Any) -> None:
         """Acceleration, and torque given to the load."""
         driving = self.air_gap - p.rotor.d * x.w
-        self.a, self.tau = carried(u.load, x.phi, x.w, p.rotor.J, driving)
+        self.a, self.tau = shaft_motion(u.load, x.phi, x.w, p.rotor.J, driving)
 
     def outputs(self) -> dict[str, Any]:
         """The fields of `MotorOutputs` that follow from it."""
@@ -188,6 +188,6 @@ class Motor(Model):
         raise NotImplementedError
 
 
-def braked(xp: Any, rotor: Any) -> Any:
+def friction_time(xp: Any, rotor: Any) -> Any:
     """The time constant of the rotor that its own friction `d` brakes, without any load [s]; at most a second."""
     return 1.0 / xp.maximum(rotor.d / rotor.J, 1.0)

@@ -376,11 +376,9 @@ class _Fit:
         rated, most, locked = points = self.points(MATH, bare, self._speed_at_breakdown(bare))
         residuals = self.relative(points)
         residuals["efficiency"] = rated.tau * n.speed / rated.supply_power / n.efficiency - 1.0
-        fan = bare.cooling.still + (1.0 - bare.cooling.still) * min(1.0 - n.slip, 1.0)
-        R_th = self.assumptions.rise * fan / rated.heat
+        R_th = self.assumptions.rise * InductionMotor.cooling(MATH, bare, n.speed) / rated.heat
         time_constant = self.assumptions.time_constant * (n.power / 1000.0) ** self.assumptions.growth
         thermal = {"stator.R_th": R_th, "stator.C": time_constant / R_th}
-        layout = InductionMotor.parameter_layout
-        p = layout.from_names(thermal, bare)
+        p = InductionMotor.parameter_layout.from_names(thermal, bare)
         InductionMotor.check(p)
         return Identification(n, p, MappingProxyType(residuals), rated, most, locked)

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 from .description import Interface, licence_text, terminals
 from .documentation import page
-from .pack import written
+from .pack import xml_bytes
 from .recipe import icon
 from .reference import reference_results
 
 
-def accompanying(
+def companion_files(
     interface: Interface, version: str, fmi: int, libraries: Sequence[str] = ()
 ) -> dict[str, bytes]:
     """Files by their path inside the FMU; `libraries` are packages whose code it holds, under their own licences."""
@@ -25,7 +25,7 @@ def accompanying(
         files["model.png"] = png
     else:
         files |= {
-            "terminalsAndIcons/terminalsAndIcons.xml": written(terminals(interface)),
+            "terminalsAndIcons/terminalsAndIcons.xml": xml_bytes(terminals(interface)),
             "terminalsAndIcons/icon.png": png,
             "terminalsAndIcons/icon.svg": svg,
         }

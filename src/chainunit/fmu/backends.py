@@ -45,7 +45,7 @@ def export(
         return _by_python(model, file, start, fmi, platforms, "")
     if backend is None and not platforms and not targets.compiles(fmi):
         return _by_python(model, file, start, fmi, platforms, ", no C compiler for this machine found")
-    names, compiler = targets.chosen(platforms, fmi)
+    names, compiler = targets.choose(platforms, fmi)
     try:
         native.export(model, file, start, fmi=fmi, platforms=platforms, report=report)
     except WriteError:

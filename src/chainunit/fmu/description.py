@@ -78,7 +78,7 @@ class Interface:
         return [s for s in self.signals if s.causality == causality]
 
     @cached_property
-    def traced(self) -> tuple[list[Any], Any, Any, Any, list[Any], list[Any]]:
+    def trace(self) -> tuple[list[Any], Any, Any, Any, list[Any], list[Any]]:
         """The model in symbols: (p, u, x, what is derived from p, as casadi vectors), p, u and x as declarations,
         outputs part by part in declared order, and derivatives of the states."""
         import casadi
@@ -108,7 +108,7 @@ class Interface:
         dependencies, in a run (inputs and states) and at the start (parameters and inputs), from the sparsity of the
         traced equations. A state, in a run, depends on itself alone."""
         model = self.model
-        symbols, p, u, x, outputs, derivatives = self.traced
+        symbols, p, u, x, outputs, derivatives = self.trace
         states, started = [], []
         rows_at_start = [*outputs, *derivatives]
         if model.state_layout:
@@ -134,7 +134,7 @@ class Interface:
 
         if not self.model.derived:
             return []
-        symbols, p, *_ = self.traced
+        symbols, p, *_ = self.trace
         rows = [casadi.SX(v) for v in self.model.derive(casadi_(), p)]
         known = {i for row in self._known(symbols[:1], rows) for i in row}
         for i in sorted(known):
@@ -298,7 +298,7 @@ def _root(model: type[Model], version: str, own: Mapping[str, str]) -> Element:
                 ("copyright", _copyright()),
                 ("license", "MIT"),
                 ("generationTool", f"chainunit {version}"),
-                ("generationDateAndTime", generated()),
+                ("generationDateAndTime", generation_time()),
                 ("variableNamingConvention", "structured"),
             ]
         ),
@@ -315,7 +315,7 @@ def licence_text(package: str) -> str:
     return metadata.distribution(package).read_text("licenses/LICENSE") or ""
 
 
-def generated() -> str:
+def generation_time() -> str:
     """When the FMU was made, in UTC: SOURCE_DATE_EPOCH [s], else the day of this version's release, so that the same
     model gives the same file.
 

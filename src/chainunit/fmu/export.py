@@ -24,9 +24,9 @@ from pythonfmu import FmuBuilder
 from ..errors import InputError
 from ..files import folder, whole
 from ..model import Model
-from .accompany import accompanying
+from .accompany import companion_files
 from .description import Interface, model_description
-from .pack import checked, pack
+from .pack import interface_of, pack
 from .recipe import recipes
 from .script import Script
 
@@ -58,7 +58,7 @@ def export(model: type[Model], file: Path, start: dict[str, float] | None = None
     InputError
         where the start values are out of bounds or make no machine.
     """
-    interface = checked(model, start)
+    interface = interface_of(model, start)
     file = Path(file)
     folder(file.parent)
     with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
@@ -69,7 +69,7 @@ def export(model: type[Model], file: Path, start: dict[str, float] | None = None
         raw = _build(script, work / "raw.fmu")
         version = metadata.version("chainunit")
         with whole(file) as part:
-            pack(_contents(raw) | accompanying(interface, version, 2, ("pythonfmu",)), part)
+            pack(_contents(raw) | companion_files(interface, version, 2, ("pythonfmu",)), part)
     return file
 
 
@@ -87,7 +87,7 @@ def complete(slave: type[Script], resources: Path) -> Element:
     KeyError, InputError
         see `export`; also for an import of the script that cannot be carried.
     """
-    interface = checked(slave.model, slave.start, slave)
+    interface = interface_of(slave.model, slave.start, slave)
     script = resources / f"{slave.__module__}.py"
     text = script.read_text("utf-8")
     files = _imported(text)

@@ -16,7 +16,7 @@ from .script import Script
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the oldest time that a zip entry can bear
 
 
-def checked(
+def interface_of(
     model: type[Model], start: Mapping[str, float] | None, own: type[Script] | None = None
 ) -> Interface:
     """The interface of `model` with its start values, which must make a model.
@@ -46,7 +46,7 @@ def pack(contents: Mapping[str, bytes], file: Path) -> None:
             archive.writestr(entry, contents[name], compresslevel=9)
 
 
-def written(root: Element) -> bytes:
+def xml_bytes(root: Element) -> bytes:
     """An XML file of that root, indented."""
     indent(root)
     return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root)

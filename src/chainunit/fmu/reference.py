@@ -21,7 +21,7 @@ from ..engines import MATH
 from ..ports import FLANGE, LOAD
 from ..quantities import Quantity
 from .description import Interface
-from .pack import written
+from .pack import xml_bytes
 
 STANDARD = "org.fmi-standard.fmi-ls-ref"
 REFERENCE = f"extra/{STANDARD}"
@@ -64,7 +64,7 @@ def reference_results(interface: Interface) -> dict[str, bytes]:
         SubElement(
             root, "Related", type="text/csv", source=f"{name}_{end}.csv", role=role, description=words[end]
         )
-    return files | {f"{REFERENCE}/fmi-ls-manifest.xml": written(root)}
+    return files | {f"{REFERENCE}/fmi-ls-manifest.xml": xml_bytes(root)}
 
 
 def _tables(interface: Interface) -> dict[str, tuple[list[str], list[list[float]]]]:
@@ -118,7 +118,7 @@ def _march(interface: Interface, p: Any) -> Any:
     model = interface.model
     layout = model.state_layout
     assert layout is not None
-    (of_p, of_u, of_x, of_derived), *_, derivatives = interface.traced
+    (of_p, of_u, of_x, of_derived), *_, derivatives = interface.trace
     given, since = casadi.SX.sym("given", len(model.input_layout.names)), casadi.SX.sym("since")
     moved = [given[k] for k in range(given.numel())]
     for place, rate, half in model.course(moved):
@@ -233,7 +233,7 @@ def _inertia(interface: Interface, torque: str) -> float:
     model, layout = interface.model, interface.model.state_layout
     if layout is None:
         return 1.0
-    symbols, *_, derivatives = interface.traced
+    symbols, *_, derivatives = interface.trace
     speeds = [d for d, v in zip(derivatives, interface.states, strict=True) if v.unit == "rad/s"]
     by = casadi.jacobian(casadi.vertcat(*speeds), symbols[1][model.input_layout.names.index(torque)])
     p = model.prepared(MATH, model.parameter_layout.instance([s.start for s in interface.of("parameter")]))

@@ -20,7 +20,7 @@ from ..files import folder, whole
 from ..fmu.backends import Backend
 from ..fmu.backends import export as export_fmu
 from ..fmu.description import Interface, Signal
-from ..fmu.pack import checked, pack, written
+from ..fmu.pack import interface_of, pack, xml_bytes
 from ..quantities import base_units
 from .graph import ModelComponent, System
 
@@ -90,9 +90,9 @@ def export(
             sources[component] = paths[alike]
     for component, interface in interfaces.items():
         free = [s for s in interface.of("input") if f"{component}.{s.name}" not in driven]
-        contents[_parameter_file(component)] = written(_parameter_set([*interface.of("parameter"), *free]))
+        contents[_parameter_file(component)] = xml_bytes(_parameter_set([*interface.of("parameter"), *free]))
     structure = _description(system, interfaces, sources, (name, description), (stop, step))
-    contents["SystemStructure.ssd"] = written(structure)
+    contents["SystemStructure.ssd"] = xml_bytes(structure)
     with whole(file) as part:
         pack(contents, part)
     parts = ", ".join(f"{component} ({i.model.name})" for component, i in interfaces.items())
@@ -110,7 +110,7 @@ def _interfaces(system: System) -> dict[str, Interface]:
         if not isinstance(component, ModelComponent):
             raise InputError(f"{name} ({component.title}): is an FMU of somebody else, which is not packaged")
         try:
-            interfaces[name] = checked(component.model, start[name])
+            interfaces[name] = interface_of(component.model, start[name])
         except InputError as error:
             raise InputError(f"{name}: {error}") from error
     return interfaces

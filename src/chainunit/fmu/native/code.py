@@ -15,7 +15,7 @@ from typing import Any
 _LONGEST = 2500
 """operations of a part: the time of a compiler grows faster than the length of a function"""
 _WIDEST = 60
-"""characters of an operation that is written where it is users, and not into a line of its own"""
+"""characters of an operation that is written where it is used, and not into a line of its own"""
 
 
 def _operations() -> Mapping[int, str]:

@@ -15,12 +15,12 @@ from xml.etree.ElementTree import Element, SubElement
 
 from ...files import folder, whole
 from ...model import Model
-from ..accompany import accompanying
+from ..accompany import companion_files
 from ..description import model_description, model_description_3
-from ..pack import checked, pack, written
+from ..pack import interface_of, pack, xml_bytes
 from ..recipe import recipes
 from .generate import kernels, rules, tables
-from .platforms import build, chosen
+from .platforms import build, choose
 
 _LAYER = ("model.h", "runtime.c", "fmi.h")
 
@@ -90,8 +90,8 @@ def export(
     RunError
         where the compiler fails, with what it said.
     """
-    names, compiler = chosen(platforms, fmi)
-    interface = checked(model, start)
+    names, compiler = choose(platforms, fmi)
+    interface = interface_of(model, start)
     file = Path(file)
     folder(file.parent)
     of_version = _VERSIONS[fmi]
@@ -112,7 +112,7 @@ def export(
     functions, room = kernels(interface)
     sources = {name: (recipes() / "native" / name).read_bytes() for name in layer}
     sources |= {"kernels.c": functions.encode(), "rules.h": rules().encode()}
-    digest = hashlib.sha256(written(description))
+    digest = hashlib.sha256(xml_bytes(description))
     for text in (*sources.values(), tables(interface, "", room).encode()):
         digest.update(text + b"\0")
     guid = f"{{{uuid.UUID(digest.hexdigest()[:32])}}}"
@@ -120,8 +120,8 @@ def export(
     sources["model.c"] = tables(interface, guid, room).encode()
     sources |= {name: (_headers() / name).read_bytes() for name in of_version.headers}
     contents = {f"sources/{name}": text for name, text in sources.items()}
-    contents["modelDescription.xml"] = written(description)
-    contents |= accompanying(interface, version, fmi)
+    contents["modelDescription.xml"] = xml_bytes(description)
+    contents |= companion_files(interface, version, fmi)
     if fmi == 3:
         contents["sources/buildDescription.xml"] = _build_description(model.name, compiled)
     for name in names:
@@ -139,7 +139,7 @@ def _build_description(identifier: str, names: Sequence[str]) -> bytes:
     files = SubElement(configuration, "SourceFileSet", language="C99")
     for name in names:
         SubElement(files, "SourceFile", name=name)
-    return written(root)
+    return xml_bytes(root)
 
 
 def _headers() -> Path:

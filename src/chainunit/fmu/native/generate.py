@@ -34,7 +34,7 @@ def groups(interface: Interface) -> list[list[int]]:
     return lists
 
 
-def differenced(interface: Interface) -> set[int]:
+def difference_groups(interface: Interface) -> set[int]:
     """Groups without code for their derivatives, see `Part`."""
     names = {name for part in interface.model.parts for name in part.by_differences}
     return {g for g, group in enumerate(groups(interface)) if interface.others[group[0]].name in names}
@@ -52,7 +52,7 @@ def _programs(interface: Interface) -> Iterator[Program]:
     import casadi
 
     model = interface.model
-    (ps, us, xs, ks), p, u, x, outputs, derivatives = interface.traced
+    (ps, us, xs, ks), p, u, x, outputs, derivatives = interface.trace
     # what is derived from parameters comes last, and only where there is something
     more = [ks] if model.derived else []
     point = [ps, us, xs, *more]
@@ -66,7 +66,7 @@ def _programs(interface: Interface) -> Iterator[Program]:
     values = [casadi.vertcat(*(outputs[k] for k in group)) for group in places]
     yield Program("values", point, values, offsets, "OFTEN")
     du, dx = casadi.SX.sym("du", us.shape[0]), casadi.SX.sym("dx", xs.shape[0])
-    apart = differenced(interface)
+    apart = difference_groups(interface)
     smooth = [casadi.SX(0, 1) if g in apart else group for g, group in enumerate(values)]
     smooth.append(casadi.vertcat(*derivatives))
     slopes = [casadi.jtimes(row, casadi.vertcat(us, xs), casadi.vertcat(du, dx)) for row in smooth]
@@ -226,7 +226,7 @@ def tables(interface: Interface, guid: str, room: int) -> str:
         "n_z": model.start_unknowns,
         "n_w": room,
         "n_groups": len(group_rows),
-        "differenced": f"{sum(1 << g for g in differenced(interface))}u",
+        "differenced": f"{sum(1 << g for g in difference_groups(interface))}u",
         "n_required": len(model.required),
         "n_start_required": len(model.start_required),
         "start": "starts",

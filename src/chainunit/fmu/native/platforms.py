@@ -113,7 +113,7 @@ def _zig() -> Compiler | None:
     return Compiler((sys.executable, "-m", "ziglang", "cc"), zig=True)
 
 
-def chosen(names: Sequence[str], fmi: int) -> tuple[tuple[str, ...], Compiler]:
+def choose(names: Sequence[str], fmi: int) -> tuple[tuple[str, ...], Compiler]:
     """Platforms and the compiler for them; without names, this machine's.
 
     Raises
@@ -158,7 +158,7 @@ def build(
 
     Parameters
     ----------
-    compiler : see `chosen`
+    compiler : see `choose`
     name, fmi : platform and version of FMI
     identifier : model identifier, the library's name
     sources : files by name; `translated` names those that the compiler is given
