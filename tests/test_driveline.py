@@ -72,12 +72,13 @@ def test_power_in_is_power_out_and_stored_and_lost():
         out, _ = at(p, u, x)
         rates = CardanDriveline.derivatives(engines.MATH, p, u, LAYOUT.instance(x))
         dual = engines.dual(engines.MATH)
-        moving = CardanDriveline.evaluate(
+        along = (
             dual,
             p,
             dataclasses.replace(u, phi=engines.Dual(u.phi, u.w)),
             LAYOUT.instance([engines.Dual(v, d) for v, d in zip(x, rates, strict=True)]),
-        )[0]
+        )
+        moving = CardanDriveline.parts[0].equations(*along, CardanDriveline.shared(*along))
         grows = engines.slope(moving.kinetic_energy) + engines.slope(moving.potential_energy)
         given = out.driven.tau * x[2]
         terms = (out.power, given, grows, out.dissipated_power)

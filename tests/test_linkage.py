@@ -3,6 +3,7 @@ solution; energy, two routes to the torque, slopes, and the direct model of any 
 
 from __future__ import annotations
 
+import functools
 import json
 import math
 from dataclasses import replace
@@ -15,17 +16,19 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from chainunit.engines import MATH, Dual, casadi_, dual, numpy_, slope
+from chainunit.errors import GeometryError
 from chainunit.groups.body import Bar, Mass
 from chainunit.groups.chain import Rods
 from chainunit.groups.driver import Crank
 from chainunit.groups.dyad import Dyad
 from chainunit.groups.hanging_chain import HangingChain
 from chainunit.groups.loads import Pin, PinLosses, Processing, Push, Resistance, Weight
+from chainunit.groups.triad import Triad
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.machines.parts import Force, force
 from chainunit.mechanism.chains import ChainedState
 from chainunit.mechanism.linkage import Linkage
-from chainunit.mechanism.machine import Mechanism
+from chainunit.mechanism.machine import MachineState, Mechanism
 from chainunit.mechanism.models import InverseMachine, ShaftMotion
 from chainunit.planar import Vec2
 from chainunit.ports import PortValues
@@ -167,7 +170,8 @@ def test_power_and_two_torques(seed):
     p, u, s = case(seed)
     out = SixBar.evaluate(MATH, p, u)[0]
     moving = SixBar.input_layout.from_names({"phi": Dual(u.phi, u.w), "w": Dual(u.w, u.a)}, u)
-    stored = SixBar.evaluate(dual(MATH), p, moving)[0]
+    engine = dual(MATH)
+    stored = SixBar.parts[0].equations(engine, p, moving, None, SixBar.shared(engine, p, moving, None))
     grows = slope(stored.kinetic_energy), slope(stored.potential_energy)
     size = abs(out.power) + sum(map(abs, grows)) + abs(out.dissipated_power)
     assert abs(out.power - sum(grows) - out.dissipated_power) < 1e-11 * size
@@ -219,24 +223,79 @@ def test_the_direct_model_is_the_inverse_of_the_inverse_one(seed):
     assert rates == [u.w, out.a]
     assert need.tau + 0.02 * out.a == pytest.approx(7.0, rel=1e-11)
     assert out.output_bearing.fx == pytest.approx(need.output_bearing.fx, rel=1e-11)
+    # the motor drives what is on its shaft, too
+    assert out.power == pytest.approx(7.0 * u.w)
+    assert out.kinetic_energy == pytest.approx(need.kinetic_energy + 0.5 * 0.02 * u.w**2)
+    engine, moving = dual(MATH), TurningSixBar.States(phi=Dual(u.phi, u.w), w=Dual(u.w, out.a))
+    (along,) = TurningSixBar.evaluate(engine, p, given, moving)
+    stored = slope(along.kinetic_energy) + slope(along.potential_energy)
+    assert out.power == pytest.approx(stored + out.dissipated_power, abs=1e-10 * abs(stored) + 1e-9)
+
+
+class LightSixBar(SixBar):
+    """Whose crank is given no body at all."""
+
+    @staticmethod
+    def linkage(p, u):
+        """The same but for the crank."""
+        bars = SixBar.linkage(p, u)
+        return replace(bars, crank=Crank(bars.crank.bar._replace(mass=None), "A"))
+
+
+def test_a_crank_without_a_body_needs_an_inertia_on_its_shaft():
+    direct = LightSixBar.direct()
+    with pytest.raises(GeometryError, match=r"inertia of the crank and on its shaft = 0 kg\.m2"):
+        direct.check(direct.Parameters())
+    p = direct.check(direct.Parameters(J_added=0.1))
+    assert math.isfinite(direct.derivatives(MATH, p, direct.Inputs(), direct.initial_states(MATH, p))[1])
+
+
+def test_numbers_derived_once_follow_from_the_groups():
+    """No model states how many."""
+    assert SixBar.derived == 0
+    assert KnifeDrive.derived == KnifeDrive.direct().derived == Triad.derived > 0
+
+
+def hanging(p, u, state):
+    """The six-bar with four rods from a ground pin to a point of the output link."""
+    rods = Rods([0.2, 0.15, 0.2, 0.15], [2.0, 1.0, 1.5, 3.0], [0.3, 0.1, 0.2, 0.1, 0.4])
+    bars = SixBar.linkage(p, u)
+    chain = HangingChain("wall", "W", rods, state, p.g, Resistance("", 12.0, p.processing), 2)
+    ground = {**bars.ground, "wall": Vec2(-0.6, 0.7)}
+    return replace(bars, ground=ground, loads={**bars.loads, "chain": chain})
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_slopes_with_a_chain_match_the_complex_step(seed):
+    """By the crank's angle and speed, the rods where they are: the chain resists the acceleration of its pin, whose
+    slope has the third derivative."""
+    p, u, _ = case(seed)
+    rng = np.random.default_rng(seed)
+    q, w, state = u.phi / p.ratio, u.w / p.ratio, (rng.uniform(0.2, 2.0, 4), rng.uniform(-1.0, 1.0, 4))
+    linkage = hanging(p, u, tuple(list(map(float, values)) for values in state))
+
+    def bias(q, w):
+        return MachineState(numpy_(), Mechanism(numpy_(), linkage, q), w).bias
+
+    slopes = MachineState(MATH, Mechanism(MATH, linkage, q), w).slopes()
+    wanted = [bias(q + 1e-30j, w).imag / 1e-30, bias(q, w + 1e-30j).imag / 1e-30]
+    np.testing.assert_allclose(slopes, wanted, rtol=1e-10, atol=1e-10)
+
+
+def test_dual_numbers_over_dual_numbers_are_refused():
+    """They would mix up what they are the slopes of."""
+    p, u, _ = case(1)
+    moving = SixBar.input_layout.from_names({"phi": Dual(u.phi, 1.0)}, u)
+    with pytest.raises(TypeError, match="dual numbers over dual numbers"):
+        SixBar.evaluate(dual(MATH), p, moving)
 
 
 def test_a_chain_hangs_on_any_linkage():
     """Four rods from a ground pin to a point of the output link: power is what bodies and chain store and lose, with
     any acceleration, by dual numbers along the motion; the torque by the forces is that of virtual work."""
     p, u, _ = case(3)
-    rods = Rods([0.2, 0.15, 0.2, 0.15], [2.0, 1.0, 1.5, 3.0], [0.3, 0.1, 0.2, 0.1, 0.4])
-    bars = SixBar.linkage(p, u)
     q, w, a = 2.0, 5.0, 20.0
-
-    def chain(state):
-        resistance = Resistance("", 12.0, p.processing)
-        return HangingChain("wall", "W", rods, state, p.g, resistance, 2)
-
-    def linkage(state):
-        ground = {**bars.ground, "wall": Vec2(-0.6, 0.7)}
-        return replace(bars, ground=ground, loads={**bars.loads, "chain": chain(state)})
-
+    linkage = functools.partial(hanging, p, u)
     state = [0.5, 0.9, 1.4, 2.0], [0.0, 1.0, -1.0, 0.5]
     for _ in range(30):
         m = Mechanism(MATH, linkage(state), q)
@@ -281,6 +340,8 @@ def test_a_knife_drive_without_losses_keeps_its_energy():
     energies = []
     for phi, w in run.y.T:
         s = model.shared(MATH, p, u, model.States(phi=float(phi), w=float(w)))
-        energies.append(s.kinetic_energy + s.held_energy + 0.5 * p.J_added * w * w)
+        (out,) = model.evaluate(MATH, p, u, model.States(phi=float(phi), w=float(w)))
+        assert out.kinetic_energy == pytest.approx(s.kinetic_energy + 0.5 * p.J_added * w * w)
+        energies.append(out.kinetic_energy + out.potential_energy)
     assert run.y[0, -1] > 2.0 * math.pi and np.ptp(run.y[1]) > 1.0
     assert np.ptp(energies) < 1e-8 * abs(np.max(np.abs(energies)))

@@ -121,12 +121,25 @@ def slope(x: Any) -> Any:
     return x.d if isinstance(x, Dual) else 0.0
 
 
+class _DualEngine(SimpleNamespace):
+    pass
+
+
 def dual(xp: Any) -> SimpleNamespace:
     """The engine on dual numbers over `xp`; plain numbers pass through it unharmed.
 
     At a kink (`abs`, `minimum`, `maximum`) the derivative is that of either side, as
     in every automatic differentiation.
+
+    Raises
+    ------
+    TypeError
+        over an engine that is dual itself: parts of both would be mixed up.
     """
+    if isinstance(xp, _DualEngine):
+        raise TypeError(
+            "dual numbers over dual numbers: take an engine that is not dual; there is one slope only"
+        )
 
     def lift(f: Any, df: Any) -> Any:
         def g(x: Any) -> Any:
@@ -157,7 +170,7 @@ def dual(xp: Any) -> SimpleNamespace:
         takes_a = value(a) >= value(b)
         return Dual(xp.maximum(value(a), value(b)), slope(b) + takes_a * (slope(a) - slope(b)))
 
-    return SimpleNamespace(
+    return _DualEngine(
         sin=lift(xp.sin, lambda v, y: xp.cos(v)),
         cos=lift(xp.cos, lambda v, y: -xp.sin(v)),
         sqrt=lift(xp.sqrt, lambda v, y: 0.5 / y),

@@ -86,9 +86,9 @@ class Motion:
         self.p1 = p1
         self.p2 = p2
 
-    def lifted(self) -> Motion:
-        """The motion with the derivatives by q as dual parts, without its second ones."""
-        return Motion(lifted(self.p, self.p1), lifted(self.p1, self.p2))
+    def lifted(self, p3: Vec2) -> Motion:
+        """The motion with the derivatives by q as dual parts, from the third one."""
+        return Motion(lifted(self.p, self.p1), lifted(self.p1, self.p2), lifted(self.p2, p3))
 
 
 class Link:
@@ -130,8 +130,11 @@ class Link:
         across, along = t3 - t1 * t1 * t1, 3.0 * (t1 * self.t2)
         return Vec2(start.x - r.y * across - r.x * along, start.y + r.x * across - r.y * along)
 
-    def lifted(self) -> Link:
-        """The link with the derivatives by q as dual parts, without its second ones."""
+    def lifted(self, start: Vec2, t3: Any) -> Link:
+        """The link with the derivatives by q as dual parts, from the third ones of its pin and its angle."""
         return Link(
-            self.pin.lifted(), lifted(self.u, self.u.turned() * self.t1), Dual(self.t1, self.t2), None
+            self.pin.lifted(start),
+            lifted(self.u, self.u.turned() * self.t1),
+            Dual(self.t1, self.t2),
+            Dual(self.t2, t3),
         )

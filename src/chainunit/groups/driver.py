@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..planar import ZERO, Link, Motion, Vec2
-from .body import Bar, Load
+from .body import Bar, Load, Mass
 from .group import Group, SolvedGroup, Third
 
 
@@ -36,6 +36,16 @@ class Crank(Group):
     def joints(self) -> tuple[tuple[str, str], ...]:
         """Its bearing."""
         return ((self.bar.pin, self.bar.name),)
+
+    @property
+    def inertia(self) -> Any:
+        """Inertia of the crank alone about its bearing [kg m2]."""
+        mass = self.bar.mass
+        if mass is None:
+            return 0.0
+        beside = mass.t if isinstance(mass, Mass) else None
+        arm2 = mass.s * mass.s if beside is None else mass.s * mass.s + beside * beside
+        return mass.I + mass.m * arm2
 
     def solve(self, xp: Any, q: Any, pins: Mapping[str, Motion], derived: Sequence[Any]) -> TurnedCrank:
         """The crank at the angle `q` [rad]."""

@@ -32,6 +32,7 @@ from ..mechanism.models import (
     declared_class,
     fields_of,
     names_of,
+    turned,
 )
 from ..model import Model, Part, Requirement
 from ..ports import PortSlopes, PortValues, Start
@@ -255,7 +256,7 @@ def _turning(chains: Organs) -> type[ChainedModel]:
             a=a,
             tau_bias=s.bias / p.ratio,
             J=s.J / (p.ratio * p.ratio),
-            **chains.loads(xp, p, x, s, a / p.ratio),
+            **turned(p, u, x, chains.loads(xp, p, x, s, a / p.ratio)),
         )
 
     class TurningChainUnitFlexible(ChainedModel):

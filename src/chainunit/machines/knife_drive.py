@@ -216,7 +216,6 @@ class KnifeDrive(InverseMachine):
     joints = JOINTS
     pins = PINS
     probes = staticmethod(_probes)
-    derived = Triad.derived
 
     required = (
         dataclasses.replace(

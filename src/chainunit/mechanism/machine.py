@@ -70,12 +70,8 @@ class Mechanism:
                 turn = links[joint[1]].t1
                 self.turns[joint] = turn if carrier is None else turn - links[carrier].t1
 
-    def lifted(self) -> LiftedMechanism:
-        """The same as loads see it, with its derivatives by q as dual parts."""
-        return LiftedMechanism(self)
-
-    def third(self) -> dict[str, Third]:
-        """Third derivatives by q of each link."""
+    def third(self) -> tuple[dict[str, Third], dict[str, Vec2]]:
+        """Third derivatives by q of each link and of each pin that is not in the ground."""
         pins: dict[str, Vec2] = {}
         thirds: dict[str, Third] = {}
         for solved, connections in self._groups:
@@ -86,7 +82,7 @@ class Mechanism:
                 link = self.links[name]
                 for point in self.topology.points[name]:
                     pins[point] = link.third(self.pins[point].p - link.pin.p, *thirds[name])
-        return thirds
+        return thirds, pins
 
     def turning(self, reactions: Mapping[Joint, Vec2]) -> Iterator[Wrench]:
         """The part of the reactions in the moments on the links as their arms turn with q."""
@@ -149,10 +145,15 @@ class LiftedMechanism:
 
     __slots__ = ("_of", "bodies", "links", "pins", "turns")
 
-    def __init__(self, m: Mechanism) -> None:
+    def __init__(self, m: Mechanism, links: Mapping[str, Third], pins: Mapping[str, Vec2]) -> None:
+        """
+        Parameters
+        ----------
+        links, pins : their third derivatives, see `Mechanism.third`
+        """
         self._of = m
-        self.links = {name: link.lifted() for name, link in m.links.items()}
-        self.pins = {name: pin.lifted() for name, pin in m.pins.items()}
+        self.links = {name: link.lifted(*links[name]) for name, link in m.links.items()}
+        self.pins = {name: pin.lifted(pins.get(name, ZERO)) for name, pin in m.pins.items()}
         self.bodies: Mapping[str, Body] = {}
         self.turns: Mapping[Joint, Any] = {}
 
@@ -282,7 +283,8 @@ class MachineState:
         return functools.reduce(xp.minimum, sizes) if sizes else 1.0
 
     def slopes(self) -> tuple[Any, Any]:
-        """Derivatives of `bias` by the crank angle [N m/rad] and the crank speed [N m s/rad].
+        """Derivatives of `bias` by the crank angle [N m/rad] and the crank speed [N m s/rad], with chains where their
+        states stand.
 
         By the second route: the losses need the slopes of all reactions, and the torque comes with them. The sums of
         forces and moments on each link are zero, and so are their derivatives: a force pass with the slopes of the
@@ -291,10 +293,11 @@ class MachineState:
         return self._by_angle(), self._by_speed()
 
     def _by_angle(self) -> Any:
-        m, w2, field, third = self.m, self.w * self.w, self.steady.field, self.m.third()
-        acting = {name: body.centrifugal_slope(w2, field, third[name]) for name, body in m.bodies.items()}
+        m, w2, field = self.m, self.w * self.w, self.steady.field
+        links, pins = m.third()
+        acting = {name: body.centrifugal_slope(w2, field, links[name]) for name, body in m.bodies.items()}
         loaded(acting, m.turning(self.steady.reactions))
-        return self._slope(m.lifted(), self.w, acting, m.turns2())
+        return self._slope(LiftedMechanism(m, links, pins), self.w, acting, m.turns2())
 
     def _by_speed(self) -> Any:
         acting = {name: body.centrifugal(2.0 * self.w) for name, body in self.m.bodies.items()}

@@ -57,6 +57,11 @@ class ShaftMotion:
 class LinkageModel(Model):
     """A model whose mechanics are those of a linkage."""
 
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        if hasattr(cls, "Parameters"):
+            cls.derived = cls.linkage(cls.Parameters(), cls.Inputs()).derived
+
     @staticmethod
     def linkage(p: Any, u: Any) -> Linkage:
         """The linkage with these parameters and inputs; places and lengths do not depend on the inputs."""
@@ -234,7 +239,6 @@ class DirectMachine(LinkageModel):
 
     def __init_subclass__(cls) -> None:
         cls.required = (*cls.inverse.required, cls._carried)
-        cls.derived = cls.inverse.derived
         cls.parts = (Part(cls.Outputs, cls._outputs),)
         super().__init_subclass__()
 
@@ -247,8 +251,7 @@ class DirectMachine(LinkageModel):
     def requirements(cls, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
         """Those of the inverse model, and an inertia that never vanishes."""
         yield from cls.inverse.requirements(xp, p)
-        crank = cls.linkage(p, cls.Inputs()).crank.bar.mass
-        yield p.J_added * p.ratio * p.ratio + crank.I + crank.m * crank.s * crank.s, 0.0, math.inf
+        yield p.J_added * p.ratio * p.ratio + cls.linkage(p, cls.Inputs()).crank.inertia, 0.0, math.inf
 
     @staticmethod
     def initial_states(xp: Any, p: Any) -> Any:
@@ -279,9 +282,16 @@ class DirectMachine(LinkageModel):
             a=a,
             tau_bias=s.bias / p.ratio,
             J=s.J / (p.ratio * p.ratio),
-            **running(s, at_crank),
+            **turned(p, u, x, running(s, at_crank)),
             **cls.inverse.probes(xp, p, u, s, at_crank),
         )
+
+
+def turned(p: Any, u: Any, x: Any, fields: dict[str, Any]) -> dict[str, Any]:
+    """The fields of `running` of a machine that turns by itself: with the inertia on its shaft, and the power of the
+    motor."""
+    kinetic = fields["kinetic_energy"] + 0.5 * p.J_added * (x.w * x.w)
+    return fields | {"power": u.tau * x.w, "kinetic_energy": kinetic}
 
 
 def acceleration(p: Any, u: Any, s: MachineState) -> Any:
