@@ -6,23 +6,24 @@ import io
 
 from rich.console import Console
 
-from chainunit.report import chain_unit, files, html, motion, series, terminal
+from chainunit.report import files, html, motion, series, terminal
+from chainunit.report import study as study_report
 from chainunit.text import DEFAULT_UNITS
 
 
 def page_of(study, result=None):
-    return html.render(chain_unit.report(study, result))
+    return html.render(study_report.report(study, result))
 
 
 def said_of(study, width=200):
     told = io.StringIO()
     console = Console(file=told, markup=False, highlight=False, width=width)
-    terminal.show(chain_unit.report(study), console)
+    terminal.show(study_report.report(study), console)
     return told.getvalue()
 
 
 def write(study, folder):
-    numbers, *others = files.writers(chain_unit.report(study), folder, "result")
+    numbers, *others = files.writers(study_report.report(study), folder, "result")
     return [file for each in (numbers, lambda: series.write(study, folder), *others) for file in each()]
 
 

@@ -19,7 +19,8 @@ from reports import page_of, pictures, said_of, write
 
 from chainunit import EMPTY, InputError, RunError
 from chainunit.drives.induction_motor import SoftStart
-from chainunit.report import chain_unit, chain_unit_motion, html, page_figures
+from chainunit.report import chain_unit_motion, html, page_figures
+from chainunit.report import study as study_report
 from chainunit.report.blocks import at
 from chainunit.study import config
 from chainunit.study.chain import rest_forces
@@ -51,7 +52,7 @@ def study(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def written(study, tmp_path_factory):
-    return html.write(chain_unit.report(study), tmp_path_factory.mktemp("a page"))
+    return html.write(study_report.report(study), tmp_path_factory.mktemp("a page"))
 
 
 @pytest.fixture(scope="module")
@@ -315,7 +316,7 @@ def test_steady_running_begins_where_the_study_takes_it(study):
     soft = SoftStart(voltage=0.5, time=0.7)
     config = dataclasses.replace(study.config, start="soft", starter=Starter(soft_start=soft))
     slow = dataclasses.replace(study, config=config, steady_from=None)
-    start_up = next(each for each in chain_unit.report(slow).figures if each.name == "time-start-up")
+    start_up = next(each for each in study_report.report(slow).figures if each.name == "time-start-up")
     (mark,) = page_figures.figure(start_up, DEFAULT_UNITS).layout.annotations
     assert mark.text == "steady from here" and mark.x == slow.settled == pytest.approx(0.7 + math.pi / 3.0)
     first = pictures(chain_unit_motion.motion(slow))["runs"][0]
@@ -565,7 +566,7 @@ def test_a_run_that_stopped_early_has_a_page(study, tmp_path):
     stopped.failure = RunError("motor: it <broke>")
     stopped.runs = {"unfinished": study.runs["start_up"].isel(time=slice(0, 1))}
     stopped.answers, stopped.pins, stopped.event, stopped.certificate = {}, {}, {}, {}
-    text = html.write(chain_unit.report(stopped), tmp_path).read_text("utf-8")
+    text = html.write(study_report.report(stopped), tmp_path).read_text("utf-8")
     assert "The run stopped early:" in text and "it &lt;broke&gt;" in text
     assert not any(words["data-path"] == "status" for words in Reader(text).words)
     stopped.runs = {}
@@ -580,7 +581,7 @@ def test_an_error_leaves_the_old_page(study, tmp_path, monkeypatch):
 
     monkeypatch.setattr(html, "get_plotlyjs", fails)
     with pytest.raises(OSError):
-        html.write(chain_unit.report(study), tmp_path)
+        html.write(study_report.report(study), tmp_path)
     assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("report.html", "old")]
 
 

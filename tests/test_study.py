@@ -17,7 +17,7 @@ from fmpy.validation import validate_fmu
 from reports import write
 
 from chainunit import EMPTY, ChainUnit, SideLoads
-from chainunit.report import chain_unit
+from chainunit.report import study as study_report
 from chainunit.study.cycle import alone, cycle, factors_for, overload_factors, sides_over_speed
 
 SHORT = """
@@ -52,7 +52,7 @@ def test_study_writes_numbers_series_plots_and_fmus(done):
         "load_cycle.csv",
         "fmu",
         "result.md",
-        *chain_unit.PICTURES,
+        *study_report.PICTURES,
     } - {
         "driveline.png",
         "chain_sweep.png",

@@ -130,7 +130,7 @@ def test_chains_at_their_limits():
     ):
         verdict = of_chains(**given)
         assert [r.topic for r in verdict.reasons] == [topic] and verdict.holds == holds
-        assert verdict.organ == "chains" and "organ =" not in verdict.text
+        assert verdict.model == "chains" and "organ =" not in verdict.text
 
 
 def test_words_and_data():

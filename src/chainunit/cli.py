@@ -31,6 +31,14 @@ class Backend(StrEnum):
     python = "python"
 
 
+class Example(StrEnum):
+    """A packaged study file."""
+
+    chain_unit = "chain-unit"
+    knife = "knife"
+    driveline = "driveline"
+
+
 _BackendOption = Annotated[
     Backend | None,
     typer.Option("--backend", help="Of the FMUs: native where a C compiler is found, else python."),
@@ -107,18 +115,18 @@ def study(
     ] = False,
     backend: _BackendOption = None,
     example: Annotated[
-        bool,
-        typer.Option("--example", help="Print the packaged study file, as a start for your own, and stop."),
-    ] = False,
+        Example | None,
+        typer.Option("--example", help="Print a packaged study file, as a start for your own, and stop."),
+    ] = None,
 ) -> None:
-    """Run the machine with its motor: start-up, steady running, one-sided overloads.
+    """Run a machine with its motor: start-up, steady running, overloads.
 
     Writes report.html, result.json, result.md, result.nc, plots and the FMUs into the output folder.
     """
     from .study import config as configuration
 
     if example:
-        print(configuration.example(), end="")
+        print(configuration.example(example.value), end="")
         return
     loaded = _study_file(config)
     from .study.choice import check_files
@@ -126,17 +134,18 @@ def study(
     # before anything of an earlier run is taken away
     check_files(loaded)
     with claimed(output):
-        from .report import chain_unit, files, series
+        from .report import files, series
+        from .report import study as contents
         from .study.run import run_study
         from .study.study import LOAD_CYCLE
 
-        _clear(output, *files.names("result", chain_unit.PICTURES), series.SERIES, LOAD_CYCLE)
+        _clear(output, *files.names("result", contents.PICTURES), series.SERIES, LOAD_CYCLE)
         errors = _console(stderr=True)
         with _progress("exporting FMUs", errors) as progress:
             result = run_study(
                 loaded, output, progress, check=check, backend=backend.value if backend else None
             )
-        report = chain_unit.report(result)
+        report = contents.report(result)
         numbers, *others = files.writers(report, output, "result")
         unwritten = _leave(
             report, (numbers, lambda: series.write(result, output), *others), remarks=not errors.is_terminal

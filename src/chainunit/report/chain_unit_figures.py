@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..engines import numpy_
-from ..machines.chain_unit import SIDES, ChamberForces
+from ..machines.chain_unit import SIDES
 from ..study.chain import HIGH
 from ..study.shaft import RIGID
 from ..study.study import Study
@@ -25,10 +25,6 @@ PICTURES = (
     *("reactions.png", "start_up.png", "driveline.png", "chain_sweep.png"),
 )
 _MOTION = ("phi", "w", "a")
-_LOADS = [
-    *(f"machine.{name}" for name in ChamberForces.input_layout.names if name not in _MOTION),
-    "motor.voltage",
-]
 _ANGLE = fig.Axis("crank angle from the upward vertical", "rad", low=0.0, high=2.0 * math.pi, step=45.0)
 _SERIES = {
     "torque": fig.Axis("crank torque", "N.m"),
@@ -45,7 +41,8 @@ def figures(s: b.Source, study: Study) -> Iterator[fig.Figure]:
         yield _torque_speed(study, driven)
     if study.statics.cycles:
         yield _turn(s, study)
-    yield _sides(s, study)
+    if study.statics.organs is not None:
+        yield _sides(s, study)
     if study.statics.loops:
         yield _speed_loop(study)
     if study.chain is not None and len(study.chain.sweep) > 1:
@@ -105,13 +102,15 @@ def _torque_speed(study: Study, names: list[str]) -> fig.Figure:
 
 
 def _turn(s: b.Source, study: Study) -> fig.Figure:
-    items: dict[fig.Axis, list[fig.Item]] = {
-        fig.Axis(f"{of} torque", "N.m"): [] for of in ("crank", "rocker")
-    }
-    for look, (name, c) in enumerate(study.statics.cycles.items()):
-        angle = np.append(c.angle, 2.0 * math.pi)
-        for curves, y in zip(items.values(), (c.crank_torque, c.outputs.rocker.tau), strict=True):
-            curves.append(fig.Curve(name, angle, np.append(y, y[0]), look))
+    torques = {"crank": lambda c: c.crank_torque}
+    if study.statics.organs is not None:
+        torques["rocker"] = lambda c: c.outputs.rocker.tau
+    items: dict[fig.Axis, list[fig.Item]] = {}
+    for of, torque in torques.items():
+        curves = items[fig.Axis(f"{of} torque", "N.m")] = []
+        for look, (name, c) in enumerate(study.statics.cycles.items()):
+            y = np.broadcast_to(torque(c), c.angle.shape)
+            curves.append(fig.Curve(name, np.append(c.angle, 2.0 * math.pi), np.append(y, y[0]), look))
     return fig.Figure(
         "turn",
         "Torque over a crank turn at constant speed",
@@ -124,7 +123,8 @@ def _turn(s: b.Source, study: Study) -> fig.Figure:
 
 
 def _sides(s: b.Source, study: Study) -> fig.Figure:
-    sides = study.statics.sides
+    assert study.statics.organs is not None
+    sides = study.statics.organs.sides
     words = {"both": "both sides"} | {str(side): f"{side} side alone" for side in SIDES}
 
     def items(of: str) -> Iterator[fig.Item]:
@@ -304,10 +304,12 @@ def _shaft_torque(run: Any, time: Any) -> list[fig.Item]:
 
 def _marks(study: Study, name: str, event: float | None) -> Callable[[bool], list[fig.Item]]:
     """What is marked in each panel of a run; words only where they are asked for."""
+    run = study.runs[name]
 
     def marks(words: bool) -> list[fig.Item]:
         if event is not None:
-            changing = _changing(study.runs[name])
+            loads = (name for name in study.drive.machine.model.input_layout.names if name not in _MOTION)
+            changing = _changing(run, [*(f"machine.{load}" for load in loads), "motor.voltage"])
             shade = [] if changing is None else [fig.Shade(changing[0] - event, changing[1] - event)]
             return [*shade, fig.Mark(0.0, words="event" if words else "")]
         if name == "start_up" and study.answers:
@@ -317,10 +319,10 @@ def _marks(study: Study, name: str, event: float | None) -> Callable[[bool], lis
     return marks
 
 
-def _changing(run: Any) -> tuple[float, float] | None:
+def _changing(run: Any, loads: Iterable[str]) -> tuple[float, float] | None:
     """From when to when the loads differ from one sample to the next [s]."""
     changes = np.zeros(len(run["time"]) - 1, bool)
-    for name in _LOADS:
+    for name in loads:
         if name in run:
             changes |= np.diff(run[name].values) != 0.0
     places = np.flatnonzero(changes)
@@ -416,7 +418,7 @@ def _driveline(study: Study) -> fig.Figure:
 
 
 def _reactions(study: Study) -> fig.Figure:
-    runs, pins = list(study.pins), list(read.PINS)
+    runs, pins = list(study.pins), list(next(iter(study.pins.values())))
     height = 0.84 / len(runs)
     items = []
     for look, name in enumerate(runs):

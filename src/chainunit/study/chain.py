@@ -22,7 +22,7 @@ import numpy as np
 from ..engines import numpy_
 from ..errors import InterruptedRunError, RunError
 from ..machines.api import ChainUnit
-from ..machines.chain_unit import SIDES, ChamberForces, SideLoads
+from ..machines.chain_unit import SIDES, ChamberForces, Feed
 from ..machines.flexible import flexible
 from ..quantities import Layout, Value, declaration, quantity
 from ..system.instance import Fmu, Instance
@@ -202,8 +202,7 @@ def run_turns(
     fmu: Fmu,
     drive: Drive,
     crank_speed: float,
-    left: SideLoads,
-    right: SideLoads,
+    feed: Feed,
     outputs: Sequence[str],
     *,
     starts: int,
@@ -234,11 +233,7 @@ def run_turns(
     names = [*outputs, *rods]
     ratio = drive.driven.p.ratio
     step = 2.0 * math.pi / crank_speed / points
-    parameters = model.parameter_layout.named(p) | {
-        f"{side}.{name}": value
-        for side, loads in zip(SIDES, (left, right), strict=True)
-        for name, value in Layout(SideLoads).named(loads).items()
-    }
+    parameters = model.parameter_layout.named(p) | Layout(Feed).named(feed)
     done = [0]
 
     def one(start: int, stop: Callable[[], bool]) -> Any:
@@ -276,20 +271,18 @@ def run_turns(
     )
 
 
-def duty(fmu: Fmu, drive: Drive, crank_speed: float, left: SideLoads, right: SideLoads) -> Cycle:
+def duty(fmu: Fmu, drive: Drive, crank_speed: float, feed: Feed) -> Cycle:
     """The machine with chains over all turns of all starts, of shape (turns, points), where `cycle` gives the one
     turn of two bars: the begin of sizing."""
     chain = drive.chain
     sample = run_turns(
-        fmu, drive, crank_speed, left, right, ("tau", "J"), starts=int(chain.starts), turns=int(chain.turns)
+        fmu, drive, crank_speed, feed, ("tau", "J"), starts=int(chain.starts), turns=int(chain.turns)
     )
     tau, J = (sample.values[name].reshape(-1, POINTS) for name in ("tau", "J"))
     return Cycle(sample.angle, tau * drive.driven.p.ratio, SimpleNamespace(J=J, tau=tau))
 
 
-def two_bar_pulls(
-    machine: ChainUnit, angle: Any, crank_speed: float, left: SideLoads, right: SideLoads
-) -> Any:
+def two_bar_pulls(machine: ChainUnit, angle: Any, crank_speed: float, feed: Feed) -> Any:
     """Mean axial pull [N] in wall and web of both sides of two bars at crank angles `angle` [rad], shape (4, n): as
     two rods without damping, so that slack means the same of both."""
     model, xp = flexible(1, 1), numpy_()
@@ -298,7 +291,7 @@ def two_bar_pulls(
     }
     p = model.parameter_layout.from_names(named)
     ratio = machine.p.ratio
-    u = model.Inputs(phi=angle * ratio, w=crank_speed * ratio, a=0.0, left=left, right=right)
+    u = model.Inputs(phi=angle * ratio, w=crank_speed * ratio, a=0.0, left=feed.left, right=feed.right)
     sides = model.evaluate(xp, p, u, model.start(xp, p, u))[0]
     pulls = [getattr(getattr(sides, side), f"pull_{k}") for side in SIDES for k in (1, 2)]
     return np.array([np.broadcast_to(pull, np.shape(angle)) for pull in pulls])
@@ -323,8 +316,7 @@ def numbers_at(
         fmu,
         drive,
         crank_speed,
-        feed.left,
-        feed.right,
+        feed,
         outputs,
         starts=starts,
         turns=turns,
@@ -336,7 +328,7 @@ def numbers_at(
     def peaks(x: Any) -> Any:
         return np.max(np.abs(x), axis=2)
 
-    two = cycle(drive.machine, crank_speed, feed.left, feed.right)
+    two = cycle(drive.machine, crank_speed, feed)
     snatch, two_bar_snatch = [], []
     for side in SIDES:
         bars = getattr(two.outputs, side).rocker_joint
@@ -345,7 +337,7 @@ def numbers_at(
         snatch.append(peaks(size) / rest)
         two_bar_snatch.append(np.max(np.hypot(bars.fx, bars.fy)) / two_bar_rest)
     snatched = np.maximum(*snatch)
-    pushed = two_bar_pulls(drive.machine, two.angle, crank_speed, feed.left, feed.right) < 0.0
+    pushed = two_bar_pulls(drive.machine, two.angle, crank_speed, feed) < 0.0
     duration = 2.0 * math.pi / crank_speed * turns
     energy = float(np.min(np.mean(np.abs(values["power"]), axis=(1, 2)))) * duration
     gap = max(float(np.max(np.ptp(values[f"{side}.energy_residual"], axis=(1, 2)))) for side in SIDES)
@@ -462,7 +454,7 @@ def study_chain(
 
 def _rocker_at_rest(config: Config, drive: Drive) -> float:
     """The rocker torque of two bars, largest of a turn that takes for ever [N.m]."""
-    slowly = cycle(drive.machine, 1e-6, config.feed.left, config.feed.right)
+    slowly = cycle(drive.machine, 1e-6, config.feed)
     return float(np.max(np.abs(slowly.outputs.rocker.tau)))
 
 

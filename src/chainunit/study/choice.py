@@ -13,13 +13,13 @@ from ..drives.cardan import Cardan
 from ..drives.catalogue import check_own
 from ..drives.driveline import CardanDriveline
 from ..drives.motor import Motor
-from ..drives.motors import motor_of
 from ..drives.speed_control import Tuning
 from ..drives.torsion import with_damping_ratio
 from ..errors import InputError
 from ..fmu.backends import Backend
 from ..quantities import Layout
 from ..system import foreign_component
+from .catalogue_drive import catalogue_drive
 from .config import Config
 from .cycle import cycle
 from .drive import Drive
@@ -46,18 +46,21 @@ def choose(
     if config.foreign is not None:
         return _with_foreign(config)
     if config.sizing is None:
-        motor, p = motor_of(config.motor), config.motor
-        drive = Drive(
-            motor,
-            p,
-            config.machine,
-            motor.follows(p),
-            feed_forward=config.feed_forward,
-            chain=config.chain,
-        )
-        return Choice(*tune(config, with_line(config, drive)))
+        return Choice(*tune(config, with_line(config, _given(config))))
     sized = size(config, folder, report, backend)
     return Choice(with_line(config, sized.best.drive), sizing=sized)
+
+
+def _given(config: Config) -> Drive:
+    """The drive by the motor whose parameters the file gives, or by the one of the catalogue that it names."""
+    if config.plate is not None:
+        turn = cycle(config.machine, config.run.crank_speed, config.feed)
+        drive = catalogue_drive(config, config.plate, turn.crank_torque)
+    else:
+        motor, p = config.motor_type, config.motor
+        drive = Drive(motor, p, config.machine, motor.follows(p), chain=config.chain)
+    drive = replace(drive, feed_forward=config.feed_forward)
+    return drive if config.flywheel is None else drive.with_flywheel(config.flywheel.J)
 
 
 def check_files(config: Config) -> None:
@@ -128,7 +131,7 @@ def with_line(config: Config, drive: Drive) -> Drive:
     values = {name: x for name, x in given.items() if name in CardanDriveline.parameter_layout.names}
     gear = drive.ratio if config.place == "crank" else 1.0
     if config.damping_ratio is not None:
-        J = cycle(drive.machine, config.run.crank_speed, config.feed.left, config.feed.right).outputs.J
+        J = cycle(drive.machine, config.run.crank_speed, config.feed).outputs.J
         ends = {"J1": drive.parameters.rotor.J * gear**2, "J4": values["J4"] + float(np.mean(J)) * gear**2}
         undamped = Cardan(**{name: x for name, x in values.items() if name in Layout(Cardan).names} | ends)
         damped = with_damping_ratio(undamped, config.damping_ratio)
@@ -138,7 +141,7 @@ def with_line(config: Config, drive: Drive) -> Drive:
 
 def tune(config: Config, drive: Drive) -> tuple[Drive, Tuning | None]:
     """The drive with controller gains tuned to its inertia, where the config does not give them."""
-    both = cycle(config.machine, config.run.crank_speed, config.feed.left, config.feed.right)
+    both = cycle(config.machine, config.run.crank_speed, config.feed)
     fixed = {name.removeprefix("motor.") for name in config.given if name.startswith("motor.")}
     inertia = drive.rotor_inertia + float(np.mean(both.outputs.J))
     parameters, tuning = drive.motor.tune(drive.parameters, inertia, fixed)

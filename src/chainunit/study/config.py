@@ -5,17 +5,23 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict
 
 from ..drives.cardan import check
-from ..drives.dc_motor import DcMotor
+from ..drives.catalogue import CatalogueMotor, motor_of_catalogue
 from ..drives.gearing import Transmission
+from ..drives.motor import Motor
+from ..drives.motors import MOTORS
 from ..errors import GeometryError, InputError, shown
 from ..machines.api import ChainUnit, ratios
 from ..machines.chain_unit import ChamberForces, SideLoads, SideName
+from ..machines.machine import Machine
+from ..mechanism.models import InverseMachine
+from ..models import MACHINES
 from ..quantities import Layout
 from ..reading import (
     Slip,
@@ -35,12 +41,12 @@ from .event_table import RandomEvent, read_events, read_random_event
 from .events import Event, OneSidedFeed
 from .sections import (
     ORGANS,
-    SECTIONS,
     STARTS,
     ChainOrgans,
     Coupling,
     Driveline,
-    Feed,
+    FileSection,
+    Flywheel,
     ForeignMotor,
     MonteCarlo,
     Ratios,
@@ -48,6 +54,7 @@ from .sections import (
     Sizing,
     Starter,
     SystemTable,
+    sections_of,
 )
 
 
@@ -58,19 +65,87 @@ class ReportTable(BaseModel):
     units: dict[str, str] = {}
 
 
-_File = file_form(
-    "Config",
-    {
-        name: section.form(section.declared, name, f"{name}.", **section.keys)
-        for name, section in SECTIONS.items()
-    }
-    | {"report": ReportTable, "system": SystemTable},
-    feed_forward=(bool, False),
-    start=(Literal[STARTS], "direct"),
-    organ=(Literal[ORGANS], "two-bar"),
-    catalogue=(str, ""),
-    event=(list[Any], []),
-)
+EXAMPLES = {"chain-unit": "example.toml", "knife": "knife_drive.toml", "driveline": "accelerator.toml"}
+"""Packaged study files by the names of the examples."""
+_OF_MACHINE = {"ChamberForces": "chain-unit", "KnifeDrive": "knife", "Accelerator": "driveline"}
+"""The example from which a study takes what its file leaves out, by machine."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Parts:
+    """The kinds of machine and motor that the table [system] names, and the example that goes with the machine."""
+
+    machine: type[InverseMachine]
+    motor: type[Motor]
+    """`Motor` itself where the motor is an FMU of somebody else"""
+    designation: str = ""
+    """of a motor in the catalogue"""
+    file: str = ""
+    """of a motor that is an FMU of somebody else"""
+
+    @property
+    def gives_motor(self) -> bool:
+        """Whether the table [motor] gives the motor."""
+        return not self.designation and not self.file
+
+    @property
+    def sections(self) -> dict[str, FileSection]:
+        """The tables of the file."""
+        return sections_of(self.machine, self.motor)
+
+    @property
+    def form(self) -> type[BaseModel]:
+        """The form of the file."""
+        return _form(self.machine, self.motor)
+
+    @property
+    def example(self) -> dict[str, Any]:
+        """The tables of the example, empty where there is none."""
+        name = _OF_MACHINE.get(self.machine.name)
+        return toml(example(name)) if name else {}
+
+
+@cache
+def _form(machine: type[InverseMachine], motor: type[Motor]) -> type[BaseModel]:
+    return file_form(
+        "Config",
+        {
+            name: section.form(section.declared, name, f"{name}.", **section.keys)
+            for name, section in sections_of(machine, motor).items()
+        }
+        | {"report": ReportTable, "system": SystemTable},
+        feed_forward=(bool, False),
+        empty_start=(bool, False),
+        start=(Literal[STARTS], "direct"),
+        organ=(Literal[ORGANS], "two-bar"),
+        catalogue=(str, ""),
+        event=(list[Any], []),
+    )
+
+
+def _parts(data: Mapping[str, Any]) -> Parts:
+    """Machine and motor of a file, checked before all else: the other tables depend on them."""
+    table = read_table(SystemTable, _table(data, "system"), "system.")
+    machine = MACHINES.get(table.machine)
+    if machine is None:
+        raise InputError(f"system.machine = {shown(table.machine)}: must be one of {', '.join(MACHINES)}")
+    motor = table.motor
+    if not motor and "motor" not in data and "sizing" not in data and machine.name in _OF_MACHINE:
+        motor = toml(example(_OF_MACHINE[machine.name])).get("system", {}).get("motor", "")
+    if not motor:
+        return Parts(machine, MOTORS["DcMotor"])
+    if motor.lower().endswith(".fmu"):
+        return Parts(machine, Motor, file=motor)
+    if motor in MOTORS:
+        return Parts(machine, MOTORS[motor])
+    return Parts(machine, MOTORS["InductionMotor"], designation=motor)
+
+
+def _table(data: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    table = data.get(name, {})
+    if not isinstance(table, Mapping):
+        raise InputError(f"{name} = {shown(table)}: must be a table")
+    return table
 
 
 @dataclasses.dataclass(frozen=True)
@@ -78,16 +153,27 @@ class Config:
     """A study, checked: machine, motor, loads, runs and events by the names of their runs."""
 
     title: str
-    machine: ChainUnit
-    feed: Feed
+    machine: Machine
+    feed: Any
+    """loads in normal running, as the machine declares them"""
+    motor_type: type[Motor]
+    """`Motor` itself where it is an FMU of somebody else"""
     motor: Any
+    """its parameters, where the file gives them"""
     run: Run
     events: Mapping[str, Event]
     coupling: Coupling | None
     monte_carlo: MonteCarlo
     random: RandomEvent
     feed_forward: bool
+    empty_start: bool
+    """whether the feed comes once the machine runs"""
     sizing: Sizing | None
+    plate: CatalogueMotor | None
+    """the motor, where the file names one of the catalogue"""
+    flywheel: Flywheel | None
+    flywheels: tuple[float, ...]
+    """inertias of flywheels that are compared [kg m2]"""
     gear: Transmission
     start: str
     starter: Starter
@@ -115,11 +201,16 @@ class Config:
         return float(2.0 * math.pi / self.run.crank_speed)
 
     @property
-    def settled(self) -> float:
-        """Time from which running counts as steady [s]: `run.settle_turns` after the ramp of the reference or of the
-        soft starter."""
+    def started(self) -> float:
+        """Time at which the ramp of the reference or of the soft starter ends [s]."""
         soft = self.starter.soft_start.time if self.start == "soft" else 0.0
-        return float(max(self.run.ramp, soft) + self.run.settle_turns * self.turn)
+        return float(max(self.run.ramp, soft))
+
+    @property
+    def settled(self) -> float:
+        """Time from which running counts as steady [s]: `run.settle_turns` after the start, or after an empty machine
+        is fed, which is later."""
+        return float(self.started + self.run.settle_turns * self.turn)
 
     def gives(self, section: str) -> bool:
         """Whether the file sets anything in that table."""
@@ -146,9 +237,9 @@ def load(file: Path | None = None) -> Config:
     return read(file, example, parse)
 
 
-def example() -> str:
-    """The packaged study file."""
-    return packaged("example.toml")
+def example(name: str = "chain-unit") -> str:
+    """A packaged study file, by its name in `EXAMPLES`."""
+    return packaged(EXAMPLES[name])
 
 
 def parse(text: str, source: str = "config") -> Config:
@@ -161,9 +252,10 @@ def parse(text: str, source: str = "config") -> Config:
         see `load`.
     """
     data = toml(text)
-    read_table(_File, data)
-    checked = read_table(_File, _over_example(data))
-    declared = {name: section.declared for name, section in SECTIONS.items()}
+    parts = _parts(data)
+    read_table(parts.form, data)
+    checked = read_table(parts.form, _over_example(data, parts))
+    declared = {name: section.declared for name, section in parts.sections.items()}
     unusual = tuple(slips(declared, data))
     try:
         events = read_events(checked.event)
@@ -171,7 +263,7 @@ def parse(text: str, source: str = "config") -> Config:
             kinds = {f"event.{name}": event.Parameters for name, event in events.items()}
             tables = dict(zip(events, data["event"], strict=True))
             unusual += tuple(slips(kinds, {"event": tables}))
-        return _config(data, checked, events, source, unusual)
+        return _config(data, checked, parts, events, source, unusual)
     except InputError as error:
         # values that do not fit together may be a slip of the unit
         hints = [f'was {slip.variable.name} = "{slip.meant}" meant?' for slip in unusual if slip.meant]
@@ -181,52 +273,67 @@ def parse(text: str, source: str = "config") -> Config:
 def _config(
     data: Mapping[str, Any],
     checked: Any,
+    parts: Parts,
     events: Mapping[str, Event],
     source: str,
     unusual: tuple[Slip, ...],
 ) -> Config:
     """The study of a file whose values are each allowed."""
-    _check_company(data)
-    tables = {name: section.values(getattr(checked, name)) for name, section in SECTIONS.items()}
+    sections = parts.sections
+    _check_company(data, parts)
+    tables = {name: section.values(getattr(checked, name)) for name, section in sections.items()}
     values = {
         name: Layout(section.declared).from_names(
             {key: x for key, x in tables[name].items() if key in Layout(section.declared).names},
             section.default,
         )
-        for name, section in SECTIONS.items()
+        for name, section in sections.items()
     }
-    _check_order(values)
-    parts = {name: values[name] for name in ("feed", "run", "monte_carlo", "gear", "starter")}
-    parts |= {
-        name: values[name] if name in data else None for name, each in SECTIONS.items() if each.optional
+    _check_order(values, sections)
+    of_study = {name: values[name] for name in ("feed", "run", "monte_carlo", "gear", "starter")}
+    of_study |= {
+        name: values[name] if name in data else None for name, each in sections.items() if each.optional
     }
     if "sizing" in data and checked.start != "inverter" and "inertia_ratio" not in tables["sizing"]:
         # of motors on the line only where it is given
-        parts["sizing"] = dataclasses.replace(parts["sizing"], inertia_ratio=math.inf)
+        of_study["sizing"] = dataclasses.replace(of_study["sizing"], inertia_ratio=math.inf)
+    catalogue = _beside(checked.catalogue, source)
     config = Config(
         title=checked.title,
-        machine=_machine(tables["machine"], tables["ratios"]),
-        motor=_checked("motor: ", DcMotor.check, values["motor"]),
+        machine=_machine(parts, tables["machine"], tables["ratios"]),
+        motor_type=parts.motor,
+        motor=_checked("motor: ", parts.motor.check, values["motor"]) if parts.gives_motor else None,
+        plate=_plate(parts.designation, catalogue),
+        flywheels=tuple(sorted({x for x in (tables["flywheel"].get("compare") or [])})),
         events=events,
         random=read_random_event(checked.monte_carlo.event, "monte_carlo.event"),
         feed_forward=checked.feed_forward,
+        empty_start=checked.empty_start,
         start=checked.start,
-        catalogue=_beside(checked.catalogue, source),
+        catalogue=catalogue,
         place=checked.driveline.place,
         damping_ratio=checked.driveline.damping_ratio,
         chain=values["chain"] if checked.organ == "chain" else None,
-        foreign=_foreign(checked.system, source),
+        foreign=_foreign(parts.file, checked.system, source),
         source=source,
         given=frozenset(_names(data, events)),
         slips=unusual,
         units=chosen_units(checked.report.units),
-        **parts,
+        **of_study,
     )
     if config.driveline is not None:
         _checked("driveline.", check, config.driveline)
     _check_loads(config)
     _check_steps(config)
     return config
+
+
+def _plate(designation: str, file: Path | None) -> CatalogueMotor | None:
+    """The motor of the catalogue that [system] names."""
+    try:
+        return motor_of_catalogue(designation, file) if designation else None
+    except InputError as error:
+        raise InputError(f"system.motor = {error}") from error
 
 
 def _checked(prefix: str, check: Callable[[Any], object], values: Any) -> Any:
@@ -250,7 +357,7 @@ def _names(data: Mapping[str, Any], events: Mapping[str, Event], prefix: str = "
             yield prefix + name
 
 
-def _machine(given: dict[str, float], of_papers: Mapping[str, float]) -> ChainUnit:
+def _machine(parts: Parts, given: dict[str, float], of_papers: Mapping[str, float]) -> Machine:
     """The machine by its lengths, or by the papers' ratios in their place."""
     if of_papers:
         try:
@@ -264,7 +371,7 @@ def _machine(given: dict[str, float], of_papers: Mapping[str, float]) -> ChainUn
             )
         given = given | lengths
     try:
-        return ChainUnit(given)
+        return ChainUnit(given) if parts.machine is ChamberForces else Machine(parts.machine, given)
     except InputError as error:
         raise InputError(f"machine: {error}{_taken_over(error, given)}") from error
 
@@ -277,31 +384,38 @@ def _taken_over(error: InputError, given: Mapping[str, float]) -> str:
     return f"; not in the file, so taken from the packaged example: {', '.join(taken)}" if taken else ""
 
 
-def _check_company(data: Mapping[str, Any]) -> None:
+def _check_company(data: Mapping[str, Any], parts: Parts) -> None:
     """Refuse values that would be passed over in silence."""
-    if "system" in data:
-        file = data["system"].get("motor")
-        if file is None:
-            raise InputError('system: names no motor; add motor = "file.fmu", or leave [system] out')
+    named = data.get("system", {}).get("motor")
+    if data.get("system") == {}:
+        raise InputError('system: names nothing; add motor = "file.fmu", or leave [system] out')
+    if "names" in data.get("system", {}) and not parts.file:
+        raise InputError('system.names: are of an FMU of somebody else; add motor = "file.fmu", or leave them out')
+    if named is not None:
         for name in ("motor", "sizing"):
+            if name in data and not (name == "motor" and parts.gives_motor):
+                raise InputError(
+                    f"{name}: given beside system.motor = {shown(named)}, which is the motor; leave out one of the two"
+                )
+    if parts.machine is not ChamberForces:
+        for name in ("ratios", "chain", "organ", "sizing"):
             if name in data:
-                raise InputError(
-                    f"{name}: given beside system.motor = {shown(file)}, which is the motor; leave out one of the two"
-                )
+                raise InputError(f"{name}: is of the chain unit, and the machine is {parts.machine.name}; leave it out")
     if "sizing" in data:
-        for name in ("motor", "feed_forward"):
+        for name in ("motor", "feed_forward", "flywheel"):
             if data.get(name):
-                raise InputError(
-                    f"{name}: is of the DC motor, and [sizing] picks another; leave out one of the two"
-                )
+                words = "sizing finds its own" if name == "flywheel" else "is of the DC motor, and [sizing] picks another"
+                raise InputError(f"{name}: {words}; leave out one of the two")
         if "ratio" in data.get("machine", {}):
             raise InputError("machine.ratio: [sizing] finds it; to have it kept, give gear.ratio")
-    else:
+    elif not parts.designation:
         for name in ("gear", "start", "starter", "catalogue"):
             if name in data:
                 raise InputError(
-                    f"{name}: is of the motor that [sizing] picks; add [sizing], or leave it out"
+                    f"{name}: is of a motor of the catalogue; add [sizing] or system.motor, or leave it out"
                 )
+    elif "ratio" in data.get("machine", {}):
+        raise InputError("machine.ratio: follows from the motor's rated speed; to have another, give gear.ratio")
     if "chain" in data and data.get("organ") != "chain":
         raise InputError('chain: is of organs that are chains; add organ = "chain", or leave it out')
 
@@ -314,7 +428,7 @@ _ORDER = (
 """Quantities of which the second has to be more than the first."""
 
 
-def _check_order(values: Mapping[str, Any]) -> None:
+def _check_order(values: Mapping[str, Any], sections: Mapping[str, FileSection]) -> None:
     """Limits that leave nothing between them, and counts that are none."""
 
     def value(name: str) -> tuple[float, str]:
@@ -327,7 +441,7 @@ def _check_order(values: Mapping[str, Any]) -> None:
         (least, limit), (most, shown) = value(low), value(high)
         if most < least or (most == least and relation == ">"):
             raise InputError(f"{high} = {shown}: must be {relation} {low}, {limit}")
-    for section, table in SECTIONS.items():
+    for section, table in sections.items():
         for key in table.whole:
             number, shown = value(f"{section}.{key}")
             if number != int(number):
@@ -336,16 +450,16 @@ def _check_order(values: Mapping[str, Any]) -> None:
 
 def _check_loads(config: Config) -> None:
     """Refuse loads that, together, no machine reaches: all on one side, and at the height of each event."""
-    feed = config.feed
-    for v in Layout(SideLoads).variables:
+    feed, model = config.feed, config.machine.model
+    for v in Layout(SideLoads).variables if isinstance(config.machine, ChainUnit) else ():
         most = getattr(feed.left, v.name) + getattr(feed.right, v.name)
         if not v.quantity.admits(most):
             raise InputError(
                 f"feed: {v.name} of both sides = {most:.9g} {v.unit}: must be <= {v.quantity.high:g} {v.unit} "
                 "together, as an overload may lay all of it on one side"
             )
-    inputs = {v.name: v for v in ChamberForces.input_layout.variables}
-    normal = {name: v.quantity.start or 0.0 for name, v in inputs.items()} | Layout(Feed).named(feed)
+    inputs = {v.name: v for v in model.input_layout.variables}
+    normal = {name: v.quantity.start or 0.0 for name, v in inputs.items()} | Layout(model.Feed).named(feed)
     hardest = [(f"event.{name}", event) for name, event in config.events.items()]
     hardest += [("monte_carlo.event", event) for event in config.random.hardest()]
     for where, event in hardest:
@@ -385,20 +499,27 @@ def _beside(name: str, source: str) -> Path | None:
     return (Path(source).parent / name) if name else None
 
 
-def _foreign(table: Any, source: str) -> ForeignMotor | None:
+def _foreign(name: str, table: Any, source: str) -> ForeignMotor | None:
     """The motor of somebody else that a study file names."""
-    file = _beside(table.motor, source)
+    file = _beside(name, source)
     return None if file is None else ForeignMotor(file, given_values(table.names))
 
 
 LENGTHS = ("r", "l", "h", "c", "hy", "e", "l1", "l2", "z")
 
 
-def _over_example(data: Mapping[str, Any]) -> dict[str, Any]:
-    """A study file laid over the packaged example: a value that is not named is the example's. Its ratios give way to
-    lengths of the user's own."""
-    base = toml(example())
-    if any(name in data.get("machine", {}) for name in LENGTHS) and "ratios" not in data:
-        del base["ratios"]
+def _over_example(data: Mapping[str, Any], parts: Parts) -> dict[str, Any]:
+    """A study file laid over the example of its machine: a value that is not named is the example's. Its ratios give
+    way to lengths of the user's own, its motor to another one."""
+    base = parts.example
+    if any(name in _table(data, "machine") for name in LENGTHS) and "ratios" not in data:
+        base.pop("ratios", None)
+    other = "motor" in _table(data, "system") or "sizing" in data
+    if other or "motor" in data:
+        base.get("system", {}).pop("motor", None)
+        for name in ("gear", "start", "starter"):
+            base.pop(name, None)
+    if other and not parts.gives_motor:
+        base.pop("motor", None)
     base["title"] = ""
     return merged(base, data)

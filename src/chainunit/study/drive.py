@@ -1,4 +1,4 @@
-"""A motor and the machine that it drives, as they are co-simulated."""
+"""The system of a study: a motor and the machine that it drives, as they are co-simulated."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..fmu.backends import Backend
 from ..fmu.backends import export as export_fmu
 from ..machines.api import ChainUnit
 from ..machines.chain_organs import OrganLaw
-from ..machines.chain_unit import ChamberForces, DirectChainUnit
+from ..machines.machine import Machine
 from ..machines.flexible import flexible
 from ..machines.hanging import split
 from ..model import Model
@@ -28,7 +28,7 @@ from ..system import Component, FmuComponent, ModelComponent, Profile, System, e
 
 
 class AbsentError(InputError):
-    """A quantity that an FMU of somebody else does not give."""
+    """A quantity that this motor or machine does not give."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Drive:
 
     motor: type[Motor]
     parameters: Any
-    machine: ChainUnit
+    machine: Machine
     follows: bool = True
     rated_current: float | None = None
     """[A], where a nameplate tells it"""
@@ -58,10 +58,10 @@ class Drive:
     @property
     def ratio(self) -> float:
         """Motor turns per crank turn."""
-        return float(self.machine.p.ratio)
+        return self.machine.ratio
 
     @cached_property
-    def driven(self) -> ChainUnit:
+    def driven(self) -> Machine:
         """The machine as its FMU is: with the gear that is left behind the driveline."""
         return self.machine if self.line is None else self.machine.replace(ratio=self.ratio / self.line.ratio)
 
@@ -71,6 +71,11 @@ class Drive:
         self.needs_own("the inertia of its rotor")
         line = 0.0 if self.line is None else self.line.J4 / self.line.ratio**2
         return float(self.parameters.rotor.J + line)
+
+    def with_flywheel(self, J: float) -> Drive:
+        """The drive with a flywheel of the inertia `J` [kg m2] on the motor's shaft."""
+        p = self.parameters
+        return replace(self, parameters=replace(p, rotor=replace(p.rotor, J=p.rotor.J + J)))
 
     def needs_own(self, quantity: str) -> None:
         """Refuse what only a motor of this package can tell.
@@ -83,16 +88,27 @@ class Drive:
         if self.foreign is not None:
             raise AbsentError(f"{self.foreign.title}: {quantity} is not known of an FMU of somebody else")
 
+    def needs_organs(self, quantity: str) -> None:
+        """Refuse what only a chain unit has.
+
+        Raises
+        ------
+        AbsentError
+            where the machine is another.
+        """
+        if not isinstance(self.machine, ChainUnit):
+            raise AbsentError(f"{self.machine.model.name}: has no {quantity}")
+
     def series(self, run: xr.Dataset, name: str) -> Any:
         """A variable of a run, shape (time,).
 
         Raises
         ------
         AbsentError
-            where the motor is an FMU of somebody else, which does not give it.
+            where motor or machine do not give it.
         """
-        if name.startswith("motor.") and name not in run:
-            self.needs_own(name)
+        if name not in run:
+            raise AbsentError(f"{name}: is not known of this motor or machine")
         return run[name].values
 
     def load_inertia(self, run: xr.Dataset) -> Any:
@@ -115,11 +131,9 @@ class Drive:
     def load_model(self) -> tuple[type[Model], Any]:
         """Model of the machine, with two bars or chains, and its parameters."""
         if self.chain is None:
-            return ChamberForces, self.driven.p
+            return self.machine.model, self.driven.p
         model = flexible(*self.rods)
-        return model, model.parameter_layout.from_names(
-            ChamberForces.parameter_layout.named(self.driven.p) | self.organ()
-        )
+        return model, model.parameter_layout.from_names(self.driven.named | self.organ())
 
     def organ(self) -> dict[str, float]:
         """What the model with chains has beside the parameters of the one with two bars."""
@@ -143,19 +157,19 @@ class Drive:
         if not self.feed_forward:
             return System(components, joints)
         # a control knows the machine with two bars
-        components["model"] = ModelComponent(ChamberForces, self.machine.p)
+        components["model"] = ModelComponent(self.machine.model, self.machine.p)
         wires = [("motor.phi", "model.phi"), ("motor.w", "model.w"), ("model.tau", "motor.tau_ff")]
         return System(components, joints, wires)
 
     def crank_torque(self, run: xr.Dataset) -> Any:
         """Torque at the crank in a run [N m], shape (time,)."""
-        return run["machine.tau"].values * self.driven.p.ratio
+        return run["machine.tau"].values * self.driven.ratio
 
     def crank_motion(self, run: xr.Dataset) -> tuple[Any, Any]:
         """Angle [rad] and speed [rad/s] of the crank in a run, shape (time,), also of a machine that turns by
         itself."""
         phi, w = ("phi0", "w0") if "machine.phi0" in run else ("phi", "w")
-        ratio = self.driven.p.ratio
+        ratio = self.driven.ratio
         return run[f"machine.{phi}"].values / ratio, run[f"machine.{w}"].values / ratio
 
     def turns(self, run: xr.Dataset) -> float:
@@ -222,10 +236,6 @@ class Drive:
         model = {f"model.{name}": value for name, value in named.items()} if self.feed_forward else {}
         return {f"machine.{name}": value for name, value in named.items()} | model
 
-    def machine_parameters(self) -> dict[str, float]:
-        """Parameters of the machine by name."""
-        return ChamberForces.parameter_layout.named(self.machine.p)
-
     def largest_torque(self, run: xr.Dataset, T: float) -> Any:
         """Largest air-gap torque that the motor can give at each instant of a run [N m], shape (time,), with its
         winding at `T` [K]; see `Motor.largest_torque`."""
@@ -249,16 +259,21 @@ class Drive:
         at = (float(np.mean(run[f"motor.{name}"].values)) for name in self.motor.limited_by)
         return self.motor.pull_out(self.parameters, T, *at) * self.ratio
 
+    @property
+    def coasting_model(self) -> type[Model]:
+        """The machine that turns by itself."""
+        return self.machine.model.direct()
+
     def coasting(self, folder: Path, backend: Backend | None = None) -> Path:
         """Write the FMU of the machine that turns by itself, and with it what is on its shaft."""
-        file = folder / f"{DirectChainUnit.name}.fmu"
-        export_fmu(DirectChainUnit, file, self.coasting_parameters(), backend=backend)
+        file = folder / f"{self.coasting_model.name}.fmu"
+        export_fmu(self.coasting_model, file, self.coasting_parameters(), backend=backend)
         return file
 
     def coasting_parameters(self) -> dict[str, float]:
         """Its parameters by name."""
         added = {} if self.line is None else {"J_added": self.line.J4}
-        return ChamberForces.parameter_layout.named(self.driven.p) | added
+        return self.driven.named | added
 
 
 def _exported(model: type[Model], p: Any, folder: Path, backend: Backend | None) -> tuple[Path, str]:

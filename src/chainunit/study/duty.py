@@ -21,7 +21,8 @@ from ..text import entries
 from .chain import HIGH
 from .chain import duty as chain_duty
 from .config import Config
-from .cycle import Cycle, all_on_one, cycle
+from .cycle import Cycle, cycle
+from .organs import all_on_one
 from .drive import Drive
 
 
@@ -87,17 +88,17 @@ class Duty:
 def duty_of(config: Config, folder: Path, backend: Backend | None) -> Duty:
     """The duty of a study with `sizing`; chains are run by their FMU, which is written to `folder`."""
     feed, w = config.feed, config.run.crank_speed
-    loads = {side: all_on_one(side, feed.left, feed.right) for side in SIDES}
-    both = cycle(config.machine, w, feed.left, feed.right)
-    one_sided = {side: cycle(config.machine, w, *case) for side, case in loads.items()}
+    loads = {side: all_on_one(side, feed) for side in SIDES}
+    both = cycle(config.machine, w, feed)
+    one_sided = {side: cycle(config.machine, w, case) for side, case in loads.items()}
     size = {side: rms((1.0, turn.crank_torque)) for side, turn in one_sided.items()}
     heavier: SideName = "left" if size["left"] >= size["right"] else "right"
     if config.chain is not None:
         drive = Drive(InductionMotor, None, config.machine, chain=config.chain)
         fmu = Fmu(drive.export_machine(folder, backend)[0])
         try:
-            both = chain_duty(fmu, drive, w, feed.left, feed.right)
-            one_sided = {side: chain_duty(fmu, drive, w, *case) for side, case in loads.items()}
+            both = chain_duty(fmu, drive, w, feed)
+            one_sided = {side: chain_duty(fmu, drive, w, case) for side, case in loads.items()}
         finally:
             fmu.close()
     return Duty(both, one_sided, heavier, cycle_numbers(config, both, one_sided, heavier))

@@ -446,3 +446,30 @@ class Dip(Event):
         whole = normal["voltage"]
         low = (at, edge, (1.0 - self.p.depth) * whole)
         return {"voltage": Profile(whole, (low, (at + self.p.duration, edge, whole)))}
+
+
+class Cut(Event):
+    """The blade meets a harder stack, or something in it that hardly gives way."""
+
+    kind, run = "cut", "hard_cut"
+    words, heading = "the blade meets a hard stack", "hard cut"
+    role, sided = Role.SHOCK, False
+    acts_on = ("cut_force",)
+    draws: ClassVar[Mapping[str, tuple[float, float]]] = {"force": (3e4, 1e5)}
+
+    @declaration
+    class Parameters(Timing):
+        """Of the stack."""
+
+        force: Value = quantity("N", "resistance of the hard stack to the blade", default=6e4, min=0.0)
+        duration: Value = quantity(
+            "s", "time for which the stack is hard", default=1.5, min=1e-3, max=1e4, usual=(1e-2, 600.0)
+        )
+
+    def signals(
+        self, normal: Mapping[str, float], at: float, state: Mapping[str, float]
+    ) -> dict[str, OverTime]:
+        """The resistance of the hard stack in place of the usual one; it changes within 10 ms."""
+        edge, usual = 1e-2, normal["cut_force"]
+        changes = ((at, edge, self.p.force), (at + self.p.duration, edge, usual))
+        return {"cut_force": Profile(usual, changes)}

@@ -16,20 +16,22 @@ from .verdict import RESIDUAL, STEADY, Holds, Verdict
 
 def model_verdict(study: Study) -> Verdict:
     """Whether the model of the organs holds, from the numbers of the runs."""
-    config, limits, answers = study.config, study.statics.limits, study.answers
+    config, organs, answers = study.config, study.statics.organs, study.answers
     steady = answers.get(STEADY)
     mean = steady.speed_mean if steady else config.run.crank_speed
     speed, residuals = max(config.run.crank_speed, mean), _residuals(study)
     runs: dict[str, Answers] = {**answers}
     if study.start is not None:
         runs[verdict.START] = study.start
+    if organs is None:
+        return verdict.rigid_links(speed, residuals, reached=mean)
     if config.chain is None:
         emptied = {name for name in study.overloads if config.events[name].empties}
         always = 0.0 in (config.feed.left.material_mass, config.feed.right.material_mass)
         return verdict.two_bars(
             speed,
-            limits.chain_resonance,
-            limits.slack_speed,
+            organs.limits.chain_resonance,
+            organs.limits.slack_speed,
             {name: (a.web_pull_least, a.wall_pull_least) for name, a in runs.items()},
             residuals,
             empty={""} if always else emptied,

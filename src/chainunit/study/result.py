@@ -11,7 +11,6 @@ from .. import __version__
 from ..quantities import variables
 from ..text import entries, entry
 from .coupling import coupling_sentence
-from .cycle import factors_for
 from .judgement import motor_verdict
 from .measures import Phase, measures_of
 from .study import Study
@@ -83,14 +82,8 @@ def _given(study: Study) -> dict[str, Any]:
 def _statics(study: Study) -> dict[str, Any]:
     """What needs no co-simulation."""
     statics = study.statics
-    uses = factors_for(statics.factors)
     return {
-        "overload_factors": {
-            side: {name: factor | {"for": uses[name]} for name, factor in entries(factors).items()}
-            for side, factors in statics.factors.items()
-        },
-        "limits": entries(statics.limits),
-        "sides_over_speed": statics.sides.as_dict(),
+        **(statics.organs.as_dict() if statics.organs else {}),
         "speed_loop": {
             name: {
                 "inertia": entry(loop.inertia, "kg.m2"),

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..machines.chain_unit import SIDES, DirectChainUnit
 from ..system import CoSimulation, Jump, ModelComponent, Profile, System, certify, monolithic, rigid, without
 from .config import Config
 from .drive import Drive
@@ -20,6 +19,12 @@ from .events import Event, OverTime
 from .measures import end_gap, whole_turns
 
 Progress = Callable[[float], None]
+STARTED = 0.95
+"""Share of the speed that is asked for at which a start is over."""
+_LONGEST_START = 30.0
+"""Time after which an empty machine is fed, however slowly it turns [s]."""
+_FEED_RISE = 0.1
+"""Part of a turn in which the feed comes."""
 _PATIENCE = 20.0
 """Turns, at the speed that is asked, that a study runs on until the motor has settled and made its turns."""
 CLOSED = 0.01
@@ -39,6 +44,17 @@ class Transient:
 
 
 @dataclass(frozen=True)
+class StartUp:
+    """Start-up and steady running: the run, the time from which it is steady and that to which it should have run
+    [s], and the `rig` that it leaves."""
+
+    run: xr.Dataset
+    steady_from: float
+    stop: float
+    rig: Rig
+
+
+@dataclass(frozen=True)
 class Rig:
     """A drive as the FMUs of `files`, with the loads and the speed of the study; or its `twin`, a function of the
     system that leaves a part out."""
@@ -47,6 +63,8 @@ class Rig:
     drive: Drive
     files: Mapping[str, Path]
     twin: Callable[[System], System] | None = None
+    fed_from: float | None = None
+    """when the feed came [s], of a machine that starts empty, once it is known"""
 
     @property
     def step(self) -> float:
@@ -113,13 +131,22 @@ class Rig:
         """Loads of normal running with what is `given` in their place, and the speed reference, from rest with
         `ramp`."""
         run = self.config.run
+        loads = self.drive.loads(self.config.feed)
+        if ramp and self.config.empty_start:
+            loads = {full: self._coming(value) for full, value in loads.items()}
         signals = {
-            **self.drive.loads(self.config.feed),
+            **loads,
             **(given or {}),
             **self.drive.reference(run.crank_speed, run.ramp if ramp else None),
         }
         # a twin has no use for those of the part that is left out
         return {full: x for full, x in signals.items() if full.partition(".")[0] in self.graph.components}
+
+    def _coming(self, value: float) -> OverTime:
+        """The feed of a machine that starts empty."""
+        if self.fed_from is None:
+            return 0.0
+        return Profile(0.0, ((self.fed_from, _FEED_RISE * self.config.turn, value),))
 
     def from_rest(self, event: Event | None = None) -> CoSimulation:
         """The co-simulation from rest on, with the event of a start if there is one."""
@@ -134,14 +161,32 @@ class Rig:
             ahead += 2.0 * math.pi
         return float(ahead / max(speed, 0.5 * self.config.run.crank_speed))
 
+    def start_empty(
+        self, simulation: CoSimulation, progress: Progress, guards: Mapping[str, float]
+    ) -> tuple[xr.Dataset, Rig]:
+        """The start of an empty machine, until it turns at `STARTED` of its speed or a guard ends it; and the rig that
+        is fed from then on."""
+        goal = {"motor.w": STARTED * self.config.run.crank_speed * self.drive.ratio}
+        run = simulation.run(_LONGEST_START, self.step, progress, guards={**guards, **goal})
+        fed = replace(self, fed_from=simulation.time)
+        simulation.signals = fed.signals(ramp=True)
+        return run, fed
+
     def start_up(
         self, simulation: CoSimulation, stop: float, progress: Progress, guards: Mapping[str, float]
-    ) -> tuple[xr.Dataset, float, float]:
-        """Start-up and steady running to the time `stop`, or longer, see `_missing`; with the time from which it is
-        steady and the time to which it should have run [s]."""
+    ) -> StartUp:
+        """Start-up and steady running to the time `stop`, or longer, see `_missing`; of a machine that starts empty
+        as long after it is fed."""
+        rig, pieces, steady_from = self, [], self.config.settled
+        if self.config.empty_start:
+            run, rig = self.start_empty(simulation, progress, guards)
+            pieces = [run]
+            later = simulation.time - self.config.started
+            stop, steady_from = stop + later, steady_from + later
+            if any(abs(float(run[name][-1])) >= limit for name, limit in guards.items()):
+                return StartUp(run, steady_from, stop, rig)
         longest = stop + _PATIENCE * self.config.turn
-        steady_from = self.config.settled
-        run = simulation.run(stop, self.step, progress, guards=guards)
+        run = joined([*pieces, simulation.run(stop, self.step, progress, guards=guards)])
         while stop - 0.5 * self.step <= simulation.time < longest:
             lack, steady_from = self._missing(run, steady_from)
             if lack is None:
@@ -149,7 +194,7 @@ class Rig:
             # at the speed that is asked at most; what is still missing then is seen in the next round
             stop = min(longest, stop + max(lack * self.config.turn, self.step))
             run = joined([run, simulation.run(stop, self.step, progress, guards=guards)])
-        return run, steady_from, stop
+        return StartUp(run, steady_from, stop, rig)
 
     def _missing(self, run: xr.Dataset, steady_from: float) -> tuple[float | None, float]:
         """Turns that are missing of those that are evaluated, where the crank turns too slowly, or the motor has not
@@ -199,8 +244,9 @@ class Rig:
         it had, for as long as the motor would have been followed and a second more."""
         begin = float(run["time"][-1])
         start = {f"{x}_start": float(run[f"machine.{x}0"][-1]) for x in ("phi", "w")}
-        p = DirectChainUnit.parameter_layout.from_names(self.drive.coasting_parameters() | start)
-        alone = System({"machine": ModelComponent(DirectChainUnit, p, file)})
+        model = self.drive.coasting_model
+        p = model.parameter_layout.from_names(self.drive.coasting_parameters() | start)
+        alone = System({"machine": ModelComponent(model, p, file)})
         loads = self.drive.loads(self.config.feed) | transient.signals
         loads = {full: x for full, x in loads.items() if full.startswith("machine.")}
         with CoSimulation(alone, {**loads, "machine.tau": 0.0}, begin) as simulation:
@@ -209,7 +255,7 @@ class Rig:
     def residuals(self, run: xr.Dataset) -> dict[str, float]:
         """Writes the energy residual of each shaft into the run, named after what it drives, where that is not the
         machine; its share of the energy moved."""
-        feed = {f"machine.{s}.material_mass": partial(self._energy_per_kg, s) for s in SIDES}
+        feed = {f"machine.{name}": partial(self._held, name) for name in self.drive.machine.stored_per_unit}
         shares = {}
         for driven, (residual, share) in certify(run, self.graph, feed).items():
             prefix = "" if driven == "machine" else f"{driven}_"
@@ -217,10 +263,11 @@ class Rig:
             shares[f"{prefix}energy_residual_share"] = share
         return shares
 
-    def _energy_per_kg(self, side: str, run: xr.Dataset) -> Any:
+    def _held(self, name: str, run: xr.Dataset) -> Any:
+        """Energy that a unit of the input of that name holds on its place, shape (time,)."""
         if self.drive.chain is not None:
-            return run[f"machine.{side}.energy_per_kg"].values
-        return self.drive.driven.energy_per_kg(side, run["machine.phi0"].values, run["machine.w0"].values)
+            return run[f"machine.{name.partition('.')[0]}.energy_per_kg"].values
+        return self.drive.driven.stored_per_unit[name](run["machine.phi0"].values, run["machine.w0"].values)
 
     def compare(
         self,

@@ -21,7 +21,7 @@ from .choice import choose
 from .config import Config
 from .coupling import on_coupling, recommended
 from .events import Event
-from .limits import statics
+from .statics import statics
 from .measures import Phase, Trip, read_answers, read_measure, whole_turns
 from .monte_carlo import Task
 from .monte_carlo import run as run_monte_carlo
@@ -186,7 +186,9 @@ class Runner:
         """
         study, rig, config = self.study, self.rig, self.study.config
         progress = self._progress("start-up and steady running", 0.0)
-        run, study.steady_from, self.stop = rig.start_up(simulation, self.stop, progress, self.start_guards)
+        start_up = rig.start_up(simulation, self.stop, progress, self.start_guards)
+        run, study.steady_from, self.stop = start_up.run, start_up.steady_from, start_up.stop
+        self.rig = rig = start_up.rig
         self._certify("start_up", run)
         if simulation.time < self.stop - 0.5 * rig.step:
             raise RunError(

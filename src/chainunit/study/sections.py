@@ -6,20 +6,19 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, create_model
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model
 
-from ..drives.dc_motor import DcMotor
 from ..drives.driveline import Mounted
 from ..drives.gearing import KINDS, Transmission
 from ..drives.induction_motor import Inverter, SoftStart
 from ..drives.line_table import form, given_line
+from ..drives.motor import Motor
 from ..machines.chain_organs import LEAST, MOST, OrganLaw
-from ..machines.chain_unit import ChamberForces
-from ..machines.chain_unit import Feed as Feed
-from ..quantities import Value, declaration, group, quantity
-from ..reading import given_values, schema
+from ..mechanism.models import InverseMachine
+from ..quantities import Value, declaration, group, quantity, variables
+from ..reading import given_values, schema, to_number
 from ..system import MOTOR_NAMES
 
 
@@ -143,6 +142,21 @@ class Sizing:
 
 
 @declaration
+class Flywheel:
+    """A flywheel on the motor's shaft, and the fluctuation for which the least one is searched."""
+
+    J: Value = quantity("kg.m2", "inertia of the flywheel, on the motor shaft", default=0.0, min=0.0, max=1e6)
+    fluctuation: Value = quantity(
+        "1",
+        "permitted fluctuation of the speed, (largest - least)/mean",
+        default=0.05,
+        min=1e-4,
+        max=1.0,
+        kind="percent",
+    )
+
+
+@declaration
 class Starter:
     """How an induction motor is started, where `start` is "soft" or "inverter"."""
 
@@ -189,6 +203,14 @@ class ChainOrgans(OrganLaw):
     )
 
 
+def numbers(declared: type, quantity_name: str, name: str, most: int) -> Any:
+    """The type of a list of at most `most` values of a declared quantity, called `name` in a refusal."""
+    variable = next(v for v in variables(declared) if v.name == quantity_name)
+    variable = dataclasses.replace(variable, name=name)
+    value = Annotated[float, BeforeValidator(lambda entry: to_number(variable, entry))]
+    return Annotated[list[value], Field(max_length=most)]  # type: ignore[valid-type]
+
+
 ORGANS = ("two-bar", "chain")
 """How the organs are modelled."""
 
@@ -213,10 +235,11 @@ _MotorNames = _names_form("names", MOTOR_NAMES)
 SystemTable = create_model(
     "system",
     __config__=ConfigDict(extra="forbid"),
+    machine=(str, Field("ChamberForces", min_length=1)),
     motor=(str, Field("", min_length=1)),
     names=(_MotorNames, Field(default_factory=_MotorNames)),
 )
-"""Parts of the system that are FMUs of somebody else."""
+"""Machine and motor of the system: names of models, of motors in the catalogue, or FMUs of somebody else."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -246,14 +269,16 @@ class FileSection:
 
 
 SECTIONS: Mapping[str, FileSection] = {
-    "machine": FileSection(ChamberForces.Parameters),
     "ratios": FileSection(Ratios),
-    "feed": FileSection(Feed),
-    "motor": FileSection(DcMotor.Parameters),
     "run": FileSection(Run, whole=("turns",)),
     "coupling": FileSection(Coupling, optional=True),
     "monte_carlo": FileSection(MonteCarlo, whole=("runs", "seed"), keys={"event": (dict[str, Any], {})}),
     "sizing": FileSection(Sizing, optional=True),
+    "flywheel": FileSection(
+        Flywheel,
+        optional=True,
+        keys={"compare": (numbers(Flywheel, "J", "flywheel.compare", 12), [])},
+    ),
     "gear": FileSection(Transmission, default=KINDS["gear"]),
     "starter": FileSection(Starter),
     "chain": FileSection(ChainOrgans, whole=("rods", "sweep_points", "starts", "turns")),
@@ -265,3 +290,10 @@ SECTIONS: Mapping[str, FileSection] = {
         values=partial(given_line, prefix="driveline."),
     ),
 }
+"""Tables of every study file, besides those of its machine, its feed, and its motor."""
+
+
+def sections_of(machine: type[InverseMachine], motor: type[Motor]) -> dict[str, FileSection]:
+    """The tables of a study with this machine and this kind of motor."""
+    own = {"machine": machine.Parameters, "feed": machine.Feed, "motor": motor.Parameters}
+    return {name: FileSection(declared) for name, declared in own.items()} | dict(SECTIONS)

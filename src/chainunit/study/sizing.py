@@ -227,9 +227,7 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
     whole = max(0.0, duty.numbers.inertia_wanted / bare.drive.ratio**2 - bare.drive.parameters.rotor.J)
 
     def trial_with(share: float) -> Candidate:
-        p = bare.drive.parameters
-        p = dataclasses.replace(p, rotor=dataclasses.replace(p.rotor, J=p.rotor.J + share * whole))
-        drive = dataclasses.replace(bare.drive, parameters=p)
+        drive = bare.drive.with_flywheel(share * whole)
         candidate = dataclasses.replace(bare, drive=drive, flywheel=share * whole)
         judge(config, candidate, duty, files)
         return candidate
@@ -261,38 +259,8 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
 
 def proposed(config: Config, motor: CatalogueMotor, duty: Duty) -> Candidate:
     """A motor with the gear ratio at which the crank has its speed, without a flywheel."""
-    limits, gear = config.sizing, config.gear
-    assert limits is not None
-    plate = motor.nameplate
-    p = motor.identify().parameters
-    synchronous, rated_speed, rated_torque = plate.synchronous, plate.speed, plate.torque
-    w = config.run.crank_speed
-    follows = config.start == "inverter"
-    ratio = gear.ratio if "gear.ratio" in config.given else rated_speed / w
-    speed, drag = rated_speed, gear.d
-    for _ in range(3):
-        shaft = motor_side(numpy_(), dataclasses.replace(gear, ratio=ratio), duty.both.crank_torque, speed)
-        mean = float(np.mean(shaft))
-        # the slip goes with the torque; an inverter makes up for it
-        speed = rated_speed if follows else synchronous - (synchronous - rated_speed) * mean / rated_torque
-        if "gear.ratio" not in config.given:
-            ratio = speed / w
-        drag = (mean - duty.numbers.torque_mean / ratio) / speed
-    soft = config.starter.soft_start if config.start == "soft" else p.soft_start
-    slip_hz = (synchronous - rated_speed) * plate.poles / (4.0 * math.pi)
-    inverter = config.starter.inverter
-    if follows:
-        slip = inverter.slip or slip_hz / rated_torque
-        inverter = dataclasses.replace(inverter, on=1.0, slip=slip)
-    p = dataclasses.replace(
-        p,
-        rotor=dataclasses.replace(p.rotor, J=p.rotor.J + gear.J, d=p.rotor.d + drag),
-        soft_start=soft,
-        inverter=inverter,
-        ambient=dataclasses.replace(p.ambient, T=limits.ambient),
-    )
-    machine = config.machine.replace({"ratio": ratio})
-    drive = Drive(InductionMotor, p, machine, follows, rated_current=plate.rated_current, chain=config.chain)
+    assert config.sizing is not None
+    drive = catalogue_drive(config, motor, duty.both.crank_torque, config.sizing.ambient)
     return Candidate(motor, drive, 0.0, {})
 
 

@@ -15,7 +15,7 @@ from . import verdict
 from .chain import ChainResult
 from .config import LENGTHS, Config
 from .drive import Drive
-from .limits import DriveStatics
+from .statics import DriveStatics
 from .measures import Answers, Phase, Trip, Window, not_known, reaches, whole_turns
 from .monte_carlo import MonteCarloResult
 from .protection import Setting
@@ -159,6 +159,11 @@ class Study:
         return "example"
 
     @property
+    def kind(self) -> str:
+        """What is studied, as the heading of a report."""
+        return self.drive.machine.model.description.partition(":")[0] + ": forces, torque and overload"
+
+    @property
     def reaches(self) -> bool:
         """Whether the crank turns at the speed that is asked for, as far as is known."""
         steady = self.answers.get(STEADY)
@@ -207,8 +212,7 @@ class Study:
 
     def window(self, phase: Phase, run: xr.Dataset, begin: float = 0.0, trip: Trip | None = None) -> Window:
         """The rows of a run to read measures from."""
-        feed = self.config.feed
-        sides = self.drive.machine.loaded_sides(feed)
+        sides = self.drive.machine.loaded_sides(self.config.feed)
         asked = self.config.run.crank_speed
         steady = None
         if phase in (Phase.EVENT, Phase.LOADED_START):

@@ -26,6 +26,7 @@ START = "start_up"
 """Run from rest to normal running."""
 
 TWO_BARS = "two bars"
+RIGID_LINKS = "rigid links"
 _CHAINS = 'take organ = "chain"'
 
 Holds = Literal["true", "in part", "false"]
@@ -111,8 +112,8 @@ class Reason:
 class Verdict:
     """Whether the model holds, and the reasons where it does not, or not everywhere."""
 
-    organ: str
-    """the model of the organs in words"""
+    model: str
+    """in words: of the organs of a chain unit, of the links of any other machine"""
     speed: float
     """of the crank, at which the model is judged [rad/s]"""
     reasons: tuple[Reason, ...] = ()
@@ -142,13 +143,14 @@ class Verdict:
     @property
     def caveat(self) -> str:
         """To be said beside what rests on a model that does not hold; empty where it does, or fails in part alone."""
-        return f"for {self.organ}, which do not hold here" if self.holds == "false" else ""
+        return f"for {self.model}, which do not hold here" if self.holds == "false" else ""
 
     @property
     def text(self) -> str:
         """The verdict in a line."""
         holds = {"true": "holds", "in part": "holds in part", "false": "does not hold"}[self.holds]
-        line = f"The model of the organs {holds}: {self.organ}, the crank at "
+        part = "machine" if self.model == RIGID_LINKS else "organs"
+        line = f"The model of the {part} {holds}: {self.model}, the crank at "
         line += f"{self._turns}, judged at the {self._judged} asked for" if self._asked else self._judged
         why, remedies = [], []
         for topic, (short, _, remedy) in _TOPICS.items():
@@ -184,7 +186,7 @@ class Verdict:
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON."""
         return {
-            "organ": self.organ,
+            "model": self.model,
             "holds": self.holds,
             "caveat": self.caveat or None,
             "text": self.text,
@@ -253,6 +255,19 @@ def two_bars(
         runs = [""] if "" in empty else sorted(empty)
         reasons += [Reason("rocker torque", "crank_speed", speed, limit, "rad/s", run) for run in runs]
     return Verdict(TWO_BARS, speed, (*reasons, *_unbalanced(residuals)), reached)
+
+
+def rigid_links(
+    speed: float, residuals: Mapping[str, float], *, reached: float | None = None
+) -> Verdict:
+    """The verdict on a linkage without organs, whose links are rigid: it holds where the energy balance is kept.
+
+    Parameters
+    ----------
+    speed, reached : of the crank, at which it is judged, and that it has, where that is another [rad/s]
+    residuals : by run, the energy residual over the energy moved
+    """
+    return Verdict(RIGID_LINKS, speed, tuple(_unbalanced(residuals)), reached)
 
 
 def chains(

@@ -1,4 +1,4 @@
-"""The report on a chain unit with its drive: the answer, every run in numbers, what it rests on, what was given."""
+"""The report on a study: the answer, every run in numbers, what it rests on, what was given."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from importlib import metadata
 from typing import Any
 
 from ..quantities import Layout, Variable
-from ..study.cycle import OverloadFactors
-from ..study.limits import Limits
+from ..study.organs import Limits, OverloadFactors
 from ..study.measures import Answers
 from ..study.monte_carlo import Sample
 from ..study.result import as_dict
@@ -24,7 +23,6 @@ from .chain_unit_parts import chains, sizing, spoken
 from .lines import Line, Number, Strong, capital, joined, line
 from .terminal import plain_line
 
-KIND = "Chain unit: forces, torque and one-sided overload"
 _KEY = ("crank_torque_peak", "motor_torque_peak", "power_peak", "current_peak", "winding_temperature")
 """The families of answers that are shown large, each by its first field."""
 _HOLDS: dict[str, b.Severity] = {"true": "good", "in part": "partly", "false": "bad"}
@@ -36,7 +34,7 @@ def report(study: Study, result: Mapping[str, Any] | None = None) -> b.Report:
     s = b.Source(as_dict(study) if result is None else result)
     return b.Report(
         study.config.title,
-        KIND,
+        study.kind,
         s.result,
         tuple(_opening(s, study)),
         (
@@ -45,7 +43,7 @@ def report(study: Study, result: Mapping[str, Any] | None = None) -> b.Report:
             b.Section("runs", "Every run in numbers", tuple(_runs(s, study))),
             b.Section("chains", "Chains and two bars", tuple(chains(s, study)) if study.chain else ()),
             b.Section("plots", "Plots", tuple(figures(s, study))),
-            b.Section("motion", "The machine in motion", (motion(study),) if study.runs else ()),
+            b.Section("motion", "The machine in motion", (motion(study),) if study.runs and study.statics.organs else ()),
             b.Section("basis", "What this rests on", tuple(_basis(s, study))),
             b.Section("given", "All that was given", (_given(s, study),)),
         ),
@@ -59,15 +57,19 @@ def report(study: Study, result: Mapping[str, Any] | None = None) -> b.Report:
 
 
 def _opening(s: b.Source, study: Study) -> Iterator[b.Block]:
+    machine = "chain unit" if "limits" in s.result else "machine"
     question = s.line(
-        "Which motor, gear and flywheel does this chain unit need? Its crank turns at "
+        f"Which motor, gear and flywheel does this {machine} need? Its crank turns at "
         if "sizing" in s.result
-        else "What does the drive of this chain unit have to give? A motor turns the crank through a gear of ratio "
+        else f"What does the drive of this {machine} have to give? A motor turns the crank through a gear of ratio "
         "{=machine.ratio}, in normal running at "
-    ) + s.line(
+    )
+    question += s.line(
         "{=run.crank_speed}. The left organ carries {=feed.left.material_mass} of material and works against "
         "{=feed.left.processing_force}, the right one {=feed.right.material_mass} and "
         "{=feed.right.processing_force}."
+        if "limits" in s.result
+        else "{=run.crank_speed}."
     )
     if study.answers:
         question += s.line(
@@ -151,7 +153,7 @@ def _answer(s: b.Source, study: Study) -> Iterator[b.Block]:
         )
     else:
         yield b.Text("The study ended before any run could be evaluated.", "lead", "long")
-    if s.result["overload_factors"]:
+    if "overload_factors" in s.result:
         yield _factors(s, study)
     yield from (b.Judgement("warning", each) for each in s.lines("warnings"))
     if answers and not s.result["warnings"]:
@@ -238,7 +240,7 @@ def _runs(s: b.Source, study: Study) -> Iterator[b.Block]:
         yield b.Table(s.rows(Torsion, "driveline"), title="The driveline's torsion")
     if s.result.get("monte_carlo"):
         yield from _random(s)
-    if s.result["limits"]:
+    if "limits" in s.result:
         yield from _limits(s, study)
     if loops := s.result.get("speed_loop"):
         title = "The speed loop, linearised; dip and settling: after a step of the load torque"

@@ -1,0 +1,243 @@
+"""The organs of a chain unit without co-simulation: one side against both, and where two bars end as a model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..machines.api import EMPTY, ChainUnit
+from ..machines.chain_unit import SIDES, Feed, SideLoads, SideName, other
+from ..quantities import Value, declaration, quantity
+from ..text import entries, entry
+from .cycle import Cycle, cycle
+
+
+def all_on_one(side: SideName, feed: Feed) -> Feed:
+    """The feed where the organ of `side` has the load of both."""
+    left, right = feed.left, feed.right
+    whole = SideLoads(
+        material_mass=left.material_mass + right.material_mass,
+        processing_force=left.processing_force + right.processing_force,
+    )
+    return Feed(left=whole, right=EMPTY) if side == "left" else Feed(left=EMPTY, right=whole)
+
+
+def without(side: SideName, feed: Feed) -> Feed:
+    """The feed with the organ of that side empty."""
+    return Feed(left=feed.left, right=EMPTY) if side == "right" else Feed(left=EMPTY, right=feed.right)
+
+
+def alone(machine: ChainUnit, side: SideName) -> ChainUnit:
+    """The machine with its organ of that side alone: the papers' one-sided loading."""
+    gone = other(side)
+    return machine.replace({f"{gone}.wall_mass": 0.0, f"{gone}.web_mass": 0.0})
+
+
+def _cycle_alone(
+    machine: ChainUnit,
+    side: SideName,
+    crank_speed: float,
+    feed: Feed,
+    points: int = 720,
+) -> Cycle:
+    """A turn with the organ of that side alone, which keeps its load."""
+    return cycle(alone(machine, side), crank_speed, without(other(side), feed), points)
+
+
+@declaration
+class OverloadFactors:
+    """How much more one side asks than both, five ways for as many questions; see `overload_factors`. The first is
+    the one that sizes the drive."""
+
+    feed_crank_torque: Value = quantity("1", "crank torque, all feed on the side, ratio of cycle maxima")
+    feed_rocker_torque: Value = quantity("1", "rocker torque, all feed on the side, ratio of cycle maxima")
+    crank_torque: Value = quantity("1", "crank torque, organ alone, ratio of cycle maxima")
+    rocker_torque: Value = quantity("1", "rocker torque, organ alone, ratio of cycle maxima")
+    static_at_extreme: Value = quantity(
+        "1", "R/(R - R of the other organ), at rest at the extreme where it is least"
+    )
+
+
+def factors_for(factors: Mapping[SideName, OverloadFactors]) -> dict[str, str]:
+    """The use of each overload factor, by its name; of the first, the feed that sizes the drive."""
+    side = max(factors, key=lambda name: factors[name].feed_crank_torque)
+    feed = f"all on the {side}" if factors[side].feed_crank_torque > 1.0 else "on both sides"
+    return {
+        "feed_crank_torque": f"feed {feed} sizes the drive: gear, motor, crank pin",
+        "feed_rocker_torque": "strength of rocker, pivot, organ bearings",
+        "crank_torque": "drive of a machine with one organ",
+        "rocker_torque": "rocker of a machine with one organ",
+        "static_at_extreme": "comparison with the papers; no design factor",
+    }
+
+
+def overload_factors(
+    machine: ChainUnit, crank_speed: float, feed: Feed, side: SideName = "left"
+) -> OverloadFactors:
+    """The overload factors of the machine on its `side` against both.
+
+    The first two are for one-sided feed: ratios of cycle maxima at `crank_speed`, all feed on that side to feed
+    on both, with both organs in place. The others are of a machine with its organ of `side` alone, as the papers'.
+
+    `static_at_extreme` is, of the left organ, the papers' R_left/(R_left - R_right) at the right extreme of the
+    rocker, at rest; of the right organ R_right/(R_right - R_left) at the left extreme, which is not as far out.
+    It diverges as the swing shrinks, and its value at the extreme is its minimum, so that it is no design
+    factor (docs/physics.md). In the ratios of one organ alone to both, gravity and inertia cancel or add up, and
+    above a certain speed both sides together are the heavier case.
+    """
+    extremes = machine.rocker_extremes()
+    # each organ pulls hardest at the rocker where this is farthest from it
+    psi = extremes[0 if side == "left" else 1][0]
+    static = machine.chamber(psi, 0.0, 0.0, feed.left, feed.right)
+    both = cycle(machine, crank_speed, feed)
+    fed = cycle(machine, crank_speed, all_on_one(side, feed))
+    one = _cycle_alone(machine, side, crank_speed, feed)
+
+    def ratio(x: Any, y: Any) -> float:
+        whole = float(np.max(np.abs(y)))
+        return float(np.max(np.abs(x))) / whole if whole > 0.0 else math.nan
+
+    return OverloadFactors(
+        feed_crank_torque=ratio(fed.crank_torque, both.crank_torque),
+        feed_rocker_torque=ratio(fed.outputs.rocker.tau, both.outputs.rocker.tau),
+        crank_torque=ratio(one.crank_torque, both.crank_torque),
+        rocker_torque=ratio(one.outputs.rocker.tau, both.outputs.rocker.tau),
+        static_at_extreme=ratio(getattr(static, side).tangential_load, static.rocker.tangential_load),
+    )
+
+
+@dataclass(frozen=True)
+class Sides:
+    """Cycle maxima of the torques [N m] over crank speed [rad/s], each of shape (speeds,): with both organs, with the
+    left one alone, with the right one alone; and where one alone and both are alike."""
+
+    speed: Any
+    rocker_both: Any
+    rocker_left: Any
+    rocker_right: Any
+    crank_both: Any
+    crank_left: Any
+    crank_right: Any
+
+    def crossings(self) -> dict[str, dict[SideName, list[float]]]:
+        """Crank speeds at which one side alone and both ask the same [rad/s], linear between the points, by torque
+        ("rocker", "crank") and side."""
+        speeds: dict[str, dict[SideName, list[float]]] = {}
+        for torque in _TORQUES:
+            speeds[torque] = {}
+            for side in SIDES:
+                excess = getattr(self, f"{torque}_{side}") - getattr(self, f"{torque}_both")
+                at = np.flatnonzero(np.diff(np.sign(excess)) != 0)
+                slope = np.diff(excess)[at]
+                speeds[torque][side] = [
+                    float(self.speed[k] - excess[k] * (self.speed[k + 1] - self.speed[k]) / d)
+                    for k, d in zip(at, slope, strict=True)
+                ]
+        return speeds
+
+    def as_dict(self) -> dict[str, Any]:
+        """Ready for JSON, with units."""
+        return {
+            "speed": {"value": self.speed.tolist(), "unit": "rad/s"},
+            **{name: {"value": getattr(self, name).tolist(), "unit": "N.m"} for name in _MAXIMA},
+            "crossings": {
+                torque: {side: [entry(w, "rad/s", "speed") for w in speeds] for side, speeds in of.items()}
+                for torque, of in self.crossings().items()
+            },
+        }
+
+
+_TORQUES = ("rocker", "crank")
+_MAXIMA = tuple(f"{torque}_{which}" for torque in _TORQUES for which in ("both", *SIDES))
+
+
+def sides_over_speed(
+    machine: ChainUnit, feed: Feed, highest: float = 15.0, points: int = 30
+) -> Sides:
+    """Two-sided against one-sided over crank speeds up to `highest` [rad/s]: at low speed one side alone is the
+    heavier case, since nothing balances its weight; at high speed both are, since inertia adds up."""
+    speed = np.linspace(highest / points, highest, points)
+    peaks: dict[str, list[float]] = {name: [] for name in _MAXIMA}
+    for w in speed:
+        turns = {"both": cycle(machine, float(w), feed, 360)} | {
+            side: _cycle_alone(machine, side, float(w), feed, 360) for side in SIDES
+        }
+        for which, turn in turns.items():
+            peaks[f"rocker_{which}"].append(float(np.max(np.abs(turn.outputs.rocker.tau))))
+            peaks[f"crank_{which}"].append(float(np.max(np.abs(turn.crank_torque))))
+    return Sides(speed, **{name: np.array(found) for name, found in peaks.items()})
+
+
+@declaration
+class Limits:
+    """Where the model ends."""
+
+    slack_speed: Value = quantity(
+        "rad/s", "crank speed at which a web first goes slack with this feed", kind="speed"
+    )
+    slack_speed_empty: Value = quantity(
+        "rad/s", "crank speed at which a web first goes slack, empty", kind="speed"
+    )
+    chain_resonance: Value = quantity(
+        "rad/s", "crank speed at the lowest natural frequency of an organ as a chain", kind="speed"
+    )
+    rocker_extreme_right: Value = quantity("rad", "right extreme of the rocker")
+    rocker_extreme_left: Value = quantity("rad", "left extreme of the rocker")
+    margin: Value = quantity("1", "least |sin| of the transmission angles over the turn")
+
+
+@dataclass(frozen=True)
+class Organs:
+    """What the organs of a chain unit ask at constant speed: one side against both, over the speed, and the limits of
+    two bars."""
+
+    factors: dict[SideName, OverloadFactors]
+    """of the organ of that side alone"""
+    sides: Sides
+    limits: Limits
+
+    def as_dict(self) -> dict[str, Any]:
+        """Ready for JSON."""
+        uses = factors_for(self.factors)
+        return {
+            "overload_factors": {
+                side: {name: factor | {"for": uses[name]} for name, factor in entries(factors).items()}
+                for side, factors in self.factors.items()
+            },
+            "limits": entries(self.limits),
+            "sides_over_speed": self.sides.as_dict(),
+        }
+
+
+def organ_cycles(machine: ChainUnit, crank_speed: float, feed: Feed) -> dict[str, Cycle]:
+    """Turns at constant speed, by how the organs are loaded."""
+    loads = {
+        "both sides": feed,
+        "right side empty": without("right", feed),
+        "left side empty": without("left", feed),
+        "all feed on the left": all_on_one("left", feed),
+        "all feed on the right": all_on_one("right", feed),
+    }
+    return {name: cycle(machine, crank_speed, each) for name, each in loads.items()}
+
+
+def organs(machine: ChainUnit, crank_speed: float, feed: Feed, margin: float) -> Organs:
+    """The organs with this feed; `margin` is the least of the turn."""
+    (right, _), (left, _) = machine.rocker_extremes()
+    modes = machine.chain_modes(feed.left, feed.right)
+    return Organs(
+        factors={side: overload_factors(machine, crank_speed, feed, side) for side in SIDES},
+        sides=sides_over_speed(machine, feed),
+        limits=Limits(
+            slack_speed=machine.slack_speed(feed.left, feed.right),
+            slack_speed_empty=machine.slack_speed(),
+            chain_resonance=math.inf if modes is None else float(modes.frequency[0]),
+            rocker_extreme_right=right,
+            rocker_extreme_left=left,
+            margin=margin,
+        ),
+    )

@@ -1,0 +1,84 @@
+"""Results without co-simulation: turns at constant speed, the speed loop, the line's torsion, the organs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..drives.speed_control import Loop
+from ..errors import InputError
+from ..machines.api import ChainUnit
+from .config import Config
+from .cycle import Cycle, cycle, no_feed
+from .drive import Drive
+from .organs import Organs, organ_cycles, organs
+from .shaft import Torsion, torsion
+
+
+@dataclass(frozen=True)
+class DriveStatics:
+    """Results on a machine and its drive before they run."""
+
+    cycles: dict[str, Cycle]
+    """turns at constant speed, by how the machine is loaded"""
+    loops: dict[str, Loop] = field(default_factory=dict)
+    """the linearised speed loop of a controlled motor, by which inertia"""
+    torsion: Torsion | None = None
+    """of the driveline, if there is one"""
+    organs: Organs | None = None
+    """of a chain unit"""
+
+    @property
+    def normal(self) -> Cycle:
+        """The turn with the feed of normal running."""
+        return next(iter(self.cycles.values()))
+
+
+def statics(config: Config, drive: Drive) -> DriveStatics:
+    """Everything of a study that needs no co-simulation.
+
+    Raises
+    ------
+    InputError
+        where the communication step is too long for the driveline.
+    """
+    machine, feed, w = drive.machine, config.feed, config.run.crank_speed
+    if isinstance(machine, ChainUnit):
+        cycles = organ_cycles(machine, w, feed)
+    else:
+        cycles = {"normal running": cycle(machine, w, feed), "without feed": cycle(machine, w, no_feed(feed))}
+    normal = next(iter(cycles.values())).outputs
+    margin = float(np.min(normal.margin))
+    return DriveStatics(
+        cycles=cycles,
+        loops={} if drive.foreign else _loops(drive, normal.J),
+        torsion=None if drive.line is None else _torsion(config, drive, normal.J),
+        organs=organs(machine, w, feed, margin) if isinstance(machine, ChainUnit) else None,
+    )
+
+
+def _loops(drive: Drive, inertia: Any) -> dict[str, Loop]:
+    """The speed loop with the mean, the least and the largest inertia of the turn, where the motor has one."""
+    sizes = {
+        "mean inertia": np.mean(inertia),
+        "least inertia": np.min(inertia),
+        "largest inertia": np.max(inertia),
+    }
+    loops = {
+        name: drive.motor.speed_loop(drive.parameters, drive.rotor_inertia + float(size))
+        for name, size in sizes.items()
+    }
+    return {name: loop for name, loop in loops.items() if loop is not None}
+
+
+def _torsion(config: Config, drive: Drive, inertia: Any) -> Torsion:
+    """The line's natural frequencies, for which the communication step has to be short enough."""
+    line = torsion(drive, inertia)
+    if config.run.step > line.step_longest:
+        raise InputError(
+            f"run.step = {config.run.step:g} s: the driveline swings at {line.k_largest:.4g} rad/s; must be <= "
+            f"{line.step_longest:.3g} s"
+        )
+    return line
