@@ -109,7 +109,7 @@ def test_titles_are_harmless_wherever_they_go():
     from chainunit.report.markdown import markdown_text
     from chainunit.study import driveline, knife
     from chainunit.study.drive import Drive
-    from chainunit.study.limits import statics
+    from chainunit.study.statics import statics
     from chainunit.study.study import Study
 
     for module in (config, driveline, knife):

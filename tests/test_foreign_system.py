@@ -447,7 +447,7 @@ def test_its_speeds_and_torques_are_those_of_ours(folder):
         (("load.J", "load.mass"), r"system\.names\.load\.mass: unknown key; known here: tau_bias, J, "),
         (('"rotor_speed"', "3"), r"system\.names\.w = 3: must be a text"),
         (('"ForeignMotor.fmu"', '""'), r'system\.motor = "": string should have at least 1 character'),
-        (('motor = "ForeignMotor.fmu"', ""), r"system: names no motor; add motor"),
+        (('motor = "ForeignMotor.fmu"', ""), r"system.names: are of an FMU of somebody else"),
         (
             ("[run]", "[motor]\nrotor.J = 0.01\n[run]"),
             r'motor: given beside system\.motor = "ForeignMotor\.fmu", .*',
@@ -461,7 +461,7 @@ def test_its_speeds_and_torques_are_those_of_ours(folder):
             ("[run]", "[monte_carlo]\nruns = 9\n[run]"),
             r"system\.motor: .*current and torque are not known.*; leave",
         ),
-        (("[run]", "[starter]\n[run]"), r"starter: is of the motor that \[sizing\] picks"),
+        (("[run]", "[starter]\n[run]"), r"starter: is of a motor of the catalogue"),
     ],
 )
 def test_a_study_file_that_does_not_fit_is_refused_in_a_line(change, said, folder):

@@ -19,6 +19,7 @@ from reports import page_of, pictures, said_of, write
 
 from chainunit import EMPTY, InputError, RunError
 from chainunit.drives.induction_motor import SoftStart
+from chainunit.machines.chain_unit import Feed
 from chainunit.report import chain_unit_motion, html, page_figures
 from chainunit.report import study as study_report
 from chainunit.report.blocks import at
@@ -27,7 +28,7 @@ from chainunit.study.chain import rest_forces
 from chainunit.study.cycle import cycle
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
-from chainunit.study.sections import Feed, Starter
+from chainunit.study.sections import Starter
 from chainunit.text import DEFAULT_UNITS, digits_text, forms, scales, unit_text
 from chainunit.text import number as told_as
 
@@ -410,11 +411,12 @@ def test_what_does_not_act_is_not_given(study):
 
 def test_the_speeds_at_which_a_web_goes_slack_are_a_sentence(study):
     slack = {"slack_speed": 0.0, "slack_speed_empty": 4.64, "chain_resonance": 5.0}
-    limits = dataclasses.replace(study.statics.limits, **slack)
+    organs = study.statics.organs
+    organs = dataclasses.replace(organs, limits=dataclasses.replace(organs.limits, **slack))
     assert (
         "With this feed, a web is slack at rest; empty, a web first goes slack at 4.64 rad/s (44.3 rev/min) of the "
         "crank; the lowest mode of a chain lies near 5.00 rad/s (47.7 rev/min)."
-    ) in said_of(dataclasses.replace(study, statics=dataclasses.replace(study.statics, limits=limits)))
+    ) in said_of(dataclasses.replace(study, statics=dataclasses.replace(study.statics, organs=organs)))
 
 
 def test_a_motor_that_sizing_found_insufficient_is_not_praised(study, monkeypatch):
@@ -682,7 +684,7 @@ def test_chains_stand_beside_two_bars(chains, tmp_path):
 def test_each_snatch_is_in_parts_of_its_own_rest(chains):
     """At rest a chain of 8 rods pulls as two bars do with this feed, but not without: the parts differ by a fifth."""
     machine, feed, own = chains.drive.machine, chains.config.feed, chains.chain.own
-    out = cycle(machine, own.speed, feed.left, feed.right).outputs
+    out = cycle(machine, own.speed, feed).outputs
     at_rest = machine.chamber(0.0, left=feed.left, right=feed.right)
 
     def size(joint):

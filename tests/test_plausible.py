@@ -12,12 +12,11 @@ from reports import page_of, said_of
 
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.errors import InputError
-from chainunit.machines.chain_unit import ChamberForces
+from chainunit.machines.chain_unit import ChamberForces, Feed
 from chainunit.models import MODELS
 from chainunit.quantities import Layout
 from chainunit.reading import slips
 from chainunit.study import config
-from chainunit.study.sections import Feed
 
 MM = {"r": 150, "l": 1500, "h": 1000, "c": 1492.48, "hy": 1000, "e": 810, "l1": 1350, "l2": 540, "z": 853.815}
 
@@ -168,8 +167,8 @@ def test_what_is_refused_for_a_slip_says_so(text, told):
 
 def test_the_remark_stands_on_terminal_page_and_in_json():
     from chainunit.study.drive import Drive
-    from chainunit.study.limits import statics
     from chainunit.study.result import as_dict
+    from chainunit.study.statics import statics
     from chainunit.study.study import Study
 
     given = config.parse("[machine]\npin = { diameter = 60 }")

@@ -267,7 +267,7 @@ damping_ratio = 0.04
     line = drive.line
     assert line.c2 == pytest.approx(stiffness(hollow(0.06, 0.04), 1.0)) and line.c3 == 5e4
     feed = config.parse(SHORT).feed
-    J = cycle(drive.machine, 6.0, feed.left, feed.right).outputs.J
+    J = cycle(drive.machine, 6.0, feed).outputs.J
     c = 1.0 / (1.0 / line.c2 + 1.0 / line.c3)
     J1, J4 = drive.parameters.rotor.J * line.ratio**2, line.J4 + float(np.mean(J)) * line.ratio**2
     k = np.sqrt(c * (1.0 / J1 + 1.0 / J4))

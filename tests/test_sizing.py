@@ -21,7 +21,7 @@ from chainunit.drives.motor import T_RATED
 from chainunit.engines import MATH
 from chainunit.errors import InputError, InterruptedRunError
 from chainunit.fmu.backends import export
-from chainunit.machines.chain_unit import SideLoads
+from chainunit.machines.chain_unit import Feed, SideLoads
 from chainunit.study import sizing
 from chainunit.study.config import parse
 from chainunit.study.cycle import cycle
@@ -142,7 +142,9 @@ def test_peaks_are_of_both_sides(sized, tmp_path):
             SideLoads(material_mass=600.0 * (side == one), processing_force=240.0 * (side == one))
             for one in ("left", "right")
         ]
-        turns[side] = cycle(config.machine, config.run.crank_speed, *loads).crank_torque
+        turns[side] = cycle(
+            config.machine, config.run.crank_speed, Feed(left=loads[0], right=loads[1])
+        ).crank_torque
     peaks = {side: float(np.max(np.abs(torque))) for side, torque in turns.items()}
     assert sized.duty.heavier == "left" and peaks["right"] > 1.2 * peaks["left"]
     assert sized.duty.numbers.torque_peak_one_sided == pytest.approx(peaks["right"], rel=1e-9)

@@ -17,8 +17,10 @@ from fmpy.validation import validate_fmu
 from reports import write
 
 from chainunit import EMPTY, ChainUnit, SideLoads
+from chainunit.machines.chain_unit import Feed
 from chainunit.report import study as study_report
-from chainunit.study.cycle import alone, cycle, factors_for, overload_factors, sides_over_speed
+from chainunit.study.cycle import cycle
+from chainunit.study.organs import alone, factors_for, overload_factors, sides_over_speed
 
 SHORT = """
 [run]
@@ -378,7 +380,7 @@ def test_overload_factors_are_the_erratas():
     machine = ChainUnit.from_ratios(0.1, 2 / 3, 0.6, 0.5, bare | {"pin.friction": 0.0})
     rocker, crank = {}, {}
     for speed in (1e-6, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 20.0, 50.0):
-        factors = overload_factors(machine, speed, EMPTY, EMPTY)
+        factors = overload_factors(machine, speed, NONE)
         rocker[speed], crank[speed] = factors.rocker_torque, factors.crank_torque
     wanted = {1e-6: (1.36, 1.9), 5.0: (3.1, 5.3), 10.0: (0.50, 0.80), 20.0: (0.63, 0.53), 50.0: (0.66, 0.57)}
     for speed, (on_rocker, on_crank) in wanted.items():
@@ -391,10 +393,10 @@ def test_overload_factors_are_the_erratas():
 def test_cycle_and_the_side_that_is_gone():
     machine = ChainUnit(ratio=7.0)
     loads = SideLoads(material_mass=10.0, processing_force=0.0)
-    c = cycle(machine, 3.0, loads, EMPTY)
+    c = cycle(machine, 3.0, Feed(left=loads, right=EMPTY))
     out = machine.forces(7.0 * c.angle[100], 21.0, 0.0, loads, EMPTY)
     assert c.crank_torque[100] == pytest.approx(7.0 * float(out.tau))
-    left = cycle(alone(machine, "left"), 3.0, loads, EMPTY)
+    left = cycle(alone(machine, "left"), 3.0, Feed(left=loads, right=EMPTY))
     assert np.all(left.outputs.right.tangential_load == 0.0)
 
 
@@ -402,6 +404,8 @@ FED = (
     SideLoads(material_mass=30.0, processing_force=300.0),
     SideLoads(material_mass=20.0, processing_force=100.0),
 )
+FEED = Feed(left=FED[0], right=FED[1])
+NONE = Feed(left=EMPTY, right=EMPTY)
 
 
 def peaks(machine, speed, left, right, points):
@@ -418,13 +422,13 @@ def test_each_side_alone_has_its_overload_factors():
     """Against the machine without the masses and the load of the other side."""
     machine = ChainUnit(ratio=7.0)
     both = peaks(machine, 4.0, *FED, 720)
-    found = {side: overload_factors(machine, 4.0, *FED, side) for side in ("left", "right")}
+    found = {side: overload_factors(machine, 4.0, FEED, side) for side in ("left", "right")}
     for side, gone, loads in (("left", "right", (FED[0], EMPTY)), ("right", "left", (EMPTY, FED[1]))):
         bare = machine.replace({f"{gone}.wall_mass": 0.0, f"{gone}.web_mass": 0.0})
         one = peaks(bare, 4.0, *loads, 720)
         assert found[side].crank_torque == pytest.approx(one["crank"] / both["crank"], rel=1e-12)
         assert found[side].rocker_torque == pytest.approx(one["rocker"] / both["rocker"], rel=1e-12)
-    assert found["left"] == overload_factors(machine, 4.0, *FED)
+    assert found["left"] == overload_factors(machine, 4.0, FEED)
     assert abs(found["left"].rocker_torque / found["right"].rocker_torque - 1.0) > 0.05
 
 
@@ -443,13 +447,13 @@ def test_what_sizes_the_drive_is_the_feed_on_one_side_with_both_organs():
         turning = (phi, speed * machine.p.ratio)
         free = machine.torque_by_reactions(*turning, 0.0, *of)
         crank[name] = np.max(np.abs(free + machine.friction_torque(*turning, *of)))
-    found = {side: overload_factors(machine, speed, *FED, side) for side in ("left", "right")}
+    found = {side: overload_factors(machine, speed, FEED, side) for side in ("left", "right")}
     for side, of in found.items():
         assert of.feed_crank_torque == pytest.approx(crank[side] / crank["both"], rel=1e-9)
         assert of.feed_rocker_torque == pytest.approx(rocker[side] / rocker["both"], rel=1e-12)
     larger = max(found, key=lambda side: found[side].feed_crank_torque)
     assert factors_for(found)["feed_crank_torque"].startswith(f"feed all on the {larger} sizes the drive")
-    none = {side: overload_factors(machine, speed, EMPTY, EMPTY, side) for side in found}
+    none = {side: overload_factors(machine, speed, NONE, side) for side in found}
     assert [f.feed_crank_torque for f in none.values()] == [1.0, 1.0]
     assert factors_for(none)["feed_crank_torque"].startswith("feed on both sides sizes the drive")
 
@@ -464,14 +468,14 @@ def test_the_static_factor_of_the_right_organ_belongs_to_the_left_extreme():
         wanted = mirrored.left.tangential_load / (
             mirrored.left.tangential_load - mirrored.right.tangential_load
         )
-        found = overload_factors(machine, 1.0, *FED, side).static_at_extreme
+        found = overload_factors(machine, 1.0, FEED, side).static_at_extreme
         assert found == pytest.approx(float(wanted), rel=1e-12)
         assert found > 1.0
 
 
 def test_each_side_alone_over_the_speed():
     machine = ChainUnit()
-    sides = sides_over_speed(machine, *FED, highest=12.0, points=12)
+    sides = sides_over_speed(machine, FEED, highest=12.0, points=12)
     both, crossed = [peaks(machine, w, *FED, 360) for w in sides.speed], 0
     for side, gone, loads in (("left", "right", (FED[0], EMPTY)), ("right", "left", (EMPTY, FED[1]))):
         bare = machine.replace({f"{gone}.wall_mass": 0.0, f"{gone}.web_mass": 0.0})

@@ -65,6 +65,11 @@ class Machine:
         """Motor turns per crank turn."""
         return float(self.p.ratio)
 
+    @property
+    def named(self) -> dict[str, float]:
+        """Parameters by name."""
+        return self.model.parameter_layout.named(self.p)
+
     def inputs(self, named: Mapping[str, Any]) -> Any:
         """Inputs from values by name, each as its declaration admits it; one that is not named is at its start.
 

@@ -16,8 +16,9 @@ import numpy as np
 
 from ..engines import MATH
 from ..machines.api import EMPTY, ChainUnit
+from ..machines.chain_unit import Feed
 from ..machines.crank_rocker import half_width_range
-from ..study.cycle import overload_factors
+from ..study.organs import overload_factors
 from .table import PICK
 
 RHO, LAM, MU, ZETA = 0.1, 2.0 / 3.0, 0.6, 0.5
@@ -333,7 +334,7 @@ def cycle_factor(torque: str, crank_speed: float) -> float:
 
 @cache
 def _factors(crank_speed: float) -> Any:
-    return overload_factors(machine(1.0), crank_speed, EMPTY, EMPTY)
+    return overload_factors(machine(1.0), crank_speed, Feed(left=EMPTY, right=EMPTY))
 
 
 def crossing(torque: str) -> float:

@@ -12,6 +12,7 @@ import numpy as np
 from ..engines import numpy_
 from ..machines.chain_unit import SIDES
 from ..study.chain import HIGH
+from ..study.cycle import Cycle
 from ..study.shaft import RIGID
 from ..study.study import Study
 from ..text import forms
@@ -102,7 +103,7 @@ def _torque_speed(study: Study, names: list[str]) -> fig.Figure:
 
 
 def _turn(s: b.Source, study: Study) -> fig.Figure:
-    torques = {"crank": lambda c: c.crank_torque}
+    torques: dict[str, Callable[[Cycle], Any]] = {"crank": lambda c: c.crank_torque}
     if study.statics.organs is not None:
         torques["rocker"] = lambda c: c.outputs.rocker.tau
     items: dict[fig.Axis, list[fig.Item]] = {}

@@ -8,9 +8,9 @@ from importlib import metadata
 from typing import Any
 
 from ..quantities import Layout, Variable
-from ..study.organs import Limits, OverloadFactors
 from ..study.measures import Answers
 from ..study.monte_carlo import Sample
+from ..study.organs import Limits, OverloadFactors
 from ..study.result import as_dict
 from ..study.shaft import ShaftAnswers, Torsion
 from ..study.study import Study
@@ -43,7 +43,11 @@ def report(study: Study, result: Mapping[str, Any] | None = None) -> b.Report:
             b.Section("runs", "Every run in numbers", tuple(_runs(s, study))),
             b.Section("chains", "Chains and two bars", tuple(chains(s, study)) if study.chain else ()),
             b.Section("plots", "Plots", tuple(figures(s, study))),
-            b.Section("motion", "The machine in motion", (motion(study),) if study.runs and study.statics.organs else ()),
+            b.Section(
+                "motion",
+                "The machine in motion",
+                tuple(_motion(study)),
+            ),
             b.Section("basis", "What this rests on", tuple(_basis(s, study))),
             b.Section("given", "All that was given", (_given(s, study),)),
         ),
@@ -51,6 +55,11 @@ def report(study: Study, result: Mapping[str, Any] | None = None) -> b.Report:
         failure=s.words("failure") if study.failure is not None else (),
         units=study.config.units,
     )
+
+
+def _motion(study: Study) -> Iterator[b.Block]:
+    if study.runs and study.statics.organs is not None:
+        yield motion(study)
 
 
 # -- what was asked

@@ -333,11 +333,11 @@ def numbers_at(
     for side in SIDES:
         bars = getattr(two.outputs, side).rocker_joint
         size = np.hypot(*(values[f"{side}.rocker_joint.{x}"] for x in ("fx", "fy")))
-        rest, two_bar_rest = rest_forces(drive.machine, side, feed, sum(drive.rods))
+        rest, two_bar_rest = rest_forces(drive.chain_unit, side, feed, sum(drive.rods))
         snatch.append(peaks(size) / rest)
         two_bar_snatch.append(np.max(np.hypot(bars.fx, bars.fy)) / two_bar_rest)
     snatched = np.maximum(*snatch)
-    pushed = two_bar_pulls(drive.machine, two.angle, crank_speed, feed) < 0.0
+    pushed = two_bar_pulls(drive.chain_unit, two.angle, crank_speed, feed) < 0.0
     duration = 2.0 * math.pi / crank_speed * turns
     energy = float(np.min(np.mean(np.abs(values["power"]), axis=(1, 2)))) * duration
     gap = max(float(np.max(np.ptp(values[f"{side}.energy_residual"], axis=(1, 2)))) for side in SIDES)
@@ -404,7 +404,7 @@ def study_chain(
     """
     chain, own = config.chain, config.run.crank_speed
     assert chain is not None
-    modes = drive.machine.chain_modes(config.feed.left, config.feed.right)
+    modes = drive.chain_unit.chain_modes(config.feed.left, config.feed.right)
     critical = []
     if modes is not None:
         for mode, frequency in enumerate(modes.frequency[:4], 1):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping
-from functools import cache
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
@@ -91,36 +91,32 @@ class Parts:
     @property
     def sections(self) -> dict[str, FileSection]:
         """The tables of the file."""
-        return sections_of(self.machine, self.motor)
+        motor = self.motor if self.gives_motor else MOTORS["DcMotor"]
+        return sections_of(self.machine, motor)
 
-    @property
+    @cached_property
     def form(self) -> type[BaseModel]:
         """The form of the file."""
-        return _form(self.machine, self.motor)
+        return file_form(
+            "Config",
+            {
+                name: section.form(section.declared, name, f"{name}.", **section.keys)
+                for name, section in self.sections.items()
+            }
+            | {"report": ReportTable, "system": SystemTable},
+            feed_forward=(bool, False),
+            empty_start=(bool, False),
+            start=(Literal[STARTS], "direct"),
+            organ=(Literal[ORGANS], "two-bar"),
+            catalogue=(str, ""),
+            event=(list[Any], []),
+        )
 
     @property
     def example(self) -> dict[str, Any]:
         """The tables of the example, empty where there is none."""
         name = _OF_MACHINE.get(self.machine.name)
         return toml(example(name)) if name else {}
-
-
-@cache
-def _form(machine: type[InverseMachine], motor: type[Motor]) -> type[BaseModel]:
-    return file_form(
-        "Config",
-        {
-            name: section.form(section.declared, name, f"{name}.", **section.keys)
-            for name, section in sections_of(machine, motor).items()
-        }
-        | {"report": ReportTable, "system": SystemTable},
-        feed_forward=(bool, False),
-        empty_start=(bool, False),
-        start=(Literal[STARTS], "direct"),
-        organ=(Literal[ORGANS], "two-bar"),
-        catalogue=(str, ""),
-        event=(list[Any], []),
-    )
 
 
 def _parts(data: Mapping[str, Any]) -> Parts:
@@ -304,7 +300,7 @@ def _config(
         motor_type=parts.motor,
         motor=_checked("motor: ", parts.motor.check, values["motor"]) if parts.gives_motor else None,
         plate=_plate(parts.designation, catalogue),
-        flywheels=tuple(sorted({x for x in (tables["flywheel"].get("compare") or [])})),
+        flywheels=tuple(sorted(set(tables["flywheel"].get("compare", [])))),
         events=events,
         random=read_random_event(checked.monte_carlo.event, "monte_carlo.event"),
         feed_forward=checked.feed_forward,
@@ -390,21 +386,30 @@ def _check_company(data: Mapping[str, Any], parts: Parts) -> None:
     if data.get("system") == {}:
         raise InputError('system: names nothing; add motor = "file.fmu", or leave [system] out')
     if "names" in data.get("system", {}) and not parts.file:
-        raise InputError('system.names: are of an FMU of somebody else; add motor = "file.fmu", or leave them out')
+        raise InputError(
+            'system.names: are of an FMU of somebody else; add motor = "file.fmu", or leave them out'
+        )
     if named is not None:
         for name in ("motor", "sizing"):
             if name in data and not (name == "motor" and parts.gives_motor):
                 raise InputError(
-                    f"{name}: given beside system.motor = {shown(named)}, which is the motor; leave out one of the two"
+                    f"{name}: given beside system.motor = {shown(named)}, which is the motor; leave out one of "
+                    "the two"
                 )
     if parts.machine is not ChamberForces:
         for name in ("ratios", "chain", "organ", "sizing"):
             if name in data:
-                raise InputError(f"{name}: is of the chain unit, and the machine is {parts.machine.name}; leave it out")
+                raise InputError(
+                    f"{name}: is of the chain unit, and the machine is {parts.machine.name}; leave it out"
+                )
     if "sizing" in data:
         for name in ("motor", "feed_forward", "flywheel"):
             if data.get(name):
-                words = "sizing finds its own" if name == "flywheel" else "is of the DC motor, and [sizing] picks another"
+                words = (
+                    "sizing finds its own"
+                    if name == "flywheel"
+                    else "is of the DC motor, and [sizing] picks another"
+                )
                 raise InputError(f"{name}: {words}; leave out one of the two")
         if "ratio" in data.get("machine", {}):
             raise InputError("machine.ratio: [sizing] finds it; to have it kept, give gear.ratio")
@@ -415,7 +420,9 @@ def _check_company(data: Mapping[str, Any], parts: Parts) -> None:
                     f"{name}: is of a motor of the catalogue; add [sizing] or system.motor, or leave it out"
                 )
     elif "ratio" in data.get("machine", {}):
-        raise InputError("machine.ratio: follows from the motor's rated speed; to have another, give gear.ratio")
+        raise InputError(
+            "machine.ratio: follows from the motor's rated speed; to have another, give gear.ratio"
+        )
     if "chain" in data and data.get("organ") != "chain":
         raise InputError('chain: is of organs that are chains; add organ = "chain", or leave it out')
 

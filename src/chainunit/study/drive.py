@@ -19,9 +19,9 @@ from ..fmu.backends import Backend
 from ..fmu.backends import export as export_fmu
 from ..machines.api import ChainUnit
 from ..machines.chain_organs import OrganLaw
-from ..machines.machine import Machine
 from ..machines.flexible import flexible
 from ..machines.hanging import split
+from ..machines.machine import Machine
 from ..model import Model
 from ..quantities import Layout
 from ..system import Component, FmuComponent, ModelComponent, Profile, System, export, shaft_joints
@@ -88,16 +88,18 @@ class Drive:
         if self.foreign is not None:
             raise AbsentError(f"{self.foreign.title}: {quantity} is not known of an FMU of somebody else")
 
-    def needs_organs(self, quantity: str) -> None:
-        """Refuse what only a chain unit has.
+    @property
+    def chain_unit(self) -> ChainUnit:
+        """The machine, where it is a chain unit.
 
         Raises
         ------
         AbsentError
-            where the machine is another.
+            where it is another.
         """
-        if not isinstance(self.machine, ChainUnit):
-            raise AbsentError(f"{self.machine.model.name}: has no {quantity}")
+        if isinstance(self.machine, ChainUnit):
+            return self.machine
+        raise AbsentError(f"{self.machine.model.name}: has no organs")
 
     def series(self, run: xr.Dataset, name: str) -> Any:
         """A variable of a run, shape (time,).

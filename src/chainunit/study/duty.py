@@ -22,8 +22,8 @@ from .chain import HIGH
 from .chain import duty as chain_duty
 from .config import Config
 from .cycle import Cycle, cycle
-from .organs import all_on_one
 from .drive import Drive
+from .organs import all_on_one
 
 
 def rms(*parts: tuple[float, Any]) -> float:

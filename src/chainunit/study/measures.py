@@ -149,7 +149,7 @@ class Window:
 
     def least_pull(self, rod: str) -> float:
         """Of a kind of rod on either side [N]; infinite where no organ has weight."""
-        self.drive.needs_organs(f"the {rod}s")
+        assert self.drive.chain_unit
         pulls = (float(np.min(self.value(f"machine.{side}.{rod}_pull"))) for side in self.sides)
         return min(pulls, default=math.inf)
 

@@ -155,9 +155,7 @@ _TORQUES = ("rocker", "crank")
 _MAXIMA = tuple(f"{torque}_{which}" for torque in _TORQUES for which in ("both", *SIDES))
 
 
-def sides_over_speed(
-    machine: ChainUnit, feed: Feed, highest: float = 15.0, points: int = 30
-) -> Sides:
+def sides_over_speed(machine: ChainUnit, feed: Feed, highest: float = 15.0, points: int = 30) -> Sides:
     """Two-sided against one-sided over crank speeds up to `highest` [rad/s]: at low speed one side alone is the
     heavier case, since nothing balances its weight; at high speed both are, since inertia adds up."""
     speed = np.linspace(highest / points, highest, points)

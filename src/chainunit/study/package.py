@@ -12,11 +12,12 @@ from ..drives.driveline import CardanDriveline
 from ..drives.motor import Motor
 from ..errors import InputError, RunError
 from ..fmu.backends import Backend
-from ..machines.api import ChainUnit
 from ..machines.chain_organs import LEAST, MOST
-from ..machines.chain_unit import ChamberForces, DirectChainUnit
+from ..machines.chain_unit import ChamberForces
 from ..machines.flexible import flexible
 from ..machines.hanging import split
+from ..machines.machine import Machine
+from ..mechanism.models import DirectMachine
 from ..model import Model
 from ..quantities import Layout
 from ..system import System
@@ -34,7 +35,7 @@ def study_system(config: Config, drive: Drive) -> System:
     for name, machine in (("machine", drive.driven), ("model", drive.machine)):
         if name in drive.graph.components:
             # a connected input needs no start value, but an FMU that runs alone has one
-            values = _machine(config, drive, ChamberForces, machine)
+            values = _machine(config, machine.model, machine)
             start |= {f"{name}.{variable}": x for variable, x in values.items()}
     return replace(drive.graph, start=start)
 
@@ -52,7 +53,7 @@ def start_of(
     Raises
     ------
     InputError
-        where the study's motor is another, or it has no driveline.
+        where the study's motor or machine is another, or it has no driveline.
     RunError
         where sizing finds no motor.
     """
@@ -62,7 +63,9 @@ def start_of(
             raise InputError("the study has no [driveline]; add the table, or export without --config")
         return model.parameter_layout.named(drive.line)
     if not issubclass(model, Motor):
-        given = _machine(config, drive, model, drive.driven)
+        if not _is_of(model, drive):
+            raise InputError(f"the study's machine is {drive.driven.model.name}, not {model.name}")
+        given = _machine(config, model, drive.driven)
         return given | (drive.organ() if model.name == "ChainUnitFlexible" else {})
     if drive.motor is not model:
         title = drive.graph.components["motor"].title
@@ -85,15 +88,19 @@ def with_rods(number: int, start: Mapping[str, float]) -> type[Model]:
     return flexible(*split((start.get("l1", lengths.l1), start.get("l2", lengths.l2)), number))
 
 
-def _machine(config: Config, drive: Drive, model: type[Model], machine: ChainUnit) -> dict[str, float]:
+def _is_of(model: type[Model], drive: Drive) -> bool:
+    """Whether a model is that of the machine, its direct one, or the one with chains."""
+    own = drive.driven.model
+    chains = own is ChamberForces and model.name == "ChainUnitFlexible"
+    return model is own or chains or model is own.direct()
+
+
+def _machine(config: Config, model: type[Model], machine: Machine) -> dict[str, float]:
     """The machine with its feed and the gear that it has, at the speed of the study."""
-    speed = config.run.crank_speed * machine.p.ratio
-    turning = {"w_start": speed} if model is DirectChainUnit else {"phi": 0.0, "w": speed, "a": 0.0}
-    return (
-        ChamberForces.parameter_layout.named(machine.p)
-        | Layout(type(config.feed)).named(config.feed)
-        | turning
-    )
+    speed = config.run.crank_speed * machine.ratio
+    direct = issubclass(model, DirectMachine)
+    turning = {"w_start": speed} if direct else {"phi": 0.0, "w": speed, "a": 0.0}
+    return machine.named | Layout(type(config.feed)).named(config.feed) | turning
 
 
 def _drive(config: Config, backend: Backend | None, report: Callable[[str], None]) -> Drive:

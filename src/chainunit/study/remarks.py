@@ -140,7 +140,8 @@ def _on_runs(study: Study) -> None:
 def _happenings(study: Study, name: str) -> Iterator[tuple[str, str, dict[str, Amount]]]:
     """What happened in a run: kind, numbers in words, the same as data."""
     config, answers = study.config, study.answers[name]
-    pushed = answers.web_pull_least < 0.0 or answers.wall_pull_least < 0.0
+    pulls = answers.web_pull_least, answers.wall_pull_least
+    pushed = any(pull is not None and pull < 0.0 for pull in pulls)
     if answers.slack_time == 0.0 and pushed:
         yield "rod end pushed", "", {}
     largest = study.drive.motor.current_limit(study.motor)

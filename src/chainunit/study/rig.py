@@ -164,8 +164,8 @@ class Rig:
     def start_empty(
         self, simulation: CoSimulation, progress: Progress, guards: Mapping[str, float]
     ) -> tuple[xr.Dataset, Rig]:
-        """The start of an empty machine, until it turns at `STARTED` of its speed or a guard ends it; and the rig that
-        is fed from then on."""
+        """The start of an empty machine, until it turns at `STARTED` of its speed or a guard ends it; and the rig
+        that is fed from then on."""
         goal = {"motor.w": STARTED * self.config.run.crank_speed * self.drive.ratio}
         run = simulation.run(_LONGEST_START, self.step, progress, guards={**guards, **goal})
         fed = replace(self, fed_from=simulation.time)

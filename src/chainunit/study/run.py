@@ -21,13 +21,13 @@ from .choice import choose
 from .config import Config
 from .coupling import on_coupling, recommended
 from .events import Event
-from .statics import statics
 from .measures import Phase, Trip, read_answers, read_measure, whole_turns
 from .monte_carlo import Task
 from .monte_carlo import run as run_monte_carlo
 from .remarks import conclude
 from .rig import Progress, Rig, Transient
 from .shaft import shaft_answers, with_rigid
+from .statics import statics
 from .study import Spread, Study
 
 _PEAKS = ("crank_torque", "motor_torque", "rocker_torque")

@@ -208,7 +208,7 @@ def numbers(declared: type, quantity_name: str, name: str, most: int) -> Any:
     variable = next(v for v in variables(declared) if v.name == quantity_name)
     variable = dataclasses.replace(variable, name=name)
     value = Annotated[float, BeforeValidator(lambda entry: to_number(variable, entry))]
-    return Annotated[list[value], Field(max_length=most)]  # type: ignore[valid-type]
+    return Annotated[list[value], Field(max_length=most)]
 
 
 ORGANS = ("two-bar", "chain")
@@ -269,7 +269,6 @@ class FileSection:
 
 
 SECTIONS: Mapping[str, FileSection] = {
-    "ratios": FileSection(Ratios),
     "run": FileSection(Run, whole=("turns",)),
     "coupling": FileSection(Coupling, optional=True),
     "monte_carlo": FileSection(MonteCarlo, whole=("runs", "seed"), keys={"event": (dict[str, Any], {})}),
@@ -295,5 +294,5 @@ SECTIONS: Mapping[str, FileSection] = {
 
 def sections_of(machine: type[InverseMachine], motor: type[Motor]) -> dict[str, FileSection]:
     """The tables of a study with this machine and this kind of motor."""
-    own = {"machine": machine.Parameters, "feed": machine.Feed, "motor": motor.Parameters}
+    own = {"machine": machine.Parameters, "ratios": Ratios, "feed": machine.Feed, "motor": motor.Parameters}
     return {name: FileSection(declared) for name, declared in own.items()} | dict(SECTIONS)

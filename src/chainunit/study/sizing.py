@@ -15,16 +15,12 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..drives.catalogue import CatalogueMotor, catalogue
-from ..drives.gearing import motor_side
-from ..drives.induction_motor import InductionMotor
-from ..engines import numpy_
 from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
 from ..quantities import Value, declaration, quantity
 from ..text import entries, number
+from .catalogue_drive import catalogue_drive
 from .chain import HIGH
 from .config import Config
 from .drive import Drive

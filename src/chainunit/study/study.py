@@ -15,12 +15,12 @@ from . import verdict
 from .chain import ChainResult
 from .config import LENGTHS, Config
 from .drive import Drive
-from .statics import DriveStatics
 from .measures import Answers, Phase, Trip, Window, not_known, reaches, whole_turns
 from .monte_carlo import MonteCarloResult
 from .protection import Setting
 from .shaft import Cycles, ShaftAnswers
 from .sizing import SizingResult
+from .statics import DriveStatics
 from .verdict import STEADY, Verdict
 
 LOAD_CYCLE = "load_cycle.csv"

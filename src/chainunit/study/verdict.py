@@ -257,9 +257,7 @@ def two_bars(
     return Verdict(TWO_BARS, speed, (*reasons, *_unbalanced(residuals)), reached)
 
 
-def rigid_links(
-    speed: float, residuals: Mapping[str, float], *, reached: float | None = None
-) -> Verdict:
+def rigid_links(speed: float, residuals: Mapping[str, float], *, reached: float | None = None) -> Verdict:
     """The verdict on a linkage without organs, whose links are rigid: it holds where the energy balance is kept.
 
     Parameters
