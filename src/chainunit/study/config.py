@@ -46,7 +46,7 @@ from .sections import (
     Coupling,
     Driveline,
     FileSection,
-    Flywheel,
+    FlywheelTable,
     ForeignMotor,
     MonteCarlo,
     Ratios,
@@ -167,7 +167,7 @@ class Config:
     sizing: Sizing | None
     plate: CatalogueMotor | None
     """the motor, where the file names one of the catalogue"""
-    flywheel: Flywheel | None
+    flywheel: FlywheelTable | None
     flywheels: tuple[float, ...]
     """inertias of flywheels that are compared [kg m2]"""
     gear: Transmission

@@ -448,7 +448,7 @@ class Dip(Event):
         return {"voltage": Profile(whole, (low, (at + self.p.duration, edge, whole)))}
 
 
-class Cut(Event):
+class HardCut(Event):
     """The blade meets a harder stack, or something in it that hardly gives way."""
 
     kind, run = "cut", "hard_cut"

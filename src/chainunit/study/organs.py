@@ -189,7 +189,7 @@ class Limits:
 
 
 @dataclass(frozen=True)
-class Organs:
+class OrganStatics:
     """What the organs of a chain unit ask at constant speed: one side against both, over the speed, and the limits of
     two bars."""
 
@@ -223,11 +223,11 @@ def organ_cycles(machine: ChainUnit, crank_speed: float, feed: Feed) -> dict[str
     return {name: cycle(machine, crank_speed, each) for name, each in loads.items()}
 
 
-def organs(machine: ChainUnit, crank_speed: float, feed: Feed, margin: float) -> Organs:
+def organs(machine: ChainUnit, crank_speed: float, feed: Feed, margin: float) -> OrganStatics:
     """The organs with this feed; `margin` is the least of the turn."""
     (right, _), (left, _) = machine.rocker_extremes()
     modes = machine.chain_modes(feed.left, feed.right)
-    return Organs(
+    return OrganStatics(
         factors={side: overload_factors(machine, crank_speed, feed, side) for side in SIDES},
         sides=sides_over_speed(machine, feed),
         limits=Limits(

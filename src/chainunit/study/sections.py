@@ -142,7 +142,7 @@ class Sizing:
 
 
 @declaration
-class Flywheel:
+class FlywheelTable:
     """A flywheel on the motor's shaft, and the fluctuation for which the least one is searched."""
 
     J: Value = quantity("kg.m2", "inertia of the flywheel, on the motor shaft", default=0.0, min=0.0, max=1e6)
@@ -274,9 +274,9 @@ SECTIONS: Mapping[str, FileSection] = {
     "monte_carlo": FileSection(MonteCarlo, whole=("runs", "seed"), keys={"event": (dict[str, Any], {})}),
     "sizing": FileSection(Sizing, optional=True),
     "flywheel": FileSection(
-        Flywheel,
+        FlywheelTable,
         optional=True,
-        keys={"compare": (numbers(Flywheel, "J", "flywheel.compare", 12), [])},
+        keys={"compare": (numbers(FlywheelTable, "J", "flywheel.compare", 12), [])},
     ),
     "gear": FileSection(Transmission, default=KINDS["gear"]),
     "starter": FileSection(Starter),

@@ -13,7 +13,7 @@ from ..machines.api import ChainUnit
 from .config import Config
 from .cycle import Cycle, cycle, no_feed
 from .drive import Drive
-from .organs import Organs, organ_cycles, organs
+from .organs import OrganStatics, organ_cycles, organs
 from .shaft import Torsion, torsion
 
 
@@ -27,7 +27,7 @@ class DriveStatics:
     """the linearised speed loop of a controlled motor, by which inertia"""
     torsion: Torsion | None = None
     """of the driveline, if there is one"""
-    organs: Organs | None = None
+    organs: OrganStatics | None = None
     """of a chain unit"""
 
     @property
