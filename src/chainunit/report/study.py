@@ -16,13 +16,16 @@ from ..study.shaft import ShaftAnswers, Torsion
 from ..study.study import Study
 from . import accessors as read
 from . import blocks as b
-from .chain_unit_figures import PICTURES as PICTURES
+from .analyses import ANALYSES
+from .chain_unit_figures import PICTURES as _PICTURES
 from .chain_unit_figures import figures
 from .chain_unit_motion import motion
 from .chain_unit_parts import chains, sizing, spoken
 from .lines import Line, Number, Strong, capital, joined, line
 from .terminal import plain_line
 
+PICTURES = (*_PICTURES, *(picture for each in ANALYSES.values() for picture in each.pictures))
+"""Files of all figures that a report may have."""
 _KEY = ("crank_torque_peak", "motor_torque_peak", "power_peak", "current_peak", "winding_temperature")
 """The families of answers that are shown large, each by its first field."""
 _HOLDS: dict[str, b.Severity] = {"true": "good", "in part": "partly", "false": "bad"}
@@ -42,6 +45,10 @@ def report(study: Study, result: Mapping[str, Any] | None = None) -> b.Report:
             b.Section("sizing", "The drive", tuple(sizing(s, study)) if "sizing" in s.result else ()),
             b.Section("runs", "Every run in numbers", tuple(_runs(s, study))),
             b.Section("chains", "Chains and two bars", tuple(chains(s, study)) if study.chain else ()),
+            *(
+                b.Section(name, ANALYSES[name].heading, tuple(ANALYSES[name].blocks(s, study)))
+                for name in study.findings
+            ),
             b.Section("plots", "Plots", tuple(figures(s, study))),
             b.Section(
                 "motion",

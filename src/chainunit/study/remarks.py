@@ -53,6 +53,8 @@ def conclude(study: Study) -> None:
     _on_assumptions(study)
     if study.statics.torsion is not None:
         _on_shaft(study)
+    for found in study.findings.values():
+        found.remark(study)
 
 
 def _on_steady_running(study: Study, steady: Answers) -> None:

@@ -152,7 +152,8 @@ def _spread(study: Study, name: str) -> dict[str, Any]:
 
 def _parts(study: Study) -> dict[str, Any]:
     """What only some studies have."""
-    config, parts = study.config, {}
+    config = study.config
+    parts = {name: found.as_dict() for name, found in study.findings.items()}
     if study.sizing:
         parts["sizing"] = study.sizing.as_dict() | {"protection": _protection(study)}
     if study.monte_carlo:

@@ -15,6 +15,8 @@ from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
 from ..system import CoSimulation
 from . import verdict
+from .analyses import ANALYSES
+from .analysis import Report
 from .bearings import pin_loads
 from .chain import study_chain
 from .choice import choose
@@ -32,8 +34,6 @@ from .study import Spread, Study
 
 _PEAKS = ("crank_torque", "motor_torque", "rocker_torque")
 """What is told over the range of an assumption."""
-Report = Callable[[str, float, float], None]
-"""Called with what is running, the time done and the time to do [s]."""
 
 
 def run_study(
@@ -64,6 +64,7 @@ def run_study(
     study = Study(config, drive, statics(config, drive), choice.tuning, choice.sizing)
     if config.monte_carlo.runs:
         _check_random(config, Rig(config, drive, {}))
+    _analyse(study, Rig(config, drive, {}), report, needs_runs=False)
     files, study.made = drive.export(folder / "fmu", backend)
     runner = Runner(study, Rig(config, drive, files), report)
     try:
@@ -71,6 +72,7 @@ def run_study(
         if config.monte_carlo.runs:
             task = Task(config, drive, files, runner.stop)
             study.monte_carlo = run_monte_carlo(task, folder, report)
+        _analyse(study, runner.rig, report, needs_runs=True)
     except RunError as error:
         if error.partial is not None:
             study.runs["unfinished"] = error.partial
@@ -83,6 +85,15 @@ def run_study(
         _chains(study, files["machine"], report)
     conclude(study)
     return study
+
+
+def _analyse(study: Study, rig: Rig, report: Report, *, needs_runs: bool) -> None:
+    """Every analysis that the system has the parts for."""
+    for analysis in ANALYSES:
+        if analysis.needs_runs == needs_runs and analysis.applies(study.config, study.drive):
+            found = analysis.find(study, rig, report)
+            if found is not None:
+                study.findings[analysis.name] = found
 
 
 def _check_random(config: Config, rig: Rig) -> None:

@@ -103,6 +103,8 @@ class Study:
     which would set it"""
     ripple_without: float | None = None
     """fluctuation of the speed in steady running without the feed-forward that the study has"""
+    findings: dict[str, Any] = field(default_factory=dict)
+    """`Findings` of each analysis, by its name"""
     chain: ChainResult | None = None
     """the organs as chains at constant speed, where the study has them"""
     monte_carlo: MonteCarloResult | None = None

@@ -1,0 +1,21 @@
+"""The sections of a report that belong to analyses of a study, by the name of the analysis."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+from ..study.study import Study
+from .blocks import Block, Source
+
+
+@dataclass(frozen=True)
+class Contents:
+    """The section of an analysis: its heading, its blocks (tables, words, figures), and the files of its figures."""
+
+    heading: str
+    blocks: Callable[[Source, Study], Iterator[Block]]
+    pictures: tuple[str, ...] = ()
+
+
+ANALYSES: Mapping[str, Contents] = {}

@@ -1,0 +1,7 @@
+"""The analyses that a study may have, in the order in which they are made."""
+
+from __future__ import annotations
+
+from .analysis import Analysis
+
+ANALYSES: tuple[type[Analysis], ...] = ()
