@@ -18,12 +18,12 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, shown
 from ..quantities import DISPLAY_UNITS, Layout, Value, Variable, declaration, quantity
+from ..reading import packaged, to_number, toml
 from .induction_motor import InductionMotor
 from .motor import Motor
 from .nameplate import Identification, Nameplate, check, identify
@@ -143,8 +143,7 @@ def check_own(extra: Path | None) -> None:
 @cache
 def _packaged() -> tuple[CatalogueMotor, ...]:
     name = "motors.csv"
-    text = (resources.files("chainunit") / "data" / name).read_text("utf-8")
-    return tuple(_motors(_csv_rows(text, name), set()))
+    return tuple(_motors(_csv_rows(packaged(name), name), set()))
 
 
 def _motors(rows: Iterator[tuple[str, Mapping[str, Any]]], others: set[str]) -> list[CatalogueMotor]:
@@ -159,9 +158,6 @@ def _motors(rows: Iterator[tuple[str, Mapping[str, Any]]], others: set[str]) -> 
 
 
 def _motor(origin: str, row: Mapping[str, Any], others: set[str]) -> CatalogueMotor:
-    # of the study files, which may come to import the catalogue
-    from ..reading import to_number
-
     for name in row:
         if name not in _VARIABLES and name not in _TEXTS:
             raise InputError(f"{shown(name)}: unknown; known here: {', '.join((*_TEXTS, *_VARIABLES))}")
@@ -232,8 +228,6 @@ def _with_unit(cell: str, unit: str) -> str:
 
 
 def _toml_rows(text: str, file: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    from ..reading import toml
-
     try:
         data = toml(text)
     except InputError as error:

@@ -21,8 +21,8 @@ class Tuning:
     """[deg]"""
     crossover: float
     """of the speed loop [rad/s]"""
-    current_crossover: float
-    """[rad/s]"""
+    current_crossover: float | None = None
+    """of a current loop below it [rad/s]"""
 
 
 def tune(armature: Any, inertia: float, bandwidth: float = 300.0, crossover_share: float = 0.1) -> Tuning:

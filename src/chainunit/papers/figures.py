@@ -287,7 +287,7 @@ def closing() -> Figure:
         ends = np.array([p0.zeta_range(math.radians(degrees), float(m)) for m in mu])
         ends[ends[:, 0] >= ends[:, 1]] = np.nan
         items += [Curve(f"swing of +-{degrees:g} deg", mu, end, look) for end in ends.T]
-    items.append(Curve("the papers' machine", (p0.MU,), (p0.ZETA,), "printed", "o", joined=False))
+    items.append(_points((p0.MU,), (p0.ZETA,), "the papers' machine"))
     return _single(
         "two-bar-range",
         "Two-bar organs close between the lines (l2 = l1 - e)",

@@ -1,0 +1,62 @@
+"""A third type of motor is one file, here `servo_motor`, and a line in the registry."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from servo_motor import ServoMotor
+from systems import pair
+
+from chainunit.drives.motors import MOTORS, motor_of
+from chainunit.study import config, run
+from chainunit.study.result import as_dict
+from chainunit.system import CoSimulation, Profile, export, monolithic
+
+STUDY = """
+title = "A servo motor"
+
+[system]
+motor = "ServoMotor"
+
+[motor]
+coil.R = 1.5
+control.i = 3.0
+"""
+
+
+@pytest.fixture
+def registered(monkeypatch):
+    monkeypatch.setitem(MOTORS, ServoMotor.name, ServoMotor)
+
+
+def test_it_runs_as_an_fmu(tmp_path):
+    """Its co-simulation with the machine is the monolithic solution of the same equations."""
+    system, _ = export(pair("ChamberForces", ServoMotor, values={"machine.ratio": 50.0}), tmp_path, "native")
+    signals = {"motor.w_ref": Profile(0.0, ((0.0, 0.2, 150.0),))}
+    with CoSimulation(system, signals) as simulation:
+        seen = simulation.run(0.5, 5e-4)
+    wanted = monolithic(system, signals, seen["time"].values)
+    for name in ("motor.w", "motor.T"):
+        np.testing.assert_allclose(seen[name], wanted[name], rtol=1e-4, atol=1e-3)
+    np.testing.assert_allclose(seen["motor.tau"].values[-1], wanted["motor.tau"].values[-1], rtol=1e-2)
+
+
+def test_a_study_names_it(registered, tmp_path):
+    chosen = config.parse(STUDY)
+    study = run.run_study(chosen, tmp_path)
+    assert study.failure is None and study.drive.motor is motor_of(study.motor) is ServoMotor
+    steady, p = study.answers["steady"], study.motor
+    assert p.coil.R == 1.5 and p.control.ki == pytest.approx(4.0 * p.control.kp)
+    assert steady.speed_mean == pytest.approx(chosen.run.crank_speed, rel=1e-6)
+    # torque of the shaft: the current's, less that of the rotor
+    turns = study.steady
+    driving = p.coil.k * turns["motor.i"] - p.rotor.d * turns["motor.w"] - p.rotor.J * turns["motor.a"]
+    np.testing.assert_allclose(driving, turns["motor.tau"], atol=1e-9)
+    kinds = {remark.kind for remark in study.warnings}
+    reaches_limit = any(answers.current_peak > 0.999 * 3.0 for answers in study.answers.values())
+    assert ("current limit" in kinds) == reaches_limit
+    result = json.loads(json.dumps(as_dict(study)))
+    assert result["motor"]["kind"] == "ServoMotor" and result["speed_loop"] == {}
+    assert result["control"]["crossover"]["value"] == 20.0
