@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from reports import page_of
 from servo_motor import ServoMotor
 from systems import pair
 
@@ -60,3 +61,5 @@ def test_a_study_names_it(registered, tmp_path):
     result = json.loads(json.dumps(as_dict(study)))
     assert result["motor"]["kind"] == "ServoMotor" and result["speed_loop"] == {}
     assert result["control"]["crossover"]["value"] == 20.0
+    page = page_of(study)
+    assert "ServoMotor" in page and "current limit" in page and "coil.R" in page

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..errors import InputError
+from ..text import entry
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,15 @@ class Tuning:
     """of the speed loop [rad/s]"""
     current_crossover: float | None = None
     """of a current loop below it [rad/s]"""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Ready for JSON."""
+        margins = {
+            "phase_margin": (self.phase_margin, "deg"),
+            "crossover": (self.crossover, "rad/s"),
+            "current_crossover": (self.current_crossover, "rad/s"),
+        }
+        return {name: entry(x, unit) for name, (x, unit) in margins.items() if x is not None}
 
 
 def tune(armature: Any, inertia: float, bandwidth: float = 300.0, crossover_share: float = 0.1) -> Tuning:

@@ -521,12 +521,11 @@ def _over_example(data: Mapping[str, Any], parts: Parts) -> dict[str, Any]:
     base = parts.example
     if any(name in _table(data, "machine") for name in LENGTHS) and "ratios" not in data:
         base.pop("ratios", None)
-    other = "motor" in _table(data, "system") or "sizing" in data
-    if other or "motor" in data:
+    if parts.motor is not _parts(base).motor:
+        base.pop("motor", None)
+    if "motor" in _table(data, "system") or "sizing" in data or "motor" in data:
         base.get("system", {}).pop("motor", None)
         for name in ("gear", "start", "starter"):
             base.pop(name, None)
-    if other and not parts.gives_motor:
-        base.pop("motor", None)
     base["title"] = ""
     return merged(base, data)

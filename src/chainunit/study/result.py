@@ -94,11 +94,7 @@ def _statics(study: Study) -> dict[str, Any]:
             }
             for name, loop in statics.loops.items()
         },
-        "control": {
-            "phase_margin": entry(study.tuning.phase_margin, "deg"),
-            "crossover": entry(study.tuning.crossover, "rad/s"),
-            "current_crossover": entry(study.tuning.current_crossover, "rad/s"),
-        }
+        "control": study.tuning.as_dict()
         if study.tuning
         else study.drive.motor.control
         if study.drive.follows
