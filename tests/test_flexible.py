@@ -37,7 +37,7 @@ from chainunit.machines.chain_unit import (
     drive,
     rocker_motion,
 )
-from chainunit.machines.flexible import flexible, turning
+from chainunit.machines.flexible import flexible
 from chainunit.mechanism.machine import MachineState, Mechanism
 from chainunit.study import config
 from chainunit.study.chain import numbers_at, study_chain
@@ -204,7 +204,7 @@ def direct_case(rng):
     """A machine with chains in motion: both models, parameters of the direct one, and inputs and states of both."""
     model, p, u, x = moving(rng)
     walls, webs = model.organs.walls, model.organs.webs
-    direct = turning(walls, webs)
+    direct = flexible(walls, webs).direct()
     q = direct.parameter_layout.from_names(
         model.parameter_layout.named(p)
         | {"J_added": rng.uniform(0.1, 1.0), "phi_start": u.phi, "w_start": u.w}
@@ -236,7 +236,7 @@ def test_the_direct_model_with_chains_is_the_inverse_of_the_inverse_one():
 def test_a_machine_with_chains_that_turns_by_itself_keeps_its_energy():
     """From the hanging start, without losses or torque: kinetic energy of shaft, links and rods, and potential
     energy; the chains stay closed."""
-    model = turning(2, 1)
+    model = flexible(2, 1).direct()
     p = model.check(
         model.parameter_layout.from_names(
             {
@@ -261,10 +261,62 @@ def test_a_machine_with_chains_that_turns_by_itself_keeps_its_energy():
     assert np.ptp(energies) < 1e-6 * np.max(np.abs(energies))
 
 
+def test_the_direct_model_goes_on_from_where_the_inverse_one_is():
+    """From angles and speeds of the rods, folded beyond a stop or not; the energy that is due is that which is
+    there."""
+    rng = np.random.default_rng(36)
+    for _ in range(20):
+        model, p, u, x = moving(rng)
+        state = model.state_layout.instance(x)
+        outputs = named(model, p, u, state)
+        direct = model.direct()
+        start = direct.start_from({**outputs, **model.state_layout.named(state)})
+        p = dataclasses.replace(p, organ=dataclasses.replace(p.organ, fold_limit=0.01))
+        q = direct.check(direct.parameter_layout.from_names(model.parameter_layout.named(p) | start))
+        begun = direct.begin(q, direct.Inputs(left=u.left, right=u.right))
+        wanted = dict(zip(model.state_layout.names, x, strict=True))
+        for side in SIDES:
+            bent = named(direct, q, direct.Inputs(left=u.left, right=u.right), begun)
+            kinetic, potential = (bent[f"{side}.{kind}_energy"] for kind in ("kinetic", "potential"))
+            wanted[f"{side}.energy_due"] = kinetic + potential
+        got = direct.state_layout.named(begun)
+        assert (got.pop("phi"), got.pop("w")) == (u.phi, u.w)
+        for name, value in wanted.items():
+            assert got[name] == pytest.approx(value, rel=1e-9, abs=1e-9), name
+
+
+@native
+def test_the_direct_fmu_goes_on_from_where_the_inverse_one_is(tmp_path):
+    model = flexible(2, 1)
+    inverse, direct = (
+        export_native(m, tmp_path / f"{m.name}.fmu", {"g": 9.7}) for m in (model, model.direct())
+    )
+    begin = {"phi": 0.3, "w": 6.0}
+    names = ["phi0", "w0", *(name for name in model.state_layout.names if "energy" not in name)]
+    run = fmpy.simulate_fmu(
+        str(inverse),
+        stop_time=0.7,
+        output_interval=0.01,
+        start_values=begin,
+        output=names,
+        relative_tolerance=1e-9,
+    )
+    outputs = {name: float(run[name][-1]) for name in names}
+    assert max(abs(outputs[f"left.omega_{k}"]) for k in (1, 2, 3)) > 0.5
+    rods = [name for name in names if "theta" in name or "omega" in name]
+    end = fmpy.simulate_fmu(
+        str(direct), stop_time=0.01, output_interval=0.01, output=["phi", "w", *rods],
+        start_values=model.direct().start_from(outputs),
+    )  # fmt: skip
+    assert (end["phi"][0], end["w"][0]) == (outputs["phi0"], outputs["w0"])
+    for name in rods:
+        assert end[name][0] == pytest.approx(outputs[name], rel=1e-6, abs=1e-6), name
+
+
 @native
 @pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
 def test_the_direct_fmu_runs_as_its_equations(kind, tmp_path):
-    model, values = turning(2, 1), {"w_start": 4.0, "tau": 30.0, "left.material_mass": 40.0}
+    model, values = flexible(2, 1).direct(), {"w_start": 4.0, "tau": 30.0, "left.material_mass": 40.0}
     file = export_native(model, tmp_path / "turning.fmu", {n: v for n, v in values.items() if n != "tau"})
     p = model.check(model.parameter_layout.from_names({"w_start": 4.0}))
     u, layout = model.input_layout.from_names({"tau": 30.0, "left.material_mass": 40.0}), model.state_layout
@@ -903,6 +955,7 @@ def test_numbers_of_rods_that_make_no_model():
             flexible(walls, webs)
         assert "\n" not in str(refused.value)
     assert flexible(3, 1) is flexible(3, 1) and flexible(3, 1).built_by == "flexible(3, 1)"
+    assert flexible(3, 1).direct().built_by == "flexible(3, 1).direct()"
 
 
 def test_two_rods_stand_where_a_hanging_chain_would_not():

@@ -206,7 +206,9 @@ def _script(model: type[Model], start: dict[str, float]) -> str:
     plain = _SCRIPT.format(name=model.name, package=".".join(package), module=module, call=call)
     text = file.read_text() if file.is_file() else plain
     if model.built_by:
-        text = re.sub(r"(?m)^(    model = \w+\.)\w+\([\d, ]*\)", rf"\g<1>{model.built_by}", text)
+        text = re.sub(
+            r"(?m)^(    model = \w+\.)\w+\([\d, ]*\)(?:\.\w+\(\))*", rf"\g<1>{model.built_by}", text
+        )
     values = {name: float(start[name]) for name in sorted(start)}
     return text + (f"    start = {values!r}\n" if values else "")
 

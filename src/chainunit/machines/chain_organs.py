@@ -37,6 +37,8 @@ from .chain_unit import (
 
 _CLOSED = 1e-6
 """Gap at the start above which a chain does not hang [m]."""
+_ANY_FOLD = 1e6
+"""Angle beyond any fold [rad]."""
 _NO_PULL = 1e-6  # N, over which a rod turns from pulled to slack
 LEAST, MOST = 2, 24
 """Rods of an organ."""
@@ -117,16 +119,36 @@ class ChainSide(chain_unit.Side):
     energy_per_kg: Value = quantity("J/kg", "energy of a kilogram of material on its place")
 
 
-def _numbered(name: str, number: int, unit: str, words: str, nominal: float | None) -> list[Any]:
+def _numbered(
+    name: str,
+    number: int,
+    unit: str,
+    words: str,
+    nominal: float | None = None,
+    default: float | None = None,
+) -> list[Any]:
     return [
-        (f"{name}_{k}", Value, quantity(unit, words.format(k, k + 1), nominal=nominal))
+        (f"{name}_{k}", Value, quantity(unit, words.format(k, k + 1), nominal=nominal, default=default))
         for k in range(1, number + 1)
     ]
 
 
-def both(of: type) -> list[Any]:
+def both(of: type, default: Any = None) -> list[Any]:
     """Fields for the declaration `of` on each side."""
-    return [(name, of, group(of, f"{name} organ")) for name in SIDES]
+    return [(name, of, group(of, f"{name} organ", default=default)) for name in SIDES]
+
+
+@declaration
+class RodsGiven:
+    """The start of the rods of both organs."""
+
+    given: Value = quantity(
+        "1",
+        "1: they start with these angles and speeds, closed by the smallest change; 0: where they hang at rest",
+        default=0.0,
+        min=0.0,
+        max=1.0,
+    )
 
 
 class Organs:
@@ -142,7 +164,7 @@ class Organs:
             "ChainStates",
             (),
             [
-                *_numbered("theta", N, "rad", words, None),
+                *_numbered("theta", N, "rad", words),
                 *_numbered("omega", N, "rad/s", "speed of rod {}", 10.0),
                 ("energy_due", Value, quantity("J", due, nominal=100.0)),
             ],
@@ -152,10 +174,21 @@ class Organs:
             (ChainSide,),
             [
                 *_numbered("pull", N, "N", "mean axial pull in rod {}", 100.0),
-                *_numbered("fold", N - 1, "rad", "angle of rod {1} from rod {0}", None),
+                *_numbered("fold", N - 1, "rad", "angle of rod {1} from rod {0}"),
             ],
         )
         self._layout = Layout(self.States)
+        self.rod_names = self._layout.names[: 2 * N]
+        rod_start = declared_class(
+            "RodStart",
+            (),
+            [
+                *_numbered("theta", N, "rad", words, default=0.0),
+                *_numbered("omega", N, "rad/s", "speed of rod {}", default=0.0),
+            ],
+        )
+        self.RodsStart = declared_class("RodsStart", (RodsGiven,), both(rod_start, rod_start()))
+        self._start_layout = Layout(rod_start)
 
     def split(self, x: Any) -> list[State]:
         """Angles and speeds of the rods, left and right."""
@@ -229,12 +262,12 @@ class Organs:
         )
         return loads, -forces[0]
 
-    def loads(self, xp: Any, p: Any, x: Any, s: ChainedState, a: Any) -> dict[str, Any]:
-        """The fields of `Outputs` at crank acceleration `a`."""
+    def probes(self, xp: Any, p: Any, u: Any, s: Any, a: Any) -> dict[str, Any]:
+        """See `InverseMachine`."""
         reactions = s.reactions(a)
         sides: dict[str, Any] = {}
         for side, names in NAMES.items():
-            sides[side], support = self._side(xp, p, s, a, side, getattr(x, side).energy_due)
+            sides[side], support = self._side(xp, p, s, a, side, getattr(s.x, side).energy_due)
             reactions[names.a1, names.wall] = support
         left, right = sides.values()
         chains = s.chains.values()
@@ -291,8 +324,11 @@ class Organs:
         sides = zip(self.rods(p, u), self._reaches(xp, p, u, q), (z[:3], z[3:]), strict=True)
         return [value for rods, reach, own in sides for value in hanging_chain.hang(xp, rods, reach, own)]
 
-    def started(self, xp: Any, p: Any, u: Any, q: Any, w: Any, z: Sequence[Any]) -> dict[str, Any]:
-        """States of both sides: hanging at rest, and taken along by A2 where the crank turns."""
+    def started(
+        self, xp: Any, p: Any, u: Any, q: Any, w: Any, z: Sequence[Any], rods_start: Any = None
+    ) -> dict[str, Any]:
+        """States of both sides: hanging at rest, or as `rods_start` gives them, and taken along by A2 where the crank
+        turns."""
         states: list[Any] = []
         bars = None if self.unknowns else Mechanism(xp, ChamberForces.linkage(p, u), q).links
         for k, (rods, names) in enumerate(zip(self.rods(p, u), NAMES.values(), strict=True)):
@@ -301,6 +337,8 @@ class Organs:
             else:
                 theta = hanging_chain.resting(xp, rods, names.hand, z[3 * k : 3 * k + 3])
             states.append((theta, [0.0 * theta[0]] * self.number))
+        if rods_start is not None:
+            states = [self._given(rods_start, *each) for each in zip(SIDES, states, strict=True)]
         m = self.mechanism(xp, p, u, states, q)
         # once: of a chain that was not found to hang it leaves a gap, see `start_limits`
         states = [m.linkage.loads[side].closed(xp, m, w)[:2] for side in SIDES]
@@ -311,11 +349,22 @@ class Organs:
             sides[side] = self._layout.instance([*theta, *omega, kinetic + potential])
         return sides
 
+    def _given(self, rods_start: Any, side: str, hanging: State) -> State:
+        """Angles and speeds of a side: those that are given, or those of the hanging chain."""
+        N, share = self.number, rods_start.given
+        given = self._start_layout.values(getattr(rods_start, side))
+        values = [
+            (1.0 - share) * rest + share * own
+            for rest, own in zip((*hanging[0], *hanging[1]), given, strict=True)
+        ]
+        return values[:N], values[N:]
+
     def start_limits(self, xp: Any, p: Any, u: Any, x: Any, q: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """Of each side: the chain ends at A2, and no stop between rods is met."""
+        """Of each side: the chain ends at A2, and where it is to hang at rest no stop between rods is met."""
+        moving = p.rods_start.given if hasattr(p, "rods_start") else 0.0
         for h in self.held(xp, self.mechanism(xp, p, u, self.split(x), q), 0.0):
             yield h.missing.length(xp), -math.inf, _CLOSED
-            yield _largest_fold(xp, h.data.state[0]), -math.inf, p.organ.fold_limit
+            yield _largest_fold(xp, h.data.state[0]), -math.inf, p.organ.fold_limit + _ANY_FOLD * moving
 
 
 def _largest_fold(xp: Any, theta: Sequence[Any]) -> Any:

@@ -9,47 +9,30 @@ only.
 
 Pin friction acts in the four pins of the drive alone; in those of the chains it is the viscous damping of `organ`.
 
-Two models have these organs: the inverse one, and the direct one, whose states are the shaft's, too.
+Two models have these organs: the inverse one, and the direct one, whose states are the shaft's, too. The direct one
+starts where its chains hang at rest, or from the angles and speeds of the rods in `rods_start`.
 """
 
 from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
-from typing import Any
+from typing import Any, ClassVar
 
 from ..errors import InputError
-from ..integrate import Solver
 from ..mechanism.chains import ChainedState
-from ..mechanism.models import (
-    AddedInertia,
-    LinkageModel,
-    Turning,
-    TurningStates,
-    acceleration,
-    declared_class,
-    fields_of,
-    names_of,
-    turned,
-)
-from ..model import Model, Part, Requirement
-from ..ports import PortSlopes, PortValues, Start
-from ..quantities import Layout, declaration, group
+from ..mechanism.linkage import Linkage
+from ..mechanism.models import DirectMachine, InverseMachine, LinkageModel, acceleration, declared_class
+from ..model import Requirement
+from ..ports import PortSlopes
+from ..quantities import Layout, group
 from .chain_organs import MOST, Organs, Parameters, both
-from .chain_unit import SIDES, ChamberForces, DirectChainUnit, Inputs, Outputs
+from .chain_unit import SIDES, ChamberForces, Inputs, Outputs, drive
 
 CLOSING = 20.0
 """Rate at which a chain that has drifted off A2 is drawn back [1/s]."""
-
-
-@declaration
-class DirectChainParameters(Start, AddedInertia, Parameters):
-    """Parameters of the chain unit with chains that turns by itself."""
-
-    solver: Solver = group(Solver, "internal integrator", default=Solver(max_steps=1e5))
-
 
 _HANGS = tuple(
     Requirement(subject.format(side), unit, why, ("z", "l1", "l2", "e"))
@@ -78,33 +61,23 @@ _MASSES = tuple(
 )
 
 
-class ChainedModel(Model):
-    """A model of the chain unit with chains. Its own integrator controls its error to `tolerance`.
+class ChainedModel(LinkageModel):
+    """A model of the chain unit with chains. Its own integrator controls its error to `tolerance`."""
 
-    `bars` is the model with two bars that has the same shaft; `shaft` names the states of the shaft, none where its
-    motion is given.
-    """
-
-    bars: type[LinkageModel]
-    organs: Organs
-    shaft: tuple[str, ...] = ()
+    organs: ClassVar[Organs]
     controlled = True
     start_required = _HANGS
 
     def __init_subclass__(cls) -> None:
-        cls.required = (*cls.bars.required, *_MASSES)
-        cls.terminals = cls.bars.terminals
-        cls.start_unknowns = cls.organs.unknowns
-        cls.start_rounds = 100 if cls.start_unknowns else 0
+        if hasattr(cls, "organs"):
+            cls.start_unknowns = cls.organs.unknowns
+            cls.start_rounds = 100 if cls.start_unknowns else 0
         super().__init_subclass__()
 
-    @classmethod
-    def requirements(cls, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """Those of two bars, and masses that move."""
-        yield from cls.bars.requirements(xp, p)
-        for masses in (p.left, p.right):
-            yield masses.wall_mass, 0.0, math.inf
-            yield masses.web_mass, 0.0, math.inf
+    @staticmethod
+    def linkage(p: Any, u: Any) -> Linkage:
+        """The drive; its chains hang where their states say."""
+        return drive(p, u, (), {})
 
     @staticmethod
     def internal_step(xp: Any, p: Any) -> Any:
@@ -119,9 +92,7 @@ class ChainedModel(Model):
     @classmethod
     def at_crank(cls, p: Any, u: Any, x: Any = None) -> tuple[Any, Any]:
         """Angle [rad] and speed [rad/s] of the crank; without states those at the start."""
-        if not cls.shaft:
-            return u.phi / p.ratio, u.w / p.ratio
-        return (p.phi_start / p.ratio, p.w_start / p.ratio) if x is None else (x.phi / p.ratio, x.w / p.ratio)
+        raise NotImplementedError
 
     @classmethod
     def start_limits(cls, xp: Any, p: Any, u: Any, x: Any) -> Iterator[tuple[Any, Any, Any]]:
@@ -141,25 +112,61 @@ class ChainedModel(Model):
     @classmethod
     def started(cls, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> Any:
         """See `Organs.started`."""
-        shaft = {name: getattr(p, f"{name}_start") for name in cls.shaft}
         assert cls.States is not None
-        return cls.States(**shaft, **cls.organs.started(xp, p, u, *cls.at_crank(p, u), z))
+        return cls.States(**cls.organs.started(xp, p, u, *cls.at_crank(p, u), z))
 
     @classmethod
     def closed(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """See `Organs.closed`."""
-        shaft = [getattr(x, name) for name in cls.shaft]
-        return [*shaft, *cls.organs.closed(xp, p, u, x, *cls.at_crank(p, u, x))]
+        return cls.organs.closed(xp, p, u, x, *cls.at_crank(p, u, x))
 
     @classmethod
     def shared(cls, xp: Any, p: Any, u: Any, x: Any) -> ChainedState:
         """The machine at its crank angle and speed."""
         q, w = cls.at_crank(p, u, x)
-        return ChainedState(xp, cls.organs.mechanism(xp, p, u, cls.organs.split(x), q), w)
+        return ChainedState(xp, cls.organs.mechanism(xp, p, u, cls.organs.split(x), q), w, x=x)
 
 
-def flexible(walls: int, webs: int) -> type[ChainedModel]:
-    """The machine with `walls` + `webs` rods an organ.
+class TurningChains(ChainedModel, DirectMachine):
+    """The direct model of the chain unit with chains."""
+
+    @classmethod
+    def at_crank(cls, p: Any, u: Any, x: Any = None) -> tuple[Any, Any]:
+        """See `ChainedModel`: of its own states."""
+        shaft = cls.initial_states(None, p) if x is None else x
+        return shaft.phi / p.ratio, shaft.w / p.ratio
+
+    @classmethod
+    def start_from(cls, outputs: Mapping[str, float]) -> dict[str, float]:
+        """See `DirectMachine`: with the angles and speeds of the rods."""
+        rods = {
+            f"rods_start.{side}.{name}": outputs[f"{side}.{name}"]
+            for side in SIDES
+            for name in cls.organs.rod_names
+        }
+        return {**super().start_from(outputs), "rods_start.given": 1.0, **rods}
+
+    @classmethod
+    def started(cls, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> Any:
+        """See `Organs.started`."""
+        chains = cls.organs.started(xp, p, u, *cls.at_crank(p, u), z, p.rods_start)
+        return cls.States(**vars(cls.initial_states(xp, p)), **chains)
+
+    @classmethod
+    def closed(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+        """See `Organs.closed`."""
+        return [x.phi, x.w, *super().closed(xp, p, u, x)]
+
+    @classmethod
+    def derivatives(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+        """Time derivatives of the states, in declared order."""
+        s = cls.shared(xp, p, u, x)
+        a = acceleration(p, u, s)
+        return [x.w, a, *(v for h in s.chains.values() for v in h.rates(a / p.ratio, CLOSING))]
+
+
+def flexible(walls: int, webs: int) -> type[InverseMachine]:
+    """The machine with `walls` + `webs` rods an organ; its direct model is `flexible(walls, webs).direct()`.
 
     Raises
     ------
@@ -175,28 +182,10 @@ def flexible(walls: int, webs: int) -> type[ChainedModel]:
 
 
 @functools.cache
-def _flexible(walls: int, webs: int) -> type[ChainedModel]:
+def _flexible(walls: int, webs: int) -> type[InverseMachine]:
     chains = Organs(walls, webs)
-    declared = declared_class("ChainOutputs", (Outputs,), both(chains.Side))
 
-    def results(xp: Any, p: Any, u: Any, x: Any, s: ChainedState) -> Any:
-        a = u.a / p.ratio
-        return declared(
-            tau=s.torque(a) / p.ratio,
-            tau_bias=s.bias / p.ratio,
-            J=s.J / (p.ratio * p.ratio),
-            dJ_dphi=s.along(u.phi / p.ratio)[2] / (p.ratio * p.ratio * p.ratio),
-            phi0=u.phi,
-            w0=u.w,
-            **chains.loads(xp, p, x, s, a),
-        )
-
-    def port_slopes(xp: Any, p: Any, u: Any, x: Any, s: ChainedState) -> PortSlopes:
-        by_angle, by_speed, _ = s.along(u.phi / p.ratio)
-        per_motor_turn = 1.0 / (p.ratio * p.ratio)
-        return PortSlopes(tau_bias_dphi=by_angle * per_motor_turn, tau_bias_dw=by_speed * per_motor_turn)
-
-    class ChainUnitFlexible(ChainedModel):
+    class ChainUnitFlexible(ChainedModel, InverseMachine):
         """The chain unit with its organs as chains of rods, as many as `flexible` was told.
 
         Inputs, outputs and load port are those of ChamberForces, and connect alike. In a co-simulation the inputs phi
@@ -211,17 +200,42 @@ def _flexible(walls: int, webs: int) -> type[ChainedModel]:
             f"Forces in a chain unit whose organs are chains of {chains.number} rods, {walls} in the wall and {webs} "
             "in the web: from motor angle and speed to torque, load port and every support reaction"
         )
-        bars, organs = ChamberForces, chains
-        Feed, joints, pins = ChamberForces.Feed, ChamberForces.joints, ChamberForces.pins
+        direct_description = (
+            f"A chain unit that turns by itself, with organs of {chains.number} rods: from motor torque to angle, "
+            "speed, acceleration and every support reaction"
+        )
+        organs = chains
         Parameters = Parameters
         Inputs = Inputs
+        Feed = ChamberForces.Feed
         States = declared_class("States", (), both(chains.States))
+        Outputs = declared_class("ChainOutputs", (Outputs,), both(chains.Side))
+        joints, pins = ChamberForces.joints, ChamberForces.pins
+        probes = chains.probes
         input_rates = MappingProxyType({"phi": "w", "w": "a"})
+        by_differences = frozenset(("dJ_dphi", *Layout(PortSlopes).names))
+        required = (*ChamberForces.required, *_MASSES)
+
+        @staticmethod
+        def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
+            """Those of two bars, and masses that move."""
+            yield from ChamberForces.requirements(xp, p)
+            for masses in (p.left, p.right):
+                yield masses.wall_mass, 0.0, math.inf
+                yield masses.web_mass, 0.0, math.inf
 
         @classmethod
-        def direct(cls) -> type[ChainedModel]:
-            """The direct model of the same machine."""
-            return _turning(chains)
+        def at_crank(cls, p: Any, u: Any, x: Any = None) -> tuple[Any, Any]:
+            """See `ChainedModel`: of the given motion."""
+            return u.phi / p.ratio, u.w / p.ratio
+
+        @classmethod
+        @functools.cache
+        def direct(cls) -> type[DirectMachine]:
+            """See `InverseMachine`."""
+            words = "start of the rods"
+            rods = group(chains.RodsStart, words, default=chains.RodsStart())
+            return cls._turning(TurningChains, [("rods_start", chains.RodsStart, rods)], organs=chains)
 
         @classmethod
         def derivatives(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
@@ -230,61 +244,7 @@ def _flexible(walls: int, webs: int) -> type[ChainedModel]:
             m = chains.mechanism(xp, p, u, chains.split(x), q)
             return [v for h in chains.held(xp, m, w) for v in h.rates(u.a / p.ratio, CLOSING)]
 
-        parts = (
-            Part(declared, results, by_differences=frozenset(("dJ_dphi",))),
-            Part(PortSlopes, port_slopes, by_differences=frozenset(Layout(PortSlopes).names)),
-        )
-
     return ChainUnitFlexible
-
-
-def turning(walls: int, webs: int) -> type[ChainedModel]:
-    """The machine with chains that turns by itself, see `flexible`."""
-    return _turning(flexible(walls, webs).organs)
-
-
-@functools.cache
-def _turning(chains: Organs) -> type[ChainedModel]:
-    carried = fields_of(
-        declared_class("_", (Outputs,), both(chains.Side)), without=("tau", *names_of(PortValues))
-    )
-    declared = declared_class("DirectChainOutputs", (), [*carried, *fields_of(Turning)])
-
-    def results(xp: Any, p: Any, u: Any, x: Any, s: ChainedState) -> Any:
-        a = acceleration(p, u, s)
-        return declared(
-            a=a,
-            tau_bias=s.bias / p.ratio,
-            J=s.J / (p.ratio * p.ratio),
-            **turned(p, u, x, chains.loads(xp, p, x, s, a / p.ratio)),
-        )
-
-    class TurningChainUnitFlexible(ChainedModel):
-        """The chain unit with chains that turns by itself: the torque of the motor in, the motion of shaft and rods
-        out."""
-
-        name = "ChainUnitFlexibleDirect"
-        built_by = f"turning({chains.walls}, {chains.webs})"
-        description = (
-            f"A chain unit that turns by itself, with organs of {chains.number} rods: from motor torque to angle, "
-            "speed, acceleration and every support reaction"
-        )
-        bars, organs, shaft = DirectChainUnit, chains, ("phi", "w")
-        Parameters = DirectChainParameters
-        Inputs = DirectChainUnit.Inputs
-        States = declared_class("States", (TurningStates,), both(chains.States))
-
-        @classmethod
-        def derivatives(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
-            """Time derivatives of the states, in declared order."""
-            s = cls.shared(xp, p, u, x)
-            a = acceleration(p, u, s)
-            rates = [v for h in s.chains.values() for v in h.rates(a / p.ratio, CLOSING)]
-            return [x.w, a, *rates]
-
-        parts = (Part(declared, results),)
-
-    return TurningChainUnitFlexible
 
 
 ChainUnitFlexible = flexible(6, 2)

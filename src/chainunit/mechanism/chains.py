@@ -25,12 +25,15 @@ W_SMALL = 0.01
 
 
 class ChainedState(MachineState):
-    """A linkage with chains at one point: the `chains` by the names of their loads."""
+    """A linkage with chains at one point: the `chains` by the names of their loads; `x` the states of the model."""
 
-    __slots__ = ("_slopes", "chains")
+    __slots__ = ("_slopes", "chains", "x")
 
-    def __init__(self, xp: Any, m: Mechanism, w: Any, loads: Mapping[str, Any] | None = None) -> None:
+    def __init__(
+        self, xp: Any, m: Mechanism, w: Any, loads: Mapping[str, Any] | None = None, x: Any = None
+    ) -> None:
         super().__init__(xp, m, w, loads)
+        self.x = x
         self.chains: dict[str, HeldChain] = {
             name: self.effects[name].source
             for name, load in self._loads.items()
@@ -55,13 +58,21 @@ class ChainedState(MachineState):
             loads[name] = loads[name]._replace(state=(theta, omega))
         return loads
 
-    def along(self, q: Any) -> tuple[Any, Any, Any]:
-        """tau_bias_dphi, tau_bias_dw and dJ_dphi at the crank angle `q`, along the motion."""
+    @property
+    def inertia_slope(self) -> Any:
+        """The derivative of `J` by the crank angle along the motion [kg m2/rad]."""
+        return self._along()[2]
+
+    def slopes(self) -> tuple[Any, Any]:
+        """Derivatives of `bias` by the crank angle [N m/rad] and the crank speed [N m s/rad], along the motion."""
+        return self._along()[:2]
+
+    def _along(self) -> tuple[Any, Any, Any]:
         if self._slopes is None:
             w, engine = self.w, dual(self._xp)
             rates = {name: chain.chain.rates for name, chain in self.chains.items()}
             moving = self._moving({name: (c.data.state[1], rates[name]) for name, c in self.chains.items()})
-            along = MachineState(engine, Mechanism(engine, self.m.linkage, Dual(q, w)), w, moving)
+            along = MachineState(engine, Mechanism(engine, self.m.linkage, Dual(self.m.q, w)), w, moving)
             by_a = {}
             for name, chain in self.chains.items():
                 pushed, _ = chain.at(1.0)

@@ -28,7 +28,7 @@ class Mechanism:
     """The links of a linkage at crank angle `q` [rad]: `links`, `pins` with points, and `bodies` by name; `turns` the
     relative rotation in each joint per rotation of the crank."""
 
-    __slots__ = ("_groups", "bodies", "linkage", "links", "pins", "topology", "turns")
+    __slots__ = ("_groups", "bodies", "linkage", "links", "pins", "q", "topology", "turns")
 
     def __init__(
         self,
@@ -45,7 +45,7 @@ class Mechanism:
         derived : numbers that the groups derive from the lengths, see `derived_numbers`
         topology : that of the linkage, if it is known
         """
-        self.linkage = linkage
+        self.linkage, self.q = linkage, q
         self.topology = linkage.topology if topology is None else topology
         self.links: dict[str, Link] = {}
         self.pins = {name: Motion(at) for name, at in linkage.ground.items()}
@@ -260,6 +260,11 @@ class MachineState:
     def torque_by_reactions(self, a: Any) -> Any:
         """The crank torque from the forces, group by group, without friction [N m]: the second route."""
         return self.steady.torque + self._inertial()[0] * a
+
+    @property
+    def inertia_slope(self) -> Any:
+        """The derivative of `J` by the crank angle [kg m2/rad]."""
+        return self.dJ
 
     @property
     def kinetic_energy(self) -> Any:

@@ -20,11 +20,11 @@ from ..quantities import Layout, Value, declaration, quantity
 from .linkage import Linkage, Topology
 from .machine import MachineState, Mechanism, derived_numbers
 
-Fields = list[tuple[str, Any, Any]]
+Fields = Sequence[tuple[str, Any, Any]]
 """Name, type and field of each quantity or group of a declaration that is built from others."""
 
 
-def declared_class(name: str, bases: tuple[type, ...], fields: Sequence[tuple[str, Any, Any]] = ()) -> Any:
+def declared_class(name: str, bases: tuple[type, ...], fields: Fields = ()) -> Any:
     """A declaration that is built from its fields."""
     return dataclasses.make_dataclass(name, fields, bases=bases, frozen=True, kw_only=True)
 
@@ -103,6 +103,8 @@ class InverseMachine(LinkageModel):
     direct_name: ClassVar[str]
     """Name of the direct model, ``<name>Direct`` where a machine states none."""
     direct_description: ClassVar[str] = ""
+    by_differences: ClassVar[frozenset[str]] = frozenset()
+    """Outputs whose own derivatives are taken by differences, see `chainunit.model.Part`."""
 
     terminals = (*flanges("inflow"), load_terminal())
 
@@ -119,12 +121,17 @@ class InverseMachine(LinkageModel):
         if "name" in own and "direct_name" not in own:
             cls.direct_name = f"{cls.name}Direct"
         if "Outputs" in own and "parts" not in own:
-            cls.parts = Part(cls.Outputs, cls._outputs), Part(PortSlopes, slopes)
+            apart = cls.by_differences
+            cls.parts = (
+                Part(cls.Outputs, cls._outputs, by_differences=apart & set(Layout(cls.Outputs).names)),
+                Part(PortSlopes, slopes, by_differences=apart & set(Layout(PortSlopes).names)),
+            )
         super().__init_subclass__()
 
     @staticmethod
     def probes(xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
-        """The machine's own outputs, of a state at crank acceleration `a`."""
+        """The machine's own outputs, of a state at crank acceleration `a`; those that `running` gives, too, where it
+        gives them otherwise."""
         raise NotImplementedError
 
     @classmethod
@@ -139,11 +146,10 @@ class InverseMachine(LinkageModel):
             tau=s.torque(a) / p.ratio,
             tau_bias=s.bias / p.ratio,
             J=s.J / (p.ratio * p.ratio),
-            dJ_dphi=s.dJ / (p.ratio * p.ratio * p.ratio),
+            dJ_dphi=s.inertia_slope / (p.ratio * p.ratio * p.ratio),
             phi0=u.phi,
             w0=u.w,
-            **running(s, a),
-            **cls.probes(xp, p, u, s, a),
+            **running(s, a) | cls.probes(xp, p, u, s, a),
         )
 
     @classmethod
@@ -154,22 +160,33 @@ class InverseMachine(LinkageModel):
         Its parameters are those of the machine, the inertia on its shaft and the start; its inputs the torque and the
         loads; its outputs those of the machine without `tau` and load port, and `Turning`.
         """
+        return cls._turning(DirectMachine)
+
+    @classmethod
+    def _turning(cls, base: type[DirectMachine], parameters: Fields = (), **more: Any) -> type[DirectMachine]:
+        """The direct model as a subclass of `base`, with more `parameters` and attributes."""
         carried = fields_of(cls.Outputs, without=("tau", *names_of(PortValues)))
+        # the machine's own where the start declares it, too
+        own = [field for field in fields_of(cls.Parameters) if field[0] in names_of(Start)]
         members = {
             "__module__": cls.__module__,
             "__doc__": f"The direct model of {cls.__name__}: motor torque in, motion out.",
             "name": cls.direct_name,
             "description": cls.direct_description
             or f"{cls.name} that turns by itself: from motor torque to angle, speed, acceleration and every reaction",
-            "built_by": f"{cls.__qualname__}.direct()",
+            "built_by": f"{cls.built_by or cls.__qualname__}.direct()",
             "inverse": cls,
-            "Parameters": declared_class("DirectParameters", (Start, AddedInertia, cls.Parameters)),
+            "Parameters": declared_class(
+                "DirectParameters", (Start, AddedInertia, cls.Parameters), [*own, *parameters]
+            ),
+            "States": declared_class("States", (TurningStates,), fields_of(cls.States) if cls.States else ()),
             "Inputs": declared_class(
                 "DirectInputs", (DrivingTorque,), fields_of(cls.Inputs, without=names_of(ShaftMotion))
             ),
             "Outputs": declared_class("DirectOutputs", (), [*carried, *fields_of(Turning)]),
+            **more,
         }
-        return type(f"Direct{cls.__name__}", (DirectMachine,), members)
+        return type(f"Direct{cls.__name__}", (base,), members)
 
 
 def running(s: MachineState, a: Any) -> dict[str, Any]:
@@ -238,6 +255,8 @@ class DirectMachine(LinkageModel):
     )
 
     def __init_subclass__(cls) -> None:
+        if not hasattr(cls, "inverse"):  # a common base of several models
+            return
         cls.required = (*cls.inverse.required, cls._carried)
         cls.parts = (Part(cls.Outputs, cls._outputs),)
         super().__init_subclass__()
@@ -252,6 +271,12 @@ class DirectMachine(LinkageModel):
         """Those of the inverse model, and an inertia that never vanishes."""
         yield from cls.inverse.requirements(xp, p)
         yield p.J_added * p.ratio * p.ratio + cls.linkage(p, cls.Inputs()).crank.inertia, 0.0, math.inf
+
+    @classmethod
+    def start_from(cls, outputs: Mapping[str, float]) -> dict[str, float]:
+        """Start parameters with which it goes on from a motion of the inverse model, whose outputs and states at that
+        instant are given by name."""
+        return {"phi_start": outputs["phi0"], "w_start": outputs["w0"]}
 
     @staticmethod
     def initial_states(xp: Any, p: Any) -> Any:
@@ -278,20 +303,16 @@ class DirectMachine(LinkageModel):
     def _outputs(cls, xp: Any, p: Any, u: Any, x: Any, s: MachineState) -> Any:
         a = acceleration(p, u, s)
         at_crank = a / p.ratio
+        fields = running(s, at_crank) | cls.inverse.probes(xp, p, u, s, at_crank)
+        # the motor drives what is on its shaft, too
+        fields["kinetic_energy"] += 0.5 * p.J_added * (x.w * x.w)
+        fields["power"] = u.tau * x.w
         return cls.Outputs(
             a=a,
             tau_bias=s.bias / p.ratio,
             J=s.J / (p.ratio * p.ratio),
-            **turned(p, u, x, running(s, at_crank)),
-            **cls.inverse.probes(xp, p, u, s, at_crank),
+            **fields,
         )
-
-
-def turned(p: Any, u: Any, x: Any, fields: dict[str, Any]) -> dict[str, Any]:
-    """The fields of `running` of a machine that turns by itself: with the inertia on its shaft, and the power of the
-    motor."""
-    kinetic = fields["kinetic_energy"] + 0.5 * p.J_added * (x.w * x.w)
-    return fields | {"power": u.tau * x.w, "kinetic_energy": kinetic}
 
 
 def acceleration(p: Any, u: Any, s: MachineState) -> Any:
