@@ -1,28 +1,26 @@
-"""The models that become FMUs, and those of machines, by name."""
+"""The models that become FMUs, by name. A module of `machines` adds its machine by itself."""
 
-from collections.abc import Mapping
+from importlib import import_module
+from pkgutil import iter_modules
 
+from . import machines
 from .drives.driveline import CardanDriveline
 from .drives.motors import MOTORS
-from .machines.accelerator import Accelerator
-from .machines.chain_unit import ChamberForces
 from .machines.flexible import ChainUnitFlexible
-from .machines.knife_drive import KnifeDrive
-from .mechanism.models import InverseMachine
+from .mechanism.models import MACHINES as MACHINES
 from .model import Model
 
-_MACHINES: tuple[type[InverseMachine], ...] = (ChamberForces, KnifeDrive, Accelerator)
-MACHINES: Mapping[str, type[InverseMachine]] = {model.name: model for model in _MACHINES}
-"""The inverse models of linkage machines: parameters, feed, pins and the direct model of each follow from it."""
+for _module in iter_modules(machines.__path__):
+    import_module(f"{machines.__name__}.{_module.name}")
 
+_CHAIN_UNIT = MACHINES["ChamberForces"]
 _MODELS: tuple[type[Model], ...] = (
-    ChamberForces,
-    ChamberForces.direct(),
+    _CHAIN_UNIT,
+    _CHAIN_UNIT.direct(),
     *MOTORS.values(),
     CardanDriveline,
-    KnifeDrive,
+    *(machine for machine in MACHINES.values() if machine is not _CHAIN_UNIT),
     ChainUnitFlexible,
-    Accelerator,
 )
 MODELS = {model.name: model for model in _MODELS}
 """All models."""

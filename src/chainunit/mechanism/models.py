@@ -20,6 +20,8 @@ from ..quantities import Layout, Value, declaration, quantity
 from .linkage import Linkage, Topology
 from .machine import MachineState, Mechanism, derived_numbers
 
+MACHINES: dict[str, type[InverseMachine]] = {}
+"""The machines by name: a class of that kind anywhere is a machine that study files may name."""
 Fields = Sequence[tuple[str, Any, Any]]
 """Name, type and field of each quantity or group of a declaration that is built from others."""
 
@@ -118,8 +120,10 @@ class InverseMachine(LinkageModel):
             cls.feed_layout = Layout(cls.Feed)
         if "joints" in own and "pins" not in own:
             cls.pins = {f"{pin} {link}": output for output, (pin, link) in cls.joints.items()}
-        if "name" in own and "direct_name" not in own:
-            cls.direct_name = f"{cls.name}Direct"
+        if "name" in own:
+            MACHINES[cls.name] = cls
+            if "direct_name" not in own:
+                cls.direct_name = f"{cls.name}Direct"
         if "Outputs" in own and "parts" not in own:
             apart = cls.by_differences
             cls.parts = (

@@ -1,0 +1,171 @@
+"""How far a change reaches: each kind of addition is made to a copy of the package, in as many files as the table of
+docs/architecture.md says, and used there by the program."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import chainunit
+
+HERE = Path(__file__).parent / "additions"
+EVENT = '''
+
+class Sticking(Event):
+    """The pusher meets more resistance for a while."""
+
+    kind, run = "sticking", "sticking"
+    words, heading = "the pusher sticks", "sticking"
+    role, sided = Role.SHOCK, False
+    acts_on = ("resistance",)
+
+    @declaration
+    class Parameters(Timing):
+        """Of the resistance."""
+
+        factor: Value = quantity("1", "resistance over that of normal running", default=3.0, min=1.0)
+
+    def signals(
+        self, normal: Mapping[str, float], at: float, state: Mapping[str, float]
+    ) -> dict[str, OverTime]:
+        """More from the begin on."""
+        usual = normal["resistance"]
+        return {"resistance": Profile(usual, ((at, 0.01, self.p.factor * usual),))}
+'''
+MEASURE = """    bearing_peak: Value = measure(
+        "N",
+        "force in the bearing O3, peak",
+        lambda w: float(
+            np.max(np.hypot(w.value("machine.output_bearing.fx"), w.value("machine.output_bearing.fy")))
+        ),
+        during=_ALL,
+    )
+"""
+STUDY = """
+title = "A six-bar with a motor of another type"
+
+[system]
+machine = "SixBar"
+motor = "SlipMotor"
+
+[machine]
+ratio = 10
+
+[motor]
+rotor = { J = 0.05 }
+
+[run]
+crank_speed = 15.5
+settle_turns = 3
+
+[[event]]
+type = "sticking"
+factor = 2
+"""
+
+
+class House:
+    """A copy of the package, and the files of it that are changed or new."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.touched = folder, []
+        self.package = folder / "src" / "chainunit"
+        shutil.copytree(Path(chainunit.__file__).parent, self.package)
+        shutil.copytree(Path(__file__).parents[1] / "fmu", folder / "fmu")
+
+    def add(self, name: str, file: Path) -> None:
+        shutil.copy(file, self.package / name)
+        self.touched.append(name)
+
+    def insert(self, name: str, before: str, text: str) -> None:
+        path = self.package / name
+        whole = path.read_text("utf-8")
+        assert whole.count(before) == 1 or not before
+        path.write_text(whole.replace(before, text + before) if before else whole + text, "utf-8")
+        self.touched.append(name)
+
+    def run(self, *command: str) -> str:
+        env = os.environ | {"PYTHONPATH": str(self.package.parent)}
+        call = [sys.executable, "-c", "from chainunit.cli import main; main()", *command]
+        done = subprocess.run(call, cwd=self.folder, env=env, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+
+@pytest.fixture(scope="module")
+def house(tmp_path_factory):
+    return House(tmp_path_factory.mktemp("house"))
+
+
+def files_of(house, add):
+    before = len(house.touched)
+    add()
+    return len(house.touched) - before
+
+
+@pytest.fixture(scope="module")
+def result(house):
+    """The study of the six-bar by a motor of a new type, with a new event and a new measure."""
+    assert files_of(house, lambda: house.add("machines/six_bar.py", HERE / "six_bar.py")) == 1
+
+    def motor():
+        house.add("drives/slip_motor.py", HERE / "slip_motor.py")
+        house.insert("drives/motors.py", "\nMOTORS:", "from .slip_motor import SlipMotor\n")
+        path = house.package / "drives" / "motors.py"
+        types = "(DcMotor, InductionMotor)"
+        path.write_text(path.read_text("utf-8").replace(types, types[:-1] + ", SlipMotor)"), "utf-8")
+
+    assert files_of(house, motor) == 2
+    assert files_of(house, lambda: house.insert("study/events.py", "", EVENT)) == 1
+    line = '    speed_mean: Value = measure("rad/s"'
+    assert files_of(house, lambda: house.insert("study/measures.py", line, MEASURE)) == 1
+    (house.folder / "mine.toml").write_text(STUDY, "utf-8")
+    house.run("study", "mine.toml", "-o", "mine")
+    return json.loads((house.folder / "mine" / "result.json").read_text("utf-8"))
+
+
+def test_a_machine_is_a_file_and_has_fmu_and_study(house, result):
+    said = house.run("export", "SixBar", "-o", "SixBar.fmu", "--config", "mine.toml")
+    assert said.startswith("SixBar.fmu: SixBar")
+    assert result["machine"]["crank_length"]["value"] == 0.1 and result["status"] == "complete"
+    assert list(result["pins"]["steady"]) == ["O1 crank", "A coupler", "O3 output"]
+    assert result["certificate"]["start_up"]["energy_residual_share"]["value"] < 1e-4
+    # the torque of normal running, by virtual work of another route: the power that is lost over the speed
+    steady = result["answers"]["steady"]
+    with xr.open_dataset(house.folder / "mine" / "result.nc", group="start_up") as run:
+        time, lost = run["time"].values, run["machine.dissipated_power"].values
+        angle = run["machine.phi0"].values / 10.0
+        turn = angle >= angle[-1] - 2.0 * np.pi
+        mean = np.trapezoid(lost[turn], time[turn]) / np.ptp(time[turn])
+    assert steady["crank_torque_mean"]["value"] * steady["speed_mean"]["value"] == pytest.approx(
+        mean, rel=0.02
+    )
+
+
+def test_a_motor_type_is_a_file_and_a_line(result):
+    assert result["motor"]["kind"] == "SlipMotor"
+    steady = result["answers"]["steady"]
+    # the straight line gives the speed that belongs to the mean torque
+    torque = 3.0 * (157.0 - 10.0 * steady["speed_mean"]["value"])
+    assert steady["current_rms"]["value"] >= 0.3 * torque > 0.0
+
+
+def test_an_event_is_a_class(result):
+    assert result["events"]["sticking"]["type"] == "sticking"
+    peaks = {run: result["answers"][run]["crank_torque_peak"]["value"] for run in ("steady", "sticking")}
+    assert peaks["sticking"] > 1.1 * peaks["steady"]
+
+
+def test_a_measure_is_a_field(house, result):
+    for run in ("steady", "sticking"):
+        peak = result["answers"][run]["bearing_peak"]["value"]
+        assert peak == pytest.approx(result["pins"][run]["O3 output"]["peak"]["value"], rel=1e-12)
+    assert "force in the bearing O3, peak" in (house.folder / "mine" / "report.html").read_text("utf-8")
