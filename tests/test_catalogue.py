@@ -16,7 +16,6 @@ from chainunit import engines
 from chainunit.drives.catalogue import LAYOUT, catalogue, heading, motor_of_catalogue
 from chainunit.drives.gearing import KINDS, W_REST, Transmission, motor_side
 from chainunit.drives.induction_motor import InductionMotor, breakdown, steady
-from chainunit.drives.motors import motor_of
 from chainunit.drives.nameplate import LAYOUT as NAMEPLATE
 from chainunit.drives.nameplate import TYPICAL, Assumptions, Nameplate, check, identify
 from chainunit.errors import InputError
@@ -97,7 +96,7 @@ def test_a_motor_is_found_by_its_designation():
     found = motor_of_catalogue(wanted.designation)
     assert found == wanted
     model, parameters = found.model()
-    assert model is motor_of(parameters) is InductionMotor
+    assert model is InductionMotor
     assert parameters == found.identify().parameters and not model.follows(parameters)
     with pytest.raises(InputError, match=r'"IE3 4-pole 2 kW": not in the catalogue.*"IE3 4-pole 22 kW, '):
         motor_of_catalogue("IE3 4-pole 2 kW")

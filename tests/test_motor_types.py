@@ -10,7 +10,7 @@ from reports import page_of
 from servo_motor import ServoMotor
 from systems import pair
 
-from chainunit.drives.motors import MOTORS, motor_of
+from chainunit.drives.motors import MOTORS
 from chainunit.study import config, run
 from chainunit.study.result import as_dict
 from chainunit.system import CoSimulation, Profile, export, monolithic
@@ -47,7 +47,7 @@ def test_it_runs_as_an_fmu(tmp_path):
 def test_a_study_names_it(registered, tmp_path):
     chosen = config.parse(STUDY)
     study = run.run_study(chosen, tmp_path)
-    assert study.failure is None and study.drive.motor is motor_of(study.motor) is ServoMotor
+    assert study.failure is None and study.drive.motor is ServoMotor
     steady, p = study.answers["steady"], study.motor
     assert p.coil.R == 1.5 and p.control.ki == pytest.approx(4.0 * p.control.kp)
     assert steady.speed_mean == pytest.approx(chosen.run.crank_speed, rel=1e-6)

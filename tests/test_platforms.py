@@ -36,9 +36,11 @@ EXPORTED = {
 @here
 def test_backends_say_what_they_took(tmp_path, monkeypatch):
     motor = MODELS["DcMotor"]
-    said = export_any(motor, tmp_path / "a.fmu")
-    assert "native code by" in said and "found here" in said
-    assert "pythonfmu" in export_any(motor, tmp_path / "b.fmu", backend="python")
+    made = export_any(motor, tmp_path / "a.fmu")
+    said = str(made)
+    assert made.backend == "native" and "native code by" in said and "found here" in said
+    made = export_any(motor, tmp_path / "b.fmu", backend="python")
+    assert made.backend == "python" and "pythonfmu" in str(made)
     with pytest.raises(InputError, match="--platforms needs the native backend"):
         export_any(motor, tmp_path / "d.fmu", backend="python", platforms=["linux64"])
     with pytest.raises(InputError, match="must be 2 or 3"):
@@ -51,12 +53,12 @@ def test_backends_say_what_they_took(tmp_path, monkeypatch):
         export_any(motor, tmp_path / "d.fmu", platforms=["aarch64-linux"])
     # without zig the system's compiler serves this machine alone
     monkeypatch.setattr(platforms, "_zig", lambda: None)
-    assert "linux64 (run)" in export_any(motor, tmp_path / "a.fmu", platforms=["linux64"])
+    assert "linux64 (run)" in str(export_any(motor, tmp_path / "a.fmu", platforms=["linux64"]))
     with pytest.raises(InputError, match=r"needs zig.*pip install 'chainunit\[cross\]'"):
         export_any(motor, tmp_path / "d.fmu", platforms=["linux64", "win64"])
     # without any
     monkeypatch.setattr(shutil, "which", lambda name: None)
-    assert "no C compiler for this machine found" in export_any(motor, tmp_path / "c.fmu")
+    assert "no C compiler for this machine found" in str(export_any(motor, tmp_path / "c.fmu"))
     with pytest.raises(InputError, match="--fmi 3 needs the native backend"):
         export_any(motor, tmp_path / "d.fmu", fmi=3)
     with pytest.raises(InputError, match="for this machine found: install one"):
@@ -65,7 +67,7 @@ def test_backends_say_what_they_took(tmp_path, monkeypatch):
     monkeypatch.undo()
     false = shutil.which("false")
     monkeypatch.setattr(platforms, "compiler", lambda: Compiler((false,), zig=False))
-    assert "false failed" in export_any(motor, tmp_path / "e.fmu")
+    assert "false failed" in str(export_any(motor, tmp_path / "e.fmu"))
     with pytest.raises(RunError, match=r"the C compiler .*false failed"):
         export_any(motor, tmp_path / "d.fmu", backend="native")
     assert {p.name for p in tmp_path.iterdir()} == {"a.fmu", "b.fmu", "c.fmu", "e.fmu"}
@@ -75,7 +77,7 @@ def test_backends_say_what_they_took(tmp_path, monkeypatch):
 @here
 def test_zig_serves_where_the_system_has_no_compiler(tmp_path, monkeypatch):
     monkeypatch.setattr(shutil, "which", lambda name: None)
-    said = export_any(MODELS["DcMotor"], tmp_path / "a.fmu")
+    said = str(export_any(MODELS["DcMotor"], tmp_path / "a.fmu"))
     assert "native code by zig, the C compiler found here" in said
     end = fmpy.simulate_fmu(str(tmp_path / "a.fmu"), start_values={"w_ref": 50.0}, stop_time=0.05)[-1]
     assert end["w"] > 1.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -15,6 +16,17 @@ from .native import platforms as targets
 Backend = Literal["native", "python"]
 
 
+@dataclass(frozen=True)
+class Origin:
+    """By which backend an FMU was made, and in `words` how and why."""
+
+    backend: Backend
+    words: str
+
+    def __str__(self) -> str:
+        return self.words
+
+
 def export(
     model: type[Model],
     file: Path,
@@ -24,8 +36,8 @@ def export(
     fmi: int = 2,
     platforms: Sequence[str] = (),
     report: Callable[[str], None] = lambda what: None,
-) -> str:
-    """Write `model` as an FMU and say, in words, which backend words it and why.
+) -> Origin:
+    """Write `model` as an FMU and say which backend made it, and why.
 
     Parameters
     ----------
@@ -55,9 +67,11 @@ def export(
             raise
         return _by_python(model, file, start, fmi, platforms, f", the C compiler {compiler.name} failed")
     words = f"FMI {fmi}.0, Co-Simulation and Model Exchange, native code by {compiler.name}"
-    if not platforms:
-        return words + ("" if backend else ", the C compiler found here")
-    return f"{words} for " + ", ".join(f"{name} ({targets.PLATFORMS[name].tried})" for name in names)
+    if platforms:
+        words += " for " + ", ".join(f"{name} ({targets.PLATFORMS[name].tried})" for name in names)
+    elif backend is None:
+        words += ", the C compiler found here"
+    return Origin("native", words)
 
 
 def _by_python(
@@ -67,7 +81,7 @@ def _by_python(
     fmi: int,
     platforms: Sequence[str],
     why: str,
-) -> str:
+) -> Origin:
     if fmi != 2:
         raise InputError(
             "--fmi 3 needs the native backend, that is a C compiler (cc, gcc, clang, or zig by "
@@ -76,4 +90,5 @@ def _by_python(
     if platforms:
         raise InputError("--platforms needs the native backend; a Python FMU runs on Linux and Windows alike")
     python.export(model, file, start)
-    return f"FMI 2.0 Co-Simulation, by pythonfmu{why}; needs Python 3.11 in the importing process"
+    words = f"FMI 2.0 Co-Simulation, by pythonfmu{why}; needs Python 3.11 in the importing process"
+    return Origin("python", words)

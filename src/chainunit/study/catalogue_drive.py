@@ -10,7 +10,6 @@ import numpy as np
 
 from ..drives.catalogue import CatalogueMotor
 from ..drives.gearing import motor_side
-from ..drives.induction_motor import InductionMotor
 from ..engines import numpy_
 from .config import Config
 from .drive import Drive
@@ -32,7 +31,7 @@ def catalogue_drive(
         where no circuit meets the motor's nameplate.
     """
     gear, plate, w = config.gear, motor.nameplate, config.run.crank_speed
-    p = motor.identify().parameters
+    model, p = motor.model()
     synchronous, rated_speed, rated_torque = plate.synchronous, plate.speed, plate.torque
     follows = config.start == "inverter"
     given = "gear.ratio" in config.given
@@ -61,4 +60,4 @@ def catalogue_drive(
         ambient=surroundings,
     )
     machine = config.machine.replace({"ratio": ratio})
-    return Drive(InductionMotor, p, machine, follows, rated_current=plate.rated_current, chain=config.chain)
+    return Drive(model, p, machine, follows, rated_current=plate.rated_current, chain=config.chain)

@@ -15,7 +15,7 @@ import xarray as xr
 from ..drives.driveline import CardanDriveline
 from ..drives.motor import Motor
 from ..errors import InputError
-from ..fmu.backends import Backend
+from ..fmu.backends import Backend, Origin
 from ..fmu.backends import export as export_fmu
 from ..machines.api import ChainUnit
 from ..machines.chain_organs import OrganLaw
@@ -204,14 +204,19 @@ class Drive:
             run.attrs,
         )
 
-    def export(self, folder: Path, backend: Backend | None = None) -> tuple[dict[str, Path], dict[str, str]]:
+    def export(
+        self, folder: Path, backend: Backend | None = None
+    ) -> tuple[dict[str, Path], dict[str, Origin]]:
         """Write the FMUs, with these start values; returns files by component, and how they were made."""
-        exported, backends = export(self.graph, folder, backend)
-        return {name: c.file for name, c in exported.components.items() if c.file}, backends
+        exported, origins = export(self.graph, folder, backend)
+        return {name: c.file for name, c in exported.components.items() if c.file}, origins
 
-    def export_machine(self, folder: Path, backend: Backend | None = None) -> tuple[Path, str]:
+    def export_machine(self, folder: Path, backend: Backend | None = None) -> Path:
         """Write the machine's FMU alone; the same as `export` writes."""
-        return _exported(*self.load_model(), folder, backend)
+        model, p = self.load_model()
+        file = folder / f"{model.name}.fmu"
+        export_fmu(model, file, model.parameter_layout.named(p), backend=backend)
+        return file
 
     def system(self, files: Mapping[str, Path]) -> System:
         """The system of FMUs that were made of these models, whatever start values they carry."""
@@ -276,8 +281,3 @@ class Drive:
         """Its parameters by name."""
         added = {} if self.line is None else {"J_added": self.line.J4}
         return self.driven.named | added
-
-
-def _exported(model: type[Model], p: Any, folder: Path, backend: Backend | None) -> tuple[Path, str]:
-    file = folder / f"{model.name}.fmu"
-    return file, export_fmu(model, file, model.parameter_layout.named(p), backend=backend)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..drives.induction_motor import InductionMotor
+from ..drives.motor import Motor
 from ..fmu.backends import Backend
 from ..machines.chain_unit import SIDES, SideName
 from ..quantities import Value, declaration, quantity
@@ -94,8 +94,8 @@ def duty_of(config: Config, folder: Path, backend: Backend | None) -> Duty:
     size = {side: rms((1.0, turn.crank_torque)) for side, turn in one_sided.items()}
     heavier: SideName = "left" if size["left"] >= size["right"] else "right"
     if config.chain is not None:
-        drive = Drive(InductionMotor, None, config.machine, chain=config.chain)
-        fmu = Fmu(drive.export_machine(folder, backend)[0])
+        drive = Drive(Motor, None, config.machine, chain=config.chain)
+        fmu = Fmu(drive.export_machine(folder, backend))
         try:
             both = chain_duty(fmu, drive, w, feed)
             one_sided = {side: chain_duty(fmu, drive, w, case) for side, case in loads.items()}

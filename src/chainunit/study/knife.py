@@ -19,7 +19,7 @@ from pydantic import BeforeValidator, Field
 from ..drives.catalogue import CatalogueMotor, motor_of_catalogue
 from ..drives.induction_motor import InductionMotor
 from ..errors import InputError, RunError
-from ..fmu.backends import Backend
+from ..fmu.backends import Backend, Origin
 from ..machines.knife_drive import KnifeDrive, Parameters
 from ..quantities import Layout, Value, declaration, quantity, variables
 from ..reading import (
@@ -242,7 +242,7 @@ class KnifeStudy:
     wheels: list[Wheel] = dataclasses.field(default_factory=list)
     least: Wheel | None = None
     """the least flywheel that keeps the permitted fluctuation, where one was found"""
-    backends: dict[str, str] = dataclasses.field(default_factory=dict)
+    backends: dict[str, Origin] = dataclasses.field(default_factory=dict)
     failure: RunError | None = None
     unfinished: xr.Dataset | None = None
     """the results of the run that failed, up to there"""

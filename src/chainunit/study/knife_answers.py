@@ -172,7 +172,7 @@ def as_dict(study: KnifeStudy) -> dict[str, Any]:
         "flywheels": [{**entries(w.answers), "stalled": w.stalled} for w in study.wheels],
         "least_flywheel": None if study.least is None else entries(study.least.answers),
         "flywheel_by_hand": array_entry(study.flywheel_by_hand, "kg.m2"),
-        "fmus": study.backends,
+        "fmus": {name: str(origin) for name, origin in study.backends.items()},
         "warnings": warnings(study),
         "notes": notes(study),
         "failure": None if study.failure is None else str(study.failure),

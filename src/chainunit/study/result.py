@@ -50,7 +50,7 @@ def as_dict(study: Study) -> dict[str, Any]:
         **_statics(study),
         **_runs(study),
         **_parts(study),
-        "fmus": study.made,
+        "fmus": {name: str(origin) for name, origin in study.fmus.items()},
     }
 
 

@@ -65,7 +65,7 @@ def run_study(
     if config.monte_carlo.runs:
         _check_random(config, Rig(config, drive, {}))
     _analyse(study, Rig(config, drive, {}), report, needs_runs=False)
-    files, study.made = drive.export(folder / "fmu", backend)
+    files, study.fmus = drive.export(folder / "fmu", backend)
     runner = Runner(study, Rig(config, drive, files), report)
     try:
         runner.run(check, lambda: drive.coasting(folder / "fmu", backend))
@@ -105,7 +105,7 @@ def _check_random(config: Config, rig: Rig) -> None:
 
 def _chains(study: Study, file: Path, report: Report) -> None:
     """Chains at constant speed; left out where an FMU in Python would take hours for their many turns."""
-    if "native" not in study.made["machine"]:
+    if study.fmus["machine"].backend != "native":
         study.remark(
             "note",
             "chains left out",

@@ -10,6 +10,7 @@ import xarray as xr
 
 from ..drives.speed_control import Tuning
 from ..errors import RunError
+from ..fmu.backends import Origin
 from ..text import entry, number
 from . import verdict
 from .chain import ChainResult
@@ -77,7 +78,7 @@ class Study:
     statics: DriveStatics
     tuning: Tuning | None = None
     sizing: SizingResult | None = None
-    made: dict[str, str] = field(default_factory=dict)
+    fmus: dict[str, Origin] = field(default_factory=dict)
     """how each FMU was made"""
     runs: dict[str, xr.Dataset] = field(default_factory=dict)
     steady_from: float | None = None

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from ..fmu.backends import Backend
+from ..fmu.backends import Backend, Origin
 from ..fmu.backends import export as export_fmu
 from .graph import Component, ModelComponent, System
 
@@ -16,16 +16,16 @@ def export(
     folder: Path,
     backend: Backend | None = None,
     report: Callable[[str], None] = lambda what: None,
-) -> tuple[System, dict[str, str]]:
+) -> tuple[System, dict[str, Origin]]:
     """Write an FMU for each model of the system that has none, with the component's start values, to `folder`.
     Components of one model share the file of the first.
 
     Returns
     -------
-    the system of these files, and how each component's was made, in words.
+    the system of these files, and how each component's was made.
     """
     components: dict[str, Component] = {}
-    origins: dict[str, str] = {}
+    origins: dict[str, Origin] = {}
     files: dict[object, Path] = {}
     for name, component in system.components.items():
         if isinstance(component, ModelComponent) and component.file is None:

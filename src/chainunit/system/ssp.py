@@ -85,7 +85,7 @@ def export(
                 source = f"resources/{model.name}.fmu"
                 paths[alike] = f"resources/{model.name}_{component}.fmu" if source in contents else source
                 fmu = Path(scratch) / f"{model.name}.fmu"
-                origins.append(export_fmu(model, fmu, start, backend=backend, report=report))
+                origins.append(str(export_fmu(model, fmu, start, backend=backend, report=report)))
                 contents[paths[alike]] = fmu.read_bytes()
             sources[component] = paths[alike]
     for component, interface in interfaces.items():
