@@ -98,6 +98,8 @@ def test_temperatures():
         ("[machine]\nr = true", "machine.r = True: must be a number in m"),
         ("title = 3", "title = 3: must be a text"),
         ("feed_forward = 3", "feed_forward = 3: must be true or false"),
+        ('feed_forward = "yes"', 'feed_forward = "yes": must be true or false'),
+        ("empty_start = 1", "empty_start = 1: must be true or false"),
         ('organ = "belt"', 'organ = "belt": must be "two-bar" or "chain"'),
         ('[event]\ntype = "jam"', "event = {'type': 'jam'}: must be a list of tables, each below [[event]]"),
         ('[report]\nunits = "imperial"', 'report.units = "imperial": must be a table'),

@@ -48,7 +48,6 @@ def test_events_are_named_after_type_and_side():
     [
         ("event = 3", "event = 3: "),
         ("event = [3]", "event 1 = 3: must be a table"),
-        ('[[event]]\nside = "left"', "event 1: type = None: must be one of jam, lumps, empties"),
         ('[[event]]\ntype = "jamm"', 'event 1: type = "jamm": must be one of jam, lumps'),
         ('[[event]]\ntype = "jam"', 'event 1 (jam): side: must be given, "left" or "right"'),
         ('[[event]]\ntype = "jam"\nside = "up"', 'event 1 (jam): side = "up": must be "left" or "right"'),
@@ -61,6 +60,7 @@ def test_events_are_named_after_type_and_side():
             '[[event]]\ntype = "jam"\nside = "left"\nforc = 1',
             "event.jam_left.forc: unknown key; known here: crank_angle, turns, force",
         ),
+        ('[[event]]\nside = "left"', "event 1: type: must be given, one of jam, lumps, "),
         ('[[event]]\ntype = "dip"\nname = "Dip 1"', 'event 1 (dip): name = "Dip 1": must be small letters'),
         ('[[event]]\ntype = "dip"\nname = "steady"', 'event 1 (dip): name = "steady": is that of another'),
         ('event = [{ type = "dip" }, { type = "blocked", name = "dip" }]', 'event 2 (blocked): name = "dip"'),
@@ -99,10 +99,26 @@ def test_what_lumps_and_jams_do_over_time():
         for t, force in ((-0.001, 50.0), (0.025, 400.0), (0.05, 750.0), (0.25, 750.0), (0.3001, 50.0)):
             assert at(signal, begin + t) == pytest.approx(force, abs=1e-6)
     assert at(signal, 1.0 + 2.4 + 0.1) == 50.0
-    assert lumps.on("right", p).follow(0.1) == pytest.approx(2.4)
+    # the last lump is gone after 1.9 s; a turn more is followed
+    assert lumps.on("right", p).follow(0.1) == pytest.approx(2.0)
     assert lumps.on("right", p).follow(10.0) == pytest.approx(21.0)
     jam = TYPES["jam"]
     assert set(Layout(jam.Parameters).names) < set(Layout(lumps.Parameters).names)
+
+
+@pytest.mark.parametrize("kind", [name for name, of in TYPES.items() if not of.from_rest])
+def test_an_event_is_followed_to_its_end_and_a_turn_more(kind):
+    """However long it lasts, and however short the turns that are asked for are."""
+    of, turn = TYPES[kind], 0.25
+    longer = {n: 7.0 for n in Layout(of.Parameters).names if n in ("duration", "shift")}
+    event = of.on("left" if of.sided else "", of.Parameters(turns=1.0, **longer))
+    normal = dict.fromkeys(event.inputs(event.side), 50.0)
+    signals = event.signals(normal, 0.0, dict.fromkeys(event.reads, 0.1)).values()
+    end = event.follow(turn) - turn
+    assert end >= (7.0 if longer else 0.0)
+    for signal in signals:
+        assert at(signal, end + 1e-9) == at(signal, end + 100.0)
+    assert of.on(event.side, of.Parameters(turns=200.0, **longer)).follow(turn) == pytest.approx(200.1 * turn)
 
 
 @pytest.mark.parametrize("share", [1.0, 0.25])

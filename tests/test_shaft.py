@@ -205,6 +205,9 @@ def test_a_coupling_that_opens_lets_line_and_machine_coast(tmp_path):
     w = float(study.runs["jam_left"]["machine.w0"][-1])
     assert float(coasting["machine.w"][0]) == pytest.approx(w, rel=1e-12)
     assert study.drive.coasting_parameters()["J_added"] == study.drive.line.J4
+    # what stays behind is the energy of the machine before it opened, and of the line's end
+    before = float(study.runs["jam_left"]["machine.kinetic_energy"][-1])
+    assert jam.energy_behind == pytest.approx(before + 0.5 * study.drive.line.J4 * w * w, rel=1e-9)
     assert study.certificate["jam_left"]["driveline_energy_residual_share"] < 1e-3
 
 

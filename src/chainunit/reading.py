@@ -261,7 +261,6 @@ def first_line(error: ValidationError, file: type[BaseModel], prefix: str = "") 
 _KINDS = {
     "string_type": "a text",
     "bool_type": "true or false",
-    "bool_parsing": "true or false",
     "dict_type": "a table",
 }
 """What a value must be, by the kind of pydantic's error."""

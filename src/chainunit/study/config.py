@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, StrictBool
 
 from ..drives.cardan import check
 from ..drives.catalogue import CatalogueMotor, motor_of_catalogue
@@ -104,8 +104,8 @@ class Parts:
                 for name, section in self.sections.items()
             }
             | {"report": ReportTable, "system": SystemTable},
-            feed_forward=(bool, False),
-            empty_start=(bool, False),
+            feed_forward=(StrictBool, False),
+            empty_start=(StrictBool, False),
             start=(Literal[STARTS], "direct"),
             organ=(Literal[ORGANS], "two-bar"),
             catalogue=(str, ""),

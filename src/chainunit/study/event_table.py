@@ -124,7 +124,8 @@ def _type(table: Any, where: str) -> type[Event]:
     name = table.get("type")
     of = TYPES.get(name) if isinstance(name, str) else None
     if of is None:
-        raise InputError(f"{where}: type = {shown(name)}: must be one of {', '.join(TYPES)}")
+        refused = ": must be given," if name is None else f" = {shown(name)}: must be"
+        raise InputError(f"{where}: type{refused} one of {', '.join(TYPES)}")
     return of
 
 

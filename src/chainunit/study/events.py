@@ -9,6 +9,7 @@ out an event whose inputs its system does not have.
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -16,7 +17,7 @@ from typing import Any, ClassVar, Literal, TypeAlias
 
 from ..machines.chain_unit import SIDES, SideName, other
 from ..quantities import Value, declaration, quantity
-from ..system.signals import Profile
+from ..system.signals import Profile, corners
 from ..text import number
 
 OverTime: TypeAlias = float | Profile
@@ -51,7 +52,11 @@ class Timing:
         usual=(0.0, 6.3),
     )
     turns: Value = quantity(
-        "1", "crank turns that are followed after the event begins", default=2.0, min=1.0, max=1e4
+        "1",
+        "crank turns that are followed after the event begins; a turn after its last change at least",
+        default=2.0,
+        min=1.0,
+        max=1e4,
     )
 
 
@@ -144,9 +149,16 @@ class Event:
         raise NotImplementedError
 
     def follow(self, turn: float) -> float:
-        """Time that is followed from its begin on [s], where a turn of the crank takes `turn` [s]."""
+        """Time that is followed from its begin on [s], where a turn of the crank takes `turn` [s]: the turns that are
+        asked for, and a turn after the last change at least."""
         # a little more than asked, so that a dip in speed does not cost a whole turn
-        return float((self.p.turns + 0.1) * turn)
+        return float(max((self.p.turns + 0.1) * turn, self.lasts + turn))
+
+    @property
+    def lasts(self) -> float:
+        """Time from its begin to the last change of its signals [s]."""
+        signals = self.signals(defaultdict(float), 0.0, defaultdict(float))
+        return max([0.0, *corners(signals.values())])
 
     def variants(self) -> tuple[Event, ...]:
         """The same event with what is assumed in it at the ends of its range; none where nothing is."""
@@ -238,10 +250,6 @@ class Lumps(Jam):
 
     def _begins(self, at: float) -> list[float]:
         return [at + k * self._period for k in range(int(self.p.number))]
-
-    def follow(self, turn: float) -> float:
-        """The turns asked for, and all lumps."""
-        return max(super().follow(turn), self.p.number * self._period)
 
 
 _LOADS = ("material_mass", "processing_force")
