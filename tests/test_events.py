@@ -121,6 +121,24 @@ def test_an_event_is_followed_to_its_end_and_a_turn_more(kind):
     assert of.on(event.side, of.Parameters(turns=200.0, **longer)).follow(turn) == pytest.approx(200.1 * turn)
 
 
+def test_an_overload_is_on_top_of_the_load():
+    rig = rig_of('[system]\nmachine = "Accelerator"\n[feed]\nload = 300\n')
+    overload = TYPES["overload"]
+    event = overload.on("", overload.Parameters(torque=800.0, duration=0.4, rise=0.1))
+    assert rig.takes(event) and not rig_of().takes(event)
+    ((name, signal),) = rig.event_signals(event, 1.0, {}).items()
+    assert name == "machine.load"
+    for t, torque in (
+        (0.99, 300.0),
+        (1.05, 700.0),
+        (1.1, 1100.0),
+        (1.5, 1100.0),
+        (1.55, 700.0),
+        (1.61, 300.0),
+    ):
+        assert at(signal, t) == pytest.approx(torque)
+
+
 @pytest.mark.parametrize("share", [1.0, 0.25])
 def test_feed_that_moves_keeps_its_mass(share):
     rig = rig_of("[feed]\nleft = { material_mass = 40 }\nright = { material_mass = 20 }\n")

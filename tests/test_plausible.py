@@ -194,3 +194,10 @@ def test_the_remark_stands_on_terminal_page_and_in_json():
 def test_a_gear_ratio_that_no_drive_has_is_remarked():
     (told,) = map(str, config.parse("[machine]\nratio = 5000").slips)
     assert told.startswith("machine.ratio = 5000: is unusual") and "usual: 1 to 500" in told
+
+
+def test_the_usual_speed_is_that_of_the_machine():
+    fast = '[system]\nmachine = "Accelerator"\n[run]\ncrank_speed = {}'
+    assert config.parse(fast.format(150)).slips == ()
+    (slip,) = config.parse(fast.format('"90 rev/min"')).slips
+    assert slip.variable.name == "run.crank_speed" and "usual: 10 to 1000 rad/s" in str(slip)

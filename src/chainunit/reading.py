@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, TypeVar
 
 from pydantic import (
@@ -153,14 +154,23 @@ class Slip:
         return f"{v.name} = {self.value:g}{unit}: is unusual ({v.description}; {usual}){hint}"
 
 
-def slips(declared: Mapping[str, type], data: Mapping[str, Any]) -> Iterator[Slip]:
-    """The unusual values in the sections of a checked file, `declared` by the name of the section."""
+def slips(
+    declared: Mapping[str, type],
+    data: Mapping[str, Any],
+    usual: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+) -> Iterator[Slip]:
+    """The unusual values in the sections of a checked file, `declared` by the name of the section; `usual` are sizes
+    that are usual here in place of the declared ones, by the name of the quantity."""
     for section, of in declared.items():
         for variable in variables(of, f"{section}."):
             given: Any = data
             for name in variable.name.split("."):
                 given = given.get(name) if isinstance(given, Mapping) else None
             if given is not None:
+                here = usual.get(variable.name, variable.quantity.usual)
+                variable = dataclasses.replace(
+                    variable, quantity=dataclasses.replace(variable.quantity, usual=here)
+                )
                 value = to_number(variable, given)
                 if not variable.quantity.is_usual(value):
                     yield Slip(variable, value, _meant(variable, given))

@@ -78,6 +78,7 @@ class Accelerator(InverseMachine):
     Outputs = Outputs
     joints = MappingProxyType({"bearing": ("O", "rotor")})
     pins = MappingProxyType({"O rotor bearing": "bearing"})
+    usual_speed = (10.0, 1000.0)
 
     @staticmethod
     def linkage(p: Any, u: Any) -> Linkage:

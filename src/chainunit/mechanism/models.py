@@ -105,6 +105,8 @@ class InverseMachine(LinkageModel):
     direct_name: ClassVar[str]
     """Name of the direct model, ``<name>Direct`` where a machine states none."""
     direct_description: ClassVar[str] = ""
+    usual_speed: ClassVar[tuple[float, float]] = (0.05, 25.0)
+    """Of the crank [rad/s]; beyond, a slip of the unit is likely."""
     by_differences: ClassVar[frozenset[str]] = frozenset()
     """Outputs whose own derivatives are taken by differences, see `chainunit.model.Part`."""
 

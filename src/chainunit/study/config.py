@@ -252,7 +252,7 @@ def parse(text: str, source: str = "config") -> Config:
     read_table(parts.form, data)
     checked = read_table(parts.form, _over_example(data, parts))
     declared = {name: section.declared for name, section in parts.sections.items()}
-    unusual = tuple(slips(declared, data))
+    unusual = tuple(slips(declared, data, {"run.crank_speed": parts.machine.usual_speed}))
     try:
         events = read_events(checked.event)
         if "event" in data:

@@ -481,3 +481,34 @@ class HardCut(Event):
         edge, usual = 1e-2, normal["cut_force"]
         changes = ((at, edge, self.p.force), (at + self.p.duration, edge, usual))
         return {"cut_force": Profile(usual, changes)}
+
+
+class Overload(Event):
+    """The material brakes the machine more than usual."""
+
+    kind, run = "overload", "overload"
+    words, heading = "the load of the machine rises", "overload"
+    role, sided = Role.SHOCK, False
+    acts_on = ("load",)
+    draws: ClassVar[Mapping[str, tuple[float, float]]] = {"torque": (500.0, 2000.0)}
+
+    @declaration
+    class Parameters(Timing):
+        """Of the load."""
+
+        torque: Value = quantity(
+            "N.m", "torque of the material beside that of normal running", default=500.0, min=0.0
+        )
+        duration: Value = quantity(
+            "s", "time for which it lasts", default=0.5, min=1e-4, max=1e4, usual=(1e-3, 60.0)
+        )
+        rise: Value = quantity(
+            "s", "time in which it rises and falls", default=0.005, min=1e-4, max=1e4, usual=(1e-4, 60.0)
+        )
+
+    def signals(
+        self, normal: Mapping[str, float], at: float, state: Mapping[str, float]
+    ) -> dict[str, OverTime]:
+        """The torque of the material, on top of that of normal running."""
+        p = self.p
+        return {"load": _pulses(normal["load"], p.torque, [at], p.rise, p.duration)}

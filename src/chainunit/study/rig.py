@@ -181,7 +181,9 @@ class Rig:
         if self.config.empty_start:
             run, rig = self.start_empty(simulation, progress, guards)
             pieces = [run]
-            later = simulation.time - self.config.started
+            # a motor that follows a ramp is not steady before its end
+            fed = max(simulation.time, self.config.started) if self.drive.follows else simulation.time
+            later = fed - self.config.started
             stop, steady_from = stop + later, steady_from + later
             if any(abs(float(run[name][-1])) >= limit for name, limit in guards.items()):
                 return StartUp(run, steady_from, stop, rig)

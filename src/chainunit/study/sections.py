@@ -44,7 +44,6 @@ class Run:
         default=3.0,
         min=0.01,
         max=1000.0,
-        usual=(0.05, 25.0),
         kind="speed",
     )
     ramp: Value = quantity(
