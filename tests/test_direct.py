@@ -13,10 +13,10 @@ from scipy.integrate import solve_ivp
 from chainunit import EMPTY, ChainUnit, GeometryError, engines
 from chainunit.fmu.native.export import export
 from chainunit.fmu.native.platforms import compiler
-from chainunit.machines.chain_unit import ChamberForces, DirectChainUnit
+from chainunit.machines.chain_unit import ChamberForces
 from chainunit.system.instance import Fmu, Instance
 
-MODEL = DirectChainUnit
+MODEL = ChamberForces.direct()
 
 
 def parameters(machine, **more):

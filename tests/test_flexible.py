@@ -26,7 +26,6 @@ from chainunit.errors import InterruptedRunError
 from chainunit.fmu.export import export as export_python
 from chainunit.fmu.native.export import export as export_native
 from chainunit.fmu.native.platforms import compiler
-from chainunit.groups.loads import Pin, Processing, Stop
 from chainunit.machines import hanging
 from chainunit.machines.chain_organs import OrganLaw
 from chainunit.machines.chain_unit import (
@@ -38,6 +37,7 @@ from chainunit.machines.chain_unit import (
     rocker_motion,
 )
 from chainunit.machines.flexible import flexible
+from chainunit.machines.parts import Pin, Processing, Stop
 from chainunit.mechanism.machine import MachineState, Mechanism
 from chainunit.study import config
 from chainunit.study.chain import numbers_at, study_chain

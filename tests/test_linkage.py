@@ -22,10 +22,10 @@ from chainunit.groups.chain import Rods
 from chainunit.groups.driver import Crank
 from chainunit.groups.dyad import Dyad
 from chainunit.groups.hanging_chain import HangingChain
-from chainunit.groups.loads import Pin, PinLosses, Processing, Push, Resistance, Weight
+from chainunit.groups.loads import PinLosses, Push, Resistance, Weight
 from chainunit.groups.triad import Triad
 from chainunit.machines.knife_drive import KnifeDrive
-from chainunit.machines.parts import Force, force
+from chainunit.machines.parts import Force, Pin, Processing, force
 from chainunit.mechanism.chains import ChainedState
 from chainunit.mechanism.linkage import Linkage
 from chainunit.mechanism.machine import MachineState, Mechanism

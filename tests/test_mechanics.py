@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from machines import random_loads, random_machine, random_state
 
 from chainunit import EMPTY, ChainUnit, GeometryError, InputError, SideLoads, engines
-from chainunit.groups.loads import Stop
 from chainunit.machines.api import FREE
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.machines.crank_rocker import half_width_range
+from chainunit.machines.parts import Stop
 
 
 def draw(seed: int, lossless: bool = False):

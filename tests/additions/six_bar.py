@@ -8,14 +8,14 @@ from typing import Any
 from ..groups.body import Bar, Mass
 from ..groups.driver import Crank
 from ..groups.dyad import Dyad
-from ..groups.loads import Pin, PinLosses, Processing, Resistance, Weight
+from ..groups.loads import PinLosses, Resistance, Weight
 from ..mechanism.linkage import Linkage
 from ..mechanism.machine import MachineState
 from ..mechanism.models import InverseMachine, ShaftMotion
 from ..planar import Vec2
 from ..ports import PortValues
 from ..quantities import Value, declaration, group, quantity
-from .parts import Force, Rod, force
+from .parts import Force, Pin, Processing, Rod, force
 
 
 @declaration

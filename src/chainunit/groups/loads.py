@@ -1,8 +1,9 @@
 """Loads of a linkage: weight, resistance to the motion of a point, a stop, the losses of the pins.
 
-Each has declared parameters or inputs, and answers one question by `effect`: the forces on links, the torque at the
-coordinate that overcomes them by virtual work, and the energy that is held. A force that does not only depend on the
-place takes power; its torque is that power over w, written so that w = 0 is regular.
+Each takes parameters and inputs as machines declare them (`chainunit.machines.parts`), and answers one question by
+`effect`: the forces on links, the torque at the coordinate that overcomes them by virtual work, and the energy that
+is held. A force that does not only depend on the place takes power; its torque is that power over w, written so that
+w = 0 is regular.
 """
 
 from __future__ import annotations
@@ -11,7 +12,6 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol
 
 from ..planar import ZERO, Link, Motion, Vec2
-from ..quantities import Value, declaration, quantity
 from .body import Body
 
 Joint = tuple[str, str]
@@ -113,17 +113,8 @@ class Push(NamedTuple):
         return Effect((wrench_at(m, self.point, self.force),), lost=-self.force.dot(m.pins[self.point].p1))
 
 
-@declaration
-class Processing:
-    """The law of the processing force."""
-
-    v_smooth: Value = quantity(
-        "m/s", "speed of B below which the force is smoothed", default=0.02, min=1e-9, tunable=True
-    )
-
-
 class Resistance(NamedTuple):
-    """A force on a point against its motion [N], smoothed near rest by the law (`Processing`)."""
+    """A force on a point against its motion [N], smoothed below the speed `v_smooth` of its law."""
 
     point: str
     force: Any
@@ -142,17 +133,8 @@ class Resistance(NamedTuple):
         return Effect((wrench_at(m, self.point, p1 * (-per)),), lost=v2 * per)
 
 
-@declaration
-class BrakeLaw:
-    """The law of a torque against the rotation."""
-
-    w_smooth: Value = quantity(
-        "rad/s", "speed below which the torque is smoothed", default=0.02, min=1e-9, tunable=True
-    )
-
-
 class Brake(NamedTuple):
-    """A torque on a link against its rotation in the frame [N m], smoothed near rest by the law (`BrakeLaw`)."""
+    """A torque on a link against its rotation in the frame [N m], smoothed below the speed `w_smooth` of its law."""
 
     link: str
     torque: Any
@@ -167,33 +149,13 @@ class Brake(NamedTuple):
         return Effect((Wrench(self.link, ZERO, -moment),), lost=k * moment)
 
 
-@declaration
-class Stack:
-    """The stack of paper, and how it resists."""
-
-    top: Value = quantity("m", "height y of its top", default=-0.185, min=-1e4, max=1e4, tunable=True)
-    table: Value = quantity(
-        "m", "height y of the table below it", default=-0.234, min=-1e4, max=1e4, tunable=True
-    )
-    edge: Value = quantity(
-        "m", "way over which the resistance rises and falls", default=0.002, min=1e-6, tunable=True
-    )
-    v_smooth: Value = quantity(
-        "m/s",
-        "speed of the blade below which the resistance is smoothed",
-        default=0.005,
-        min=1e-9,
-        tunable=True,
-    )
-
-
 def _engaged(xp: Any, x: Any) -> Any:
     """A step from 0 to 1 about x = 0, over about two units."""
     return 0.5 * (1.0 + x / xp.sqrt(1.0 + x * x))
 
 
 class Cut(NamedTuple):
-    """The resistance of a stack (`Stack`) to a point on its way down in it [N], against the motion."""
+    """The resistance of a stack to a point on its way down in it [N], against the motion."""
 
     point: str
     force: Any
@@ -214,19 +176,9 @@ class Cut(NamedTuple):
         return Effect((wrench_at(m, self.point, k.p1 * (-per)),), lost=v2 * per)
 
 
-@declaration
-class Stop:
-    """A spring and damper between rocker and frame, which hold a blocked rocker; off where both are zero. The
-    smoothed friction and processing force hold nothing at rest."""
-
-    stiffness: Value = quantity("N.m/rad", "stiffness", default=0.0, min=0.0, nominal=1e6)
-    damping: Value = quantity("N.m.s/rad", "damping", default=0.0, min=0.0, nominal=1e4)
-    psi: Value = quantity("rad", "rocker angle at which the spring is free", default=0.0)
-
-
 class Block(NamedTuple):
-    """The obstacle of a link (`Stop`), whose angle counts from the downward vertical and never reaches the
-    horizontal."""
+    """The obstacle of a link, a spring and a damper; the angle of the link counts from the downward vertical and never
+    reaches the horizontal."""
 
     link: str
     stop: Any
@@ -245,21 +197,8 @@ class Block(NamedTuple):
         )
 
 
-@declaration
-class Pin:
-    """The pins, all alike."""
-
-    friction: Value = quantity("1", "coefficient of friction", default=0.12, min=0.0, max=100.0, tunable=True)
-    diameter: Value = quantity(
-        "m", "diameter", default=0.06, min=0.0, max=100.0, tunable=True, usual=(1e-3, 1.0)
-    )
-    w_smooth: Value = quantity(
-        "rad/s", "relative speed below which friction is smoothed", default=0.02, min=1e-9, tunable=True
-    )
-
-
 class PinLosses(NamedTuple):
-    """Losses in all pins (`Pin`): Coulomb friction that the reaction sets, smoothed near rest, and viscous damping
+    """Losses in all pins: Coulomb friction that the reaction sets, smoothed near rest, and viscous damping
     [N m s/rad] of each.
 
     A pin with the relative speed Dw and the reaction R dissipates friction * diameter/2 * |R| * Dw^2/sqrt(Dw^2 +

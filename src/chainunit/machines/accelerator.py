@@ -11,14 +11,23 @@ from typing import Any
 
 from ..groups.body import Bar
 from ..groups.driver import Crank
-from ..groups.loads import Brake, BrakeLaw, Pin, PinLosses, Weight
+from ..groups.loads import Brake, PinLosses, Weight
 from ..mechanism.linkage import Linkage
 from ..mechanism.machine import MachineState
 from ..mechanism.models import InverseMachine, ShaftMotion
 from ..planar import ZERO
 from ..ports import PortValues
 from ..quantities import Value, declaration, group, quantity
-from .parts import Force, Rod, force
+from .parts import Force, Pin, Rod, force
+
+
+@declaration
+class BrakeLaw:
+    """The law of a torque against the rotation."""
+
+    w_smooth: Value = quantity(
+        "rad/s", "speed below which the torque is smoothed", default=0.02, min=1e-9, tunable=True
+    )
 
 
 @declaration

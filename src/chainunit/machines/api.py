@@ -11,7 +11,6 @@ import numpy as np
 
 from ..engines import MATH, numpy_
 from ..errors import GeometryError
-from ..groups.loads import Stop
 from ..mechanism.models import InverseMachine
 from ..ports import PortSlopes
 from ..quantities import Quantity, Variable
@@ -20,6 +19,7 @@ from .chain_unit import SIDES, Chamber, ChamberForces, Feed, Inputs, Outputs, Pa
 from .crank_rocker import rocker_extremes
 from .hanging import Hanging, Modes, modes, rods, split
 from .machine import Machine, admitted
+from .parts import Stop
 
 _XP = numpy_()
 CHAIN_RODS = 32

@@ -19,7 +19,7 @@ from typing import Any, Literal, NamedTuple
 from ..groups.body import Bar, Mass
 from ..groups.driver import Crank
 from ..groups.dyad import Dyad
-from ..groups.loads import Block, Pin, PinLosses, Processing, Resistance, Stop, Weight
+from ..groups.loads import Block, PinLosses, Resistance, Weight
 from ..mechanism.linkage import Linkage
 from ..mechanism.machine import MachineState, Mechanism
 from ..mechanism.models import InverseMachine, ShaftMotion
@@ -28,7 +28,7 @@ from ..planar import ZERO, Link, Vec2
 from ..ports import PortValues
 from ..quantities import Value, declaration, group, quantity
 from .crank_rocker import TURNS, half_width_range, longest_crank, pressure_angle, rocker_extremes
-from .parts import Force, Rod, force
+from .parts import Force, Pin, Processing, Rod, Stop, force
 
 SideName = Literal["left", "right"]
 SIDES: tuple[SideName, ...] = ("left", "right")
@@ -465,7 +465,3 @@ class ChamberForces(InverseMachine):
     def linkage(p: Any, u: Any) -> Linkage:
         """Crank, dyad, and an organ on each side."""
         return drive(p, u, tuple(organ(p, u, side) for side in SIDES), resistances(p, u))
-
-
-DirectChainUnit = ChamberForces.direct()
-"""As an FMU it is called ChainUnit."""

@@ -16,7 +16,7 @@ from ..groups import triad
 from ..groups.body import Bar, Mass
 from ..groups.driver import Crank
 from ..groups.dyad import Dyad
-from ..groups.loads import Cut, Pin, PinLosses, Push, Stack, Weight
+from ..groups.loads import Cut, PinLosses, Push, Weight
 from ..groups.triad import Pose, Triad
 from ..mechanism.linkage import Linkage
 from ..mechanism.machine import MachineState, Mechanism
@@ -25,7 +25,7 @@ from ..planar import Vec2
 from ..ports import PortValues
 from ..quantities import Value, declaration, group, quantity
 from .crank_rocker import TURNS, longest_crank
-from .parts import Force, Rod, force
+from .parts import Force, Pin, Rod, force
 
 
 @declaration
@@ -70,6 +70,26 @@ class Assembly:
     y: Value = quantity("m", "origin of its frame, y", default=0.0172492, min=-1e4, max=1e4)
     theta: Value = quantity(
         "rad", "angle of its x axis, counter-clockwise", default=-0.0116588, min=-7.0, max=7.0
+    )
+
+
+@declaration
+class Stack:
+    """The stack of paper, and how it resists."""
+
+    top: Value = quantity("m", "height y of its top", default=-0.185, min=-1e4, max=1e4, tunable=True)
+    table: Value = quantity(
+        "m", "height y of the table below it", default=-0.234, min=-1e4, max=1e4, tunable=True
+    )
+    edge: Value = quantity(
+        "m", "way over which the resistance rises and falls", default=0.002, min=1e-6, tunable=True
+    )
+    v_smooth: Value = quantity(
+        "m/s",
+        "speed of the blade below which the resistance is smoothed",
+        default=0.005,
+        min=1e-9,
+        tunable=True,
     )
 
 

@@ -1,4 +1,4 @@
-"""The common declarations of machines: links as bodies, forces."""
+"""The common declarations of machines: links as bodies, forces, and the laws of loads (`chainunit.groups.loads`)."""
 
 from __future__ import annotations
 
@@ -20,6 +20,38 @@ class Rod:
         tunable=True,
     )
     I: Value = quantity("kg.m2", "moment of inertia about the centroid", default=0.0, min=0.0, tunable=True)
+
+
+@declaration
+class Pin:
+    """The pins, all alike."""
+
+    friction: Value = quantity("1", "coefficient of friction", default=0.12, min=0.0, max=100.0, tunable=True)
+    diameter: Value = quantity(
+        "m", "diameter", default=0.06, min=0.0, max=100.0, tunable=True, usual=(1e-3, 1.0)
+    )
+    w_smooth: Value = quantity(
+        "rad/s", "relative speed below which friction is smoothed", default=0.02, min=1e-9, tunable=True
+    )
+
+
+@declaration
+class Processing:
+    """The law of the processing force."""
+
+    v_smooth: Value = quantity(
+        "m/s", "speed of B below which the force is smoothed", default=0.02, min=1e-9, tunable=True
+    )
+
+
+@declaration
+class Stop:
+    """A spring and damper between rocker and frame, which hold a blocked rocker; off where both are zero. The
+    smoothed friction and processing force hold nothing at rest."""
+
+    stiffness: Value = quantity("N.m/rad", "stiffness", default=0.0, min=0.0, nominal=1e6)
+    damping: Value = quantity("N.m.s/rad", "damping", default=0.0, min=0.0, nominal=1e4)
+    psi: Value = quantity("rad", "rocker angle at which the spring is free", default=0.0)
 
 
 @declaration
