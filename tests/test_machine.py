@@ -60,6 +60,12 @@ def test_the_direct_model_follows_from_the_inverse_one(model):
     assert float(need["tau"]) + 0.3 * a == pytest.approx(5.0, rel=1e-9)
 
 
+def test_a_machine_of_that_name_is_one_class():
+    """Machines with chains, as many as there are numbers of rods, are none of them."""
+    assert all(model.name == name and not model.built_by for name, model in MACHINES.items())
+    assert {"ChamberForces", "KnifeDrive", "Accelerator"} <= set(MACHINES)
+
+
 def test_names_of_direct_models():
     """As their FMUs are called."""
     names = {name: model.direct().name for name, model in MODELS.items()}

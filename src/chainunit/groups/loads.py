@@ -177,7 +177,7 @@ class Cut(NamedTuple):
 
 
 class Block(NamedTuple):
-    """The obstacle of a link, a spring and a damper; the angle of the link counts from the downward vertical and never
+    """The obstacle of a link, a spring and a damper; the link's angle counts from the downward vertical and never
     reaches the horizontal."""
 
     link: str

@@ -122,10 +122,11 @@ class InverseMachine(LinkageModel):
             cls.feed_layout = Layout(cls.Feed)
         if "joints" in own and "pins" not in own:
             cls.pins = {f"{pin} {link}": output for output, (pin, link) in cls.joints.items()}
-        if "name" in own:
+        if "name" in own and "direct_name" not in own:
+            cls.direct_name = f"{cls.name}Direct"
+        # a class that a function makes has others of its name
+        if "name" in own and not cls.built_by:
             MACHINES[cls.name] = cls
-            if "direct_name" not in own:
-                cls.direct_name = f"{cls.name}Direct"
         if "Outputs" in own and "parts" not in own:
             apart = cls.by_differences
             cls.parts = (
