@@ -20,7 +20,7 @@ from reports import page_of, pictures, said_of, write
 from chainunit import EMPTY, InputError, RunError
 from chainunit.drives.induction_motor import SoftStart
 from chainunit.machines.chain_unit import Feed
-from chainunit.report import chain_unit_motion, html, page_figures
+from chainunit.report import html, page_figures, study_motion
 from chainunit.report import study as study_report
 from chainunit.report.blocks import at
 from chainunit.study import config
@@ -64,6 +64,25 @@ def chains(tmp_path_factory):
     )
     few = "[chain]\nsweep_points = 2\nsweep_lowest = 2\nsweep_highest = 12\n"
     return run_study(config.parse(text + few), tmp_path_factory.mktemp("chains"))
+
+
+@pytest.fixture(scope="module")
+def knife(tmp_path_factory):
+    """A coupling opens as the blade meets a hard stack."""
+    text = """
+title = "A knife"
+[system]
+machine = "KnifeDrive"
+[run]
+settle_turns = 1
+turns = 1
+[coupling]
+trip_torque = "2.5 kN.m"
+[[event]]
+type = "cut"
+force = "60 kN"
+"""
+    return run_study(config.parse(text), tmp_path_factory.mktemp("knife study"))
 
 
 def number(value, unit, **more):
@@ -307,7 +326,8 @@ def test_the_moving_machine_is_the_simulated_one(study, written):
     assert set(lengths) == known
     fed = moving["runs"][1]
     last = {reading["title"]: reading["values"][-1] for reading in fed["readings"]}
-    assert last["Material right"] == 0 and last["Material left"] == 60
+    material = {side: last[f"{side} organ: material that lies on the organ"] for side in ("Left", "Right")}
+    assert material == {"Left": 60, "Right": 0}
     # all of it lies on the web
     assert p.web_share == 1.0 and fed["loads"]["left web"][-1] == 60 and fed["loads"]["left wall"] == [0]
 
@@ -320,7 +340,7 @@ def test_steady_running_begins_where_the_study_takes_it(study):
     start_up = next(each for each in study_report.report(slow).figures if each.name == "time-start-up")
     (mark,) = page_figures.figure(start_up, DEFAULT_UNITS).layout.annotations
     assert mark.text == "steady from here" and mark.x == slow.settled == pytest.approx(0.7 + math.pi / 3.0)
-    first = pictures(chain_unit_motion.motion(slow))["runs"][0]
+    first = pictures(study_motion.motion(slow))["runs"][0]
     assert first["time"][first["still"] - 1] < slow.settled <= first["time"][first["still"]]
 
 
@@ -525,8 +545,8 @@ def test_one_number_of_the_reserve_everywhere(study, written):
 
 
 def test_a_long_study_is_thinned_out(study, monkeypatch):
-    monkeypatch.setattr(chain_unit_motion, "MOST", 50)
-    counts = [len(run["time"]) for run in pictures(chain_unit_motion.motion(study))["runs"]]
+    monkeypatch.setattr(study_motion, "MOST", 50)
+    counts = [len(run["time"]) for run in pictures(study_motion.motion(study))["runs"]]
     assert sum(counts) < 60 and min(counts) > 5
 
 
@@ -707,7 +727,7 @@ def test_each_snatch_is_in_parts_of_its_own_rest(chains):
 
 
 def test_the_rods_of_chains_move_as_simulated(chains):
-    moving = pictures(chain_unit_motion.motion(chains))
+    moving = pictures(study_motion.motion(chains))
     walls, webs = chains.drive.rods
     organs = {link["name"]: link["joints"] for link in moving["links"]}
     p = chains.drive.machine.p
@@ -724,6 +744,35 @@ def test_the_rods_of_chains_move_as_simulated(chains):
                 ]
                 # the chain ends at the rocker's pin to a tenth of a millimetre
                 assert np.max(np.abs(np.hypot(*np.subtract(*places)) - rod)) < 3e-4, (run["name"], ends)
+
+
+def test_any_linkage_moves(knife):
+    """Also behind the open coupling; links keep their lengths, and the blade stays on its path."""
+    moving = pictures(study_motion.motion(knife))
+    assert [run["name"] for run in moving["runs"]] == ["start_up", "hard_cut", "hard_cut_coasting"]
+    assert moving["hanging"] == ("O3", "O4") and moving["orbit"] == ("O1", "A") and moving["groups"] == ()
+    (path,) = moving["paths"]
+    size = np.ptp(path["y"])
+    for run in moving["runs"]:
+        count = len(run["time"])
+        at = {
+            name: np.array([np.broadcast_to(xy[axis], count) for axis in "xy"])
+            for name, xy in run["joints"].items()
+        }
+        for link in moving["links"]:
+            for start, end in itertools.pairwise(link["joints"]):
+                assert np.ptp(np.hypot(*(at[start] - at[end]))) < 4e-4, (run["name"], link["name"])
+        off = np.hypot(*(np.array([path["x"], path["y"]])[:, :, None] - at["blade"][:, None, :]))
+        assert np.max(np.min(off, axis=0)) < 0.05 * size
+        assert len(run["forces"]) == 10 and {force["at"] for force in run["forces"]} <= set(at)
+        whole = knife.runs[run["name"]].sel(
+            time=np.array(run["time"]) + (knife.event["hard_cut"] if run["event"] else 0.0), method="nearest"
+        )
+        assert np.max(np.abs(at["blade"][1] - whole["machine.blade.y"].values)) < 2e-4
+        torque = {reading["title"]: reading["values"] for reading in run["readings"]}["Crank torque"]
+        assert (torque == [0]) == run["name"].endswith("coasting")
+    text = page_of(knife)
+    assert "path of blade" in text and 'id="stage"' in text
 
 
 def test_two_bars_have_no_row_of_chains(study, written):

@@ -6,7 +6,6 @@ from collections.abc import Collection
 from typing import Any
 
 from ..quantities import Variable
-from ..study.bearings import PINS as PINS
 from ..study.events import in_groups
 from ..study.measures import Phase, measures_of
 from ..study.rig import DIFFERENCE as DIFFERENCE

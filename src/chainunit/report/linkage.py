@@ -1,9 +1,11 @@
-"""What a linkage gives to its picture: links through pins, places, and reactions as arrows."""
+"""What a linkage gives to its picture: links through pins, places, paths, supports, and reactions as arrows."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
+
+import numpy as np
 
 from ..mechanism.linkage import Linkage
 from ..mechanism.machine import Mechanism
@@ -11,16 +13,41 @@ from .motion import Arrow, DrawnLink
 
 
 def links(linkage: Linkage, looks: Mapping[str, str]) -> Iterator[DrawnLink]:
-    """The links as they are drawn, the crank first; a link with more than two pins is an area. `looks` are those of
-    links that are not to look like a rod."""
+    """The links as they are drawn, the crank first; those with a pin in the ground are heavier than those between,
+    and a link with more than two pins is an area. `looks` are those of links that look otherwise."""
     for name, pins in linkage.topology.links.items():
-        usual = "crank" if name == linkage.crank.bar.name else "rod"
+        crank, grounded = name == linkage.crank.bar.name, any(pin in linkage.ground for pin in pins)
+        usual = "crank" if crank else "heavy" if grounded else "light"
         yield DrawnLink(name, pins, looks.get(name, usual), closed=len(pins) > 2)
 
 
 def places(mechanism: Mechanism) -> dict[str, tuple[Any, Any]]:
     """Where its pins and points are [m]."""
     return {name: (pin.p.x, pin.p.y) for name, pin in mechanism.pins.items()}
+
+
+def paths(turn: Mechanism) -> dict[str, tuple[Any, Any]]:
+    """The curves of the points that are no pins, of a mechanism over a whole turn [m]."""
+    topology, at = turn.topology, places(turn)
+    pins = {pin for pin, _ in topology.joints}
+    return {
+        f"path of {point}": at[point]
+        for points in topology.points.values()
+        for point in points
+        if point not in pins
+    }
+
+
+def hanging(turn: Mechanism) -> tuple[str, ...]:
+    """The ground pins whose links hang from them, of a mechanism over a whole turn: their supports are above."""
+    low: dict[str, list[float]] = {}
+    at = places(turn)
+    for pins in turn.topology.links.values():
+        for pin in pins:
+            if pin in turn.linkage.ground:
+                low.setdefault(pin, []).extend(float(np.mean(at[end][1])) for end in pins if end != pin)
+    span = max(float(np.ptp([np.mean(y) for _, y in at.values()])), 1e-9)
+    return tuple(pin for pin, ends in low.items() if np.mean(ends) < at[pin][1] - 0.1 * span)
 
 
 def arrows(

@@ -75,16 +75,24 @@
 
   function build() {
     stage.replaceChildren();
+    // joints, paths and the tips of arrows of all runs, with room for names
     const x = [], y = [];
+    const reach = (list, all) => all.push(list.reduce((a, b) => Math.min(a, b)), list.reduce((a, b) => Math.max(a, b)));
     for (const r of [...motion.runs, { joints: motion.paths }])
-      for (const j of Object.values(r.joints))
-        for (const [list, all] of [[j.x, x], [j.y, y]]) {
-          all.push(list.reduce((a, b) => Math.min(a, b)), list.reduce((a, b) => Math.max(a, b)));
+      for (const j of Object.values(r.joints)) {
+        reach(j.x, x);
+        reach(j.y, y);
+      }
+    const ends = (list) => list.reduce((a, b) => Math.max(a, b)) - list.reduce((a, b) => Math.min(a, b));
+    const size = Math.max(ends(x), ends(y)), arrow = 0.26 * size;
+    for (const r of motion.runs)
+      for (const force of r.largest > 0 ? r.forces : [])
+        for (const [list, component, all] of [[r.joints[force.at].x, force.x, x], [r.joints[force.at].y, force.y, y]]) {
+          const count = Math.max(list.length, component.length);
+          reach(Array.from({ length: count }, (_, i) => of(list, i) + (arrow * of(component, i)) / r.largest), all);
         }
     const [x0, x1] = [Math.min(...x), Math.max(...x)], [y0, y1] = [Math.min(...y), Math.max(...y)];
-    const size = Math.max(x1 - x0, y1 - y0);
-    const arrow = 0.26 * size;
-    const left = 0.16 * size, right = 0.16 * size, above = 1.2 * arrow, below = 0.1 * size;
+    const left = 0.1 * size, right = left, above = left, below = left;
     scale = WIDTH / (x1 - x0 + left + right);
     height = Math.round(scale * (y1 - y0 + above + below));
     origin = [scale * (left - x0), scale * (y1 + above)];
@@ -107,15 +115,15 @@
       const [[ox, oy], [px, py]] = motion.orbit.map(at);
       add(stage, "circle", { class: "orbit", cx: ox, cy: oy, r: Math.hypot(px - ox, py - oy) });
     }
-    for (const path of motion.paths) {
-      const points = path.x.map((px, i) => `${origin[0] + scale * px} ${origin[1] - scale * of(path.y, i)}`);
-      add(add(stage, "path", { class: "path", d: "M" + points.join("L") }), "title", {}, path.title);
-    }
     parts.loads = motion.links
       .filter((link) => link.name in run.loads)
       .map((link) => [link, add(stage, "polyline", { class: "material" })]);
     parts.links = motion.links.map((link) =>
       add(stage, link.closed ? "polygon" : "polyline", { class: `link ${link.look}${link.closed ? " closed" : ""}` }));
+    for (const path of motion.paths) {
+      const points = path.x.map((px, i) => `${origin[0] + scale * px} ${origin[1] - scale * of(path.y, i)}`);
+      add(add(stage, "path", { class: "path", d: "M" + points.join("L") }), "title", {}, path.title);
+    }
     parts.joints = {};
     for (const name of Object.keys(run.joints)) {
       parts.joints[name] = [

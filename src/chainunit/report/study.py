@@ -19,9 +19,9 @@ from . import blocks as b
 from .analyses import ANALYSES
 from .chain_unit_figures import PICTURES as _PICTURES
 from .chain_unit_figures import figures
-from .chain_unit_motion import motion
 from .chain_unit_parts import chains, sizing, spoken
 from .lines import Line, Number, Strong, capital, joined, line
+from .study_motion import motion
 from .terminal import plain_line
 
 PICTURES = (*_PICTURES, *(picture for each in ANALYSES.values() for picture in each.pictures))
@@ -65,7 +65,7 @@ def report(study: Study, result: Mapping[str, Any] | None = None) -> b.Report:
 
 
 def _motion(study: Study) -> Iterator[b.Block]:
-    if study.runs and study.statics.organs is not None:
+    if study.runs:
         yield motion(study)
 
 

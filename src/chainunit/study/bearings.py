@@ -8,11 +8,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..machines.chain_unit import ChamberForces
 from .drive import Drive
 from .measures import mean, whole_turns
-
-PINS = ChamberForces.pins
 
 
 def pin_loads(drive: Drive, run: xr.Dataset) -> dict[str, dict[str, float]]:

@@ -1,0 +1,97 @@
+"""The working organs of a chain unit in motion: chains, the material on them, the processing forces."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..engines import numpy_
+from ..groups.chain import pins
+from ..groups.loads import Resistance
+from ..machines.chain_unit import NAMES, ON_SIDE, OrganNames, SideName
+from ..mechanism.machine import MachineState
+from ..planar import Vec2
+from ..study.study import Study
+from .motion import Arrow
+from .supplement import Details, Supplement
+
+_CAPTION = (
+    "Blue, full: left side; red, dashed: right side; black: crank bearing O1 and rocker pivot C. An arrow is the "
+    "force on the machine part from its support or neighbour: at A1 on the wall, at B on the wall from the web, at "
+    "A2 on the web from the rocker; P, dotted, is the processing force on the web. The brown band is the material; "
+    "its width goes with its mass. Joints are those of the simulated run."
+)
+
+
+def organ_motion(study: Study) -> Supplement:
+    """The organs of both sides, each in its colour."""
+    walls, _ = rods = (1, 1) if study.drive.chain is None else study.drive.rods
+    joints = {side: _joints(names, rods) for side, names in NAMES.items()}
+    links = {
+        link: tuple(joints[side][span])
+        for side, names in NAMES.items()
+        for link, span in ((names.wall, slice(walls + 1)), (names.web, slice(walls, None)))
+    }
+    return OrganMotion(
+        study,
+        _CAPTION,
+        links,
+        looks=dict.fromkeys(links, "chain"),
+        names={pin: "" for pins in links.values() for pin in pins[1:-1]}
+        | {pin: name for names in NAMES.values() for pin, name in ((names.a1, "A1"), (names.b, "B"))},
+        groups={
+            output: side
+            for side, names in NAMES.items()
+            for output, (_, link) in ON_SIDE.items()
+            if link in (names.wall, names.web)
+        },
+        # they would hide those of the rocker
+        hidden=("crank_pin", "coupler_pin"),
+    )
+
+
+def _joints(names: OrganNames, rods: tuple[int, int]) -> list[str]:
+    """The joints of an organ from A1 to A2."""
+    walls, webs = rods
+    joints = [f"rod {k} {names.web}" for k in range(1, walls + webs)]
+    joints[walls - 1] = names.b
+    return [names.a1, *joints, "A2"]
+
+
+class OrganMotion(Supplement):
+    """The picture of a chain unit."""
+
+    def details(self, part: Any, state: MachineState) -> Details:
+        """The rods of chains have joints of their own between the named ones."""
+        share = self.study.drive.machine.p.web_share
+        joints: dict[str, tuple[Any, Any]] = {}
+        loads: dict[str, Any] = {}
+        arrows = []
+        for side, names in NAMES.items():
+            force = state.effects[names.processing].wrenches[0].force
+            if self.study.drive.chain is not None:
+                inner, simulated = self._chain(part, state, side)
+                force = force if simulated is None else simulated
+                between = _joints(names, self.study.drive.rods)[1:-1]
+                joints |= {pin: (at.x, at.y) for pin, at in zip(between, inner, strict=True)}
+            arrows.append(Arrow(f"processing force {side}", names.b, force.x, force.y, "P", side, load=True))
+            material = part[f"machine.{side}.material_mass"].values
+            loads |= {names.wall: (1.0 - share) * material, names.web: share * material}
+        return Details(joints, tuple(arrows), loads)
+
+    def _chain(self, part: Any, state: MachineState, side: SideName) -> tuple[list[Vec2], Vec2 | None]:
+        """Places of the inner joints of a chain, and its processing force where it was simulated."""
+        drive, names = self.study.drive, NAMES[side]
+        p, (walls, webs) = drive.machine.p, drive.rods
+        a1, b, a2 = (state.m.pins[name].p for name in (names.a1, names.b, "A2"))
+        if f"machine.{side}.theta_1" not in part:
+            # behind an open coupling the machine is followed with two bars
+            on_wall = [a1 + (b - a1) * (k / walls) for k in range(1, walls)]
+            return on_wall + [b + (a2 - b) * (k / webs) for k in range(webs)], None
+        theta, omega = (
+            [part[f"machine.{side}.{x}_{k}"].values for k in range(1, walls + webs + 1)]
+            for x in ("theta", "omega")
+        )
+        chain = pins([p.l1 / walls] * walls + [p.l2 / webs] * webs, theta, omega, numpy_())
+        v, force = chain[walls].p1, part[f"machine.{side}.processing_force"].values
+        law = Resistance(names.b, force, p.processing)
+        return [a1 + pin.p for pin in chain[1:-1]], v * -law.per_speed(numpy_(), v.squared())

@@ -1,0 +1,113 @@
+"""A linkage in motion: where every joint is in each run of a study, and what it carries."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..machines.chain_unit import ChamberForces
+from ..machines.knife_drive import KnifeDrive
+from ..mechanism.models import ShaftMotion, names_of
+from ..study.study import Study
+from . import accessors as read
+from . import linkage
+from .edge_motion import EdgeMotion
+from .lines import capital
+from .motion import Animation, Clip, DrawnLink, Reading
+from .organ_motion import organ_motion
+from .supplement import Supplement
+
+SUPPLEMENTS: Mapping[type, Callable[[Study], Supplement]] = {
+    ChamberForces: organ_motion,
+    KnifeDrive: EdgeMotion,
+}
+"""By the model of a machine, what its picture has beside."""
+_PER_SECOND = 60
+_PER_TURN = 90
+MOST = 7000
+"""Pictures of all runs together: a longer study is shown at a lower rate."""
+_CAPTION = "An arrow is the force on a part of the machine from its support or neighbour{}."
+
+
+def motion(study: Study) -> Animation:
+    """Every run at about 60 pictures a second of machine time, more where the crank is fast."""
+    machine = study.drive.machine
+    turn = 2.0 * math.pi / study.config.run.crank_speed
+    interval = min(1.0 / _PER_SECOND, turn / _PER_TURN)
+    spans = (float(np.ptp(run["time"].values)) for run in study.runs.values())
+    interval = max(interval, sum(spans) / MOST)
+    supplement = SUPPLEMENTS.get(machine.model, Supplement)(study)
+    angles = np.linspace(0.0, 2.0 * math.pi, _PER_TURN + 1)
+    whole = machine.state(machine.inputs({"phi": angles * machine.ratio})).m
+    paths, crank = linkage.paths(whole), whole.linkage.crank
+    thin = f"; a thin line is the {', the '.join(paths)}" if paths else ""
+    return Animation(
+        tuple(_links(whole, supplement)),
+        tuple(whole.linkage.ground),
+        tuple(_run(study, name, interval, supplement) for name in read.in_order(study)),
+        turn,
+        supplement.caption or _CAPTION.format(thin),
+        hanging=linkage.hanging(whole),
+        orbit=(crank.bar.pin, crank.end),
+        groups=tuple(dict.fromkeys(supplement.groups.values())),
+        names=supplement.names,
+        paths=paths,
+    )
+
+
+def _links(whole: Any, supplement: Supplement) -> Iterator[DrawnLink]:
+    others = dict(supplement.links)
+    for link in linkage.links(whole.linkage, supplement.looks):
+        yield replace(link, joints=others.pop(link.name, link.joints))
+    yield from (
+        DrawnLink(name, joints, supplement.looks.get(name, "heavy")) for name, joints in others.items()
+    )
+
+
+def _run(study: Study, name: str, interval: float, supplement: Supplement) -> Clip:
+    run, drive = study.runs[name], study.drive
+    machine, model = drive.machine, drive.machine.model
+    time = run["time"].values
+    instants = np.arange(time[0], time[-1] + 0.5 * interval, interval)
+    part = run.isel(time=np.unique(np.minimum(np.searchsorted(time, instants), len(time) - 1)))
+    angle, speed = drive.crank_motion(part)
+    loads = {
+        v.name: part[f"machine.{v.name}"].values
+        for v in model.input_layout.variables
+        if f"machine.{v.name}" in part and v.name not in names_of(ShaftMotion)
+    }
+    state = machine.state(machine.inputs({"phi": angle * machine.ratio, "w": speed * machine.ratio, **loads}))
+    details = supplement.details(part, state)
+    joints = {output: pin for output, (pin, _) in model.joints.items() if output not in supplement.hidden}
+    forces = linkage.arrows(
+        model.pins,
+        joints,
+        lambda output: (part[f"machine.{output}.fx"].values, part[f"machine.{output}.fy"].values),
+        supplement.groups,
+    )
+    readings = (
+        Reading("Crank angle", angle % (2.0 * math.pi), "rad"),
+        Reading("Crank speed", speed, "rad/s"),
+        Reading("Crank torque", drive.crank_torque(part), "N.m"),
+        *(
+            Reading(capital(v.description), loads[v.name], v.unit, v.kind)
+            for v in model.feed_layout.variables
+            if v.name in loads
+        ),
+    )
+    event = read.event_time(study, name)
+    return Clip(
+        name,
+        read.title(study, name),
+        part["time"].values - (event or 0.0),
+        {**linkage.places(state.m), **details.joints},
+        readings,
+        (*forces, *details.arrows),
+        details.loads,
+        event is not None,
+        still=study.settled if event is None else 0.0,
+    )
