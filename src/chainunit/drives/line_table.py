@@ -67,7 +67,7 @@ def _shaft(title: str, prefix: str) -> type[BaseModel]:
     )
 
 
-def given_line(table: BaseModel, prefix: str) -> dict[str, Any]:
+def line_values(table: BaseModel, prefix: str) -> dict[str, Any]:
     """The values of the table by name, with the stiffness of its shafts worked out; a `damping_ratio` as it is, as it
     goes with inertias that the table may not have.
 
@@ -104,9 +104,9 @@ def values(table: BaseModel, prefix: str) -> dict[str, float]:
     Raises
     ------
     InputError
-        see `given_line`.
+        see `line_values`.
     """
-    numbers = given_line(table, prefix)
+    numbers = line_values(table, prefix)
     ratio = numbers.pop("damping_ratio", None)
     if ratio is None:
         return numbers

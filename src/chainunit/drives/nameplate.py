@@ -78,8 +78,13 @@ class Nameplate:
     @property
     def rated_current(self) -> float:
         """Rated current [A], as it is given, or as it follows from the other values."""
+        return float(self.current or self.implied_current)
+
+    @property
+    def implied_current(self) -> float:
+        """Rated current [A] as it follows from the other values."""
         apparent = self.power / (self.efficiency * self.power_factor)
-        return float(self.current or apparent / (math.sqrt(3.0) * self.voltage))
+        return float(apparent / (math.sqrt(3.0) * self.voltage))
 
     @property
     def apparent_power(self) -> float:
@@ -183,15 +188,14 @@ def check(nameplate: Nameplate, assumptions: Assumptions = TYPICAL) -> None:
             f"speed = {n.speed:g} rad/s ({rev[0]:g} rev/min): with poles = {n.poles:g} at {n.frequency:g} Hz it "
             f"must be > {low:g} and < {high:g} rad/s, the synchronous speed ({rev[1]:g} and {rev[2]:g} rev/min)"
         )
-    if n.current:
-        implied = n.power / (n.efficiency * n.power_factor * math.sqrt(3.0) * n.voltage)
-        low, high = (1.0 - LARGEST_RESIDUAL) * implied, (1.0 + LARGEST_RESIDUAL) * implied
-        if not low < n.current < high:
-            raise InputError(
-                f"current = {n.current:g} A: power, voltage, efficiency and power factor make it {implied:.4g} A; "
-                f"must be > {low:.4g} and < {high:.4g} A, or be left out"
-            )
-    most = _air_gap_efficiency(n, assumptions)
+    low, high = ((1.0 + sign * LARGEST_RESIDUAL) * n.implied_current for sign in (-1.0, 1.0))
+    if n.current and not low < n.current < high:
+        raise InputError(
+            f"current = {n.current:g} A: power, voltage, efficiency and power factor make it {n.implied_current:.4g} "
+            f"A; must be > {low:.4g} and < {high:.4g} A, or be left out"
+        )
+    # slip and friction alone would leave that much
+    most = (1.0 - n.slip) / (1.0 + assumptions.friction)
     real = n.power / (n.apparent_power * n.power_factor)
     if not max(real, n.efficiency) < most:
         raise InputError(
@@ -204,11 +208,6 @@ def check(nameplate: Nameplate, assumptions: Assumptions = TYPICAL) -> None:
             f"locked_torque_ratio = {n.locked_torque_ratio:g}: takes more than the whole power of the locked-rotor "
             f"current; must be < {most:.3g}"
         )
-
-
-def _air_gap_efficiency(n: Nameplate, assumptions: Assumptions) -> float:
-    """Efficiency that slip and friction alone would leave."""
-    return float((1.0 - n.slip) / (1.0 + assumptions.friction))
 
 
 @lru_cache(maxsize=1024)

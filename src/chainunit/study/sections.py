@@ -13,7 +13,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model
 from ..drives.driveline import Mounted
 from ..drives.gearing import KINDS, Transmission
 from ..drives.induction_motor import Inverter, SoftStart
-from ..drives.line_table import form, given_line
+from ..drives.line_table import form, line_values
 from ..drives.motor import Motor
 from ..machines.chain_organs import LEAST, MOST, OrganLaw
 from ..mechanism.models import InverseMachine
@@ -285,7 +285,7 @@ SECTIONS: Mapping[str, FileSection] = {
         optional=True,
         keys={"place": (Literal[PLACES], "crank")},
         form=form,
-        values=partial(given_line, prefix="driveline."),
+        values=partial(line_values, prefix="driveline."),
     ),
 }
 """Tables of every study file, besides those of its machine, its feed, and its motor."""
