@@ -368,10 +368,11 @@ def _random(s: b.Source) -> Iterator[b.Block]:
     sides = joined(
         s.line(f"{{=monte_carlo.sides.{side}}} {side}") for side in s.result["monte_carlo"]["sides"]
     )
+    of_sides = line(" (", sides, ")") if sides else ()
     title = s.line(
-        "Overloads at random, {=monte_carlo.runs} runs ({sides}); in brackets: interval of {=monte_carlo.confidence} "
+        "Overloads at random, {=monte_carlo.runs} runs{sides}; in brackets: interval of {=monte_carlo.confidence} "
         "confidence",
-        sides=sides,
+        sides=of_sides,
     )
     if rows:
         yield b.Table(rows, b.heads("", *heads), title=title)

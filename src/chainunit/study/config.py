@@ -397,11 +397,13 @@ def _check_company(data: Mapping[str, Any], parts: Parts) -> None:
                     "the two"
                 )
     if parts.machine is not ChamberForces:
-        for name in ("ratios", "chain", "organ", "sizing"):
+        for name in ("ratios", "chain", "organ"):
             if name in data:
                 raise InputError(
                     f"{name}: is of the chain unit, and the machine is {parts.machine.name}; leave it out"
                 )
+        if "one_sided_share" in data.get("sizing", {}):
+            raise InputError(f"sizing.one_sided_share: the {parts.machine.name} has no sides; leave it out")
     if "sizing" in data:
         for name in ("motor", "feed_forward", "flywheel"):
             if data.get(name):

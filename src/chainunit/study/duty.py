@@ -14,6 +14,7 @@ import numpy as np
 
 from ..drives.motor import Motor
 from ..fmu.backends import Backend
+from ..machines.api import ChainUnit
 from ..machines.chain_unit import SIDES, SideName
 from ..quantities import Value, declaration, quantity
 from ..system.instance import Fmu
@@ -49,10 +50,10 @@ class CycleNumbers:
     """The torque of a machine over a turn at constant crank speed; at the crank."""
 
     power_mean: Value = quantity("W", "mean power")
-    torque_mean: Value = quantity("N.m", "mean torque, both sides loaded")
-    torque_peak: Value = quantity("N.m", "peak torque, both sides loaded")
+    torque_mean: Value = quantity("N.m", "mean torque, normal feed")
+    torque_peak: Value = quantity("N.m", "peak torque, normal feed")
     torque_peak_one_sided: Value = quantity("N.m", "peak torque, all feed on one side, the larger of both")
-    torque_rms: Value = quantity("N.m", "RMS torque of the duty, both cases in their shares of time")
+    torque_rms: Value = quantity("N.m", "RMS torque of the duty, each feed in its share of time")
     inertia_least: Value = quantity("kg.m2", "reflected inertia, least")
     inertia_mean: Value = quantity("kg.m2", "reflected inertia, mean")
     inertia_largest: Value = quantity("kg.m2", "reflected inertia, largest")
@@ -64,44 +65,41 @@ class CycleNumbers:
 
 @dataclass(frozen=True)
 class Duty:
-    """The duty of any drive, at constant speed of the crank: the turn with both sides loaded, those with
-    all feed on one side, and which of these asks the larger RMS torque with two bars, as the rocker swings farther to
-    one side than to the other; with chains of many turns."""
+    """The duty of any drive, at constant speed of the crank: the turn with the feed of normal running, and of a
+    machine with two sides those with all feed on one side, and which of these asks the larger RMS torque with two
+    bars, as the rocker swings farther to one side than to the other; with chains of many turns."""
 
-    both: Cycle
+    normal: Cycle
     one_sided: Mapping[SideName, Cycle]
-    heavier: SideName
+    heavier: SideName | None
     numbers: CycleNumbers
 
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON."""
-        peaks = {side: _peak(turn) for side, turn in self.one_sided.items()}
-        return {
-            "cycle": entries(self.numbers, titled=True),
-            "one_sided": {
-                "larger_rms": self.heavier,
-                "larger_peak": max(SIDES, key=lambda side: peaks[side]),
-            },
-        }
+        peaks = [(_peak(turn), side) for side, turn in self.one_sided.items()]
+        sides = {"one_sided": {"larger_rms": self.heavier, "larger_peak": max(peaks)[1]}} if peaks else {}
+        return {"cycle": entries(self.numbers, titled=True), **sides}
 
 
 def duty_of(config: Config, folder: Path, backend: Backend | None) -> Duty:
     """The duty of a study with `sizing`; chains are run by their FMU, which is written to `folder`."""
     feed, w = config.feed, config.run.crank_speed
-    loads = {side: all_on_one(side, feed) for side in SIDES}
-    both = cycle(config.machine, w, feed)
+    sides = SIDES if isinstance(config.machine, ChainUnit) else ()
+    loads = {side: all_on_one(side, feed) for side in sides}
+    normal = cycle(config.machine, w, feed)
     one_sided = {side: cycle(config.machine, w, case) for side, case in loads.items()}
-    size = {side: rms((1.0, turn.crank_torque)) for side, turn in one_sided.items()}
-    heavier: SideName = "left" if size["left"] >= size["right"] else "right"
+    sizes = [(rms((1.0, turn.crank_torque)), side) for side, turn in one_sided.items()]
+    # of two that ask alike the left one
+    heavier = min(sizes, key=lambda each: -each[0])[1] if sizes else None
     if config.chain is not None:
         drive = Drive(Motor, None, config.machine, chain=config.chain)
         fmu = Fmu(drive.export_machine(folder, backend))
         try:
-            both = chain_duty(fmu, drive, w, feed)
+            normal = chain_duty(fmu, drive, w, feed)
             one_sided = {side: chain_duty(fmu, drive, w, case) for side, case in loads.items()}
         finally:
             fmu.close()
-    return Duty(both, one_sided, heavier, cycle_numbers(config, both, one_sided, heavier))
+    return Duty(normal, one_sided, heavier, cycle_numbers(config, normal, one_sided, heavier))
 
 
 def _peak(cycle: Cycle) -> float:
@@ -112,26 +110,29 @@ def _peak(cycle: Cycle) -> float:
 
 
 def cycle_numbers(
-    config: Config, both: Cycle, one_sided: Mapping[SideName, Cycle], heavier: SideName
+    config: Config, normal: Cycle, one_sided: Mapping[SideName, Cycle], heavier: SideName | None
 ) -> CycleNumbers:
     """Of a duty: with all feed on one side the RMS torque of the heavier, and the larger of both peaks, which may be
     that of the other side."""
     assert config.sizing is not None
     w, share = config.run.crank_speed, config.sizing.one_sided_share
-    inertia = both.outputs.J * config.machine.p.ratio**2
-    mean = float(np.mean(both.crank_torque))
+    inertia = normal.outputs.J * config.machine.ratio**2
+    mean = float(np.mean(normal.crank_torque))
+    cases = [(1.0, normal.crank_torque)]
+    if heavier is not None:
+        cases = [(1.0 - share, normal.crank_torque), (share, one_sided[heavier].crank_torque)]
     return CycleNumbers(
         power_mean=mean * w,
         torque_mean=mean,
-        torque_peak=_peak(both),
-        torque_peak_one_sided=max(_peak(turn) for turn in one_sided.values()),
-        torque_rms=rms((1.0 - share, both.crank_torque), (share, one_sided[heavier].crank_torque)),
+        torque_peak=_peak(normal),
+        torque_peak_one_sided=max(map(_peak, one_sided.values()), default=None),
+        torque_rms=rms(*cases),
         inertia_least=float(np.min(inertia)),
         inertia_mean=float(np.mean(inertia)),
         inertia_largest=float(np.max(inertia)),
         inertia_wanted=float(
             np.quantile(
-                [flywheel(turn, w, config.sizing.fluctuation) for turn in np.atleast_2d(both.crank_torque)],
+                [flywheel(turn, w, config.sizing.fluctuation) for turn in np.atleast_2d(normal.crank_torque)],
                 HIGH,
             )
         ),

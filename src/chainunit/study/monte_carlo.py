@@ -85,11 +85,15 @@ class Task:
     drive: Drive
     files: Mapping[str, Path]
     steady: float
+    fed_from: float | None = None
+    """when a machine that starts empty was fed [s]"""
+    absent: frozenset[str] = frozenset()
+    """names of the measures that this motor or machine does not have"""
 
     @property
     def rig(self) -> Rig:
         """The drive on its co-simulation."""
-        return Rig(self.config, self.drive, self.files)
+        return Rig(self.config, self.drive, self.files, fed_from=self.fed_from)
 
     def digest(self) -> str:
         """Name of all that the results depend on: every parameter, and the content of the FMUs."""
@@ -104,6 +108,7 @@ class Task:
             "monte_carlo": {k: v for k, v in asdict(config.monte_carlo).items() if k != "runs"},
             "coupling": asdict(config.coupling) if config.coupling else None,
             "steady": self.steady,
+            "fed_from": self.fed_from,
             "row": list(_Row.model_fields),
         }
         content = hashlib.sha256(json.dumps(relevant, sort_keys=True).encode())
@@ -213,10 +218,11 @@ def row_of(task: Task, digest: str, number: int) -> dict[str, Any]:
         return {**named, "failed": str(error), **dict.fromkeys(layout.names)}
 
 
-def read(file: Path) -> tuple[dict[int, dict[str, Any]], int]:
+def read(file: Path, absent: frozenset[str] = frozenset()) -> tuple[dict[int, dict[str, Any]], int]:
     """Rows of a results file by their number, and how many lines were left out.
 
-    A line counts that is a row in its whole form: every number is there and finite, or the run failed and none is. Of
+    A line counts that is a row in its whole form: every number is there and finite, but for those of `absent`
+    measures, or the run failed and none is. Of
     rows of one number that differ none counts. A last line that a kill cut off is passed over.
     """
     rows: dict[int, dict[str, Any]] = {}
@@ -226,7 +232,7 @@ def read(file: Path) -> tuple[dict[int, dict[str, Any]], int]:
         return rows, left_out
     with file.open("rb") as lines:
         for line in lines:
-            row = _checked(line)
+            row = _checked(line, absent)
             if row is None:
                 left_out += line.endswith(b"\n")
             elif rows.setdefault(row["run"], row) is not row:
@@ -236,14 +242,16 @@ def read(file: Path) -> tuple[dict[int, dict[str, Any]], int]:
     return {number: row for number, row in rows.items() if number not in twice}, left_out + len(twice)
 
 
-def _checked(line: bytes) -> dict[str, Any] | None:
+def _checked(line: bytes, absent: frozenset[str]) -> dict[str, Any] | None:
     """The row of a line, or None where it is none."""
     try:
         row = _Row.model_validate_json(line).model_dump()
     except ValidationError:
         return None
     gaps = {name for name in Layout(Sample).names if row[name] is None}
-    whole_row = gaps <= {"trip_torque"} if row["failed"] is None else len(gaps) == len(Layout(Sample).names)
+    whole_row = (
+        gaps <= {"trip_torque", *absent} if row["failed"] is None else len(gaps) == len(Layout(Sample).names)
+    )
     return row if whole_row else None
 
 
@@ -285,8 +293,9 @@ class MonteCarloResult:
 
     @property
     def sides(self) -> dict[SideName, int]:
-        """Number of runs by the side on which the lump came."""
-        return {side: sum(row["side"] == side for row in self.rows) for side in SIDES}
+        """Number of runs by the side on which the event came; empty where it has none."""
+        sides = {row["side"] for row in self.rows}
+        return {side: sum(row["side"] == side for row in self.rows) for side in SIDES if sides != {None}}
 
     @property
     def failed(self) -> int:
@@ -325,7 +334,7 @@ def run(
     """
     digest = task.digest()
     file = folder / f"monte_carlo_{digest}.jsonl"
-    rows, left_out = read(file)
+    rows, left_out = read(file, task.absent)
     resumed = len(rows)
     count = int(task.config.monte_carlo.runs)
     open_runs = [k for k in range(count) if k not in rows]

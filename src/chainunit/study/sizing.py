@@ -46,8 +46,10 @@ class Standing(StrEnum):
     REJECTED = "rejected"
 
 
-_WORSE_WITH_INERTIA = ("start", "starts", "inertia")
-"""Checks that no flywheel heals."""
+_EVENED = ("speed", "rms_torque", "peak_torque", "temperature")
+"""Checks that a flywheel eases: it evens the speed, and with it the torque of a load that comes and goes."""
+_WORSE_WITH_INERTIA = ("start", "inertia")
+"""Checks that it makes worse."""
 
 
 @dataclass
@@ -215,8 +217,8 @@ def size(
 
 
 def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[str, Path]) -> Candidate:
-    """The candidate as it is, or with the least flywheel, to about a tenth, that keeps the speed as asked; as it is,
-    too, where it misses a limit that no flywheel heals.
+    """The candidate as it is, or with the least flywheel, to about a tenth, that keeps the speed as asked and the
+    motor within its torque and temperature; as it is, too, where it misses a limit that no flywheel heals.
 
     The largest tried is that of the hand formula, which leaves out that a motor's torque falls with speed and evens
     it, too."""
@@ -229,12 +231,15 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
         return candidate
 
     def even(candidate: Candidate) -> bool:
-        sizes = candidate.sizes
-        hopeless = any(sizes.get(name, 0.0) > 1.0 for name in _WORSE_WITH_INERTIA)
-        return hopeless or not 1.0 < sizes.get("speed", 0.0) < math.inf
+        sizes = {name: candidate.sizes.get(name, 0.0) for name in (*_EVENED, *_WORSE_WITH_INERTIA, "starts")}
+        hopeless = any(sizes[name] > 1.0 for name in _WORSE_WITH_INERTIA)
+        # a winding that is too hot from running alone permits no starts either
+        hopeless |= sizes["starts"] > 1.0 >= sizes["temperature"]
+        return hopeless or not any(1.0 < sizes[name] < math.inf for name in _EVENED)
 
     best, below = trial_with(0.0), 0.0
-    if even(best):
+    mean = duty.numbers.torque_mean / bare.drive.ratio
+    if even(best) or mean > bare.motor.nameplate.torque:
         return best
     for share in (0.03, 0.1, 0.3, 1.0):
         best = trial_with(share)
@@ -256,7 +261,7 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
 def proposed(config: Config, motor: CatalogueMotor, duty: Duty) -> Candidate:
     """A motor with the gear ratio at which the crank has its speed, without a flywheel."""
     assert config.sizing is not None
-    drive = catalogue_drive(config, motor, duty.both.crank_torque, config.sizing.ambient)
+    drive = catalogue_drive(config, motor, duty.normal.crank_torque, config.sizing.ambient)
     return Candidate(motor, drive, 0.0, {})
 
 

@@ -202,7 +202,12 @@ class Study:
     @property
     def not_known(self) -> frozenset[str]:
         """Names of the measures that the motor, an FMU of somebody else, does not tell in steady running."""
-        if self.drive.foreign is None or verdict.STEADY not in self.answers:
+        return frozenset() if self.drive.foreign is None else self.absent
+
+    @property
+    def absent(self) -> frozenset[str]:
+        """Names of the measures that motor or machine do not tell in steady running."""
+        if verdict.STEADY not in self.answers:
             return frozenset()
         return not_known(self.window(Phase.STEADY, self.steady))
 

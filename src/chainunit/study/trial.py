@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ from ..drives.catalogue import CatalogueMotor
 from ..drives.induction_motor import volts_per_hertz
 from ..drives.motor import T_RATED
 from ..engines import MATH
-from ..machines.chain_unit import SIDES, SideName
+from ..machines.chain_unit import SideName
 from ..text import entry, number
 from .config import Config
 from .drive import Drive
@@ -78,7 +79,7 @@ class Trial:
     config: Config
     motor: CatalogueMotor
     drive: Drive
-    heavier: SideName
+    heavier: SideName | None
     start: xr.Dataset
     steady: xr.Dataset
     shifts: tuple[xr.Dataset, ...]
@@ -168,17 +169,18 @@ class Trial:
     @cached_property
     def _heat(self) -> tuple[float, float]:
         """Heat of the duty [W], and that of a start beyond it [J]."""
-        running, one_sided = (
-            float(np.mean(run["motor.heat"])) for run in (self.steady, self.one_sided[self.heavier])
-        )
-        steady = (1.0 - self._share) * running + self._share * one_sided
+        steady = sum(share * float(np.mean(run["motor.heat"])) for share, run in self._cases)
         time, heat = self.start["time"].values, self.start["motor.heat"].values
         return steady, max(0.0, float(np.trapezoid(heat - steady, time)))
 
     @property
-    def _share(self) -> float:
+    def _cases(self) -> list[tuple[float, xr.Dataset]]:
+        """The runs of the duty, each with its share of the time."""
         assert self.config.sizing is not None
-        return float(self.config.sizing.one_sided_share)
+        if self.heavier is None:
+            return [(1.0, self.steady)]
+        share = float(self.config.sizing.one_sided_share)
+        return [(1.0 - share, self.steady), (share, self.one_sided[self.heavier])]
 
     def checks(self) -> dict[str, Check]:
         """Each value beside its limit, by name; without a value where the machine does not get up to speed."""
@@ -189,7 +191,6 @@ class Trial:
             return Check(title, value if self.started is not None else None, limit, unit, kind)
 
         longest = 1.0 + 1.2 * self.config.run.ramp if self.drive.follows else plate.locked_time
-        torques = (self.steady[_GAP].values, self.one_sided[self.heavier][_GAP].values)
         weaker = min(1.0, plate.frequency / self.frequency)
         cooled = min(1.0, self._cooling / self.drive.motor.cooling(MATH, p, plate.speed))
         breakdown = self.breakdown_torque / asked.breakdown_margin
@@ -198,7 +199,7 @@ class Trial:
             "start": Check("time to start", self.started, longest, "s"),
             "rms_torque": check(
                 "RMS torque",
-                rms((1.0 - self._share, torques[0]), (self._share, torques[1])),
+                rms(*((share, run[_GAP].values) for share, run in self._cases)),
                 plate.torque * weaker * math.sqrt(cooled),
                 "N.m",
             ),
@@ -255,9 +256,12 @@ def try_motor(
     rig = Rig(config, drive, files)
     with rig.from_rest() as simulation:
         start = simulation.run(window, rig.step)
+        if config.empty_start:
+            rig = dataclasses.replace(rig, fed_from=simulation.time)
+            simulation.signals = rig.signals(ramp=True)
         steady = simulation.run(window + 2.0 * turn, rig.step)
         event, shifts, one_sided = simulation.save(), [], {}
-        for side in SIDES:
+        for side in duty.one_sided:
             feed = config.one_sided(side)
             shifts.append(rig.follow(simulation, feed, event, event + feed.p.shift + turn).run)
             one_sided[side] = simulation.run(simulation.time + turn, rig.step)

@@ -1,0 +1,89 @@
+"""A study of a machine that is no chain unit has all that a study has: here sizing and random overloads."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from chainunit import InputError
+from chainunit.study.config import parse
+from chainunit.study.monte_carlo import read
+from chainunit.study.result import as_dict
+from chainunit.study.run import run_study
+
+KNIFE = """
+[system]
+machine = "KnifeDrive"
+[sizing]
+poles_least = 2
+poles_most = 2
+candidates = 1
+[gear]
+efficiency = 0.95
+[run]
+settle_turns = 2
+turns = 1
+[monte_carlo]
+runs = 2
+duration = 1
+event = { type = "cut" }
+[[event]]
+type = "cut"
+turns = 1
+"""
+
+
+@pytest.fixture(scope="module")
+def sized(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("sized")
+    study = run_study(parse(KNIFE), folder)
+    assert study.failure is None
+    return study, folder
+
+
+def test_a_flywheel_makes_a_small_motor_fit_a_load_that_comes_and_goes(sized):
+    study, _ = sized
+    best = study.sizing.best
+    assert study.sizing.chosen is best and best.flywheel > 0.0
+    steady, ratio = study.answers["steady"], study.drive.ratio
+    plate = best.motor.nameplate
+    # without it the RMS torque of the turn alone asks for more than the motor has
+    by_turn = study.statics.cycles["normal running"].crank_torque / ratio
+    assert np.sqrt(np.mean(by_turn**2)) > plate.torque > steady.motor_torque_rms > np.mean(by_turn)
+    assert steady.speed_ripple <= study.config.sizing.fluctuation
+    # the duty has one feed, and no sides
+    numbers = as_dict(study)
+    assert "one_sided" not in numbers["sizing"]
+    assert numbers["sizing"]["cycle"]["torque_peak_one_sided"]["value"] is None
+    assert numbers["sizing"]["cycle"]["torque_peak"]["value"] == pytest.approx(
+        np.max(np.abs(by_turn)) * ratio
+    )
+
+
+def test_random_overloads_of_a_machine_without_sides(sized):
+    study, _ = sized
+    rows = study.monte_carlo.rows
+    assert len(rows) == 2 and study.monte_carlo.failed == 0 and study.monte_carlo.sides == {}
+    for row in rows:
+        assert row["side"] is None and row["rocker_torque_peak"] is None
+        assert 3e4 <= row["drawn"]["force"] <= 1e5 and np.isfinite(row["crank_torque_peak"])
+    # read again they count, but not for a machine that has a rocker
+    assert len(read(study.monte_carlo.file, study.absent)[0]) == 2
+    assert read(study.monte_carlo.file) == ({}, 2)
+    assert len(json.dumps(as_dict(study), allow_nan=False)) > 1000
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (("candidates = 1", "one_sided_share = 0.2"), "sizing.one_sided_share: the KnifeDrive has no sides"),
+        (("[run]", "[ratios]\nrho = 0.1\n[run]"), "ratios: is of the chain unit"),
+        (('"KnifeDrive"', '"Knife"'), 'system.machine = "Knife": must be one of'),
+    ],
+)
+def test_what_belongs_to_another_machine_is_refused(change, told):
+    with pytest.raises(InputError) as caught:
+        parse(KNIFE.replace(*change))
+    assert told in str(caught.value)
