@@ -249,15 +249,19 @@ def test_the_page_needs_nothing_else(written):
 def test_every_axis_says_what_it_shows_in_which_unit(study, written):
     figures = json.loads(Reader(written.read_text("utf-8")).scripts["figures"])
     assert set(figures) == {
-        "torque-speed", "turn", "sides", "speed-loop", "time-start-up", "time-feed-left", "time-jam-left", "reactions"
+        "torque-speed", "turn", "turn-at-constant-speed", "sides", "speed-loop", "time-start-up", "time-feed-left",
+        "time-jam-left", "reactions",
     }  # fmt: skip
     for name, figure in figures.items():
         axes = {
             k: v["title"]["text"] for k, v in figure["layout"].items() if k[1:5] == "axis" and "title" in v
         }
         for axis, title in axes.items():
-            assert re.fullmatch(r".+ \[(N m|N|rad/s|A|s|deg|1|rad/\(N m s\))\]|pin", title), (name, axis)
-        columns = {"torque-speed": 2, "speed-loop": 3}.get(name, 1)
+            assert re.fullmatch(r".+ \[(N m|N|rad/s|A|s|deg|1|kg m2|rad/\(N m s\))\]|pin", title), (
+                name,
+                axis,
+            )
+        columns = {"torque-speed": 2, "turn-at-constant-speed": 2, "speed-loop": 3}.get(name, 1)
         assert sum(axis.startswith("x") for axis in axes) == columns
         drawn = {trace.get("yaxis", "y") for trace in figure["data"]}
         assert {f"yaxis{y[1:]}" for y in drawn} <= set(axes)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 from ..study.study import Study
+from . import blade, turn
 from .blocks import Block, Source
 
 
@@ -18,4 +19,7 @@ class Contents:
     pictures: tuple[str, ...] = ()
 
 
-ANALYSES: Mapping[str, Contents] = {}
+ANALYSES: Mapping[str, Contents] = {
+    "constant_speed": Contents("A turn at constant speed", turn.blocks, (turn.PICTURE,)),
+    "blade": Contents("The blade", blade.blocks, (blade.PICTURE,)),
+}

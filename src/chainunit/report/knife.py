@@ -12,7 +12,7 @@ from ..engines import numpy_
 from ..machines.knife_drive import Inputs, KnifeDrive
 from ..mechanism.machine import Mechanism
 from ..quantities import Layout
-from ..study.cutting import PINS, Reaction, Turn, outputs
+from ..study.cutting import PINS, KnifeReaction, KnifeTurn, outputs
 from ..study.flywheels import Wheel, WheelAnswers
 from ..study.knife import KnifeStudy
 from ..study.knife_answers import as_dict
@@ -65,11 +65,11 @@ def _turn(s: b.Source) -> b.Table:
     """The turn at constant speed: quantity and value."""
     most = max(s.result["pins"], key=lambda pin: s.result["pins"][pin]["peak"]["value"])
     largest = b.TableRow((f"largest reaction, {most}", s.number(f"pins.{most}.peak")))
-    return b.Table((*s.rows(Turn, "turn", digits=4), largest))
+    return b.Table((*s.rows(KnifeTurn, "turn", digits=4), largest))
 
 
 def _pins(s: b.Source) -> b.Table:
-    names = Layout(Reaction).names
+    names = Layout(KnifeReaction).names
     rows = (
         b.TableRow((pin, *(s.number(f"pins.{pin}.{name}") for name in names))) for pin in s.result["pins"]
     )

@@ -3,5 +3,7 @@
 from __future__ import annotations
 
 from .analysis import Analysis
+from .blade import BladeAnalysis
+from .turn import TurnAnalysis
 
-ANALYSES: tuple[type[Analysis], ...] = ()
+ANALYSES: tuple[type[Analysis], ...] = (TurnAnalysis, BladeAnalysis)

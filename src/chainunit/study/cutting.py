@@ -24,7 +24,7 @@ _TURN = 2.0 * math.pi
 
 
 @declaration
-class Turn:
+class KnifeTurn:
     """A turn of the crank at constant speed."""
 
     blade_top: Value = quantity("m", "blade, highest y", kind="millimetres")
@@ -48,7 +48,7 @@ class Turn:
 
 
 @declaration
-class Reaction:
+class KnifeReaction:
     """The peak of a pin over a turn at constant speed, and the crank angle at which it comes."""
 
     peak: Value = quantity("N", "largest reaction, cutting")
@@ -74,8 +74,8 @@ class TurnCurves:
     y: Any
     tilt: Any
     """[rad]"""
-    turn: Turn
-    pins: dict[str, Reaction]
+    turn: KnifeTurn
+    pins: dict[str, KnifeReaction]
 
     @property
     def top(self) -> float:
@@ -97,7 +97,7 @@ def statics(p: Parameters, w: float, force: float) -> TurnCurves:
     path = float(np.sum(inside * _way(blade.x, blade.y)))
     inertia = np.broadcast_to(cutting.J * p.ratio**2, angle.shape)
     speed = np.hypot(blade.vx, blade.vy)
-    turn = Turn(
+    turn = KnifeTurn(
         blade_top=float(np.max(blade.y)),
         blade_bottom=float(np.min(blade.y)),
         blade_draw=abs(float(np.sum(inside * (np.roll(blade.x, -1) - blade.x)))),
@@ -121,7 +121,7 @@ def statics(p: Parameters, w: float, force: float) -> TurnCurves:
     for title, name in PINS.items():
         sizes = [np.hypot(getattr(o, name).fx, getattr(o, name).fy) for o in (cutting, free)]
         at = [int(np.argmax(size)) for size in sizes]
-        pins[title] = Reaction(
+        pins[title] = KnifeReaction(
             peak=float(sizes[0][at[0]]),
             angle=float(angle[at[0]]),
             peak_free=float(sizes[1][at[1]]),

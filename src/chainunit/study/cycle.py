@@ -31,6 +31,15 @@ def cycle(machine: Machine, crank_speed: float, feed: Any, points: int = 720) ->
     return Cycle(angle, out.tau * ratio, out)
 
 
+def energy_swing(torque: Any) -> float:
+    """Energy [J] that runs ahead of the mean over a turn, largest less least: what the moving masses have to store
+    where the drive gives the mean of the `torque` [N m], evenly spaced in angle, shape (n,) (Wittenbauer's method
+    with the torque at constant speed)."""
+    torque = np.asarray(torque, dtype=float)
+    excess = np.cumsum(torque - np.mean(torque)) * (2.0 * math.pi / len(torque))
+    return float(np.ptp(excess))
+
+
 def no_feed(feed: Any) -> Any:
     """A feed of that kind with nothing in it."""
     layout = Layout(type(feed))

@@ -22,7 +22,7 @@ from ..text import entries
 from .chain import HIGH
 from .chain import duty as chain_duty
 from .config import Config
-from .cycle import Cycle, cycle
+from .cycle import Cycle, cycle, energy_swing
 from .drive import Drive
 from .organs import all_on_one
 
@@ -37,12 +37,9 @@ def flywheel(torque: Any, speed: float, fluctuation: float) -> float:
     """Inertia [kg m2] on the shaft that keeps (largest - least)/mean of its speed at `fluctuation`.
 
     `torque` [N m] is that of the shaft over a turn at constant `speed` [rad/s], evenly spaced in angle, shape
-    (n,), against a drive that gives its mean: J = (E_max - E_min)/(fluctuation w^2), with E the energy that runs
-    ahead of the mean (Wittenbauer's method with the torque at constant speed).
+    (n,), against a drive that gives its mean: J = dE/(fluctuation w^2), see `energy_swing`.
     """
-    torque = np.asarray(torque, dtype=float)
-    excess = np.cumsum(torque - np.mean(torque)) * (2.0 * math.pi / len(torque))
-    return float(np.ptp(excess)) / (fluctuation * speed * speed)
+    return energy_swing(torque) / (fluctuation * speed * speed)
 
 
 @declaration

@@ -1,0 +1,132 @@
+"""The section on the blade of a knife drive: its path, its tilt, the work of a cut."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from ..engines import numpy_
+from ..machines.knife_drive import KnifeDrive
+from ..mechanism.machine import Mechanism
+from ..study.blade import BladeFindings, Cutting
+from ..study.study import Study
+from ..text import number
+from . import blocks as b
+from . import figure as fig
+from . import linkage
+from .motion import DrawnLink
+from .turn import ANGLE
+
+PICTURE = "blade_path.png"
+LOOKS = {
+    "coupler": "light",
+    "rocker": "heavy",
+    "leg_b": "light",
+    "leg_3": "light",
+    "leg_4": "light",
+    "knife": "light",
+}
+EDGE = DrawnLink("edge", ("first", "last"), "heavy")
+
+
+def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
+    """Table and figure."""
+    yield b.Table(s.rows(Cutting, "blade", digits=4), title="The blade over a turn at constant speed")
+    yield _figure(study, study.findings["blade"])
+
+
+def _mechanism(p: Any, q: Any) -> Mechanism:
+    return KnifeDrive.state(numpy_(), p, KnifeDrive.Inputs(), q, 0.0).m
+
+
+def places(p: Any, m: Mechanism) -> dict[str, tuple[Any, Any]]:
+    """Pins, the middle of the edge and its ends [m]; the edge is drawn as long as the knife's pins lie apart."""
+    ends = {"first": min(p.knife.d.x, p.knife.e.x), "last": max(p.knife.d.x, p.knife.e.x)}
+    edge = {name: m.links["knife"].beside(x, p.knife.blade.y).p for name, x in ends.items()}
+    return linkage.places(m) | {name: (point.x, point.y) for name, point in edge.items()}
+
+
+def _drawn(links: tuple[DrawnLink, ...], at: Mapping[str, tuple[Any, Any]]) -> tuple[Any, Any]:
+    """All links as one line with gaps, shape (points,)."""
+    gap, points = (math.nan, math.nan), []
+    for link in links:
+        points += [at[pin] for pin in (*link.joints, *link.joints[: int(link.closed)])] + [gap]
+    x, y = np.array(points, float).T
+    return x, y
+
+
+def _spans(found: BladeFindings) -> list[fig.Shade]:
+    """Where the blade goes down in the stack."""
+    y, stack = found.y, found.stack
+    inside = (np.roll(y, -1) < y) & (y < stack.top) & (y > stack.table)
+    edge = np.diff(np.concatenate([[False], inside, [False]]).astype(int))
+    angle = np.append(found.turn.angle, 2.0 * math.pi)
+    ends = zip(angle[edge > 0], angle[edge < 0], strict=True)
+    return [fig.Shade(float(low), float(high), "in the stack") for low, high in ends]
+
+
+def _figure(study: Study, found: BladeFindings) -> fig.Figure:
+    angle = found.turn.angle
+    fall = (float(angle[np.argmin(found.y)]) - found.top) % (2.0 * math.pi)
+    metre, small = ((fig.Axis("x", "m", kind), fig.Axis("y", "m", kind)) for kind in ("", "millimetres"))
+    tilt: tuple[fig.Item, ...] = (fig.Curve("tilt", angle, found.tilt, listed=False), *_spans(found))
+    panels = (
+        fig.Panel(
+            *metre,
+            tuple(_positions(study.drive.machine.p, found, fall)),
+            "The linkage in three positions",
+            equal=True,
+        ),
+        fig.Panel(
+            *small,
+            tuple(_path(found, fall)),
+            "Path of the edge's middle; crank angles on its way down",
+            equal=True,
+        ),
+        fig.Panel(ANGLE, fig.Axis("tilt of the blade", "rad"), tilt, "Tilt of the blade"),
+    )
+    return fig.Figure(
+        "blade-path",
+        "The linkage in three positions, the path of its blade and its tilt",
+        "The linkage with its blade at the top, half-way and at the bottom; the path of the edge's middle; the tilt "
+        "of the blade over the crank angle.",
+        tuple((panel,) for panel in panels),
+        file=PICTURE,
+        heights=(2.2, 1.5, 1.0),
+    )
+
+
+def _positions(p: Any, found: BladeFindings, fall: float) -> Iterator[fig.Item]:
+    """The linkage with its blade at the top, half-way and at the bottom, and the stack."""
+    at: dict[str, tuple[Any, Any]] = {}
+    for look, (name, q) in (
+        (2, ("blade at its top", found.top)),
+        (1, ("half-way", found.top + 0.5 * fall)),
+        (0, ("at its bottom", found.top + fall)),
+    ):
+        m = _mechanism(p, q)
+        at = places(p, m)
+        words = f"{name}, crank at {number(q % (2.0 * math.pi), 'rad')}"
+        yield fig.Curve(words, *_drawn((*linkage.links(m.linkage, LOOKS), EDGE), at), look, "o")
+    ends = sorted(float(at[name][0]) for name in ("first", "last"))
+    low, high = ([each, each] for each in (found.stack.table, found.stack.top))
+    yield fig.Between("stack", ends, low, high, "hatched")
+    yield fig.Curve("path of the edge's middle", found.x, found.y, "path")
+    yield from (fig.Label(float(x), float(y), name) for name, (x, y) in at.items() if len(name) < 3)
+
+
+def _path(found: BladeFindings, fall: float) -> Iterator[fig.Item]:
+    """The path of the edge's middle, with crank angles on the way down alone: the way up may run along the same
+    line."""
+    x, y = (np.append(each, each[0]) for each in (found.x, found.y))
+    yield fig.Shade(found.stack.table, found.stack.top, "stack", "y", "hatched")
+    yield fig.Curve("path of the edge's middle", x, y, listed=False)
+    angle = found.turn.angle
+    for k in range(7):
+        i = round((found.top + fall * k / 6.0) / (2.0 * math.pi) * len(angle)) % len(angle)
+        at = float(found.x[i]), float(found.y[i])
+        yield fig.Curve("", [at[0]], [at[1]], marker="o", joined=False, listed=False)
+        yield fig.Label(at[0], at[1], number(float(angle[i]), "rad"), "left" if k == 6 else "right")

@@ -1,0 +1,69 @@
+"""The section on a turn at constant speed: torque, inertia and energy, and the largest reactions of the pins."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..quantities import Layout
+from ..study.study import Study
+from ..study.turn import Reaction, Turn, TurnFindings
+from ..text import number
+from . import blocks as b
+from . import figure as fig
+
+PICTURE = "turn.png"
+ANGLE = fig.Axis("crank angle from the upward vertical", "rad", low=0.0, high=2.0 * math.pi, step=45.0)
+
+
+def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
+    """Table, reactions and figure."""
+    turn: TurnFindings = study.findings["constant_speed"]
+    lead = s.line("Inverse dynamics at {=run.crank_speed} of the crank, without a motor.")
+    yield b.Text(lead, "lead", "long")
+    yield b.Table(s.rows(Turn, "constant_speed", none="none"), title="A turn at constant speed", form="long")
+    if turn.pins:
+        names = Layout(Reaction).names
+        rows = (
+            b.TableRow((pin, *(s.number(f"constant_speed.pins.{pin}.{name}") for name in names)))
+            for pin in turn.pins
+        )
+        heads = b.heads("pin", "peak, with feed", "at", "peak, without feed", "at")
+        yield b.Table(
+            tuple(rows), heads, title="What the pins carry over a turn at constant speed", form="long"
+        )
+    yield _figure(turn)
+
+
+def _figure(turn: TurnFindings) -> fig.Figure:
+    inertia = fig.Curve("inertia", turn.fed.angle, turn.inertia, listed=False)
+    panels = [fig.Panel(ANGLE, fig.Axis("reflected inertia", "kg.m2", low=0.0), (inertia,))]
+    if turn.pins:
+        panels.append(_reactions(turn))
+    return fig.Figure(
+        "turn-at-constant-speed",
+        "Inertia and largest reactions over a turn at constant speed",
+        "The inertia reflected to the crank over the crank angle; bars of the largest reaction of every pin, with "
+        "feed and without it, with the crank angle at which it comes.",
+        tuple((panel,) for panel in panels),
+        file=PICTURE,
+        heights=(1.0, 0.17 * len(turn.pins))[: len(panels)],
+    )
+
+
+def _reactions(turn: TurnFindings) -> fig.Panel:
+    pins, items = turn.pins, []
+    for look, shift, words, size, angle in (
+        (1, -0.2, "with feed", "peak", "angle"),
+        (2, 0.2, "without feed", "peak_free", "angle_free"),
+    ):
+        peaks = [(getattr(r, size), getattr(r, angle)) for r in pins.values()]
+        places = tuple(f"{number(peak, 'N')} at {number(at, 'rad')}" for peak, at in peaks)
+        at = np.arange(len(pins)) + shift
+        items.append(fig.Bars(words, at, [peak for peak, _ in peaks], 0.38, look, words=places))
+    # room for the words beside the bars
+    largest = max(max(r.peak, r.peak_free) for r in pins.values())
+    x = fig.Axis("largest reaction", "N", low=0.0, high=1.3 * largest)
+    return fig.Panel(x, fig.Axis("pin", names=tuple(pins)), tuple(items))

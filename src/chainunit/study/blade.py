@@ -1,0 +1,187 @@
+"""The blade of a knife drive over a turn at constant speed: its path and tilt, and the work of a cut.
+
+The mechanics are in `machines.knife_drive`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..machines.knife_drive import KnifeDrive, Stack
+from ..quantities import Value, declaration, quantity
+from ..text import entries, number
+from .analysis import Analysis, Findings, Report
+from .config import Config
+from .cycle import Cycle, cycle
+from .drive import Drive
+from .result import array_entry
+from .rig import Rig
+from .study import Study
+from .turn import EVERY, POINTS
+
+
+@declaration
+class Cutting:
+    """The blade over a turn of the crank at constant speed, with the cut of normal running."""
+
+    blade_top: Value = quantity("m", "blade, highest y", kind="millimetres")
+    blade_bottom: Value = quantity("m", "blade, lowest y", kind="millimetres")
+    blade_draw: Value = quantity("m", "blade, way along x in the stack", kind="millimetres")
+    tilt_least: Value = quantity("rad", "tilt of the blade, least")
+    tilt_largest: Value = quantity("rad", "tilt of the blade, largest")
+    speed_in_stack: Value = quantity("m/s", "speed of the blade in the stack, largest")
+    cut_work: Value = quantity("J", "work of a cut")
+    cut_path: Value = quantity("m", "path of the blade through the stack", kind="millimetres")
+    cut_work_by_path: Value = quantity("J", "force times path through the stack")
+    losses: Value = quantity("J", "losses of the pins in a turn, cutting")
+
+
+@dataclass(frozen=True)
+class BladeFindings(Findings):
+    """The turn with the cut, and its numbers; place and tilt of the blade are arrays over the crank angle."""
+
+    turn: Cycle
+    stack: Stack
+    numbers: Cutting
+
+    @property
+    def x(self) -> Any:
+        """Of the middle of the edge [m], shape (POINTS,)."""
+        return self.turn.outputs.blade.x
+
+    @property
+    def y(self) -> Any:
+        """Of the middle of the edge [m], shape (POINTS,)."""
+        return self.turn.outputs.blade.y
+
+    @property
+    def tilt(self) -> Any:
+        """[rad], shape (POINTS,)."""
+        return self.turn.outputs.blade.tilt
+
+    @property
+    def top(self) -> float:
+        """Crank angle at which the blade is highest [rad]."""
+        return float(self.turn.angle[np.argmax(self.y)])
+
+    def as_dict(self) -> dict[str, Any]:
+        """Ready for JSON."""
+        curves = {
+            "angle": (self.turn.angle, "rad"),
+            "x": (self.x, "m"),
+            "y": (self.y, "m"),
+            "tilt": (self.tilt, "rad"),
+        }
+        over_turn = {name: array_entry(x[::EVERY], unit) for name, (x, unit) in curves.items()}
+        return {**entries(self.numbers), "over_turn": over_turn}
+
+    def remark(self, study: Study) -> None:
+        """Where the blade does not go through the stack, and what the work of a cut rests on."""
+        n, warn = self.numbers, partial(study.remark, "warning")
+        top, table = (float(x) for x in (self.stack.top, self.stack.table))
+        if n.blade_bottom > top:
+            warn(
+                "no cut",
+                "no cut takes place: the blade comes down to y = {low}, the stack's top is at {high}.",
+                low=_height(n.blade_bottom),
+                high=_height(top),
+                blade_bottom=(n.blade_bottom, "m", "millimetres"),
+            )
+        elif n.blade_bottom > table:
+            warn(
+                "table not reached",
+                "the blade does not reach the table: it comes down to y = {low}, the table is at {high}.",
+                low=_height(n.blade_bottom),
+                high=_height(table),
+                blade_bottom=(n.blade_bottom, "m", "millimetres"),
+            )
+        if n.blade_top < top:
+            warn(
+                "stack not left",
+                "the blade does not leave the stack: it rises to y = {high}, the stack's top is at {low}.",
+                high=_height(n.blade_top),
+                low=_height(top),
+                blade_top=(n.blade_top, "m", "millimetres"),
+            )
+        if n.cut_path > 0.0:
+            study.remark(
+                "note",
+                "work of a cut",
+                "Work of a cut {cut_work}; force times path through the stack {cut_work_by_path}. The resistance "
+                "rises and falls over stack.edge, and fades below stack.v_smooth.",
+                cut_work=(n.cut_work, "J"),
+                cut_work_by_path=(n.cut_work_by_path, "J"),
+            )
+
+
+def _height(y: float) -> str:
+    return number(y, "m", "millimetres", 4)
+
+
+class BladeAnalysis(Analysis):
+    """The blade of a knife drive."""
+
+    name = "blade"
+
+    @staticmethod
+    def applies(config: Config, drive: Drive) -> bool:
+        """Whether the machine has a blade."""
+        return issubclass(drive.machine.model, KnifeDrive)
+
+    @staticmethod
+    def find(study: Study, rig: Rig, report: Report) -> BladeFindings:
+        """The turn at the crank speed of the study.
+
+        Raises
+        ------
+        InputError
+            for a stack whose top is not above the table.
+        """
+        config, machine = study.config, study.drive.machine
+        stack = machine.p.stack
+        if not stack.top > stack.table:
+            raise InputError(
+                f"machine.stack.top = {stack.top:g} m: must be > {stack.table:g} m, the height of the table"
+            )
+        turn = cycle(machine, config.run.crank_speed, config.feed, POINTS)
+        return BladeFindings(turn, stack, _numbers(turn, stack, config))
+
+
+def _numbers(turn: Cycle, stack: Stack, config: Config) -> Cutting:
+    blade, time = turn.outputs.blade, config.turn
+    against = -(blade.cut_fx * blade.vx + blade.cut_fy * blade.vy)
+    work = float(np.mean(against)) * time
+    losses = float(np.mean(turn.outputs.dissipated_power)) * time - work
+    inside = in_stack(stack, blade.x, blade.y)
+    path = float(np.sum(inside * _way(blade.x, blade.y)))
+    speed = np.hypot(blade.vx, blade.vy)
+    return Cutting(
+        blade_top=float(np.max(blade.y)),
+        blade_bottom=float(np.min(blade.y)),
+        blade_draw=abs(float(np.sum(inside * (np.roll(blade.x, -1) - blade.x)))),
+        tilt_least=float(np.min(blade.tilt)),
+        tilt_largest=float(np.max(blade.tilt)),
+        speed_in_stack=float(np.max(speed, where=inside > 0.0, initial=0.0)),
+        cut_work=work,
+        cut_path=path,
+        cut_work_by_path=config.feed.cut_force * path,
+        losses=losses if losses > 1e-9 * work else 0.0,  # of two sums that differ by roundoff alone
+    )
+
+
+def _way(x: Any, y: Any) -> Any:
+    """Length of each piece of a closed path [m]."""
+    return np.hypot(np.roll(x, -1) - x, np.roll(y, -1) - y)
+
+
+def in_stack(stack: Stack, x: Any, y: Any) -> Any:
+    """Share of each piece of the blade's closed path that goes down between top and table, shape (n,)."""
+    after = np.roll(y, -1)
+    within = np.clip(y, stack.table, stack.top) - np.clip(after, stack.table, stack.top)
+    fall = y - after
+    return np.where(fall > 0.0, within / np.where(fall > 0.0, fall, 1.0), 0.0)

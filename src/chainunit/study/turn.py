@@ -1,0 +1,132 @@
+"""A turn of the crank at constant speed, with the feed and without it: torque, inertia, energy, reactions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from operator import attrgetter
+from typing import Any
+
+import numpy as np
+
+from ..quantities import Value, declaration, quantity
+from ..text import entries
+from .analysis import Analysis, Findings, Report
+from .config import Config
+from .cycle import Cycle, cycle, energy_swing, no_feed
+from .drive import Drive
+from .result import array_entry
+from .rig import Rig
+from .study import Study
+
+POINTS = 3600
+"""Crank angles of the turn."""
+EVERY = 10
+"""One of so many angles stands in the result."""
+
+
+@declaration
+class Turn:
+    """A turn of the crank at constant speed, with the feed of normal running where nothing else is said."""
+
+    torque_peak: Value = quantity("N.m", "crank torque, peak")
+    torque_peak_free: Value = quantity("N.m", "crank torque, peak, without feed")
+    torque_mean: Value = quantity("N.m", "crank torque, mean")
+    lost: Value = quantity("J", "energy that load and pins take in a turn")
+    lost_free: Value = quantity("J", "energy that the pins take in a turn without feed")
+    energy_swing: Value = quantity("J", "energy to be stored at constant torque of the drive")
+    inertia_least: Value = quantity("kg.m2", "inertia reflected to the crank, least")
+    inertia_largest: Value = quantity("kg.m2", "inertia reflected to the crank, largest")
+    inertia_mean: Value = quantity("kg.m2", "inertia reflected to the crank, mean")
+    margin: Value = quantity("1", "margin from a dead position, least")
+
+
+@declaration
+class Reaction:
+    """The largest reaction of a pin over the turn, and the crank angle at which it comes."""
+
+    peak: Value = quantity("N", "largest reaction")
+    angle: Value = quantity("rad", "crank angle of it")
+    peak_free: Value = quantity("N", "largest reaction, without feed")
+    angle_free: Value = quantity("rad", "crank angle of it")
+
+
+@dataclass(frozen=True)
+class TurnFindings(Findings):
+    """The turn with the feed (`fed`) and without it (`free`), its numbers, and the reactions by the pins' titles."""
+
+    fed: Cycle
+    free: Cycle
+    inertia: Any
+    """at the crank [kg m2], shape (POINTS,)"""
+    numbers: Turn
+    pins: dict[str, Reaction]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Ready for JSON."""
+        curves = {
+            "angle": (self.fed.angle, "rad"),
+            "torque": (self.fed.crank_torque, "N.m"),
+            "torque_free": (self.free.crank_torque, "N.m"),
+            "inertia": (self.inertia, "kg.m2"),
+        }
+        return {
+            **entries(self.numbers),
+            "pins": {title: entries(reaction) for title, reaction in self.pins.items()},
+            "over_turn": {name: array_entry(x[::EVERY], unit) for name, (x, unit) in curves.items()},
+        }
+
+    def remark(self, study: Study) -> None:
+        """Its numbers speak for themselves."""
+
+
+class TurnAnalysis(Analysis):
+    """Of every machine; of organs that are chains the two bars in their place."""
+
+    name = "constant_speed"
+
+    @staticmethod
+    def applies(config: Config, drive: Drive) -> bool:
+        """Every machine turns."""
+        return True
+
+    @staticmethod
+    def find(study: Study, rig: Rig, report: Report) -> TurnFindings:
+        """The turn at the crank speed of the study."""
+        return turn_of(study.config, study.drive)
+
+
+def turn_of(config: Config, drive: Drive) -> TurnFindings:
+    """The turn at the crank speed of a study, by inverse dynamics."""
+    machine, feed, w = drive.machine, config.feed, config.run.crank_speed
+    fed, free = (cycle(machine, w, each, POINTS) for each in (feed, no_feed(feed)))
+    inertia = np.broadcast_to(fed.outputs.J * machine.ratio**2, fed.angle.shape)
+    return TurnFindings(
+        fed,
+        free,
+        inertia,
+        Turn(
+            torque_peak=float(np.max(np.abs(fed.crank_torque))),
+            torque_peak_free=float(np.max(np.abs(free.crank_torque))),
+            torque_mean=float(np.mean(fed.crank_torque)),
+            lost=float(np.mean(fed.outputs.dissipated_power)) * config.turn,
+            lost_free=float(np.mean(free.outputs.dissipated_power)) * config.turn,
+            energy_swing=energy_swing(fed.crank_torque),
+            inertia_least=float(np.min(inertia)),
+            inertia_largest=float(np.max(inertia)),
+            inertia_mean=float(np.mean(inertia)),
+            margin=float(np.min(fed.outputs.margin)),
+        ),
+        {title: _reaction(fed, free, output) for title, output in machine.model.pins.items()},
+    )
+
+
+def _reaction(fed: Cycle, free: Cycle, output: str) -> Reaction:
+    forces = (attrgetter(output)(each.outputs) for each in (fed, free))
+    sizes = [np.broadcast_to(np.hypot(force.fx, force.fy), fed.angle.shape) for force in forces]
+    at = [int(np.argmax(size)) for size in sizes]
+    return Reaction(
+        peak=float(sizes[0][at[0]]),
+        angle=float(fed.angle[at[0]]),
+        peak_free=float(sizes[1][at[1]]),
+        angle_free=float(fed.angle[at[1]]),
+    )
