@@ -143,7 +143,7 @@ class Parameters(MotorParameters):
 
 @declaration
 class Inputs(LoadInput):
-    """The load, the supply and what is demand of the inverter."""
+    """The load, the supply and what is asked of the inverter."""
 
     voltage: Value = quantity(
         "1",

@@ -17,6 +17,7 @@ import math
 import os
 import sys
 from collections.abc import Callable
+from functools import partialmethod
 from pathlib import Path
 from typing import Any, TypeVar
 from xml.etree.ElementTree import Element
@@ -378,30 +379,20 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
 
     # every variable is a Real; pythonfmu would raise for another type, which is fatal for the host
 
-    def _no_such_type(self, vrs: list[int]) -> None:
+    def _get_other(self, nothing: Any, vrs: list[int]) -> list[Any]:
+        """None are there: each is `nothing`, and there is a line in the log."""
+        self._set_other(vrs, [])
+        return [nothing] * len(vrs)
+
+    def _set_other(self, vrs: list[int], values: list[Any]) -> None:
+        """None are there: a line in the log."""
         if vrs:
             self._tell(refusals.OTHER_TYPE.format(type="Real"))
 
-    def get_integer(self, vrs: list[int]) -> list[int]:
-        """None are there: zeros, and a line in the log."""
-        self._no_such_type(vrs)
-        return [0] * len(vrs)
-
-    def get_boolean(self, vrs: list[int]) -> list[bool]:
-        """None are there: False, and a line in the log."""
-        self._no_such_type(vrs)
-        return [False] * len(vrs)
-
-    def get_string(self, vrs: list[int]) -> list[str]:
-        """None are there: empty texts, and a line in the log."""
-        self._no_such_type(vrs)
-        return [""] * len(vrs)
-
-    def set_integer(self, vrs: list[int], values: list[int]) -> None:
-        """None are there: a line in the log."""
-        self._no_such_type(vrs)
-
-    set_boolean = set_string = set_integer
+    get_integer = partialmethod(_get_other, 0)
+    get_boolean = partialmethod(_get_other, False)
+    get_string = partialmethod(_get_other, "")
+    set_integer = set_boolean = set_string = _set_other
 
     # -- states of the FMU, and its description
 
@@ -440,21 +431,22 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
         self._closed = state["closed"]
 
     def _bad_state(self, state: dict[str, Any]) -> str:
-        """Why the state cannot be taken."""
+        """Why the state cannot be taken; an error where it is none of this model."""
         if "damaged" in state:
             return str(state["damaged"])
         if state["of"] != _IDENTITY:
             return refusals.STATE_OF_ANOTHER
         values, x = state["set"], state["x"]
         flags = [state[name] for name in ("initialized", "started", "closed")]
-        if {type(v) for v in (*values, *x, state["time"], state["stop"], state["pace"])} - {float, int}:
-            return "it is not a saved state of this model"
-        if len(values) != self._first or len(x) != (self._n_x if state["started"] else 0):
-            return "it is not a saved state of this model"
+        numbers = {type(v) for v in (*values, *x, state["time"], state["stop"], state["pace"])} <= {
+            float,
+            int,
+        }
+        complete = len(values) == self._first and len(x) == (self._n_x if state["started"] else 0)
+        if not (numbers and complete and state["pace"] >= 0.0 and {type(flag) for flag in flags} == {bool}):
+            raise ValueError
         if not all(map(math.isfinite, x)):
             return "a value in it is not finite"
-        if not state["pace"] >= 0.0 or {type(flag) for flag in flags} != {bool}:
-            return "it is not a saved state of this model"
         if state["started"] and state["initialized"]:  # else `_prepare` judges them
             for variable, value in zip(self._variables[: self._n_p], values, strict=False):
                 if not variable.quantity.admits(value):

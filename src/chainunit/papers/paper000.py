@@ -360,7 +360,7 @@ def extreme(place: str) -> tuple[float, float]:
 
 
 def at_extreme(place: str) -> float:
-    """The crank angle there [rad]."""
+    """The crank angle phi at an extreme of the rocker [rad]."""
     return extreme(place)[1]
 
 
