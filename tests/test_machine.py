@@ -41,8 +41,8 @@ def test_each_bearing_has_an_output_and_a_joint(model):
     assert set(model.joints.values()) <= set(model.topology().joints)
     for output in model.pins.values():
         assert {f"{output}.fx", f"{output}.fy"} <= set(names)
-    turned = Machine(model).pin_turns(np.linspace(0.0, 1.0, 20))
-    assert len(turned) == len(model.pins) and all(angle.shape == (20,) for angle in turned)
+    turned = Machine(model).pin_turns({"phi0": np.linspace(0.0, 1.0, 20)})
+    assert set(turned) == set(model.joints) and all(angle.shape == (20,) for angle in turned.values())
 
 
 @pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
@@ -85,7 +85,7 @@ def test_what_a_chain_unit_has_beside_others():
     assert other.loaded_sides(None) == () and other.stored_per_unit == {}
     feed = machine.model.Feed()
     assert machine.loaded_sides(feed) == ("left", "right")
-    energy = machine.stored_per_unit["left.material_mass"](0.4, 3.0)
+    energy = machine.stored_per_unit["left.material_mass"]({"phi0": 0.4, "w0": 3.0})
     more = machine.model.Feed(left=type(feed.left)(material_mass=32.0))
     stored = [
         out.kinetic_energy + out.potential_energy

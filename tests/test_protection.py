@@ -13,6 +13,7 @@ from reports import said_of
 from chainunit.drives.induction_motor import InductionMotor, steady
 from chainunit.drives.motor import T_RATED
 from chainunit.engines import MATH
+from chainunit.machines.chain_unit import SIDES
 from chainunit.study import config, sizing
 from chainunit.study.bearings import mean_load
 from chainunit.study.coupling import coupling_sentence
@@ -214,3 +215,33 @@ def test_the_largest_torque_is_that_of_voltage_frequency_and_a_warm_winding():
     # warm less than cold, and behind friction less than at the air gap
     assert found[0] < drive.largest_torque(run, T_RATED)[0]
     assert drive.pull_out(run.isel(time=[0]), T) < found[0] * drive.ratio
+
+
+def test_behind_an_open_coupling_the_machine_has_its_chains(tmp_path):
+    """It goes on from the rods' angles and speeds at that instant, and its energy from there on is only lost."""
+    text = """organ = "chain"
+[coupling]
+trip_torque = 350
+[[event]]
+type = "jam"
+side = "left"
+force = "6 kN"
+[chain]
+rods = 4
+sweep_points = 0
+"""
+    study = run_study(config.parse(text), tmp_path)
+    jam, coasting = study.runs["jam_left"], study.runs["jam_left_coasting"]
+    rods = [f"machine.{side}.{x}_{k}" for side in SIDES for x in ("theta", "omega") for k in range(1, 5)]
+    for name in ("machine.rocker.psi", "machine.kinetic_energy", "machine.potential_energy", *rods):
+        # at a communication point the shaft's speed was just corrected: the rods' speeds are closed to it
+        near = 1e-3 if "omega" in name or "kinetic" in name else 1e-6
+        assert float(coasting[name][0]) == pytest.approx(float(jam[name][-1]), rel=near, abs=near), name
+    energy = coasting["machine.kinetic_energy"] + coasting["machine.potential_energy"]
+    assert float(energy[-1]) < float(energy[0]) - 1.0
+    # what is in the machine is what was there less what was lost
+    lost = np.trapezoid(coasting["machine.dissipated_power"], coasting["time"])
+    assert float(energy[0] - energy[-1]) == pytest.approx(lost, rel=0.02)
+    for side in SIDES:
+        assert float(np.max(coasting[f"machine.{side}.drift"])) < 1e-6
+        assert {f"A2 {side} web at rocker", f"B {side} hinge"} <= set(study.pins["jam_left"])

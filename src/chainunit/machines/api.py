@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from functools import partial
+from operator import itemgetter
 from typing import Any, Self
 
 import numpy as np
@@ -17,6 +18,7 @@ from ..quantities import Quantity, Variable
 from . import chain_unit
 from .chain_unit import SIDES, Chamber, ChamberForces, Feed, Inputs, Outputs, Parameters, SideLoads
 from .crank_rocker import rocker_extremes
+from .flexible import ChainedModel
 from .hanging import Hanging, Modes, modes, rods, split
 from .machine import Machine, admitted
 from .parts import Stop
@@ -161,9 +163,12 @@ class ChainUnit(Machine):
         return energy(**{side: kilogram}) - energy()
 
     @property
-    def stored_per_unit(self) -> Mapping[str, Callable[[Any, Any], Any]]:
+    def stored_per_unit(self) -> Mapping[str, Callable[[Mapping[str, Any]], Any]]:
         """See `Machine`: the material of both organs."""
-        return {f"{side}.material_mass": partial(self.energy_per_kg, side) for side in SIDES}
+        return {f"{side}.material_mass": partial(self._per_kg, side) for side in SIDES}
+
+    def _per_kg(self, side: str, run: Mapping[str, Any]) -> Any:
+        return self.energy_per_kg(side, run["phi0"], run["w0"])
 
     def chamber(
         self, psi: Any, w: Any = 0.0, a: Any = 0.0, left: SideLoads = EMPTY, right: SideLoads = EMPTY
@@ -317,8 +322,30 @@ def ratios(rho: float, lam: float, mu: float, zeta: float, l: float, l1: float) 
     }
 
 
+class ChainedUnit(Machine):
+    """A chain unit with chains, as a run of its model shows it: its outputs need its states."""
+
+    def pin_turns(self, run: Mapping[str, Any]) -> dict[str, Any]:
+        """See `Machine`: in A2, B and A1 of each side from the angles of the rods."""
+        assert issubclass(self.model, ChainedModel)
+        angles, rods = super().pin_turns(run), self.model.organs.at_pins
+        for side in SIDES:
+            first, last, web, end = (run[f"{side}.theta_{k}"] for k in rods)
+            angles[f"{side}.rocker_joint"] = end - run["rocker.psi"]
+            angles[f"{side}.hinge"] = web - last
+            angles[f"{side}.support"] = first
+        return angles
+
+    @property
+    def stored_per_unit(self) -> Mapping[str, Callable[[Mapping[str, Any]], Any]]:
+        """See `Machine`: the material of both organs, as their chains carry it."""
+        return {f"{side}.material_mass": itemgetter(f"{side}.energy_per_kg") for side in SIDES}
+
+
 def machine_of(model: type[InverseMachine], parameters: Any = None, /, **values: float) -> Machine:
     """The machine of a model with what its kind has beside others; arguments and errors as of `Machine`."""
     if model is ChamberForces:
         return ChainUnit(parameters, **values)
+    if issubclass(model, ChainedModel):
+        return ChainedUnit(model, parameters, **values)
     return Machine(model, parameters, **values)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..engines import numpy_
 from ..errors import InputError
-from ..mechanism.machine import MachineState
+from ..mechanism.machine import MachineState, Mechanism
 from ..mechanism.models import InverseMachine
 from ..quantities import Variable, complaint
 
@@ -124,22 +124,30 @@ class Machine:
             named |= part.layout.named(out)
         return dict(zip(named, np.broadcast_arrays(*named.values()), strict=True))
 
-    def pin_turns(self, phi: Any) -> list[Any]:
-        """Angle through which each of the model's `pins` has turned [rad], from the first of the motor angles `phi`,
-        shape (n,); the sum of all turning to and fro is left to the reader."""
-        phi = array(phi)
-        turns = self.state(self.inputs({"phi": phi})).m.turns
+    def pin_turns(self, run: Mapping[str, Any]) -> dict[str, Any]:
+        """Relative angle in each of the model's joints, by output, up to a constant [rad], shape (n,), over a `run`:
+        outputs and states of the model by name, each of shape (n,). The sum of all turning to and fro is left to the
+        reader."""
+        phi = array(run["phi0"])
+        turns = self.drive(phi).turns
         step = np.diff(phi / self.p.ratio)
-        angles = []
-        for output in self.model.pins.values():
-            rate = np.broadcast_to(turns[self.model.joints[output]], phi.shape)
-            angles.append(np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * step)]))
+        angles = {}
+        for output, joint in self.model.joints.items():
+            if joint in turns:
+                rate = np.broadcast_to(turns[joint], phi.shape)
+                angles[output] = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * step)])
         return angles
 
+    def drive(self, phi: Any) -> Mechanism:
+        """The links at motor angles `phi` [rad]; of a machine with chains those of its drive."""
+        u = self.inputs({"phi": phi})
+        linkage = self.model.linkage(self.p, u)
+        return Mechanism(_XP, linkage, u.phi / self.p.ratio, getattr(self.p, "derived", ()))
+
     @property
-    def stored_per_unit(self) -> Mapping[str, Callable[[Any, Any], Any]]:
-        """By the name of an input, the energy that a unit of it holds on its place [J per unit], a function of motor
-        angle [rad] and speed [rad/s]: dE/du, with which the input enters an energy balance as it changes."""
+    def stored_per_unit(self) -> Mapping[str, Callable[[Mapping[str, Any]], Any]]:
+        """By the name of an input, the energy that a unit of it holds on its place [J per unit], a function of
+        outputs and states by name: dE/du, with which the input enters an energy balance as it changes."""
         return {}
 
     def loaded_sides(self, feed: Any) -> tuple[str, ...]:

@@ -69,8 +69,7 @@ class OrganMotion(Supplement):
         for side, names in NAMES.items():
             force = state.effects[names.processing].wrenches[0].force
             if self.study.drive.chain is not None:
-                inner, simulated = self._chain(part, state, side)
-                force = force if simulated is None else simulated
+                inner, force = self._chain(part, state, side)
                 between = _joints(names, self.study.drive.rods)[1:-1]
                 joints |= {pin: (at.x, at.y) for pin, at in zip(between, inner, strict=True)}
             arrows.append(Arrow(f"processing force {side}", names.b, force.x, force.y, "P", side, load=True))
@@ -78,15 +77,10 @@ class OrganMotion(Supplement):
             loads |= {names.wall: (1.0 - share) * material, names.web: share * material}
         return Details(joints, tuple(arrows), loads)
 
-    def _chain(self, part: Any, state: MachineState, side: SideName) -> tuple[list[Vec2], Vec2 | None]:
-        """Places of the inner joints of a chain, and its processing force where it was simulated."""
+    def _chain(self, part: Any, state: MachineState, side: SideName) -> tuple[list[Vec2], Vec2]:
+        """Places of the inner joints of a chain, and its processing force."""
         drive, names = self.study.drive, NAMES[side]
         p, (walls, webs) = drive.machine.p, drive.rods
-        a1, b, a2 = (state.m.pins[name].p for name in (names.a1, names.b, "A2"))
-        if f"machine.{side}.theta_1" not in part:
-            # behind an open coupling the machine is followed with two bars
-            on_wall = [a1 + (b - a1) * (k / walls) for k in range(1, walls)]
-            return on_wall + [b + (a2 - b) * (k / webs) for k in range(webs)], None
         theta, omega = (
             [part[f"machine.{side}.{x}_{k}"].values for k in range(1, walls + webs + 1)]
             for x in ("theta", "omega")
@@ -94,4 +88,5 @@ class OrganMotion(Supplement):
         chain = pins([p.l1 / walls] * walls + [p.l2 / webs] * webs, theta, omega, numpy_())
         v, force = chain[walls].p1, part[f"machine.{side}.processing_force"].values
         law = Resistance(names.b, force, p.processing)
+        a1 = state.m.pins[names.a1].p
         return [a1 + pin.p for pin in chain[1:-1]], v * -law.per_speed(numpy_(), v.squared())

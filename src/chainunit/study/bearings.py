@@ -15,33 +15,18 @@ from .measures import mean, whole_turns
 def pin_loads(drive: Drive, run: xr.Dataset) -> dict[str, dict[str, float]]:
     """Peak, RMS and equivalent load (mean of ISO 281 over what the pin turns) of the reaction of every pin [N]."""
     table, turns = {}, whole_turns(drive, run)
-    turned = drive.driven.pin_turns(turns["machine.phi0"].values)
-    if drive.chain is not None:
-        turned[4:] = _chain_turns(drive, turns)
-
-    def size(name: str, of: xr.Dataset) -> Any:
-        return np.hypot(of[f"machine.{name}.fx"].values, of[f"machine.{name}.fy"].values)
-
-    for (title, name), angle in zip(drive.driven.model.pins.items(), turned, strict=True):
-        evaluated = size(name, turns)
+    machine = drive.simulated
+    turned = machine.pin_turns(drive.machine_series(turns))
+    for title, name in machine.model.pins.items():
+        size, evaluated = (
+            np.hypot(of[f"machine.{name}.fx"].values, of[f"machine.{name}.fy"].values) for of in (run, turns)
+        )
         table[title] = {
-            "peak": float(np.max(size(name, run))),
+            "peak": float(np.max(size)),
             "rms": math.sqrt(mean(turns, evaluated**2)),
-            "equivalent": mean_load(evaluated, angle),
+            "equivalent": mean_load(evaluated, turned[name]),
         }
     return table
-
-
-def _chain_turns(drive: Drive, run: xr.Dataset) -> list[Any]:
-    """Relative angle in A2, B and A1 of each side [rad], shape (time,), of chains."""
-    walls, webs = drive.rods
-    angles = []
-    for side in ("left", "right"):
-        first, last, other, end = (
-            run[f"machine.{side}.theta_{k}"].values for k in (1, walls, walls + 1, walls + webs)
-        )
-        angles += [end - run["machine.rocker.psi"].values, other - last, first]
-    return angles
 
 
 def mean_load(force: Any, turned: Any, exponent: float = 3.0) -> float:

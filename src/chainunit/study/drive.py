@@ -17,12 +17,12 @@ from ..drives.motor import Motor
 from ..errors import InputError
 from ..fmu.backends import Backend, Origin
 from ..fmu.backends import export as export_fmu
-from ..machines.api import ChainUnit
+from ..machines.api import ChainUnit, machine_of
 from ..machines.chain_organs import OrganLaw
 from ..machines.flexible import flexible
 from ..machines.hanging import split
 from ..machines.machine import Machine
-from ..model import Model
+from ..mechanism.models import DirectMachine, InverseMachine
 from ..quantities import Layout
 from ..system import Component, FmuComponent, ModelComponent, Profile, System, export, shaft_joints
 
@@ -130,12 +130,25 @@ class Drive:
         walls, webs = split((self.machine.p.l1, self.machine.p.l2), int(self.chain.rods))
         return walls, webs
 
-    def load_model(self) -> tuple[type[Model], Any]:
+    def load_model(self) -> tuple[type[InverseMachine], Any]:
         """Model of the machine, with two bars or chains, and its parameters."""
         if self.chain is None:
             return self.machine.model, self.driven.p
         model = flexible(*self.rods)
         return model, model.parameter_layout.from_names(self.driven.named | self.organ())
+
+    @cached_property
+    def simulated(self) -> Machine:
+        """The machine as its FMU is, with chains where it has chains."""
+        return self.driven if self.chain is None else machine_of(*self.load_model())
+
+    def machine_series(self, run: xr.Dataset) -> dict[str, Any]:
+        """The variables of the machine in a run by name, each of shape (time,)."""
+        return {
+            name.removeprefix("machine."): run[name].values
+            for name in map(str, run.data_vars)
+            if name.startswith("machine.")
+        }
 
     def organ(self) -> dict[str, float]:
         """What the model with chains has beside the parameters of the one with two bars."""
@@ -267,9 +280,9 @@ class Drive:
         return self.motor.pull_out(self.parameters, T, *at) * self.ratio
 
     @property
-    def coasting_model(self) -> type[Model]:
+    def coasting_model(self) -> type[DirectMachine]:
         """The machine that turns by itself."""
-        return self.machine.model.direct()
+        return self.simulated.model.direct()
 
     def coasting(self, folder: Path, backend: Backend | None = None) -> Path:
         """Write the FMU of the machine that turns by itself, and with it what is on its shaft."""
@@ -280,4 +293,4 @@ class Drive:
     def coasting_parameters(self) -> dict[str, float]:
         """Its parameters by name."""
         added = {} if self.line is None else {"J_added": self.line.J4}
-        return self.driven.named | added
+        return self.simulated.named | added

@@ -213,8 +213,6 @@ def _on_chains(study: Study, chain: ChainOrgans) -> None:
             f"{walls + webs} rods have {walls + webs - 2} natural frequencies; 8 rods show what a chain does."
         )
         note("few rods", f"chains: {few}")
-    if any(name.endswith("_coasting") for name in study.runs):
-        note("coasting bars", "Behind the open coupling the machine is followed with two bars.")
     if result is None:
         return
     speed = result.own.speed

@@ -245,8 +245,8 @@ class Rig:
         """The machine of the FMU `file` behind the coupling that opened at the end of the `run`, with the loads that
         it had, for as long as the motor would have been followed and a second more."""
         begin = float(run["time"][-1])
-        start = {f"{x}_start": float(run[f"machine.{x}0"][-1]) for x in ("phi", "w")}
         model = self.drive.coasting_model
+        start = model.start_from({k: float(x[-1]) for k, x in self.drive.machine_series(run).items()})
         p = model.parameter_layout.from_names(self.drive.coasting_parameters() | start)
         alone = System({"machine": ModelComponent(model, p, file)})
         loads = self.drive.loads(self.config.feed) | transient.signals
@@ -257,7 +257,8 @@ class Rig:
     def residuals(self, run: xr.Dataset) -> dict[str, float]:
         """Writes the energy residual of each shaft into the run, named after what it drives, where that is not the
         machine; its share of the energy moved."""
-        feed = {f"machine.{name}": partial(self._held, name) for name in self.drive.machine.stored_per_unit}
+        stored = self.drive.simulated.stored_per_unit
+        feed = {f"machine.{name}": partial(self._held, per_unit) for name, per_unit in stored.items()}
         shares = {}
         for driven, (residual, share) in certify(run, self.graph, feed).items():
             prefix = "" if driven == "machine" else f"{driven}_"
@@ -265,11 +266,8 @@ class Rig:
             shares[f"{prefix}energy_residual_share"] = share
         return shares
 
-    def _held(self, name: str, run: xr.Dataset) -> Any:
-        """Energy that a unit of the input of that name holds on its place, shape (time,)."""
-        if self.drive.chain is not None:
-            return run[f"machine.{name.partition('.')[0]}.energy_per_kg"].values
-        return self.drive.driven.stored_per_unit[name](run["machine.phi0"].values, run["machine.w0"].values)
+    def _held(self, per_unit: Callable[[Mapping[str, Any]], Any], run: xr.Dataset) -> Any:
+        return per_unit(self.drive.machine_series(run))
 
     def compare(
         self,
