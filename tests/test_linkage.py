@@ -242,6 +242,25 @@ class LightSixBar(SixBar):
         return replace(bars, crank=Crank(bars.crank.bar._replace(mass=None), "A"))
 
 
+class OtherSixBar(SixBar):
+    """With another probe."""
+
+    @classmethod
+    def probes(cls, xp, p, u, s, a):
+        """The angle as a constant."""
+        return super().probes(xp, p, u, s, a) | {"angle": 3.0}
+
+
+def test_a_machine_made_of_another_has_its_own_outputs():
+    p, u, _ = case(2)
+    assert OtherSixBar.evaluate(MATH, p, u)[0].angle == 3.0 != SixBar.evaluate(MATH, p, u)[0].angle
+    direct = OtherSixBar.direct()
+    assert (
+        direct.evaluate(MATH, direct.Parameters(), direct.Inputs(), direct.States(phi=0.0, w=1.0))[0].angle
+        == 3.0
+    )
+
+
 def test_a_crank_without_a_body_needs_an_inertia_on_its_shaft():
     direct = LightSixBar.direct()
     with pytest.raises(GeometryError, match=r"inertia of the crank and on its shaft = 0 kg\.m2"):

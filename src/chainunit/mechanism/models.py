@@ -127,7 +127,7 @@ class InverseMachine(LinkageModel):
         # a class that a function makes has others of its name
         if "name" in own and not cls.built_by:
             MACHINES[cls.name] = cls
-        if "Outputs" in own and "parts" not in own:
+        if hasattr(cls, "Outputs") and "parts" not in own:
             apart = cls.by_differences
             cls.parts = (
                 Part(cls.Outputs, cls._outputs, by_differences=apart & set(Layout(cls.Outputs).names)),
@@ -186,7 +186,11 @@ class InverseMachine(LinkageModel):
             "Parameters": declared_class(
                 "DirectParameters", (Start, AddedInertia, cls.Parameters), [*own, *parameters]
             ),
-            "States": declared_class("States", (TurningStates,), fields_of(cls.States) if cls.States else ()),
+            **(
+                {"States": declared_class("States", (TurningStates,), fields_of(cls.States))}
+                if cls.States
+                else {}
+            ),
             "Inputs": declared_class(
                 "DirectInputs", (DrivingTorque,), fields_of(cls.Inputs, without=names_of(ShaftMotion))
             ),
