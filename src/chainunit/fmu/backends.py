@@ -68,7 +68,7 @@ def export(
         return _by_python(model, file, start, fmi, platforms, f", the C compiler {compiler.name} failed")
     words = f"FMI {fmi}.0, Co-Simulation and Model Exchange, native code by {compiler.name}"
     if platforms:
-        words += " for " + ", ".join(f"{name} ({targets.PLATFORMS[name].tried})" for name in names)
+        words += " for " + ", ".join(f"{name} ({targets.PLATFORMS[name].tests})" for name in names)
     elif backend is None:
         words += ", the C compiler found here"
     return Origin("native", words)

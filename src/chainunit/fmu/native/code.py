@@ -81,6 +81,7 @@ class Program:
         forms = _operations()
         self._forms: list[str] = []
         self._operands: list[tuple[int, ...]] = []
+        self._arguments: dict[int, tuple[int, int]] = {}  # which argument, and which of its values
         places: dict[int, int] = {}  # where CasADi's registers are now
         simple: dict[str, int] = {}
         results = [0] * rows.numel()
@@ -102,6 +103,7 @@ class Program:
                 places[into[0]] = once(number(function.instruction_constant(k)))
             elif kind == casadi.OP_INPUT:
                 places[into[0]] = once(f"i{of[0]}[{of[1]}]")
+                self._arguments[places[into[0]]] = of[0], of[1]
             elif kind == casadi.OP_OUTPUT:
                 results[into[1]] = places[of[0]]
             else:
@@ -157,9 +159,11 @@ class Program:
 
         def outside(place: int) -> str:
             text = f"w[{self._slots[place]}]" if self._operands[place] else self._forms[place]
-            if text[0] == "i":
-                arguments.add(int(text[1 : text.index("[")]))
-            return named(place, text) if uses[place] > 1 and text[0] in "iw" else text
+            if place in self._arguments:
+                arguments.add(self._arguments[place][0])
+            elif not self._operands[place]:
+                return text  # a number
+            return named(place, text) if uses[place] > 1 else text
 
         for place in part:
             for operand in self._operands[place]:
@@ -178,9 +182,9 @@ class Program:
         """The definition of the function that calls them."""
 
         def result(place: int) -> str:
-            text = self._forms[place]
-            argument = f"arg[{text[1:].replace('[', '][', 1)}" if text[0] == "i" else text
-            return f"w[{self._slots[place]}]" if self._operands[place] else argument
+            if place in self._arguments:
+                return "arg[{}][{}]".format(*self._arguments[place])
+            return f"w[{self._slots[place]}]" if self._operands[place] else self._forms[place]
 
         lines = [
             f"static void kernel_{self.name}(const double *const *arg, double *res, double *w, unsigned wanted) {{"

@@ -32,11 +32,13 @@ KERNELS, KERNELS_OBJECT, HEADER = "kernels.c", "kernels.o", "model.h"
 @dataclass(frozen=True)
 class Platform:
     """One platform: suffix of its libraries, and for each FMI version the folders of `binaries` with the zig targets
-    of the library in it; several targets make one fat library. `tried` says how far its binaries are tested."""
+    of the library in it; several targets make one fat library. `tests` says how far its binaries are tested, `linked`
+    are what its libraries are linked with."""
 
     suffix: str
     folders: Mapping[int, Mapping[str, tuple[str, ...]]]
-    tried: str
+    tests: str
+    linked: tuple[str, ...] = ("-lm",)
 
 
 _LINUX, _ARM_LINUX = "x86_64-linux-gnu.2.17", "aarch64-linux-gnu.2.17"
@@ -44,7 +46,7 @@ _MAC, _ARM_MAC, _WINDOWS = "x86_64-macos.10.15", "aarch64-macos.11.0", "x86_64-w
 PLATFORMS: dict[str, Platform] = {
     "linux64": Platform(".so", {2: {"linux64": (_LINUX,)}, 3: {"x86_64-linux": (_LINUX,)}}, "run"),
     "win64": Platform(
-        ".dll", {2: {"win64": (_WINDOWS,)}, 3: {"x86_64-windows": (_WINDOWS,)}}, "run under Wine"
+        ".dll", {2: {"win64": (_WINDOWS,)}, 3: {"x86_64-windows": (_WINDOWS,)}}, "run under Wine", ()
     ),
     "darwin64": Platform(
         ".dylib",
@@ -171,18 +173,22 @@ def build(
     wanted = PLATFORMS[name]
     libraries = {}
     for folder, targets in wanted.folders[fmi].items():
-        slices = [_compile(compiler, t, identifier + wanted.suffix, sources, translated) for t in targets]
+        slices = [_compile(compiler, target, wanted, identifier, sources, translated) for target in targets]
         library = slices[0] if len(slices) == 1 else fat(slices)
         libraries[f"binaries/{folder}/{identifier}{wanted.suffix}"] = library
     return libraries
 
 
 def _compile(
-    compiler: Compiler, target: str, library: str, sources: Mapping[str, bytes], files: Sequence[str]
+    compiler: Compiler,
+    target: str,
+    wanted: Platform,
+    identifier: str,
+    sources: Mapping[str, bytes],
+    files: Sequence[str],
 ) -> bytes:
     own = ("-target", target) if compiler.zig else ("-Wl,--build-id=none", "-DCHAINUNIT_OLD_GLIBC")
-    math = () if "windows" in target else ("-lm",)
-    flags = (*own, *_FLAGS)
+    flags, library = (*own, *_FLAGS), identifier + wanted.suffix
     # the kernels take almost all of the time, and are the same for any start values
     kernels = {name: sources[name] for name in (KERNELS, HEADER)}
     object_code = compile_code(
@@ -190,7 +196,7 @@ def _compile(
     )
     rest = {name: text for name, text in sources.items() if name != KERNELS} | {KERNELS_OBJECT: object_code}
     others = [name for name in files if name != KERNELS]
-    arguments = (*flags, *_SHARED, *others, KERNELS_OBJECT, "-o", library, *math)
+    arguments = (*flags, *_SHARED, *others, KERNELS_OBJECT, "-o", library, *wanted.linked)
     return compile_code(compiler, arguments, rest, library)
 
 
