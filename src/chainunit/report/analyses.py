@@ -12,7 +12,7 @@ from .blocks import Block, Source
 
 @dataclass(frozen=True)
 class Contents:
-    """The section of an analysis: its heading, its blocks (tables, words, figures), and the files of its figures."""
+    """A section: its heading, its blocks (tables, words, figures), and the files of its figures."""
 
     heading: str
     blocks: Callable[[Source, Study], Iterator[Block]]

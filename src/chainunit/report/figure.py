@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal, TypeAlias
 
@@ -164,6 +164,11 @@ class Figure:
         """Row, column and panel of each."""
         for r, row in enumerate(self.panels):
             yield from ((r, c, panel) for c, panel in enumerate(row) if panel is not None)
+
+
+def stacked(x: Axis, panels: Iterable[tuple[Axis, Iterable[Item]]]) -> tuple[tuple[Panel], ...]:
+    """Panels below each other, over the same x."""
+    return tuple((Panel(x, y, tuple(items)),) for y, items in panels)
 
 
 def along(item: Item) -> dict[str, str]:

@@ -67,3 +67,8 @@ def joined(lines: Iterable[Line], between: str = ", ") -> tuple[Piece, ...]:
 def capital(text: str) -> str:
     """The text with a capital at its begin."""
     return text[:1].upper() + text[1:]
+
+
+def spoken(name: str) -> str:
+    """The name of a number in words."""
+    return "RMS" if name == "rms" else name.replace("_", " ")

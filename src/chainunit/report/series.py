@@ -10,7 +10,7 @@ import xarray as xr
 from .. import __version__
 from ..files import netcdf, whole
 from ..study.study import LOAD_CYCLE, Study
-from .accessors import title
+from .run_names import title
 
 SERIES = "result.nc"
 

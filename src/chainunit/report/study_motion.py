@@ -13,8 +13,8 @@ from ..machines.chain_unit import ChamberForces
 from ..machines.knife_drive import KnifeDrive
 from ..mechanism.models import ShaftMotion, names_of
 from ..study.study import Study
-from . import accessors as read
 from . import linkage
+from . import run_names as read
 from .edge_motion import EdgeMotion
 from .lines import capital
 from .motion import Animation, Clip, DrawnLink, Reading

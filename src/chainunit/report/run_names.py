@@ -1,20 +1,15 @@
-"""What the report on a chain unit reads of its study, in one place."""
+"""The runs of a study as a report names and orders them."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import Any
 
 from ..quantities import Variable
 from ..study.events import in_groups
-from ..study.measures import Phase, measures_of
-from ..study.rig import DIFFERENCE as DIFFERENCE
 from ..study.study import Study
 
 COASTING = "_coasting"
 """Ends the name of a run of the machine alone, behind the safety coupling that opened in the run named before it."""
-START_UP = tuple(measures_of(Phase.START_UP))
-"""What is measured in a start-up."""
 _TITLES = {"start_up": "start-up and steady running", "unfinished": "the run that stopped early"}
 _MINOR = "supply_power_mean winding_temperature speed_mean speed_least power_mean crank_torque_mean cycle_gap".split()
 
@@ -59,16 +54,3 @@ def event_time(study: Study, run: str) -> float | None:
 def minor(variable: Variable) -> bool:
     """Whether the terminal leaves an answer out."""
     return variable.name in _MINOR
-
-
-def series(study: Study, run: str) -> dict[str, Any]:
-    """Time after the event, crank torque and speed, motor current of a run where it is current, each of the shape
-    (time,)."""
-    rows, drive = study.runs[run], study.drive
-    current = {} if drive.foreign else {"current": rows[f"motor.{drive.motor.current}"].values}
-    return {
-        "time": rows["time"].values - (event_time(study, run) or 0.0),
-        "torque": drive.crank_torque(rows),
-        "speed": drive.crank_motion(rows)[1],
-        **current,
-    }

@@ -1,0 +1,205 @@
+"""The section on the organs as chains: beside two bars at the study's speed, and over the speeds of the sweep."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from ..study.chain import HIGH
+from ..study.study import Study
+from . import blocks as b
+from . import figure as fig
+from .lines import Line, joined, line
+from .pictures import Pictures
+from .style import WIDE
+
+PICTURES = Pictures()
+_OWN = (
+    ("crank torque, peak", ("crank_torque_median", "crank_torque_high", "two_bar_crank_torque")),
+    ("crank torque, RMS", ("crank_torque_rms", "", "two_bar_crank_torque_rms")),
+    ("rocker torque, peak", ("rocker_torque_median", "rocker_torque_high", "two_bar_rocker_torque")),
+    ("snatch: force at A2 over its own at rest", ("snatch_median", "snatch_high", "two_bar_snatch")),
+    ("turns that count as independent, at the quantile", ("independent_turns", "", "")),
+    ("snatch, largest over least median of a start", ("snatch_spread", "", "")),
+    ("time with a slack rod; two bars: with one that pushes", ("slack_time", "", "two_bar_slack_time")),
+    ("rods that are slack, mean over time", ("slack_rods", "", "")),
+    ("largest angle between neighbouring rods", ("fold_largest", "", "")),
+    ("energy residual of an organ over the energy moved", ("energy_residual", "", "")),
+)
+
+
+def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
+    """Words, tables and figure."""
+    if study.chain is None:
+        return
+    chain = s.result["chain"]
+    lead = (
+        "The organs are chains of {=chain.rods_of_wall} rods in the wall and {=chain.rods_of_web} in the web, the "
+        "crank is held at constant speed, {=chain.starts} starts at other crank angles are followed over "
+        "{=chain.turns} turns each. Where rods go slack the motion may be chaotic: no single peak is a prediction. "
+        "Median and quantile are of the peaks of single turns, all turns of all starts."
+    )
+    yield b.Text(s.line(lead), "lead", "long")
+    yield from _avoid(s, chain)
+    yield _own_speed(s, chain)
+    slack = {
+        side: joined(
+            s.line(f"{{chain.slack_by_rod.{side}.{k}.rod}}: {{chain.slack_by_rod.{side}.{k}}}")
+            for k, rod in enumerate(rods)
+            if rod["value"] > 0.0
+        )
+        for side, rods in chain["slack_by_rod"].items()
+    }
+    if any(slack.values()):
+        rows = tuple(b.TableRow((side, words or "none")) for side, words in slack.items())
+        yield b.Table(rows, title="Rods that go slack, share of the time", numeric=False)
+    if len(chain["sweep"]) > 1:
+        yield _sweep(s, chain)
+    if chain["critical_speeds"]:
+        yield from _critical(s, chain, study)
+    yield from PICTURES.figures(s, study)
+
+
+def _avoid(s: b.Source, chain: Mapping[str, Any]) -> Iterator[b.Block]:
+    """The speeds that the crank should not have."""
+    sweep = chain["sweep"]
+    for i, band in enumerate(chain["avoid"]):
+        path = f"chain.avoid.{i}"
+        end = f" to {{{path}.to}}" if band["to"] != band["from"] else ""
+        ends = ", where the sweep begins" if band["from"] == sweep[0]["speed"] else ""
+        ends += ", where the sweep ends" if end and band["to"] == sweep[-1]["speed"] else ""
+        yield b.Judgement("partly", s.line(f"Avoid {{{path}.from}}{end}{ends}: {{{path}.why}}."))
+    if not chain["avoid"] and len(sweep) > 1:
+        ends = f"{{chain.sweep.0.speed}} to {{chain.sweep.{len(sweep) - 1}.speed}}"
+        yield b.Text(s.line(f"No speed to avoid from {ends}."), "fine")
+
+
+def _own_speed(s: b.Source, chain: Mapping[str, Any]) -> b.Table:
+    rows = [
+        b.TableRow((title, *(s.estimate(f"chain.own_speed.{name}") if name else "" for name in names)))
+        for title, names in _OWN
+    ]
+    if chain["resonance"]["value"] is not None:
+        rows += [
+            b.TableRow(("resonance of an organ, crank speed", s.number("chain.resonance"), "", "")),
+            b.TableRow(
+                ("distance to it, relative; negative below", s.number("chain.distance_to_resonance"), "", "")
+            ),
+        ]
+    title = (
+        "Chains and two bars at constant {=chain.own_speed.speed}, {=chain.starts} starts of {=chain.turns} turns; "
+        "in brackets: interval of {=chain.confidence} confidence"
+    )
+    quantile = s.line("chains, {=chain.quantile} of turns")
+    heads = b.heads("peaks are of single turns", "chains, median", quantile, "two bars")
+    return b.Table(tuple(rows), heads, title=s.line(title))
+
+
+def _sweep(s: b.Source, chain: Mapping[str, Any]) -> b.Table:
+    columns = {
+        "crank_torque_median": "crank torque: median",
+        "crank_torque_high": "crank torque: {=chain.quantile} quantile",
+        "two_bar_crank_torque": "crank torque: two bars",
+        "rocker_torque_median": "rocker torque: median",
+        "rocker_torque_high": "rocker torque: {=chain.quantile} quantile",
+        "two_bar_rocker_torque": "rocker torque: two bars",
+        "snatch_median": "snatch: median",
+        "snatch_high": "snatch: {=chain.quantile} quantile",
+        "slack_time": "time with a slack rod",
+    }
+
+    def cell(i: int, name: str) -> Line:
+        unknown = chain["sweep"][i].get(f"{name}_from", {"value": 0.0})["value"] is None
+        return "-" if unknown else s.number(f"chain.sweep.{i}.{name}")
+
+    rows = (
+        b.TableRow((s.number(f"chain.sweep.{i}.speed"), *(cell(i, name) for name in columns)))
+        for i in range(len(chain["sweep"]))
+    )
+    title = "Over the crank speed; -: the starts differ by so much that they do not tell the quantile"
+    return b.Table(
+        tuple(rows), b.heads("crank speed", *map(s.line, columns.values())), title=title, form="long"
+    )
+
+
+def _critical(s: b.Source, chain: Mapping[str, Any], study: Study) -> Iterator[b.Block]:
+    """Critical crank speeds: all in a table, those within the sweep in a sentence."""
+    path = "chain.critical_speeds"
+    places: dict[float, dict[float, int]] = {}
+    for i, each in enumerate(chain["critical_speeds"]):
+        places.setdefault(each["mode"]["value"], {})[each["order"]["value"]] = i
+    rows = (
+        b.TableRow(
+            (
+                s.line(f"mode {{={path}.{next(iter(by_order.values()))}.mode}}"),
+                *(s.number(f"{path}.{i}.speed") for i in by_order.values()),
+            )
+        )
+        for by_order in places.values()
+    )
+    orders = (s.line(f"order {{={path}.{i}.order}}") for i in next(iter(places.values())).values())
+    title = "Critical crank speeds, at which a multiple of the speed is a natural frequency of an organ"
+    yield b.Table(tuple(rows), b.heads("", *orders), title=title, form="long")
+    assert study.chain is not None
+    inside = [
+        s.line(f"{{{path}.{places[mode][order]}.speed}} (mode {mode}, order {order})")
+        for mode, order, _ in sorted(study.chain.within_sweep(), key=lambda each: each[2])
+    ]
+    if inside:
+        yield b.Text(line("Critical speeds within the sweep: ", joined(inside), "."), form="short")
+
+
+@PICTURES.declare(lambda study: study.chain is not None and len(study.chain.sweep) > 1, "chain_sweep.png")
+def _over_speed(s: b.Source, study: Study) -> fig.Figure:
+    """Torques of chains and two bars, and the time slack."""
+    result = study.chain
+    assert result is not None
+    rows = result.sweep
+    speed = np.array([n.speed for n in rows])
+    x = fig.Axis("crank speed", "rad/s", "speed", low=float(speed[0]), high=float(speed[-1]))
+    # on a narrow screen, too, no label covers another
+    words: list[fig.Item] = [
+        fig.Mark(
+            at, words=f"mode {mode}" + (f", order {order}" if order > 1 else ""), look="thin", upright=True
+        )
+        for mode, order, at in result.within_sweep(0.05)
+    ]
+    marks: list[fig.Item] = [
+        *(fig.Shade(band.low, band.high, "to avoid") for band in result.avoid),
+        *(fig.Mark(at, look="thin") for _, _, at in result.within_sweep()),
+        fig.Mark(result.own.speed, "the study's speed", look=2),
+    ]
+
+    def compared(median: Any, two: Any) -> list[fig.Item]:
+        return [
+            fig.Curve("chains, median", speed, median, 0, "o"),
+            fig.Curve("two bars", speed, two, 1, "s"),
+            *marks,
+        ]
+
+    panels: list[tuple[fig.Axis, list[fig.Item]]] = []
+    for of in ("rocker", "crank"):
+        names = (f"{of}_torque_median", f"{of}_torque_high", f"two_bar_{of}_torque")
+        median, high, two = (np.array([getattr(n, name) for n in rows]) for name in names)
+        sizes = np.concatenate([median, high, two])
+        wide = float(np.nanmax(sizes)) > WIDE * max(float(np.nanmin(sizes)), 1e-9)
+        quantile = fig.Between(f"chains, up to the {100 * HIGH:g} % quantile", speed, median, high)
+        y = fig.Axis(f"{of} torque, peak", "N.m", low=None if wide else 0.0, log=wide)
+        panels.append((y, [quantile, *compared(median, two), *([] if panels else words)]))
+    slack = compared([n.slack_time for n in rows], [n.two_bar_slack_time for n in rows])
+    panels.append((fig.Axis("time slack", "1", "percent", low=-0.04, high=1.04), slack))
+    return fig.Figure(
+        "chains",
+        "Chains and two bars over the crank speed",
+        "Peaks of rocker torque and crank torque in a turn over the crank speed, chains and two bars, and below the "
+        "share of the time in which a rod is slack; speeds to avoid are shaded, critical speeds are lines.",
+        fig.stacked(x, panels),
+        s.line(
+            "The crank held at constant speed, {=chain.starts} starts of {=chain.turns} turns each. Shaded: speeds "
+            "to avoid; dash-dotted: the speed of normal running; thin: critical speeds. Two bars do not go slack: of "
+            "them, the time in which one pushes."
+        ),
+        heights=(1.1, 1.1, 0.65),
+    )

@@ -1,0 +1,295 @@
+"""The section of plots: torque and speed of each run, a turn at constant speed, what the pins carry."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..engines import numpy_
+from ..study.cycle import Cycle
+from ..study.drive import Drive
+from ..study.study import Study
+from ..text import forms
+from . import blocks as b
+from . import figure as fig
+from . import run_names as read
+from .pictures import Pictures
+from .shaft import TORQUE, shaft_torque
+
+PICTURES = Pictures()
+_MOTION = ("phi", "w", "a")
+_ANGLE = fig.Axis("crank angle from the upward vertical", "rad", low=0.0, high=2.0 * math.pi, step=45.0)
+_TORQUE = fig.Axis("crank torque", "N.m")
+_SPEED = fig.Axis("crank speed", "rad/s")
+_CURRENT = fig.Axis("motor current", "A")
+
+
+@PICTURES.declare(lambda study: read.driven(study) and study.drive.foreign is None, "torque_speed.png")
+def _torque_speed(s: b.Source, study: Study) -> fig.Figure:
+    """The start, and beside it the overloads of each side, at a scale of their own."""
+    names, panels = read.driven(study), []
+    for group in [[name for name in names if not read.is_event(study, name)], *read.groups(study, names)]:
+        # an overload from its event on; before it is the steady running of the first panel
+        runs = {name: study.runs[name].sel(time=slice(read.event_time(study, name), None)) for name in group}
+        curves = [
+            fig.Curve(
+                read.title(study, name),
+                run["motor.w"].values,
+                run["motor.air_gap_tau"].values,
+                names.index(name),
+            )
+            for name, run in runs.items()
+        ]
+        slowest, fastest = (float(of([of(curve.x) for curve in curves])) for of in (np.min, np.max))
+        room = 0.15 * (fastest - slowest)
+        low = slowest - room if slowest < 0.0 else max(0.0, slowest - room)
+        w = np.linspace(low, fastest + room, 301)
+        most = np.broadcast_to(study.drive.motor.limit(numpy_(), study.drive.parameters, w), w.shape)
+        # beyond the synchronous speed it falls out of all that is run
+        most = np.where(most < min(float(np.min(curve.y)) for curve in curves), np.nan, most)
+        x = fig.Axis("motor speed", "rad/s", "speed", low=low, high=fastest + room)
+        limit = fig.Curve("most that the drive gives, steady", w, most, "limit")
+        panels.append(
+            fig.Panel(x, fig.Axis("air-gap torque", "N.m"), (*curves, limit), _group_title(study, group))
+        )
+    return fig.Figure(
+        "torque-speed",
+        "Torque-speed plane: the start, and the overloads from their event on",
+        "Air-gap torque of the motor over its speed, a line for each run, with the most that the drive gives in "
+        "steady running.",
+        (tuple(panels),),
+        "Steady running is a closed loop. Grey: the most that the drive gives in steady running.",
+        heights=(1.6,),
+    )
+
+
+def _group_title(study: Study, runs: list[str]) -> str:
+    """What the runs of a panel have in common."""
+    sides = [study.config.events[run].loaded_side for run in runs if read.is_event(study, run)]
+    if not sides:
+        return "Start-up and steady running"
+    return f"Overloads of the {sides[0]} side" if sides[0] else "Overloads"
+
+
+@PICTURES.declare(lambda study: study.statics.cycles, "torque_angle.png")
+def _turn(s: b.Source, study: Study) -> fig.Figure:
+    torques: dict[str, Callable[[Cycle], Any]] = {"crank": lambda c: c.crank_torque}
+    if study.statics.organs is not None:
+        torques["rocker"] = lambda c: c.outputs.rocker.tau
+    items: dict[fig.Axis, list[fig.Item]] = {}
+    for of, torque in torques.items():
+        curves = items[fig.Axis(f"{of} torque", "N.m")] = []
+        for look, (name, c) in enumerate(study.statics.cycles.items()):
+            y = np.broadcast_to(torque(c), c.angle.shape)
+            curves.append(fig.Curve(name, np.append(c.angle, 2.0 * math.pi), np.append(y, y[0]), look))
+    return fig.Figure(
+        "turn",
+        "Torque over a crank turn at constant speed",
+        "Crank torque and, below, the torque that both organs ask of the rocker, over the crank angle: both sides "
+        "loaded, one side empty, all feed on one side.",
+        fig.stacked(_ANGLE, items.items()),
+        s.line("Inverse dynamics of two bars at {=run.crank_speed} of the crank, without a motor."),
+    )
+
+
+@PICTURES.declare(lambda study: study.statics.loops, "speed_loop.png")
+def _speed_loop(s: b.Source, study: Study) -> fig.Figure:
+    loops = list(enumerate(study.statics.loops.items()))
+    frequency = fig.Axis("frequency", "rad/s", log=True)
+    longest = 1.5 * max(loop.settling for loop in study.statics.loops.values())
+    time = fig.Axis("time after a step of the load torque", "s", low=0.0, high=longest)
+    panels = (
+        (frequency, fig.Axis("gain of the open loop", log=True), "frequency", "gain", "Gain"),
+        (frequency, fig.Axis("phase", "deg", low=-270.0, high=0.0, step=45.0), "frequency", "phase", "Phase"),
+        (
+            time,
+            fig.Axis("deviation of the motor speed", "rad/(N.m.s)"),
+            "time",
+            "deviation",
+            "Disturbance step",
+        ),
+    )
+
+    def items(over: str, of: str) -> Iterator[fig.Item]:
+        yield from (
+            fig.Curve(name, getattr(loop, over), getattr(loop, of), look) for look, (name, loop) in loops
+        )
+        if of == "gain":
+            yield fig.Mark(1.0, axis="y", look="thin")
+
+    return fig.Figure(
+        "speed-loop",
+        "The speed loop, linearised",
+        "Gain and phase of the open speed loop over the frequency, and the deviation of the motor speed after a step "
+        "of the load torque.",
+        (tuple(fig.Panel(x, y, tuple(items(over, of)), title) for x, y, over, of, title in panels),),
+        heights=(1.4,),
+    )
+
+
+# -- over time
+
+
+@PICTURES.declare(lambda study: "start_up" in study.runs, "start_up.png")
+def _start_up(s: b.Source, study: Study) -> fig.Figure:
+    return _transient(s, study, "start_up")
+
+
+@PICTURES.declare(read.driven)
+def _others(s: b.Source, study: Study) -> Iterator[fig.Figure]:
+    return (_transient(s, study, name) for name in read.driven(study) if name != "start_up")
+
+
+@PICTURES.declare(lambda study: read.groups(study, study.overloads), "overload_time.png")
+def _overloads(s: b.Source, study: Study) -> fig.Figure:
+    """The overloads beside each other in print: a band of rows for each side, the scales alike in all."""
+    groups = [[_transient(s, study, name) for name in group] for group in read.groups(study, study.overloads)]
+    rows: list[list[fig.Panel | None]] = []
+    for group in groups:
+        for k in range(min(3, *(len(each.panels) for each in group))):
+            panels = ((each, each.panels[k][0]) for each in group)
+            rows.append([panel and replace(panel, title="" if k else each.title) for each, panel in panels])
+    widest = max(map(len, rows))
+    return fig.Figure(
+        "overloads",
+        "Overloads",
+        "Crank torque, crank speed and motor current of every overload.",
+        tuple((*row, *[None] * (widest - len(row))) for row in rows),
+        level=True,
+        on_page=False,
+    )
+
+
+def _transient(s: b.Source, study: Study, name: str) -> fig.Figure:
+    """Torque, speed and current of a run over time."""
+    run, drive, event = study.runs[name], study.drive, read.event_time(study, name)
+    time = run["time"].values - (event or 0.0)
+    low, high = float(time[0]), float(time[-1])
+    speed: list[fig.Item] = [fig.Curve(_SPEED.label, time, drive.crank_motion(run)[1], listed=False)]
+    items: dict[fig.Axis, list[fig.Item]] = {
+        _TORQUE: [fig.Curve(_TORQUE.label, time, drive.crank_torque(run), listed=False)],
+        _SPEED: speed,
+        **_current(drive, run, time),
+    }
+    if drive.line is not None:
+        items[TORQUE] = shaft_torque(run, time)
+    if event is None and drive.follows:
+        speed.append(fig.Curve("speed asked for", time, run["motor.w_ref"].values / drive.ratio, 1))
+    behind = study.runs.get(name + read.COASTING)
+    if behind is not None:
+        after = behind["time"].values - (event or 0.0)
+        speed.append(fig.Curve("crank behind the open coupling", after, drive.crank_motion(behind)[1], 1))
+        high = float(after[-1])
+    if event is not None:
+        # the last quarter turn before the event says enough of steady running
+        low = max(low, -0.5 * math.pi / study.config.run.crank_speed)
+    marks, words = _marks(study, name, event), read.title(study, name)
+    return fig.Figure(
+        f"time-{name.replace('_', '-')}",
+        words,
+        f"Crank torque, crank speed and motor current over time: {words}."
+        + ("" if event is None else " The event is marked by a dashed line; the loads change in the shade."),
+        fig.stacked(
+            fig.Axis("time" if event is None else "time after the event", "s", low=low, high=high),
+            ((axis, (*curves, *marks(axis is _TORQUE))) for axis, curves in items.items()),
+        ),
+        s.line(_after(s, study, name)) if event is not None else (),
+        half=True,
+    )
+
+
+def _current(drive: Drive, run: Any, time: Any) -> dict[fig.Axis, list[fig.Item]]:
+    """The motor's current where it is known, with its limit where it comes near."""
+    if drive.foreign is not None:
+        return {}
+    current, limit = run[f"motor.{drive.motor.current}"].values, drive.motor.current_limit(drive.parameters)
+    items: list[fig.Item] = [fig.Curve(_CURRENT.label, time, current, listed=False)]
+    if limit is not None and np.max(np.abs(current)) > 0.5 * limit:
+        items.append(fig.Mark(limit, "current limit", axis="y", look="limit"))
+    return {_CURRENT: items}
+
+
+def _marks(study: Study, name: str, event: float | None) -> Callable[[bool], list[fig.Item]]:
+    """What is marked in each panel of a run; words only where they are asked for."""
+    run = study.runs[name]
+
+    def marks(words: bool) -> list[fig.Item]:
+        if event is not None:
+            loads = (name for name in study.drive.machine.model.input_layout.names if name not in _MOTION)
+            changing = _changing(run, [*(f"machine.{load}" for load in loads), "motor.voltage"])
+            shade = [] if changing is None else [fig.Shade(changing[0] - event, changing[1] - event)]
+            return [*shade, fig.Mark(0.0, words="event" if words else "")]
+        if name == "start_up" and study.answers:
+            return [fig.Mark(study.settled, words="steady from here" if words else "")]
+        return []
+
+    return marks
+
+
+def _changing(run: Any, loads: Iterable[str]) -> tuple[float, float] | None:
+    """From when to when the loads differ from one sample to the next [s]."""
+    changes = np.zeros(len(run["time"]) - 1, bool)
+    for name in loads:
+        if name in run:
+            changes |= np.diff(run[name].values) != 0.0
+    places = np.flatnonzero(changes)
+    if not places.size:
+        return None
+    time = run["time"].values
+    return float(time[places[0]]), float(time[places[-1] + 1])
+
+
+def _after(s: b.Source, study: Study, run: str) -> str:
+    """What the speed does after the event, as a template."""
+    caption = "Upright, dashed: the event. Shaded: the loads change."
+    if run not in s.result["answers"]:
+        return caption
+    least, dip, back = (f"answers.{run}.{name}" for name in ("speed_least", "speed_dip", "recovery_time"))
+    share, recovery = s.value(dip), s.value(back)
+    if share is None or share <= 0.0:
+        caption += f" The least speed is {{{least}}}"
+    elif not forms(share, "1", "dip")[0][1]:
+        # words stand in the number's place
+        caption += f" The crank {{{dip}}}"
+    else:
+        caption += f" The speed dips by {{{dip}}}"
+    if not study.returns:
+        caption += "; the motor does not reach the speed asked for, so that there is no band to return to."
+    elif recovery is None:
+        caption += "; it does not return to its steady band within the time followed."
+    elif recovery == 0.0:
+        caption += "; it does not leave its steady band."
+    else:
+        caption += f"; it is back in its steady band after {{{back}}}."
+    if run in s.result["block_peaks"]:
+        path, ends = f"block_peaks.{run}", s.result["block_peaks"][run]
+        names = [name.removesuffix("_low") for name in ends if name.endswith("_low")]
+        ranges = {name: f"{{{path}.{name}_low}} to {{{path}.{name}_high}}" for name in names}
+        assumed = (f"{name} {ranges[name]}" for name in names if ends[f"{name}_low"].get("kind") == "assumed")
+        caption += f" Assumed: {', '.join(assumed)}; the crank torque peaks at {ranges['crank_torque']}."
+    return caption
+
+
+@PICTURES.declare(lambda study: study.pins, "reactions.png")
+def _reactions(s: b.Source, study: Study) -> fig.Figure:
+    runs, pins = list(study.pins), list(next(iter(study.pins.values())))
+    height = 0.84 / len(runs)
+    items = []
+    for look, name in enumerate(runs):
+        places = np.arange(len(pins)) - 0.42 + (look + 0.5) * height
+        peak = f"{study.called(name)}: peak"
+        for words, size, wide in ((peak, "peak", 0.92), ("dark inner bar: RMS", "rms", 0.34)):
+            sizes = [study.pins[name][pin][size] for pin in pins]
+            items.append(fig.Bars(words, places, sizes, wide * height, look, slim=size == "rms"))
+    return fig.Figure(
+        "reactions",
+        "What the pins carry",
+        "Bars of the reaction of every pin in every run: the wide bar is the peak, the dark one inside the RMS.",
+        ((fig.Panel(fig.Axis("reaction", "N", low=0.0), fig.Axis("pin", names=tuple(pins)), tuple(items)),),),
+        "Peak and RMS of the force in each pin, frame x right, y up; means over whole crank turns.",
+        heights=(max(11, 20 - len(runs)) * len(runs) * len(pins) / 250.0,),
+    )

@@ -1,0 +1,108 @@
+"""The section on the organs of a chain unit: one side against both, and where two bars end as a model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..machines.chain_unit import SIDES
+from ..quantities import Layout
+from ..study.organs import Limits, OverloadFactors
+from ..study.study import Study
+from . import blocks as b
+from . import figure as fig
+from .lines import capital
+from .pictures import Pictures
+
+PICTURES = Pictures()
+
+
+def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
+    """Factors, limits and figure."""
+    if study.statics.organs is None:
+        return
+    yield _factors(s, study)
+    yield from _limits(s, study)
+    yield from PICTURES.figures(s, study)
+
+
+def _factors(s: b.Source, study: Study) -> b.Table:
+    sides = s.result["overload_factors"]
+    described = {v.name: v.description for v in Layout(OverloadFactors).variables}
+    first = next(iter(sides))
+    rows = (
+        b.TableRow(
+            (
+                described[name],
+                *(s.number(f"overload_factors.{side}.{name}") for side in sides),
+                s.words(f"overload_factors.{first}.{name}.for"),
+            )
+        )
+        for name in sides[first]
+    )
+    # chains have no cycle at constant speed: the factors are those of two bars in every study
+    by = "" if study.drive.chain is None else ", of two bars in place of the chains"
+    title = s.line("Overload factor, one side against both, at {=run.crank_speed}" + by)
+    return b.Table(tuple(rows), b.heads("way", *sides, "is for"), title=title, numeric=False)
+
+
+def _limits(s: b.Source, study: Study) -> Iterator[b.Block]:
+    swing = "Rocker swings from {limits.rocker_extreme_left} to {limits.rocker_extreme_right}; margin {limits.margin}"
+    yield b.Text(s.line(f"{swing}."), form="short")
+    web = "a web" if study.drive.chain is None else "with two bars a web"
+    cases = [
+        f"{case}, {web} "
+        + (
+            f"first goes slack at {{limits.{name}}} of the crank"
+            if s.value(f"limits.{name}")
+            else "is slack at rest"
+        )
+        for case, name in (("with this feed", "slack_speed"), ("empty", "slack_speed_empty"))
+        if s.value(f"limits.{name}") is not None
+    ]
+    if s.value("limits.chain_resonance") is not None:
+        cases.append("the lowest mode of a chain lies near {limits.chain_resonance}")
+    if cases:
+        yield b.Text(s.line(capital("; ".join(cases)) + "."))
+    yield b.Table(s.rows(Limits, "limits", none="none"), title="Where the model ends", form="long")
+
+
+@PICTURES.declare(lambda study: study.statics.organs is not None, "sides_over_speed.png")
+def _sides(s: b.Source, study: Study) -> fig.Figure:
+    assert study.statics.organs is not None
+    sides = study.statics.organs.sides
+    words = {"both": "both sides"} | {str(side): f"{side} side alone" for side in SIDES}
+
+    def items(of: str) -> Iterator[fig.Item]:
+        for look, (which, name) in enumerate(words.items()):
+            yield fig.Curve(name, sides.speed, getattr(sides, f"{of}_{which}"), look)
+        yield from (fig.Mark(at, look="thin") for speeds in sides.crossings()[of].values() for at in speeds)
+        yield fig.Mark(study.config.run.crank_speed, words="normal running" if of == "crank" else "")
+
+    x = fig.Axis("crank speed", "rad/s", "speed", low=0.0, high=float(sides.speed[-1]))
+    axes = {of: fig.Axis(f"{of} torque, peak", "N.m", low=0.0) for of in ("crank", "rocker")}
+    caption = (
+        "Largest torques of a turn by inverse dynamics of two bars. Where lines cross, one side alone asks as much "
+        "as both"
+    )
+    return fig.Figure(
+        "sides",
+        "One side alone against both, over the speed",
+        "Largest crank torque and rocker torque in a turn over the crank speed, with both sides and with each side "
+        "alone; the speed of normal running is marked.",
+        fig.stacked(x, ((axis, items(of)) for of, axis in axes.items())),
+        s.line(f"{caption}{_crossings(s)}."),
+    )
+
+
+def _crossings(s: b.Source) -> str:
+    """Where one side alone asks as much as both, as a template; empty where nothing crosses."""
+    text = ""
+    for torque, sides in s.result["sides_over_speed"]["crossings"].items():
+        path = f"sides_over_speed.crossings.{torque}"
+        places = [
+            f"{side} alone at " + " and ".join(f"{{{path}.{side}.{k}}}" for k in range(len(speeds)))
+            for side, speeds in sides.items()
+            if speeds
+        ]
+        text += f"; {torque} torque: {', '.join(places)}" if places else ""
+    return text

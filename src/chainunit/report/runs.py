@@ -1,0 +1,145 @@
+"""The section on every run in numbers: all answers, what the pins carry, overloads at random, the speed loop."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from ..quantities import Layout, Variable
+from ..study.measures import Answers, Phase, measures_of
+from ..study.monte_carlo import Sample
+from ..study.study import Study
+from . import blocks as b
+from . import run_names as read
+from .lines import Line, Number, joined, line, spoken
+from .terminal import plain_line
+
+
+def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
+    """Every answer of every run, what the pins carry, and where the model ends."""
+    if s.result["answers"]:
+        yield _table_of_runs(s, study)
+    if s.result.get("start_up"):
+        numbers = [(v, s.number(f"start_up.{v.name}")) for v in measures_of(Phase.START_UP)]
+        start = [(v.description, size) for v, size in numbers if size.value is not None]
+        sizes = joined((line(f"{title} ", size) for title, size in start), "; ")
+        yield b.Text(line("Start-up: ", sizes, "."), form="short")
+        yield b.Table(tuple(map(b.TableRow, start)), title="What the start-up asks of the drive", form="long")
+    if s.result["pins"]:
+        yield _pins(s, study)
+    if s.result.get("monte_carlo"):
+        yield from _random(s)
+    if loops := s.result.get("speed_loop"):
+        title = "The speed loop, linearised; dip and settling: after a step of the load torque"
+        yield matrix(s, "speed_loop", {loop: spoken(loop) for loop in loops}, title, first="")
+
+
+def matrix(s: b.Source, path: str, rows: Mapping[str, str], title: str, first: str, **more: Any) -> b.Table:
+    """A table of all that stands below `path`: what has a title in `rows`, by what each has."""
+    sections = b.at(s.result, path)
+    names = list(dict.fromkeys(name for section in rows for name in sections[section]))
+    cells = (
+        b.TableRow(
+            (words, *(s.number(f"{path}.{of}.{name}") if name in sections[of] else "" for name in names))
+        )
+        for of, words in rows.items()
+    )
+    return b.Table(tuple(cells), b.heads(first, *map(spoken, names)), title=title, **more)
+
+
+def ordered(study: Study, runs: Iterable[str]) -> list[str]:
+    """Runs with the overloads of each side beside each other."""
+    runs = list(runs)
+    by_side = [run for group in read.groups(study, runs) for run in group]
+    return [*(run for run in runs if run not in by_side), *by_side]
+
+
+def over_runs(
+    study: Study, runs: list[str], rows: Iterable[b.TableRow], title: str, first: str = ""
+) -> b.Table:
+    """A table with a column for each run; those of the overloads of a side belong together."""
+    columns = (b.Column(read.title(study, run), read.short(study, run)) for run in runs)
+    groups = (tuple(runs.index(run) + 1 for run in group) for group in read.groups(study, runs))
+    return b.Table(tuple(rows), (b.Column("", first), *columns), title=title, groups=tuple(groups))
+
+
+def _table_of_runs(s: b.Source, study: Study) -> b.Table:
+    answers, unknown = s.result["answers"], study.not_known
+    runs = ordered(study, answers)
+    rows = (
+        b.TableRow(
+            (v.description, *(number(s, study, run, v) for run in runs)),
+            form="long" if read.minor(v) else "both",
+        )
+        for v in Layout(Answers).variables
+        # nothing to say of a coupling that is not there, or that did not open; a dash for what a motor does not tell
+        if v.name in unknown
+        or any(answers[run][v.name]["value"] is not None for run in runs)
+        or (v.name == "recovery_time" and study.returns and study.overloads)
+    )
+    head = "crank at {=run.crank_speed}"
+    if not study.reaches:
+        head = "crank at {answers.steady.speed_mean}; {=run.crank_speed} NOT reached"
+    title = f"What each run asks of the drive{'; the motor is insufficient' if study.insufficient else ''}"
+    return over_runs(study, runs, rows, title, plain_line(s.line(head), study.config.units))
+
+
+def _pins(s: b.Source, study: Study) -> b.Table:
+    tables = s.result["pins"]
+    reference = "steady" if "steady" in tables else next(iter(tables))
+    sizes = list(next(iter(tables[reference].values())))
+
+    def row(pin: str) -> b.TableRow:
+        worst = max(tables, key=lambda run: tables[run][pin]["peak"]["value"])
+        own = (s.number(f"pins.{reference}.{pin}.{size}") for size in sizes)
+        return b.TableRow(
+            (pin, *own, s.number(f"pins.{worst}.{pin}.peak"), study.called(worst), read.short(study, worst))
+        )
+
+    columns = (
+        b.Column(f"{read.title(study, reference)}, {spoken(size)}", f"{reference}, {spoken(size)}")
+        for size in sizes
+    )
+    return b.Table(
+        tuple(map(row, tables[reference])),
+        (
+            b.Column("pin"),
+            *columns,
+            b.Column("largest peak", "largest"),
+            b.Column("in", form="long"),
+            b.Column("in", form="short"),
+        ),
+        title="What the bearings carry (equivalent: ISO 281)",
+    )
+
+
+def _random(s: b.Source) -> Iterator[b.Block]:
+    """The quantiles of overloads at random."""
+    quantiles = {name: sizes for name, sizes in s.result["monte_carlo"]["quantiles"].items() if sizes}
+    declared = {v.name: v.description.removeprefix("1 where ") for v in Layout(Sample).variables}
+    columns = list(dict.fromkeys(k for sizes in quantiles.values() for k in sizes))
+
+    def cell(name: str, k: str) -> Line:
+        return (
+            s.estimate(f"monte_carlo.quantiles.{name}.{k}", ".low", ".high") if k in quantiles[name] else ""
+        )
+
+    rows = tuple(b.TableRow((declared[name], *(cell(name, k) for k in columns))) for name in quantiles)
+    heads = (f"{k[1:]} % of runs below" if k.startswith("q") else "share of runs" for k in columns)
+    sides = joined(
+        s.line(f"{{=monte_carlo.sides.{side}}} {side}") for side in s.result["monte_carlo"]["sides"]
+    )
+    of_sides = line(" (", sides, ")") if sides else ()
+    title = s.line(
+        "Overloads at random, {=monte_carlo.runs} runs{sides}; in brackets: interval of {=monte_carlo.confidence} "
+        "confidence",
+        sides=of_sides,
+    )
+    if rows:
+        yield b.Table(rows, b.heads("", *heads), title=title)
+
+
+def number(s: b.Source, study: Study, run: str, v: Variable) -> Number:
+    """An answer of a run."""
+    back = v.name == "recovery_time" and run != "steady" and study.returns
+    return s.number(f"answers.{run}.{v.name}", none="not reached" if back else "-")

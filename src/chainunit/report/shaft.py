@@ -1,0 +1,74 @@
+"""The section on the driveline: the torque that its shafts carry in each run, and its cycles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from ..quantities import Layout
+from ..study.shaft import RIGID, ShaftAnswers, Torsion
+from ..study.study import Study
+from . import blocks as b
+from . import figure as fig
+from . import run_names as read
+from .pictures import Pictures
+from .runs import ordered, over_runs
+
+PICTURES = Pictures()
+TORQUE = fig.Axis("torque in shaft 2", "N.m")
+
+
+def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
+    """Tables and figure."""
+    if not study.shaft:
+        return
+    yield _shaft(s, study)
+    yield b.Table(s.rows(Torsion, "driveline"), title="The driveline's torsion")
+    yield from PICTURES.figures(s, study)
+
+
+def _shaft(s: b.Source, study: Study) -> b.Table:
+    """What each run asks of the driveline."""
+    runs = ordered(study, s.result["shaft"])
+    rows = (
+        b.TableRow((v.description, *(s.number(f"shaft.{run}.{v.name}") for run in runs)))
+        for v in Layout(ShaftAnswers).variables
+    )
+    return over_runs(study, runs, rows, "What the driveline carries")
+
+
+@PICTURES.declare(lambda study: study.shaft, "driveline.png")
+def _driveline(s: b.Source, study: Study) -> fig.Figure:
+    """Torque in the driveline beside that of a rigid one, and its rainflow cycles."""
+    largest = max(answers.range_largest for answers in study.shaft.values())
+    above, below = [], []
+    for name in study.shaft:
+        since = study.settled if name == "steady" else study.event[name]
+        run = study.runs["start_up" if name == "steady" else name].sel(time=slice(since, None))
+        time = run["time"].values - since
+        x = fig.Axis("time", "s", low=0.0, high=float(time[-1]))
+        title = read.title(study, name)
+        above.append(fig.Panel(x, TORQUE, tuple(shaft_torque(run, time)), title))
+        rows = study.cycles_of[name].classes(largest)
+        middle, wide = (
+            [0.5 * (row["from"] + row["to"]) for row in rows],
+            0.9 * (rows[0]["to"] - rows[0]["from"]),
+        )
+        bars = fig.Bars("cycles", middle, [row["count"] for row in rows], wide, 1)
+        cycles = fig.Axis("cycles counted (rainflow)", low=0.0), fig.Axis("range of torque", "N.m", low=0.0)
+        below.append(fig.Panel(*cycles, (bars,)))
+    return fig.Figure(
+        "driveline",
+        "The torque in the driveline, and its cycles",
+        "Torque in shaft 2 over time, with this driveline and with a rigid shaft, and below the cycles that are "
+        "counted in each class of torque range.",
+        (tuple(above), tuple(below)),
+        heights=(1.3, 0.9),
+        level=True,
+    )
+
+
+def shaft_torque(run: Any, time: Any) -> list[fig.Item]:
+    """Torque in the driveline, and what it were with a rigid shaft, where that is known."""
+    rigid = [fig.Curve("with a rigid shaft", time, run[RIGID].values, 1)] if RIGID in run else []
+    return [fig.Curve("with this driveline", time, run["driveline.tau2"].values), *rigid]
