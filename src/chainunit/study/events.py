@@ -412,8 +412,8 @@ class Blocked(Event):
         soft, stiff = (number(variant.p.stiffness, "N.m/rad", "assumed") for variant in self.variants())
         return (
             f"the stop's stiffness and damping are assumed {decides}, {number(low, 'N.m')} to {number(high, 'N.m')} "
-            f"of crank torque for {soft} to {stiff}, damping with the root of it. Take the stiffness of what is "
-            "jammed (N/m) times the square of its distance from the pivot C (m) for the stiffness of the event, now "
+            f"of crank torque for {soft} to {stiff}, damping with the root of it. For the stiffness of the event "
+            "take that of the jammed part (N/m) times the square of its distance from the pivot C (m); it is now "
             f"{number(self.p.stiffness, 'N.m/rad')}, and its damping, now {number(self.p.damping, 'N.m.s/rad')}."
         )
 

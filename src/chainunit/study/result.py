@@ -132,7 +132,7 @@ def _runs(study: Study) -> dict[str, Any]:
 
 
 def _spread(study: Study, name: str) -> dict[str, Any]:
-    """Ends of what an event assumes, and of the peaks over it."""
+    """The range that an event assumes, and the peaks over it."""
     spread, units = (
         study.spreads[name],
         {v.name: v.unit for v in variables(study.config.events[name].Parameters)},

@@ -262,13 +262,13 @@ class Runner:
         self.study.runs[name] = run
 
     def _assumption(self, simulation: CoSimulation, transient: Transient, done: float) -> None:
-        """The peaks over the range of what an event assumes, from the steady state that was saved; all without a
+        """The peaks over the range that an event assumes, from the steady state that was saved; all without a
         safety coupling, which would cut them off."""
         event, begin = transient.event, transient.begin
         variants = event.variants()
         if not variants:
             return
-        self.report(f"{event.title}, over the range of what is assumed", done, self.total)
+        self.report(f"{event.title}, over the range of its assumption", done, self.total)
         answers = self.study.answers[event.name]
         peaks = {name: [] if self.rig.guards else [getattr(answers, f"{name}_peak")] for name in _PEAKS}
         for variant in (*variants, event) if self.rig.guards else variants:

@@ -1,8 +1,8 @@
 """Sizing of the drive: which motor of the catalogue, behind which gear, with which flywheel.
 
 First the cycle by inverse dynamics, then every candidate is co-simulated by its FMU: a start under load, steady
-running, and steady running with all feed on one side. Each check is a utilisation: what is used of what is
-permitted. Hand formulas (RMS torque, flywheel, relay) stand here and in `protection`; the rest is read from the runs.
+running, and steady running with all feed on one side. Each check is a utilisation, value over
+limit. Hand formulas (RMS torque, flywheel, relay) stand here and in `protection`; the rest is read from the runs.
 """
 
 from __future__ import annotations

@@ -34,8 +34,8 @@ Amount: TypeAlias = tuple[float | None, str] | tuple[float | None, str, str]
 
 @dataclass(frozen=True)
 class Remark:
-    """Something that the reader has to know beside the numbers: a `warning` of what is wrong, or not as was asked, or
-    a `note` of what the numbers rest on. `kind` names what it is about, `runs` where it is so."""
+    """Something that the reader has to know beside the numbers: a `warning` of a fault, or of a demand that
+    is not met, or a `note` on an assumption behind the numbers. `kind` names its subject, `runs` the runs of it."""
 
     severity: Literal["warning", "note"]
     kind: str
@@ -116,12 +116,12 @@ class Study:
 
     @property
     def warnings(self) -> list[Remark]:
-        """Remarks of what is wrong, or not as was asked."""
+        """Remarks on faults, and on demands that are not met."""
         return [remark for remark in self.remarks if remark.severity == "warning"]
 
     @property
     def notes(self) -> list[Remark]:
-        """Remarks of what the numbers rest on."""
+        """Remarks on the assumptions behind the numbers."""
         return [remark for remark in self.remarks if remark.severity == "note"]
 
     def remark(

@@ -23,8 +23,8 @@ that a kilogram has on its place in the machine."""
 
 def energy_residual(run: xr.Dataset, bond: Bond, feed: Feed | None = None) -> tuple[xr.DataArray, float]:
     """The energy that is missing at each instant [J], shape (time,), and its largest size in relation to the
-    energy that went to and fro through the bond (integral of |tau w|), or to a millionth of what the machine holds,
-    where that is more: in a machine that stands nothing but rounding moves.
+    energy that went to and fro through the bond (integral of |tau w|), or to a millionth of the energy that the
+    machine holds, where that is more: in a machine that stands nothing but rounding moves.
 
     Powers are integrated by Simpson's rule over the communication points.
     """

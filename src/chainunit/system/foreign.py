@@ -186,7 +186,7 @@ def _prefixes(names: Iterable[str], members: Iterable[str]) -> list[str]:
 
 
 def _of(ends: Iterable[str], like: Terminal, name: str, prefix: str) -> Terminal:
-    """A terminal as `like`, of the members that there are."""
+    """A terminal as `like`, of the members that the FMU has."""
     members = {m: prefix + m for m in like.members if prefix + m in ends}
     return Terminal(name, like.kind, like.description, members)
 

@@ -373,8 +373,8 @@ def bridge(system: System, name: str) -> System:
 
 
 def rigid(system: System, line: str) -> System:
-    """The system with a rigid shaft in place of the component `line`: its inertia `J4` on the rotor of what drives
-    it, its gear `ratio` in the machine behind it.
+    """The system with a rigid shaft in place of the component `line`: its inertia `J4` on the rotor of its driver,
+    its gear `ratio` in the machine behind it.
 
     Raises
     ------

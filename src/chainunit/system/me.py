@@ -198,7 +198,7 @@ class ModelExchange(Simulation):
 
         def changed(t: float) -> bool:
             signs = self._indicators(t, self._dense(t)) > 0.0
-            # one that is zero at the begin of a step has no sign yet, such as the height of what bounces
+            # one that is zero at the begin of a step has no sign yet, such as the height of a ball that bounces
             self._signs = np.where(self._unsigned, signs, self._signs)
             self._unsigned[:] = False
             return bool((signs != self._signs).any())

@@ -14,7 +14,7 @@ from ..files import netcdf
 from .instance import Instance
 
 Recorder = tuple[Instance, Any, list[str]]
-"""An instance, the handle of what is kept of it, and the full names of that."""
+"""An instance, the handle of its recorded variables, and their full names."""
 BLOCK = 4096
 """Rows that are written to a file at a time."""
 
