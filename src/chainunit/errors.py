@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import reprlib
 import unicodedata
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 
@@ -30,6 +32,15 @@ class InterruptedRunError(RunError):
 
 class WriteError(RunError):
     """A file could not be written, such as on a full disk; the message names it."""
+
+
+@contextmanager
+def refusal_prefix(prefix: str) -> Iterator[None]:
+    """Put `prefix`, which says where a value stands, before the line of an InputError."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{prefix}{error}") from error
 
 
 _JOINERS = "\u200c\u200d"  # some scripts and signs need them inside a word

@@ -29,7 +29,7 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails
 
-from .errors import InputError, printable, shown
+from .errors import InputError, printable, refusal_prefix, shown
 from .quantities import Layout, Variable, base_units, complaint, variables
 
 T = TypeVar("T")
@@ -335,11 +335,22 @@ def read(file: Path | None, example: Callable[[], str], parse: Callable[[str, st
         in one line that begins with the name of the file.
     """
     source = str(file) if file else "packaged example"
+    text = file_text(file) if file else example()
+    with refusal_prefix(f"{source}: "):
+        return parse(text, source)
+
+
+def file_text(file: Path) -> str:
+    """The text of a file in UTF-8, with a byte order mark or without.
+
+    Raises
+    ------
+    InputError
+        in one line that begins with the name of the file.
+    """
     try:
-        return parse(file.read_text("utf-8") if file else example(), source)
+        return file.read_text("utf-8-sig")
     except OSError as error:
-        raise InputError(f"{source}: cannot be read ({error.strerror or error})") from error
+        raise InputError(f"{file}: cannot be read ({error.strerror or error})") from error
     except UnicodeDecodeError as error:
-        raise InputError(f"{source}: is not UTF-8 text") from error
-    except InputError as error:
-        raise InputError(f"{source}: {error}") from error
+        raise InputError(f"{file}: is not UTF-8 text") from error

@@ -21,9 +21,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError, shown
+from ..errors import InputError, refusal_prefix, shown
 from ..quantities import DISPLAY_UNITS, Layout, Value, Variable, declaration, quantity
-from ..reading import packaged, to_number, toml
+from ..reading import file_text, packaged, to_number, toml
 from .induction_motor import InductionMotor
 from .motor import Motor
 from .nameplate import Identification, Nameplate, check, identify
@@ -67,10 +67,8 @@ class CatalogueMotor:
         InputError
             in one line, where no circuit meets its nameplate.
         """
-        try:
+        with refusal_prefix(f"{self.origin}: {self.designation}: "):
             return identify(self.nameplate)
-        except InputError as error:
-            raise InputError(f"{self.origin}: {self.designation}: {error}") from error
 
     def model(self) -> tuple[type[Motor], Any]:
         """The model of the motor, and its parameters.
@@ -99,14 +97,8 @@ def catalogue(extra: Path | None = None) -> list[CatalogueMotor]:
     """
     motors = list(_packaged())
     if extra is not None:
-        try:
-            text = extra.read_text("utf-8-sig")
-        except OSError as error:
-            raise InputError(f"{extra}: cannot be read ({error.strerror or error})") from error
-        except UnicodeDecodeError as error:
-            raise InputError(f"{extra}: is not UTF-8 text") from error
         rows = _toml_rows if extra.suffix.lower() == ".toml" else _csv_rows
-        motors += _motors(rows(text, str(extra)), {m.designation for m in motors})
+        motors += _motors(rows(file_text(extra), str(extra)), {m.designation for m in motors})
     return motors
 
 
@@ -228,10 +220,8 @@ def _with_unit(cell: str, unit: str) -> str:
 
 
 def _toml_rows(text: str, file: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    try:
+    with refusal_prefix(f"{file}: "):
         data = toml(text)
-    except InputError as error:
-        raise InputError(f"{file}: {error}") from error
     tables = data.pop("motor", None)
     for name in data:
         raise InputError(f"{file}: {shown(name)}: unknown; each motor is a table [[motor]]")

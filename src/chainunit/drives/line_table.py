@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, Field
 
-from ..errors import InputError
+from ..errors import InputError, refusal_prefix
 from ..quantities import Quantity, Value, Variable, declaration, quantity, variables
 from ..reading import number, schema, to_number
 from .cardan import Cardan, ShaftLine
@@ -86,10 +86,8 @@ def line_values(table: BaseModel, prefix: str) -> dict[str, Any]:
                 f"{prefix}{stiffness}: given beside {prefix}{shaft}, which sets it; leave out one of the two"
             )
         keys = {name: getattr(described, name) for name in described.model_fields_set}
-        try:
+        with refusal_prefix(f"{prefix}{shaft}."):
             numbers[stiffness] = stiffness_of(keys)
-        except InputError as error:
-            raise InputError(f"{prefix}{shaft}.{error}") from error
     for name in ("d2", "d3"):
         if name in numbers and "damping_ratio" in numbers:
             raise InputError(

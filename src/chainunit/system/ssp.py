@@ -15,7 +15,7 @@ from importlib import metadata
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
-from ..errors import InputError
+from ..errors import InputError, refusal_prefix
 from ..files import folder, whole
 from ..fmu.backends import Backend
 from ..fmu.backends import export as export_fmu
@@ -109,10 +109,8 @@ def _interfaces(system: System) -> dict[str, Interface]:
     for name, component in system.components.items():
         if not isinstance(component, ModelComponent):
             raise InputError(f"{name} ({component.title}): is an FMU of somebody else, which is not packaged")
-        try:
+        with refusal_prefix(f"{name}: "):
             interfaces[name] = interface_of(component.model, start[name])
-        except InputError as error:
-            raise InputError(f"{name}: {error}") from error
     return interfaces
 
 
