@@ -81,8 +81,8 @@ def test_each_measure_has_its_reader_and_its_runs():
     for each in dataclasses.fields(Answers):
         assert callable(each.metadata["read"]) and each.metadata["during"] <= set(Phase)
     assert {v.name for v in measures_of(Phase.START_UP)} == {
-        "crank_torque_peak", "motor_torque_peak", "current_peak", "rocker_torque_peak", "web_pull_least",
-        "wall_pull_least", "slack_time", "fold_largest",
+        "start_time", "crank_torque_peak", "motor_torque_peak", "current_peak", "rocker_torque_peak",
+        "web_pull_least", "wall_pull_least", "slack_time", "fold_largest",
     }  # fmt: skip
     steady = window()
     for phase in Phase:

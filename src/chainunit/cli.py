@@ -1,4 +1,4 @@
-"""The command line: ``study``, ``driveline``, ``knife``, ``reproduce``, ``export``, ``export-ssp``."""
+"""The command line: ``study``, ``driveline``, ``reproduce``, ``export``, ``export-ssp``."""
 
 from __future__ import annotations
 
@@ -251,44 +251,6 @@ def driveline(
         _finish(report, output, "driveline")
 
 
-@app.command()
-def knife(
-    config: Annotated[
-        Path | None, typer.Argument(help="Knife file (TOML); without one, the packaged example.")
-    ] = None,
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path("knife"),
-    backend: _BackendOption = None,
-    example: Annotated[
-        bool,
-        typer.Option("--example", help="Print the packaged knife file, as a start for your own, and stop."),
-    ] = False,
-) -> None:
-    """A paper cutter's knife drive with motor and flywheel: blade, reactions, cut, speed fluctuation.
-
-    Writes report.html, knife.json, knife.md, plots and the FMUs into the output folder.
-    """
-    from .study import knife as knives
-
-    if example:
-        print(knives.example(), end="")
-        return
-    loaded = knives.load(config)
-    with claimed(output):
-        from .report import files
-        from .report import knife as contents
-
-        _clear(output, *files.names("knife", contents.PICTURES))
-        errors = _console(stderr=True)
-        with _progress("the turn at constant speed", errors) as progress:
-            result = knives.run_knife(loaded, output, progress, backend.value if backend else None)
-        report = contents.report(result)
-        unwritten = _leave(report, files.writers(report, output, "knife"))
-    if result.failure is not None:
-        _stopped_early(result.failure, output, errors)
-    if unwritten is not None:
-        raise unwritten
-
-
 def _stopped_early(failure: RunError, output: Path, errors: Console) -> None:
     sentence = f"The run stopped early: {failure}. What was computed before is in {output}."
     errors.print(printable(sentence, 2000), soft_wrap=True)
@@ -350,9 +312,7 @@ def export(
     ] = None,
     config: Annotated[
         Path | None,
-        typer.Option(
-            "--config", help="Study file (or knife file) whose machine, feed or motor gives the start values."
-        ),
+        typer.Option("--config", help="Study file whose machine, feed or motor gives the start values."),
     ] = None,
     backend: _BackendOption = None,
     fmi: Annotated[int, typer.Option("--fmi", help="Version of FMI: 2, or 3 (native only).")] = 2,
@@ -387,11 +347,7 @@ def export(
     with _console(stderr=True).status("exporting") as status:
         start = {}
         model = MODELS[name]
-        if config and name == "KnifeDrive":
-            from .study import knife as knives
-
-            start = knives.start_of(knives.load(config))
-        elif config:
+        if config:
             loaded = _study_file(config)
             start = start_of(loaded, model, backend=kind, report=status.update)
             if rods is None and loaded.chain:

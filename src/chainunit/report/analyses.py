@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 from ..study.study import Study
-from . import blade, turn
+from . import blade, flywheels, turn
 from .blocks import Block, Source
 
 
@@ -22,4 +22,5 @@ class Contents:
 ANALYSES: Mapping[str, Contents] = {
     "constant_speed": Contents("A turn at constant speed", turn.blocks, (turn.PICTURE,)),
     "blade": Contents("The blade", blade.blocks, (blade.PICTURE,)),
+    "flywheels": Contents("Flywheels", flywheels.blocks, (flywheels.PICTURE,)),
 }

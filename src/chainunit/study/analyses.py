@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from .analysis import Analysis
 from .blade import BladeAnalysis
+from .flywheels import FlywheelAnalysis
 from .turn import TurnAnalysis
 
-ANALYSES: tuple[type[Analysis], ...] = (TurnAnalysis, BladeAnalysis)
+ANALYSES: tuple[type[Analysis], ...] = (TurnAnalysis, BladeAnalysis, FlywheelAnalysis)

@@ -65,7 +65,7 @@ class ReportTable(BaseModel):
     units: dict[str, str] = {}
 
 
-EXAMPLES = {"chain-unit": "example.toml", "knife": "knife_drive.toml", "driveline": "accelerator.toml"}
+EXAMPLES = {"chain-unit": "example.toml", "knife": "knife.toml", "driveline": "accelerator.toml"}
 """Packaged study files by the names of the examples."""
 _OF_MACHINE = {"ChamberForces": "chain-unit", "KnifeDrive": "knife", "Accelerator": "driveline"}
 """The example from which a study takes what its file leaves out, by machine."""
@@ -207,6 +207,11 @@ class Config:
         """Time from which running counts as steady [s]: `run.settle_turns` after the start, or after an empty machine
         is fed, which is later."""
         return float(self.started + self.run.settle_turns * self.turn)
+
+    @property
+    def stop(self) -> float:
+        """Time to which start-up and steady running are run [s], where the motor settles at once."""
+        return float(self.settled + (self.run.turns + 0.1) * self.turn)
 
     def gives(self, section: str) -> bool:
         """Whether the file sets anything in that table."""

@@ -2,66 +2,239 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
 
 import xarray as xr
 
-from ..quantities import Value, declaration, quantity
+from ..quantities import Layout, Value, declaration, quantity
+from ..text import entries, entry, number
+from .analysis import Analysis, Findings, Report
+from .choice import tune
+from .config import Config
+from .drive import Drive
+from .measures import Answers, Phase, Window, read_answers, same_measure, whole_turns
+from .rig import CLOSED, Rig
+from .study import Amount, Study
+from .turn import Turn
+from .verdict import RESIDUAL, STEADY
 
 CLOSE = 0.03
 """Relative width below the permitted fluctuation in which that of the least flywheel lies."""
+START_LONG = 10.0
+"""Time of a start from which on it is worth a word [s]."""
+CREEPS = 0.5
+"""Share of the speed that is asked for below which a machine is said to stand."""
+_TRIALS = 8
 
 
 @declaration
-class WheelAnswers:
-    """The answers of the co-simulation of a flywheel; None where the motor does not start, or stalls under the cut.
-    Torque and current of the motor are those of cutting, over whole turns."""
+class FlywheelAnswers:
+    """The drive with a flywheel, in steady running; None where the motor does not start, or stalls under the load."""
 
     flywheel: Value = quantity("kg.m2", "flywheel, on the motor shaft")
-    inertia: Value = quantity("kg.m2", "rotor, flywheel and mean of the machine, on the motor shaft")
-    start_time: Value = quantity("s", "start without cut, to 95 % of the rated speed")
-    speed_mean: Value = quantity("rad/s", "crank speed, mean; cuts per minute", kind="speed")
-    speed_least: Value = quantity("rad/s", "crank speed, least", kind="speed")
-    fluctuation: Value = quantity("1", "fluctuation of the speed", kind="percent")
-    fluctuation_by_hand: Value = quantity("1", "fluctuation by hand, dE/(J w2)", kind="percent")
-    motor_torque_peak: Value = quantity("N.m", "motor torque (air gap), peak")
-    motor_torque_rms: Value = quantity("N.m", "motor torque (air gap), RMS")
-    current_peak: Value = quantity("A", "motor current, peak")
-    current_rms: Value = quantity("A", "motor current, RMS")
-    current_share: Value = quantity("1", "RMS current over rated current", kind="percent")
-    supply_power_mean: Value = quantity("W", "electric power, mean")
-    stored_share: Value = quantity(
-        "1", "share of a cut's work from flywheel and moving masses, over the cut", kind="percent"
-    )
-    stored_share_most: Value = quantity(
-        "1", "the same, from the beginning of the cut to their least energy", kind="percent"
-    )
-    drift: Value = quantity(
-        "1", "change of speed over the measured turns, as a share of the fluctuation", kind="percent"
-    )
-    residual: Value = quantity("1", "energy residual, the larger of start and cutting", kind="percent")
+    inertia: Value = quantity("kg.m2", "all inertia on the motor shaft, mean of the machine's")
+    start_time: Value = same_measure("start_time")
+    speed_mean: Value = same_measure("speed_mean")
+    speed_least: Value = same_measure("speed_least")
+    speed_ripple: Value = same_measure("speed_ripple")
+    by_hand: Value = quantity("1", "ripple by hand, dE/(J w2)", kind="percent")
+    motor_torque_peak: Value = same_measure("motor_torque_peak")
+    motor_torque_rms: Value = same_measure("motor_torque_rms")
+    current_peak: Value = same_measure("current_peak")
+    current_rms: Value = same_measure("current_rms")
+    current_share: Value = same_measure("current_share")
+    supply_power_mean: Value = same_measure("supply_power_mean")
+    stored_share: Value = same_measure("stored_share")
+    stored_share_most: Value = same_measure("stored_share_most")
+    cycle_gap: Value = same_measure("cycle_gap")
+    residual: Value = quantity("1", "energy residual", kind="percent")
 
 
-@dataclasses.dataclass
+@dataclass(frozen=True)
 class Wheel:
-    """A flywheel with its runs. `turns` are those of the measurement; where it stalled, all of the run."""
+    """A flywheel with its run; `turns` are the steady ones, or where it makes none all of the run."""
 
-    answers: WheelAnswers
-    start: xr.Dataset | None = None
-    turns: xr.Dataset | None = None
-    stalled: bool = False
-    """under the cut"""
+    answers: FlywheelAnswers
+    turns: xr.Dataset
 
     @property
     def flywheel(self) -> float:
         """[kg m2]"""
         return float(self.answers.flywheel)
 
-    def keeps(self, fluctuation: float) -> bool:
-        """Whether it cuts and keeps the fluctuation."""
-        return self.answers.fluctuation is not None and self.answers.fluctuation <= fluctuation
+    @property
+    def stalls(self) -> bool:
+        """Whether the machine starts, and then stands or creeps under its load."""
+        return self.answers.start_time is not None and self.answers.speed_ripple is None
+
+    def keeps(self, permitted: float) -> bool:
+        """Whether it runs and keeps the `permitted` fluctuation."""
+        return self.answers.speed_ripple is not None and self.answers.speed_ripple <= permitted
+
+
+@dataclass
+class FlywheelFindings(Findings):
+    """The flywheels by their inertia, the least that keeps the `permitted` fluctuation where one was found, and what
+    the hand formula takes: the `swing` of the energy in a turn [J], the speed of the motor [rad/s], and all inertia
+    on its shaft but for a flywheel (`bare`) [kg m2]."""
+
+    own: float
+    """flywheel of the study [kg m2]"""
+    permitted: float
+    swing: float
+    speed: float
+    bare: float
+    mean_torque: float
+    """of the machine at the motor's shaft, at constant speed [N m]"""
+    wheels: list[Wheel] = field(default_factory=list)
+    least: Wheel | None = None
+    searched: bool = False
+
+    def by_hand(self, flywheel: float) -> float:
+        """Fluctuation with that flywheel [kg m2] where the drive gives a constant torque."""
+        return self.swing / ((self.bare + flywheel) * self.speed * self.speed)
+
+    @property
+    def flywheel_by_hand(self) -> float:
+        """Flywheel that keeps the permitted fluctuation by the hand formula [kg m2]; 0 where none is needed."""
+        return max(0.0, self.bare * (self.by_hand(0.0) / self.permitted - 1.0))
+
+    @property
+    def rows(self) -> list[tuple[str, Wheel, str]]:
+        """By inertia: in words what each flywheel is, its run, and its place in the result."""
+        runs = [(wheel, f"flywheels.compared.{i}") for i, wheel in enumerate(self.wheels)]
+        if self.least is not None and self.least not in self.wheels:
+            runs.append((self.least, "flywheels.least"))
+        return [
+            (self._words(wheel), wheel, path) for wheel, path in sorted(runs, key=lambda run: run[0].flywheel)
+        ]
+
+    def _words(self, wheel: Wheel) -> str:
+        special = (("given", wheel.flywheel == self.own), ("least", wheel is self.least))
+        return ", ".join(word for word, so in (*special, ("stalls", wheel.stalls)) if so)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Ready for JSON."""
+        return {
+            "compared": [entries(wheel.answers) | {"stalls": wheel.stalls} for wheel in self.wheels],
+            "least": None if self.least is None else entries(self.least.answers),
+            "permitted": entry(self.permitted, "1", "percent"),
+            "by_hand": entry(self.flywheel_by_hand, "kg.m2"),
+        }
+
+    def remark(self, study: Study) -> None:
+        """What an engineer should change, and what the least flywheel does."""
+        _on_wheels(self, study)
+        _on_fluctuation(self, study)
+        if not study.drive.follows:
+            study.remark(
+                "note",
+                "cold windings",
+                "The windings begin cold and have no time to warm up in these runs; warm, the motor slips more.",
+            )
+
+
+class FlywheelAnalysis(Analysis):
+    """The flywheels of the table [flywheel]; each has the run of the study, with gains tuned to its inertia."""
+
+    name = "flywheels"
+    needs_runs = True
+
+    @staticmethod
+    def applies(config: Config, drive: Drive) -> bool:
+        """Whether flywheels are asked for, and the motor is of this package."""
+        return config.flywheel is not None and drive.foreign is None
+
+    @staticmethod
+    def find(study: Study, rig: Rig, report: Report) -> FlywheelFindings:
+        """Run them.
+
+        Raises
+        ------
+        RunError
+            where a run fails; what was found before is in the study.
+        """
+        config, table, drive = study.config, study.config.flywheel, study.drive
+        assert table is not None
+        turn: Turn = study.findings["constant_speed"].numbers
+        found = FlywheelFindings(
+            own=table.J,
+            permitted=table.fluctuation,
+            swing=turn.energy_swing,
+            speed=config.run.crank_speed * drive.ratio,
+            bare=drive.rotor_inertia - table.J + turn.inertia_mean / drive.ratio**2,
+            mean_torque=turn.torque_mean / drive.ratio,
+        )
+        study.findings[FlywheelAnalysis.name] = found
+        sizes = sorted({table.J, *config.flywheels})
+
+        def run(flywheel: float) -> Wheel:
+            done = float(len(found.wheels))
+            report(f"flywheel of {number(flywheel, 'kg.m2')}", done, float(len(sizes) + 1))
+            return _run(study, rig, found, flywheel)
+
+        for size in sizes:
+            found.wheels.append(_own(study, found) if size == table.J else run(size))
+        found.least = least_flywheel(found.wheels, found.permitted, found.bare, found.flywheel_by_hand, run)
+        found.searched = True
+        return found
+
+
+def _own(study: Study, found: FlywheelFindings) -> Wheel:
+    """The flywheel of the study, whose run has been made."""
+    assert study.start is not None
+    residual = study.certificate["start_up"]["energy_residual_share"]
+    turns = study.steady
+    return _wheel(study, found, found.own, study.answers[STEADY], study.start, turns, residual)
+
+
+def _run(study: Study, rig: Rig, found: FlywheelFindings, flywheel: float) -> Wheel:
+    """The start-up and steady running of the study with another flywheel [kg m2], without its safety coupling."""
+    config = study.config
+    drive, _ = tune(config, study.drive.with_flywheel(flywheel - found.own))
+    sides = drive.machine.loaded_sides(config.feed)
+    rig = replace(rig, drive=drive, fed_from=None)
+    with rig.from_rest() as simulation:
+        start_up = rig.start_up(simulation, config.stop, lambda time: None, {})
+    run = start_up.run
+    residual = rig.residuals(run)["energy_residual_share"]
+    turns = whole_turns(drive, run.sel(time=slice(start_up.steady_from, None)), config.run.turns)
+    start, steady = (
+        read_answers(Window(phase, rows, drive, sides, config.run.crank_speed))
+        for phase, rows in (
+            (Phase.START_UP, run.sel(time=slice(None, turns["time"].values[0]))),
+            (Phase.STEADY, turns),
+        )
+    )
+    return _wheel(study, found, flywheel, steady, start, turns, residual)
+
+
+def _wheel(
+    study: Study,
+    found: FlywheelFindings,
+    flywheel: float,
+    steady: Answers,
+    start: Answers,
+    turns: xr.Dataset,
+    residual: float,
+) -> Wheel:
+    """A flywheel with what was read from its run; a machine that stands or creeps has no answers in steady
+    running."""
+    turning = steady.speed_mean > CREEPS * study.config.run.crank_speed
+    own = {
+        "flywheel": flywheel,
+        "inertia": found.bare + flywheel,
+        "start_time": start.start_time,
+        "by_hand": found.by_hand(flywheel),
+        "residual": residual,
+    }
+    names = Layout(FlywheelAnswers).names
+    values = {name: own.get(name, getattr(steady, name, None) if turning else None) for name in names}
+    return Wheel(FlywheelAnswers(**values), turns)
 
 
 def least_flywheel(
@@ -69,65 +242,197 @@ def least_flywheel(
     permitted: float,
     bare: float,
     by_hand: float,
-    running: Callable[[float], Wheel],
-    simulated: Callable[[float], Wheel],
+    run: Callable[[float], Wheel],
 ) -> Wheel | None:
     """The least flywheel that keeps the `permitted` fluctuation, to `CLOSE` of the fluctuation.
 
     None where none of the `wheels` does, in order of their inertia, nor that of the hand formula, nor one a fifth
-    heavier than the heaviest. It need not start. The fluctuation falls with the inertia, and between two flywheels
-    nearly as a power of it.
+    heavier than the heaviest. The fluctuation falls with the inertia, and between two flywheels nearly as a power of
+    it.
 
     Parameters
     ----------
     bare : inertia on the motor shaft without a flywheel [kg m2]
     by_hand : flywheel by the hand formula [kg m2]
-    running, simulated : a run with a flywheel [kg m2], without and with its start
+    run : the run with a flywheel [kg m2]
     """
     above = next((wheel for wheel in wheels if wheel.keeps(permitted)), None)
     # a flywheel with which the motor does not start is not too light
     starting = [wheel for wheel in wheels if wheel.answers.start_time is not None]
     below = next((w for w in reversed(starting) if above is None or w.flywheel < above.flywheel), None)
     if below is None:
-        below = running(0.0)
         if above is not None and above.flywheel == 0.0:
             return above
+        below = run(0.0)
         if below.keeps(permitted):
-            return simulated(0.0)
+            return below
     if above is None:
-        above = running(max(by_hand, 1.2 * below.flywheel))
+        above = run(max(by_hand, 1.2 * below.flywheel))
         if not above.keeps(permitted):
             return None
-    above = _between(below, above, permitted, bare, running)
-    if above.start is not None:
-        return above
-    # the start warms the windings, and the motor slips a little more
-    wheel = simulated(above.flywheel)
-    for _ in range(4):
-        if wheel.answers.fluctuation is None or wheel.keeps(permitted):
-            break
-        heavier = wheel.answers.inertia * wheel.answers.fluctuation / permitted * (1.0 + CLOSE)
-        wheel = simulated(heavier - bare)
-    return wheel
-
-
-def _between(
-    below: Wheel, above: Wheel, permitted: float, bare: float, running: Callable[[float], Wheel]
-) -> Wheel:
-    """The lightest of a few flywheels that keep the fluctuation, as `above` does and `below` does not."""
-    for _ in range(8):
-        if above.answers.fluctuation >= (1.0 - CLOSE) * permitted:
+    for _ in range(_TRIALS):
+        if above.answers.speed_ripple >= (1.0 - CLOSE) * permitted:
             break
         x = [math.log(wheel.answers.inertia) for wheel in (below, above)]
         share = 0.5
-        if below.answers.fluctuation is not None:
-            y = [math.log(wheel.answers.fluctuation) for wheel in (below, above)]
+        if below.answers.speed_ripple is not None:
+            y = [math.log(wheel.answers.speed_ripple) for wheel in (below, above)]
             # a little below the permitted one, so that the next flywheel is likely to keep it
             goal = math.log((1.0 - 0.5 * CLOSE) * permitted)
             share = min(max((y[0] - goal) / (y[0] - y[1]), 0.05), 0.95)
-        middle = running(math.exp(x[0] + share * (x[1] - x[0])) - bare)
+        middle = run(math.exp(x[0] + share * (x[1] - x[0])) - bare)
         if middle.keeps(permitted):
             above = middle
         else:
             below = middle
     return above
+
+
+# -- remarks
+
+
+@dataclass(frozen=True)
+class Trouble:
+    """What may go wrong with flywheels: which have it, at that rated current [A], and the answer that shows it."""
+
+    kind: str
+    has: Callable[[Wheel, float], bool]
+    text: str
+    number: str = ""
+
+    def amount(self, wheel: Wheel) -> Amount:
+        """The answer with its unit and kind."""
+        v = next(v for v in Layout(FlywheelAnswers).variables if v.name == self.number)
+        return getattr(wheel.answers, v.name), v.unit, v.kind
+
+    def words(self, wheel: Wheel) -> str:
+        """The flywheel, and the answer where there is one."""
+        size = number(wheel.flywheel, "kg.m2")
+        return f"{size} ({number(*self.amount(wheel))})" if self.number else size
+
+
+def _over(answer: float | None, limit: float) -> bool:
+    return answer is not None and answer > limit
+
+
+_TROUBLES = (
+    Trouble(
+        "flywheel stalls",
+        lambda wheel, rated: wheel.stalls,
+        "the motor stalls under the load with a flywheel of {where}: a larger motor or flywheel, or less load.",
+    ),
+    Trouble(
+        "flywheel does not start",
+        lambda wheel, rated: wheel.answers.start_time is None,
+        "the motor does not come up to speed with a flywheel of {where}.",
+    ),
+    Trouble(
+        "rated current",
+        lambda wheel, rated: _over(wheel.answers.current_rms, rated),
+        "the RMS current passes the rated {rated}, so that the motor becomes too hot, with a flywheel of {where}.",
+        "current_rms",
+    ),
+    Trouble(
+        "long start",
+        lambda wheel, rated: _over(wheel.answers.start_time, START_LONG),
+        "the start takes more than {long} with a flywheel of {where}.",
+        "start_time",
+    ),
+    Trouble(
+        "energy with flywheel",
+        lambda wheel, rated: not wheel.answers.residual < RESIDUAL,
+        "energy is missing with a flywheel of {where}: a shorter run.step is needed.",
+        "residual",
+    ),
+    Trouble(
+        "flywheel not settled",
+        lambda wheel, rated: _over(wheel.answers.cycle_gap, CLOSED),
+        "the turns do not close with a flywheel of {where}: raise run.settle_turns.",
+        "cycle_gap",
+    ),
+)
+
+
+def _on_wheels(found: FlywheelFindings, study: Study) -> None:
+    """A warning for each kind of trouble, with all flywheels that have it; the study warns of its own."""
+    plate = study.config.plate
+    rated = math.inf if plate is None else plate.nameplate.rated_current
+    if plate is not None and found.mean_torque > plate.nameplate.torque:
+        study.remark(
+            "warning",
+            "motor too small",
+            "the load takes {mean} of the motor on average, rated is {rated}: a larger motor helps, no flywheel "
+            "does.",
+            mean=(found.mean_torque, "N.m"),
+            rated=(plate.nameplate.torque, "N.m"),
+        )
+
+    parts: dict[str, Amount] = {"rated": (rated, "A"), "long": (START_LONG, "s")}
+    for trouble in _TROUBLES:
+        wheels = [wheel for wheel in found.wheels if trouble.has(wheel, rated)]
+        if wheels:
+            amounts = {
+                f"{wheel.flywheel:g}.{trouble.number}": trouble.amount(wheel)
+                for wheel in wheels
+                if trouble.number
+            }
+            where = ", ".join(map(trouble.words, wheels))
+            words = {name: number(*part, full=False) for name, part in parts.items()}
+            study.remark("warning", trouble.kind, trouble.text, where=where, **words, **amounts)
+
+
+def _on_fluctuation(found: FlywheelFindings, study: Study) -> None:
+    """Whether the flywheel of the study keeps the fluctuation, and the least that does."""
+    permitted = number(found.permitted, "1", "percent")
+    own = next((wheel for wheel in found.wheels if wheel.flywheel == found.own), None)
+    if own is not None and own.answers.speed_ripple is not None and not own.keeps(found.permitted):
+        study.remark(
+            "warning",
+            "fluctuation",
+            "the speed fluctuates by {speed_ripple} with the study's flywheel, {flywheel}; permitted is {permitted}.",
+            STEADY,
+            speed_ripple=(own.answers.speed_ripple, "1", "percent"),
+            flywheel=(own.flywheel, "kg.m2"),
+            permitted=(found.permitted, "1", "percent"),
+        )
+    # a flywheel without a run is not judged
+    if found.searched and not any(wheel.keeps(found.permitted) for wheel in found.wheels):
+        more = "." if found.least is not None else ", nor does a larger one that was tried."
+        study.remark(
+            "warning",
+            "no flywheel keeps it",
+            f"no flywheel of the list keeps the speed within {permitted}{more}",
+        )
+    if found.least is not None:
+        _on_least(found, found.least, partial(study.remark, "note", "least flywheel"))
+
+
+def _on_least(found: FlywheelFindings, least: Wheel, note: Callable[..., None]) -> None:
+    a, by_hand, close = least.answers, found.flywheel_by_hand, number(CLOSE, "1", "percent")
+    text = (
+        f"A fluctuation of {{permitted}} takes a flywheel of {{flywheel}} at least, found to {close} of it; "
+        if least.flywheel
+        else "For a fluctuation of {permitted} no flywheel is needed; "
+    )
+    text += "the hand formula asks for {by_hand}" if by_hand else "nor is it by hand"
+    if by_hand > least.flywheel:
+        text += ", as it leaves out that the motor's torque rises where the speed falls"
+    parts: Mapping[str, tuple[str, Amount]] = {
+        "stored": (
+            "flywheel and moving masses lend {stored} of a cut's work",
+            (a.stored_share_most, "1", "percent"),
+        ),
+        "current": ("the RMS current is {current} of the rated", (a.current_share, "1", "percent")),
+        "start": ("the start takes {start}", (a.start_time, "s")),
+    }
+    known = {name: part for name, part in parts.items() if part[1][0] is not None}
+    text += (
+        f". {'With it' if least.flywheel else 'Without'} {', '.join(words for words, _ in known.values())}."
+    )
+    note(
+        text,
+        permitted=(found.permitted, "1", "percent"),
+        flywheel=(least.flywheel, "kg.m2"),
+        by_hand=(by_hand, "kg.m2"),
+        **{name: amount for name, (_, amount) in known.items()},
+    )

@@ -19,7 +19,10 @@ import xarray as xr
 from ..quantities import Layout, Value, Variable, declaration, quantity
 from . import protection
 from .drive import AbsentError, Drive
+from .stored import stored_shares
 
+STARTED = 0.95
+"""Share of the speed that is asked for at which a start is over."""
 BURNT = 2000.0
 """Temperature that stands for a winding without a thermal steady state [K]."""
 
@@ -250,6 +253,19 @@ def _fold(w: Window) -> float | None:
     return max((float(np.max(w.value(f"machine.{side}.fold_largest"))) for side in w.sides), default=0.0)
 
 
+def _start_time(w: Window) -> float | None:
+    """When the crank first turns at `STARTED` of its speed."""
+    at_speed = np.flatnonzero(w.speed >= STARTED * w.asked)
+    return float(w.since[at_speed[0]]) if at_speed.size else None
+
+
+def _lent(w: Window) -> tuple[float | None, float | None]:
+    """See `stored_shares`; None of a machine that does not cut."""
+    if "machine.blade.cut_fx" not in w.run:
+        return None, None
+    return stored_shares(w.turns, w.drive.rotor_inertia)
+
+
 def _standstill(w: Window) -> float | None:
     """When the machine behind an open coupling stands, after the event."""
     if w.trip is None:
@@ -287,6 +303,12 @@ class Answers:
     times count from the event; `energy_after_trip` passes the safety coupling while it opens, `energy_behind`
     stays in the machine."""
 
+    start_time: Value = measure(
+        "s",
+        f"start, to {100 * STARTED:g} % of the speed",
+        _start_time,
+        during=frozenset({Phase.START_UP, Phase.LOADED_START}),
+    )
     crank_torque_peak: Value = measure(
         "N.m", "crank torque, peak", lambda w: peak(w.crank_torque), during=_ALL
     )
@@ -301,6 +323,13 @@ class Answers:
     supply_power_mean: Value = measure("W", "electric power, mean", lambda w: w.mean("motor.supply_power"))
     current_peak: Value = measure("A", "motor current, peak", lambda w: w.largest(w.current), during=_ALL)
     current_rms: Value = measure("A", "motor current, RMS", lambda w: w.rms(w.current))
+    current_share: Value = measure(
+        "1",
+        "RMS current over rated current",
+        lambda w: None if w.drive.rated_current is None else w.rms(w.current) / w.drive.rated_current,
+        kind="percent",
+        during=_STEADY,
+    )
     winding_temperature: Value = measure(
         "K", "winding temperature, thermal steady state", lambda w: w.settled_temperature, during=_STEADY
     )
@@ -340,6 +369,20 @@ class Answers:
         "shaft over motor torque",
         lambda w: w.largest("motor.tau") / w.largest("motor.air_gap_tau"),
         kind="percent",
+    )
+    stored_share: Value = measure(
+        "1",
+        "share of a cut's work from flywheel and moving masses, over the cut",
+        lambda w: _lent(w)[0],
+        kind="percent",
+        during=_STEADY,
+    )
+    stored_share_most: Value = measure(
+        "1",
+        "the same, from the beginning of the cut to their least energy",
+        lambda w: _lent(w)[1],
+        kind="percent",
+        during=_STEADY,
     )
     shaking_force: Value = measure(
         "N", "shaking force", lambda w: w.swing("machine.frame.fx", "machine.frame.fy")

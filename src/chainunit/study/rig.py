@@ -16,11 +16,9 @@ from ..system import CoSimulation, Jump, ModelComponent, Profile, System, certif
 from .config import Config
 from .drive import Drive
 from .events import Event, OverTime
-from .measures import end_gap, whole_turns
+from .measures import STARTED, end_gap, whole_turns
 
 Progress = Callable[[float], None]
-STARTED = 0.95
-"""Share of the speed that is asked for at which a start is over."""
 _LONGEST_START = 30.0
 """Time after which an empty machine is fed, however slowly it turns [s]."""
 _FEED_RISE = 0.1

@@ -127,7 +127,7 @@ class Runner:
     def __init__(self, study: Study, rig: Rig, report: Report) -> None:
         config = study.config
         self.study, self.rig, self.report = study, rig, report
-        self.stop = study.settled + (config.run.turns + 0.1) * config.turn
+        self.stop = config.stop
         """to which the start-up is run [s]; later where the motor takes longer to settle"""
         taken = [event for event in config.events.values() if rig.takes(event)]
         self.events = [event for event in taken if not event.from_rest]
@@ -172,7 +172,7 @@ class Runner:
 
     def _progress(self, what: str, before: float) -> Progress:
         def progress(time: float) -> None:
-            self.report(what, before + time, self.total)
+            self.report(what, min(before + time, self.total), self.total)
 
         return progress
 

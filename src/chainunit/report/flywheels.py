@@ -1,0 +1,129 @@
+"""The section on the flywheels of a study: a row for each, a turn with each, the fluctuation over the inertia."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ..quantities import Layout
+from ..study.flywheels import FlywheelAnswers, FlywheelFindings, Wheel
+from ..study.study import Study
+from ..text import number
+from . import blocks as b
+from . import figure as fig
+from .lines import Line, line
+from .style import LINES
+from .turn import ANGLE
+
+PICTURE = "flywheel.png"
+_HEADS = {
+    "start_time": "start",
+    "speed_ripple": "ripple",
+    "by_hand": "by hand",
+    "motor_torque_peak": "torque, peak",
+    "current_rms": "current, RMS",
+    "current_share": "of rated",
+}
+"""Heads of the columns on a terminal, which leaves the others out."""
+
+
+def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
+    """Table and figure."""
+    found: FlywheelFindings = study.findings["flywheels"]
+    if found.wheels:
+        yield _table(s, found)
+    running = [wheel for _, wheel, _ in found.rows if wheel.answers.speed_ripple is not None]
+    if running:
+        yield _figure(study, found, running)
+
+
+def _table(s: b.Source, found: FlywheelFindings) -> b.Table:
+    rows = found.rows
+    shown = [
+        v
+        for v in Layout(FlywheelAnswers).variables
+        if v.name != "flywheel" and any(getattr(wheel.answers, v.name) is not None for _, wheel, _ in rows)
+    ]
+    columns = (
+        b.Column(v.description, _HEADS.get(v.name, ""), "both" if v.name in _HEADS else "long") for v in shown
+    )
+
+    def head(words: str, path: str) -> Line:
+        return line(s.number(f"{path}.flywheel"), f" ({words})" if words else "")
+
+    return b.Table(
+        tuple(
+            b.TableRow((head(words, path), *(s.number(f"{path}.{v.name}") for v in shown)))
+            for words, _, path in rows
+        ),
+        (b.Column("flywheel"), *columns),
+        title=s.line("Flywheels on the motor's shaft; permitted ripple of the speed {=flywheels.permitted}"),
+    )
+
+
+def _figure(study: Study, found: FlywheelFindings, running: list[Wheel]) -> fig.Figure:
+    drive, plate = study.drive, study.config.plate
+    # as many as there are lines to tell apart, from the least to the largest
+    some = [running[round(k)] for k in np.linspace(0, len(running) - 1, min(len(running), len(LINES)))]
+    speed, torque, current = (
+        fig.Axis("crank speed", "rad/s", "speed"),
+        fig.Axis("motor torque, air gap", "N.m"),
+        fig.Axis("motor current", "A"),
+    )
+    items: dict[fig.Axis, list[fig.Item]] = {speed: [], torque: [], current: []}
+    if plate is not None:
+        items[torque].append(fig.Mark(plate.nameplate.torque, "rated", axis="y", look="reference"))
+        items[current].append(fig.Mark(plate.nameplate.rated_current, "rated", axis="y", look="reference"))
+    for look, wheel in enumerate(some):
+        run = wheel.turns
+        angle, w = drive.crank_motion(run)
+        series = {
+            speed: w,
+            torque: run["motor.air_gap_tau"].values,
+            current: run[f"motor.{drive.motor.current}"].values,
+        }
+        for axis, y in series.items():
+            items[axis].append(fig.Curve(number(wheel.flywheel, "kg.m2"), *_last_turn(angle, y), look))
+    panels = [fig.Panel(ANGLE, axis, tuple(curves)) for axis, curves in items.items()]
+    return fig.Figure(
+        "flywheel",
+        "A turn with each flywheel, and the ripple of the speed over the inertia",
+        "Crank speed, motor torque and current over a turn with each flywheel; ripple of the speed over inertia.",
+        ((panels[0], panels[1]), (panels[2], _ripple(found, running))),
+        file=PICTURE,
+        heights=(1.3, 1.3),
+    )
+
+
+def _last_turn(angle: Any, y: Any) -> tuple[Any, Any]:
+    """The last turn of a run over the crank angle from 0 to 2 pi."""
+    turn = 2.0 * math.pi
+    last = angle > angle[-1] - turn
+    place = angle[last] % turn
+    order = np.argsort(place)
+    return place[order], y[last][order]
+
+
+def _ripple(found: FlywheelFindings, running: list[Wheel]) -> fig.Panel:
+    """The ripple of the speed over the inertia on the motor's shaft."""
+    inertia = np.array([wheel.answers.inertia for wheel in running])
+    sizes = [wheel.answers.speed_ripple for wheel in running]
+    ends = np.array(
+        [min(inertia[0], found.bare), 1.3 * max(inertia[-1], found.bare + found.flywheel_by_hand)]
+    )
+    by_hand = [found.by_hand(J - found.bare) for J in ends]
+    items: list[fig.Item] = [
+        fig.Curve("by hand, dE/(J w2)", ends, by_hand, 1),
+        fig.Curve("co-simulated", inertia, sizes, marker="o"),
+        fig.Mark(found.permitted, "permitted", axis="y", look=3),
+    ]
+    if found.least in running:
+        a = found.least.answers
+        items.append(fig.Curve("least flywheel", [a.inertia], [a.speed_ripple], marker="s", joined=False))
+    low, high = 0.7 * min(*sizes, found.permitted), min(2.0, 1.5 * max(by_hand))
+    y = fig.Axis("ripple of the speed", "1", "percent", low=low, high=high, log=True)
+    x = fig.Axis("inertia on the motor's shaft", "kg.m2", log=True)
+    return fig.Panel(x, y, tuple(items), "Ripple over inertia")

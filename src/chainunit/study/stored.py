@@ -1,0 +1,44 @@
+"""Energy that flywheel and moving masses lend to a cut."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+
+def cutting_power(run: xr.Dataset) -> Any:
+    """Power that the stack takes from the blade [W], shape (time,)."""
+    vx, vy, fx, fy = (run[f"machine.blade.{name}"].values for name in ("vx", "vy", "cut_fx", "cut_fy"))
+    return -(fx * vx + fy * vy)
+
+
+def stored_shares(turns: xr.Dataset, inertia: float) -> tuple[float | None, float | None]:
+    """Energy that rotor, flywheel (together of this `inertia` [kg m2]) and machine lend to a cut, over its work: from
+    the beginning of the cut to its end, and from its beginning to their least energy. None where nothing is cut.
+
+    The rest comes from the motor through the air gap, less friction; towards the end of a cut, where the blade slows
+    down, the motor may already give back to them. `turns` are whole ones, that go on as they began.
+    """
+    power, time = cutting_power(turns), turns["time"].values
+    if not np.max(power) > 0.0:
+        return None, None
+    stored = (
+        0.5 * inertia * turns["motor.w"].values ** 2
+        + turns["machine.kinetic_energy"].values
+        + turns["machine.potential_energy"].values
+    )
+    rows = len(time)
+    # a cut that begins before the last row ends in the turns after it
+    time = np.append(time, time[1:] + time[-1] - time[0])
+    power, stored = (np.append(x, x[1:]) for x in (power, stored))
+    inside = power > 0.01 * np.max(power)
+    edge = np.diff(np.concatenate([[False], inside, [False]]).astype(int))
+    net = most = work = 0.0
+    for a, b in zip(np.flatnonzero(edge > 0), np.flatnonzero(edge < 0), strict=True):
+        if 0 < a < rows:
+            net += float(stored[a] - stored[b - 1])
+            most += float(stored[a] - np.min(stored[a:b]))
+            work += float(np.trapezoid(power[a:b], time[a:b]))
+    return (net / work, most / work) if work > 0.0 else (None, None)
