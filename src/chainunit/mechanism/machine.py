@@ -13,7 +13,7 @@ are new.
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from ..engines import Dual, dual, slope
@@ -140,6 +140,18 @@ def loaded(loads: dict[str, Load], wrenches: Iterable[Wrench]) -> dict[str, Load
     return loads
 
 
+class _OnDemand(dict[str, Any]):
+    """Values that are made when they are first asked for: loads ask for few."""
+
+    def __init__(self, make: Callable[[str], Any]) -> None:
+        super().__init__()
+        self._make = make
+
+    def __missing__(self, name: str) -> Any:
+        value = self[name] = self._make(name)
+        return value
+
+
 class LiftedMechanism:
     """A mechanism as loads see it, with its derivatives by q as dual parts."""
 
@@ -152,8 +164,8 @@ class LiftedMechanism:
         links, pins : their third derivatives, see `Mechanism.third`
         """
         self._of = m
-        self.links = {name: link.lifted(*links[name]) for name, link in m.links.items()}
-        self.pins = {name: pin.lifted(pins.get(name, ZERO)) for name, pin in m.pins.items()}
+        self.links: Mapping[str, Link] = _OnDemand(lambda name: m.links[name].lifted(*links[name]))
+        self.pins: Mapping[str, Motion] = _OnDemand(lambda name: m.pins[name].lifted(pins.get(name, ZERO)))
         self.bodies: Mapping[str, Body] = {}
         self.turns: Mapping[Joint, Any] = {}
 
