@@ -20,11 +20,12 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..engines import Dual, dual, numpy_
+from ..engines import Dual, dual, numpy_, value
 from ..integrate import rk4
 from .cardan import Cardan, Twist, frozen_frequency, middle_angle, two_joints
 
@@ -94,22 +95,20 @@ class _LineRates:
     def __call__(self, time: float, x: Sequence[Any]) -> list[Any]:
         phi1, w1, phi4, w4 = x
         lifted = isinstance(phi1, Dual)
-        at1, at4 = (phi1.v, phi4.v) if lifted else (phi1, phi4)
-        near = at1 - self.twist
+        near = value(phi1) - self.twist
         if lifted:
             # at the root one more step of Newton carries the exact slopes
-            near = middle_angle(self.plain, self.p, at1, at4, near, _NEWTON)
+            near = middle_angle(self.plain, self.p, phi1.v, phi4.v, near, _NEWTON)
             line = Twist(self.dual, self.p, phi1, w1, phi4, w4, near, 1)
-            self.twist = line.twist2.v
         else:
             line = Twist(self.plain, self.p, phi1, w1, phi4, w4, near, _NEWTON)
-            self.twist = line.twist2
+        self.twist = value(line.twist2)
         if time == 0.0:
             for record, torque in (
                 (self.torque2, line.twist2 * self.p.c2),
                 (self.torque3, line.twist3 * self.p.c3),
             ):
-                record.append(torque.v if lifted else torque)
+                record.append(value(torque))
         a1, a4 = (self.drive - line.tau1) / self.p.J1, (line.tau4 - self.load) / self.p.J4
         if lifted and self.held is not None:
             # the control of the common speed pulls both inertias in proportion to themselves
@@ -209,23 +208,14 @@ def _all(
     parts, before = [], 0.0
     for first in range(0, len(speed), chunk):
         batch = order[first : first + chunk]
-        share = len(batch) / len(speed)
-
-        def report(x: float, before: float = before, share: float = share) -> None:
-            progress(before + share * x)
-
-        count = int(max(counts[batch]))
+        share, count = len(batch) / len(speed), int(max(counts[batch]))
+        report = partial(lambda before, share, x: progress(before + share * x), before, share)
         parts.append(
             _shoot(_pick(p, batch), speed[batch], load[batch], guess[:, batch], count, iterations, report)
         )
         before += share
     back = np.argsort(order, kind="stable")
-    return SteadyMotion(
-        *(
-            np.concatenate([getattr(part, name) for part in parts], -1)[..., back]
-            for name in SteadyMotion._fields
-        )
-    )
+    return SteadyMotion(*(np.concatenate(each, -1)[..., back] for each in zip(*parts, strict=True)))
 
 
 def _shoot(
@@ -272,7 +262,7 @@ def _shoot(
             drive[active] += change[3] * weights[3]
     progress(1.0)
     x[:, ~closed], drive[~closed] = np.nan, np.nan
-    multiplier, angle, free = np.full(n, np.nan), np.full(n, np.nan), np.full(n, np.nan)
+    multiplier, angle, free = np.full((3, n), np.nan)
     if np.any(closed):
         torsional = np.linalg.eigvals(np.moveaxis(held[:, :, closed], 2, 0))
         multiplier[closed] = np.max(np.abs(torsional), axis=1)
@@ -408,7 +398,7 @@ def simulate(
     phi3, i, _ = two_joints(numpy_(), q, np.zeros(n))
     w1 = speed * np.sqrt(inertia / (p.J1 + i * i * p.J4))
     x: list[Any] = [np.zeros(n), w1, phi3, i * w1, speed.copy(), np.zeros(n)]
-    peak2, peak3, begin, end = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
+    peak2, peak3, begin, end = np.zeros((4, n))
     whole = steps + int(np.max(window)) + 1
     for step in range(whole):
         now, angle = step - steps, x[0]
