@@ -44,17 +44,19 @@ SIGNALS = {"motor.w_ref": Profile(0.0, ((0.0, 0.2, 150.0),))}
 RATIO = 50.0
 
 
-def build(folder, names=MappingProxyType({}), **options):
+def build(folder, names=MappingProxyType({}), left_out=(), script=SCRIPT, **options):
     """The FMU, by pythonfmu in a process of its own; `names` are its own names of variables."""
-    script = folder / "ForeignMotor.py"
-    script.write_text(SCRIPT.read_text().replace("NAMES = {}", f"NAMES = {dict(names)!r}"))
+    text = script.read_text().replace("NAMES = {}", f"NAMES = {dict(names)!r}")
+    name = re.search(r"class (\w+)", text)[1]
+    script = folder / f"{name}.py"
+    script.write_text(text.replace("LEFT_OUT = ()", f"LEFT_OUT = {tuple(left_out)!r}"))
     given = {"canGetAndSetFMUstate": "true", "canSerializeFMUstate": "true"} | options
     code = (
         "from pythonfmu import FmuBuilder\n"
-        f"FmuBuilder.build_FMU({str(script)!r}, {str(folder / 'ForeignMotor.fmu')!r}, **{given!r})\n"
+        f"FmuBuilder.build_FMU({str(script)!r}, {str(script.with_suffix('.fmu'))!r}, **{given!r})\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
-    return folder / "ForeignMotor.fmu"
+    return script.with_suffix(".fmu")
 
 
 @pytest.fixture(scope="module")
@@ -367,7 +369,7 @@ OWN_MOTOR = "[motor]\n" + "".join(
     for name, value in DcMotor.parameter_layout.named(DcMotor.Parameters()).items()
     if "." in name
 )
-OTHER_NAMES = 'names = { w = "rotor_speed", phi = "rotor_angle", load.J = "inertia_behind" }\n'
+OTHER_NAMES = 'motor_names = { w = "rotor_speed", phi = "rotor_angle", load.J = "inertia_behind" }\n'
 
 
 @pytest.fixture(scope="module")
@@ -442,12 +444,12 @@ def test_its_speeds_and_torques_are_those_of_ours(folder):
         (("rotor_speed", "speed"), r"system\.motor: .*has no variable speed, which was given for w"),
         (
             ('w = "rotor_speed"', 'omega = "x"'),
-            r"system\.names\.omega: unknown key; known here: phi, w, a, tau, ",
+            r"system\.motor_names\.omega: unknown key; known here: phi, w, a, tau, ",
         ),
-        (("load.J", "load.mass"), r"system\.names\.load\.mass: unknown key; known here: tau_bias, J, "),
-        (('"rotor_speed"', "3"), r"system\.names\.w = 3: must be a text"),
+        (("load.J", "load.mass"), r"system\.motor_names\.load\.mass: unknown key; known here: tau_bias, J, "),
+        (('"rotor_speed"', "3"), r"system\.motor_names\.w = 3: must be a text"),
         (('"ForeignMotor.fmu"', '""'), r'system\.motor = "": string should have at least 1 character'),
-        (('motor = "ForeignMotor.fmu"', ""), r"system.names: are of an FMU of somebody else"),
+        (('motor = "ForeignMotor.fmu"', ""), r"system.motor_names: are of an FMU of somebody else"),
         (
             ("[run]", "[motor]\nrotor.J = 0.01\n[run]"),
             r'motor: given beside system\.motor = "ForeignMotor\.fmu", .*',

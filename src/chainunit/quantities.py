@@ -306,7 +306,7 @@ class Layout:
         self.cls = cls
         self.variables = tuple(variables(cls))
         self.names = tuple(v.name for v in self.variables)
-        self._getter = attrgetter(*self.names)
+        self._getter: Any = attrgetter(*self.names) if self.names else lambda instance: ()
         self._plan = _plan(cls, 0)[0]
 
     def values(self, instance: Any) -> list[Any]:

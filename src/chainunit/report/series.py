@@ -19,18 +19,12 @@ def _load_cycle(study: Study, turns: xr.Dataset, file: Path) -> Path:
     """The load that the motor shaft sees in the steady turns, in the form that sizing tools import: a row per instant
     with time, speed, torque of the load and inertia of the load, units in the head. The last row is the first of the
     next turn."""
-    names = {
-        "time": "time",
-        "motor.w": "speed",
-        f"{study.drive.loading}.tau": "torque",
-        "machine.J": "inertia",
-    }
+    time, drive = turns["time"].values, study.drive
+    torque, speed = drive.motor_shaft(turns)
+    columns = time - time[0], speed, torque, drive.load_inertia(turns)
     with whole(file) as part, part.open("w", newline="", encoding="utf-8") as out:
         writer = csv.writer(out)
-        writer.writerow(f"{title} [{turns[name].attrs['units']}]" for name, title in names.items())
-        columns = [turns[name].values for name in names]
-        columns[0] = columns[0] - columns[0][0]
-        columns[-1] = study.drive.load_inertia(turns)
+        writer.writerow(("time [s]", "speed [rad/s]", "torque [N.m]", "inertia [kg.m2]"))
         writer.writerows([f"{x:.9g}" for x in row] for row in zip(*columns, strict=True))
     return file
 

@@ -13,7 +13,10 @@ from .measures import mean, whole_turns
 
 
 def pin_loads(drive: Drive, run: xr.Dataset) -> dict[str, dict[str, float]]:
-    """Peak, RMS and equivalent load (mean of ISO 281 over what the pin turns) of the reaction of every pin [N]."""
+    """Peak, RMS and equivalent load (mean of ISO 281 over what the pin turns) of the reaction of every pin [N]; none
+    of a machine that is an FMU of somebody else."""
+    if drive.outsider:
+        return {}
     table, turns = {}, whole_turns(drive, run)
     machine = drive.simulated
     turned = machine.pin_turns(drive.machine_series(turns))

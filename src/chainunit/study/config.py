@@ -39,6 +39,7 @@ from ..system.signals import Profile
 from ..text import DEFAULT_UNITS, Units, chosen_units
 from .event_table import RandomEvent, read_events, read_random_event
 from .events import Event, OneSidedFeed
+from .foreign_machine import ForeignMachine, ForeignModel, foreign_model
 from .sections import (
     ORGANS,
     STARTS,
@@ -75,7 +76,7 @@ _OF_MACHINE = {"ChamberForces": "chain-unit", "KnifeDrive": "knife", "Accelerato
 class Parts:
     """The kinds of machine and motor that the table [system] names, and the example that goes with the machine."""
 
-    machine: type[InverseMachine]
+    machine: type[InverseMachine | ForeignModel]
     motor: type[Motor]
     """`Motor` itself where the motor is an FMU of somebody else"""
     designation: str = ""
@@ -119,22 +120,38 @@ class Parts:
         return toml(example(name)) if name else {}
 
 
-def _parts(data: Mapping[str, Any]) -> Parts:
+def _is_fmu(name: str) -> bool:
+    return name.lower().endswith(".fmu")
+
+
+def _parts(data: Mapping[str, Any], source: str) -> Parts:
     """Machine and motor of a file, checked before all else: the other tables depend on them."""
     table = read_table(SystemTable, _table(data, "system"), "system.")
-    machine = MACHINES.get(table.machine)
-    if machine is None:
-        raise InputError(f"system.machine = {shown(table.machine)}: must be one of {', '.join(MACHINES)}")
+    machine = _machine_model(table, source)
     motor = table.motor
     if not motor and "motor" not in data and "sizing" not in data and machine.name in _OF_MACHINE:
         motor = toml(example(_OF_MACHINE[machine.name])).get("system", {}).get("motor", "")
     if not motor:
         return Parts(machine, MOTORS["DcMotor"])
-    if motor.lower().endswith(".fmu"):
+    if _is_fmu(motor):
         return Parts(machine, Motor, file=motor)
     if motor in MOTORS:
         return Parts(machine, MOTORS[motor])
     return Parts(machine, MOTORS["InductionMotor"], designation=motor)
+
+
+def _machine_model(table: Any, source: str) -> type[InverseMachine | ForeignModel]:
+    """The machine that the table [system] names."""
+    if not _is_fmu(table.machine):
+        if table.machine in MACHINES:
+            return MACHINES[table.machine]
+        raise InputError(
+            f"system.machine = {shown(table.machine)}: must be one of {', '.join(MACHINES)}, or a file .fmu"
+        )
+    try:
+        return foreign_model(_beside(table.machine, source), given_values(table.machine_names))
+    except InputError as error:
+        raise InputError(f"system.machine: {error}") from error
 
 
 def _table(data: Mapping[str, Any], name: str) -> Mapping[str, Any]:
@@ -253,7 +270,7 @@ def parse(text: str, source: str = "config") -> Config:
         see `load`.
     """
     data = toml(text)
-    parts = _parts(data)
+    parts = _parts(data, source)
     read_table(parts.form, data)
     checked = read_table(parts.form, _over_example(data, parts))
     declared = {name: section.declared for name, section in parts.sections.items()}
@@ -298,7 +315,7 @@ def _config(
     if "sizing" in data and checked.start != "inverter" and "inertia_ratio" not in tables["sizing"]:
         # of motors on the line only where it is given
         of_study["sizing"] = dataclasses.replace(of_study["sizing"], inertia_ratio=math.inf)
-    catalogue = _beside(checked.catalogue, source)
+    catalogue = _beside(checked.catalogue, source) if checked.catalogue else None
     config = Config(
         title=checked.title,
         machine=_machine(parts, tables["machine"], tables["ratios"]),
@@ -315,7 +332,9 @@ def _config(
         place=checked.driveline.place,
         damping_ratio=checked.driveline.damping_ratio,
         chain=values["chain"] if checked.organ == "chain" else None,
-        foreign=_foreign(parts.file, checked.system, source),
+        foreign=ForeignMotor(_beside(parts.file, source), given_values(checked.system.motor_names))
+        if parts.file
+        else None,
         source=source,
         given=frozenset(_names(data, events)),
         slips=unusual,
@@ -372,7 +391,8 @@ def _machine(parts: Parts, given: dict[str, float], of_papers: Mapping[str, floa
             )
         given = given | lengths
     try:
-        return ChainUnit(given) if parts.machine is ChamberForces else Machine(parts.machine, given)
+        of: Any = ForeignMachine if issubclass(parts.machine, ForeignModel) else Machine
+        return ChainUnit(given) if parts.machine is ChamberForces else of(parts.machine, given)
     except InputError as error:
         raise InputError(f"machine: {error}{_taken_over(error, given)}") from error
 
@@ -390,10 +410,16 @@ def _check_company(data: Mapping[str, Any], parts: Parts) -> None:
     named = data.get("system", {}).get("motor")
     if data.get("system") == {}:
         raise InputError('system: names nothing; add motor = "file.fmu", or leave [system] out')
-    if "names" in data.get("system", {}) and not parts.file:
-        raise InputError(
-            'system.names: are of an FMU of somebody else; add motor = "file.fmu", or leave them out'
-        )
+    foreign = {"motor": bool(parts.file), "machine": issubclass(parts.machine, ForeignModel)}
+    for part, is_foreign in foreign.items():
+        if f"{part}_names" in data.get("system", {}) and not is_foreign:
+            raise InputError(
+                f'system.{part}_names: are of an FMU of somebody else; add {part} = "file.fmu", or leave them out'
+            )
+    if foreign["machine"] and data.get("feed_forward"):
+        raise InputError("feed_forward: needs a model of the machine, which is an FMU; leave it out")
+    if foreign["machine"] and _table(data, "monte_carlo").get("runs"):
+        raise InputError("monte_carlo.runs: needs a model of the machine, which is an FMU; leave it out")
     if named is not None:
         for name in ("motor", "sizing"):
             if name in data and not (name == "motor" and parts.gives_motor):
@@ -508,15 +534,9 @@ def _check_steps(config: Config) -> None:
         )
 
 
-def _beside(name: str, source: str) -> Path | None:
+def _beside(name: str, source: str) -> Path:
     """A file that a study file names, relative to the study file."""
-    return (Path(source).parent / name) if name else None
-
-
-def _foreign(name: str, table: Any, source: str) -> ForeignMotor | None:
-    """The motor of somebody else that a study file names."""
-    file = _beside(name, source)
-    return None if file is None else ForeignMotor(file, given_values(table.names))
+    return Path(source).parent / name
 
 
 LENGTHS = ("r", "l", "h", "c", "hy", "e", "l1", "l2", "z")
@@ -528,7 +548,7 @@ def _over_example(data: Mapping[str, Any], parts: Parts) -> dict[str, Any]:
     base = parts.example
     if any(name in _table(data, "machine") for name in LENGTHS) and "ratios" not in data:
         base.pop("ratios", None)
-    if parts.motor is not _parts(base).motor:
+    if parts.motor is not _parts(base, "").motor:
         base.pop("motor", None)
     if "motor" in _table(data, "system") or "sizing" in data or "motor" in data:
         base.get("system", {}).pop("motor", None)

@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 
 from ..drives.driveline import CardanDriveline
+from ..drives.gear import Gear
 from ..drives.motor import Motor
 from ..errors import InputError
 from ..fmu.backends import Backend, Origin
@@ -24,7 +25,18 @@ from ..machines.hanging import split
 from ..machines.machine import Machine
 from ..mechanism.models import DirectMachine, InverseMachine
 from ..quantities import Layout
-from ..system import Component, FmuComponent, ModelComponent, Profile, System, export, shaft_joints
+from ..system import (
+    Bond,
+    Component,
+    FmuComponent,
+    ModelComponent,
+    Profile,
+    System,
+    export,
+    shaft_joints,
+    through,
+)
+from .foreign_machine import ForeignMachine
 
 
 class AbsentError(InputError):
@@ -116,19 +128,37 @@ class Drive:
     def load_inertia(self, run: xr.Dataset) -> Any:
         """Inertia at the motor's shaft beside the rotor [kg m2], shape (time,); with a driveline that of its even
         ratio."""
-        J = run["machine.J"].values
+        J = run["machine.J"].values / self.gear**2
         return J if self.line is None else (J + self.line.J4) / self.line.ratio**2
 
-    @property
-    def loading(self) -> str:
-        """Name of the component that loads the motor."""
-        return next(bond.machine for bond in self.graph.bonds if bond.driver == "motor")
+    def shaft_power(self, run: xr.Dataset) -> Any:
+        """Power at the motor's shaft [W], shape (time,)."""
+        full = f"{self._first_bond.machine}.power"
+        if full in run:
+            return run[full].values
+        torque, speed = self.motor_shaft(run)
+        return torque * speed
+
+    def motor_shaft(self, run: xr.Dataset) -> tuple[Any, Any]:
+        """Torque of the load [N m] and speed [rad/s] of the motor's shaft, shape (time,)."""
+        return through(run, self._first_bond)
 
     @property
     def rods(self) -> tuple[int, int]:
         """How many rods the wall and the web have, where the organs are chains."""
         walls, webs = split((self.machine.p.l1, self.machine.p.l2), int(self.chain.rods))
         return walls, webs
+
+    @property
+    def outsider(self) -> ForeignMachine | None:
+        """The machine as the shaft behind the line drives it, where it is an FMU of somebody else."""
+        return self.driven if isinstance(self.driven, ForeignMachine) else None
+
+    @property
+    def outsiders(self) -> list[str]:
+        """Names of the FMUs of somebody else."""
+        parts = self.outsider and self.outsider.component, self.foreign
+        return [part.title for part in parts if part]
 
     def load_model(self) -> tuple[type[InverseMachine], Any]:
         """Model of the machine, with two bars or chains, and its parameters."""
@@ -161,14 +191,23 @@ class Drive:
     def graph(self) -> System:
         """The system of the models, each before what drives it; with feed-forward also the machine that the control
         asks, `model`."""
-        components: dict[str, Component] = {"machine": ModelComponent(*self.load_model())}
-        if self.line is None:
-            joints = shaft_joints("motor", "machine")
-        else:
-            components["driveline"] = ModelComponent(CardanDriveline, self.line)
-            behind = shaft_joints("driveline", "machine", flange="driven", load="machine")
-            joints = [*shaft_joints("motor", "driveline"), *behind]
-        components["motor"] = self.foreign or ModelComponent(self.motor, self.parameters)
+        outsider = self.outsider
+        between: dict[str, Component] = {}
+        if self.gear != 1.0 or (outsider and self.line is not None and not outsider.model.has_gear()):
+            between["gear"] = ModelComponent(Gear, Gear.Parameters(ratio=self.gear))
+        if self.line is not None:
+            between["driveline"] = ModelComponent(CardanDriveline, self.line)
+        joints: list[tuple[str, str]] = []
+        behind = "machine"
+        for name in between:
+            joints = [*shaft_joints(name, behind, flange="driven", load="machine"), *joints]
+            behind = name
+        joints = [*shaft_joints("motor", behind), *joints]
+        components: dict[str, Component] = {
+            "machine": outsider.component if outsider else ModelComponent(*self.load_model()),
+            **between,
+            "motor": self.foreign or ModelComponent(self.motor, self.parameters),
+        }
         if not self.feed_forward:
             return System(components, joints)
         # a control knows the machine with two bars
@@ -176,16 +215,32 @@ class Drive:
         wires = [("motor.phi", "model.phi"), ("motor.w", "model.w"), ("model.tau", "motor.tau_ff")]
         return System(components, joints, wires)
 
+    @property
+    def gear(self) -> float:
+        """Ratio of the gear that is a part of its own before the machine; 1 where the machine has it inside."""
+        outsider = self.outsider
+        return outsider.ratio if outsider and outsider.needs_gear else 1.0
+
+    @property
+    def _first_bond(self) -> Bond:
+        return next(bond for bond in self.graph.bonds if bond.driver == "motor")
+
+    @property
+    def _last_bond(self) -> Bond:
+        return next(bond for bond in self.graph.bonds if bond.machine == "machine")
+
     def crank_torque(self, run: xr.Dataset) -> Any:
         """Torque at the crank in a run [N m], shape (time,)."""
-        return run["machine.tau"].values * self.driven.ratio
+        return through(run, self._last_bond)[0] * (self.driven.ratio / self.gear)
 
     def crank_motion(self, run: xr.Dataset) -> tuple[Any, Any]:
         """Angle [rad] and speed [rad/s] of the crank in a run, shape (time,), also of a machine that turns by
         itself."""
-        phi, w = ("phi0", "w0") if "machine.phi0" in run else ("phi", "w")
-        ratio = self.driven.ratio
-        return run[f"machine.{phi}"].values / ratio, run[f"machine.{w}"].values / ratio
+        bond, ratio = self._last_bond, self.driven.ratio / self.gear
+        given = (f"{bond.driver}.{bond.flanges[0].members[x]}" for x in ("phi", "w"))
+        pairs = (("machine.phi0", "machine.w0"), ("machine.phi", "machine.w"), tuple(given))
+        phi, w = next(pair for pair in pairs if set(pair) <= set(run))
+        return run[phi].values / ratio, run[w].values / ratio
 
     def turns(self, run: xr.Dataset) -> float:
         """Turns that the crank makes from the first to the last row of a run."""
@@ -284,8 +339,11 @@ class Drive:
         """The machine that turns by itself."""
         return self.simulated.model.direct()
 
-    def coasting(self, folder: Path, backend: Backend | None = None) -> Path:
-        """Write the FMU of the machine that turns by itself, and with it what is on its shaft."""
+    def coasting(self, folder: Path, backend: Backend | None = None) -> Path | None:
+        """Write the FMU of the machine that turns by itself, and with it what is on its shaft; None where the machine
+        is an FMU of somebody else, of which there is no such model."""
+        if self.outsider:
+            return None
         file = folder / f"{self.coasting_model.name}.fmu"
         export_fmu(self.coasting_model, file, self.coasting_parameters(), backend=backend)
         return file

@@ -47,11 +47,11 @@ _AT_SPEED = frozenset({Phase.STEADY, Phase.EVENT})
 @dataclass(frozen=True)
 class Trip:
     """A safety coupling that opened: when [s], the energy that passed it until no torque did [J], and the run of the
-    machine behind it."""
+    machine behind it, where it could be followed."""
 
     time: float
     passed: float
-    coasting: xr.Dataset
+    coasting: xr.Dataset | None
 
 
 @dataclass(frozen=True)
@@ -94,6 +94,11 @@ class Window:
         return self.mean(lambda run: self.drive.crank_motion(run)[1])
 
     @property
+    def coasting(self) -> xr.Dataset | None:
+        """The run of the machine behind the coupling that opened, if there is one."""
+        return self.trip.coasting if self.trip else None
+
+    @property
     def since(self) -> Any:
         """Time since the begin of an overload [s], shape (time,)."""
         return self.value("time") - self.begin
@@ -103,11 +108,6 @@ class Window:
         """Name of the motor's current."""
         self.drive.needs_own("the current")
         return f"motor.{self.drive.motor.current}"
-
-    @property
-    def power(self) -> str:
-        """Name of the power at the motor's shaft."""
-        return f"{self.drive.loading}.power"
 
     @property
     def kept(self) -> float:
@@ -268,9 +268,9 @@ def _lent(w: Window) -> tuple[float | None, float | None]:
 
 def _standstill(w: Window) -> float | None:
     """When the machine behind an open coupling stands, after the event."""
-    if w.trip is None:
+    run = w.coasting
+    if run is None:
         return None
-    run = w.trip.coasting
     still = np.flatnonzero(np.abs(w.drive.crank_motion(run)[1]) < 0.01 * w.asked)
     return float(run["time"][still[0]]) - w.begin if still.size else None
 
@@ -318,8 +318,10 @@ class Answers:
         "N.m", "motor torque, peak", lambda w: w.largest("motor.air_gap_tau"), during=_ALL
     )
     motor_torque_rms: Value = measure("N.m", "motor torque, RMS", lambda w: w.rms("motor.air_gap_tau"))
-    power_peak: Value = measure("W", "shaft power, peak", lambda w: max(0.0, float(np.max(w.value(w.power)))))
-    power_mean: Value = measure("W", "shaft power, mean", lambda w: w.mean(w.power))
+    power_peak: Value = measure(
+        "W", "shaft power, peak", lambda w: max(0.0, float(np.max(w.drive.shaft_power(w.run))))
+    )
+    power_mean: Value = measure("W", "shaft power, mean", lambda w: w.mean(w.drive.shaft_power))
     supply_power_mean: Value = measure("W", "electric power, mean", lambda w: w.mean("motor.supply_power"))
     current_peak: Value = measure("A", "motor current, peak", lambda w: w.largest(w.current), during=_ALL)
     current_rms: Value = measure("A", "motor current, RMS", lambda w: w.rms(w.current))
@@ -405,7 +407,7 @@ class Answers:
     energy_behind: Value = measure(
         "J",
         "energy behind it",
-        lambda w: float(w.trip.coasting["machine.kinetic_energy"][0]) if w.trip else None,
+        lambda w: None if w.coasting is None else float(w.coasting["machine.kinetic_energy"][0]),
         during=_EVENTS,
     )
     standstill_time: Value = measure("s", "machine stands after", _standstill, during=_EVENTS)

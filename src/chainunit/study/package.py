@@ -90,6 +90,8 @@ def with_rods(number: int, start: Mapping[str, float]) -> type[Model]:
 
 def _is_of(model: type[Model], drive: Drive) -> bool:
     """Whether a model is that of the machine, its direct one, or the one with chains."""
+    if drive.outsider:
+        return False
     own = drive.driven.model
     chains = own is ChamberForces and model.name == "ChainUnitFlexible"
     return model is own or chains or model is own.direct()

@@ -26,6 +26,11 @@ def conclude(study: Study) -> None:
     config, note = study.config, partial(study.remark, "note")
     packaged = "Masses, pins, feed and drive are assumed; the papers print none."
     own = "What the study file does not name is the packaged example's, whose masses and drive are assumed."
+    if study.drive.outsider:
+        own = (
+            "What the study file does not name of the machine is at the start value of its FMU. The turn at constant "
+            "speed is by that FMU alone; bearings, and the machine behind an open coupling, are not known of it."
+        )
     note("assumed", packaged if config.source == "packaged example" else own)
     note(
         "smoothed friction",
@@ -160,7 +165,10 @@ def _happenings(study: Study, name: str) -> Iterator[tuple[str, str, dict[str, A
         units = {"coupling_trip_time": "s", "energy_after_trip": "J", "energy_behind": "J"}
         amounts: dict[str, Amount] = {each: (getattr(answers, each), unit) for each, unit in units.items()}
         time, passed, behind = (number(*amount) for amount in amounts.values())
-        yield "trip", f"after {time}; {passed} pass it while it opens, {behind} stay behind it", amounts
+        stays = "the machine behind it is an FMU and is not followed"
+        if answers.energy_behind is not None:
+            stays = f"{behind} stay behind it"
+        yield "trip", f"after {time}; {passed} pass it while it opens, {stays}", amounts
     elif name in config.events and answers.recovery_time is None and study.returns:
         yield "not recovered", "", {}
 

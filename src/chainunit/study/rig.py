@@ -115,7 +115,8 @@ class Rig:
 
     def takes(self, event: Event) -> bool:
         """Whether the drive has the inputs that the event acts on."""
-        return set(event.inputs(event.side)) <= set(self._inputs)
+        machine = self.graph.components["machine"].connectors
+        return set(event.inputs(event.side)) <= set(self._inputs) and set(event.reads) <= set(machine)
 
     def event_signals(self, event: Event, begin: float, state: Mapping[str, float]) -> dict[str, OverTime]:
         """The signals of the event, by full name, where it begins at `begin` [s] with the outputs `state`."""

@@ -59,8 +59,9 @@ def run_study(
     report = report or (lambda what, done, todo: None)
     choice = choose(config, folder / "fmu", report, backend)
     drive = choice.drive
-    if check and drive.foreign is not None:
-        raise InputError(f"--check: the equations of {drive.foreign.title} are not known; leave --check out")
+    if check and drive.outsiders:
+        titles = " and ".join(drive.outsiders)
+        raise InputError(f"--check: the equations of {titles} are not known; leave --check out")
     study = Study(config, drive, statics(config, drive), choice.tuning, choice.sizing)
     if config.monte_carlo.runs:
         _check_random(config, Rig(config, drive, {}))
@@ -137,7 +138,7 @@ class Runner:
         self.start_guards = {} if study.start_apart else rig.guards
         self._coasting: Path | None = None
 
-    def run(self, check: bool, coasting: Callable[[], Path]) -> None:
+    def run(self, check: bool, coasting: Callable[[], Path | None]) -> None:
         """Every run of the study; `check` compares each with the monolithic solution, `coasting` writes the FMU of
         the machine behind an open coupling."""
         self._export_coasting = coasting
@@ -208,10 +209,10 @@ class Runner:
             )
         steady = study.steady
         study.answers["steady"] = read_answers(study.window(Phase.STEADY, steady))
-        study.pins["steady"] = pin_loads(rig.drive, steady)
+        self._bearings("steady", steady)
         start = run.sel(time=slice(None, steady["time"].values[0]))
         study.start = read_answers(study.window(Phase.START_UP, start))
-        study.pins[verdict.START] = pin_loads(rig.drive, start)
+        self._bearings(verdict.START, start)
         if study.start_apart:
             study.start_torque = on_coupling(rig.drive, run.sel(time=slice(None, study.settled)))
         asked = on_coupling(rig.drive, steady)
@@ -247,15 +248,19 @@ class Runner:
         if coupling and simulation.time < stop - 0.5 * rig.step:
             time = simulation.time
             run, passed = rig.release(simulation, run, coupling.release_time)
-            if self._coasting is None:
-                self._coasting = self._export_coasting()
-            coasting = rig.coast(transient, run, stop, self._coasting)
-            study.runs[f"{name}_coasting"] = coasting
+            self._coasting = self._coasting or self._export_coasting()
+            coasting = rig.coast(transient, run, stop, self._coasting) if self._coasting else None
+            if coasting is not None:
+                study.runs[f"{name}_coasting"] = coasting
             trip = Trip(time, passed, coasting)
         self._certify(name, run)
         after = run.sel(time=slice(transient.begin, None))
         study.answers[name] = read_answers(study.window(phase, after, transient.begin, trip))
-        study.pins[name] = pin_loads(rig.drive, after)
+        self._bearings(name, after)
+
+    def _bearings(self, name: str, run: xr.Dataset) -> None:
+        if loads := pin_loads(self.rig.drive, run):
+            self.study.pins[name] = loads
 
     def _certify(self, name: str, run: xr.Dataset) -> None:
         self.study.certificate[name] = self.rig.residuals(run)

@@ -19,7 +19,8 @@ from ..machines.chain_organs import LEAST, MOST, OrganLaw
 from ..mechanism.models import InverseMachine
 from ..quantities import Value, declaration, group, quantity, variables
 from ..reading import given_values, schema, to_number
-from ..system import MOTOR_NAMES
+from ..system import NAMES
+from .foreign_machine import ForeignModel
 
 
 @declaration
@@ -229,16 +230,19 @@ def _names_form(title: str, names: Sequence[str]) -> type[BaseModel]:
     return create_model(title, __config__=ConfigDict(extra="forbid"), **fields)
 
 
-_MotorNames = _names_form("names", MOTOR_NAMES)
+_MotorNames = _names_form("motor_names", NAMES["motor"])
+_MachineNames = _names_form("machine_names", NAMES["machine"])
 
 SystemTable = create_model(
     "system",
     __config__=ConfigDict(extra="forbid"),
     machine=(str, Field("ChamberForces", min_length=1)),
     motor=(str, Field("", min_length=1)),
-    names=(_MotorNames, Field(default_factory=_MotorNames)),
+    motor_names=(_MotorNames, Field(default_factory=_MotorNames)),
+    machine_names=(_MachineNames, Field(default_factory=_MachineNames)),
 )
-"""Machine and motor of the system: names of models, of motors in the catalogue, or FMUs of somebody else."""
+"""Machine and motor of the system: names of models, of motors in the catalogue, or FMUs of somebody else with the
+names of theirs that differ from ours."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -291,7 +295,7 @@ SECTIONS: Mapping[str, FileSection] = {
 """Tables of every study file, besides those of its machine, its feed, and its motor."""
 
 
-def sections_of(machine: type[InverseMachine], motor: type[Motor]) -> dict[str, FileSection]:
+def sections_of(machine: type[InverseMachine | ForeignModel], motor: type[Motor]) -> dict[str, FileSection]:
     """The tables of a study with this machine and this kind of motor."""
     own = {"machine": machine.Parameters, "ratios": Ratios, "feed": machine.Feed, "motor": motor.Parameters}
     return {name: FileSection(declared) for name, declared in own.items()} | dict(SECTIONS)

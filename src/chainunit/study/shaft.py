@@ -113,8 +113,11 @@ def torsion(drive: Drive, inertia: Any) -> Torsion:
 
 def rigid_torque(drive: Drive, rigid: xr.Dataset) -> Any:
     """Torque in shaft 2 [N m], shape (time,), in a run of the twin with a rigid shaft."""
-    line = drive.line
-    return line.ratio * rigid["machine.tau"].values + line.J4 / line.ratio * rigid["motor.a"].values
+    line, gear = drive.line, "gear.tau" in rigid
+    return (
+        line.ratio * rigid["gear.tau" if gear else "machine.tau"].values
+        + line.J4 / line.ratio * rigid["motor.a"].values
+    )
 
 
 def with_rigid(drive: Drive, run: xr.Dataset, rigid: xr.Dataset) -> xr.Dataset:

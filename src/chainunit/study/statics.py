@@ -50,12 +50,13 @@ def statics(config: Config, drive: Drive) -> DriveStatics:
     else:
         cycles = {"normal running": cycle(machine, w, feed), "without feed": cycle(machine, w, no_feed(feed))}
     normal = next(iter(cycles.values())).outputs
-    margin = float(np.min(normal.margin))
     return DriveStatics(
         cycles=cycles,
         loops={} if drive.foreign else _loops(drive, normal.J),
         torsion=None if drive.line is None else _torsion(config, drive, normal.J),
-        organs=organs(machine, w, feed, margin) if isinstance(machine, ChainUnit) else None,
+        organs=organs(machine, w, feed, float(np.min(normal.margin)))
+        if isinstance(machine, ChainUnit)
+        else None,
     )
 
 

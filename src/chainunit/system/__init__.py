@@ -5,12 +5,13 @@ Model Exchange FMUs (`ModelExchange`), the reference of the models' own equation
 a run (`energy_residual` of every power bond), the SSP package (`chainunit.system.ssp`), and twins with a part left
 out (`without`, `rigid`, `hold_loads`). An FMU of somebody else is a component, too: `foreign_component`."""
 
-from .certificate import certify, energy_residual
+from .certificate import certify, energy_residual, through
 from .fmus import export
-from .foreign import MOTOR_NAMES, fmu_component, foreign_component
+from .foreign import NAMES, fmu_component, foreign_component
 from .graph import (
     Bond,
     Component,
+    Connector,
     FmuComponent,
     ModelComponent,
     System,
@@ -25,10 +26,11 @@ from .reference import monolithic
 from .signals import Jump, Profile
 
 __all__ = [
-    "MOTOR_NAMES",
+    "NAMES",
     "Bond",
     "CoSimulation",
     "Component",
+    "Connector",
     "FmuComponent",
     "Jump",
     "ModelComponent",
@@ -44,5 +46,6 @@ __all__ = [
     "monolithic",
     "rigid",
     "shaft_joints",
+    "through",
     "without",
 ]

@@ -29,7 +29,7 @@ def energy_residual(run: xr.Dataset, bond: Bond, feed: Feed | None = None) -> tu
     Powers are integrated by Simpson's rule over the communication points.
     """
     time = run["time"].values
-    tau, w = _through(run, bond)
+    tau, w = through(run, bond)
     supply = _supply(run, bond, tau, w)
     storage, loss_power = _storage(run, bond)
     if storage is None:
@@ -58,8 +58,14 @@ def certify(
     return {bond.machine: energy_residual(run, bond, feed) for bond in system.bonds}
 
 
-def _through(run: xr.Dataset, bond: Bond) -> tuple[Any, Any]:
-    """Torque [N m] and speed [rad/s] of the shaft, of the side that gives the torque."""
+def through(run: xr.Dataset, bond: Bond) -> tuple[Any, Any]:
+    """Torque [N m] and speed [rad/s] of the shaft, shape (time,), of the side that gives the torque.
+
+    Raises
+    ------
+    InputError
+        where neither gives it.
+    """
     driver, machine = bond.flanges
     sides = ((bond.machine, machine), (bond.driver, driver))
     torques = (f"{name}.{side.members['tau']}" for name, side in sides if "tau" in side.members)

@@ -12,6 +12,7 @@ from ours to its own tells them. An FMU that leaves a unit out is taken to have 
 
 from __future__ import annotations
 
+import math
 import zipfile
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -36,12 +37,19 @@ _UNITS = {"phi": "rad", "w": "rad/s", "a": "rad/s2", "tau": "N.m"} | {
 _NEEDED = {FLANGE: ("phi", "w"), LOAD: ("tau_bias", "J")}
 _MOTOR = {"w_ref": "rad/s", "tau_ff": "N.m", "load_energy": "J", "air_gap_tau": "N.m", "supply_power": "W"}
 """Unit of each signal that a system reads or sets at a motor beside its terminals, where it has it."""
-MOTOR_NAMES = (
-    *flange("outflow").members.values(),
-    *load_terminal("load.").members.values(),
-    *_MOTOR,
-)
-"""Names of a motor's variables that a system knows."""
+_MACHINE = {
+    "ratio": "1",
+    "power": "W",
+    "kinetic_energy": "J",
+    "potential_energy": "J",
+    "dissipated_power": "W",
+}
+"""The same of a machine."""
+NAMES: Mapping[Role, tuple[str, ...]] = {
+    "motor": (*flange("outflow").members.values(), *load_terminal("load.").members.values(), *_MOTOR),
+    "machine": (*flange("inflow").members.values(), *load_terminal().members.values(), *_MACHINE),
+}
+"""Names of a motor's and of a machine's variables that a system knows."""
 _TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
 
 
@@ -78,12 +86,22 @@ def fmu_component(
         ours = {theirs: name for name, theirs in names.items()}
         units = {unit.name: unit.baseUnit for unit in fmu.description.unitDefinitions}
         connectors = {
-            name: Connector(name, v.causality, v.unit or "", _dimension(v.unit, units), float(v.start or 0.0))
+            name: Connector(
+                name,
+                v.causality,
+                v.unit or "",
+                _dimension(v.unit, units),
+                float(v.start or 0.0),
+                printable(v.description or ""),
+                float(-math.inf if v.min is None else v.min),
+                float(math.inf if v.max is None else v.max),
+            )
             for v in real
             if v.causality in ("parameter", "input", "output")
             for name in [ours.get(v.name, v.name)]
         }
         terminals = _declared(file, ours) or _by_names(connectors)
+        description = printable(fmu.description.description or "")
     finally:
         fmu.close()
     for terminal in terminals:
@@ -95,7 +113,7 @@ def fmu_component(
                     "parameter, input or output of the FMU"
                 )
         connectors |= _with_units(file, units, connectors)
-    return FmuComponent(file, connectors, {t.name: t for t in terminals}, names)
+    return FmuComponent(file, connectors, {t.name: t for t in terminals}, names, description=description)
 
 
 def foreign_component(file: Path, role: Role, names: Mapping[str, str] | None = None) -> FmuComponent:
@@ -124,7 +142,8 @@ def foreign_component(file: Path, role: Role, names: Mapping[str, str] | None = 
                 )
             if connector.causality != gives[kind]:
                 raise InputError(f"{file}: {label} is of the kind {connector.causality}; {needs}")
-    signals = {name: unit for name, unit in _MOTOR.items() if motor and name in outsider.connectors}
+    known = _MOTOR if motor else _MACHINE
+    signals = {name: unit for name, unit in known.items() if name in outsider.connectors}
     return replace(
         outsider, connectors={**outsider.connectors, **_with_units(file, signals, outsider.connectors)}
     )

@@ -7,6 +7,7 @@ joints, `shaft_joints`."""
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -27,13 +28,16 @@ Connection = tuple[str, str]
 class Connector:
     """A variable of a component that a connection can begin or end at, or that has a `start` value: `causality` is
     "parameter", "input" or "output". `dimension` holds the powers of the base units; None where the unit is not
-    known."""
+    known. Of an FMU of somebody else also its bounds and `description`."""
 
     name: str
     causality: str
     unit: str
     dimension: Mapping[str, int] | None
     start: float = 0.0
+    description: str = ""
+    least: float = -math.inf
+    most: float = math.inf
 
 
 @dataclass(frozen=True)
@@ -88,6 +92,7 @@ class FmuComponent:
     terminals: Mapping[str, Terminal]
     names: Mapping[str, str] = field(default_factory=dict)
     start: Mapping[str, float] = field(default_factory=dict)
+    description: str = ""
 
     @property
     def title(self) -> str:

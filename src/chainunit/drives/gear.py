@@ -1,0 +1,91 @@
+"""A rigid gear between a driver and a machine, for a machine whose own shaft is the slow one: no states, no loss."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..model import Model, Part
+from ..ports import (
+    LoadInput,
+    PortSlopes,
+    PortValues,
+    flange,
+    flanges,
+    load_inertia,
+    load_terminal,
+    load_torque,
+)
+from ..quantities import Value, declaration, group, quantity
+
+
+@declaration
+class GearParameters:
+    """Parameters of the gear."""
+
+    ratio: Value = quantity(
+        "1", "gear ratio, motor turns per turn of the machine", default=1.0, above=0.0, max=1e6
+    )
+
+
+@declaration
+class GearInputs(LoadInput):
+    """The motor's shaft, and the load of the machine."""
+
+    phi: Value = quantity("rad", "motor angle", default=0.0)
+    w: Value = quantity("rad/s", "motor speed", default=0.0)
+    a: Value = quantity("rad/s2", "motor acceleration", default=0.0)
+
+
+@declaration
+class SlowShaft:
+    """The shaft of the machine."""
+
+    phi: Value = quantity("rad", "angle")
+    w: Value = quantity("rad/s", "speed")
+    a: Value = quantity("rad/s2", "acceleration", nominal=100.0)
+    tau: Value = quantity("N.m", "torque given to the machine", nominal=100.0)
+
+
+@declaration
+class GearOutputs(PortSlopes, PortValues):
+    """The port at the motor, and the shaft of the machine."""
+
+    tau: Value = quantity("N.m", "torque that the motor has to give", nominal=100.0)
+    power: Value = quantity("W", "power that the motor gives", nominal=100.0)
+    driven: SlowShaft = group(SlowShaft, "driven shaft")
+
+
+def _outputs(xp: Any, p: Any, u: Any, x: Any, s: None) -> GearOutputs:
+    r, load = p.ratio, u.load
+    phi, w, a = u.phi / r, u.w / r, u.a / r
+    tau = load_inertia(load, phi) * a + load_torque(load, phi, w)
+    return GearOutputs(
+        tau_bias=load.tau_bias / r,
+        J=load.J / (r * r),
+        dJ_dphi=load.dJ_dphi / (r * r * r),
+        phi0=load.phi0 * r,
+        w0=load.w0 * r,
+        tau_bias_dphi=load.tau_bias_dphi / (r * r),
+        tau_bias_dw=load.tau_bias_dw / (r * r),
+        tau=tau / r,
+        power=tau * w,
+        driven=SlowShaft(phi=phi, w=w, a=a, tau=tau),
+    )
+
+
+class Gear(Model):
+    """A rigid gear without mass and loss: it divides angle and speed, and shows the machine's load to the motor."""
+
+    name = "Gear"
+    description = (
+        "Rigid gear without mass and loss between motor and machine: takes a load port and shows one"
+    )
+    Parameters = GearParameters
+    Inputs = GearInputs
+    terminals = (
+        *flanges("inflow"),
+        load_terminal(),
+        flange("outflow", "driven.", "driven"),
+        load_terminal("load.", "machine"),
+    )
+    parts = (Part(GearOutputs, _outputs),)

@@ -1,0 +1,137 @@
+"""A machine of somebody else in a study: an FMU, declared by its own variables."""
+
+from __future__ import annotations
+
+import keyword
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, ClassVar
+
+import numpy as np
+from pydantic import BaseModel
+
+from ..machines.machine import Machine
+from ..mechanism.models import declared_class
+from ..model import Model
+from ..quantities import Layout, Value, base_units, group, quantity
+from ..system import Connector, CoSimulation, FmuComponent, System, foreign_component
+
+_GEAR = Connector("ratio", "parameter", "1", {}, 1.0, "gear ratio, motor turns per crank turn", 1e-4, 1e4)
+
+
+class ForeignModel(Model):
+    """What a study knows of the machine in an FMU: its parameters, and as `Feed` its inputs beside its shaft.
+
+    A machine whose FMU has a parameter `ratio` has the gear inside and shows the motor's shaft; else its shaft is the
+    crank, and a gear stands before it where it is needed.
+    """
+
+    component: ClassVar[FmuComponent]
+    Feed: ClassVar[type]
+    feed_layout: ClassVar[Layout]
+    parts = ()
+    usual_speed: ClassVar[tuple[float, float]] = (0.05, 1000.0)
+
+    @classmethod
+    def has_gear(cls) -> bool:
+        """Whether the gear is inside."""
+        return "ratio" in cls.component.connectors
+
+
+def foreign_model(file: Path, names: Mapping[str, str]) -> type[ForeignModel]:
+    """The machine in an FMU; `names` are of ours those that it calls otherwise.
+
+    Raises
+    ------
+    InputError
+        see `chainunit.system.foreign_component`.
+    """
+    component = foreign_component(file, "machine", names)
+    own = component.connectors.values()
+    shaft = {v for terminal in component.terminals.values() for v in terminal.members.values()}
+    parameters = [_GEAR, *(c for c in own if c.causality == "parameter" and c.name != "ratio")]
+    if ratio := component.connectors.get("ratio"):
+        parameters[0] = replace(ratio, most=_GEAR.most, least=_GEAR.least)
+    feed = _declared("Feed", [c for c in own if c.causality == "input" and c.name not in shaft])
+    members = {
+        "name": component.title,
+        "description": component.description or component.title,
+        "component": component,
+        "Parameters": _declared("Parameters", parameters),
+        "Inputs": feed,
+        "Feed": feed,
+        "feed_layout": Layout(feed),
+    }
+    return type("ForeignModel", (ForeignModel,), members)
+
+
+def _declared(title: str, connectors: Iterable[Connector]) -> type:
+    """The declaration of variables; those with dots stand in groups. One whose name no table can have is left out."""
+    groups: dict[str, list[Connector]] = {}
+    for c in connectors:
+        head, _, rest = c.name.partition(".")
+        if head.isidentifier() and not (
+            keyword.iskeyword(head) or head[0] == "_" or hasattr(BaseModel, head)
+        ):
+            groups.setdefault(head, []).append(replace(c, name=rest))
+    fields: list[tuple[str, Any, Any]] = []
+    for head, inside in groups.items():
+        if not inside[0].name:
+            fields.append((head, Value, _quantity(inside[0])))
+        else:
+            of = _declared(f"{title}_{head}", [c for c in inside if c.name])
+            fields.append((head, of, group(of, head, default=of())))
+    declared: type = declared_class(title, (), fields)
+    return declared
+
+
+def _quantity(c: Connector) -> Any:
+    """The declaration of one variable; a unit that is not known here is told in the description."""
+    try:
+        base_units(c.unit or "1")
+        unit, words = c.unit or "1", c.description
+    except ValueError:
+        unit, words = "1", f"{c.description} [{c.unit}]"
+    return quantity(unit, words, default=c.start, min=c.least, max=c.most)
+
+
+class ForeignMachine(Machine):
+    """A machine that is an FMU of somebody else, with its parameters: it has no bearings and no direct model."""
+
+    model: Any
+
+    @property
+    def needs_gear(self) -> bool:
+        """Whether a gear has to stand before it."""
+        return self.ratio != 1.0 and not self.model.has_gear()
+
+    @property
+    def component(self) -> FmuComponent:
+        """The FMU with these parameters."""
+        known = self.model.component.connectors
+        own: FmuComponent = self.model.component
+        return replace(own, start={name: x for name, x in self.named.items() if name in known})
+
+    def outputs(self, phi: Any, w: Any = 0.0, a: Any = 0.0, feed: Any = None) -> Any:
+        """See `Machine`: torque `tau` and inertia `J` at the motor, by the FMU alone, which turns at the constant
+        speed `w` from `phi` back by a turn of the crank to the angles `phi`, which rise evenly, shape (n,)."""
+        gear = self.ratio if self.needs_gear else 1.0
+        first, w, turn = float(phi[0]) / gear, float(w) / gear, 2.0 * math.pi * self.ratio / float(w)
+        times = (np.asarray(phi) - phi[0]) / (w * gear)
+        terminals = self.model.component.terminals
+        shaft, load = terminals["flange"].members, terminals["load"].members
+        signals = {f"machine.{name}": x for name, x in self._named(feed).items()}
+        signals |= {
+            f"machine.{shaft['phi']}": lambda t: first + w * t,
+            f"machine.{shaft['w']}": w,
+        }
+        names = {"tau": f"machine.{load['tau_bias']}", "J": f"machine.{load['J']}"}
+        step = float(times[1] - times[0])
+        with CoSimulation(System({"machine": self.component}), signals, -turn) as alone:
+            alone.run(0.0, step, names=names.values())
+            run = alone.run(float(times[-1]), step, names=names.values())
+        tau, J = (run[full].values for full in names.values())
+        return SimpleNamespace(tau=tau / gear, J=J / gear**2)

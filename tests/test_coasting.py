@@ -1,0 +1,77 @@
+"""The machine behind a safety coupling that opens: of the same kind as in the study, from its state at that instant."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import cumulative_simpson
+
+from chainunit.study import config
+from chainunit.study.rig import Rig
+from chainunit.study.run import Runner, run_study
+from chainunit.system import System, monolithic
+from chainunit.system.graph import ModelComponent
+
+STUDY = """
+organ = "{organ}"
+[run]
+crank_speed = 4
+ramp = 0.4
+settle_turns = 1
+step = 0.002
+[coupling]
+trip_torque = {trip}
+release_time = 0.001
+[[event]]
+type = "jam"
+side = "left"
+force = "4 kN"
+turns = 1
+{more}
+"""
+CHAIN = "[chain]\nrods = 4\nsweep_points = 0\n"
+LINE = '[driveline]\nJ4 = 2\nc2 = 6000\nc3 = 6000\nd2 = 15\nd3 = 15\nalpha1 = "5 deg"\n'
+
+
+@pytest.mark.parametrize(
+    ("organ", "more", "trip"), [("chain", CHAIN, 420), ("two-bar", "", 420), ("chain", CHAIN + LINE, 420)]
+)
+def test_it_goes_on_as_the_same_machine(organ, more, trip, tmp_path, monkeypatch):
+    """Positions, speeds and energy do not jump as the coupling opens; what it loses from then on it dissipates."""
+    monkeypatch.setattr("chainunit.study.run._chains", lambda *_: None)
+    text = STUDY.format(organ=organ, more=more, trip=trip)
+    study = run_study(config.parse(text), tmp_path)
+    assert study.failure is None and study.answers["jam_left"].coupling_trip_time is not None
+    run, coasting = study.runs["jam_left"], study.runs["jam_left_coasting"]
+    J4 = study.drive.line.J4 if study.drive.line else 0.0
+    own = {name for name in run if name.startswith("machine.")} & set(coasting)
+    assert ("machine.left.theta_1" in own) == (organ == "chain")
+    w = float(run["machine.w0"][-1])
+    pairs = [(name, 0.0) for name in own if ".theta_" in name or ".omega_" in name or name.endswith("psi")]
+    pairs += [("machine.kinetic_energy", 0.5 * J4 * w * w), ("machine.potential_energy", 0.0)]
+    for name, added in pairs:
+        size = max(1e-3, abs(float(run[name][-1])))
+        assert float(coasting[name][0]) == pytest.approx(float(run[name][-1]) + added, abs=1e-6 * size), name
+    held = coasting["machine.kinetic_energy"] + coasting["machine.potential_energy"]
+    lost = cumulative_simpson(
+        coasting["machine.dissipated_power"].values, x=coasting["time"].values, initial=0
+    )
+    gap = held.values - held.values[0] + lost
+    assert np.max(np.abs(gap)) < 5e-3 * np.max(lost)
+    assert not [remark for remark in study.notes if "two bars" in remark.text]
+    answers = study.answers["jam_left"]
+    assert answers.energy_behind == pytest.approx(float(coasting["machine.kinetic_energy"][0]))
+    if organ == "chain":
+        return
+    # the equations of the direct model, without its FMU
+    model = study.drive.coasting_model
+    start = model.start_from({"phi0": float(run["machine.phi0"][-1]), "w0": w})
+    p = model.parameter_layout.from_names(study.drive.coasting_parameters() | start)
+    loads = {full: x for full, x in study.drive.loads(study.config.feed).items()}
+    rig = Rig(study.config, study.drive, {})
+    (event,) = Runner(study, rig, print).events
+    jam = rig.event_signals(event, study.event["jam_left"], {})
+    times = coasting["time"].values
+    alone = System({"machine": ModelComponent(model, p)})
+    exact = monolithic(alone, {**loads, **jam, "machine.tau": 0.0}, times)
+    np.testing.assert_allclose(coasting["machine.w"], exact["machine.w"], atol=1e-4 * w)

@@ -1,0 +1,278 @@
+"""A machine of somebody else in a study: an eccentric pump with the terminals' variables alone."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from pathlib import Path
+
+import foreign_motor
+import numpy as np
+import pytest
+from command import chainunit
+from scipy.integrate import solve_ivp
+from test_foreign_system import OTHER as MOTOR_OTHER
+from test_foreign_system import OTHER_NAMES, build
+
+from chainunit import InputError
+from chainunit.quantities import Value, declaration, quantity
+from chainunit.study import config
+from chainunit.study.choice import choose
+from chainunit.study.cycle import cycle
+from chainunit.study.events import TYPES, Event, Role, Timing
+from chainunit.study.run import run_study
+from chainunit.system import Profile, certify
+
+SCRIPT = Path(__file__).parent / "foreign_machine.py"
+RATIO, SPEED, MASS, PRESSURE, BURST = 25.0, 6.0, 60.0, 3e3, 8e4
+MACHINE_OTHER = {"J": "inertia", "tau_bias": "torque_needed"}
+STUDY = f"""
+[run]
+ramp = 0.3
+turns = 1
+settle_turns = 1
+step = 0.001
+crank_speed = {SPEED}
+[machine]
+ratio = {RATIO}
+piston = {{ mass = {MASS} }}
+[feed]
+back_pressure = {PRESSURE}
+"""
+MACHINE = '[system]\nmachine = "ForeignMachine.fmu"\n'
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("pump")
+    build(folder, script=SCRIPT)
+    build(folder, MOTOR_OTHER)
+    return folder
+
+
+@pytest.fixture
+def burst():
+    """A type of event for the pump's own input: the pressure rises for a while."""
+
+    class Burst(Event):
+        """The back pressure rises."""
+
+        kind, run, words, heading = "burst", "burst", "the back pressure rises", "burst"
+        role, sided = Role.SHOCK, False
+        acts_on = ("back_pressure",)
+
+        @declaration
+        class Parameters(Timing):
+            """Of the pressure."""
+
+            pressure: Value = quantity("1", "back pressure at its height", default=BURST, min=0.0)
+
+        def signals(self, normal, at, state):
+            """Up within 20 ms, and down again after 0.3 s."""
+            usual = normal["back_pressure"]
+            changes = ((at, 0.02, self.p.pressure), (at + 0.3, 0.02, usual))
+            return {"back_pressure": Profile(usual, changes)}
+
+    yield Burst
+    del TYPES["burst"]
+
+
+def parse(folder, text):
+    return config.parse(text, str(folder / "x.toml"))
+
+
+def pump(phi, w, pressure):
+    """Torque at constant speed [N m] and inertia [kg m2] of the pump, written anew."""
+    v = 0.15 * w * np.sin(phi)
+    moving = MASS * 0.15**2
+    force = 0.01 * pressure * v / np.sqrt(v * v + 0.02**2)
+    return moving * np.sin(phi) * np.cos(phi) * w * w + force * 0.15 * np.sin(phi) + 0.5 * w, (
+        2.0 + moving * np.sin(phi) ** 2
+    )
+
+
+def together(t_end, w_ref, pressure):
+    """Motor speed and crank angle over time, of motor and pump as one ODE under scipy."""
+    m = foreign_motor
+
+    def rates(t, x):
+        phi, w, i, T, integral_i, integral_v = x
+        behind = w_ref(t) - w
+        wanted_i = m.SPEED_P * behind + integral_i
+        i_ref = np.clip(wanted_i, -m.MOST_CURRENT, m.MOST_CURRENT)
+        wanted_v = m.CURRENT_P * (i_ref - i) + integral_v + m.K * w
+        v = np.clip(wanted_v, -m.MOST_VOLTAGE, m.MOST_VOLTAGE)
+        hot = m.R * (1.0 + m.ALPHA * (T - 293.15))
+        torque, inertia = pump(phi / RATIO, w / RATIO, pressure(t))
+        return [
+            w,
+            (m.K * i - m.DRAG * w - torque / RATIO) / (m.INERTIA + inertia / RATIO**2),
+            (v - hot * i - m.K * w) / m.L,
+            (hot * i * i - (T - m.AMBIENT) / m.COOLING) / m.HEAT,
+            m.SPEED_I * (behind + (i_ref - wanted_i) / m.SPEED_P),
+            m.CURRENT_I * (i_ref - i + (v - wanted_v) / m.CURRENT_P),
+        ]
+
+    start = [0.0, 0.0, 0.0, m.AMBIENT, 0.0, 0.0]
+    return solve_ivp(
+        rates, (0.0, t_end), start, "Radau", dense_output=True, rtol=1e-8, atol=1e-9, max_step=0.005
+    ).sol
+
+
+def test_what_a_file_sets_is_declared_by_the_fmu(folder):
+    study = parse(folder, STUDY + MACHINE)
+    assert study.machine.named == {"ratio": RATIO, "piston.mass": MASS, "throw": 0.15}
+    assert study.machine.component.start == {"piston.mass": MASS, "throw": 0.15}
+    assert study.feed.back_pressure == PRESSURE
+    for change, said in (
+        (("piston =", "pistn ="), r"machine\.pistn: unknown key; known here: ratio, piston, throw"),
+        (("back_pressure", "pressure"), r"feed\.pressure: unknown key; known here: back_pressure"),
+        (("ForeignMachine", "none"), r"system\.machine: .*none\.fmu: no such FMU"),
+        (("ForeignMachine", "ForeignMotor"), r"system\.machine: .*ForeignMotor\.fmu: has no variable phi; a"),
+        (("[run]", "feed_forward = true\n[run]"), r"feed_forward: needs a model of the machine"),
+        (("[run]", "[monte_carlo]\nruns = 5\n[run]"), r"monte_carlo\.runs: needs a model of the machine"),
+        (("[run]", "[sizing]\n[run]"), r"sizing: is of the chain unit, and the machine is ForeignMachine"),
+        (("[run]", 'organ = "chain"\n[run]'), r"organ: is of the chain unit"),
+        ((MACHINE, MACHINE + "machine_names = { omega = 'x' }"), r"system\.machine_names\.omega: unknown"),
+        ((MACHINE, MACHINE + "machine_names = { w = 'x' }"), r"no variable x, which was given for w"),
+        ((STUDY + MACHINE, "[system]\nmachine_names = { w = 'x' }"), r"system\.machine_names: are of an FMU"),
+    ):
+        with pytest.raises(InputError, match=said):
+            parse(folder, (STUDY + MACHINE).replace(*change))
+
+
+@pytest.mark.parametrize("ratio", [1.0, RATIO])
+def test_a_turn_at_constant_speed_is_by_the_fmu_alone(ratio, folder):
+    study = parse(folder, (STUDY + MACHINE).replace(f"ratio = {RATIO}", f"ratio = {ratio}"))
+    turn = cycle(study.machine, SPEED, study.feed, points=90)
+    torque, inertia = pump(turn.angle, SPEED, PRESSURE)
+    np.testing.assert_allclose(turn.crank_torque, torque, rtol=1e-9, atol=1e-9 * np.max(torque))
+    np.testing.assert_allclose(turn.outputs.J * ratio**2, inertia, rtol=1e-12)
+
+
+def test_motor_and_machine_of_somebody_else(folder, burst):
+    """Start-up, steady running and an event are those of both written as one ODE and integrated by scipy."""
+    text = f"{STUDY}{MACHINE}motor = 'ForeignMotor.fmu'\n{OTHER_NAMES}[[event]]\ntype = 'burst'\n"
+    study = run_study(parse(folder, text), folder / "both")
+    assert study.failure is None and set(study.runs) == {"start_up", "burst"}
+    w_ref = Profile(0.0, ((0.0, 0.3, SPEED * RATIO),))
+    begin = study.event["burst"]
+    pressure = Profile(PRESSURE, ((begin, 0.02, BURST), (begin + 0.3, 0.02, PRESSURE)))
+    burst_run = study.runs["burst"]
+    exact = together(float(burst_run["time"][-1]), w_ref, pressure)
+    for run in (study.runs["start_up"], burst_run):
+        angle, speed = exact(run["time"].values)[:2]
+        error = np.max(np.abs(run["motor.w"].values - speed)) / np.max(speed)
+        assert error < 3e-4
+        assert np.max(np.abs(run["machine.phi0"].values - angle / RATIO)) < 1e-3
+        torque, inertia = pump(angle / RATIO, speed / RATIO, pressure(run["time"].values))
+        accelerated = np.gradient(speed, run["time"].values) / RATIO
+        whole = torque + inertia * accelerated
+        inside = slice(5, -5)
+        error = np.abs(study.drive.crank_torque(run) - whole)[inside]
+        assert np.max(error) < 0.02 * np.max(np.abs(whole))
+    steady = study.answers["steady"]
+    turns = exact(np.linspace(study.settled, study.settled + 2.0 * math.pi / SPEED, 2000))[1] / RATIO
+    assert steady.speed_ripple == pytest.approx(np.ptp(turns) / np.mean(turns), rel=5e-3)
+    assert study.answers["burst"].speed_least < steady.speed_least
+    # absent: what only a model of motor or machine can tell
+    assert steady.current_peak is steady.rocker_torque_peak is steady.shaking_force is None
+    assert study.pins == {}
+    assert {"energy_residual_share", "gear_energy_residual_share"} == set(study.certificate["burst"])
+    for shares in study.certificate.values():
+        assert all(share < 2e-3 for share in shares.values())
+    assert study.verdict.holds == "true"
+
+
+def test_the_step_is_of_second_order(folder):
+    """With the slopes of the load through the gear; without them of first."""
+    errors = {}
+    for names in (None, ("dJ_dphi", "tau_bias_dphi", "tau_bias_dw")):
+        at = folder / ("plain" if names is None else "held")
+        at.mkdir(exist_ok=True)
+        build(at, script=SCRIPT, left_out=names or ())
+        build(at, MOTOR_OTHER)
+        drive = choose(
+            parse(at, f"{STUDY}{MACHINE}motor = 'ForeignMotor.fmu'\n{OTHER_NAMES}"), at, None
+        ).drive
+        from chainunit.study.rig import Rig
+
+        files, _ = drive.export(at)
+        rig = Rig(parse(at, STUDY + MACHINE), drive, files)
+        w_ref = Profile(0.0, ((0.0, 0.3, SPEED * RATIO),))
+        exact = together(0.6, w_ref, lambda t: PRESSURE)
+        for step in (0.004, 0.002):
+            with rig.from_rest() as simulation:
+                run = simulation.run(0.6, step)
+            off = run["motor.w"].values - exact(run["time"].values)[1]
+            errors[names is None, step] = np.max(np.abs(off))
+            assert certify(run, rig.graph)
+    orders = {kind: math.log2(errors[kind, 0.004] / errors[kind, 0.002]) for kind in (True, False)}
+    assert orders[True] == pytest.approx(2.0, abs=0.3), errors
+    assert orders[False] == pytest.approx(1.0, abs=0.3) and errors[False, 0.002] > 5 * errors[True, 0.002]
+
+
+def test_a_study_file_with_our_motor(folder):
+    """By the command, with a coupling that opens in a blocked pump: the machine behind it is not followed."""
+    text = f"{STUDY}{MACHINE}[coupling]\ntrip_torque = 500\n"
+    (folder / "pump.toml").write_text(text)
+    done = chainunit("study", "pump.toml", "-o", "out", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    result = json.loads((folder / "out" / "result.json").read_text())
+    assert result["status"] == "complete" and result["machine"]["piston.mass"]["value"] == MASS
+    assert result["answers"]["steady"]["speed_mean"]["value"] == pytest.approx(SPEED, rel=1e-2)
+    # the gains are tuned to the inertia that the FMU shows over a turn
+    turn = cycle(parse(folder, text).machine, SPEED, parse(folder, text).feed)
+    loop = result["speed_loop"]["mean inertia"]["inertia"]["value"]
+    assert loop == pytest.approx(float(np.mean(turn.outputs.J)) + 0.0035, rel=1e-9)
+    page = (folder / "out" / "report.html").read_text()
+    assert "An eccentric pump" in page and "piston" in page
+    for command, said in (
+        (("study", "--check", "pump.toml"), r"--check: the equations of ForeignMachine\.fmu are not known"),
+        (("export", "ChamberForces", "--config", "pump.toml"), r"the study's machine is ForeignMachine\.fmu"),
+    ):
+        done = chainunit(*command, cwd=folder)
+        assert done.returncode == 2 and re.search(said, done.stderr), done.stderr
+
+
+def test_behind_an_open_coupling_it_is_not_followed(folder, burst):
+    text = f"{STUDY}{MACHINE}[coupling]\ntrip_torque = 110\n[[event]]\ntype = 'burst'\n"
+    study = run_study(parse(folder, text), folder / "trip")
+    assert study.failure is None
+    answers = study.answers["burst"]
+    assert answers.coupling_trip_time is not None and answers.energy_after_trip is not None
+    assert answers.energy_behind is answers.standstill_time is None
+    assert set(study.runs) == {"start_up", "burst"}
+    (remark,) = (each for each in study.warnings if each.kind == "trip")
+    assert "the machine behind it is an FMU and is not followed" in remark.text
+
+
+@pytest.mark.parametrize(
+    "left_out", [("tau",), ("tau", "phi0", "w0", "dJ_dphi", "tau_bias_dphi", "tau_bias_dw")]
+)
+def test_the_least_that_it_needs(left_out, folder, tmp_path):
+    """Other names, no torque of its own, no slopes: the same study by what its driver tells."""
+    build(tmp_path, MACHINE_OTHER, left_out, SCRIPT)
+    names = 'machine_names = { J = "inertia", tau_bias = "torque_needed" }\n'
+    whole = run_study(parse(folder, STUDY + MACHINE), tmp_path / "whole").answers["steady"]
+    study = run_study(parse(tmp_path, STUDY + MACHINE + names), tmp_path / "least")
+    assert study.failure is None
+    for name in ("crank_torque_peak", "crank_torque_rms", "speed_mean", "power_mean", "current_rms"):
+        assert getattr(study.answers["steady"], name) == pytest.approx(getattr(whole, name), rel=2e-2), name
+
+
+@pytest.mark.parametrize("place", ["motor", "crank"])
+def test_a_cardan_line_before_it(place, folder):
+    """Line and gear are parts of the system; its twin with a rigid shaft is there, too."""
+    sizes = {"motor": "J4 = 0.02\nc2 = 300\nc3 = 300", "crank": 'J4 = 2\nalpha1 = "10 deg"'}[place]
+    line = f'[driveline]\n{sizes}\ndamping_ratio = 0.05\nplace = "{place}"\n'
+    text = STUDY.replace("step = 0.001", "step = 0.00025") + MACHINE + line
+    study = run_study(parse(folder, text), folder / place)
+    assert study.failure is None
+    parts = ["machine", "gear", "driveline", "motor"]
+    assert list(study.drive.graph.components) == parts
+    gear = study.drive.graph.components["gear"].parameters.ratio
+    assert gear == (RATIO if place == "motor" else 1.0) and study.drive.ratio == RATIO
+    assert study.shaft["steady"].amplification == pytest.approx(1.0, abs=0.5)
+    assert study.answers["steady"].speed_mean == pytest.approx(SPEED, rel=1e-2)
