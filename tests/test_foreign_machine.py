@@ -132,7 +132,6 @@ def test_what_a_file_sets_is_declared_by_the_fmu(folder):
         (("ForeignMachine", "ForeignMotor"), r"system\.machine: .*ForeignMotor\.fmu: has no variable phi; a"),
         (("[run]", "feed_forward = true\n[run]"), r"feed_forward: needs a model of the machine"),
         (("[run]", "[monte_carlo]\nruns = 5\n[run]"), r"monte_carlo\.runs: needs a model of the machine"),
-        (("[run]", "[sizing]\n[run]"), r"sizing: is of the chain unit, and the machine is ForeignMachine"),
         (("[run]", 'organ = "chain"\n[run]'), r"organ: is of the chain unit"),
         ((MACHINE, MACHINE + "machine_names = { omega = 'x' }"), r"system\.machine_names\.omega: unknown"),
         ((MACHINE, MACHINE + "machine_names = { w = 'x' }"), r"no variable x, which was given for w"),
@@ -234,6 +233,14 @@ def test_a_study_file_with_our_motor(folder):
     ):
         done = chainunit(*command, cwd=folder)
         assert done.returncode == 2 and re.search(said, done.stderr), done.stderr
+
+
+def test_sizing_finds_a_motor_for_it(folder):
+    text = STUDY.replace(f"ratio = {RATIO}\n", "") + MACHINE + "[sizing]\ncandidates = 1\n"
+    study = run_study(parse(folder, text), folder / "sized")
+    assert study.failure is None and study.sizing.chosen is not None
+    assert study.answers["steady"].speed_mean == pytest.approx(SPEED, rel=1e-2)
+    assert study.drive.graph.components["gear"].parameters.ratio == study.drive.ratio
 
 
 def test_behind_an_open_coupling_it_is_not_followed(folder, burst):

@@ -40,6 +40,11 @@ def report(study: Study, result: Mapping[str, Any] | None = None) -> b.Report:
     )
 
 
+def _motion(study: Study) -> list[b.Block]:
+    # of an FMU of somebody else no links are known
+    return [motion(study)] if study.runs and not study.drive.outsider else []
+
+
 # -- what was asked
 
 
@@ -174,7 +179,7 @@ _SECTIONS: Mapping[str, Contents] = {
     "chains": Contents("Chains and two bars", chains.blocks, chains.PICTURES.files),
     **ANALYSES,
     "plots": Contents("Plots", figures.PICTURES.figures, figures.PICTURES.files),
-    "motion": Contents("The machine in motion", lambda s, study: iter([motion(study)] if study.runs else [])),
+    "motion": Contents("The machine in motion", lambda s, study: iter(_motion(study))),
     "basis": Contents("What this rests on", _basis),
     "given": Contents("All that was given", _given),
 }

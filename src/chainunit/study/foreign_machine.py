@@ -32,6 +32,7 @@ class ForeignModel(Model):
     component: ClassVar[FmuComponent]
     Feed: ClassVar[type]
     feed_layout: ClassVar[Layout]
+    pins: ClassVar[Mapping[str, str]] = {}
     parts = ()
     usual_speed: ClassVar[tuple[float, float]] = (0.05, 1000.0)
 

@@ -108,16 +108,23 @@ def turn_of(config: Config, drive: Drive) -> TurnFindings:
             torque_peak=float(np.max(np.abs(fed.crank_torque))),
             torque_peak_free=float(np.max(np.abs(free.crank_torque))),
             torque_mean=float(np.mean(fed.crank_torque)),
-            lost=float(np.mean(fed.outputs.dissipated_power)) * config.turn,
-            lost_free=float(np.mean(free.outputs.dissipated_power)) * config.turn,
+            lost=_lost(fed, config.turn),
+            lost_free=_lost(free, config.turn),
             energy_swing=energy_swing(fed.crank_torque),
             inertia_least=float(np.min(inertia)),
             inertia_largest=float(np.max(inertia)),
             inertia_mean=float(np.mean(inertia)),
-            margin=float(np.min(fed.outputs.margin)),
+            margin=float(np.min(fed.outputs.margin)) if hasattr(fed.outputs, "margin") else None,
         ),
         {title: _reaction(fed, free, output) for title, output in machine.model.pins.items()},
     )
+
+
+def _lost(cycle: Cycle, turn: float) -> float:
+    """The energy that is lost in a turn [J]; of an FMU that does not count it, the energy that comes in."""
+    if hasattr(cycle.outputs, "dissipated_power"):
+        return float(np.mean(cycle.outputs.dissipated_power)) * turn
+    return float(np.mean(cycle.crank_torque)) * 2.0 * np.pi
 
 
 def _reaction(fed: Cycle, free: Cycle, output: str) -> Reaction:
