@@ -11,6 +11,7 @@ from test_linkage import SixBar
 from chainunit import ChainUnit, InputError
 from chainunit.engines import MATH
 from chainunit.machines.api import machine_of
+from chainunit.machines.flexible import flexible
 from chainunit.machines.machine import Machine
 from chainunit.models import MACHINES
 from chainunit.quantities import Layout
@@ -77,6 +78,24 @@ def test_a_feed_can_be_sent_to_another_process():
     for model in MODELS.values():
         feed = model.Feed()
         assert pickle.loads(pickle.dumps(feed)) == feed
+
+
+def test_a_machine_with_chains_is_simulated():
+    """What a run of it shows is asked of it; outputs without states are refused."""
+    machine = machine_of(flexible(2, 1), {"left.wall_mass": 50.0})
+    assert machine.p.left.wall_mass == 50.0
+    for ask in (lambda: machine.outputs(0.3), lambda: machine.evaluate({"phi": 0.3})):
+        with pytest.raises(TypeError, match="ChainUnitFlexible: its outputs follow from its states"):
+            ask()
+    rods = {f"{side}.theta_{k}": np.full(5, 0.1 * k) for side in ("left", "right") for k in (1, 2, 3)}
+    run = {"phi0": np.linspace(0.0, 1.0, 5), "rocker.psi": np.linspace(0.0, 0.1, 5), **rods}
+    turned = machine.pin_turns(run)
+    assert set(turned) == set(machine.model.joints)
+    np.testing.assert_allclose(turned["left.rocker_joint"], 0.3 - run["rocker.psi"])
+    np.testing.assert_allclose(turned["right.hinge"], 0.1)
+    bars = machine_of(MACHINES["ChamberForces"]).pin_turns(run)
+    np.testing.assert_array_equal(turned["pivot"], bars["pivot"])
+    assert machine.stored_per_unit["left.material_mass"]({"left.energy_per_kg": 2.5}) == 2.5
 
 
 def test_what_a_chain_unit_has_beside_others():

@@ -85,7 +85,15 @@ class Machine:
         return layout.instance([admitted(v, x) for v, x in zip(layout.variables, values, strict=True)])
 
     def state(self, u: Any) -> MachineState:
-        """The linkage with the `inputs`."""
+        """The linkage with the `inputs`.
+
+        Raises
+        ------
+        TypeError
+            for a machine with states of its own.
+        """
+        if self.model.States is not None:
+            raise TypeError(f"{self.model.name}: its outputs follow from its states, too; simulate it")
         return self.model.shared(_XP, self.p, u, None)
 
     def outputs(self, phi: Any, w: Any = 0.0, a: Any = 0.0, feed: Any = None) -> Any:
@@ -120,8 +128,9 @@ class Machine:
         """
         u = self.inputs({**dict.fromkeys(self.model.input_layout.names, 0.0), **inputs})
         named: dict[str, Any] = {}
-        for part, out in zip(self.model.parts, self.model.evaluate(_XP, self.p, u), strict=True):
-            named |= part.layout.named(out)
+        state = self.state(u)
+        for part in self.model.parts:
+            named |= part.layout.named(part.equations(_XP, self.p, u, None, state))
         return dict(zip(named, np.broadcast_arrays(*named.values()), strict=True))
 
     def pin_turns(self, run: Mapping[str, Any]) -> dict[str, Any]:
