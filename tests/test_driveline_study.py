@@ -1,4 +1,5 @@
-"""The driveline in rotation, against closed forms, limit cases, another integrator; its file, words and command."""
+"""The driveline in rotation, against closed forms, limit cases, another integrator; its analysis in a study, words
+and command."""
 
 from __future__ import annotations
 
@@ -7,6 +8,8 @@ import importlib.util
 import json
 import math
 import sys
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,10 +21,53 @@ from chainunit.drives import shafts, torsion
 from chainunit.drives.cardan import Cardan, Twist, frozen_frequency, two_joints
 from chainunit.drives.torsion import rigid, settling_time, simulate, steady, with_damping_ratio
 from chainunit.engines import MATH
-from chainunit.report.driveline import PICTURES
-from chainunit.study import driveline, torsion_answers
-from chainunit.study.driveline import example, load, parse, run_driveline
+from chainunit.quantities import Layout
+from chainunit.report.torsion import PICTURES
+from chainunit.study import config, torsion_findings
+from chainunit.study.choice import choose
+from chainunit.study.rig import Rig
+from chainunit.study.sections import TorsionTable
+from chainunit.study.shaft import UNEVEN, remedies, two_masses
+from chainunit.study.statics import statics
+from chainunit.study.study import Study
+from chainunit.study.torsion import Rotation, analyse
+from chainunit.study.torsion_findings import TorsionAnalysis, as_dict
+from chainunit.system import CoSimulation
 from chainunit.text import number
+
+SYSTEM = '[system]\nmachine = "Accelerator"\n'
+EVENT = '[[event]]\ntype = "overload"\ntorque = 200\nduration = 0.05\n'
+BARE = "[driveline]\nbeta_planes = 0\n"
+SMALL = """
+[torsion]
+points = 30
+slowest = 0.96
+fastest = 2.1
+speeds = 10
+bends = 3
+bend_high = "35 deg"
+damping_ratios = [0.01, 0.03]
+"""
+
+
+def parse(text):
+    return config.parse(SYSTEM + text)
+
+
+def study_of(text):
+    given = config.parse(text)
+    drive = choose(given, Path(), lambda *_: None).drive
+    return Study(given, drive, statics(given, drive))
+
+
+def findings(text):
+    study = study_of(SYSTEM + ("" if "[driveline]" in text else BARE) + text)
+    return TorsionAnalysis.find(study, Rig(study.config, study.drive, {}), lambda *_: None)
+
+
+def line_of(text):
+    study = study_of(SYSTEM + text)
+    return two_masses(study.drive, float(np.mean(study.statics.normal.outputs.J)))
 
 
 def line(damping=0.015, **given):
@@ -289,7 +335,7 @@ def test_finite_elements_agree_with_closed_forms():
         shafts.box(0.1, 0.1, 0.002), rel=0.015
     )
     text = f'[driveline]\nshaft2 = {{ section = "polygon", outline = {[list(c) for c in CORNERS]}, length = "1 m" }}'
-    assert parse(text).line.c2 == pytest.approx(8e10 * shafts.rectangle(0.08, 0.04), rel=1e-3)
+    assert parse(text).driveline.c2 == pytest.approx(8e10 * shafts.rectangle(0.08, 0.04), rel=1e-3)
     for outline in ([[0, 0], [1, 1], [1, 0], [0, 1]], [[0, 0], [1, 0]]):
         with pytest.raises(InputError, match=r"^driveline\.shaft2\.outline: "):
             parse(f'[driveline]\nshaft2 = {{ section = "polygon", length = 1, outline = {outline} }}')
@@ -302,26 +348,26 @@ def test_without_the_extra_a_polygon_is_refused(monkeypatch):
 
 
 def test_a_damping_ratio_sets_both_dampings():
-    p = parse("[driveline]\nc2 = 3e4\nc3 = 7e4\ndamping_ratio = 0.07").line
+    p = line_of("[driveline]\nc2 = 3e4\nc3 = 7e4\ndamping_ratio = 0.07")
     assert p.d2 / p.c2 == pytest.approx(p.d3 / p.c3)
     assert torsion.damping_ratio(p) == pytest.approx(0.07, rel=1e-12)
-    assert (parse("[driveline]\nd2 = 5").line.d2, parse("[driveline]\nd2 = 5").line.d3) == (5.0, 0.0)
+    given = line_of("[driveline]\nd2 = 5")
+    assert (given.d2, given.d3) == (5.0, 0.0)
 
 
-# the driveline file
+# the study file
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
         ('[driveline]\nalpha1 = "90 deg"', "driveline.alpha1 = 1.5708 rad (90 deg): a Hooke joint turns only below"),
-        ("[driveline]\nJ1 = 0", "driveline.J1 = 0 kg.m2: must be > 0 kg.m2"),
         ("[driveline]\nJ4 = nan", "driveline.J4 = nan kg.m2: must be finite"),
+        ("[driveline]\nJ1 = 1", "driveline.J1: unknown key; known here: alpha1"),
         ("[driveline]\nc2 = -4", "driveline.c2 = -4 N.m/rad: must be > 0 N.m/rad"),
         ("[driveline]\ndamping = 1", "driveline.damping: unknown key; known here: alpha1"),
-        ("[drive]\nJ1 = 1", "drive: unknown key; known here: title, driveline, running, stability"),
-        ('[driveline]\nJ1 = "heavy"', 'driveline.J1 = "heavy": must be a number in kg.m2'),
-        ('[driveline]\nJ1 = "3 m"', 'driveline.J1 = "3 m": must be a number in kg.m2'),
+        ('[driveline]\nJ4 = "heavy"', 'driveline.J4 = "heavy": must be a number in kg.m2'),
+        ('[driveline]\nJ4 = "3 m"', 'driveline.J4 = "3 m": must be a number in kg.m2'),
         ("[driveline]\nc2 = 1\nshaft2 = { section = 'round' }", "driveline.c2: given beside driveline.shaft2"),
         ("[driveline]\nd3 = 1\ndamping_ratio = 0.1", "driveline.d3: given beside driveline.damping_ratio"),
         ("[driveline]\ndamping_ratio = -0.1", "driveline.damping_ratio = -0.1: must be >= 0 and <= 0.5"),
@@ -337,17 +383,22 @@ def test_a_damping_ratio_sets_both_dampings():
             "driveline.shaft3.inner = 0.06 m: must be >= 0 and < the outer diameter, 0.05 m",
         ),
         ("[driveline]\nshaft3 = 4", "driveline.shaft3 = 4: must be a table"),
-        ("[running]\nspeed_low = 200\nspeed_high = 100", "running.speed_high = 100 rad/s: must be > 200 rad/s"),
-        ("[running]\nspeed_low = 0.1", "running.speed_low = 0.1 rad/s: must be >= 5.227 rad/s, a fiftieth"),
-        ("[running]\nspeed = 0", "running.speed = 0 rad/s: must be > 0 rad/s"),
-        ("[running]\npoints = 20.5", "running.points = 20.5: must be a whole number"),
-        ('[running]\nload = "3 N"', 'running.load = "3 N": must be a number in N.m'),
-        ("[stability]\nbend_low = 0.5\nbend_high = 0.2", "stability.bend_high = 0.2 rad: must be > 0.5 rad"),
-        ("[stability]\njoint = 'beta'", 'stability.joint = "beta": must be "alpha1", "alpha2" or "both"'),
-        ("[stability]\ndamping_ratios = []", "stability.damping_ratios = []: list should have at least 1 item"),
-        ("[stability]\ndamping_ratios = [0.9]", "stability.damping_ratios = 0.9: must be >= 0 and <= 0.5"),
-        ("[stability]\nspeeds = 3.5", "stability.speeds = 3.5: must be a whole number"),
-        ("x =", "no valid TOML"),
+        ('[feed]\nload = "3 N"', 'feed.load = "3 N": must be a number in N.m'),
+        (f"{BARE}[torsion]\nslowest = 2\nfastest = 1", "torsion.fastest = 1: must be > torsion.slowest, 2"),
+        (f"{BARE}[torsion]\nslowest = 0", "torsion.slowest = 0: must be > 0"),
+        (f"{BARE}[torsion]\npoints = 20.5", "torsion.points = 20.5: must be a whole number"),
+        (
+            f"{BARE}[torsion]\nbend_low = 0.5\nbend_high = 0.2",
+            "torsion.bend_high = 0.2 rad: must be > torsion.bend_low, 0.5 rad",
+        ),
+        (f"{BARE}[torsion]\njoint = 'beta'", 'torsion.joint = "beta": must be "alpha1", "alpha2" or "both"'),
+        (
+            f"{BARE}[torsion]\ndamping_ratios = [1, 2, 3, 4, 5]",
+            "torsion.damping_ratios = [1, 2, 3, 4, 5]: list should have at most 4 items",
+        ),
+        (f"{BARE}[torsion]\ndamping_ratios = [0.9]", "torsion.damping_ratios = 0.9: must be >= 0 and <= 0.5"),
+        (f"{BARE}[torsion]\nspeeds = 3.5", "torsion.speeds = 3.5: must be a whole number"),
+        ("[torsion]\nspeeds = 3", "torsion: is of a driveline; add [driveline], or leave it out"),
     ],
 )  # fmt: skip
 def test_refusals(text, message):
@@ -357,112 +408,200 @@ def test_refusals(text, message):
     assert "\n" not in str(refused.value)
 
 
+def test_a_speed_at_which_nothing_resonates_is_refused():
+    with pytest.raises(InputError) as refused:
+        findings(f"{BARE}[torsion]\nslowest = 0.001")
+    assert str(refused.value).startswith(
+        "torsion.slowest = 0.001: the shaft turns at 146.6 rad/s; must be >= 0.0357"
+    )
+
+
 def test_a_file_is_laid_over_the_example():
-    assert parse("").line == load().line == parse(example()).line
-    own = parse("[driveline]\nc2 = 5000").line
-    assert (own.c2, own.c3, own.J1) == (5000.0, load().line.c3, load().line.J1)
-    k = frequency(load().line)
-    assert torsion.damping_ratio(load().line) == pytest.approx(0.03)
-    assert k == pytest.approx(260.98, abs=0.01)
+    packaged = config.parse(config.example("driveline"))
+    assert parse(BARE).driveline == packaged.driveline and parse("").driveline is None
+    own = parse("[driveline]\nc2 = 5000").driveline
+    assert (own.c2, own.c3, own.J4) == (5000.0, packaged.driveline.c3, packaged.driveline.J4)
+    line = line_of(BARE)
+    assert (line.J1, line.J4) == (1.2, 60.0)
+    assert torsion.damping_ratio(line) == pytest.approx(0.03)
+    assert frequency(line) == pytest.approx(260.98, abs=0.01)
 
 
-# the study and its words
-
-SMALL = """
-[running]
-points = 30
-speed_low = "1350 rev/min"
-[stability]
-speeds = 10
-bends = 3
-bend_high = "35 deg"
-damping_ratios = [0.01, 0.03]
-"""
-
-
-def small(text="", running="", stability=""):
-    return parse(text + SMALL.replace("[stability]", running + "\n[stability]") + stability)
+# the analysis and its words
 
 
 @pytest.fixture(scope="module")
 def study():
-    return run_driveline(small("[driveline]\nalpha1 = '35 deg'\ndamping_ratio = 0.015\n")).analysis
+    return findings("[driveline]\nalpha1 = '35 deg'\ndamping_ratio = 0.015\n" + SMALL)
+
+
+def said(found, beginning, severity="warning"):
+    remarks = [remark for remark in found.remarks() if remark.severity == severity]
+    return [remark for remark in remarks if str(remark).startswith(beginning)]
+
+
+def test_numbers_are_those_of_the_former_program():
+    """Its file, its line and its load; `driveline.json` is what it wrote."""
+    before = json.loads((Path(__file__).parent / "data" / "driveline.json").read_text())
+    line = Cardan(**{name: entry["value"] for name, entry in before["driveline"].items()})
+    run = {name: entry["value"] for name, entry in before["running"].items()}
+    table = TorsionTable(
+        slowest=run["speed_low"] / run["speed"],
+        fastest=run["speed_high"] / run["speed"],
+        points=30.0,
+        speeds=10.0,
+        bends=3.0,
+        bend_high=math.radians(35.0),
+    )
+    rotation = Rotation(speed=run["speed"], load=run["load"])
+    now = as_dict(analyse(line, rotation, table, damping_ratios=(0.01, 0.03)))
+
+    def compare(old, new):
+        if isinstance(old, dict):
+            for key, value in old.items():
+                compare(value, new[key])
+        elif isinstance(old, str | None):
+            assert old == new
+        else:
+            size = np.max(np.abs(np.array(old, float)), initial=0.0)
+            np.testing.assert_allclose(
+                np.array(new, float), np.array(old, float), rtol=1e-9, atol=1e-9 * size
+            )
+
+    for key in before.keys() - {"driveline", "running"}:
+        compare(before[key], now[key])
 
 
 def test_the_orders_of_one_joint_have_a_closed_form():
     """The series of atan(tan(x)/cos(alpha)) - x."""
-    study = run_driveline(small("[driveline]\nalpha1 = '30 deg'\nalpha2 = 0\n", "load = 0\n")).analysis
+    found = findings("[driveline]\nalpha1 = '30 deg'\nalpha2 = 0\n[feed]\nload = 0\n" + SMALL)
     square = math.tan(math.radians(15.0)) ** 2
-    assert study.excitation == {
+    assert found.analysis.excitation == {
         2: pytest.approx(square, rel=1e-9),
         4: pytest.approx(square**2 / 2.0, rel=1e-9),
     }
     # without a load there is nothing to compare the peaks with
-    assert not said(study, "Shaft 2 carries") and study.static2 == 0.0
-
-
-def said(study, beginning):
-    return [line for line in torsion_answers.warnings(study) if line.startswith(beginning)]
+    assert not said(found, "Shaft 2 carries") and found.analysis.static2 == 0.0
 
 
 def test_crossings_are_where_the_orders_meet_the_band(study):
-    for n, ends in study.crossings().items():
-        assert [n * w for w in ends] == pytest.approx([study.band.least, study.band.largest])
-    low, high = study.crossings()[2]
+    analysis = study.analysis
+    for n, ends in analysis.crossings().items():
+        assert [n * w for w in ends] == pytest.approx([analysis.band.least, analysis.band.largest])
+    low, high = analysis.crossings()[2]
     (warning,) = said(study, "Running at 146.6 rad/s (1400 rev/min) is")
-    near = (study.rotation.speed - high) / study.rotation.speed
+    near = (analysis.rotation.speed - high) / analysis.rotation.speed
     ends = [number(end, "rad/s", "speed", 4) for end in (low, high)]
-    assert f"is {number(near, '1', 'percent')} from where order 2" in warning and " to ".join(ends) in warning
+    assert f"is {number(near, '1', 'percent')} from where order 2" in str(warning)
+    assert " to ".join(ends) in str(warning)
+    assert warning.quantities["near"][0] == pytest.approx(near)
 
 
 def test_the_tongue_lies_at_the_natural_frequency(study):
-    ((low, high),) = study.unstable_ranges()
-    assert low < study.at_even < high < 1.1 * low
-    assert said(study, "Unstable from") and "damping ratio 0.0150" in said(study, "Unstable from")[0]
+    analysis = study.analysis
+    ((low, high),) = analysis.unstable_ranges()
+    assert low < analysis.at_even < high < 1.1 * low
+    (warning,) = said(study, "Unstable from")
+    assert "damping ratio 0.0150" in str(warning) and warning.quantities["low"][0] == low
     # more bend and less damping widen it
-    wide = (study.map.unstable * np.gradient(study.map.speed)).sum(axis=2)
+    wide = (analysis.map.unstable * np.gradient(analysis.map.speed)).sum(axis=2)
     assert wide[0, 0] == wide[1, 0] == wide[1, 1] == 0.0 and wide[0, 2] > 0.0 and wide[0, 2] >= wide[1, 2]
 
 
 def test_peaks_are_compared_with_the_load_alone(study):
     (warning,) = said(study, "Shaft 2 carries")
-    peak = float(study.operating.peak2[0])
-    assert study.static2 == pytest.approx(375.0 * np.max(study.ratio))
-    assert number(peak, "N.m", digits=4) in warning
-    assert f"{number(peak / study.static2, '1')} times" in warning
+    analysis = study.analysis
+    peak = float(analysis.operating.peak2[0])
+    # the brake of the machine is smoothed near rest
+    assert analysis.static2 == pytest.approx(375.0 * np.max(analysis.ratio), rel=1e-7)
+    assert number(peak, "N.m", digits=4) in str(warning)
+    assert f"{number(peak / analysis.static2, '1')} times" in str(warning)
     assert said(study, "The torque of shaft 2 falls to")
 
 
-def test_what_is_uneven_is_named(study):
-    (warning,) = said(study, "Shaft 3 does not run evenly")
-    assert "make the bends equal (alpha1 = 35.0 deg, alpha2 = 8.00 deg)" in warning
+def test_what_would_even_the_joints():
+    assert remedies(Cardan(alpha1=math.radians(35.0), alpha2=math.radians(8.0))) == [
+        "make the bends equal (alpha1 = 35.0 deg, alpha2 = 8.00 deg)"
+    ]
     off = Cardan(alpha1=0.2, alpha2=0.2, beta_planes=0.1, delta_yokes=0.3)
-    _, ratio, _ = two_joints(np, off, np.linspace(0.0, math.pi, 50))
-    (line,) = torsion_answers._even_running(off, ratio)
-    assert "turn the yokes of the middle shaft by -11.5 deg" in line and "equal" not in line
+    assert remedies(off) == ["turn the yokes of the middle shaft by -11.5 deg (delta_yokes = beta_planes)"]
     mended = dataclasses.replace(off, delta_yokes=off.delta_yokes - math.radians(11.459156))
+    assert remedies(mended) == []
     _, ratio, _ = two_joints(np, mended, np.linspace(0.0, math.pi, 50))
-    assert torsion_answers._even_running(mended, ratio) == []
+    assert np.ptp(ratio) < UNEVEN
 
 
 def test_an_even_line_has_nothing_to_warn_of():
-    study = run_driveline(small("[driveline]\nalpha1 = '8 deg'\n", stability="joint = 'both'\n")).analysis
-    assert torsion_answers.warnings(study) == [] and study.unstable_ranges() == []
-    assert not np.any(study.map.unstable) and np.all(np.isfinite(study.map.growth))
-    np.testing.assert_allclose(study.steady.peak2, 375.0, rtol=1e-6)
+    found = findings("[driveline]\nalpha1 = '8 deg'\n" + SMALL + "joint = 'both'\n")
+    analysis = found.analysis
+    assert not said(found, "") and analysis.unstable_ranges() == []
+    assert not np.any(analysis.map.unstable) and np.all(np.isfinite(analysis.map.growth))
+    np.testing.assert_allclose(analysis.steady.peak2, 375.0, rtol=1e-6)
 
 
 def test_without_damping_it_says_so():
-    study = run_driveline(small("[driveline]\nd2 = 0\n")).analysis
-    assert study.simulated is None and study.damping_ratio == 0.0
-    assert any(note.startswith("Without damping no transient dies") for note in torsion_answers.notes(study))
+    found = findings("[driveline]\nd2 = 0\n" + SMALL)
+    assert found.analysis.simulated is None and found.analysis.damping_ratio == 0.0
+    assert said(found, "Without damping no transient dies", "note")
+
+
+# the analysis in a study
+
+
+def only_line(line, rotation, *_):
+    return SimpleNamespace(line=line, rotation=rotation)
+
+
+def test_the_line_is_that_of_the_study(monkeypatch):
+    """On the other side of a gear, with a flywheel, it is the same system seen from another shaft."""
+    monkeypatch.setattr(torsion_findings, "analyse", only_line)
+    text = "[machine]\nratio = 3\n[driveline]\nplace = '{}'\nJ4 = 0.4\n[flywheel]\nJ = 0.3\n" + SMALL
+    crank, motor = (findings(text.format(place)).analysis for place in ("crank", "motor"))
+    assert (crank.line.J1, crank.line.J4) == pytest.approx((1.5 * 9.0, 59.9))
+    assert (motor.line.J1, motor.line.J4) == pytest.approx((1.5, 0.4 + 59.5 / 9.0))
+    assert motor.rotation.speed == pytest.approx(3.0 * crank.rotation.speed)
+    assert motor.rotation.load == pytest.approx(crank.rotation.load / 3.0)
+
+
+@pytest.mark.parametrize(("speed", "made"), [("300 rev/min", False), ("450 rev/min", True)])
+def test_a_slow_line_is_not_analysed(monkeypatch, speed, made):
+    monkeypatch.setattr(torsion_findings, "analyse", only_line)
+    text = f"{SYSTEM}{BARE}[run]\ncrank_speed = '{speed}'\n"
+    # a table of its own asks for it
+    for more in ("", "[torsion]\nspeeds = 2\n"):
+        study = study_of(text + more)
+        found = TorsionAnalysis.find(study, Rig(study.config, study.drive, {}), lambda *_: None)
+        assert (found is not None) == (made or bool(more))
+        assert [remark.kind for remark in study.remarks] == [] if found else ["torsion left out"]
+
+
+def test_the_co_simulation_finds_the_steady_motion_of_the_analysis(tmp_path):
+    """A motor that gives a constant torque, as the analysis takes it, in the FMUs of the study."""
+    found = findings(SMALL)
+    study = study_of(f"{SYSTEM}{BARE}")
+    w = found.analysis.rotation.speed
+    drive = study.drive
+    motor = Layout(type(drive.parameters)).from_names(
+        {"speed_control.kp": 1e-6, "speed_control.ki": 0.0, "w_start": w}, drive.parameters
+    )
+    line = dataclasses.replace(drive.line, w_start=w)
+    drive = dataclasses.replace(drive, parameters=motor, line=line)
+    files, _ = drive.export(tmp_path)
+    load = found.analysis.rotation.load
+    signals = {"motor.w_ref": w, "motor.tau_ff": 0.0, "machine.load": study.config.feed.load}
+    with CoSimulation(drive.system(files), signals | {"motor.tau_ff": load}) as simulation:
+        run = simulation.run(2.5, 2.5e-4).sel(time=slice(2.2, None))
+    assert float(run["motor.w"].mean()) == pytest.approx(w, rel=0.01)
+    reached = float(run["motor.w"].mean())
+    want = steady(found.analysis.line, reached, load)
+    assert float(np.abs(run["driveline.tau2"]).max()) == pytest.approx(float(want.peak2[0]), rel=0.02)
 
 
 # the command
 
 
 def run(monkeypatch, capsys, *arguments):
-    monkeypatch.setattr(sys, "argv", ["chainunit", "driveline", *map(str, arguments)])
+    monkeypatch.setattr(sys, "argv", ["chainunit", "study", *map(str, arguments)])
     with pytest.raises(SystemExit) as left:
         cli.main()
     return left.value.code, *capsys.readouterr()
@@ -470,56 +609,36 @@ def run(monkeypatch, capsys, *arguments):
 
 def test_the_command_writes_everything(monkeypatch, capsys, tmp_path):
     file, folder = tmp_path / "mine.toml", tmp_path / "out dir"
-    file.write_text('title = "A [bold] line"\n' + SMALL)
-    folder.mkdir()
-    for stale in ("driveline.json", "ratio.png"):
-        (folder / stale).write_text("of an earlier run")
+    start = "[run]\nramp = 1\nsettle_turns = 10\nturns = 1\n"
+    file.write_text('title = "A [bold] line"\n' + SYSTEM + start + EVENT + BARE + SMALL)
     status, out, _ = run(monkeypatch, capsys, file, "-o", folder)
     assert not status
-    assert "A [bold] line" in out and "Warning: Shaft 3 does not run evenly" in out
-    names = {"report.html", "driveline.json", "driveline.md", *PICTURES}
-    assert {p.name for p in folder.iterdir()} == names
-    for name in names:
-        assert name in out
-        if name.endswith(".png"):
-            assert (folder / name).read_bytes().startswith(b"\x89PNG")
-    numbers = json.loads((folder / "driveline.json").read_text())
-    assert numbers["natural_frequency"]["even"] == {
+    assert (
+        "A [bold] line" in out and "Warning: The joints turn unevenly: shaft 3 turns 0.99449 to 1.0055" in out
+    )
+    for name in PICTURES:
+        assert (folder / name).read_bytes().startswith(b"\x89PNG")
+    numbers = json.loads((folder / "result.json").read_text())
+    torsion = numbers["torsion"]
+    assert torsion["natural_frequency"]["even"] == {
         "value": pytest.approx(260.98, abs=0.01),
         "unit": "rad/s",
         "kind": "frequency",
     }
-    assert len(numbers["resonance"]["peak_torque2"]["value"]) == 30
-    assert numbers["driveline"]["J4"] == {"value": 60.0, "unit": "kg.m2"}
-    text = (folder / "driveline.md").read_text()
-    assert "| driveline.J4 | 60 kg m2 | driven inertia |" in text and "](campbell.png)" in text
-
-
-def test_the_command_refuses_in_one_line(monkeypatch, capsys, tmp_path):
-    file, folder = tmp_path / "mine.toml", tmp_path / "out"
-    folder.mkdir()
-    (folder / "driveline.json").write_text("of an earlier run")
-    file.write_text("[driveline]\nJ1 = -1")
-    status, out, err = run(monkeypatch, capsys, file, "-o", folder)
-    assert (status, out) == (2, "")
-    allowed = "must be > 0 kg.m2 and <= 1e+09 kg.m2 (inertia of the rotor)"
-    assert err == f"chainunit: {file}: driveline.J1 = -1 kg.m2: {allowed}\n"
-    assert (folder / "driveline.json").read_text() == "of an earlier run"
-    status, _, err = run(monkeypatch, capsys, tmp_path / "none.toml")
-    assert status == 2 and "cannot be read" in err
-
-
-def test_interrupted_it_leaves_nothing(monkeypatch, capsys, tmp_path):
-    def stop(*_):
-        raise KeyboardInterrupt
-
-    (tmp_path / "driveline.json").write_text("of an earlier run")
-    monkeypatch.setattr(driveline, "run_driveline", stop)
-    status, _, err = run(monkeypatch, capsys, "-o", tmp_path)
-    assert status == 130 and err.endswith("chainunit: interrupted before all was written\n")
-    assert list(tmp_path.iterdir()) == []
+    assert len(torsion["resonance"]["peak_torque2"]["value"]) >= 30
+    assert torsion["line"]["J4"] == {"value": pytest.approx(60.0), "unit": "kg.m2"}
+    assert numbers["status"] == "complete" and numbers["answers"]["overload"] and numbers["shaft"]["steady"]
+    kinds = {remark["kind"] for remark in (*numbers["warnings"], *numbers["notes"])}
+    assert {"order near line", "peak of a shaft", "natural frequency", "uneven joints"} <= kinds
+    text = (folder / "result.md").read_text()
+    assert (
+        "| torsion.bend_high | 35 deg | largest bend of the map | file |" in text
+        and "](campbell.png)" in text
+    )
+    page = (folder / "report.html").read_text()
+    assert "Torsion of the driveline in rotation" in page and "shaft 3 turns" in page
 
 
 def test_the_example_is_printed(monkeypatch, capsys):
-    status, out, _ = run(monkeypatch, capsys, "--example")
-    assert not status and out == example()
+    status, out, _ = run(monkeypatch, capsys, "--example", "driveline")
+    assert not status and out == config.example("driveline")

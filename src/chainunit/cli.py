@@ -1,4 +1,4 @@
-"""The command line: ``study``, ``driveline``, ``reproduce``, ``export``, ``export-ssp``."""
+"""The command line: ``study``, ``reproduce``, ``export``, ``export-ssp``."""
 
 from __future__ import annotations
 
@@ -215,40 +215,6 @@ def _clear(folder: Path, *names: str) -> None:
         stale.unlink(missing_ok=True)
         for part in leftovers(stale):
             part.unlink(missing_ok=True)
-
-
-@app.command()
-def driveline(
-    config: Annotated[
-        Path | None, typer.Argument(help="Driveline file (TOML); without one, the packaged example.")
-    ] = None,
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path("driveline"),
-    example: Annotated[
-        bool,
-        typer.Option(
-            "--example", help="Print the packaged driveline file, as a start for your own, and stop."
-        ),
-    ] = False,
-) -> None:
-    """A machine behind a cardan shaft: natural frequency, resonance and stability in rotation.
-
-    Writes report.html, driveline.json, driveline.md and plots into the output folder.
-    """
-    from .study import driveline as lines
-
-    if example:
-        print(lines.example(), end="")
-        return
-    loaded = lines.load(config)
-    with claimed(output):
-        from .report import driveline as contents
-        from .report import files
-
-        _clear(output, *files.names("driveline", contents.PICTURES))
-        with _progress("steady motion", _console(stderr=True)) as progress:
-            result = lines.run_driveline(loaded, progress)
-        report = contents.report(result)
-        _finish(report, output, "driveline")
 
 
 def _stopped_early(failure: RunError, output: Path, errors: Console) -> None:

@@ -1,6 +1,6 @@
 """The TOML table of a shaft line: bends, and stiffness and damping either as such or from the shafts' geometry.
 
-`form` is its pydantic model, `values` gives its numbers. A study file and a driveline file read it alike::
+`form` is its pydantic model, `line_values` gives its numbers::
 
     [driveline]
     alpha1 = "12 deg"
@@ -18,9 +18,8 @@ from pydantic import BaseModel, BeforeValidator, Field
 from ..errors import InputError, refusal_prefix
 from ..quantities import Quantity, Value, Variable, declaration, quantity, variables
 from ..reading import number, schema, to_number
-from .cardan import Cardan, ShaftLine
+from .cardan import ShaftLine
 from .shafts import SECTIONS, Shaft, stiffness_of
-from .torsion import with_damping_ratio
 
 SHAFTS = {"shaft2": "c2", "shaft3": "c3"}
 
@@ -94,19 +93,3 @@ def line_values(table: BaseModel, prefix: str) -> dict[str, Any]:
                 f"{prefix}{name}: given beside {prefix}damping_ratio, which sets it; leave out one of the two"
             )
     return numbers
-
-
-def values(table: BaseModel, prefix: str) -> dict[str, float]:
-    """Numbers of a `Cardan` that the table gives, by name.
-
-    Raises
-    ------
-    InputError
-        see `line_values`.
-    """
-    numbers = line_values(table, prefix)
-    ratio = numbers.pop("damping_ratio", None)
-    if ratio is None:
-        return numbers
-    damped = with_damping_ratio(Cardan(**numbers), ratio)
-    return {**numbers, "d2": damped.d2, "d3": damped.d3}

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 from ..study.study import Study
-from . import blade, flywheels, turn
+from . import blade, flywheels, torsion, turn
 from .blocks import Block, Source
 
 
@@ -23,4 +23,5 @@ ANALYSES: Mapping[str, Contents] = {
     "constant_speed": Contents("A turn at constant speed", turn.blocks, (turn.PICTURE,)),
     "blade": Contents("The blade", blade.blocks, (blade.PICTURE,)),
     "flywheels": Contents("Flywheels", flywheels.blocks, (flywheels.PICTURE,)),
+    "torsion": Contents("Torsion of the driveline in rotation", torsion.blocks, torsion.PICTURES),
 }

@@ -102,6 +102,7 @@ def _given(s: b.Source, study: Study) -> Iterator[b.Block]:
         ("machine", study.drive.machine.p, "Machine"),
         ("chain", config.chain, "Chains"),
         ("driveline", config.driveline, "Driveline"),
+        ("torsion", config.torsion if "torsion" in study.findings else None, "Torsion of the driveline"),
         ("motor", study.drive.parameters, "Motor"),
     )
     given = (

@@ -5,6 +5,7 @@ from __future__ import annotations
 from .analysis import Analysis
 from .blade import BladeAnalysis
 from .flywheels import FlywheelAnalysis
+from .torsion_findings import TorsionAnalysis
 from .turn import TurnAnalysis
 
-ANALYSES: tuple[type[Analysis], ...] = (TurnAnalysis, BladeAnalysis, FlywheelAnalysis)
+ANALYSES: tuple[type[Analysis], ...] = (TurnAnalysis, BladeAnalysis, FlywheelAnalysis, TorsionAnalysis)

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ..drives.cardan import Cardan
 from ..drives.catalogue import check_own
 from ..drives.driveline import CardanDriveline
 from ..drives.motor import Motor
@@ -23,6 +22,7 @@ from .catalogue_drive import catalogue_drive
 from .config import Config
 from .cycle import cycle
 from .drive import Drive
+from .shaft import two_masses
 from .sizing import SizingResult, size
 
 
@@ -129,14 +129,13 @@ def with_line(config: Config, drive: Drive) -> Drive:
         return drive
     given = Layout(type(config.driveline)).named(config.driveline)
     values = {name: x for name, x in given.items() if name in CardanDriveline.parameter_layout.names}
-    gear = drive.ratio if config.place == "crank" else 1.0
-    if config.damping_ratio is not None:
-        J = cycle(drive.machine, config.run.crank_speed, config.feed).outputs.J
-        ends = {"J1": drive.parameters.rotor.J * gear**2, "J4": values["J4"] + float(np.mean(J)) * gear**2}
-        undamped = Cardan(**{name: x for name, x in values.items() if name in Layout(Cardan).names} | ends)
-        damped = with_damping_ratio(undamped, config.damping_ratio)
-        values |= {"d2": damped.d2, "d3": damped.d3}
-    return replace(drive, line=CardanDriveline.parameter_layout.from_names(values | {"ratio": gear}))
+    values["ratio"] = drive.ratio if config.place == "crank" else 1.0
+    drive = replace(drive, line=CardanDriveline.parameter_layout.from_names(values))
+    if config.damping_ratio is None:
+        return drive
+    J = cycle(drive.machine, config.run.crank_speed, config.feed).outputs.J
+    damped = with_damping_ratio(two_masses(drive, float(np.mean(J))), config.damping_ratio)
+    return replace(drive, line=replace(drive.line, d2=damped.d2, d3=damped.d3))
 
 
 def tune(config: Config, drive: Drive) -> tuple[Drive, Tuning | None]:

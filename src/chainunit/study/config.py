@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, StrictBool
 from ..drives.cardan import check
 from ..drives.catalogue import CatalogueMotor, motor_of_catalogue
 from ..drives.gearing import Transmission
+from ..drives.line_table import SHAFTS
 from ..drives.motor import Motor
 from ..drives.motors import MOTORS
 from ..errors import GeometryError, InputError, shown
@@ -55,6 +56,7 @@ from .sections import (
     Sizing,
     Starter,
     SystemTable,
+    TorsionTable,
     sections_of,
 )
 
@@ -66,7 +68,7 @@ class ReportTable(BaseModel):
     units: dict[str, str] = {}
 
 
-EXAMPLES = {"chain-unit": "example.toml", "knife": "knife.toml", "driveline": "accelerator.toml"}
+EXAMPLES = {"chain-unit": "example.toml", "knife": "knife.toml", "driveline": "driveline.toml"}
 """Packaged study files by the names of the examples."""
 _OF_MACHINE = {"ChamberForces": "chain-unit", "KnifeDrive": "knife", "Accelerator": "driveline"}
 """The example from which a study takes what its file leaves out, by machine."""
@@ -196,6 +198,12 @@ class Config:
     """of the driveline, one of `PLACES`"""
     damping_ratio: float | None
     """of the driveline's torsion, in place of d2 and d3"""
+    torsion: TorsionTable
+    """of the analysis of a driveline in rotation"""
+    joint: str
+    """whose bend its map of stability varies, one of `JOINTS`"""
+    damping_ratios: tuple[float, ...]
+    """of that map; the line's own where there is none"""
     chain: ChainOrgans | None
     """the organs as chains, or None for two bars"""
     foreign: ForeignMotor | None
@@ -308,7 +316,7 @@ def _config(
         for name, section in sections.items()
     }
     _check_order(values, sections)
-    of_study = {name: values[name] for name in ("feed", "run", "monte_carlo", "gear", "starter")}
+    of_study = {name: values[name] for name in ("feed", "run", "monte_carlo", "gear", "starter", "torsion")}
     of_study |= {
         name: values[name] if name in data else None for name, each in sections.items() if each.optional
     }
@@ -330,6 +338,8 @@ def _config(
         start=checked.start,
         catalogue=catalogue,
         place=checked.driveline.place,
+        joint=checked.torsion.joint,
+        damping_ratios=tuple(sorted(set(checked.torsion.damping_ratios))),
         damping_ratio=checked.driveline.damping_ratio,
         chain=values["chain"] if checked.organ == "chain" else None,
         foreign=ForeignMotor(_beside(parts.file, source), given_values(checked.system.motor_names))
@@ -456,6 +466,8 @@ def _check_company(data: Mapping[str, Any], parts: Parts) -> None:
         raise InputError(
             "machine.ratio: follows from the motor's rated speed; to have another, give gear.ratio"
         )
+    if "torsion" in data and "driveline" not in data:
+        raise InputError("torsion: is of a driveline; add [driveline], or leave it out")
     if "chain" in data and data.get("organ") != "chain":
         raise InputError('chain: is of organs that are chains; add organ = "chain", or leave it out')
 
@@ -464,6 +476,8 @@ _ORDER = (
     ("sizing.poles_least", ">=", "sizing.poles_most"),
     ("sizing.ambient", ">", "sizing.temperature"),
     ("chain.sweep_lowest", ">", "chain.sweep_highest"),
+    ("torsion.slowest", ">", "torsion.fastest"),
+    ("torsion.bend_low", ">", "torsion.bend_high"),
 )
 """Quantities of which the second has to be more than the first."""
 
@@ -544,7 +558,7 @@ LENGTHS = ("r", "l", "h", "c", "hy", "e", "l1", "l2", "z")
 
 def _over_example(data: Mapping[str, Any], parts: Parts) -> dict[str, Any]:
     """A study file laid over the example of its machine: a value that is not named is the example's. Its ratios give
-    way to lengths of the user's own, its motor to another one."""
+    way to lengths of the user's own, its motor to another one, its shafts and their damping to the user's."""
     base = parts.example
     if any(name in _table(data, "machine") for name in LENGTHS) and "ratios" not in data:
         base.pop("ratios", None)
@@ -554,5 +568,11 @@ def _over_example(data: Mapping[str, Any], parts: Parts) -> dict[str, Any]:
         base.get("system", {}).pop("motor", None)
         for name in ("gear", "start", "starter"):
             base.pop(name, None)
+    line = _table(data, "driveline")
+    for shaft, stiffness in SHAFTS.items():
+        if shaft in line or stiffness in line:
+            base.get("driveline", {}).pop(shaft, None)
+    if "d2" in line or "d3" in line:
+        base.get("driveline", {}).pop("damping_ratio", None)
     base["title"] = ""
     return merged(base, data)

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from ..drives.cardan import ORDERS, two_joints
+from ..drives.cardan import two_joints
 from ..engines import numpy_
 from ..text import number
 from .coupling import peaks_on_coupling, remark_on_coupling
@@ -16,7 +16,7 @@ from .judgement import model_verdict
 from .measures import Answers
 from .rig import CLOSED
 from .sections import ChainOrgans
-from .shaft import AMPLIFIED, NEAR
+from .shaft import AMPLIFIED, UNEVEN, remedies
 from .study import LOAD_CYCLE, Amount, Study
 from .verdict import RESIDUAL, STEADY
 
@@ -263,23 +263,19 @@ def _on_shaft(study: Study) -> None:
             crossover=(fastest, "rad/s"),
             **ends,
         )
-    speed = study.config.run.crank_speed * study.drive.driven.p.ratio
     _, i, _ = two_joints(numpy_(), line, np.linspace(0.0, np.pi, 361))
     unevenness = float(np.ptp(i))
-    if unevenness > 1e-6:
-        text = "The joints turn unevenly: i23 varies by {unevenness} twice a turn of the shaft."
-        note("uneven joints", text, unevenness=(unevenness, "1", "percent"))
-    for order in ORDERS if unevenness > 1e-6 else ():
-        if (1.0 - NEAR) * modes.k_least < order * speed < (1.0 + NEAR) * modes.k_largest:
-            warn(
-                "order near line",
-                "The shaft turns at {speed}: order {order} of the joints, {excited}, lies near the line's natural "
-                "frequency, {k_least} to {k_largest}.",
-                order=str(order),
-                speed=(speed, "rad/s"),
-                excited=(order * speed, "rad/s"),
-                **ends,
-            )
+    if unevenness > UNEVEN:
+        study.remark(
+            "warning" if "torsion" in study.findings else "note",
+            "uneven joints",
+            "The joints turn unevenly: shaft 3 turns {least} to {largest} times as fast as shaft 2 (ratio i23), and "
+            "this varies by {unevenness} twice a turn; {remedies}.",
+            least=(float(np.min(i)), "1", "", 5),
+            largest=(float(np.max(i)), "1", "", 5),
+            unevenness=(unevenness, "1", "percent"),
+            remedies=", and ".join(remedies(line)),
+        )
     for name, shaft in study.shaft.items():
         if shaft.amplification is not None and shaft.amplification > AMPLIFIED:
             warn(

@@ -66,6 +66,7 @@ def _given(study: Study) -> dict[str, Any]:
         "coupling": config.coupling,
         "chain": config.chain,
         "driveline": config.driveline,
+        "torsion": config.torsion if "torsion" in study.findings else None,
     }
     names = [v.name for section, p in sections.items() if p for v in variables(type(p), f"{section}.")]
     return {

@@ -13,7 +13,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model
 from ..drives.driveline import Mounted
 from ..drives.gearing import KINDS, Transmission
 from ..drives.induction_motor import Inverter, SoftStart
-from ..drives.line_table import form, line_values
+from ..drives.line_table import Damping, form, line_values
 from ..drives.motor import Motor
 from ..machines.chain_organs import LEAST, MOST, OrganLaw
 from ..mechanism.models import InverseMachine
@@ -178,6 +178,37 @@ class Driveline(Mounted):
 
 
 @declaration
+class TorsionTable:
+    """The analysis of the torsion of a cardan line in rotation: the speeds of the shaft that it looks at, what is
+    permitted, and the grid of its map of stability."""
+
+    slowest: Value = quantity(
+        "1", "least speed, in parts of that of normal running", default=0.3, above=0.0, max=1e3
+    )
+    fastest: Value = quantity(
+        "1", "largest speed, in parts of that of normal running", default=2.0, above=0.0, max=1e3
+    )
+    points: Value = quantity(
+        "1", "number of speeds of the resonance curve", default=200.0, min=10.0, max=5000.0
+    )
+    margin: Value = quantity(
+        "1",
+        "permitted nearness to a resonance, as a share of the speed",
+        default=0.15,
+        min=0.0,
+        max=1.0,
+        kind="percent",
+    )
+    factor: Value = quantity(
+        "1", "permitted ratio of the peak torque to that of the load alone", default=1.5, min=1.0, max=100.0
+    )
+    bend_low: Value = quantity("rad", "least bend of the map", default=0.0, min=0.0, max=1.5)
+    bend_high: Value = quantity("rad", "largest bend of the map", default=0.7, min=0.0, max=1.5)
+    speeds: Value = quantity("1", "number of speeds of the map", default=64.0, min=2.0, max=1000.0)
+    bends: Value = quantity("1", "number of bends of the map", default=14.0, min=2.0, max=1000.0)
+
+
+@declaration
 class ChainOrgans(OrganLaw):
     """The organs as chains, where `organ` is "chain", and the sweep over crank speeds with them."""
 
@@ -213,6 +244,9 @@ def numbers(declared: type, quantity_name: str, name: str, most: int) -> Any:
 
 ORGANS = ("two-bar", "chain")
 """How the organs are modelled."""
+
+JOINTS = ("alpha1", "alpha2", "both")
+"""The bends that the map of stability may vary."""
 
 PLACES = ("crank", "motor")
 """Where a driveline is: on the crank's shaft, behind the gear, or on the motor's, before it."""
@@ -290,6 +324,14 @@ SECTIONS: Mapping[str, FileSection] = {
         keys={"place": (Literal[PLACES], "crank")},
         form=form,
         values=partial(line_values, prefix="driveline."),
+    ),
+    "torsion": FileSection(
+        TorsionTable,
+        whole=("points", "speeds", "bends"),
+        keys={
+            "joint": (Literal[JOINTS], "alpha1"),
+            "damping_ratios": (numbers(Damping, "damping_ratio", "torsion.damping_ratios", 4), []),
+        },
     ),
 }
 """Tables of every study file, besides those of its machine, its feed, and its motor."""

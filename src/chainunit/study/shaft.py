@@ -5,24 +5,26 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from ..drives.cardan import Cardan, frozen_frequency
+from ..drives.cardan import Cardan, ShaftLine, frozen_frequency
 from ..drives.torsion import largest_frequency
 from ..engines import MATH
-from ..quantities import Value, declaration, quantity
+from ..quantities import Value, declaration, quantity, variables
+from ..text import number
 from .drive import Drive
 
 LONGEST_STEP = 0.3
 """Communication step times natural frequency: above it the coupling feeds the vibration more than it damps."""
 RIGID = "driveline.tau2_rigid"
 """Name in a run's Dataset of the torque in shaft 2 in the same run of the rigid drive."""
-NEAR = 0.2
-"""Share of a natural frequency within which an order of the joints is worth a word."""
+UNEVEN = 1e-6
+"""Variation of i23 up to which the line counts as even."""
 AMPLIFIED = 1.2
 """Amplification that is worth a word."""
 CLASSES = 10
@@ -92,23 +94,35 @@ def from_peak(torque: Any) -> Any:
     return np.concatenate([torque[first:], torque[: first + 1]])
 
 
+def two_masses(drive: Drive, inertia: float) -> Cardan:
+    """The drive's line between its rotor and the machine of that `inertia` at the motor [kg m2]: both inertias at
+    the line's shafts."""
+    line = drive.line
+    shafts = {v.name: getattr(line, v.name) for v in variables(ShaftLine)}
+    J1 = drive.parameters.rotor.J * line.ratio**2
+    return Cardan(**shafts, J1=J1, J4=line.J4 + inertia * line.ratio**2)
+
+
 def torsion(drive: Drive, inertia: Any) -> Torsion:
     """Natural frequencies of the drive's line with the machine's `inertia` at the motor [kg m2], an array over the
     turn."""
-    line = drive.line
-    ends, bounds = [], []
-    for J in (float(np.min(inertia)), float(np.max(inertia))):
-        two_masses = Cardan(
-            c2=line.c2,
-            c3=line.c3,
-            alpha1=line.alpha1,
-            alpha2=line.alpha2,
-            J1=drive.parameters.rotor.J * line.ratio**2,
-            J4=line.J4 + J * line.ratio**2,
-        )
-        ends.append(float(frozen_frequency(MATH, two_masses, 1.0)))
-        bounds.append(float(largest_frequency(two_masses)))
-    return Torsion(k_least=min(ends), k_largest=max(ends), step_longest=LONGEST_STEP / max(bounds))
+    lines = [two_masses(drive, float(J)) for J in (np.min(inertia), np.max(inertia))]
+    ends = [float(frozen_frequency(MATH, line, 1.0)) for line in lines]
+    longest = LONGEST_STEP / max(float(largest_frequency(line)) for line in lines)
+    return Torsion(k_least=min(ends), k_largest=max(ends), step_longest=longest)
+
+
+def remedies(line: ShaftLine) -> list[str]:
+    """What would make i23 even, in words."""
+    wanted = []
+    if not math.isclose(line.alpha1, line.alpha2, abs_tol=1e-6):
+        bends = (number(bend, "rad") for bend in (line.alpha1, line.alpha2))
+        wanted.append("make the bends equal (alpha1 = {}, alpha2 = {})".format(*bends))
+    off = (line.delta_yokes - line.beta_planes + 0.5 * math.pi) % math.pi - 0.5 * math.pi
+    if not math.isclose(off, 0.0, abs_tol=1e-6):
+        turn = number(-off, "rad")
+        wanted.append(f"turn the yokes of the middle shaft by {turn} (delta_yokes = beta_planes)")
+    return wanted
 
 
 def rigid_torque(drive: Drive, rigid: xr.Dataset) -> Any:

@@ -28,8 +28,10 @@ LOAD_CYCLE = "load_cycle.csv"
 """File with the steady turns as the motor's shaft sees them."""
 
 
-Amount: TypeAlias = tuple[float | None, str] | tuple[float | None, str, str]
-"""A number, its unit, and perhaps how people show it."""
+Amount: TypeAlias = (
+    tuple[float | None, str] | tuple[float | None, str, str] | tuple[float | None, str, str, int]
+)
+"""A number, its unit, and perhaps how people show it, and with how many digits."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,21 @@ class Remark:
     quantities: Mapping[str, Amount] = field(default_factory=dict)
     """numbers of the text; what differs from run to run is named ``run.quantity``"""
 
+    @classmethod
+    def of(
+        cls,
+        severity: Literal["warning", "note"],
+        kind: str,
+        text: str,
+        /,
+        *runs: str,
+        **parts: Amount | str,
+    ) -> Remark:
+        """A remark; in its `text` the names of the `parts`, amounts and words, stand in braces."""
+        amounts = {name: part for name, part in parts.items() if not isinstance(part, str)}
+        words = {name: part if isinstance(part, str) else number(*part) for name, part in parts.items()}
+        return cls(severity, kind, text.format_map(words), runs, amounts)
+
     def __str__(self) -> str:
         return self.text[:1].upper() + self.text[1:]
 
@@ -54,7 +71,7 @@ class Remark:
             "kind": self.kind,
             "text": str(self),
             "runs": list(self.runs),
-            "quantities": {name: entry(*amount) for name, amount in self.quantities.items()},
+            "quantities": {name: entry(*amount[:3]) for name, amount in self.quantities.items()},
         }
 
 
@@ -133,10 +150,8 @@ class Study:
         *runs: str,
         **parts: Amount | str,
     ) -> None:
-        """Add a remark; in its `text` the names of the `parts`, amounts and words, stand in braces."""
-        amounts = {name: part for name, part in parts.items() if not isinstance(part, str)}
-        words = {name: part if isinstance(part, str) else number(*part) for name, part in parts.items()}
-        self.remarks.append(Remark(severity, kind, text.format_map(words), runs, amounts))
+        """Add a remark, see `Remark.of`."""
+        self.remarks.append(Remark.of(severity, kind, text, *runs, **parts))
 
     @property
     def titles(self) -> dict[str, str]:

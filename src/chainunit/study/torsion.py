@@ -1,7 +1,7 @@
-"""A line with a cardan shaft in rotation: natural frequency, resonance and stability, the analyses of a system that
-contains one.
+"""A line with a cardan shaft in rotation: natural frequency, resonance and stability.
 
-The mechanics are in `drives.cardan` and `drives.torsion`; here are the grids of speeds and bends.
+The mechanics are in `drives.cardan` and `drives.torsion`; here are the grids of speeds and bends. The analysis of a
+study is in `torsion_findings`.
 """
 
 from __future__ import annotations
@@ -37,6 +37,8 @@ from ..drives.torsion import (
 )
 from ..engines import numpy_
 from ..quantities import Value, declaration, quantity
+from .analysis import Report
+from .sections import TorsionTable
 
 TONGUES = (1, 2, 3, 4)
 """n of the parametric resonances 2 speed = 2 k/n."""
@@ -60,45 +62,14 @@ SIMULATED = 5
 
 @declaration
 class Rotation:
-    """How the line runs, and the range of speeds of its analysis."""
+    """How the line runs."""
 
-    speed: Value = quantity(
-        "rad/s", "mean speed in normal running", default=150.0, above=0.0, max=1e4, kind="speed"
-    )
-    load: Value = quantity("N.m", "mean torque on the driven inertia", default=375.0, min=0.0, max=1e9)
-    speed_low: Value = quantity(
-        "rad/s", "least speed of the analysis", default=40.0, above=0.0, max=1e4, kind="speed"
-    )
-    speed_high: Value = quantity(
-        "rad/s", "largest speed of the analysis", default=300.0, above=0.0, max=1e4, kind="speed"
-    )
-    points: Value = quantity(
-        "1", "number of speeds of the resonance curve", default=200.0, min=10.0, max=5000.0
-    )
-    margin: Value = quantity(
-        "1",
-        "permitted nearness to a resonance, as a share of the speed",
-        default=0.15,
-        min=0.0,
-        max=1.0,
-        kind="percent",
-    )
-    factor: Value = quantity(
-        "1", "permitted ratio of the peak torque to that of the load alone", default=1.5, min=1.0, max=100.0
-    )
+    speed: Value = quantity("rad/s", "mean speed of the shaft in normal running", kind="speed")
+    load: Value = quantity("N.m", "mean torque on the driven inertia")
 
 
-@declaration
-class StabilityGrid:
-    """The grid of the map of stability."""
-
-    bend_low: Value = quantity("rad", "least bend of the map", default=0.0, min=0.0, max=1.5)
-    bend_high: Value = quantity("rad", "largest bend of the map", default=0.7, min=0.0, max=1.5)
-    speeds: Value = quantity("1", "number of speeds of the map", default=64.0, min=2.0, max=1000.0)
-    bends: Value = quantity("1", "number of bends of the map", default=14.0, min=2.0, max=1000.0)
-
-
-JOINTS = {"alpha1": ("alpha1",), "alpha2": ("alpha2",), "both": ("alpha1", "alpha2")}
+BENT = {"alpha1": ("alpha1",), "alpha2": ("alpha2",), "both": ("alpha1", "alpha2")}
+"""The bends that the map varies, by its joint."""
 
 
 def speeds(low: float, high: float, k: float, points: int) -> Any:
@@ -135,8 +106,11 @@ class LineAnalysis:
 
     line: Cardan
     rotation: Rotation
+    ranges: TorsionTable
     damping_ratio: float
     band: FrequencyBand
+    span: tuple[float, float]
+    """least and largest natural frequency [rad/s] over a turn of the shaft and over the inertia of the machine"""
     at_even: float
     """natural frequency at i23 = 1 [rad/s]"""
     excitation: dict[int, float]
@@ -159,6 +133,21 @@ class LineAnalysis:
     map: StabilityMap
 
     @property
+    def slowest(self) -> float:
+        """Least speed of the analysis [rad/s]."""
+        return float(self.ranges.slowest * self.rotation.speed)
+
+    @property
+    def fastest(self) -> float:
+        """Largest speed of the analysis [rad/s]."""
+        return float(self.ranges.fastest * self.rotation.speed)
+
+    @property
+    def shaken(self) -> bool:
+        """Whether i23 varies."""
+        return float(np.ptp(self.ratio)) > 1e-9
+
+    @property
     def static2(self) -> float:
         """Largest torque of shaft 2 from the load alone, without inertia [N.m]."""
         return float(np.max(self.ratio)) * self.rotation.load
@@ -170,8 +159,9 @@ class LineAnalysis:
         return np.abs(self.simulated.speed / self.simulated_speed - 1.0) < LOST
 
     def crossings(self) -> dict[int, tuple[float, float]]:
-        """Speeds at which an order meets the band of the natural frequency, or 2 speed = 2 k/n [rad/s], by n."""
-        return {n: (self.band.least / n, self.band.largest / n) for n in TONGUES}
+        """Speeds at which an order meets the natural frequency, or 2 speed = 2 k/n [rad/s], by n: from and to."""
+        low, high = self.span
+        return {n: (low / n, high / n) for n in TONGUES}
 
     def unstable_ranges(self) -> list[tuple[float, float]]:
         """Ranges of speed in which a torsional disturbance grows [rad/s], between points of the resonance curve."""
@@ -222,35 +212,38 @@ def _ranges(x: Any, inside: Any) -> list[tuple[float, float]]:
     return [(float(middle[a]), float(middle[b])) for a, b in zip(begins, ends, strict=True)]
 
 
-Report = Callable[[str, float, float], None]
-
-
 def analyse(
     line: Cardan,
     rotation: Rotation,
-    grid: StabilityGrid,
+    table: TorsionTable,
     joint: str = "alpha1",
-    damping_ratios: tuple[float, ...] = (0.02,),
+    damping_ratios: tuple[float, ...] = (),
     report: Report = lambda task, done, whole: None,
+    varied: tuple[float, ...] = (),
 ) -> LineAnalysis:
-    """Compute everything. `joint` is the bend of the map, for each of the `damping_ratios`; `report` gets the present
-    task, and how much of it is done."""
+    """Compute everything. `joint` is the bend of the map, for each of the `damping_ratios`, by default that of the
+    line; `varied` are natural frequencies that the line has, too [rad/s]; `report` gets the present task, and how
+    much of it is done."""
     xp = numpy_()
     k = float(frozen_frequency(xp, line, 1.0))
     angle = np.linspace(0.0, 2.0 * math.pi, 721)
     phi3, ratio, _ = two_joints(xp, line, angle)
-    speed = speeds(rotation.speed_low, rotation.speed_high, k, int(rotation.points))
-    curve = steady(line, speed, rotation.load, lambda done: report("steady motion", done, 1.0))
+    ends = table.slowest * rotation.speed, table.fastest * rotation.speed
+    speed = speeds(*ends, k, int(table.points))
+    curve = steady(line, speed, rotation.load, lambda done: report("torsion: steady motion", done, 1.0))
     speed, curve = _refined(line, rotation.load, speed, curve)
     operating = steady(line, rotation.speed, rotation.load)
     simulated = _simulated(
-        line, speed[::SIMULATED], rotation.load, lambda done: report("time simulation", done, 1.0)
+        line, speed[::SIMULATED], rotation.load, lambda done: report("torsion: time simulation", done, 1.0)
     )
+    band = frequency_band(line)
     return LineAnalysis(
         line=line,
         rotation=rotation,
+        ranges=table,
         damping_ratio=damping_ratio(line),
-        band=frequency_band(line),
+        band=band,
+        span=(min(band.least, *varied, k), max(band.largest, *varied, k)),
         at_even=k,
         excitation=_excitation(phi3 - angle, angle),
         angle=angle,
@@ -264,7 +257,13 @@ def analyse(
         simulated=simulated,
         simulated_speed=speed[::SIMULATED],
         map=stability_map(
-            line, rotation, grid, joint, damping_ratios, lambda done: report("map of stability", done, 1.0)
+            line,
+            speeds(*ends, k, int(table.speeds)),
+            np.linspace(table.bend_low, table.bend_high, int(table.bends)),
+            rotation.load,
+            joint,
+            damping_ratios or (damping_ratio(line),),
+            lambda done: report("torsion: map of stability", done, 1.0),
         ),
     )
 
@@ -287,28 +286,20 @@ def _simulated(
 
 def stability_map(
     line: Cardan,
-    rotation: Rotation,
-    grid: StabilityGrid,
+    speed: Any,
+    bend: Any,
+    load: float,
     joint: str,
     damping_ratios: tuple[float, ...],
     progress: Callable[[float], None] = lambda done: None,
 ) -> StabilityMap:
-    """Floquet stability over speed, bend and damping, under the mean load."""
-    k = float(frozen_frequency(numpy_(), line, 1.0))
-    speed = speeds(rotation.speed_low, rotation.speed_high, k, int(grid.speeds))
-    bend = np.linspace(grid.bend_low, grid.bend_high, int(grid.bends))
+    """Floquet stability over speed [rad/s], bend [rad] and damping, under the mean load [N.m]."""
     ratios = np.array(damping_ratios)
     each_ratio, each_bend, each_speed = (x.ravel() for x in np.meshgrid(ratios, bend, speed, indexing="ij"))
-    bends: dict[str, Any] = dict.fromkeys(JOINTS[joint], each_bend)
+    bends: dict[str, Any] = dict.fromkeys(BENT[joint], each_bend)
     unit = with_damping_ratio(line, 1.0)
     p = dataclasses.replace(line, d2=unit.d2 * each_ratio, d3=unit.d3 * each_ratio, **bends)
-    motion = steady(p, each_speed, rotation.load, progress)
+    motion = steady(p, each_speed, load, progress)
     shape = (len(ratios), len(bend), len(speed))
-    return StabilityMap(
-        speed,
-        bend,
-        damping_ratios,
-        joint,
-        motion.growth.reshape(shape),
-        motion.unstable.reshape(shape),
-    )
+    growth, unstable = motion.growth.reshape(shape), motion.unstable.reshape(shape)
+    return StabilityMap(speed, bend, damping_ratios, joint, growth, unstable)

@@ -1,0 +1,229 @@
+"""The section on the torsion of a driveline in rotation: natural frequency, resonance and stability."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..drives.cardan import ORDERS
+from ..study.study import Study
+from ..study.torsion import LineAnalysis
+from ..text import number
+from . import blocks as b
+from . import figure as fig
+from .lines import Line, line
+
+PICTURES = ("campbell.png", "stability.png", "resonance.png", "ratio.png")
+_JOINTS = {
+    "alpha1": "bend of the joint on shaft 2",
+    "alpha2": "bend of the joint on shaft 3",
+    "both": "both bends",
+}
+
+
+def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
+    """What the line is, its numbers, and the figures."""
+    analysis: LineAnalysis = study.findings["torsion"].analysis
+    lead = (
+        "The line by itself, between the rotor J1 and the machine J4: shaft 2 is the motor's, shaft 3 the machine's, "
+        "and a cardan shaft with two joints is between them. Shaft 3 turns i23 times as fast as shaft 2. Bent joints "
+        "vary this ratio twice a turn (order 2), large bends four times a turn, too (order 4). The motor gives a "
+        "constant torque."
+    )
+    yield b.Text(lead, "lead", "long")
+    yield b.Table(tuple(b.TableRow(row) for row in _numbers(s, analysis)), title="Torsion of the driveline")
+    yield b.Table(
+        tuple(b.TableRow(row) for row in _ranges(s, analysis)),
+        b.heads("", "from", "to"),
+        title="Torsion of the driveline: ranges",
+    )
+    yield from (_campbell(analysis), _stability(analysis), _resonance(analysis), _ratio(analysis))
+
+
+def _numbers(s: b.Source, analysis: LineAnalysis) -> Iterator[tuple[Line, Line]]:
+    """One number in each row."""
+
+    def found(path: str, *item: int, digits: int = 4) -> Line:
+        return s.number(f"torsion.{path}", *item, digits=digits)
+
+    yield "inertia J1 of the rotor, at the shaft", found("line.J1")
+    yield "inertia J4 on shaft 3, with the machine's mean", found("line.J4")
+    yield "speed of the shaft in normal running", found("running.speed")
+    yield "mean torque on J4", found("running.load")
+    yield "natural frequency at i23 = 1", found("natural_frequency.even", digits=5)
+    yield "damping ratio", s.number("torsion.damping_ratio")
+    for n in analysis.excitation:
+        yield f"order {n} moves shaft 3 by, {n} times a turn", s.number(f"torsion.excitation.order {n}")
+    if analysis.operating.exists[0]:
+        yield (
+            "Floquet multiplier in normal running, per half turn (stable below 1)",
+            found("operating.largest_multiplier", 0),
+        )
+    else:
+        yield "steady motion in normal running", "not found"
+    for i in range(len(analysis.resonances())):
+        at = found("resonance.peaks.speed", i)
+        yield line("resonance: largest torque in shaft 2 at ", at), found("resonance.peaks.torque2", i)
+
+
+def _ranges(s: b.Source, analysis: LineAnalysis) -> Iterator[tuple[Line, Line, Line]]:
+    """Two ends in each row."""
+
+    def ends(path: str, *item: int) -> tuple[Line, Line]:
+        low, high = (s.number(f"torsion.{path}", *item, end, digits=4) for end in (0, 1))
+        return low, high
+
+    def extremes(path: str, *item: int, digits: int = 4) -> tuple[Line, Line]:
+        low, high = (
+            s.number(f"torsion.{path.format(end)}", *item, digits=digits) for end in ("least", "largest")
+        )
+        return low, high
+
+    yield "ratio i23 over a turn", *extremes("ratio.{}", digits=5)
+    yield "natural frequency over a turn, at a frozen angle", *extremes("natural_frequency.{}", digits=5)
+    for n in ORDERS:
+        if analysis.excitation[n]:
+            yield f"speed at which order {n} meets it", *ends(f"crossings.speed = k/{n}")
+    if analysis.operating.exists[0]:
+        for shaft in (2, 3):
+            torques = extremes(f"operating.{{}}_torque{shaft}", 0)
+            yield f"torque of shaft {shaft} in normal running", *torques
+    for i in range(len(analysis.unstable_ranges())):
+        yield "speed at which it is unstable", *ends("resonance.unstable", i)
+    for i in range(len(analysis.missing_ranges())):
+        yield "speed at which it is not known whether it is stable", *ends("resonance.no_steady_motion", i)
+    if not analysis.unstable_ranges():
+        yield "speed at which it is unstable", "nowhere", ""
+
+
+# -- figures
+
+
+def _speed_axis(analysis: LineAnalysis) -> fig.Axis:
+    return fig.Axis("speed of the shaft", "rad/s", "speed", low=analysis.slowest, high=analysis.fastest)
+
+
+def _running(analysis: LineAnalysis) -> fig.Mark:
+    return fig.Mark(analysis.rotation.speed, "normal running", look="reference")
+
+
+def _campbell(analysis: LineAnalysis) -> fig.Figure:
+    low, high = analysis.span
+    ends = np.array([0.0, analysis.fastest])
+    places = np.flatnonzero(analysis.steady.exists & ~analysis.steady.unstable)[::4]
+    damped, frequency = "damped frequency in rotation (Floquet)", analysis.steady.frequency
+    crossed = {n: 0.5 * (first + last) for n, (first, last) in analysis.crossings().items()}
+    items: tuple[fig.Item, ...] = (
+        fig.Shade(low, high, "natural frequency over a turn, frozen angle", "y", "band"),
+        fig.Curve(damped, analysis.speed[places], frequency[places], 2, "+", joined=False),
+        *(fig.Curve(f"order {n} of i23", ends, n * ends, look) for look, n in enumerate(ORDERS)),
+        fig.Curve("order 1: parametric resonance at speed = k", ends, ends, 3),
+        _running(analysis),
+        *(
+            fig.Label(at, 0.5 * (low + high), "k" if n == 1 else f"k/{n}", "above")
+            for n, at in crossed.items()
+            if analysis.slowest < at < analysis.fastest
+        ),
+    )
+    y = fig.Axis("frequency", "rad/s", "frequency", low=0.0, high=1.7 * high)
+    title = "Where the orders of i23 meet the natural frequency k of torsion"
+    return fig.Figure(
+        "campbell",
+        "Campbell diagram of the driveline",
+        "Natural frequency of torsion and the orders of the ratio i23 over the speed of the shaft.",
+        ((fig.Panel(_speed_axis(analysis), y, items, title),),),
+        file="campbell.png",
+        heights=(2.0,),
+    )
+
+
+def _stability(analysis: LineAnalysis) -> fig.Figure:
+    grid, k = analysis.map, analysis.at_even
+    levels, names = (
+        (-1.0, 0.0, 0.01, 0.03, 10.0),
+        ("stable", "grows below 0.01 k", "0.01 to 0.03 k", "faster"),
+    )
+    y = fig.Axis(_JOINTS[grid.joint], "rad", low=float(grid.bend[0]), high=float(grid.bend[-1]))
+    panels = []
+    for ratio, growth, unstable in zip(grid.ratio, grid.growth, grid.unstable, strict=True):
+        # what does not count as unstable is not drawn so, however near
+        z = np.where(unstable, growth / k, np.minimum(growth / k, -1e-9))
+        bold = 0.0 if np.any(unstable) else None
+        items: list[fig.Item] = [fig.Field(grid.speed, grid.bend, z, levels, names, bold), _running(analysis)]
+        rows, columns = np.nonzero(~np.isfinite(growth))
+        if rows.size:
+            gaps = grid.speed[columns], grid.bend[rows]
+            items.append(fig.Curve("no steady motion found", *gaps, 1, "x", joined=False))
+        if grid.joint != "both":
+            items.append(fig.Mark(getattr(analysis.line, grid.joint), "bend as given", axis="y", look=3))
+        title = f"damping ratio {number(ratio, '1', full=False)}"
+        panels.append(fig.Panel(_speed_axis(analysis), y, tuple(items), title))
+    return fig.Figure(
+        "stability",
+        "Torsional stability of the driveline (Floquet)",
+        "Where torsional disturbances grow, over speed and bend, for each damping ratio.",
+        (tuple(panels),),
+        caption="Growth of a torsional disturbance per second, in parts of the natural frequency k.",
+        file="stability.png",
+        heights=(1.6,),
+        level=True,
+    )
+
+
+def _resonance(analysis: LineAnalysis) -> fig.Figure:
+    simulated, panels = analysis.simulated, []
+    for shaft, static in ((2, analysis.static2), (3, analysis.rotation.load)):
+        steady, rigid = (np.asarray(getattr(of, f"peak{shaft}")) for of in (analysis.steady, analysis.rigid))
+        items: list[fig.Item] = [
+            fig.Curve("steady motion", analysis.speed, steady),
+            fig.Curve("rigid shafts", analysis.speed, rigid, 2),
+            *(fig.Shade(low, high, "unstable") for low, high in analysis.unstable_ranges()),
+            _running(analysis),
+        ]
+        if simulated is not None:
+            points = simulated.speed[analysis.on_speed], getattr(simulated, f"peak{shaft}")[analysis.on_speed]
+            items.append(fig.Curve("time simulation", *points, 1, "o", joined=False))
+        if static > 0.0:
+            items.append(fig.Mark(static, "load alone", axis="y", look=3))
+        if shaft == 2:
+            peaks = analysis.resonances()
+            items += [fig.Label(at, peak, number(peak, "N.m", digits=4), "above") for at, peak in peaks]
+        # where there is nothing to see, not even roundoff is shown
+        largest = max(static, *(float(np.nanmax(y, initial=0.0)) for y in (steady, rigid)))
+        low, high = (1e-3, 1.0) if largest < 1e-3 else (None, None)
+        y = fig.Axis("peak torque", "N.m", low=low, high=high, log=True)
+        panels.append((fig.Panel(_speed_axis(analysis), y, tuple(items), f"shaft {shaft}"),))
+    return fig.Figure(
+        "resonance",
+        f"Peak torque of the driveline over speed, damping ratio {number(analysis.damping_ratio, '1')}",
+        "Peak torques of shafts 2 and 3 over the speed, elastic and rigid.",
+        tuple(panels),
+        file="resonance.png",
+        heights=(1.3, 1.3),
+    )
+
+
+def _ratio(analysis: LineAnalysis) -> fig.Figure:
+    angle = fig.Axis(
+        "angle of shaft 2 from the plane of the joint", "rad", low=0.0, high=2.0 * np.pi, step=45.0
+    )
+    bends = (number(bend, "rad") for bend in (analysis.line.alpha1, analysis.line.alpha2))
+    panels = (
+        ("ratio i23 of shaft 3 to shaft 2", fig.Axis("ratio i23"), analysis.ratio),
+        (
+            "natural frequency of the line if it stood at this angle",
+            fig.Axis("natural frequency", "rad/s", "frequency"),
+            analysis.frequency,
+        ),
+    )
+    return fig.Figure(
+        "ratio",
+        f"The driveline over a turn: bends {' and '.join(bends)}",
+        "Ratio i23 and frozen-angle natural frequency over a turn.",
+        tuple(
+            (fig.Panel(angle, y, (fig.Curve(y.label, analysis.angle, values, listed=False),), title),)
+            for title, y, values in panels
+        ),
+        file="ratio.png",
+    )

@@ -1,0 +1,354 @@
+"""The torsion of a cardan line in rotation as an analysis of a study: made of the study's own line, its remarks and
+every number for a file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..drives.cardan import ORDERS, frequency_band
+from ..drives.torsion import SteadyMotion
+from ..errors import InputError
+from ..text import entries
+from .analysis import Analysis, Findings, Report
+from .config import Config
+from .drive import Drive
+from .result import array_entry
+from .rig import Rig
+from .shaft import two_masses
+from .study import Amount, Remark, Study
+from .torsion import DRIFT, LineAnalysis, Rotation, analyse
+from .verdict import STEADY
+
+ROUNDOFF_TORQUE = 1e-6
+"""torque up to which it is none [N.m]"""
+SLOW = 1.0 / 6.0
+"""Speed of the shaft, in parts of the natural frequency, below which no order of the joints comes near it."""
+SLOWEST = 1.0 / 50.0
+"""The same below which the analysis resolves nothing."""
+APART = 1.1
+"""Ratio of two peaks from which on it is worth a word."""
+
+
+class TorsionAnalysis(Analysis):
+    """Natural frequency, resonance and Floquet stability of a cardan line between a motor of this package and the
+    machine. It is left out where the line turns too slowly for any resonance, unless the file has its table."""
+
+    name = "torsion"
+
+    @staticmethod
+    def applies(config: Config, drive: Drive) -> bool:
+        """See `Analysis`."""
+        return drive.line is not None
+
+    @staticmethod
+    def find(study: Study, rig: Rig, report: Report) -> TorsionFindings | None:
+        """See `Analysis`."""
+        config, drive, modes = study.config, study.drive, study.statics.torsion
+        assert modes is not None
+        turn = study.statics.normal
+        speed = float(config.run.crank_speed * drive.driven.ratio)
+        ends = modes.k_least, modes.k_largest
+        wanted = config.gives("torsion")
+        if not wanted and speed < SLOW * ends[0]:
+            study.remark(
+                "note",
+                "torsion left out",
+                "The line's shaft turns at {speed}, far below its natural frequency of {k_least}: no order of the "
+                "joints comes near it, and the analysis in rotation is left out; a table [torsion] asks for it.",
+                speed=(speed, "rad/s", "speed"),
+                k_least=(ends[0], "rad/s", "frequency"),
+            )
+            return None
+        line = two_masses(drive, float(np.mean(turn.outputs.J)))
+        slowest = SLOWEST * max(frequency_band(line).largest, ends[1])
+        if config.torsion.slowest * speed < slowest:
+            raise InputError(
+                f"torsion.slowest = {config.torsion.slowest:g}: the shaft turns at {speed:.4g} rad/s; must be >= "
+                f"{slowest / speed:.3g}, as below a fiftieth of the natural frequency nothing resonates"
+            )
+        load = float(np.mean(turn.crank_torque)) / drive.driven.ratio
+        rotation = Rotation(speed=speed, load=load)
+        return TorsionFindings(
+            analyse(line, rotation, config.torsion, config.joint, config.damping_ratios, report, ends)
+        )
+
+
+def _speed(x: float) -> Amount:
+    return float(x), "rad/s", "speed", 4
+
+
+def _torque(x: float) -> Amount:
+    return float(x), "N.m", "", 4
+
+
+@dataclass(frozen=True)
+class TorsionFindings(Findings):
+    """What the analysis found."""
+
+    analysis: LineAnalysis
+
+    def as_dict(self) -> dict[str, Any]:
+        """See `Findings`; null without a steady motion."""
+        return as_dict(self.analysis)
+
+    def remark(self, study: Study) -> None:
+        """See `Findings`."""
+        study.remarks += self.remarks()
+        steady = study.shaft.get(STEADY)
+        peak = float(self.analysis.operating.peak2[0])
+        if steady is not None and not 1.0 / APART < steady.tau2_peak / peak < APART:
+            study.remark(
+                "note",
+                "torque of the motor",
+                "In steady running shaft 2 peaks at {run}, in the analysis of the line in rotation at {peak}: there "
+                "the motor gives a constant torque, while speed control, slip and the machine's own unevenness act "
+                "on the torsion, too.",
+                STEADY,
+                run=_torque(steady.tau2_peak),
+                peak=_torque(peak),
+            )
+
+    def remarks(self) -> Iterator[Remark]:
+        """What the analysis alone says."""
+        yield from self._crossings()
+        if not self.analysis.operating.exists[0]:
+            yield Remark.of(
+                "warning",
+                "no steady motion",
+                "No steady motion found at {speed}: either none repeats itself each half turn, or the search did not "
+                "reach it; more damping or less bend helps both.",
+                speed=_speed(self.analysis.rotation.speed),
+            )
+        else:
+            yield from self._at_operation()
+        yield from self._over_speed()
+        yield self._gains()
+        yield from self._simulation()
+
+    def _crossings(self) -> Iterator[Remark]:
+        """Orders near whose resonance the line runs."""
+        analysis = self.analysis
+        at, margin = analysis.rotation.speed, analysis.ranges.margin
+        for n, (low, high) in analysis.crossings().items() if analysis.shaken else ():
+            near = max(low - at, at - high, 0.0) / at
+            if n in ORDERS and near < margin:
+                yield Remark.of(
+                    "warning",
+                    "order near line",
+                    f"Running at {{speed}} is {{near}} from where order {n} of the joints ({n} times a turn) meets "
+                    "the natural frequency of torsion, {low} to {high}; permitted is {margin}: change the speed or "
+                    "the shafts. The order moves shaft 3 by {amplitude}.",
+                    speed=_speed(at),
+                    near=(near, "1", "percent"),
+                    low=_speed(low),
+                    high=_speed(high),
+                    margin=(margin, "1", "percent"),
+                    amplitude=(analysis.excitation[n], "rad"),
+                )
+
+    def _at_operation(self) -> Iterator[Remark]:
+        analysis = self.analysis
+        rotation, motion = analysis.rotation, analysis.operating
+        at, factor = _speed(rotation.speed), analysis.ranges.factor
+        for shaft, peak, static in (
+            (2, float(motion.peak2[0]), analysis.static2),
+            (3, float(motion.peak3[0]), rotation.load),
+        ):
+            if static > 0.0 and peak > factor * static:
+                yield Remark.of(
+                    "warning",
+                    "peak of a shaft",
+                    f"Shaft {shaft} carries {{peak}} at {{speed}}, {{times}} times the torque of the load alone; "
+                    f"permitted is {factor:g}.",
+                    peak=_torque(peak),
+                    speed=at,
+                    times=(peak / static, "1"),
+                )
+        least = float(motion.least2[0])
+        if rotation.load > 0.0 and least < 0.0:
+            yield Remark.of(
+                "warning",
+                "torque changes sign",
+                "The torque of shaft 2 falls to {least} in each half turn: with play in splines and joints, which is "
+                "not modelled, it hammers.",
+                least=_torque(least),
+            )
+        if motion.unstable[0]:
+            yield Remark.of(
+                "warning",
+                "unstable running",
+                "Running at {speed} is unstable: a torsional vibration grows e-fold in {time}.",
+                speed=at,
+                time=(1.0 / float(motion.growth[0]), "s"),
+            )
+        elif motion.free_growth[0] > DRIFT:
+            yield Remark.of(
+                "warning",
+                "drifting speed",
+                "A motor whose torque does not fall with speed would not hold {speed}: deviations grow by {growth}, "
+                "as above a resonance faster running takes less torque; its control, or slip, must outweigh that.",
+                speed=at,
+                growth=(float(motion.free_growth[0]), "1/s"),
+            )
+
+    def _over_speed(self) -> Iterator[Remark]:
+        """Ranges of speed in which the line does not run well."""
+        analysis = self.analysis
+        for low, high in analysis.unstable_ranges():
+            yield Remark.of(
+                "warning",
+                "unstable range",
+                "Unstable from {low} to {high} at the damping ratio {damping}: torsional vibration grows by itself "
+                "(parametric resonance); more damping or less uneven joints end it.",
+                low=_speed(low),
+                high=_speed(high),
+                damping=(analysis.damping_ratio, "1"),
+            )
+        for low, high in analysis.missing_ranges():
+            yield Remark.of(
+                "warning",
+                "range without steady motion",
+                "No steady motion found from {low} to {high}: either none repeats itself each half turn, or the "
+                "search did not reach it.",
+                low=_speed(low),
+                high=_speed(high),
+            )
+        for low, high in analysis.drifting_ranges():
+            yield Remark.of(
+                "note",
+                "drifting range",
+                "Held by a speed control or slip only, not by a motor of constant torque: {low} to {high}.",
+                low=_speed(low),
+                high=_speed(high),
+            )
+
+    def _gains(self) -> Remark:
+        """What raises the natural frequency."""
+        by = self.analysis.sensitivity
+        names = {"J1": "rotor J1", "J4": "driven inertia J4", "c2": "shaft 2", "c3": "shaft 3"}
+        strongest = sorted(by, key=lambda name: -abs(by[name]))
+        gains: dict[str, Amount] = {name: (0.01 * abs(by[name]), "1", "percent") for name in strongest}
+        words = (
+            f"{'stiffer' if name[0] == 'c' else 'lighter'} {names[name]}: {{{name}}}" for name in strongest
+        )
+        text = f"What raises the natural frequency, per 1 %: {', '.join(words)}."
+        return Remark.of("note", "natural frequency", text, **gains)
+
+    def _simulation(self) -> Iterator[Remark]:
+        """What the resonance curve and its time simulation leave out."""
+        analysis = self.analysis
+        if analysis.damping_ratio <= 0.0:
+            text = (
+                "Without damping no transient dies: no time simulation, and resonance peaks are bounded by the twist "
+                "alone; give driveline.damping_ratio, or d2 and d3."
+            )
+            yield Remark.of("note", "undamped resonance", text)
+        elif analysis.simulated is None:
+            yield Remark.of(
+                "note",
+                "no time simulation",
+                "Transients take too long for a time simulation (damping ratio {damping}): the resonance curve is "
+                "that of the steady motion.",
+                damping=(analysis.damping_ratio, "1"),
+            )
+        elif not np.all(analysis.on_speed):
+            off = analysis.simulated_speed[~analysis.on_speed]
+            yield Remark.of(
+                "note",
+                "speed lost",
+                f"The slow control of the time simulation lost the speed at {len(off)} of "
+                f"{len(analysis.simulated_speed)} speeds, {{low}} to {{high}}; they are not drawn.",
+                low=_speed(off.min()),
+                high=_speed(off.max()),
+            )
+        yield Remark.of(
+            "note",
+            "run-up",
+            "The resonance curve is that of running at each speed for long; a run-up that passes quickly stays below "
+            "it.",
+        )
+
+
+def _speeds(x: Any) -> dict[str, Any]:
+    return array_entry(x, "rad/s", "speed")
+
+
+def _frequency(x: Any) -> dict[str, Any]:
+    return array_entry(x, "rad/s", "frequency")
+
+
+def _motion(m: SteadyMotion) -> dict[str, Any]:
+    torques = {
+        f"{end}_torque{shaft}": getattr(m, f"{end}{shaft}")
+        for shaft in (2, 3)
+        for end in ("peak", "least", "largest")
+    }
+    return {
+        "found": m.exists.tolist(),
+        **{
+            name: array_entry(np.where(np.abs(x) < ROUNDOFF_TORQUE, 0.0, x), "N.m")
+            for name, x in torques.items()
+        },
+        "drive_torque": array_entry(m.drive, "N.m"),
+        "growth": array_entry(m.growth, "1/s"),
+        "largest_multiplier": array_entry(m.multiplier, "1"),
+        "growth_with_constant_torque": array_entry(m.free_growth, "1/s"),
+        "frequency": _frequency(m.frequency),
+    }
+
+
+def as_dict(analysis: LineAnalysis) -> dict[str, Any]:
+    """Ready for JSON, each number with its unit; null without a steady motion."""
+    band, simulated = analysis.band, analysis.simulated
+    return {
+        "line": entries(analysis.line),
+        "running": entries(analysis.rotation),
+        **entries(analysis.ranges),
+        "damping_ratio": array_entry(analysis.damping_ratio, "1"),
+        "natural_frequency": {
+            "even": _frequency(analysis.at_even),
+            "least": _frequency(band.least),
+            "largest": _frequency(band.largest),
+            "at_ratio_zero": _frequency(band.at_zero),
+            "at_ratio_infinite": _frequency(band.at_infinity),
+        },
+        "sensitivity": {name: array_entry(x, "1") for name, x in analysis.sensitivity.items()},
+        "ratio": {
+            "least": array_entry(np.min(analysis.ratio), "1"),
+            "largest": array_entry(np.max(analysis.ratio), "1"),
+        },
+        "excitation": {f"order {n}": array_entry(x, "rad") for n, x in analysis.excitation.items()},
+        "crossings": {f"speed = k/{n}": _speeds(ends) for n, ends in analysis.crossings().items()},
+        "operating": {"static_torque2": array_entry(analysis.static2, "N.m"), **_motion(analysis.operating)},
+        "resonance": {
+            "speed": _speeds(analysis.speed),
+            **_motion(analysis.steady),
+            "peaks": {
+                "speed": _speeds([at for at, _ in analysis.resonances()]),
+                "torque2": array_entry([peak for _, peak in analysis.resonances()], "N.m"),
+            },
+            "rigid_torque2": array_entry(analysis.rigid.peak2, "N.m"),
+            "rigid_torque3": array_entry(analysis.rigid.peak3, "N.m"),
+            "unstable": _speeds(analysis.unstable_ranges()),
+            "no_steady_motion": _speeds(analysis.missing_ranges()),
+        },
+        "simulation": None
+        if simulated is None
+        else {
+            "asked_speed": _speeds(analysis.simulated_speed),
+            "speed": _speeds(simulated.speed),
+            "peak_torque2": array_entry(simulated.peak2, "N.m"),
+            "peak_torque3": array_entry(simulated.peak3, "N.m"),
+        },
+        "stability": {
+            "joint": analysis.map.joint,
+            "speed": _speeds(analysis.map.speed),
+            "bend": array_entry(analysis.map.bend, "rad"),
+            "damping_ratio": array_entry(analysis.map.ratio, "1"),
+            "growth": array_entry(analysis.map.growth, "1/s"),
+        },
+    }
