@@ -49,6 +49,16 @@ MEASURE = """    bearing_peak: Value = measure(
         during=_ALL,
     )
 """
+FIGURE = '''
+
+@PICTURES.declare(lambda study: "machine.angle" in study.runs.get("start_up", ()), "output_angle.png")
+def _output_angle(s: b.Source, study: Study) -> fig.Figure:
+    """The angle of the output link over time."""
+    run = study.runs["start_up"]
+    curve = fig.Curve("output link", run["time"].values, run["machine.angle"].values)
+    panel = fig.Panel(fig.Axis("time", "s"), fig.Axis("angle of the output link", "rad"), (curve,))
+    return fig.Figure("output-angle", "The output link", "Angle of the output link over time.", ((panel,),))
+'''
 STUDY = """
 title = "A six-bar with a motor of another type"
 
@@ -113,7 +123,7 @@ def files_of(house, add):
 
 @pytest.fixture(scope="module")
 def result(house):
-    """The study of the six-bar by a motor of a new type, with a new event and a new measure."""
+    """The study of the six-bar by a motor of a new type, with a new event, a new measure and a new figure."""
     assert files_of(house, lambda: house.add("machines/six_bar.py", HERE / "six_bar.py")) == 1
 
     def motor():
@@ -127,6 +137,7 @@ def result(house):
     assert files_of(house, lambda: house.insert("study/events.py", "", EVENT)) == 1
     line = '    speed_mean: Value = measure("rad/s"'
     assert files_of(house, lambda: house.insert("study/measures.py", line, MEASURE)) == 1
+    assert files_of(house, lambda: house.insert("report/figures.py", "", FIGURE)) == 1
     (house.folder / "mine.toml").write_text(STUDY, "utf-8")
     house.run("study", "mine.toml", "-o", "mine")
     return json.loads((house.folder / "mine" / "result.json").read_text("utf-8"))
@@ -169,3 +180,14 @@ def test_a_measure_is_a_field(house, result):
         peak = result["answers"][run]["bearing_peak"]["value"]
         assert peak == pytest.approx(result["pins"][run]["O3 output"]["peak"]["value"], rel=1e-12)
     assert "force in the bearing O3, peak" in (house.folder / "mine" / "report.html").read_text("utf-8")
+
+
+def test_a_figure_is_a_function_and_is_drawn_on_the_page_and_in_print(house, result):
+    picture = (house.folder / "mine" / "output_angle.png").read_bytes()
+    assert picture.startswith(b"\x89PNG") and len(picture) > 5000
+    assert "Angle of the output link over time." in (house.folder / "mine" / "report.html").read_text("utf-8")
+    # a later run takes the picture away where it has none
+    command = ("study", "-o", "mine", "other.toml")
+    (house.folder / "other.toml").write_text("event = []\n[run]\nsettle_turns = 0\nramp = 0.2\n", "utf-8")
+    house.run(*command)
+    assert not (house.folder / "mine" / "output_angle.png").exists()
