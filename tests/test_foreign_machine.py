@@ -5,15 +5,21 @@ from __future__ import annotations
 import json
 import math
 import re
+import zipfile
+from dataclasses import replace
 from pathlib import Path
+from xml.etree import ElementTree
 
 import foreign_motor
 import numpy as np
 import pytest
 from command import chainunit
+from fmpy.ssp.ssd import read_ssd
 from scipy.integrate import solve_ivp
 from test_foreign_system import OTHER as MOTOR_OTHER
 from test_foreign_system import OTHER_NAMES, build
+from test_ssp import TOOLS, connections
+from test_ssp import run as run_in
 
 from chainunit import InputError
 from chainunit.quantities import Value, declaration, quantity
@@ -21,8 +27,10 @@ from chainunit.study import config
 from chainunit.study.choice import choose
 from chainunit.study.cycle import cycle
 from chainunit.study.events import TYPES, Event, Role, Timing
+from chainunit.study.package import study_system
+from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
-from chainunit.system import Profile, certify
+from chainunit.system import CoSimulation, Profile, certify
 
 SCRIPT = Path(__file__).parent / "foreign_machine.py"
 RATIO, SPEED, MASS, PRESSURE, BURST = 25.0, 6.0, 60.0, 3e3, 8e4
@@ -195,8 +203,6 @@ def test_the_step_is_of_second_order(folder):
         drive = choose(
             parse(at, f"{STUDY}{MACHINE}motor = 'ForeignMotor.fmu'\n{OTHER_NAMES}"), at, None
         ).drive
-        from chainunit.study.rig import Rig
-
         files, _ = drive.export(at)
         rig = Rig(parse(at, STUDY + MACHINE), drive, files)
         w_ref = Profile(0.0, ((0.0, 0.3, SPEED * RATIO),))
@@ -283,3 +289,41 @@ def test_a_cardan_line_before_it(place, folder):
     assert gear == (RATIO if place == "motor" else 1.0) and study.drive.ratio == RATIO
     assert study.shaft["steady"].amplification == pytest.approx(1.0, abs=0.5)
     assert study.answers["steady"].speed_mean == pytest.approx(SPEED, rel=1e-2)
+
+
+@pytest.mark.parametrize("tool", TOOLS)
+def test_a_package_holds_their_files_as_they_are(tool, folder, tmp_path):
+    """In other tools the system runs as in the own master: names, values and connections are those of the FMUs."""
+    (folder / "both.toml").write_text(f"{STUDY}{MACHINE}motor = 'ForeignMotor.fmu'\n{OTHER_NAMES}")
+    done = chainunit("export-ssp", "both.toml", "-o", str(tmp_path / "both.ssp"), cwd=folder)
+    assert done.returncode == 0, done.stderr
+    assert "machine (ForeignMachine), gear (Gear), motor (ForeignMotor)" in done.stdout
+    assert "ForeignMachine.fmu as it is" in done.stdout
+    with zipfile.ZipFile(tmp_path / "both.ssp") as archive:
+        for name in ("ForeignMachine", "ForeignMotor"):
+            assert archive.read(f"resources/{name}.fmu") == (folder / f"{name}.fmu").read_bytes()
+    system = read_ssd(str(tmp_path / "both.ssp")).system
+    given = {e.name: e.parameterBindings[0].parameterValues[0].parameters for e in system.elements}
+    values = {f"{name}.{p.name}": float(p.value) for name, each in given.items() for p in each}
+    assert values == {
+        "machine.piston.mass": MASS,
+        "machine.throw": 0.15,
+        "machine.back_pressure": PRESSURE,
+        "gear.ratio": RATIO,
+        "motor.w_ref": SPEED * RATIO,
+    }
+    wired = connections(tmp_path / "both.ssp")
+    assert ("motor.rotor_speed", "gear.w") in wired and ("gear.J", "motor.inertia_behind") in wired
+    root = ElementTree.fromstring(zipfile.ZipFile(tmp_path / "both.ssp").read("SystemStructure.ssd"))
+    units = {n.get("name"): n[0].get("unit") for n in root.iter() if n.tag.endswith("}Connector")}
+    assert units["rotor_speed"] == "rad/s" and units["inertia_behind"] == "kg.m2"
+    assert units["back_pressure"] is None
+    names = ["motor.rotor_speed", "machine.phi0"]
+    got = run_in(tool, tmp_path / "both.ssp", names, 0.3, 1e-3)
+    study = parse(folder, (folder / "both.toml").read_text())
+    drive = choose(study, tmp_path, None).drive
+    files, _ = drive.export(tmp_path)
+    with CoSimulation(replace(drive.system(files), start=study_system(study, drive).start)) as simulation:
+        out = simulation.run(0.3, 1e-3)
+    wanted = np.stack([out[name].values[1:] for name in ("motor.w", "machine.phi0")], axis=1)
+    assert np.all(np.max(np.abs(got - wanted), axis=0) < 3e-3 * np.max(np.abs(wanted), axis=0))

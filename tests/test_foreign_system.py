@@ -481,10 +481,6 @@ def test_a_study_file_that_does_not_fit_is_refused_in_a_line(change, said, folde
     "command, said",
     [
         (
-            ["export-ssp", "foreign.toml"],
-            r"system\.motor: ForeignMotor\.fmu is an FMU of somebody else, and only",
-        ),
-        (
             ["study", "--check", "foreign.toml", "-o", "check"],
             r"--check: the equations of ForeignMotor\.fmu are not",
         ),

@@ -31,9 +31,11 @@ def study_system(config: Config, drive: Drive) -> System:
     """Machine, driveline and motor of a study, from rest: the speed reference is the crank speed at the motor from
     the start on, feed and processing forces are those of normal running; with feed-forward, the machine that the
     control asks is in the system, too."""
-    start = {"motor.w_ref": config.run.crank_speed * drive.ratio}
+    start = drive.loads(config.feed) if drive.outsider else {}
+    if "w_ref" in drive.graph.components["motor"].connectors:
+        start["motor.w_ref"] = config.run.crank_speed * drive.ratio
     for name, machine in (("machine", drive.driven), ("model", drive.machine)):
-        if name in drive.graph.components:
+        if name in drive.graph.components and not drive.outsider:
             # a connected input needs no start value, but an FMU that runs alone has one
             values = _machine(config, machine.model, machine)
             start |= {f"{name}.{variable}": x for variable, x in values.items()}
@@ -128,11 +130,6 @@ def export_study(
     InputError, RunError
         see `chainunit.system.ssp.export`; also where sizing finds no motor, or it is an FMU of somebody else.
     """
-    if config.foreign is not None:
-        raise InputError(
-            f"system.motor: {config.foreign.file} is an FMU of somebody else, and only models of this package are "
-            "packaged; leave [system] out"
-        )
     drive = _drive(config, backend, report)
     run = config.run
     stop = config.settled + run.turns * 2.0 * math.pi / run.crank_speed

@@ -1,5 +1,6 @@
 """Export of models and their connections as an SSP 1.0 package: FMUs, parameter sets, the structure of the system.
 
+FMUs of somebody else are in it as they are, with their own names; what the system sets of them is in their sets.
 The package runs as it is in libcosim, which reads every component's parameter set and, from an annotation, the
 step; and in ecos, which takes the set by name (``init(parameter_set="start")``). Each FMU carries its start values,
 too, so that a tool that passes the sets by runs the same system. Neither of the two reads connections to
@@ -11,6 +12,7 @@ from __future__ import annotations
 import math
 import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from importlib import metadata
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
@@ -19,10 +21,9 @@ from ..errors import InputError, refusal_prefix
 from ..files import folder, whole
 from ..fmu.backends import Backend
 from ..fmu.backends import export as export_fmu
-from ..fmu.description import Interface, Signal
 from ..fmu.pack import interface_of, pack, xml_bytes
-from ..quantities import base_units
-from .graph import ModelComponent, System
+from ..model import Model
+from .graph import Connector, FmuComponent, System
 
 PARAMETER_SET = "start"
 """Name of every component's parameter set: tools that choose sets by name apply all that share one."""
@@ -52,7 +53,7 @@ def export(
 
     Parameters
     ----------
-    system : components, of which all are models
+    system : its models become FMUs, the FMUs of somebody else are packaged as they are
     file : path of the package; a file there is replaced, in one step
     name, description : of the whole
     stop, step : end of the default experiment, and its communication step, an annotation that libcosim reads [s]
@@ -62,14 +63,14 @@ def export(
     Raises
     ------
     InputError
-        for a component that is an FMU of somebody else, start values out of bounds or that make no machine, an
-        experiment without end or step, and what `chainunit.fmu.backends.export` refuses.
+        for start values out of bounds or that make no machine, an experiment without end or step, and what
+        `chainunit.fmu.backends.export` refuses.
     RunError
         where the compiler fails.
     """
     if not (0.0 < step < math.inf and 0.0 < stop < math.inf):
         raise InputError(f"an experiment of {stop:g} s in steps of {step:g} s: must go forward")
-    interfaces = _interfaces(system)
+    parts = _parts(system)
     driven = {target for _, target in system.connections}
     file = Path(file)
     folder(file.parent)
@@ -78,44 +79,80 @@ def export(
     origins: list[str] = []
     paths: dict[tuple[object, ...], str] = {}
     with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
-        for component, interface in interfaces.items():
-            model, start = interface.model, _start(interface)
-            alike = (model, *sorted(start.items()))
+        for name_of, part in parts.items():
+            alike = (part.of, *sorted(part.start.items()))
             if alike not in paths:
-                source = f"resources/{model.name}.fmu"
-                paths[alike] = f"resources/{model.name}_{component}.fmu" if source in contents else source
-                fmu = Path(scratch) / f"{model.name}.fmu"
-                origins.append(str(export_fmu(model, fmu, start, backend=backend, report=report)))
+                source = f"resources/{part.title}.fmu"
+                paths[alike] = f"resources/{part.title}_{name_of}.fmu" if source in contents else source
+                if isinstance(part.of, Path):
+                    fmu = part.of
+                    origins.append(f"{fmu.name} as it is")
+                else:
+                    fmu = Path(scratch) / f"{part.title}.fmu"
+                    origins.append(str(export_fmu(part.of, fmu, part.start, backend=backend, report=report)))
                 contents[paths[alike]] = fmu.read_bytes()
-            sources[component] = paths[alike]
-    for component, interface in interfaces.items():
-        free = [s for s in interface.of("input") if f"{component}.{s.name}" not in driven]
-        contents[_parameter_file(component)] = xml_bytes(_parameter_set([*interface.of("parameter"), *free]))
-    structure = _description(system, interfaces, sources, (name, description), (stop, step))
+            sources[name_of] = paths[alike]
+    for name_of, part in parts.items():
+        free = [c for c in part.of_kind("input") if f"{name_of}.{c.name}" not in driven]
+        set_here = [c for c in part.of_kind("parameter") if c.name in part.start]
+        contents[_parameter_file(name_of)] = xml_bytes(_parameter_set(part, [*set_here, *free]))
+    structure = _description(system, parts, sources, (name, description), (stop, step))
     contents["SystemStructure.ssd"] = xml_bytes(structure)
-    with whole(file) as part:
-        pack(contents, part)
-    parts = ", ".join(f"{component} ({i.model.name})" for component, i in interfaces.items())
-    return f"SSP 1.0, {parts}, {len(system.connections)} connections; {'; '.join(dict.fromkeys(origins))}"
+    with whole(file) as temporary:
+        pack(contents, temporary)
+    titles = ", ".join(f"{name_of} ({part.title})" for name_of, part in parts.items())
+    return f"SSP 1.0, {titles}, {len(system.connections)} connections; {'; '.join(dict.fromkeys(origins))}"
 
 
-def _interfaces(system: System) -> dict[str, Interface]:
-    """The interface of each component with its start values."""
+@dataclass(frozen=True)
+class _Part:
+    """A component in the package: its model or the file of somebody else, its variables, and their names in the FMU
+    where they differ."""
+
+    of: type[Model] | Path
+    title: str
+    description: str
+    connectors: Sequence[Connector]
+    start: dict[str, float]
+    """start values of parameters and inputs, as the FMU carries them or the package sets them"""
+    names: Mapping[str, str]
+
+    def of_kind(self, causality: str) -> list[Connector]:
+        """The variables of a causality."""
+        return [c for c in self.connectors if c.causality == causality]
+
+    def name(self, variable: str) -> str:
+        """The name of a variable in the FMU."""
+        return self.names.get(variable, variable)
+
+
+def _parts(system: System) -> dict[str, _Part]:
+    """The components with their start values."""
     start: dict[str, dict[str, float]] = {name: {} for name in system.components}
     for full, value in system.values.items():
         name, _, variable = full.partition(".")
         start[name][variable] = float(value)
-    interfaces = {}
+    parts = {}
     for name, component in system.components.items():
-        if not isinstance(component, ModelComponent):
-            raise InputError(f"{name} ({component.title}): is an FMU of somebody else, which is not packaged")
+        if isinstance(component, FmuComponent):
+            own = list(component.connectors.values())
+            title = component.file.stem
+            parts[name] = _Part(
+                component.file, title, component.description, own, start[name], component.names
+            )
+            continue
         with refusal_prefix(f"{name}: "):
-            interfaces[name] = interface_of(component.model, start[name])
-    return interfaces
-
-
-def _start(interface: Interface) -> dict[str, float]:
-    return {s.name: float(s.start or 0.0) for s in (*interface.of("parameter"), *interface.of("input"))}
+            interface = interface_of(component.model, start[name])
+        known = component.connectors
+        own = [replace(known[s.name], start=float(s.start or 0.0)) for s in interface.signals]
+        described = [
+            replace(c, description=s.variable.description)
+            for c, s in zip(own, interface.signals, strict=True)
+        ]
+        given = {c.name: c.start for c in described if c.causality != "output"}
+        model = component.model
+        parts[name] = _Part(model, model.name, model.description, described, given, {})
+    return parts
 
 
 # -- XML
@@ -134,27 +171,34 @@ def _root(tag: str, name: str, prefixes: Iterable[str], description: str = "") -
     return root
 
 
-def _units(parent: Element, prefix: str, signals: Iterable[Signal]) -> None:
+def _units(parent: Element, prefix: str, connectors: Iterable[Connector]) -> None:
+    dimensions = {c.unit: c.dimension for c in connectors if c.unit}
+    if not dimensions:
+        return
     group = SubElement(parent, f"{prefix}:Units")
-    for unit in sorted({s.variable.unit for s in signals}):
+    for unit, dimension in sorted(dimensions.items()):
         node = SubElement(group, "ssc:Unit", name=unit)
-        SubElement(node, "ssc:BaseUnit", {base: str(power) for base, power in base_units(unit).items()})
+        SubElement(node, "ssc:BaseUnit", {base: str(power) for base, power in (dimension or {}).items()})
 
 
-def _parameter_set(signals: Sequence[Signal]) -> Element:
-    """The XML tree of an SSV file with the start values of `signals`."""
+def _real(node: Element, tag: str, c: Connector, attributes: Mapping[str, str] | None = None) -> None:
+    SubElement(node, tag, {**(attributes or {}), **({"unit": c.unit} if c.unit else {})})
+
+
+def _parameter_set(part: _Part, connectors: Sequence[Connector]) -> Element:
+    """The XML tree of an SSV file with the start values of `connectors`."""
     root = _root("ssv:ParameterSet", PARAMETER_SET, ("ssv", "ssc"))
     group = SubElement(root, "ssv:Parameters")
-    for s in signals:
-        node = SubElement(group, "ssv:Parameter", name=s.name, description=s.variable.description)
-        SubElement(node, "ssv:Real", value=repr(float(s.start or 0.0)), unit=s.variable.unit)
-    _units(root, "ssv", signals)
+    for c in connectors:
+        node = SubElement(group, "ssv:Parameter", name=part.name(c.name), description=c.description)
+        _real(node, "ssv:Real", c, {"value": repr(part.start.get(c.name, c.start))})
+    _units(root, "ssv", connectors)
     return root
 
 
 def _description(
     system: System,
-    interfaces: Mapping[str, Interface],
+    parts: Mapping[str, _Part],
     sources: Mapping[str, str],
     title: tuple[str, str],
     experiment: tuple[float, float],
@@ -166,8 +210,8 @@ def _description(
     root = _root("ssd:SystemStructureDescription", title[0], ("ssd", "ssc", "osp"), described)
     top = SubElement(root, "ssd:System", name=title[0])
     elements = SubElement(top, "ssd:Elements")
-    for name, interface in interfaces.items():
-        _component(elements, name, interface, sources[name])
+    for name, part in parts.items():
+        _component(elements, name, part, sources[name])
     if system.connections:
         connections = SubElement(top, "ssd:Connections")
         for ends in system.connections:
@@ -176,11 +220,11 @@ def _description(
                 connections,
                 "ssd:Connection",
                 startElement=source,
-                startConnector=output,
+                startConnector=parts[source].name(output),
                 endElement=target,
-                endConnector=entry,
+                endConnector=parts[target].name(entry),
             )
-    _units(root, "ssd", [s for interface in interfaces.values() for s in interface.signals])
+    _units(root, "ssd", [c for part in parts.values() for c in part.connectors])
     stop, step = (repr(float(x)) for x in experiment)
     default = SubElement(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=stop)
     annotations = SubElement(default, "ssd:Annotations")
@@ -190,21 +234,22 @@ def _description(
     return root
 
 
-def _component(elements: Element, name: str, interface: Interface, source: str) -> None:
+def _component(elements: Element, name: str, part: _Part, source: str) -> None:
     component = SubElement(
         elements,
         "ssd:Component",
         name=name,
-        description=interface.model.description,
+        description=part.description,
         type="application/x-fmu-sharedlibrary",
         source=source,
         implementation="CoSimulation",
     )
     connectors = SubElement(component, "ssd:Connectors")
-    for s in interface.signals:
-        about = s.variable.description
-        node = SubElement(connectors, "ssd:Connector", name=s.name, description=about, kind=s.causality)
-        SubElement(node, "ssc:Real", unit=s.variable.unit)
+    for c in part.connectors:
+        node = SubElement(
+            connectors, "ssd:Connector", name=part.name(c.name), description=c.description, kind=c.causality
+        )
+        _real(node, "ssc:Real", c)
     bindings = SubElement(component, "ssd:ParameterBindings")
     SubElement(
         bindings,
