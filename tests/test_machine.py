@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import doctest
 import pickle
 
 import numpy as np
@@ -10,6 +11,7 @@ from test_linkage import SixBar
 
 from chainunit import ChainUnit, InputError
 from chainunit.engines import MATH
+from chainunit.machines import api, machine
 from chainunit.machines.api import machine_of
 from chainunit.machines.flexible import flexible
 from chainunit.machines.machine import Machine
@@ -96,6 +98,11 @@ def test_a_machine_with_chains_is_simulated():
     bars = machine_of(MACHINES["ChamberForces"]).pin_turns(run)
     np.testing.assert_array_equal(turned["pivot"], bars["pivot"])
     assert machine.stored_per_unit["left.material_mass"]({"left.energy_per_kg": 2.5}) == 2.5
+
+
+@pytest.mark.parametrize("module", [api, machine])
+def test_the_examples_of_docstrings(module):
+    assert doctest.testmod(module).attempted > 0 == doctest.testmod(module).failed
 
 
 def test_what_a_chain_unit_has_beside_others():

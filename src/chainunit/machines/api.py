@@ -39,18 +39,7 @@ _ROCKER = {
 
 
 class ChainUnit(Machine):
-    """A chain unit with its parameters checked, see `Machine`.
-
-    Parameters
-    ----------
-    parameters : Parameters, or names of `ChamberForces` parameters with their values (SI), e.g.
-        ``{"r": 0.2, "crank.m": 35.0}``; a value that is not named is the packaged machine's.
-    **values : the same for names without a dot.
-
-    Raises
-    ------
-    KeyError, InputError, GeometryError
-        see `Machine`.
+    """A chain unit with its parameters checked; arguments, arrays and errors as of `Machine`.
 
     Examples
     --------

@@ -43,8 +43,8 @@ class Machine:
     --------
     >>> from chainunit.machines.knife_drive import KnifeDrive
     >>> knife = Machine(KnifeDrive, ratio=10.0)
-    >>> round(float(knife.outputs(phi=0.5, w=30.0, feed=KnifeDrive.Feed(cut_force=2000.0)).margin), 3)
-    0.522
+    >>> round(float(knife.outputs(phi=0.5, w=30.0, feed=KnifeDrive.Feed(cut_force=2000.0)).tau), 2)
+    3.41
     """
 
     def __init__(self, model: type[InverseMachine], parameters: Any = None, /, **values: float) -> None:
