@@ -62,7 +62,8 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
-    help="Forces in a chain unit: FMUs, co-simulation with motor models, drive torque and one-sided overload.",
+    help="Forces in a chain unit, and in any other machine that a crank drives: FMUs, co-simulation with motors, "
+    "drive torque, overloads.",
 )
 
 
