@@ -214,9 +214,9 @@ def test_every_number_is_traced_to_result_json(study, written):
     paths = {n["data-path"] for n in reader.numbers}
     for run, answers in result["answers"].items():
         assert {f"answers.{run}.{a}" for a, entry in answers.items() if entry["value"] is not None} <= paths
-    factors = (f"overload_factors.{side}" for side in result["overload_factors"])
+    factors = (f"organs.overload_factors.{side}" for side in result["organs"]["overload_factors"])
     events = (f"event.{name}" for name in result["event"])
-    for section in ("machine", "motor", "feed", "run", *events, "limits", *factors):
+    for section in ("machine", "motor", "feed", "run", *events, "organs.limits", *factors):
         wanted = {f"{section}.{n}" for n, e in at(result, section).items() if isinstance(e, dict)}
         assert wanted <= paths, section
     for path in ("answers.steady.crank_torque_peak", "certificate.jam_left.energy_residual_share"):
@@ -435,12 +435,12 @@ def test_what_does_not_act_is_not_given(study):
 
 def test_the_speeds_at_which_a_web_goes_slack_are_a_sentence(study):
     slack = {"slack_speed": 0.0, "slack_speed_empty": 4.64, "chain_resonance": 5.0}
-    organs = study.statics.organs
+    organs = study.findings["organs"]
     organs = dataclasses.replace(organs, limits=dataclasses.replace(organs.limits, **slack))
     assert (
         "With this feed, a web is slack at rest; empty, a web first goes slack at 4.64 rad/s (44.3 rev/min) of the "
         "crank; the lowest mode of a chain lies near 5.00 rad/s (47.7 rev/min)."
-    ) in said_of(dataclasses.replace(study, statics=dataclasses.replace(study.statics, organs=organs)))
+    ) in said_of(dataclasses.replace(study, findings=study.findings | {"organs": organs}))
 
 
 def test_a_motor_that_sizing_found_insufficient_is_not_praised(study, monkeypatch):
@@ -494,7 +494,7 @@ def test_the_study_file_chooses_the_units(study):
 
 def test_each_overload_factor_says_its_use(study, written):
     """On the terminal, on the page, in the data: which question each answers, and which one sizes the drive."""
-    sides = as_dict(study)["overload_factors"]
+    sides = as_dict(study)["organs"]["overload_factors"]
     assert list(sides) == ["left", "right"]
     told, page_text = said_of(study), written.read_text("utf-8")
     for side, of in sides.items():
@@ -502,7 +502,8 @@ def test_each_overload_factor_says_its_use(study, written):
             size = told_as(factor["value"], "1")
             assert (
                 size in told
-                and f'data-path="overload_factors.{side}.{name}" value="{factor["value"]!r}"' in page_text
+                and f'data-path="organs.overload_factors.{side}.{name}" value="{factor["value"]!r}"'
+                in page_text
             )
     factors = sides["left"]
     assert {name: factor["for"] for name, factor in factors.items()} == {
@@ -521,7 +522,7 @@ def test_each_overload_factor_says_its_use(study, written):
     for name, factor in factors.items():
         assert (
             factor["for"] in told
-            and f'data-path="overload_factors.left.{name}.for">{factor["for"]}<' in page_text
+            and f'data-path="organs.overload_factors.left.{name}.for">{factor["for"]}<' in page_text
         )
 
 

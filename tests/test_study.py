@@ -20,7 +20,8 @@ from chainunit import EMPTY, ChainUnit, SideLoads
 from chainunit.machines.chain_unit import Feed
 from chainunit.report import study as study_report
 from chainunit.study.cycle import cycle
-from chainunit.study.organs import alone, factors_for, overload_factors, sides_over_speed
+from chainunit.study.one_sided import alone
+from chainunit.study.organs import factors_for, overload_factors, sides_over_speed
 
 SHORT = """
 [run]
@@ -58,6 +59,7 @@ def test_study_writes_numbers_series_plots_and_fmus(done):
     } - {
         "driveline.png",
         "chain_sweep.png",
+        "blade_path.png",
     }
     for name in ("ChamberForces", "DcMotor"):
         assert validate_fmu(str(folder / "fmu" / f"{name}.fmu")) == []
@@ -316,8 +318,8 @@ right = { material_mass = 0, processing_force = 0 }
     assert "[/foo] mill" in done.stdout and "[red]out/result.json" in done.stdout
     numbers = json.loads((tmp_path / "[red]out" / "result.json").read_text())
     for side in ("left", "right"):
-        assert numbers["overload_factors"][side]["rocker_torque"]["value"] is None
-    assert numbers["limits"]["slack_speed"]["value"] is None
+        assert numbers["organs"]["overload_factors"][side]["rocker_torque"]["value"] is None
+    assert numbers["organs"]["limits"]["slack_speed"]["value"] is None
 
 
 def test_every_number_has_its_unit(done):

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 from ..study.study import Study
-from . import blade, flywheels, torsion, turn
+from . import blade, flywheels, organs, torsion, turn
 from .blocks import Block, Source
 
 
@@ -20,6 +20,7 @@ class Contents:
 
 
 ANALYSES: Mapping[str, Contents] = {
+    "organs": Contents("One side against both", organs.blocks, organs.PICTURES.files),
     "constant_speed": Contents("A turn at constant speed", turn.blocks, (turn.PICTURE,)),
     "blade": Contents("The blade", blade.blocks, (blade.PICTURE,)),
     "flywheels": Contents("Flywheels", flywheels.blocks, (flywheels.PICTURE,)),

@@ -78,7 +78,8 @@ def _group_title(study: Study, runs: list[str]) -> str:
 @PICTURES.declare(lambda study: study.statics.cycles, "torque_angle.png")
 def _turn(s: b.Source, study: Study) -> fig.Figure:
     torques: dict[str, Callable[[Cycle], Any]] = {"crank": lambda c: c.crank_torque}
-    if study.statics.organs is not None:
+    organs = "organs" in study.findings
+    if organs:
         torques["rocker"] = lambda c: c.outputs.rocker.tau
     items: dict[fig.Axis, list[fig.Item]] = {}
     for of, torque in torques.items():
@@ -89,10 +90,11 @@ def _turn(s: b.Source, study: Study) -> fig.Figure:
     return fig.Figure(
         "turn",
         "Torque over a crank turn at constant speed",
-        "Crank torque and, below, the torque that both organs ask of the rocker, over the crank angle: both sides "
-        "loaded, one side empty, all feed on one side.",
+        f"{' and '.join(torques).capitalize()} torque over the crank angle: {', '.join(study.statics.cycles)}.",
         fig.stacked(_ANGLE, items.items()),
-        s.line("Inverse dynamics of two bars at {=run.crank_speed} of the crank, without a motor."),
+        s.line(
+            f"Inverse dynamics{' of two bars' * organs} at {{=run.crank_speed}} of the crank, without a motor."
+        ),
     )
 
 

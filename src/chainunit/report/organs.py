@@ -18,23 +18,21 @@ PICTURES = Pictures()
 
 def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
     """Factors, limits and figure."""
-    if study.statics.organs is None:
-        return
     yield _factors(s, study)
     yield from _limits(s, study)
     yield from PICTURES.figures(s, study)
 
 
 def _factors(s: b.Source, study: Study) -> b.Table:
-    sides = s.result["overload_factors"]
+    sides = s.result["organs"]["overload_factors"]
     described = {v.name: v.description for v in Layout(OverloadFactors).variables}
     first = next(iter(sides))
     rows = (
         b.TableRow(
             (
                 described[name],
-                *(s.number(f"overload_factors.{side}.{name}") for side in sides),
-                s.words(f"overload_factors.{first}.{name}.for"),
+                *(s.number(f"organs.overload_factors.{side}.{name}") for side in sides),
+                s.words(f"organs.overload_factors.{first}.{name}.for"),
             )
         )
         for name in sides[first]
@@ -46,37 +44,36 @@ def _factors(s: b.Source, study: Study) -> b.Table:
 
 
 def _limits(s: b.Source, study: Study) -> Iterator[b.Block]:
-    swing = "Rocker swings from {limits.rocker_extreme_left} to {limits.rocker_extreme_right}; margin {limits.margin}"
-    yield b.Text(s.line(f"{swing}."), form="short")
+    swing = "Rocker swings from {organs.limits.rocker_extreme_left} to {organs.limits.rocker_extreme_right}; margin "
+    yield b.Text(s.line(swing + "{organs.limits.margin}."), form="short")
     web = "a web" if study.drive.chain is None else "with two bars a web"
     cases = [
         f"{case}, {web} "
         + (
-            f"first goes slack at {{limits.{name}}} of the crank"
-            if s.value(f"limits.{name}")
+            f"first goes slack at {{organs.limits.{name}}} of the crank"
+            if s.value(f"organs.limits.{name}")
             else "is slack at rest"
         )
         for case, name in (("with this feed", "slack_speed"), ("empty", "slack_speed_empty"))
-        if s.value(f"limits.{name}") is not None
+        if s.value(f"organs.limits.{name}") is not None
     ]
-    if s.value("limits.chain_resonance") is not None:
-        cases.append("the lowest mode of a chain lies near {limits.chain_resonance}")
+    if s.value("organs.limits.chain_resonance") is not None:
+        cases.append("the lowest mode of a chain lies near {organs.limits.chain_resonance}")
     if cases:
         yield b.Text(s.line(capital("; ".join(cases)) + "."))
-    yield b.Table(s.rows(Limits, "limits", none="none"), title="Where the model ends", form="long")
+    yield b.Table(s.rows(Limits, "organs.limits", none="none"), title="Where the model ends", form="long")
 
 
-@PICTURES.declare(lambda study: study.statics.organs is not None, "sides_over_speed.png")
+@PICTURES.declare(lambda study: True, "sides_over_speed.png")
 def _sides(s: b.Source, study: Study) -> fig.Figure:
-    assert study.statics.organs is not None
-    sides = study.statics.organs.sides
+    sides = study.findings["organs"].sides
     words = {"both": "both sides"} | {str(side): f"{side} side alone" for side in SIDES}
 
     def items(of: str) -> Iterator[fig.Item]:
         for look, (which, name) in enumerate(words.items()):
             yield fig.Curve(name, sides.speed, getattr(sides, f"{of}_{which}"), look)
         yield from (fig.Mark(at, look="thin") for speeds in sides.crossings()[of].values() for at in speeds)
-        yield fig.Mark(study.config.run.crank_speed, words="normal running" if of == "crank" else "")
+        yield fig.Mark(study.config.run.crank_speed, "normal running")
 
     x = fig.Axis("crank speed", "rad/s", "speed", low=0.0, high=float(sides.speed[-1]))
     axes = {of: fig.Axis(f"{of} torque, peak", "N.m", low=0.0) for of in ("crank", "rocker")}
@@ -97,8 +94,8 @@ def _sides(s: b.Source, study: Study) -> fig.Figure:
 def _crossings(s: b.Source) -> str:
     """Where one side alone asks as much as both, as a template; empty where nothing crosses."""
     text = ""
-    for torque, sides in s.result["sides_over_speed"]["crossings"].items():
-        path = f"sides_over_speed.crossings.{torque}"
+    for torque, sides in s.result["organs"]["sides_over_speed"]["crossings"].items():
+        path = f"organs.sides_over_speed.crossings.{torque}"
         places = [
             f"{side} alone at " + " and ".join(f"{{{path}.{side}.{k}}}" for k in range(len(speeds)))
             for side, speeds in sides.items()

@@ -11,7 +11,7 @@ from ..quantities import Layout
 from ..study.result import as_dict
 from ..study.rig import DIFFERENCE
 from ..study.study import Study
-from . import answer, chains, figures, organs, runs, shaft, sizing
+from . import answer, chains, figures, runs, shaft, sizing
 from . import blocks as b
 from . import run_names as read
 from .analyses import ANALYSES, Contents
@@ -176,7 +176,6 @@ _SECTIONS: Mapping[str, Contents] = {
     "sizing": Contents("The drive", sizing.blocks),
     "runs": Contents("Every run in numbers", runs.blocks),
     "shaft": Contents("The driveline", shaft.blocks, shaft.PICTURES.files),
-    "organs": Contents("One side against both", organs.blocks, organs.PICTURES.files),
     "chains": Contents("Chains and two bars", chains.blocks, chains.PICTURES.files),
     **ANALYSES,
     "plots": Contents("Plots", figures.PICTURES.figures, figures.PICTURES.files),

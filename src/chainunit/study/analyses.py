@@ -5,7 +5,14 @@ from __future__ import annotations
 from .analysis import Analysis
 from .blade import BladeAnalysis
 from .flywheels import FlywheelAnalysis
+from .organs import OrganAnalysis
 from .torsion_findings import TorsionAnalysis
 from .turn import TurnAnalysis
 
-ANALYSES: tuple[type[Analysis], ...] = (TurnAnalysis, BladeAnalysis, FlywheelAnalysis, TorsionAnalysis)
+ANALYSES: tuple[type[Analysis], ...] = (
+    OrganAnalysis,
+    TurnAnalysis,
+    BladeAnalysis,
+    FlywheelAnalysis,
+    TorsionAnalysis,
+)

@@ -24,7 +24,7 @@ from .chain import duty as chain_duty
 from .config import Config
 from .cycle import Cycle, cycle, energy_swing
 from .drive import Drive
-from .organs import all_on_one
+from .one_sided import all_on_one
 
 
 def rms(*parts: tuple[float, Any]) -> float:

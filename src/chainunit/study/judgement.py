@@ -9,6 +9,7 @@ from ..text import entry, number
 from . import verdict
 from .chain import HIGH
 from .measures import Answers, reaches
+from .organs import OrganAnalysis
 from .quantiles import runs_needed
 from .study import Study
 from .verdict import RESIDUAL, STEADY, Holds, Verdict
@@ -16,7 +17,7 @@ from .verdict import RESIDUAL, STEADY, Holds, Verdict
 
 def model_verdict(study: Study) -> Verdict:
     """Whether the model of the organs holds, from the numbers of the runs."""
-    config, organs, answers = study.config, study.statics.organs, study.answers
+    config, organs, answers = study.config, study.findings.get(OrganAnalysis.name), study.answers
     steady = answers.get(STEADY)
     mean = steady.speed_mean if steady else config.run.crank_speed
     speed, residuals = max(config.run.crank_speed, mean), _residuals(study)

@@ -9,32 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from ..machines.api import EMPTY, ChainUnit
-from ..machines.chain_unit import SIDES, Feed, SideLoads, SideName, other
+from ..machines.api import ChainUnit
+from ..machines.chain_unit import SIDES, Feed, SideName, other
 from ..quantities import Value, declaration, quantity
 from ..text import entries, entry
+from .analysis import Analysis, Findings, Report
+from .config import Config
 from .cycle import Cycle, cycle
-
-
-def all_on_one(side: SideName, feed: Feed) -> Feed:
-    """The feed where the organ of `side` has the load of both."""
-    left, right = feed.left, feed.right
-    whole = SideLoads(
-        material_mass=left.material_mass + right.material_mass,
-        processing_force=left.processing_force + right.processing_force,
-    )
-    return Feed(left=whole, right=EMPTY) if side == "left" else Feed(left=EMPTY, right=whole)
-
-
-def without(side: SideName, feed: Feed) -> Feed:
-    """The feed with the organ of that side empty."""
-    return Feed(left=feed.left, right=EMPTY) if side == "right" else Feed(left=EMPTY, right=feed.right)
-
-
-def alone(machine: ChainUnit, side: SideName) -> ChainUnit:
-    """The machine with its organ of that side alone: the papers' one-sided loading."""
-    gone = other(side)
-    return machine.replace({f"{gone}.wall_mass": 0.0, f"{gone}.web_mass": 0.0})
+from .drive import Drive
+from .one_sided import all_on_one, alone, without
+from .rig import Rig
+from .study import Study
 
 
 def _cycle_alone(
@@ -189,7 +174,7 @@ class Limits:
 
 
 @dataclass(frozen=True)
-class OrganStatics:
+class OrganFindings(Findings):
     """What the organs of a chain unit ask at constant speed: one side against both, over the speed, and the limits of
     two bars."""
 
@@ -210,32 +195,35 @@ class OrganStatics:
             "sides_over_speed": self.sides.as_dict(),
         }
 
-
-def organ_cycles(machine: ChainUnit, crank_speed: float, feed: Feed) -> dict[str, Cycle]:
-    """Turns at constant speed, by how the organs are loaded."""
-    loads = {
-        "both sides": feed,
-        "right side empty": without("right", feed),
-        "left side empty": without("left", feed),
-        "all feed on the left": all_on_one("left", feed),
-        "all feed on the right": all_on_one("right", feed),
-    }
-    return {name: cycle(machine, crank_speed, each) for name, each in loads.items()}
+    def remark(self, study: Study) -> None:
+        """The numbers say it all."""
 
 
-def organs(machine: ChainUnit, crank_speed: float, feed: Feed, margin: float) -> OrganStatics:
-    """The organs with this feed; `margin` is the least of the turn."""
-    (right, _), (left, _) = machine.rocker_extremes()
-    modes = machine.chain_modes(feed.left, feed.right)
-    return OrganStatics(
-        factors={side: overload_factors(machine, crank_speed, feed, side) for side in SIDES},
-        sides=sides_over_speed(machine, feed),
-        limits=Limits(
-            slack_speed=machine.slack_speed(feed.left, feed.right),
-            slack_speed_empty=machine.slack_speed(),
-            chain_resonance=math.inf if modes is None else float(modes.frequency[0]),
-            rocker_extreme_right=right,
-            rocker_extreme_left=left,
-            margin=margin,
-        ),
-    )
+class OrganAnalysis(Analysis):
+    """The organs of a chain unit with the feed of normal running."""
+
+    name = "organs"
+
+    @staticmethod
+    def applies(config: Config, drive: Drive) -> bool:
+        """To a chain unit."""
+        return isinstance(drive.machine, ChainUnit)
+
+    @staticmethod
+    def find(study: Study, rig: Rig, report: Report) -> OrganFindings:
+        """As two bars, also where they are chains."""
+        machine, feed, speed = study.drive.chain_unit, study.config.feed, study.config.run.crank_speed
+        (right, _), (left, _) = machine.rocker_extremes()
+        modes = machine.chain_modes(feed.left, feed.right)
+        return OrganFindings(
+            factors={side: overload_factors(machine, speed, feed, side) for side in SIDES},
+            sides=sides_over_speed(machine, feed),
+            limits=Limits(
+                slack_speed=machine.slack_speed(feed.left, feed.right),
+                slack_speed_empty=machine.slack_speed(),
+                chain_resonance=math.inf if modes is None else float(modes.frequency[0]),
+                rocker_extreme_right=right,
+                rocker_extreme_left=left,
+                margin=float(np.min(study.statics.normal.outputs.margin)),
+            ),
+        )

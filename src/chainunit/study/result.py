@@ -84,7 +84,6 @@ def _statics(study: Study) -> dict[str, Any]:
     """What needs no co-simulation."""
     statics = study.statics
     return {
-        **(statics.organs.as_dict() if statics.organs else {}),
         "speed_loop": {
             name: {
                 "inertia": entry(loop.inertia, "kg.m2"),

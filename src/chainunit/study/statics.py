@@ -1,4 +1,4 @@
-"""Results without co-simulation: turns at constant speed, the speed loop, the line's torsion, the organs."""
+"""Results without co-simulation: turns at constant speed, the speed loop, the line's torsion."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..machines.api import ChainUnit
 from .config import Config
 from .cycle import Cycle, cycle, no_feed
 from .drive import Drive
-from .organs import OrganStatics, organ_cycles, organs
+from .one_sided import organ_cycles
 from .shaft import Torsion, torsion
 
 
@@ -27,8 +27,6 @@ class DriveStatics:
     """the linearised speed loop of a controlled motor, by which inertia"""
     torsion: Torsion | None = None
     """of the driveline, if there is one"""
-    organs: OrganStatics | None = None
-    """of a chain unit"""
 
     @property
     def normal(self) -> Cycle:
@@ -54,9 +52,6 @@ def statics(config: Config, drive: Drive) -> DriveStatics:
         cycles=cycles,
         loops={} if drive.foreign else _loops(drive, normal.J),
         torsion=None if drive.line is None else _torsion(config, drive, normal.J),
-        organs=organs(machine, w, feed, float(np.min(normal.margin)))
-        if isinstance(machine, ChainUnit)
-        else None,
     )
 
 
