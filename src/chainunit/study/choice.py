@@ -14,7 +14,7 @@ from ..drives.driveline import CardanDriveline
 from ..drives.motor import Motor
 from ..drives.speed_control import Tuning
 from ..drives.torsion import with_damping_ratio
-from ..errors import InputError
+from ..errors import InputError, refusal_prefix
 from ..fmu.backends import Backend
 from ..quantities import Layout
 from ..system import foreign_component
@@ -80,10 +80,8 @@ def check_files(config: Config) -> None:
 def _with_foreign(config: Config) -> Choice:
     """The drive of a study that names its motor."""
     assert config.foreign is not None
-    try:
+    with refusal_prefix("system.motor: "):
         return with_motor(config, config.foreign.file, config.foreign.names)
-    except InputError as error:
-        raise InputError(f"system.motor: {error}") from error
 
 
 def with_motor(config: Config, file: Path, names: Mapping[str, str] | None = None) -> Choice:
