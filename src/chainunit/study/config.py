@@ -43,6 +43,7 @@ from .events import Event, OneSidedFeed
 from .foreign_machine import ForeignMachine, ForeignModel, foreign_model
 from .sections import (
     ORGANS,
+    SIMULATIONS,
     STARTS,
     ChainOrgans,
     Coupling,
@@ -110,6 +111,7 @@ class Parts:
             feed_forward=(StrictBool, False),
             empty_start=(StrictBool, False),
             start=(Literal[STARTS], "direct"),
+            simulation=(Literal[SIMULATIONS], "cs"),
             organ=(Literal[ORGANS], "two-bar"),
             catalogue=(str, ""),
             event=(list[Any], []),
@@ -192,6 +194,8 @@ class Config:
     gear: Transmission
     start: str
     starter: Starter
+    simulation: str
+    """one of `SIMULATIONS`"""
     catalogue: Path | None
     driveline: Driveline | None
     place: str
@@ -336,6 +340,7 @@ def _config(
         feed_forward=checked.feed_forward,
         empty_start=checked.empty_start,
         start=checked.start,
+        simulation=checked.simulation,
         catalogue=catalogue,
         place=checked.driveline.place,
         joint=checked.torsion.joint,

@@ -30,7 +30,7 @@ from ..errors import InterruptedRunError, RunError
 from ..files import whole, writing
 from ..machines.chain_unit import SIDES, SideName
 from ..quantities import Layout, Value, declaration, quantity
-from ..system import CoSimulation
+from ..system import Simulation
 from ..system.instance import remove_unpacked
 from ..text import entry
 from .config import Config
@@ -117,7 +117,7 @@ class Task:
         return content.hexdigest()[:12]
 
 
-_worker: dict[str, CoSimulation] = {}
+_worker: dict[str, Simulation] = {}
 
 
 def _close() -> None:
@@ -139,7 +139,7 @@ def _begin() -> None:
     atexit.register(_close)
 
 
-def _prepared(task: Task, digest: str) -> CoSimulation:
+def _prepared(task: Task, digest: str) -> Simulation:
     """The co-simulation of this process, started up and saved in its steady state."""
     if digest not in _worker:
         _close()
@@ -180,7 +180,7 @@ def draw(config: Config, number: int) -> Draw:
     return Draw(config.random.event(side, values), values, offset, trip)
 
 
-def one(task: Task, number: int, simulation: CoSimulation) -> Sample:
+def one(task: Task, number: int, simulation: Simulation) -> Sample:
     """Run the overload of that number from the steady state that `simulation` has saved."""
     config, drive, chance = task.config, task.drive, draw(task.config, number)
     run, trip = config.run, chance.trip_torque

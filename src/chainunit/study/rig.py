@@ -12,7 +12,20 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..system import CoSimulation, Jump, ModelComponent, Profile, System, certify, monolithic, rigid, without
+from ..errors import refusal_prefix
+from ..system import (
+    CoSimulation,
+    Jump,
+    ModelComponent,
+    ModelExchange,
+    Profile,
+    Simulation,
+    System,
+    certify,
+    monolithic,
+    rigid,
+    without,
+)
 from .config import Config
 from .drive import Drive
 from .events import Event, OverTime
@@ -147,10 +160,23 @@ class Rig:
             return 0.0
         return Profile(0.0, ((self.fed_from, _FEED_RISE * self.config.turn, value),))
 
-    def from_rest(self, event: Event | None = None) -> CoSimulation:
-        """The co-simulation from rest on, with the event of a start if there is one."""
+    def from_rest(self, event: Event | None = None) -> Simulation:
+        """The simulation from rest on, with the event of a start if there is one."""
         given = self.event_signals(event, 0.0, {}) if event else {}
-        return CoSimulation(self.system, self.signals(given, ramp=True))
+        return self.simulation(self.system, self.signals(given, ramp=True))
+
+    def simulation(self, system: System, signals: Mapping[str, Any], begin: float = 0.0) -> Simulation:
+        """A system in the way that the study runs.
+
+        Raises
+        ------
+        InputError
+            for an FMU that is not for Model Exchange, where the study asks for that.
+        """
+        if self.config.simulation == "cs":
+            return CoSimulation(system, signals, begin)
+        with refusal_prefix('simulation = "me": '):
+            return ModelExchange(system, signals, begin)
 
     def lead(self, event: Event, angle: float, speed: float) -> float:
         """Time of steady running at `speed`, from the crank angle `angle` on, until the crank next stands where the
@@ -161,7 +187,7 @@ class Rig:
         return float(ahead / max(speed, 0.5 * self.config.run.crank_speed))
 
     def start_empty(
-        self, simulation: CoSimulation, progress: Progress, guards: Mapping[str, float]
+        self, simulation: Simulation, progress: Progress, guards: Mapping[str, float]
     ) -> tuple[xr.Dataset, Rig]:
         """The start of an empty machine, until it turns at `STARTED` of its speed or a guard ends it; and the rig
         that is fed from then on."""
@@ -172,7 +198,7 @@ class Rig:
         return run, fed
 
     def start_up(
-        self, simulation: CoSimulation, stop: float, progress: Progress, guards: Mapping[str, float]
+        self, simulation: Simulation, stop: float, progress: Progress, guards: Mapping[str, float]
     ) -> StartUp:
         """Start-up and steady running to the time `stop`, or longer, see `_missing`; of a machine that starts empty
         as long after it is fed."""
@@ -213,7 +239,7 @@ class Rig:
 
     def follow(
         self,
-        simulation: CoSimulation,
+        simulation: Simulation,
         event: Event,
         begin: float,
         stop: float,
@@ -250,7 +276,7 @@ class Rig:
         alone = System({"machine": ModelComponent(model, p, file)})
         loads = self.drive.loads(self.config.feed) | transient.signals
         loads = {full: x for full, x in loads.items() if full.startswith("machine.")}
-        with CoSimulation(alone, {**loads, "machine.tau": 0.0}, begin) as simulation:
+        with self.simulation(alone, {**loads, "machine.tau": 0.0}, begin) as simulation:
             return simulation.run(max(stop, begin) + 1.0, self.step)
 
     def residuals(self, run: xr.Dataset) -> dict[str, float]:
@@ -288,7 +314,7 @@ class Rig:
             differences[of + DIFFERENCE] = float(np.max(difference) / np.max(np.abs(reference[of].values)))
         return differences, {full: float(reference[full][-1]) for full in map(str, reference.data_vars)}
 
-    def release(self, simulation: CoSimulation, run: xr.Dataset, time: float) -> tuple[xr.Dataset, float]:
+    def release(self, simulation: Simulation, run: xr.Dataset, time: float) -> tuple[xr.Dataset, float]:
         """A run that ended as the coupling opened, followed until no torque passes it, `time` [s]; with the energy
         that passed [J]."""
         if time <= 0.0:

@@ -13,7 +13,7 @@ import xarray as xr
 
 from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
-from ..system import CoSimulation
+from ..system import Simulation
 from . import verdict
 from .analyses import ANALYSES
 from .analysis import Report
@@ -188,7 +188,7 @@ class Runner:
                     event.name,
                 )
 
-    def _start_up(self, simulation: CoSimulation) -> None:
+    def _start_up(self, simulation: Simulation) -> None:
         """Start-up and steady running, and what they answer.
 
         Raises
@@ -222,7 +222,7 @@ class Runner:
                 "coupling.trip_torque must be above that"
             )
 
-    def _event(self, simulation: CoSimulation, event: Event, begin: float, done: float) -> Transient:
+    def _event(self, simulation: Simulation, event: Event, begin: float, done: float) -> Transient:
         stop = begin + event.follow(self.study.config.turn)
         progress = self._progress(event.title, done)
         transient = self.rig.follow(simulation, event, begin, stop, progress, self.rig.guards)
@@ -239,7 +239,7 @@ class Runner:
             self.report(f"monolithic reference: {event.title}", self.total, self.total)
             self._compare(event.name, transient)
 
-    def _close(self, simulation: CoSimulation, transient: Transient, stop: float, phase: Phase) -> None:
+    def _close(self, simulation: Simulation, transient: Transient, stop: float, phase: Phase) -> None:
         """What a transient answers; where the coupling tripped, also what passes it after and how the machine behind
         it comes to rest."""
         study, rig, coupling = self.study, self.rig, self.study.config.coupling
@@ -266,7 +266,7 @@ class Runner:
         self.study.certificate[name] = self.rig.residuals(run)
         self.study.runs[name] = run
 
-    def _assumption(self, simulation: CoSimulation, transient: Transient, done: float) -> None:
+    def _assumption(self, simulation: Simulation, transient: Transient, done: float) -> None:
         """The peaks over the range that an event assumes, from the steady state that was saved; all without a
         safety coupling, which would cut them off."""
         event, begin = transient.event, transient.begin

@@ -251,6 +251,9 @@ JOINTS = ("alpha1", "alpha2", "both")
 PLACES = ("crank", "motor")
 """Where a driveline is: on the crank's shaft, behind the gear, or on the motor's, before it."""
 
+SIMULATIONS = ("cs", "me")
+"""How the system runs: as a co-simulation, or as one ODE of Model Exchange FMUs."""
+
 STARTS = ("direct", "soft", "inverter")
 
 

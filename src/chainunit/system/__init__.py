@@ -24,6 +24,7 @@ from .master import CoSimulation
 from .me import ModelExchange
 from .reference import monolithic
 from .signals import Jump, Profile
+from .simulation import Simulation
 
 __all__ = [
     "NAMES",
@@ -36,6 +37,7 @@ __all__ = [
     "ModelComponent",
     "ModelExchange",
     "Profile",
+    "Simulation",
     "System",
     "certify",
     "energy_residual",

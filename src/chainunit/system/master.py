@@ -6,13 +6,13 @@ signal that varies within a step acts with its value at the step's middle, secon
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from .instance import Instance
-from .simulation import Simulation
+from .simulation import Simulation, Watch
 
 _Table = list[tuple[Instance, Any, Any]]
 """Of each instance a handle and the values of its signals, shape (n, signals)."""
@@ -27,6 +27,9 @@ class CoSimulation(Simulation):
     def _begin(self, stop: float) -> None:
         _apply(self._signal_values(np.array([self.time])), 0)
         self._transfer()
+
+    def _meet(self, watches: Sequence[Watch]) -> None:
+        """It cannot go back into a step."""
 
     def _steps(self, times: Any) -> Iterator[None]:
         points = self._signal_values(times)

@@ -4,12 +4,13 @@ There is no communication step between the FMUs: at each evaluation of the deriv
 transferred in the order of their true dependencies, with each load at exactly the present angle and speed. Rows come
 from the dense output of the solver. It stops at events: where a signal has a corner, where an FMU has named a time,
 where an event indicator changes its sign, and where an FMU asks for one after a step, as a chain does whose states
-have drifted off its constraints. After an event the solver begins anew from the states that the FMUs have then."""
+have drifted off its constraints. After an event the solver begins anew from the states that the FMUs have then. A
+guard ends a run at the instant at which it is passed."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -20,7 +21,7 @@ from ..errors import InputError, RunError
 from .graph import System
 from .instance import DiscardError, ExchangeInstance
 from .signals import at_time, corners
-from .simulation import Simulation
+from .simulation import Simulation, Watch, beyond
 
 METHODS = ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")
 """Solvers of scipy. The explicit ones suit motors, shafts and chains; Radau and BDF suit what is stiff."""
@@ -145,6 +146,7 @@ class ModelExchange(Simulation):
         self._corners = corners(self.signals.values())
         self._event(self.time)
         self._restart(self.time)
+        self._pieces: list[tuple[float, float, Any]] = []
         self._put(self.time, self._x, self._from)
 
     def _restart(self, t: float) -> None:
@@ -216,11 +218,30 @@ class ModelExchange(Simulation):
 
     def _steps(self, times: Any) -> Iterator[None]:
         for after in times[1:].tolist():
+            self._pieces = self._pieces[-1:]
             while self._reached < after:
+                before = self._reached
                 self._advance()
+                self._pieces.append((before, self._reached, self._dense))
             self._put(after, self._dense(after), self._within(after))
-            self.time = after
+            self._row, self.time = self.time, after
             yield
+
+    def _meet(self, watches: Sequence[Watch]) -> None:
+        """See `Simulation`: by bisection in the dense output since the last row, to the time just behind it."""
+        row, now = self._row, self.time
+        pieces = ((max(begin, row), min(end, now), dense) for begin, end, dense in self._pieces)
+        low, high, dense = next(piece for piece in pieces if self._at(*piece[1:], watches))
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if self._at(middle, dense, watches) else (middle, high)
+        self._at(high, dense, watches)
+        self.time = high
+
+    def _at(self, t: float, dense: Any, watches: Sequence[Watch]) -> bool:
+        """Go to an instant of a step of the solver; whether a guard is passed there."""
+        self._put(t, dense(t))
+        return beyond(watches)
 
     # -- branching
 

@@ -29,6 +29,9 @@ from .signals import Profile, at_time
 Progress = Callable[[float], None]
 """Called with the simulated time [s] now and then."""
 
+Watch = tuple[Instance, Any, list[float]]
+"""An instance, the handle of its outputs that are guarded, and their limits."""
+
 
 @contextmanager
 def stoppable() -> Iterator[Callable[[], bool]]:
@@ -256,7 +259,7 @@ class Simulation(ABC):
         stop, step : [s]
         progress : is called with the simulated time now and then
         guards : limits by full name of an output: where its size passes the limit at the end of a step, the run ends
-            with that row
+            with that row; one of Model Exchange with a row at the instant of it
         every : each so many rows one is kept, beside the first and the last
         names : full names of the outputs and driven inputs that are kept; all by default
         file : a NetCDF file that the rows are written to as they come; then of a row no more than its time stays in
@@ -319,7 +322,7 @@ class Simulation(ABC):
         step: float,
         n: int,
         every: int,
-        watches: Sequence[tuple[Instance, Any, list[float]]],
+        watches: Sequence[Watch],
         progress: Progress | None,
         stopped: Callable[[], bool],
         complaints: _Complaints,
@@ -334,13 +337,11 @@ class Simulation(ABC):
             times = np.minimum(start + step * np.arange(first, min(first + rows.BLOCK, n) + 1), stop)
             for _ in self._steps(times):
                 done += 1
-                beyond = any(
-                    abs(value) > limit
-                    for instance, handle, limits in watches
-                    for value, limit in zip(instance.read(handle), limits, strict=True)
-                )
+                passed = beyond(watches)
+                if passed:
+                    self._meet(watches)
                 interrupted = stopped()
-                ends = beyond or interrupted or done == n
+                ends = passed or interrupted or done == n
                 if ends or done % every == 0:
                     table.add(self.time)
                 if progress and done % often == 0:
@@ -350,6 +351,10 @@ class Simulation(ABC):
                 if ends:
                     return
                 complaints.step()
+
+    @abstractmethod
+    def _meet(self, watches: Sequence[Watch]) -> None:
+        """Go back from a row beyond a guard to the instant at which it was passed, where a simulation can."""
 
     def _interrupted(self) -> InterruptedRunError:
         return InterruptedRunError(f"interrupted at t = {self.time:g} s")
@@ -367,7 +372,7 @@ class Simulation(ABC):
             there = [full for full in there if full in selection]
         return self._handles(there)
 
-    def _watched(self, guards: Mapping[str, float]) -> list[tuple[Instance, Any, list[float]]]:
+    def _watched(self, guards: Mapping[str, float]) -> list[Watch]:
         """Handles and limits of the guards, by instance."""
         for full in guards:
             self.system.connector(full, "output")
@@ -414,6 +419,15 @@ class Simulation(ABC):
         for name, instance in self._instances.items():
             instance.restore(self._state[name])
         self.time = self._saved_at
+
+
+def beyond(watches: Sequence[Watch]) -> bool:
+    """Whether a guarded output passes its limit."""
+    return any(
+        abs(value) > limit
+        for instance, handle, limits in watches
+        for value, limit in zip(instance.read(handle), limits, strict=True)
+    )
 
 
 class _Complaints:
