@@ -37,6 +37,7 @@ class Example(StrEnum):
     chain_unit = "chain-unit"
     knife = "knife"
     driveline = "driveline"
+    full = "full"
 
 
 _BackendOption = Annotated[

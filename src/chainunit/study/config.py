@@ -69,7 +69,12 @@ class ReportTable(BaseModel):
     units: dict[str, str] = {}
 
 
-EXAMPLES = {"chain-unit": "example.toml", "knife": "knife.toml", "driveline": "driveline.toml"}
+EXAMPLES = {
+    "chain-unit": "example.toml",
+    "knife": "knife.toml",
+    "driveline": "driveline.toml",
+    "full": "full.toml",
+}
 """Packaged study files by the names of the examples."""
 _OF_MACHINE = {"ChamberForces": "chain-unit", "KnifeDrive": "knife", "Accelerator": "driveline"}
 """The example from which a study takes what its file leaves out, by machine."""
