@@ -15,6 +15,7 @@ from test_page import Reader, check_traced
 from chainunit import InputError
 from chainunit.drives.shafts import hollow, stiffness
 from chainunit.models import MODELS
+from chainunit.report.study_motion import motion
 from chainunit.study import config
 from chainunit.study.choice import choose
 from chainunit.study.cycle import cycle
@@ -209,6 +210,9 @@ def test_a_coupling_that_opens_lets_line_and_machine_coast(tmp_path):
     before = float(study.runs["jam_left"]["machine.kinetic_energy"][-1])
     assert jam.energy_behind == pytest.approx(before + 0.5 * study.drive.line.J4 * w * w, rel=1e-9)
     assert study.certificate["jam_left"]["driveline_energy_residual_share"] < 1e-3
+    # nothing turns what is left alone
+    assert not np.any(study.drive.crank_torque(coasting))
+    assert "jam_left_coasting" in {clip.name for clip in motion(study).runs}
 
 
 def test_the_rigid_drive_has_the_same_coupling(tmp_path):

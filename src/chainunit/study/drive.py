@@ -34,6 +34,7 @@ from ..system import (
     System,
     export,
     shaft_joints,
+    shaft_torque,
     through,
 )
 from .foreign_machine import ForeignMachine
@@ -230,8 +231,8 @@ class Drive:
         return next(bond for bond in self.graph.bonds if bond.machine == "machine")
 
     def crank_torque(self, run: xr.Dataset) -> Any:
-        """Torque at the crank in a run [N m], shape (time,)."""
-        return through(run, self._last_bond)[0] * (self.driven.ratio / self.gear)
+        """Torque at the crank in a run [N m], shape (time,), also of a machine that turns by itself."""
+        return shaft_torque(run, self._last_bond) * (self.driven.ratio / self.gear)
 
     def crank_motion(self, run: xr.Dataset) -> tuple[Any, Any]:
         """Angle [rad] and speed [rad/s] of the crank in a run, shape (time,), also of a machine that turns by

@@ -5,7 +5,7 @@ Model Exchange FMUs (`ModelExchange`), the reference of the models' own equation
 a run (`energy_residual` of every power bond), the SSP package (`chainunit.system.ssp`), and twins with a part left
 out (`without`, `rigid`, `hold_loads`). An FMU of somebody else is a component, too: `foreign_component`."""
 
-from .certificate import certify, energy_residual, through
+from .certificate import certify, energy_residual, shaft_torque, through
 from .fmus import export
 from .foreign import NAMES, fmu_component, foreign_component
 from .graph import (
@@ -48,6 +48,7 @@ __all__ = [
     "monolithic",
     "rigid",
     "shaft_joints",
+    "shaft_torque",
     "through",
     "without",
 ]

@@ -58,8 +58,8 @@ def certify(
     return {bond.machine: energy_residual(run, bond, feed) for bond in system.bonds}
 
 
-def through(run: xr.Dataset, bond: Bond) -> tuple[Any, Any]:
-    """Torque [N m] and speed [rad/s] of the shaft, shape (time,), of the side that gives the torque.
+def shaft_torque(run: xr.Dataset, bond: Bond) -> Any:
+    """Torque [N m] of the shaft, shape (time,), of the side that gives it.
 
     Raises
     ------
@@ -74,7 +74,13 @@ def through(run: xr.Dataset, bond: Bond) -> tuple[Any, Any]:
         raise InputError(
             f"neither {bond.machine} nor {bond.driver} gives the torque of the shaft between them"
         )
-    return run[torque].values, run[f"{bond.driver}.{driver.members['w']}"].values
+    return run[torque].values
+
+
+def through(run: xr.Dataset, bond: Bond) -> tuple[Any, Any]:
+    """Torque [N m] and speed [rad/s] of the shaft, shape (time,); see `shaft_torque`."""
+    driver, _ = bond.flanges
+    return shaft_torque(run, bond), run[f"{bond.driver}.{driver.members['w']}"].values
 
 
 def _shaft_power(run: xr.Dataset, name: str, terminal: Any, tau: Any, w: Any) -> Any:
