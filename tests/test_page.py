@@ -774,8 +774,8 @@ def test_any_linkage_moves(knife):
             time=np.array(run["time"]) + (knife.event["hard_cut"] if run["event"] else 0.0), method="nearest"
         )
         assert np.max(np.abs(at["blade"][1] - whole["machine.blade.y"].values)) < 2e-4
-        torque = {reading["title"]: reading["values"] for reading in run["readings"]}["Crank torque"]
-        assert (torque == [0]) == run["name"].endswith("coasting")
+        titles = {reading["title"] for reading in run["readings"]}
+        assert ("Crank torque" in titles) == (not run["name"].endswith("coasting"))
     text = page_of(knife)
     assert "path of blade" in text and 'id="stage"' in text
 

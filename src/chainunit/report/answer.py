@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
-from ..quantities import Layout, Variable
-from ..study.measures import Answers
+from ..study.measures import MEASURES
 from ..study.study import Study
 from . import blocks as b
 from . import run_names as read
 from .lines import Line, Strong, joined, line
 from .runs import number
 
-_KEY = ("crank_torque_peak", "motor_torque_peak", "power_peak", "current_peak", "winding_temperature")
-"""The families of answers that are shown large, each by its first field."""
 _HOLDS: dict[str, b.Severity] = {"true": "good", "in part": "partly", "false": "bad"}
 
 
@@ -38,14 +35,7 @@ def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
         speed = _speed(s, study, reference)
         lead = line(f"Large: {read.title(study, reference)}, the crank at ", speed, f".{worst}")
         yield b.Text(lead, "lead", "long")
-        families = _families(answers[reference]).items()
-        yield b.Cards(
-            tuple(
-                _card(s, study, family, members, reference)
-                for family, members in families
-                if members[0][1].name in _KEY
-            )
-        )
+        yield b.Cards(tuple(_cards(s, study, reference)))
     else:
         yield b.Text("The study ended before any run could be evaluated.", "lead", "long")
     yield from (b.Judgement("warning", each) for each in s.lines("warnings"))
@@ -61,27 +51,24 @@ def _speed(s: b.Source, study: Study, run: str) -> Line:
     return line(reached, s.line(", not the {=run.crank_speed} asked for"))
 
 
-def _families(names: Iterable[str]) -> dict[str, list[tuple[str, Variable]]]:
-    """Answers by what they are of: {"crank torque": [("peak", ..), ("RMS", ..)]}, as their descriptions say."""
-    families: dict[str, list[tuple[str, Variable]]] = {}
-    have = set(names)
-    for v in Layout(Answers).variables:
-        if v.name in have:
-            family, _, kind = v.description.partition(", ")
-            families.setdefault(family, []).append((kind, v))
-    return families
+def _cards(s: b.Source, study: Study, run: str) -> Iterator[b.Card]:
+    """Families of answers, large: of each the first two numbers in the run `run`, and the worst overload."""
+    families: dict[str, list[str]] = {}
+    for name in s.result["answers"][run]:
+        families.setdefault(MEASURES[name].of, []).append(name)
+    for of, names in families.items():
+        if MEASURES[names[0]].card:
+            numbers = [(MEASURES[name].words, number(s, study, run, name)) for name in names]
+            lines = [joined(line(f"{words} ", size) for words, size in numbers[2:])] if numbers[2:] else []
+            cards = tuple((size, words) for words, size in numbers[:2])
+            yield b.Card(of, cards, (*lines, *_worst(s, study, names[0])))
 
 
-def _card(s: b.Source, study: Study, family: str, members: list[tuple[str, Variable]], run: str) -> b.Card:
-    """An answer, large: its first two numbers in the run `run`, and the worst overload."""
-    large, small = members[:2], members[2:]
-    lines = [joined(line(f"{kind} ", number(s, study, run, v)) for kind, v in small)] if small else []
-    kind, v = large[0]
-    sizes = {name: s.value(f"answers.{name}.{v.name}") for name in study.overloads}
-    magnitudes = {name: abs(size) for name, size in sizes.items() if size is not None}
+def _worst(s: b.Source, study: Study, name: str) -> Iterator[Line]:
+    """An answer in the overload that asks most."""
+    sizes = {run: s.value(f"answers.{run}.{name}") for run in study.overloads}
+    magnitudes = {run: abs(size) for run, size in sizes.items() if size is not None}
     if magnitudes:
-        worst = max(magnitudes, key=lambda name: magnitudes[name])
-        peak = Strong(number(s, study, worst, v))
-        lines.append(line(f"overload: {kind} ", peak, f", {read.title(study, worst)}"))
-    numbers = ((number(s, study, run, v), kind or read.title(study, run)) for kind, v in large)
-    return b.Card(family, tuple(numbers), tuple(lines))
+        run = max(magnitudes, key=lambda run: magnitudes[run])
+        peak = Strong(number(s, study, run, name))
+        yield line(f"overload: {MEASURES[name].words} ", peak, f", {read.title(study, run)}")

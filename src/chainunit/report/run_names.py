@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from ..quantities import Variable
 from ..study.events import in_groups
 from ..study.study import Study
 
 COASTING = "_coasting"
 """Ends the name of a run of the machine alone, behind the safety coupling that opened in the run named before it."""
 _TITLES = {"start_up": "start-up and steady running", "unfinished": "the run that stopped early"}
-_MINOR = "supply_power_mean winding_temperature speed_mean speed_least power_mean crank_torque_mean cycle_gap".split()
 
 
 def is_event(study: Study, run: str) -> bool:
@@ -49,8 +47,3 @@ def in_order(study: Study) -> list[str]:
 def event_time(study: Study, run: str) -> float | None:
     """When the overload of a run begins [s]; None where it has none, or is one from the start."""
     return study.event.get(run.removesuffix(COASTING)) or None
-
-
-def minor(variable: Variable) -> bool:
-    """Whether the terminal leaves an answer out."""
-    return variable.name in _MINOR

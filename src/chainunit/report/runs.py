@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from ..quantities import Layout, Variable
-from ..study.measures import Answers, Phase, measures_of
+from ..quantities import Layout
+from ..study.measures import MEASURES, Answers, Phase, measures_of
 from ..study.monte_carlo import Sample
 from ..study.study import Study
 from . import blocks as b
@@ -68,8 +68,8 @@ def _table_of_runs(s: b.Source, study: Study) -> b.Table:
     runs = ordered(study, answers)
     rows = (
         b.TableRow(
-            (v.description, *(number(s, study, run, v) for run in runs)),
-            form="long" if read.minor(v) else "both",
+            (v.description, *(number(s, study, run, v.name) for run in runs)),
+            form="long" if MEASURES[v.name].minor else "both",
         )
         for v in Layout(Answers).variables
         # nothing to say of a coupling that is not there, or that did not open; a dash for what a motor does not tell
@@ -139,7 +139,7 @@ def _random(s: b.Source) -> Iterator[b.Block]:
         yield b.Table(rows, b.heads("", *heads), title=title)
 
 
-def number(s: b.Source, study: Study, run: str, v: Variable) -> Number:
+def number(s: b.Source, study: Study, run: str, name: str) -> Number:
     """An answer of a run."""
-    back = v.name == "recovery_time" and run != "steady" and study.returns
-    return s.number(f"answers.{run}.{v.name}", none="not reached" if back else "-")
+    back = name == "recovery_time" and run != "steady" and study.returns
+    return s.number(f"answers.{run}.{name}", none="not reached" if back else "-")

@@ -89,10 +89,11 @@ def _run(study: Study, name: str, interval: float, supplement: Supplement) -> Cl
         lambda output: (part[f"machine.{output}.fx"].values, part[f"machine.{output}.fy"].values),
         supplement.groups,
     )
+    driven = name in read.driven(study)
     readings = (
         Reading("Crank angle", angle % (2.0 * math.pi), "rad"),
         Reading("Crank speed", speed, "rad/s"),
-        Reading("Crank torque", drive.crank_torque(part), "N.m"),
+        *([Reading("Crank torque", drive.crank_torque(part), "N.m")] if driven else []),
         *(
             Reading(capital(v.description), loads[v.name], v.unit, v.kind)
             for v in model.feed_layout.variables

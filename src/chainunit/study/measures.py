@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum, auto
 from functools import cached_property
@@ -278,13 +278,35 @@ def _standstill(w: Window) -> float | None:
 Read = Callable[[Window], float | None]
 
 
+@dataclass(frozen=True)
+class Measure:
+    """How a measure is read, in which runs it means something, and how it is shown: those of one thing, `of`, are a
+    family; a family whose first measure is on a `card` is shown large; what is `minor` is left out where there is
+    little room."""
+
+    read: Read
+    during: frozenset[Phase]
+    words: str
+    of: str = ""
+    card: bool = False
+    minor: bool = False
+
+
 def measure(
-    unit: str, description: str, read: Read, *, kind: str = "", during: frozenset[Phase] = _RUNNING
+    unit: str,
+    words: str,
+    read: Read,
+    *,
+    of: str = "",
+    kind: str = "",
+    during: frozenset[Phase] = _RUNNING,
+    card: bool = False,
+    minor: bool = False,
 ) -> Any:
-    """A field that declares a measure: as `quantity`, the function that reads it, and in which runs it means
-    something."""
-    declared = quantity(unit, description, kind=kind)
-    return dataclasses.field(metadata={**declared.metadata, "read": read, "during": during})
+    """A field that declares a `Measure`: as `quantity`, described by what it is `of` and its `words`."""
+    declared = quantity(unit, f"{of}, {words}" if of else words, kind=kind)
+    own = Measure(read, during, words, of or words, card, minor)
+    return dataclasses.field(metadata={**declared.metadata, "measure": own})
 
 
 @declaration
@@ -294,37 +316,44 @@ class Answers:
     `power_peak` is the most that the motor gives, 0 where it only brakes.
 
     The ripple is (largest - least)/mean of the speed; `shaft_share` the peak torque on the machine's shaft over
-    that of the motor (the rest is the rotor's inertia); `shaking_*` the largest deviation of the frame's load
-    from its mean, the moment about C; `torque_reserve` least part that is left of the driving torque that the warm
-    motor can give at an instant, at its speed, voltage and frequency: 0 at the limit, less where a transient passes
+    that of the motor (the rest is the rotor's inertia); `start_time` ends at 95 % of the speed; `shaking_*` the
+    largest deviation of the frame's load from its mean, the moment about C; `torque_reserve` the least part that is
+    left of the driving torque that the warm motor can give at an instant, at its speed, voltage and frequency: 0 at
+    the limit, less where a transient passes
     it, None in a start;
     `winding_temperature` is where the winding comes to rest if the steady turns go on for ever;
     `cycle_gap` is the difference between the ends of the steady turns, of speed or torque, over the largest value;
     times count from the event; `energy_after_trip` passes the safety coupling while it opens, `energy_behind`
     stays in the machine."""
 
-    start_time: Value = measure(
-        "s",
-        f"start, to {100 * STARTED:g} % of the speed",
-        _start_time,
-        during=frozenset({Phase.START_UP, Phase.LOADED_START}),
-    )
     crank_torque_peak: Value = measure(
-        "N.m", "crank torque, peak", lambda w: peak(w.crank_torque), during=_ALL
+        "N.m", "peak", lambda w: peak(w.crank_torque), during=_ALL, of="crank torque", card=True
     )
-    crank_torque_rms: Value = measure("N.m", "crank torque, RMS", lambda w: w.rms(w.drive.crank_torque))
-    crank_torque_mean: Value = measure("N.m", "crank torque, mean", lambda w: w.mean(w.drive.crank_torque))
+    crank_torque_rms: Value = measure("N.m", "RMS", lambda w: w.rms(w.drive.crank_torque), of="crank torque")
+    crank_torque_mean: Value = measure(
+        "N.m", "mean", lambda w: w.mean(w.drive.crank_torque), of="crank torque", minor=True
+    )
     motor_torque_peak: Value = measure(
-        "N.m", "motor torque, peak", lambda w: w.largest("motor.air_gap_tau"), during=_ALL
+        "N.m", "peak", lambda w: w.largest("motor.air_gap_tau"), during=_ALL, of="motor torque", card=True
     )
-    motor_torque_rms: Value = measure("N.m", "motor torque, RMS", lambda w: w.rms("motor.air_gap_tau"))
+    motor_torque_rms: Value = measure("N.m", "RMS", lambda w: w.rms("motor.air_gap_tau"), of="motor torque")
     power_peak: Value = measure(
-        "W", "shaft power, peak", lambda w: max(0.0, float(np.max(w.drive.shaft_power(w.run))))
+        "W",
+        "peak",
+        lambda w: max(0.0, float(np.max(w.drive.shaft_power(w.run)))),
+        of="shaft power",
+        card=True,
     )
-    power_mean: Value = measure("W", "shaft power, mean", lambda w: w.mean(w.drive.shaft_power))
-    supply_power_mean: Value = measure("W", "electric power, mean", lambda w: w.mean("motor.supply_power"))
-    current_peak: Value = measure("A", "motor current, peak", lambda w: w.largest(w.current), during=_ALL)
-    current_rms: Value = measure("A", "motor current, RMS", lambda w: w.rms(w.current))
+    power_mean: Value = measure(
+        "W", "mean", lambda w: w.mean(w.drive.shaft_power), of="shaft power", minor=True
+    )
+    supply_power_mean: Value = measure(
+        "W", "mean", lambda w: w.mean("motor.supply_power"), of="electric power", minor=True
+    )
+    current_peak: Value = measure(
+        "A", "peak", lambda w: w.largest(w.current), during=_ALL, of="motor current", card=True
+    )
+    current_rms: Value = measure("A", "RMS", lambda w: w.rms(w.current), of="motor current")
     current_share: Value = measure(
         "1",
         "RMS current over rated current",
@@ -333,14 +362,28 @@ class Answers:
         during=_STEADY,
     )
     winding_temperature: Value = measure(
-        "K", "winding temperature, thermal steady state", lambda w: w.settled_temperature, during=_STEADY
+        "K",
+        "thermal steady state",
+        lambda w: w.settled_temperature,
+        during=_STEADY,
+        of="winding temperature",
+        card=True,
+        minor=True,
     )
     rocker_torque_peak: Value = measure(
-        "N.m", "rocker torque, peak", lambda w: w.largest("machine.rocker.tau"), during=_ALL
+        "N.m", "peak", lambda w: w.largest("machine.rocker.tau"), during=_ALL, of="rocker torque"
     )
-    speed_mean: Value = measure("rad/s", "crank speed, mean", lambda w: w.speed_mean, kind="speed")
+    speed_mean: Value = measure(
+        "rad/s", "mean", lambda w: w.speed_mean, kind="speed", of="crank speed", minor=True
+    )
     speed_least: Value = measure(
-        "rad/s", "crank speed, least", lambda w: float(np.min(w.speed)), kind="speed"
+        "rad/s", "least", lambda w: float(np.min(w.speed)), kind="speed", of="crank speed", minor=True
+    )
+    start_time: Value = measure(
+        "s",
+        "start-up time",
+        _start_time,
+        during=frozenset({Phase.START_UP, Phase.LOADED_START}),
     )
     speed_ripple: Value = measure(
         "1",
@@ -355,6 +398,7 @@ class Answers:
         lambda w: end_gap(w.drive, w.turns),
         kind="percent",
         during=_STEADY,
+        minor=True,
     )
     speed_dip: Value = measure(
         "1", "speed dip", lambda w: float((w.kept - np.min(w.speed)) / w.kept), kind="dip", during=_AT_SPEED
@@ -413,6 +457,12 @@ class Answers:
     standstill_time: Value = measure("s", "machine stands after", _standstill, during=_EVENTS)
 
 
+MEASURES: Mapping[str, Measure] = {
+    each.name: each.metadata["measure"] for each in dataclasses.fields(Answers)
+}
+"""By the names of their fields."""
+
+
 def same_measure(name: str) -> Any:
     """A field that declares the measure of that name in another declaration, too."""
     (declared,) = (each for each in dataclasses.fields(Answers) if each.name == name)
@@ -421,39 +471,34 @@ def same_measure(name: str) -> Any:
 
 def read_answers(window: Window) -> Answers:
     """All measures of a window; None where one means nothing there, or there is no such thing."""
-    values = {
-        each.name: _read(each.metadata["read"], window) if window.phase in each.metadata["during"] else None
-        for each in dataclasses.fields(Answers)
-    }
-    return Answers(**values)
+    return Answers(
+        **{
+            name: read_measure(name, window) if window.phase in each.during else None
+            for name, each in MEASURES.items()
+        }
+    )
 
 
 def not_known(window: Window) -> frozenset[str]:
     """Names of the measures of a window that the motor does not tell, as an FMU of somebody else."""
     names = set()
-    for each in dataclasses.fields(Answers):
-        if window.phase in each.metadata["during"]:
+    for name, each in MEASURES.items():
+        if window.phase in each.during:
             try:
-                each.metadata["read"](window)
+                each.read(window)
             except AbsentError:
-                names.add(each.name)
+                names.add(name)
     return frozenset(names)
-
-
-def _read(read: Read, window: Window) -> float | None:
-    try:
-        return read(window)
-    except AbsentError:
-        return None
 
 
 def read_measure(name: str, window: Window) -> Any:
     """One measure of a window; None where there is no such thing."""
-    (declared,) = (each for each in dataclasses.fields(Answers) if each.name == name)
-    return _read(declared.metadata["read"], window)
+    try:
+        return MEASURES[name].read(window)
+    except AbsentError:
+        return None
 
 
 def measures_of(phase: Phase) -> tuple[Variable, ...]:
     """The measures that mean something in a run of that part."""
-    during = {each.name for each in dataclasses.fields(Answers) if phase in each.metadata["during"]}
-    return tuple(v for v in Layout(Answers).variables if v.name in during)
+    return tuple(v for v in Layout(Answers).variables if phase in MEASURES[v.name].during)
