@@ -12,8 +12,9 @@ from chainunit.errors import InputError
 from chainunit.machines.chain_unit import ChamberForces, Parameters
 from chainunit.models import MODELS
 from chainunit.reading import to_number
-from chainunit.study.config import Parts, example, load, parse
+from chainunit.study.config import load, parse
 from chainunit.study.events import TYPES, Event
+from chainunit.study.parts import Parts, example
 
 
 def test_the_packaged_example_is_the_packaged_machine():

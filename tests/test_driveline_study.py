@@ -23,7 +23,7 @@ from chainunit.drives.torsion import rigid, settling_time, simulate, steady, wit
 from chainunit.engines import MATH
 from chainunit.quantities import Layout
 from chainunit.report.torsion import PICTURES
-from chainunit.study import config, torsion_findings
+from chainunit.study import config, parts, torsion_findings
 from chainunit.study.choice import choose
 from chainunit.study.rig import Rig
 from chainunit.study.sections import TorsionTable
@@ -417,7 +417,7 @@ def test_a_speed_at_which_nothing_resonates_is_refused():
 
 
 def test_a_file_is_laid_over_the_example():
-    packaged = config.parse(config.example("driveline"))
+    packaged = config.parse(parts.example("driveline"))
     assert parse(BARE).driveline == packaged.driveline and parse("").driveline is None
     own = parse("[driveline]\nc2 = 5000").driveline
     assert (own.c2, own.c3, own.J4) == (5000.0, packaged.driveline.c3, packaged.driveline.J4)
@@ -641,4 +641,4 @@ def test_the_command_writes_everything(monkeypatch, capsys, tmp_path):
 
 def test_the_example_is_printed(monkeypatch, capsys):
     status, out, _ = run(monkeypatch, capsys, "--example", "driveline")
-    assert not status and out == config.example("driveline")
+    assert not status and out == parts.example("driveline")

@@ -22,9 +22,10 @@ from chainunit.report.study import report
 from chainunit.study import flywheels
 from chainunit.study.blade import BladeAnalysis, in_stack
 from chainunit.study.choice import choose
-from chainunit.study.config import example, load, parse
+from chainunit.study.config import load, parse
 from chainunit.study.flywheels import FlywheelAnswers, FlywheelFindings, Wheel, least_flywheel
 from chainunit.study.measures import Phase, Window, read_answers
+from chainunit.study.parts import example
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
 from chainunit.study.statics import statics

@@ -125,10 +125,10 @@ def study(
 
     Writes report.html, result.json, result.md, result.nc, plots and the FMUs into the output folder.
     """
-    from .study import config as configuration
+    from .study import parts
 
     if example:
-        print(configuration.example(example.value), end="")
+        print(parts.example(example.value), end="")
         return
     loaded = _study_file(config)
     from .study.choice import check_files

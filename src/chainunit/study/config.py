@@ -5,32 +5,22 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping
-from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
-
-from pydantic import BaseModel, ConfigDict, StrictBool
+from typing import Any
 
 from ..drives.cardan import check
 from ..drives.catalogue import CatalogueMotor, motor_of_catalogue
 from ..drives.gearing import Transmission
-from ..drives.line_table import SHAFTS
 from ..drives.motor import Motor
-from ..drives.motors import MOTORS
-from ..errors import GeometryError, InputError, shown
+from ..errors import GeometryError, InputError
 from ..machines.api import ChainUnit, ratios
 from ..machines.chain_unit import ChamberForces, SideLoads, SideName
 from ..machines.machine import Machine
-from ..mechanism.models import InverseMachine
-from ..models import MACHINES
 from ..quantities import Layout
 from ..reading import (
     Slip,
-    file_form,
     filled,
     given_values,
-    merged,
-    packaged,
     read,
     read_table,
     slips,
@@ -40,11 +30,9 @@ from ..system.signals import Profile
 from ..text import DEFAULT_UNITS, Units, chosen_units
 from .event_table import RandomEvent, read_events, read_random_event
 from .events import Event, OneSidedFeed
-from .foreign_machine import ForeignMachine, ForeignModel, foreign_model
+from .foreign_machine import ForeignMachine, ForeignModel
+from .parts import Parts, beside, check_company, example, over_example, parts_of
 from .sections import (
-    ORGANS,
-    SIMULATIONS,
-    STARTS,
     ChainOrgans,
     Coupling,
     Driveline,
@@ -56,118 +44,8 @@ from .sections import (
     Run,
     Sizing,
     Starter,
-    SystemTable,
     TorsionTable,
-    sections_of,
 )
-
-
-class ReportTable(BaseModel):
-    """How the report on a study shows it."""
-
-    model_config = ConfigDict(extra="forbid")
-    units: dict[str, str] = {}
-
-
-EXAMPLES = {
-    "chain-unit": "example.toml",
-    "knife": "knife.toml",
-    "driveline": "driveline.toml",
-    "full": "full.toml",
-}
-"""Packaged study files by the names of the examples."""
-_OF_MACHINE = {"ChamberForces": "chain-unit", "KnifeDrive": "knife", "Accelerator": "driveline"}
-"""The example from which a study takes what its file leaves out, by machine."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Parts:
-    """The kinds of machine and motor that the table [system] names, and the example that goes with the machine."""
-
-    machine: type[InverseMachine | ForeignModel]
-    motor: type[Motor]
-    """`Motor` itself where the motor is an FMU of somebody else"""
-    designation: str = ""
-    """of a motor in the catalogue"""
-    file: str = ""
-    """of a motor that is an FMU of somebody else"""
-
-    @property
-    def gives_motor(self) -> bool:
-        """Whether the table [motor] gives the motor."""
-        return not self.designation and not self.file
-
-    @property
-    def sections(self) -> dict[str, FileSection]:
-        """The tables of the file."""
-        motor = self.motor if self.gives_motor else MOTORS["DcMotor"]
-        return sections_of(self.machine, motor)
-
-    @cached_property
-    def form(self) -> type[BaseModel]:
-        """The form of the file."""
-        return file_form(
-            "Config",
-            {
-                name: section.form(section.declared, name, f"{name}.", **section.keys)
-                for name, section in self.sections.items()
-            }
-            | {"report": ReportTable, "system": SystemTable},
-            feed_forward=(StrictBool, False),
-            empty_start=(StrictBool, False),
-            start=(Literal[STARTS], "direct"),
-            simulation=(Literal[SIMULATIONS], "cs"),
-            organ=(Literal[ORGANS], "two-bar"),
-            catalogue=(str, ""),
-            event=(list[Any], []),
-        )
-
-    @property
-    def example(self) -> dict[str, Any]:
-        """The tables of the example, empty where there is none."""
-        name = _OF_MACHINE.get(self.machine.name)
-        return toml(example(name)) if name else {}
-
-
-def _is_fmu(name: str) -> bool:
-    return name.lower().endswith(".fmu")
-
-
-def _parts(data: Mapping[str, Any], source: str) -> Parts:
-    """Machine and motor of a file, checked before all else: the other tables depend on them."""
-    table = read_table(SystemTable, _table(data, "system"), "system.")
-    machine = _machine_model(table, source)
-    motor = table.motor
-    if not motor and "motor" not in data and "sizing" not in data and machine.name in _OF_MACHINE:
-        motor = toml(example(_OF_MACHINE[machine.name])).get("system", {}).get("motor", "")
-    if not motor:
-        return Parts(machine, MOTORS["DcMotor"])
-    if _is_fmu(motor):
-        return Parts(machine, Motor, file=motor)
-    if motor in MOTORS:
-        return Parts(machine, MOTORS[motor])
-    return Parts(machine, MOTORS["InductionMotor"], designation=motor)
-
-
-def _machine_model(table: Any, source: str) -> type[InverseMachine | ForeignModel]:
-    """The machine that the table [system] names."""
-    if not _is_fmu(table.machine):
-        if table.machine in MACHINES:
-            return MACHINES[table.machine]
-        raise InputError(
-            f"system.machine = {shown(table.machine)}: must be one of {', '.join(MACHINES)}, or a file .fmu"
-        )
-    try:
-        return foreign_model(_beside(table.machine, source), given_values(table.machine_names))
-    except InputError as error:
-        raise InputError(f"system.machine: {error}") from error
-
-
-def _table(data: Mapping[str, Any], name: str) -> Mapping[str, Any]:
-    table = data.get(name, {})
-    if not isinstance(table, Mapping):
-        raise InputError(f"{name} = {shown(table)}: must be a table")
-    return table
 
 
 @dataclasses.dataclass(frozen=True)
@@ -272,11 +150,6 @@ def load(file: Path | None = None) -> Config:
     return read(file, example, parse)
 
 
-def example(name: str = "chain-unit") -> str:
-    """A packaged study file, by its name in `EXAMPLES`."""
-    return packaged(EXAMPLES[name])
-
-
 def parse(text: str, source: str = "config") -> Config:
     """A study from TOML text. What it leaves out is the example's: the packaged file's, and where that does not name
     it, as declared.
@@ -287,9 +160,9 @@ def parse(text: str, source: str = "config") -> Config:
         see `load`.
     """
     data = toml(text)
-    parts = _parts(data, source)
+    parts = parts_of(data, source)
     read_table(parts.form, data)
-    checked = read_table(parts.form, _over_example(data, parts))
+    checked = read_table(parts.form, over_example(data, parts))
     declared = {name: section.declared for name, section in parts.sections.items()}
     unusual = tuple(slips(declared, data, {"run.crank_speed": parts.machine.usual_speed}))
     try:
@@ -315,7 +188,7 @@ def _config(
 ) -> Config:
     """The study of a file whose values are each allowed."""
     sections = parts.sections
-    _check_company(data, parts)
+    check_company(data, parts)
     tables = {name: section.values(getattr(checked, name)) for name, section in sections.items()}
     values = {
         name: Layout(section.declared).from_names(
@@ -332,7 +205,7 @@ def _config(
     if "sizing" in data and checked.start != "inverter" and "inertia_ratio" not in tables["sizing"]:
         # of motors on the line only where it is given
         of_study["sizing"] = dataclasses.replace(of_study["sizing"], inertia_ratio=math.inf)
-    catalogue = _beside(checked.catalogue, source) if checked.catalogue else None
+    catalogue = beside(checked.catalogue, source) if checked.catalogue else None
     config = Config(
         title=checked.title,
         machine=_machine(parts, tables["machine"], tables["ratios"]),
@@ -352,7 +225,7 @@ def _config(
         damping_ratios=tuple(sorted(set(checked.torsion.damping_ratios))),
         damping_ratio=checked.driveline.damping_ratio,
         chain=values["chain"] if checked.organ == "chain" else None,
-        foreign=ForeignMotor(_beside(parts.file, source), given_values(checked.system.motor_names))
+        foreign=ForeignMotor(beside(parts.file, source), given_values(checked.system.motor_names))
         if parts.file
         else None,
         source=source,
@@ -423,63 +296,6 @@ def _taken_over(error: InputError, given: Mapping[str, float]) -> str:
     example = Layout(type(ChainUnit().p)).named(ChainUnit().p)
     taken = [f"{name} = {example[name]:g}" for name in names if name in example and name not in given]
     return f"; not in the file, so taken from the packaged example: {', '.join(taken)}" if taken else ""
-
-
-def _check_company(data: Mapping[str, Any], parts: Parts) -> None:
-    """Refuse values that would be passed over in silence."""
-    named = data.get("system", {}).get("motor")
-    if data.get("system") == {}:
-        raise InputError('system: names nothing; add motor = "file.fmu", or leave [system] out')
-    foreign = {"motor": bool(parts.file), "machine": issubclass(parts.machine, ForeignModel)}
-    for part, is_foreign in foreign.items():
-        if f"{part}_names" in data.get("system", {}) and not is_foreign:
-            raise InputError(
-                f'system.{part}_names: are of an FMU of somebody else; add {part} = "file.fmu", or leave them out'
-            )
-    if foreign["machine"] and data.get("feed_forward"):
-        raise InputError("feed_forward: needs a model of the machine, which is an FMU; leave it out")
-    if foreign["machine"] and _table(data, "monte_carlo").get("runs"):
-        raise InputError("monte_carlo.runs: needs a model of the machine, which is an FMU; leave it out")
-    if named is not None:
-        for name in ("motor", "sizing"):
-            if name in data and not (name == "motor" and parts.gives_motor):
-                raise InputError(
-                    f"{name}: given beside system.motor = {shown(named)}, which is the motor; leave out one of "
-                    "the two"
-                )
-    if parts.machine is not ChamberForces:
-        for name in ("ratios", "chain", "organ"):
-            if name in data:
-                raise InputError(
-                    f"{name}: is of the chain unit, and the machine is {parts.machine.name}; leave it out"
-                )
-        if "one_sided_share" in data.get("sizing", {}):
-            raise InputError(f"sizing.one_sided_share: the {parts.machine.name} has no sides; leave it out")
-    if "sizing" in data:
-        for name in ("motor", "feed_forward", "flywheel"):
-            if data.get(name):
-                words = (
-                    "sizing finds its own"
-                    if name == "flywheel"
-                    else "is of the DC motor, and [sizing] picks another"
-                )
-                raise InputError(f"{name}: {words}; leave out one of the two")
-        if "ratio" in data.get("machine", {}):
-            raise InputError("machine.ratio: [sizing] finds it; to have it kept, give gear.ratio")
-    elif not parts.designation:
-        for name in ("gear", "start", "starter", "catalogue"):
-            if name in data:
-                raise InputError(
-                    f"{name}: is of a motor of the catalogue; add [sizing] or system.motor, or leave it out"
-                )
-    elif "ratio" in data.get("machine", {}):
-        raise InputError(
-            "machine.ratio: follows from the motor's rated speed; to have another, give gear.ratio"
-        )
-    if "torsion" in data and "driveline" not in data:
-        raise InputError("torsion: is of a driveline; add [driveline], or leave it out")
-    if "chain" in data and data.get("organ") != "chain":
-        raise InputError('chain: is of organs that are chains; add organ = "chain", or leave it out')
 
 
 _ORDER = (
@@ -556,33 +372,3 @@ def _check_steps(config: Config) -> None:
             f"run.step = {run.step:g} s: the study would take {steps:.2g} steps, more than {MOST_STEPS:.0e}; "
             "lengthen the step, raise the speed, or lessen the turns"
         )
-
-
-def _beside(name: str, source: str) -> Path:
-    """A file that a study file names, relative to the study file."""
-    return Path(source).parent / name
-
-
-LENGTHS = ("r", "l", "h", "c", "hy", "e", "l1", "l2", "z")
-
-
-def _over_example(data: Mapping[str, Any], parts: Parts) -> dict[str, Any]:
-    """A study file laid over the example of its machine: a value that is not named is the example's. Its ratios give
-    way to lengths of the user's own, its motor to another one, its shafts and their damping to the user's."""
-    base = parts.example
-    if any(name in _table(data, "machine") for name in LENGTHS) and "ratios" not in data:
-        base.pop("ratios", None)
-    if parts.motor is not _parts(base, "").motor:
-        base.pop("motor", None)
-    if "motor" in _table(data, "system") or "sizing" in data or "motor" in data:
-        base.get("system", {}).pop("motor", None)
-        for name in ("gear", "start", "starter"):
-            base.pop(name, None)
-    line = _table(data, "driveline")
-    for shaft, stiffness in SHAFTS.items():
-        if shaft in line or stiffness in line:
-            base.get("driveline", {}).pop(shaft, None)
-    if "d2" in line or "d3" in line:
-        base.get("driveline", {}).pop("damping_ratio", None)
-    base["title"] = ""
-    return merged(base, data)

@@ -14,10 +14,11 @@ from ..fmu.backends import Origin
 from ..text import entry, number
 from . import verdict
 from .chain import ChainResult
-from .config import LENGTHS, Config
+from .config import Config
 from .drive import Drive
 from .measures import Answers, Phase, Trip, Window, not_known, reaches, whole_turns
 from .monte_carlo import MonteCarloResult
+from .parts import LENGTHS
 from .protection import Setting
 from .shaft import Cycles, ShaftAnswers
 from .sizing import SizingResult

@@ -1,0 +1,221 @@
+"""What a study file names: the kinds of machine and motor, the form of its tables that follows from them, and the
+example from which it takes what it leaves out."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, StrictBool
+
+from ..drives.line_table import SHAFTS
+from ..drives.motor import Motor
+from ..drives.motors import MOTORS
+from ..errors import InputError, refusal_prefix, shown
+from ..machines.chain_unit import ChamberForces
+from ..mechanism.models import InverseMachine
+from ..models import MACHINES
+from ..reading import file_form, given_values, merged, packaged, read_table, toml
+from .foreign_machine import ForeignModel, foreign_model
+from .sections import ORGANS, SIMULATIONS, STARTS, FileSection, SystemTable, sections_of
+
+
+class ReportTable(BaseModel):
+    """How the report on a study shows it."""
+
+    model_config = ConfigDict(extra="forbid")
+    units: dict[str, str] = {}
+
+
+EXAMPLES = {
+    "chain-unit": "example.toml",
+    "knife": "knife.toml",
+    "driveline": "driveline.toml",
+    "full": "full.toml",
+}
+"""Packaged study files by the names of the examples."""
+_OF_MACHINE = {"ChamberForces": "chain-unit", "KnifeDrive": "knife", "Accelerator": "driveline"}
+"""The example from which a study takes what its file leaves out, by machine."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Parts:
+    """The kinds of machine and motor that the table [system] names, and the example that goes with the machine."""
+
+    machine: type[InverseMachine | ForeignModel]
+    motor: type[Motor]
+    """`Motor` itself where the motor is an FMU of somebody else"""
+    designation: str = ""
+    """of a motor in the catalogue"""
+    file: str = ""
+    """of a motor that is an FMU of somebody else"""
+
+    @property
+    def gives_motor(self) -> bool:
+        """Whether the table [motor] gives the motor."""
+        return not self.designation and not self.file
+
+    @property
+    def sections(self) -> dict[str, FileSection]:
+        """The tables of the file."""
+        motor = self.motor if self.gives_motor else MOTORS["DcMotor"]
+        return sections_of(self.machine, motor)
+
+    @cached_property
+    def form(self) -> type[BaseModel]:
+        """The form of the file."""
+        return file_form(
+            "Config",
+            {
+                name: section.form(section.declared, name, f"{name}.", **section.keys)
+                for name, section in self.sections.items()
+            }
+            | {"report": ReportTable, "system": SystemTable},
+            feed_forward=(StrictBool, False),
+            empty_start=(StrictBool, False),
+            start=(Literal[STARTS], "direct"),
+            simulation=(Literal[SIMULATIONS], "cs"),
+            organ=(Literal[ORGANS], "two-bar"),
+            catalogue=(str, ""),
+            event=(list[Any], []),
+        )
+
+    @property
+    def example(self) -> dict[str, Any]:
+        """The tables of the example, empty where there is none."""
+        name = _OF_MACHINE.get(self.machine.name)
+        return toml(example(name)) if name else {}
+
+
+def _is_fmu(name: str) -> bool:
+    return name.lower().endswith(".fmu")
+
+
+def parts_of(data: Mapping[str, Any], source: str) -> Parts:
+    """Machine and motor of a file, checked before all else: the other tables depend on them."""
+    table = read_table(SystemTable, _table(data, "system"), "system.")
+    machine = _machine_model(table, source)
+    motor = table.motor
+    if not motor and "motor" not in data and "sizing" not in data and machine.name in _OF_MACHINE:
+        motor = toml(example(_OF_MACHINE[machine.name])).get("system", {}).get("motor", "")
+    if not motor:
+        return Parts(machine, MOTORS["DcMotor"])
+    if _is_fmu(motor):
+        return Parts(machine, Motor, file=motor)
+    if motor in MOTORS:
+        return Parts(machine, MOTORS[motor])
+    return Parts(machine, MOTORS["InductionMotor"], designation=motor)
+
+
+def _machine_model(table: Any, source: str) -> type[InverseMachine | ForeignModel]:
+    """The machine that the table [system] names."""
+    if not _is_fmu(table.machine):
+        if table.machine in MACHINES:
+            return MACHINES[table.machine]
+        raise InputError(
+            f"system.machine = {shown(table.machine)}: must be one of {', '.join(MACHINES)}, or a file .fmu"
+        )
+    with refusal_prefix("system.machine: "):
+        return foreign_model(beside(table.machine, source), given_values(table.machine_names))
+
+
+def _table(data: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    table = data.get(name, {})
+    if not isinstance(table, Mapping):
+        raise InputError(f"{name} = {shown(table)}: must be a table")
+    return table
+
+
+def example(name: str = "chain-unit") -> str:
+    """A packaged study file, by its name in `EXAMPLES`."""
+    return packaged(EXAMPLES[name])
+
+
+def beside(name: str, source: str) -> Path:
+    """A file that a study file names, relative to the study file."""
+    return Path(source).parent / name
+
+
+LENGTHS = ("r", "l", "h", "c", "hy", "e", "l1", "l2", "z")
+
+
+def over_example(data: Mapping[str, Any], parts: Parts) -> dict[str, Any]:
+    """A study file laid over the example of its machine: a value that is not named is the example's. Its ratios give
+    way to lengths of the user's own, its motor to another one, its shafts and their damping to the user's."""
+    base = parts.example
+    if any(name in _table(data, "machine") for name in LENGTHS) and "ratios" not in data:
+        base.pop("ratios", None)
+    if parts.motor is not parts_of(base, "").motor:
+        base.pop("motor", None)
+    if "motor" in _table(data, "system") or "sizing" in data or "motor" in data:
+        base.get("system", {}).pop("motor", None)
+        for name in ("gear", "start", "starter"):
+            base.pop(name, None)
+    line = _table(data, "driveline")
+    for shaft, stiffness in SHAFTS.items():
+        if shaft in line or stiffness in line:
+            base.get("driveline", {}).pop(shaft, None)
+    if "d2" in line or "d3" in line:
+        base.get("driveline", {}).pop("damping_ratio", None)
+    base["title"] = ""
+    return merged(base, data)
+
+
+def check_company(data: Mapping[str, Any], parts: Parts) -> None:
+    """Refuse values that would be passed over in silence."""
+    named = data.get("system", {}).get("motor")
+    if data.get("system") == {}:
+        raise InputError('system: names nothing; add motor = "file.fmu", or leave [system] out')
+    foreign = {"motor": bool(parts.file), "machine": issubclass(parts.machine, ForeignModel)}
+    for part, is_foreign in foreign.items():
+        if f"{part}_names" in data.get("system", {}) and not is_foreign:
+            raise InputError(
+                f'system.{part}_names: are of an FMU of somebody else; add {part} = "file.fmu", or leave them out'
+            )
+    if foreign["machine"] and data.get("feed_forward"):
+        raise InputError("feed_forward: needs a model of the machine, which is an FMU; leave it out")
+    if foreign["machine"] and _table(data, "monte_carlo").get("runs"):
+        raise InputError("monte_carlo.runs: needs a model of the machine, which is an FMU; leave it out")
+    if named is not None:
+        for name in ("motor", "sizing"):
+            if name in data and not (name == "motor" and parts.gives_motor):
+                raise InputError(
+                    f"{name}: given beside system.motor = {shown(named)}, which is the motor; leave out one of "
+                    "the two"
+                )
+    if parts.machine is not ChamberForces:
+        for name in ("ratios", "chain", "organ"):
+            if name in data:
+                raise InputError(
+                    f"{name}: is of the chain unit, and the machine is {parts.machine.name}; leave it out"
+                )
+        if "one_sided_share" in data.get("sizing", {}):
+            raise InputError(f"sizing.one_sided_share: the {parts.machine.name} has no sides; leave it out")
+    if "sizing" in data:
+        for name in ("motor", "feed_forward", "flywheel"):
+            if data.get(name):
+                words = (
+                    "sizing finds its own"
+                    if name == "flywheel"
+                    else "is of the DC motor, and [sizing] picks another"
+                )
+                raise InputError(f"{name}: {words}; leave out one of the two")
+        if "ratio" in data.get("machine", {}):
+            raise InputError("machine.ratio: [sizing] finds it; to have it kept, give gear.ratio")
+    elif not parts.designation:
+        for name in ("gear", "start", "starter", "catalogue"):
+            if name in data:
+                raise InputError(
+                    f"{name}: is of a motor of the catalogue; add [sizing] or system.motor, or leave it out"
+                )
+    elif "ratio" in data.get("machine", {}):
+        raise InputError(
+            "machine.ratio: follows from the motor's rated speed; to have another, give gear.ratio"
+        )
+    if "torsion" in data and "driveline" not in data:
+        raise InputError("torsion: is of a driveline; add [driveline], or leave it out")
+    if "chain" in data and data.get("organ") != "chain":
+        raise InputError('chain: is of organs that are chains; add organ = "chain", or leave it out')
