@@ -147,7 +147,7 @@ def test_the_loop_is_that_of_the_tuning_and_of_the_motor():
     )
     speed = solved.y[LAYOUT.names.index("w")]
     np.testing.assert_allclose(speed, 0.5 * found.deviation, atol=1e-6 * np.max(np.abs(speed)))
-    assert found.speed_dip == pytest.approx(np.max(np.abs(speed)) / 0.5, rel=1e-4)
+    assert found.largest_deviation == pytest.approx(np.max(np.abs(speed)) / 0.5, rel=1e-4)
 
 
 def test_feed_forward_of_the_whole_torque_leaves_no_dip():

@@ -89,7 +89,7 @@ class Loop:
     """[deg]"""
     crossover: float
     """[rad/s]"""
-    speed_dip: float
+    largest_deviation: float
     """largest deviation of the motor speed after a step of the load torque [(rad/s)/(N m)]"""
     settling: float
     """time until the deviation stays below a twentieth of that [s]"""

@@ -102,6 +102,8 @@ class InverseMachine(LinkageModel):
     """Joint of each reaction by the name of the output."""
     pins: ClassVar[Mapping[str, str]] = {}
     """Output of each bearing by its title, which is the name of pin and link where a machine states none."""
+    noun: ClassVar[str] = "machine"
+    """What people call it."""
     direct_name: ClassVar[str]
     """Name of the direct model, ``<name>Direct`` where a machine states none."""
     direct_description: ClassVar[str] = ""

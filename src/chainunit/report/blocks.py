@@ -272,13 +272,13 @@ class Source:
         yield from (Judgement("warning", each) for each in self.lines("warnings"))
         yield from (Text(each, "note") for each in self.lines("notes"))
 
-    def rows(self, declared: type, path: str, **more: Any) -> tuple[TableRow, ...]:
-        """A row for each declared quantity that stands at `path`: description and number."""
+    def rows(self, declared: type, path: str, only: str = "", **more: Any) -> tuple[TableRow, ...]:
+        """A row for each declared quantity that stands at `path`, or for `only` that one: description and number."""
         have = at(self.result, path)
         return tuple(
             TableRow((v.description, self.number(f"{path}.{v.name}", **more)))
             for v in Layout(declared).variables
-            if v.name in have
+            if v.name in have and only in ("", v.name)
         )
 
     def given(self, title: str, declared: Any, path: str, leave_out: Iterable[str] = ()) -> tuple[str, Any]:

@@ -30,7 +30,7 @@ def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
     if s.result.get("monte_carlo"):
         yield from _random(s)
     if loops := s.result.get("speed_loop"):
-        title = "The speed loop, linearised; dip and settling: after a step of the load torque"
+        title = "The speed loop, linearised; deviation and settling: after a step of the load torque"
         yield matrix(s, "speed_loop", {loop: spoken(loop) for loop in loops}, title, first="")
 
 

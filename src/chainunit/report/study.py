@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping
 from importlib import metadata
 from typing import Any
 
-from ..quantities import Layout
 from ..study.result import as_dict
 from ..study.rig import DIFFERENCE
 from ..study.study import Study
@@ -49,19 +48,12 @@ def _motion(study: Study) -> list[b.Block]:
 
 
 def _opening(s: b.Source, study: Study) -> Iterator[b.Block]:
-    machine = "chain unit" if "limits" in s.result else "machine"
+    noun = study.noun
     question = s.line(
-        f"Which motor, gear and flywheel does this {machine} need? Its crank turns at "
+        f"Which motor, gear and flywheel does this {noun} need? Its crank turns at {{=run.crank_speed}}."
         if "sizing" in s.result
-        else f"What does the drive of this {machine} have to give? A motor turns the crank through a gear of ratio "
-        "{=machine.ratio}, in normal running at "
-    )
-    question += s.line(
-        "{=run.crank_speed}. The left organ carries {=feed.left.material_mass} of material and works against "
-        "{=feed.left.processing_force}, the right one {=feed.right.material_mass} and "
-        "{=feed.right.processing_force}."
-        if "limits" in s.result
-        else "{=run.crank_speed}."
+        else f"What does the motor of this {noun} have to give? It turns the crank through a gear of ratio "
+        "{=machine.ratio}, in normal running at {=run.crank_speed}."
     )
     if study.answers:
         question += s.line(
@@ -73,20 +65,15 @@ def _opening(s: b.Source, study: Study) -> Iterator[b.Block]:
         words = "; ".join(read.title(study, name) for name in names)
         question += line(f" Then come overloads, each by itself: {words}.")
     yield b.Text(question, form="long")
-    ratio = () if "sizing" in s.result else ("machine.ratio",)
-    feed = (f"feed.{name}" for name in Layout(type(study.config.feed)).names)
-    rows = (
-        b.TableRow((_described(study, path), s.number(path, given=True)))
-        for path in ("run.crank_speed", *ratio, *feed)
-    )
+    sized, feed = "sizing" in s.result, study.config.feed
+    parts = {"machine": study.drive.machine.p, "run": study.config.run}
+    wanted = [("run", "crank_speed"), *([] if sized else [("machine", "ratio")])]
+    rows = [
+        *([] if sized else [b.TableRow(("motor", s.words("motor.kind")))]),
+        *(row for of, name in wanted for row in s.rows(type(parts[of]), of, only=name, given=True)),
+        *s.rows(type(feed), "feed", given=True),
+    ]
     yield b.Table(tuple(rows), title="In short", form="long")
-
-
-def _described(study: Study, path: str) -> str:
-    """The declared description of a given quantity."""
-    section, _, name = path.partition(".")
-    declared = study.drive.machine.p if section == "machine" else getattr(study.config, section)
-    return next(v.description for v in Layout(type(declared)).variables if v.name == name)
 
 
 def _given(s: b.Source, study: Study) -> Iterator[b.Block]:

@@ -92,7 +92,10 @@ def motor_verdict(study: Study) -> dict[str, Any] | None:
         text += f"; least reserve of torque {number(reserve, '1', 'percent')} ({study.called(run)})"
     else:
         over = number(-reserves[run], "1", "percent") + (" or more" if reserves[run] <= -1.0 else "")
-        text += f"; no reserve of torque: the torque passes the largest steady one by {over} ({study.called(run)})"
+        text += (
+            f"; no torque is left in reserve: for a moment it gives {over} more than it can give for long "
+            f"({study.called(run)})"
+        )
     if left_out:
         names = ", ".join(study.called(name) for name in left_out)
         text += f"; runs whose energy balance is not kept are left out ({names})"

@@ -89,7 +89,7 @@ def _statics(study: Study) -> dict[str, Any]:
                 "inertia": entry(loop.inertia, "kg.m2"),
                 "phase_margin": entry(loop.phase_margin, "deg"),
                 "crossover": entry(loop.crossover, "rad/s"),
-                "speed_dip": entry(loop.speed_dip, "rad/(N.m.s)"),
+                "deviation": entry(loop.largest_deviation, "rad/(N.m.s)"),
                 "settling": entry(loop.settling, "s"),
             }
             for name, loop in statics.loops.items()

@@ -105,7 +105,12 @@ class Sizing:
     """The demands on a motor from the catalogue."""
 
     one_sided_share: Value = quantity(
-        "1", "share of the running time with all feed on one side", default=0.1, min=0.0, max=1.0
+        "1",
+        "share of the running time with all feed on one side",
+        default=0.1,
+        min=0.0,
+        max=1.0,
+        kind="percent",
     )
     starts_per_hour: Value = quantity("1", "starts per hour", default=2.0, min=0.0, max=1000.0)
     fluctuation: Value = quantity(
@@ -114,6 +119,7 @@ class Sizing:
         default=0.05,
         above=0.0,
         max=1.0,
+        kind="percent",
     )
     breakdown_margin: Value = quantity(
         "1", "factor between the peak torque and the breakdown torque", default=1.25, min=1.0, max=10.0

@@ -180,7 +180,12 @@ class Study:
     @property
     def kind(self) -> str:
         """What is studied, as the heading of a report."""
-        return self.drive.machine.model.description.partition(":")[0] + ": forces, torque and overload"
+        return f"{self.noun.capitalize()}: forces, torque and overload"
+
+    @property
+    def noun(self) -> str:
+        """What people call the machine; of one of somebody else no more is known than that it is one."""
+        return "machine" if self.drive.outsider else self.drive.machine.model.noun
 
     @property
     def reaches(self) -> bool:
