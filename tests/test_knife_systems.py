@@ -1,0 +1,158 @@
+"""The knife drive with a DC motor, a safety coupling that trips in a hard cut, a cardan line on its crank: each is a
+study with the same page; its numbers by another route."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from reports import page_of
+from scipy.integrate import cumulative_trapezoid, solve_ivp
+
+from chainunit.engines import MATH
+from chainunit.report.study import report
+from chainunit.study.config import parse
+from chainunit.study.run import run_study
+
+HEAD = 'event = []\n[system]\nmachine = "KnifeDrive"\n'
+RUN = "[run]\nsettle_turns = 2\nturns = 1\n"
+DC_MOTOR = """
+event = []
+[system]
+machine = "KnifeDrive"
+motor = "DcMotor"
+[machine]
+ratio = 35
+[motor]
+armature = { R = 0.6, L = 0.01, k = 1.3 }
+rotor = { J = 0.02 }
+limit = { i = 40, v = 300 }
+[flywheel]
+J = 0.2
+compare = [0.4]
+"""
+COUPLING = """
+[system]
+machine = "KnifeDrive"
+[machine]
+pin = { friction = 0.1 }
+[flywheel]
+J = 0.8
+compare = []
+[coupling]
+trip_torque = 2500
+[[event]]
+type = "cut"
+force = "60 kN"
+turns = 1
+"""
+CARDAN = """
+[driveline]
+place = "crank"
+alpha1 = "12 deg"
+alpha2 = "8 deg"
+shaft2 = { section = "round", outer = "60 mm", length = "1.5 m" }
+shaft3 = { section = "round", outer = "60 mm", length = "1.5 m" }
+damping_ratio = 0.05
+J4 = 0.5
+"""
+
+
+def run(text, folder):
+    study = run_study(parse(text + RUN), folder)
+    assert study.failure is None
+    assert max(x for shares in study.certificate.values() for x in shares.values()) < 1e-3
+    return study
+
+
+def sections(study):
+    """The sections of the page that have anything in them, each of which the page shows."""
+    names = [section.name for section in report(study).sections if section.blocks]
+    page = page_of(study)
+    assert all(f'id="{name}"' in page for name in names)
+    return set(names)
+
+
+COMMON = {"answer", "runs", "constant_speed", "blade", "plots", "motion", "basis", "given"}
+
+
+def cut_work(study):
+    return study.findings["blade"].numbers.cut_work
+
+
+def test_a_dc_motor_keeps_the_speed_and_each_flywheel_has_gains_of_its_own(tmp_path):
+    study = run(DC_MOTOR, tmp_path)
+    steady, drive = study.answers["steady"], study.drive
+    assert study.reaches and drive.follows and steady.current_share is None
+    # what the armature gives is the work of the cuts and its own friction, and heats the winding
+    rows = study.steady
+    w = rows["motor.w"].values
+    k, d = drive.parameters.armature.k, drive.parameters.rotor.d
+    work = np.trapezoid((k * rows["motor.armature.i"].values - d * w) * w, rows["time"].values)
+    assert work == pytest.approx(cut_work(study), rel=0.01)
+    heat = float(np.trapezoid(rows["motor.heat"], rows["time"]) / np.ptp(rows["time"].values))
+    turning = cut_work(study) * steady.speed_mean / (2.0 * math.pi)
+    friction = d * float(np.mean(w**2))
+    assert steady.supply_power_mean == pytest.approx(turning + heat + friction, rel=0.01)
+    # the same gains over the inertia: half the ripple with about twice the inertia
+    light, heavy = (wheel.answers for wheel in study.findings["flywheels"].wheels)
+    assert light.speed_ripple == steady.speed_ripple
+    shares = light.inertia / heavy.inertia, heavy.speed_ripple / light.speed_ripple
+    assert shares[1] == pytest.approx(shares[0], rel=0.1)
+    assert sections(study) == COMMON | {"flywheels"}
+
+
+def test_a_coupling_opens_in_a_hard_cut_and_the_machine_comes_to_rest(tmp_path):
+    study = run(COUPLING, tmp_path)
+    answers = study.answers["hard_cut"]
+    coasting = study.runs["hard_cut_coasting"]
+    assert 0.0 < answers.coupling_trip_time < answers.standstill_time < 2.0
+    run_up = study.runs["hard_cut"]
+    at = int(np.argmin(np.abs(run_up["time"].values - study.event["hard_cut"] - answers.coupling_trip_time)))
+    before, after = run_up["motor.tau"].values[at - 1 : at + 1] * study.drive.ratio
+    assert before < 2500.0 <= after
+    # behind it the machine has what it had, and loses it to stack and pins
+    energy = coasting["machine.kinetic_energy"].values + coasting["machine.potential_energy"].values
+    time = coasting["time"].values
+    lost = cumulative_trapezoid(coasting["machine.dissipated_power"].values, time, initial=0.0)
+    assert coasting["machine.kinetic_energy"].values[0] == pytest.approx(answers.energy_behind)
+    assert np.max(np.abs(energy + lost - energy[0])) < 0.02 * answers.energy_behind
+    # the same by another integrator, from where the coupling let go
+    model = study.drive.coasting_model
+    p = model.prepared(MATH, model.parameter_layout.from_names(study.drive.coasting_parameters()))
+    force = np.interp(time, time, coasting["machine.cut_force"].values)
+
+    def rate(t, x):
+        u = model.input_layout.from_names({"tau": 0.0, "cut_force": float(np.interp(t, time, force))})
+        return model.derivatives(MATH, p, u, model.state_layout.instance(list(x)))
+
+    start = [float(coasting[f"machine.{x}"][0]) for x in ("phi", "w")]
+    at = time[time < time[0] + 0.1]
+    other = solve_ivp(rate, (time[0], at[-1]), start, t_eval=at, rtol=1e-8, atol=1e-8, max_step=1e-3)
+    speed = coasting["machine.w"].values[: len(at)]
+    assert np.max(np.abs(other.y[1] - speed)) < 0.01 * np.max(np.abs(speed))
+    assert sections(study) == COMMON | {"flywheels"}
+
+
+def test_a_cardan_line_on_the_crank(tmp_path):
+    study = run(HEAD + "[flywheel]\nJ = 0.8\ncompare = []\nfluctuation = 0.045\n" + CARDAN, tmp_path)
+    steady, rows = study.answers["steady"], study.steady
+    # the line gives on what the motor puts in: of a turn the work of the cut
+    tau, w = rows["driveline.tau3"].values, study.drive.crank_motion(rows)[1]
+    work = np.trapezoid(tau * w, rows["time"].values)
+    assert work == pytest.approx(cut_work(study), rel=0.01)
+    assert steady.crank_torque_mean == pytest.approx(cut_work(study) / (2.0 * math.pi), rel=0.02)
+    shaft = study.shaft["steady"]
+    assert shaft.tau2_rigid == pytest.approx(steady.crank_torque_peak, rel=0.05)
+    assert 1.0 < shaft.amplification < 1.5
+    # least and largest frequency of the line, by the formula for two masses at their ends
+    line, turn = study.drive.line, study.findings["constant_speed"].numbers
+    motor = study.drive.parameters.rotor.J * study.drive.ratio**2
+    c = line.c2 * line.c3 / (line.c2 + line.c3)
+    for J, k in (
+        (turn.inertia_largest, study.statics.torsion.k_least),
+        (turn.inertia_least, study.statics.torsion.k_largest),
+    ):
+        assert k == pytest.approx(math.sqrt(c * (1.0 / motor + 1.0 / (line.J4 + J))), rel=0.03)
+    assert sections(study) >= COMMON | {"flywheels", "shaft"}
