@@ -11,6 +11,7 @@ from reports import page_of
 from scipy.integrate import cumulative_trapezoid, solve_ivp
 
 from chainunit.engines import MATH
+from chainunit.quantities import Layout
 from chainunit.report.study import report
 from chainunit.study.config import parse
 from chainunit.study.run import run_study
@@ -107,31 +108,33 @@ def test_a_coupling_opens_in_a_hard_cut_and_the_machine_comes_to_rest(tmp_path):
     study = run(COUPLING, tmp_path)
     answers = study.answers["hard_cut"]
     coasting = study.runs["hard_cut_coasting"]
-    assert 0.0 < answers.coupling_trip_time < answers.standstill_time < 2.0
+    assert 0.0 < answers.coupling_trip_time < answers.standstill_time < answers.coupling_trip_time + 0.01
     run_up = study.runs["hard_cut"]
     at = int(np.argmin(np.abs(run_up["time"].values - study.event["hard_cut"] - answers.coupling_trip_time)))
     before, after = run_up["motor.tau"].values[at - 1 : at + 1] * study.drive.ratio
     assert before < 2500.0 <= after
-    # behind it the machine has what it had, and loses it to stack and pins
+    # behind it the stack stops the blade within a millisecond; then it creeps through, and what it loses in height
+    # goes to stack and pins
     energy = coasting["machine.kinetic_energy"].values + coasting["machine.potential_energy"].values
-    time = coasting["time"].values
-    lost = cumulative_trapezoid(coasting["machine.dissipated_power"].values, time, initial=0.0)
+    time, w = coasting["time"].values, coasting["machine.w"].values
     assert coasting["machine.kinetic_energy"].values[0] == pytest.approx(answers.energy_behind)
-    assert np.max(np.abs(energy + lost - energy[0])) < 0.02 * answers.energy_behind
+    assert w[0] > 50.0 and np.all((w[1:] > 0.0) & (w[1:] < 0.01 * w[0]))
+    lost = cumulative_trapezoid(coasting["machine.dissipated_power"].values[1:], time[1:], initial=0.0)
+    assert np.max(np.abs(energy[1:] + lost - energy[1])) < 1e-3
     # the same by another integrator, from where the coupling let go
     model = study.drive.coasting_model
     p = model.prepared(MATH, model.parameter_layout.from_names(study.drive.coasting_parameters()))
-    force = np.interp(time, time, coasting["machine.cut_force"].values)
+    u = model.input_layout.from_names({"tau": 0.0, "cut_force": 6e4})
+    states = Layout(model.States)
 
     def rate(t, x):
-        u = model.input_layout.from_names({"tau": 0.0, "cut_force": float(np.interp(t, time, force))})
-        return model.derivatives(MATH, p, u, model.state_layout.instance(list(x)))
+        return model.derivatives(MATH, p, u, states.instance(list(x)))
 
     start = [float(coasting[f"machine.{x}"][0]) for x in ("phi", "w")]
-    at = time[time < time[0] + 0.1]
-    other = solve_ivp(rate, (time[0], at[-1]), start, t_eval=at, rtol=1e-8, atol=1e-8, max_step=1e-3)
-    speed = coasting["machine.w"].values[: len(at)]
-    assert np.max(np.abs(other.y[1] - speed)) < 0.01 * np.max(np.abs(speed))
+    span = time[0], time[10]
+    other = solve_ivp(rate, span, start, "Radau", t_eval=time[:11], rtol=1e-8, atol=1e-9)
+    way = coasting["machine.phi"].values[:11] - start[0]
+    assert way == pytest.approx(other.y[0] - start[0], abs=1e-4 * np.max(way))
     assert sections(study) == COMMON | {"flywheels"}
 
 

@@ -296,11 +296,22 @@ class DirectMachine(LinkageModel):
         """The start angle and speed."""
         return TurningStates(phi=p.phi_start, w=p.w_start)
 
+    controlled = True
+
     @staticmethod
     def internal_step(xp: Any, p: Any) -> Any:
-        """A quarter of a millisecond: the motion is slow, and smoothed friction near rest, its fastest part, takes
-        some milliseconds with the declared `pin.w_smooth`; a much smaller one wants Model Exchange."""
-        return 2.5e-4
+        """5 ms: a cut or a stop that comes is not passed over."""
+        return 5e-3
+
+    @staticmethod
+    def tolerance(xp: Any, p: Any) -> Any:
+        """The motion is slow, but smoothed friction near rest, and a blade that a stack stops, take microseconds."""
+        return 1e-7
+
+    @staticmethod
+    def closed(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+        """The states themselves: they have no constraints."""
+        return [x.phi, x.w]
 
     @classmethod
     def shared(cls, xp: Any, p: Any, u: Any, x: Any) -> MachineState:
