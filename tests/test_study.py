@@ -60,6 +60,7 @@ def test_study_writes_numbers_series_plots_and_fmus(done):
         "driveline.png",
         "chain_sweep.png",
         "blade_path.png",
+        "flywheel.png",
     }
     for name in ("ChamberForces", "DcMotor"):
         assert validate_fmu(str(folder / "fmu" / f"{name}.fmu")) == []
