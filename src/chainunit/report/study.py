@@ -69,7 +69,7 @@ def _opening(s: b.Source, study: Study) -> Iterator[b.Block]:
     parts = {"machine": study.drive.machine.p, "run": study.config.run}
     wanted = [("run", "crank_speed"), *([] if sized else [("machine", "ratio")])]
     rows = [
-        *([] if sized else [b.TableRow(("motor", s.words("motor.kind")))]),
+        *([] if sized else [b.TableRow(("motor", s.words("motor.title")))]),
         *(row for of, name in wanted for row in s.rows(type(parts[of]), of, only=name, given=True)),
         *s.rows(type(feed), "feed", given=True),
     ]

@@ -25,9 +25,11 @@ def array_entry(x: Any, unit: str, kind: str = "") -> dict[str, Any]:
 
 
 def _motor(study: Study) -> dict[str, Any]:
-    kind = {"kind": study.drive.graph.components["motor"].title}
+    kind = study.drive.graph.components["motor"].title
+    plate = study.sizing.best.motor if study.sizing else study.config.plate
+    titles = {"kind": kind, "title": plate.designation if plate else kind}
     # of an FMU of somebody else no parameters are known
-    return kind if study.motor is None else kind | entries(study.motor)
+    return titles if study.motor is None else titles | entries(study.motor)
 
 
 def as_dict(study: Study) -> dict[str, Any]:
