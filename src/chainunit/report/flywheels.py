@@ -33,6 +33,9 @@ _HEADS = {
 def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
     """Table and figure."""
     found: FlywheelFindings = study.findings["flywheels"]
+    if study.config.plate is not None:
+        rated = ", ".join(f"{{motor.rated_{name}}}" for name in ("power", "speed", "torque", "current"))
+        yield b.Text(s.line(f"Motor: {{motor.title}}, rated {rated}; ratio {{machine.ratio:4}}."))
     if found.wheels:
         yield _table(s, found)
     running = [wheel for _, wheel, _ in found.rows if wheel.answers.speed_ripple is not None]

@@ -86,6 +86,7 @@ def _given(s: b.Source, study: Study) -> Iterator[b.Block]:
         ("feed", config.feed, "Feed in normal running"),
         *((f"event.{name}", event.p, read.title(study, name)) for name, event in config.events.items()),
         ("coupling", config.coupling, "Safety coupling"),
+        ("flywheel", config.flywheel, "Flywheel"),
         ("machine", study.drive.machine.p, "Machine"),
         ("chain", config.chain, "Chains"),
         ("driveline", config.driveline, "Driveline"),

@@ -100,6 +100,8 @@ def with_motor(config: Config, file: Path, names: Mapping[str, str] | None = Non
     motor = foreign_component(file, "motor", names)
     if config.driveline is not None:
         raise InputError(f"{file}: the inertia of its rotor is not known; leave [driveline] out")
+    if config.flywheel is not None:
+        raise InputError(f"{file}: its rotor takes no flywheel; leave [flywheel] out")
     if config.monte_carlo.runs:
         raise InputError(
             f"{file}: its current and torque are not known, of which random overloads tell the quantiles; leave "

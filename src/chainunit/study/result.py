@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
+from ..drives.catalogue import CatalogueMotor
 from ..quantities import variables
 from ..text import entries, entry
 from .coupling import coupling_sentence
@@ -29,7 +30,20 @@ def _motor(study: Study) -> dict[str, Any]:
     plate = study.sizing.best.motor if study.sizing else study.config.plate
     titles = {"kind": kind, "title": plate.designation if plate else kind}
     # of an FMU of somebody else no parameters are known
-    return titles if study.motor is None else titles | entries(study.motor)
+    return titles | _rating(plate) | ({} if study.motor is None else entries(study.motor))
+
+
+def _rating(motor: CatalogueMotor | None) -> dict[str, Any]:
+    """Of a motor of the catalogue."""
+    if motor is None:
+        return {}
+    plate = motor.nameplate
+    return {
+        "rated_power": entry(plate.power, "W"),
+        "rated_speed": entry(plate.speed, "rad/s", "speed"),
+        "rated_torque": entry(plate.torque, "N.m"),
+        "rated_current": entry(plate.rated_current, "A"),
+    }
 
 
 def as_dict(study: Study) -> dict[str, Any]:
@@ -66,6 +80,7 @@ def _given(study: Study) -> dict[str, Any]:
         "run": config.run,
         **{f"event.{name}": event.p for name, event in config.events.items()},
         "coupling": config.coupling,
+        "flywheel": config.flywheel,
         "chain": config.chain,
         "driveline": config.driveline,
         "torsion": config.torsion if "torsion" in study.findings else None,
@@ -79,6 +94,7 @@ def _given(study: Study) -> dict[str, Any]:
         "run": entries(config.run),
         "event": {name: entries(event.p) for name, event in config.events.items()},
         "coupling": entries(config.coupling) if config.coupling else None,
+        **({"flywheel": entries(config.flywheel)} if config.flywheel else {}),
     }
 
 
