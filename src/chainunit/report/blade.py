@@ -17,19 +17,12 @@ from ..text import number
 from . import blocks as b
 from . import figure as fig
 from . import linkage
+from .edge_motion import ENDS, edge
 from .motion import DrawnLink
 from .turn import ANGLE
 
 PICTURE = "blade_path.png"
-LOOKS = {
-    "coupler": "light",
-    "rocker": "heavy",
-    "leg_b": "light",
-    "leg_3": "light",
-    "leg_4": "light",
-    "knife": "light",
-}
-EDGE = DrawnLink("edge", ("first", "last"), "heavy")
+_EDGE = DrawnLink("edge", ENDS, "heavy")
 
 
 def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
@@ -40,13 +33,6 @@ def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
 
 def _mechanism(p: Any, q: Any) -> Mechanism:
     return KnifeDrive.state(numpy_(), p, KnifeDrive.Inputs(), q, 0.0).m
-
-
-def places(p: Any, m: Mechanism) -> dict[str, tuple[Any, Any]]:
-    """Pins, the middle of the edge and its ends [m]; the edge is drawn as long as the knife's pins lie apart."""
-    ends = {"first": min(p.knife.d.x, p.knife.e.x), "last": max(p.knife.d.x, p.knife.e.x)}
-    edge = {name: m.links["knife"].beside(x, p.knife.blade.y).p for name, x in ends.items()}
-    return linkage.places(m) | {name: (point.x, point.y) for name, point in edge.items()}
 
 
 def _drawn(links: tuple[DrawnLink, ...], at: Mapping[str, tuple[Any, Any]]) -> tuple[Any, Any]:
@@ -108,10 +94,10 @@ def _positions(p: Any, found: BladeFindings, fall: float) -> Iterator[fig.Item]:
         (0, ("at its bottom", found.top + fall)),
     ):
         m = _mechanism(p, q)
-        at = places(p, m)
+        at = linkage.places(m) | edge(p, m.links)
         words = f"{name}, crank at {number(q % (2.0 * math.pi), 'rad')}"
-        yield fig.Curve(words, *_drawn((*linkage.links(m.linkage, LOOKS), EDGE), at), look, "o")
-    ends = sorted(float(at[name][0]) for name in ("first", "last"))
+        yield fig.Curve(words, *_drawn((*linkage.links(m.linkage, {}), _EDGE), at), look, "o")
+    ends = sorted(float(at[name][0]) for name in ENDS)
     low, high = ([each, each] for each in (found.stack.table, found.stack.top))
     yield fig.Between("stack", ends, low, high, "hatched")
     yield fig.Curve("path of the edge's middle", found.x, found.y, "path")

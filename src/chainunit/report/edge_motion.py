@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from ..mechanism.machine import MachineState
+from ..planar import Link
 from ..study.study import Study
 from .supplement import Details, Supplement
 
-_ENDS = ("first end of the edge", "last end of the edge")
+ENDS = ("first end of the edge", "last end of the edge")
+
+
+def edge(p: Any, links: Mapping[str, Link]) -> dict[str, tuple[Any, Any]]:
+    """Where the ends of the edge are [m]: it is drawn as long as the knife's pins lie apart."""
+    ends = min(p.knife.d.x, p.knife.e.x), max(p.knife.d.x, p.knife.e.x)
+    points = (links["knife"].beside(x, p.knife.blade.y).p for x in ends)
+    return {name: (point.x, point.y) for name, point in zip(ENDS, points, strict=True)}
 
 
 class EdgeMotion(Supplement):
-    """The edge is drawn as long as the knife's pins lie apart."""
+    """The picture of a knife drive has its edge."""
 
     def __init__(self, study: Study) -> None:
-        super().__init__(study, links={"edge": _ENDS}, names=dict.fromkeys(_ENDS, ""))
+        super().__init__(study, links={"edge": ENDS}, names=dict.fromkeys(ENDS, ""))
 
     def details(self, part: Any, state: MachineState) -> Details:
         """Where the edge ends."""
-        knife = self.study.drive.machine.p.knife
-        ends = min(knife.d.x, knife.e.x), max(knife.d.x, knife.e.x)
-        points = (state.m.links["knife"].beside(x, knife.blade.y).p for x in ends)
-        return Details({name: (point.x, point.y) for name, point in zip(_ENDS, points, strict=True)})
+        return Details(edge(self.study.drive.machine.p, state.m.links))

@@ -19,10 +19,10 @@ from . import figure as fig
 from . import run_names as read
 from .pictures import Pictures
 from .shaft import TORQUE, shaft_torque
+from .turn import ANGLE
 
 PICTURES = Pictures()
 _MOTION = ("phi", "w", "a")
-_ANGLE = fig.Axis("crank angle from the upward vertical", "rad", low=0.0, high=2.0 * math.pi, step=45.0)
 _TORQUE = fig.Axis("crank torque", "N.m")
 _SPEED = fig.Axis("crank speed", "rad/s")
 _CURRENT = fig.Axis("motor current", "A")
@@ -91,7 +91,7 @@ def _turn(s: b.Source, study: Study) -> fig.Figure:
         "turn",
         "Torque over a crank turn at constant speed",
         f"{' and '.join(torques).capitalize()} torque over the crank angle: {', '.join(study.statics.cycles)}.",
-        fig.stacked(_ANGLE, items.items()),
+        fig.stacked(ANGLE, items.items()),
         s.line(
             f"Inverse dynamics{' of two bars' * organs} at {{=run.crank_speed}} of the crank, without a motor."
         ),
