@@ -23,7 +23,8 @@ def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
     if not study.shaft:
         return
     yield _shaft(s, study)
-    yield b.Table(s.rows(Torsion, "driveline"), title="The driveline's torsion")
+    if "torsion" not in s.result:
+        yield b.Table(s.rows(Torsion, "driveline"), title="The driveline's torsion")
     yield from PICTURES.figures(s, study)
 
 
