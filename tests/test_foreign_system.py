@@ -459,6 +459,7 @@ def test_its_speeds_and_torques_are_those_of_ours(folder):
             ("[run]", "[driveline]\nJ4 = 2\n[run]"),
             r"system\.motor: .*inertia of its rotor is not known; leave",
         ),
+        (("[run]", "[flywheel]\nJ = 1\n[run]"), r"system\.motor: .*leave \[flywheel\] out"),
         (
             ("[run]", "[monte_carlo]\nruns = 9\n[run]"),
             r"system\.motor: .*current and torque are not known.*; leave",

@@ -33,7 +33,7 @@ from ..system import (
     Profile,
     System,
     export,
-    shaft_joints,
+    in_line,
     shaft_torque,
     through,
 )
@@ -198,23 +198,19 @@ class Drive:
             between["gear"] = ModelComponent(Gear, Gear.Parameters(ratio=self.gear))
         if self.line is not None:
             between["driveline"] = ModelComponent(CardanDriveline, self.line)
-        joints: list[tuple[str, str]] = []
-        behind = "machine"
-        for name in between:
-            joints = [*shaft_joints(name, behind, flange="driven", load="machine"), *joints]
-            behind = name
-        joints = [*shaft_joints("motor", behind), *joints]
-        components: dict[str, Component] = {
-            "machine": outsider.component if outsider else ModelComponent(*self.load_model()),
-            **between,
-            "motor": self.foreign or ModelComponent(self.motor, self.parameters),
-        }
+        system = in_line(
+            {
+                "machine": outsider.component if outsider else ModelComponent(*self.load_model()),
+                **between,
+                "motor": self.foreign or ModelComponent(self.motor, self.parameters),
+            }
+        )
         if not self.feed_forward:
-            return System(components, joints)
+            return system
         # a control knows the machine with two bars
-        components["model"] = ModelComponent(self.machine.model, self.machine.p)
+        model = ModelComponent(self.machine.model, self.machine.p)
         wires = [("motor.phi", "model.phi"), ("motor.w", "model.w"), ("model.tau", "motor.tau_ff")]
-        return System(components, joints, wires)
+        return replace(system, components={**system.components, "model": model}, wires=wires)
 
     @property
     def gear(self) -> float:

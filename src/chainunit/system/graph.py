@@ -12,6 +12,7 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -274,6 +275,16 @@ def shaft_joints(
 ) -> list[tuple[str, str]]:
     """The two joints of a shaft with its load port; `flange` and `load` are the driver's terminals."""
     return [(f"{driver}.{flange}", f"{machine}.flange"), (f"{driver}.{load}", f"{machine}.load")]
+
+
+def in_line(parts: Mapping[str, Component]) -> System:
+    """The machine and the parts that drive it, each behind the one after it, the motor last. What stands between has
+    the terminals `driven` and `machine` towards the machine."""
+    joints: list[tuple[str, str]] = []
+    for machine, driver in pairwise(parts):
+        ends = ("driven", "machine") if "driven" in parts[driver].terminals else ("flange", "load")
+        joints = [*shaft_joints(driver, machine, flange=ends[0], load=ends[1]), *joints]
+    return System(parts, joints)
 
 
 # -- in which order values are known
