@@ -697,3 +697,37 @@ def test_the_overloads_of_both_sides_are_readable(columns, tables):
     heads = [line for line in said.getvalue().splitlines() if "steady" in line]
     assert len(heads) == tables and all("jam left" in heads[0] for _ in heads)
     assert "jam right" in heads[-1] and all(len(line) <= columns for line in heads)
+
+
+def test_feed_forward_of_chains_is_told_by_chains(tmp_path, monkeypatch):
+    """The control asks a machine of the same kind: the ripple that is left is a fraction of that with two bars."""
+    from chainunit.study import config
+    from chainunit.study.drive import Drive
+    from chainunit.study.run import run_study
+
+    monkeypatch.setattr("chainunit.study.run._chains", lambda *_: None)
+    text = """
+organ = "chain"
+feed_forward = true
+event = []
+[chain]
+rods = 4
+[run]
+crank_speed = 3
+ramp = 1
+settle_turns = 2
+"""
+    whole, ripples = Drive.load_model, []
+
+    def bars(drive, machine=None):
+        return (machine.model, machine.p) if machine else whole(drive)
+
+    for name in ("chains", "bars"):
+        study = run_study(config.parse(text), tmp_path / name)
+        assert study.failure is None
+        ripples.append(study.answers["steady"].speed_ripple)
+        kinds = {part: c.model.name for part, c in study.drive.graph.components.items()}
+        model = "ChainUnitFlexible" if name == "chains" else "ChamberForces"
+        assert (kinds["machine"], kinds["model"]) == ("ChainUnitFlexible", model)
+        monkeypatch.setattr(Drive, "load_model", bars)
+    assert ripples[0] < 0.4 * ripples[1] < 0.2 * study.ripple_without

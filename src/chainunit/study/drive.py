@@ -161,12 +161,13 @@ class Drive:
         parts = self.outsider and self.outsider.component, self.foreign
         return [part.title for part in parts if part]
 
-    def load_model(self) -> tuple[type[InverseMachine], Any]:
-        """Model of the machine, with two bars or chains, and its parameters."""
+    def load_model(self, machine: Machine | None = None) -> tuple[type[InverseMachine], Any]:
+        """Model of the machine, with two bars or chains, and its parameters: those of `driven`, or of another."""
+        machine = machine or self.driven
         if self.chain is None:
-            return self.machine.model, self.driven.p
+            return machine.model, machine.p
         model = flexible(*self.rods)
-        return model, model.parameter_layout.from_names(self.driven.named | self.organ())
+        return model, model.parameter_layout.from_names(machine.named | self.organ())
 
     @cached_property
     def simulated(self) -> Machine:
@@ -207,8 +208,8 @@ class Drive:
         )
         if not self.feed_forward:
             return system
-        # a control knows the machine with two bars
-        model = ModelComponent(self.machine.model, self.machine.p)
+        # it turns with the motor's shaft, before the driveline
+        model = ModelComponent(*self.load_model(self.machine))
         wires = [("motor.phi", "model.phi"), ("motor.w", "model.w"), ("model.tau", "motor.tau_ff")]
         return replace(system, components={**system.components, "model": model}, wires=wires)
 
@@ -285,7 +286,7 @@ class Drive:
 
     def system(self, files: Mapping[str, Path]) -> System:
         """The system of FMUs that were made of these models, whatever start values they carry."""
-        # the machine that the control asks is the same FMU as the machine, if that has two bars
+        # the machine that the control asks is the same FMU as the machine
         known = {"model": files["machine"], **files}
         components: dict[str, Component] = {
             name: replace(c, file=known[name]) for name, c in self.graph.components.items()
