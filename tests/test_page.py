@@ -780,6 +780,15 @@ def test_any_linkage_moves(knife):
     assert "path of blade" in text and 'id="stage"' in text
 
 
+def test_one_bearing_has_room_for_its_bars(study):
+    """A panel without height stops the script of the page, and with it the animation."""
+    pins = {run: dict([next(iter(table.items()))]) for run, table in study.pins.items()}
+    figures = study_report.report(dataclasses.replace(study, pins=pins)).figures
+    (reactions,) = (figure for figure in figures if figure.name == "reactions")
+    layout = page_figures.figure(reactions, DEFAULT_UNITS).layout
+    assert layout.height - layout.margin.t - layout.margin.b > 100
+
+
 def test_two_bars_have_no_row_of_chains(study, written):
     for text in (said_of(study, 140), written.read_text("utf-8")):
         for words in ("are of the time with a slack rod", "argest angle between", "Chains and two bars"):

@@ -293,5 +293,5 @@ def _reactions(s: b.Source, study: Study) -> fig.Figure:
         "Bars of the reaction of every pin in every run: the wide bar is the peak, the dark one inside the RMS.",
         ((fig.Panel(fig.Axis("reaction", "N", low=0.0), fig.Axis("pin", names=tuple(pins)), tuple(items)),),),
         "Peak and RMS of the force in each pin, frame x right, y up; means over whole crank turns.",
-        heights=(max(11, 20 - len(runs)) * len(runs) * len(pins) / 250.0,),
+        heights=(max(0.6, max(11, 20 - len(runs)) * len(runs) * len(pins) / 250.0),),
     )
