@@ -140,7 +140,7 @@ def with_line(config: Config, drive: Drive) -> Drive:
 
 def tune(config: Config, drive: Drive) -> tuple[Drive, Tuning | None]:
     """The drive with controller gains tuned to its inertia, where the config does not give them."""
-    both = cycle(config.machine, config.run.crank_speed, config.feed)
+    both = cycle(drive.machine, config.run.crank_speed, config.feed)
     fixed = {name.removeprefix("motor.") for name in config.given if name.startswith("motor.")}
     inertia = drive.rotor_inertia + float(np.mean(both.outputs.J))
     parameters, tuning = drive.motor.tune(drive.parameters, inertia, fixed)

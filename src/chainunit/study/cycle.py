@@ -41,6 +41,6 @@ def energy_swing(torque: Any) -> float:
 
 
 def no_feed(feed: Any) -> Any:
-    """A feed of that kind with nothing in it."""
+    """A feed of that kind with nothing in it; a quantity that cannot be zero is at its start."""
     layout = Layout(type(feed))
-    return layout.instance([0.0] * len(layout.names))
+    return layout.instance([0.0 if v.quantity.admits(0.0) else v.quantity.start for v in layout.variables])

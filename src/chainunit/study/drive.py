@@ -224,6 +224,16 @@ class Drive:
         return next(bond for bond in self.graph.bonds if bond.driver == "motor")
 
     @property
+    def motor_speed(self) -> str:
+        """Name of the speed of the motor's shaft in a run."""
+        return f"motor.{self._first_bond.flanges[0].members['w']}"
+
+    @property
+    def motor_torque(self) -> str:
+        """Name of the torque that the motor gives to its shaft in a run."""
+        return f"motor.{self._first_bond.flanges[0].members.get('tau', 'tau')}"
+
+    @property
     def _last_bond(self) -> Bond:
         return next(bond for bond in self.graph.bonds if bond.machine == "machine")
 

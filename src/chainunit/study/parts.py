@@ -177,6 +177,11 @@ def check_company(data: Mapping[str, Any], parts: Parts) -> None:
             )
     if foreign["machine"] and data.get("feed_forward"):
         raise InputError("feed_forward: needs a model of the machine, which is an FMU; leave it out")
+    told = foreign["motor"] or "sizing" in data or "tau_ff" in parts.motor.input_layout.names
+    if data.get("feed_forward") and not told:
+        raise InputError(
+            f"feed_forward: a motor of the type {parts.motor.name} has no input for the torque; leave it out"
+        )
     if foreign["machine"] and _table(data, "monte_carlo").get("runs"):
         raise InputError("monte_carlo.runs: needs a model of the machine, which is an FMU; leave it out")
     if named is not None:

@@ -27,17 +27,21 @@ from ..system import (
     without,
 )
 from .config import Config
+from .cycle import no_feed
 from .drive import Drive
 from .events import Event, OverTime
 from .measures import STARTED, end_gap, whole_turns
 
 Progress = Callable[[float], None]
 _LONGEST_START = 30.0
-"""Time after which an empty machine is fed, however slowly it turns [s]."""
+"""Time after the ramp after which an empty machine is fed, however slowly it turns [s]."""
 _FEED_RISE = 0.1
 """Part of a turn in which the feed comes."""
 _PATIENCE = 20.0
-"""Turns, at the speed that is asked, that a study runs on until the motor has settled and made its turns."""
+"""Turns, at the speed that is asked, that a study runs on until the motor has settled and made its turns; of a fast
+machine at least as many seconds as `_SETTLES`."""
+_SETTLES = 5.0
+"""Time in which a drive settles, whatever the speed of its crank [s]."""
 CLOSED = 0.01
 """Gap between the ends of the steady turns up to which they count as closed."""
 
@@ -109,7 +113,7 @@ class Rig:
     def guards(self) -> dict[str, float]:
         """The torque at which a safety coupling opens, at the motor."""
         coupling = self.config.coupling
-        return {"motor.tau": coupling.trip_torque / self.drive.ratio} if coupling else {}
+        return {self.drive.motor_torque: coupling.trip_torque / self.drive.ratio} if coupling else {}
 
     @cached_property
     def _inputs(self) -> dict[str, tuple[str, float]]:
@@ -145,7 +149,8 @@ class Rig:
         run = self.config.run
         loads = self.drive.loads(self.config.feed)
         if ramp and self.config.empty_start:
-            loads = {full: self._coming(value) for full, value in loads.items()}
+            empty = self.drive.loads(no_feed(self.config.feed))
+            loads = {full: self._coming(empty[full], value) for full, value in loads.items()}
         signals = {
             **loads,
             **(given or {}),
@@ -154,11 +159,11 @@ class Rig:
         # a twin has no use for those of the part that is left out
         return {full: x for full, x in signals.items() if full.partition(".")[0] in self.graph.components}
 
-    def _coming(self, value: float) -> OverTime:
-        """The feed of a machine that starts empty."""
+    def _coming(self, empty: float, value: float) -> OverTime:
+        """A load of a machine that starts empty."""
         if self.fed_from is None:
-            return 0.0
-        return Profile(0.0, ((self.fed_from, _FEED_RISE * self.config.turn, value),))
+            return empty
+        return Profile(empty, ((self.fed_from, _FEED_RISE * self.config.turn, value),))
 
     def from_rest(self, event: Event | None = None) -> Simulation:
         """The simulation from rest on, with the event of a start if there is one."""
@@ -191,8 +196,9 @@ class Rig:
     ) -> tuple[xr.Dataset, Rig]:
         """The start of an empty machine, until it turns at `STARTED` of its speed or a guard ends it; and the rig
         that is fed from then on."""
-        goal = {"motor.w": STARTED * self.config.run.crank_speed * self.drive.ratio}
-        run = simulation.run(_LONGEST_START, self.step, progress, guards={**guards, **goal})
+        goal = {self.drive.motor_speed: STARTED * self.config.run.crank_speed * self.drive.ratio}
+        longest = self.config.started + _LONGEST_START
+        run = simulation.run(longest, self.step, progress, guards={**guards, **goal})
         fed = replace(self, fed_from=simulation.time)
         simulation.signals = fed.signals(ramp=True)
         return run, fed
@@ -212,7 +218,7 @@ class Rig:
             stop, steady_from = stop + later, steady_from + later
             if any(abs(float(run[name][-1])) >= limit for name, limit in guards.items()):
                 return StartUp(run, steady_from, stop, rig)
-        longest = stop + _PATIENCE * self.config.turn
+        longest = stop + max(_PATIENCE * self.config.turn, _SETTLES)
         run = joined([*pieces, simulation.run(stop, self.step, progress, guards=guards)])
         while stop - 0.5 * self.step <= simulation.time < longest:
             lack, steady_from = self._missing(run, steady_from)
@@ -320,7 +326,8 @@ class Rig:
         if time <= 0.0:
             return run, 0.0
         release = simulation.run(simulation.time + time, min(self.step, time))
-        energy = float(np.trapezoid(release["motor.tau"] * release["motor.w"], release["time"]))
+        torque, speed = (release[name] for name in (self.drive.motor_torque, self.drive.motor_speed))
+        energy = float(np.trapezoid(torque * speed, release["time"]))
         return joined([run, release]), energy
 
 

@@ -312,7 +312,7 @@ class Runner:
         """The fluctuation of the speed that the study would have without its feed-forward."""
         study, run = self.study, self.study.config.run
         with self.rig.plain.from_rest() as simulation:
-            steady = simulation.run(self.stop, self.rig.step).sel(time=slice(study.config.settled, None))
+            steady = simulation.run(self.stop, self.rig.step).sel(time=slice(study.settled, None))
         steady = whole_turns(self.rig.drive, steady, run.turns)
         study.ripple_without = read_answers(study.window(Phase.STEADY, steady)).speed_ripple
 
