@@ -221,6 +221,8 @@ def test_what_the_numbers_depend_on_is_in_the_name(killed):
     assert killed[0].name == f"monte_carlo_{digest}.jsonl"
     other = dataclasses.replace(drive, feed_forward=True)
     assert monte_carlo.Task(config, other, files, 1.0).digest() != digest
+    solver = dataclasses.replace(config, simulation="me")
+    assert monte_carlo.Task(solver, drive, files, 1.0).digest() != digest
     more = parse(STUDY.format(runs=20))
     assert monte_carlo.Task(more, drive, files, 1.0).digest() == digest
 

@@ -36,7 +36,7 @@ from ..text import entry
 from .config import Config
 from .drive import Drive
 from .events import AnySide, Event
-from .measures import Phase, Window, read_measure, same_measure
+from .measures import MEASURES, Phase, Window, read_measure, same_measure
 from .quantiles import CONFIDENCE, Estimate, quantile, runs_needed, share
 from .rig import Rig
 
@@ -100,6 +100,7 @@ class Task:
         config, drive = self.config, self.drive
         relevant = {
             "chainunit": __version__,
+            "simulation": config.simulation,
             "connections": drive.graph.connections,
             "start": drive.graph.values,
             "feed": asdict(config.feed),
@@ -197,7 +198,7 @@ def one(task: Task, number: int, simulation: Simulation) -> Sample:
         crank_angle=angle % (2.0 * math.pi),
         event=event,
         trip_torque=trip if config.coupling else None,
-        **{each.name: read_measure(each.name, window) for each in fields(Sample) if "read" in each.metadata},
+        **{each.name: read_measure(each.name, window) for each in fields(Sample) if each.name in MEASURES},
         stalls=float(stalls),
         trips=float(tripped),
     )
