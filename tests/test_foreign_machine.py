@@ -30,6 +30,7 @@ from chainunit.study.events import TYPES, Event, Role, Timing
 from chainunit.study.package import study_system
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
+from chainunit.study.sizing import size
 from chainunit.system import CoSimulation, Profile, certify
 
 SCRIPT = Path(__file__).parent / "foreign_machine.py"
@@ -241,12 +242,30 @@ def test_a_study_file_with_our_motor(folder):
         assert done.returncode == 2 and re.search(said, done.stderr), done.stderr
 
 
+SIZED = STUDY.replace(f"ratio = {RATIO}\n", "") + MACHINE + "[sizing]\ncandidates = 1\ninertia_ratio = 1000\n"
+
+
+def compare_with_pump(best):
+    """Torque at the crank and inertia at the motor, of the candidate, with those of the pump."""
+    torque, inertia = pump(np.linspace(0.0, 2.0 * math.pi, 720), SPEED, PRESSURE)
+    assert best.duty_torque == pytest.approx(np.max(np.abs(torque)), rel=0.05)
+    rotor, plate = best.drive.parameters.rotor.J, best.motor.nameplate.J
+    reflected = np.max(inertia) / best.drive.ratio**2
+    assert best.checks["inertia"].value == pytest.approx((reflected + rotor - plate) / plate, rel=1e-3)
+
+
 def test_sizing_finds_a_motor_for_it(folder):
-    text = STUDY.replace(f"ratio = {RATIO}\n", "") + MACHINE + "[sizing]\ncandidates = 1\n"
-    study = run_study(parse(folder, text), folder / "sized")
+    study = run_study(parse(folder, SIZED), folder / "sized")
     assert study.failure is None and study.sizing.chosen is not None
     assert study.answers["steady"].speed_mean == pytest.approx(SPEED, rel=1e-2)
     assert study.drive.graph.components["gear"].parameters.ratio == study.drive.ratio
+    compare_with_pump(study.sizing.best)
+
+
+def test_sizing_does_without_its_torque(tmp_path):
+    build(tmp_path, left_out=("tau",), script=SCRIPT)
+    found = size(parse(tmp_path, SIZED), tmp_path, lambda *said: None)
+    compare_with_pump(found.best)
 
 
 def test_behind_an_open_coupling_it_is_not_followed(folder, burst):

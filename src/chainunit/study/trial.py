@@ -108,12 +108,12 @@ class Trial:
     def duty_torque(self) -> float:
         """Peak at the crank in steady running, and while all feed moves to either side and runs there [N m]."""
         runs = (self.steady, *self.shifts, *self.one_sided.values())
-        return max(peak(run["machine.tau"]) for run in runs) * self.drive.ratio
+        return max(peak(self.drive.crank_torque(run)) for run in runs)
 
     @cached_property
     def peak_torque(self) -> float:
         """The same, and in the start [N m]."""
-        return max(self.duty_torque, peak(self.start["machine.tau"]) * self.drive.ratio)
+        return max(self.duty_torque, peak(self.drive.crank_torque(self.start)))
 
     @cached_property
     def frequency(self) -> float:
@@ -153,7 +153,7 @@ class Trial:
         permitted = permitted_starts(p, running, start, self._cooling, self.config.sizing.temperature)
         if plate.starts and self.config.start == "direct":
             # the catalogue's number is that of the bare rotor
-            total = p.rotor.J + float(np.mean(self.steady["machine.J"]))
+            total = p.rotor.J + float(np.mean(self.drive.load_inertia(self.steady)))
             permitted = min(permitted, plate.starts * plate.J / total)
         return permitted
 
@@ -227,7 +227,7 @@ class Trial:
             "speed": check("speed fluctuation", self.fluctuation, asked.fluctuation, "1", "percent"),
         }
         if math.isfinite(asked.inertia_ratio):
-            reflected = float(np.max(self.steady["machine.J"]))
+            reflected = float(np.max(self.drive.load_inertia(self.steady)))
             ratio = (reflected + p.rotor.J - plate.J) / plate.J
             checks["inertia"] = Check("inertia ratio", ratio, asked.inertia_ratio, "1")
         if "gear.torque_limit" in self.config.given:
