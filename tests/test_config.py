@@ -216,7 +216,7 @@ def test_a_refused_geometry_names_the_lengths_that_are_the_examples():
     """Twice some of the lengths: c and hy, which the file does not give, are why they do not fit."""
     twice = {"r": 0.3, "l": 3.0, "h": 2.0, "l1": 2.7, "l2": 1.08, "e": 1.62, "z": 1.70763}
     text = "[machine]\n" + "\n".join(f"{name} = {value}" for name, value in twice.items())
-    taken = "; not in the file, so taken from the packaged example: c = 1.49248, hy = 1"
+    taken = "; not in the file, so at the declared start value: c = 1.49248, hy = 1"
     with pytest.raises(InputError) as refused:
         parse(text)
     assert str(refused.value).endswith(taken)

@@ -7,7 +7,15 @@ import math
 import numpy as np
 import pytest
 
-from chainunit.study.verdict import CRANK_GOOD, RESIDUAL, ROCKER_GOOD, ROCKER_GOOD_EMPTY, chains, two_bars
+from chainunit.study.verdict import (
+    CRANK_GOOD,
+    RESIDUAL,
+    ROCKER_GOOD,
+    ROCKER_GOOD_EMPTY,
+    chains,
+    outsider,
+    two_bars,
+)
 
 PULLED = {"steady": (20.0, 50.0), "jam_left": (5.0, 0.0)}
 KEPT = {"steady": 1e-6, "jam_left": 1e-5}
@@ -112,6 +120,16 @@ def test_an_energy_balance_that_is_not_kept():
         for share in (RESIDUAL, math.nan):
             verdict = bars(residuals=KEPT | {run: share})
             assert verdict.holds == holds and [r.topic for r in verdict.reasons] == ["energy"]
+
+
+def test_of_a_machine_that_is_not_known_only_the_energy_balance_is_judged():
+    kept, lost = (outsider(3.0, {"steady": share}) for share in (1e-6, 1.0))
+    assert (kept.holds, kept.caveat) == ("true", "") and kept.as_dict()["model"] is None
+    assert kept.text == (
+        "The machine is an FMU whose own model is not known; its energy balance holds: the crank at 3.00 rad/s."
+    )
+    assert lost.holds == "false" and lost.caveat == "the energy balance does not hold here"
+    assert "rigid links" not in kept.text and "organs" not in lost.text
 
 
 def of_chains(fold=0.1, slack=0.0, independent=300.0, residuals=KEPT, run="steady"):

@@ -16,6 +16,7 @@ from ..errors import GeometryError, InputError
 from ..machines.api import ChainUnit, ratios
 from ..machines.chain_unit import ChamberForces, SideLoads, SideName
 from ..machines.machine import Machine
+from ..mechanism.models import InverseMachine
 from ..quantities import Layout
 from ..reading import (
     Slip,
@@ -287,15 +288,17 @@ def _machine(parts: Parts, given: dict[str, float], of_papers: Mapping[str, floa
         of: Any = ForeignMachine if issubclass(parts.machine, ForeignModel) else Machine
         return ChainUnit(given) if parts.machine is ChamberForces else of(parts.machine, given)
     except InputError as error:
-        raise InputError(f"machine: {error}{_taken_over(error, given)}") from error
+        raise InputError(f"machine: {error}{_taken_over(error, parts.machine, given)}") from error
 
 
-def _taken_over(error: InputError, given: Mapping[str, float]) -> str:
-    """The lengths behind a refusal that the file does not give, as words to follow it."""
+def _taken_over(
+    error: InputError, machine: type[InverseMachine | ForeignModel], given: Mapping[str, float]
+) -> str:
+    """The lengths behind a refusal that neither file nor example give, as words to follow it."""
     names = error.names if isinstance(error, GeometryError) else ()
-    example = Layout(type(ChainUnit().p)).named(ChainUnit().p)
-    taken = [f"{name} = {example[name]:g}" for name in names if name in example and name not in given]
-    return f"; not in the file, so taken from the packaged example: {', '.join(taken)}" if taken else ""
+    declared = Layout(machine.Parameters).named(machine.Parameters())
+    taken = [f"{name} = {declared[name]:g}" for name in names if name not in given]
+    return f"; not in the file, so at the declared start value: {', '.join(taken)}" if taken else ""
 
 
 _ORDER = (

@@ -41,7 +41,11 @@ from .foreign_machine import ForeignMachine
 
 
 class AbsentError(InputError):
-    """A quantity that this motor or machine does not give."""
+    """A quantity that this motor or machine does not give; `part` is its name in the system."""
+
+    def __init__(self, part: str, text: str) -> None:
+        super().__init__(text)
+        self.part = part
 
 
 @dataclass(frozen=True)
@@ -99,7 +103,9 @@ class Drive:
             where the motor is an FMU of somebody else.
         """
         if self.foreign is not None:
-            raise AbsentError(f"{self.foreign.title}: {quantity} is not known of an FMU of somebody else")
+            raise AbsentError(
+                "motor", f"{self.foreign.title}: {quantity} is not known of an FMU of somebody else"
+            )
 
     @property
     def chain_unit(self) -> ChainUnit:
@@ -112,7 +118,7 @@ class Drive:
         """
         if isinstance(self.machine, ChainUnit):
             return self.machine
-        raise AbsentError(f"{self.machine.model.name}: has no organs")
+        raise AbsentError("machine", f"{self.machine.model.name}: has no organs")
 
     def series(self, run: xr.Dataset, name: str) -> Any:
         """A variable of a run, shape (time,).
@@ -123,7 +129,7 @@ class Drive:
             where motor or machine do not give it.
         """
         if name not in run:
-            raise AbsentError(f"{name}: is not known of this motor or machine")
+            raise AbsentError(name.partition(".")[0], f"{name}: is not known of this motor or machine")
         return run[name].values
 
     def load_inertia(self, run: xr.Dataset) -> Any:

@@ -19,7 +19,7 @@ from .drive import Drive
 from .measures import Answers, Phase, Window, read_answers, same_measure, whole_turns
 from .rig import CLOSED, Rig
 from .study import Amount, Study
-from .turn import Turn
+from .turn import Turn, TurnAnalysis
 from .verdict import RESIDUAL, STEADY
 
 CLOSE = 0.03
@@ -160,7 +160,7 @@ class FlywheelAnalysis(Analysis):
         """
         config, table, drive = study.config, study.config.flywheel, study.drive
         assert table is not None
-        turn: Turn = study.findings["constant_speed"].numbers
+        turn: Turn = study.findings[TurnAnalysis.name].numbers
         found = FlywheelFindings(
             own=table.J,
             permitted=table.fluctuation,

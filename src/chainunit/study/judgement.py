@@ -16,7 +16,7 @@ from .verdict import RESIDUAL, STEADY, Holds, Verdict
 
 
 def model_verdict(study: Study) -> Verdict:
-    """Whether the model of the organs holds, from the numbers of the runs."""
+    """Whether the model of the machine holds, from the numbers of the runs."""
     config, organs, answers = study.config, study.findings.get(OrganAnalysis.name), study.answers
     steady = answers.get(STEADY)
     mean = steady.speed_mean if steady else config.run.crank_speed
@@ -24,6 +24,8 @@ def model_verdict(study: Study) -> Verdict:
     runs: dict[str, Answers] = {**answers}
     if study.start is not None:
         runs[verdict.START] = study.start
+    if study.drive.outsider:
+        return verdict.outsider(speed, residuals, reached=mean)
     if organs is None:
         return verdict.rigid_links(speed, residuals, reached=mean)
     if config.chain is None:

@@ -479,16 +479,16 @@ def read_answers(window: Window) -> Answers:
     )
 
 
-def not_known(window: Window) -> frozenset[str]:
-    """Names of the measures of a window that the motor does not tell, as an FMU of somebody else."""
-    names = set()
+def not_known(window: Window) -> dict[str, str]:
+    """The measures of a window that motor or machine do not tell, by name, each with the part that does not."""
+    parts = {}
     for name, each in MEASURES.items():
         if window.phase in each.during:
             try:
                 each.read(window)
-            except AbsentError:
-                names.add(name)
-    return frozenset(names)
+            except AbsentError as absent:
+                parts[name] = absent.part
+    return parts
 
 
 def read_measure(name: str, window: Window) -> Any:

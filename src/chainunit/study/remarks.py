@@ -18,6 +18,7 @@ from .rig import CLOSED
 from .sections import ChainOrgans
 from .shaft import AMPLIFIED, UNEVEN, remedies
 from .study import LOAD_CYCLE, Amount, Study
+from .torsion_findings import TorsionAnalysis
 from .verdict import RESIDUAL, STEADY
 
 
@@ -28,7 +29,7 @@ def conclude(study: Study) -> None:
     own = "What the study file does not name is the packaged example's, whose masses and drive are assumed."
     if study.drive.outsider:
         own = (
-            "What the study file does not name of the machine is at the start value of its FMU. The turn at constant "
+            f"The machine is an FMU, {study.drive.outsider.model.description}. What the study file does not name of it is at the start value of its FMU. The turn at constant "
             "speed is by that FMU alone; bearings, and the machine behind an open coupling, are not known of it."
         )
     note("assumed", packaged if config.source == "packaged example" else own)
@@ -267,7 +268,7 @@ def _on_shaft(study: Study) -> None:
     unevenness = float(np.ptp(i))
     if unevenness > UNEVEN:
         study.remark(
-            "warning" if "torsion" in study.findings else "note",
+            "warning" if TorsionAnalysis.name in study.findings else "note",
             "uneven joints",
             "The joints turn unevenly: shaft 3 turns {least} to {largest} times as fast as shaft 2 (ratio i23), and "
             "this varies by {unevenness} twice a turn; {remedies}.",

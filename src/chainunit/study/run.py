@@ -71,7 +71,7 @@ def run_study(
     try:
         runner.run(check, lambda: drive.coasting(folder / "fmu", backend))
         if config.monte_carlo.runs:
-            task = Task(config, drive, files, runner.stop, runner.rig.fed_from, study.absent)
+            task = Task(config, drive, files, runner.stop, runner.rig.fed_from, frozenset(study.absent))
             study.monte_carlo = run_monte_carlo(task, folder, report)
         _analyse(study, runner.rig, report, needs_runs=True)
     except RunError as error:

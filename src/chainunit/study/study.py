@@ -223,13 +223,15 @@ class Study:
     @property
     def not_known(self) -> frozenset[str]:
         """Names of the measures that the motor, an FMU of somebody else, does not tell in steady running."""
-        return frozenset() if self.drive.foreign is None else self.absent
+        if self.drive.foreign is None:
+            return frozenset()
+        return frozenset(name for name, part in self.absent.items() if part == "motor")
 
     @property
-    def absent(self) -> frozenset[str]:
-        """Names of the measures that motor or machine do not tell in steady running."""
+    def absent(self) -> Mapping[str, str]:
+        """The measures that motor or machine do not tell in steady running, each with the part that does not."""
         if verdict.STEADY not in self.answers:
-            return frozenset()
+            return {}
         return not_known(self.window(Phase.STEADY, self.steady))
 
     @property

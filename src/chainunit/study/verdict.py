@@ -2,7 +2,7 @@
 
 Two bars hold a chain's place as long as neither is pushed and the crank turns well below the chain's lowest natural
 frequency. Chains hold as long as their energy balance does, no rod folds through its stop, and peaks do not depend on
-the start.
+the start. Of a machine whose links are not known only the energy balance is judged.
 """
 
 from __future__ import annotations
@@ -25,11 +25,17 @@ STEADY = "steady"
 START = "start_up"
 """Run from rest to normal running."""
 
-TWO_BARS = "two bars"
-RIGID_LINKS = "rigid links"
 _CHAINS = 'take organ = "chain"'
 
 Holds = Literal["true", "in part", "false"]
+Subject = Literal["organs", "machine", "energy balance"]
+"""What is judged: how the organs are modelled, how the machine is, or the energy balance alone, of a machine whose
+own model is not known."""
+_SUBJECTS: Mapping[Subject, str] = {
+    "organs": "The model of the organs",
+    "machine": "The model of the machine",
+    "energy balance": "The machine is an FMU whose own model is not known; its energy balance",
+}
 
 _TOPICS = {
     "pushed": (
@@ -112,8 +118,9 @@ class Reason:
 class Verdict:
     """Whether the model holds, and the reasons where it does not, or not everywhere."""
 
+    subject: Subject
     model: str
-    """in words: of the organs of a chain unit, of the links of any other machine"""
+    """in words: of the organs of a chain unit, of the links of another machine; "" where it is not known"""
     speed: float
     """of the crank, at which the model is judged [rad/s]"""
     reasons: tuple[Reason, ...] = ()
@@ -143,14 +150,20 @@ class Verdict:
     @property
     def caveat(self) -> str:
         """To be said beside what rests on a model that does not hold; empty where it does, or fails in part alone."""
-        return f"for {self.model}, which do not hold here" if self.holds == "false" else ""
+        if self.holds != "false":
+            return ""
+        return (
+            f"for {self.model}, which do not hold here"
+            if self.model
+            else "the energy balance does not hold here"
+        )
 
     @property
     def text(self) -> str:
         """The verdict in a line."""
         holds = {"true": "holds", "in part": "holds in part", "false": "does not hold"}[self.holds]
-        part = "machine" if self.model == RIGID_LINKS else "organs"
-        line = f"The model of the {part} {holds}: {self.model}, the crank at "
+        model = f"{self.model}, " if self.model else ""
+        line = f"{_SUBJECTS[self.subject]} {holds}: {model}the crank at "
         line += f"{self._turns}, judged at the {self._judged} asked for" if self._asked else self._judged
         why, remedies = [], []
         for topic, (short, _, remedy) in _TOPICS.items():
@@ -186,7 +199,8 @@ class Verdict:
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON."""
         return {
-            "model": self.model,
+            "subject": self.subject,
+            "model": self.model or None,
             "holds": self.holds,
             "caveat": self.caveat or None,
             "text": self.text,
@@ -254,7 +268,7 @@ def two_bars(
         limit = ROCKER_GOOD_EMPTY * mode
         runs = [""] if "" in empty else sorted(empty)
         reasons += [Reason("rocker torque", "crank_speed", speed, limit, "rad/s", run) for run in runs]
-    return Verdict(TWO_BARS, speed, (*reasons, *_unbalanced(residuals)), reached)
+    return Verdict("organs", "two bars", speed, (*reasons, *_unbalanced(residuals)), reached)
 
 
 def rigid_links(speed: float, residuals: Mapping[str, float], *, reached: float | None = None) -> Verdict:
@@ -265,7 +279,17 @@ def rigid_links(speed: float, residuals: Mapping[str, float], *, reached: float 
     speed, reached : of the crank, at which it is judged, and that it has, where that is another [rad/s]
     residuals : by run, the energy residual over the energy moved
     """
-    return Verdict(RIGID_LINKS, speed, tuple(_unbalanced(residuals)), reached)
+    return Verdict("machine", "rigid links", speed, tuple(_unbalanced(residuals)), reached)
+
+
+def outsider(speed: float, residuals: Mapping[str, float], *, reached: float | None = None) -> Verdict:
+    """The verdict on a machine that is an FMU of somebody else: on its energy balance alone.
+
+    Parameters
+    ----------
+    speed, reached, residuals : see `rigid_links`
+    """
+    return Verdict("energy balance", "", speed, tuple(_unbalanced(residuals)), reached)
 
 
 def chains(
@@ -303,7 +327,7 @@ def chains(
             reasons.append(Reason("slack", "slack_time", share, 0.0, "1", run, "percent"))
     if independent < needed:
         reasons.append(Reason("starts", "independent_turns", independent, needed, "1"))
-    return Verdict("chains", speed, (*reasons, *_unbalanced(residuals)), reached)
+    return Verdict("organs", "chains", speed, (*reasons, *_unbalanced(residuals)), reached)
 
 
 def _unbalanced(residuals: Mapping[str, float]) -> list[Reason]:
