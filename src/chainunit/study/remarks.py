@@ -29,8 +29,9 @@ def conclude(study: Study) -> None:
     own = "What the study file does not name is the packaged example's, whose masses and drive are assumed."
     if study.drive.outsider:
         own = (
-            f"The machine is an FMU, {study.drive.outsider.model.description}. What the study file does not name of it is at the start value of its FMU. The turn at constant "
-            "speed is by that FMU alone; bearings, and the machine behind an open coupling, are not known of it."
+            f"The machine is an FMU, {study.drive.outsider.model.description}. What the study file does not name of "
+            "it is at the start value of its FMU. The turn at constant speed is by that FMU alone; bearings, and the "
+            "machine behind an open coupling, are not known of it."
         )
     note("assumed", packaged if config.source == "packaged example" else own)
     note(
