@@ -17,7 +17,7 @@ import typer.core
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from .errors import InputError, InterruptedRunError, RunError, WriteError, printable
+from .errors import InputError, InterruptedRunError, RunError, WriteError, printable, refusal_prefix
 from .files import claimed, full, leftovers
 
 if TYPE_CHECKING:
@@ -134,7 +134,8 @@ def study(
     from .study.choice import check_files
 
     # before anything of an earlier run is taken away
-    check_files(loaded)
+    with refusal_prefix(f"{loaded.source}: "):
+        check_files(loaded)
     with claimed(output):
         from .report import files, series
         from .report import study as contents
@@ -143,7 +144,10 @@ def study(
 
         _clear(output, *files.names("result", contents.PICTURES), series.SERIES, LOAD_CYCLE)
         errors = _console(stderr=True)
-        with _progress("exporting FMUs", errors) as progress:
+        with (
+            refusal_prefix(f"{loaded.source}: "),
+            _progress("the machine at constant speed", errors) as progress,
+        ):
             result = run_study(
                 loaded, output, progress, check=check, backend=backend.value if backend else None
             )

@@ -26,8 +26,9 @@ _HEADS = {
     "motor_torque_peak": "torque, peak",
     "current_rms": "current, RMS",
     "current_share": "of rated",
+    "stored_share_most": "lent to a cut",
 }
-"""Heads of the columns on a terminal, which leaves the others out."""
+"""The columns, with their heads on a terminal; result.json has every number."""
 
 
 def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
@@ -48,18 +49,16 @@ def _table(s: b.Source, found: FlywheelFindings) -> b.Table:
     shown = [
         v
         for v in Layout(FlywheelAnswers).variables
-        if v.name != "flywheel" and any(getattr(wheel.answers, v.name) is not None for _, wheel, _ in rows)
+        if v.name in _HEADS and any(getattr(wheel.answers, v.name) is not None for _, wheel, _ in rows)
     ]
-    columns = (
-        b.Column(v.description, _HEADS.get(v.name, ""), "both" if v.name in _HEADS else "long") for v in shown
-    )
+    columns = (b.Column(v.description, _HEADS[v.name]) for v in shown)
 
     def head(words: str, path: str) -> Line:
         return line(s.number(f"{path}.flywheel"), f" ({words})" if words else "")
 
     return b.Table(
         tuple(
-            b.TableRow((head(words, path), *(s.number(f"{path}.{v.name}") for v in shown)))
+            b.TableRow((head(words, path), *(s.number(f"{path}.{v.name}", none="-") for v in shown)))
             for words, _, path in rows
         ),
         (b.Column("flywheel"), *columns),

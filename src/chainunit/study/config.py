@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from ..drives.cardan import check
-from ..drives.catalogue import CatalogueMotor, motor_of_catalogue
+from ..drives.catalogue import CatalogueMotor, catalogue, motor_of_catalogue
 from ..drives.gearing import Transmission
 from ..drives.motor import Motor
-from ..errors import GeometryError, InputError
+from ..drives.motors import MOTORS
+from ..errors import GeometryError, InputError, refusal_prefix
 from ..machines.api import ChainUnit, ratios
 from ..machines.chain_unit import ChamberForces, SideLoads, SideName
 from ..machines.machine import Machine
@@ -206,13 +207,13 @@ def _config(
     if "sizing" in data and checked.start != "inverter" and "inertia_ratio" not in tables["sizing"]:
         # of motors on the line only where it is given
         of_study["sizing"] = dataclasses.replace(of_study["sizing"], inertia_ratio=math.inf)
-    catalogue = beside(checked.catalogue, source) if checked.catalogue else None
+    own_motors = beside(checked.catalogue, source) if checked.catalogue else None
     config = Config(
         title=checked.title,
         machine=_machine(parts, tables["machine"], tables["ratios"]),
         motor_type=parts.motor,
         motor=_checked("motor: ", parts.motor.check, values["motor"]) if parts.gives_motor else None,
-        plate=_plate(parts.designation, catalogue),
+        plate=_plate(parts.designation, own_motors),
         flywheels=tuple(sorted(set(tables["flywheel"].get("compare", [])))),
         events=events,
         random=read_random_event(checked.monte_carlo.event, "monte_carlo.event"),
@@ -220,7 +221,7 @@ def _config(
         empty_start=checked.empty_start,
         start=checked.start,
         simulation=checked.simulation,
-        catalogue=catalogue,
+        catalogue=own_motors,
         place=checked.driveline.place,
         joint=checked.torsion.joint,
         damping_ratios=tuple(sorted(set(checked.torsion.damping_ratios))),
@@ -244,10 +245,12 @@ def _config(
 
 def _plate(designation: str, file: Path | None) -> CatalogueMotor | None:
     """The motor of the catalogue that [system] names."""
-    try:
-        return motor_of_catalogue(designation, file) if designation else None
-    except InputError as error:
-        raise InputError(f"system.motor = {error}") from error
+    if not designation:
+        return None
+    with refusal_prefix("catalogue = "):
+        catalogue(file)
+    with refusal_prefix("system.motor = "):
+        return motor_of_catalogue(designation, file)
 
 
 def _checked(prefix: str, check: Callable[[Any], object], values: Any) -> Any:
@@ -344,9 +347,17 @@ def _check_loads(config: Config) -> None:
     inputs = {v.name: v for v in model.input_layout.variables}
     normal = {name: v.quantity.start or 0.0 for name, v in inputs.items()} | Layout(model.Feed).named(feed)
     hardest = [(f"event.{name}", event) for name, event in config.events.items()]
-    hardest += [("monte_carlo.event", event) for event in config.random.hardest()]
+    if config.monte_carlo.runs:
+        hardest += [("monte_carlo.event", event) for event in config.random.hardest()]
+    of_motors = {name for motor in MOTORS.values() for name in motor.input_layout.names}
     for where, event in hardest:
-        if not set(event.inputs(event.side)) <= set(inputs):
+        needed = set(event.inputs(event.side))
+        if not needed <= set(inputs):
+            if config.foreign is None and not needed <= {*inputs, *of_motors}:
+                raise InputError(
+                    f"{where}: the {model.name} has no {' or '.join(sorted(needed))}; leave it out"
+                )
+            # of a motor: the study says whether it has the input
             continue
         for name, signal in event.signals(normal, 0.0, dict.fromkeys(event.reads, 0.0)).items():
             most = (

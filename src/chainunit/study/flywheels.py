@@ -229,7 +229,8 @@ def _wheel(
         "flywheel": flywheel,
         "inertia": found.bare + flywheel,
         "start_time": start.start_time,
-        "by_hand": found.by_hand(flywheel),
+        # a ripple of more than 2 is none: the formula does not hold there
+        "by_hand": by_hand if (by_hand := found.by_hand(flywheel)) < 2.0 else None,
         "residual": residual,
     }
     names = Layout(FlywheelAnswers).names

@@ -257,12 +257,14 @@ def _on_shaft(study: Study) -> None:
         "k_largest": (modes.k_largest, "rad/s"),
     }
     fastest = max((loop.crossover for loop in study.statics.loops.values()), default=0.0)
-    if fastest > modes.k_least / 3.0:
+    if fastest > modes.antiresonance / 3.0:
         warn(
             "control near line",
-            "The speed loop crosses over at {crossover}, near the line's natural frequency of {k_least}: control and "
-            "shaft disturb each other; lower the gains or stiffen the line.",
+            "The speed loop crosses over at {crossover}, near {antiresonance}, at which the machine swings on the "
+            "shafts against a motor that stands: its margins are those of a rigid drive and do not hold here, "
+            "control and shaft disturb each other; lower the gains or stiffen the line.",
             crossover=(fastest, "rad/s"),
+            antiresonance=(modes.antiresonance, "rad/s"),
             **ends,
         )
     _, i, _ = two_joints(numpy_(), line, np.linspace(0.0, np.pi, 361))

@@ -66,6 +66,7 @@ def run_study(
     if config.monte_carlo.runs:
         _check_random(config, Rig(config, drive, {}))
     _analyse(study, Rig(config, drive, {}), report, needs_runs=False)
+    report("exporting FMUs", 0.0, 1.0)
     files, study.fmus = drive.export(folder / "fmu", backend)
     runner = Runner(study, Rig(config, drive, files), report)
     try:
@@ -210,11 +211,14 @@ class Runner:
         steady = study.steady
         study.answers["steady"] = read_answers(study.window(Phase.STEADY, steady))
         self._bearings("steady", steady)
-        start = run.sel(time=slice(None, steady["time"].values[0]))
+        # the start of an empty machine ends where the feed comes
+        end = steady["time"].values[0] if rig.fed_from is None else rig.fed_from
+        start = run.sel(time=slice(None, end))
         study.start = read_answers(study.window(Phase.START_UP, start))
         self._bearings(verdict.START, start)
         if study.start_apart:
-            study.start_torque = on_coupling(rig.drive, run.sel(time=slice(None, study.settled)))
+            end = study.settled if rig.fed_from is None else rig.fed_from
+            study.start_torque = on_coupling(rig.drive, run.sel(time=slice(None, end)))
         asked = on_coupling(rig.drive, steady)
         if config.coupling and asked > config.coupling.trip_torque:
             raise RunError(

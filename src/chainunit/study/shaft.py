@@ -56,6 +56,9 @@ class Torsion:
 
     k_least: Value = quantity("rad/s", "least natural frequency of torsion")
     k_largest: Value = quantity("rad/s", "largest natural frequency of torsion")
+    antiresonance: Value = quantity(
+        "rad/s", "least natural frequency of the machine on the shafts, the motor held"
+    )
     step_longest: Value = quantity("s", "longest communication step")
 
 
@@ -109,7 +112,8 @@ def torsion(drive: Drive, inertia: Any) -> Torsion:
     lines = [two_masses(drive, float(J)) for J in (np.min(inertia), np.max(inertia))]
     ends = [float(frozen_frequency(MATH, line, 1.0)) for line in lines]
     longest = LONGEST_STEP / max(float(largest_frequency(line)) for line in lines)
-    return Torsion(k_least=min(ends), k_largest=max(ends), step_longest=longest)
+    behind = [math.sqrt(1.0 / ((1.0 / line.c2 + 1.0 / line.c3) * line.J4)) for line in lines]
+    return Torsion(k_least=min(ends), k_largest=max(ends), antiresonance=min(behind), step_longest=longest)
 
 
 def remedies(line: ShaftLine) -> list[str]:

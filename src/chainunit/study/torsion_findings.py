@@ -162,8 +162,8 @@ class TorsionFindings(Findings):
                 yield Remark.of(
                     "warning",
                     "peak of a shaft",
-                    f"Shaft {shaft} carries {{peak}} at {{speed}}, {{times}} times the torque of the load alone; "
-                    f"permitted is {factor:g}.",
+                    f"With a motor of constant torque shaft {shaft} carries {{peak}} at {{speed}}, {{times}} times "
+                    f"the torque of the load alone; permitted is {factor:g}. The runs have it with this motor.",
                     peak=_torque(peak),
                     speed=at,
                     times=(peak / static, "1"),
@@ -173,8 +173,8 @@ class TorsionFindings(Findings):
             yield Remark.of(
                 "warning",
                 "torque changes sign",
-                "The torque of shaft 2 falls to {least} in each half turn: with play in splines and joints, which is "
-                "not modelled, it hammers.",
+                "With a motor of constant torque that of shaft 2 falls to {least} in each half turn: with play in "
+                "splines and joints, which is not modelled, it hammers.",
                 least=_torque(least),
             )
         if motion.unstable[0]:
