@@ -82,7 +82,7 @@ def rig(done):
 
 def at_speed(rig, flywheel, **changes):
     """The rig with that flywheel, at its speed from the start on."""
-    drive = rig.drive.with_flywheel(flywheel - rig.config.flywheel.J)
+    drive = dataclasses.replace(rig.drive, flywheel=flywheel)
     speed = rig.config.run.crank_speed * drive.ratio
     return dataclasses.replace(
         rig,
@@ -182,7 +182,7 @@ def test_cutting_against_the_static_torque_of_the_motor(rig):
     study, rig = rig
     _, answers = steady_turns(at_speed(rig, 0.8))
     found, drive = study.findings["constant_speed"], study.drive
-    p, ratio, angle = drive.parameters, drive.ratio, study.findings["constant_speed"].fed.angle
+    p, ratio, angle = drive.fmu_parameters, drive.ratio, study.findings["constant_speed"].fed.angle
     # torque at the speed asked for; what goes with the square of the speed is small here
     torque, inertia = found.fed.crank_torque / ratio, found.inertia / ratio**2
 
@@ -206,7 +206,7 @@ def test_cutting_against_the_static_torque_of_the_motor(rig):
 def test_energy_over_a_cut(done):
     """What flywheel and machine lose, and what comes through the air gap, is the work of the cut."""
     study, _ = done
-    run, answers, p = study.steady, study.answers["steady"], study.drive.parameters
+    run, answers, p = study.steady, study.answers["steady"], study.drive.fmu_parameters
     power, time = cutting_power(run), run["time"].values
     rotor = run["motor.w"].values
     given = (run["motor.air_gap_tau"].values - p.rotor.d * rotor) * rotor

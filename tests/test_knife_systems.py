@@ -89,7 +89,7 @@ def test_a_dc_motor_keeps_the_speed_and_each_flywheel_has_gains_of_its_own(tmp_p
     # what the armature gives is the work of the cuts and its own friction, and heats the winding
     rows = study.steady
     w = rows["motor.w"].values
-    k, d = drive.parameters.armature.k, drive.parameters.rotor.d
+    k, d = drive.parameters.armature.k, drive.fmu_parameters.rotor.d
     work = np.trapezoid((k * rows["motor.armature.i"].values - d * w) * w, rows["time"].values)
     assert work == pytest.approx(cut_work(study), rel=0.01)
     heat = float(np.trapezoid(rows["motor.heat"], rows["time"]) / np.ptp(rows["time"].values))
@@ -151,7 +151,7 @@ def test_a_cardan_line_on_the_crank(tmp_path):
     assert 1.0 < shaft.amplification < 1.5
     # least and largest frequency of the line, by the formula for two masses at their ends
     line, turn = study.drive.line, study.findings["constant_speed"].numbers
-    motor = study.drive.parameters.rotor.J * study.drive.ratio**2
+    motor = study.drive.fmu_parameters.rotor.J * study.drive.ratio**2
     c = line.c2 * line.c3 / (line.c2 + line.c3)
     for J, k in (
         (turn.inertia_largest, study.statics.torsion.k_least),

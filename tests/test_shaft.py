@@ -124,7 +124,7 @@ def test_before_or_behind_the_gear(tmp_path):
 def test_the_frequency_is_that_of_rotor_gear_shafts_and_machine(study):
     """The eigenproblem in the angles of rotor (behind the gear) and driven shaft, the straight cardan condensed."""
     drive = study.drive
-    line, rotor, found = drive.line, drive.parameters.rotor.J, torsion(drive, [2e-3, 9e-3])
+    line, rotor, found = drive.line, drive.fmu_parameters.rotor.J, torsion(drive, [2e-3, 9e-3])
     for J, expected in zip((2e-3, 9e-3), (found.k_largest, found.k_least), strict=True):
         c = 1.0 / (1.0 / line.c2 + 1.0 / line.c3)
         # twist = phi_motor/ratio - phi_driven; both inertias where they turn
@@ -238,7 +238,7 @@ def test_the_speed_loop_is_tuned_and_shown_with_the_line(tmp_path):
     """A heavy J4: the gains are those of rotor, J4 and machine, and so is the loop that is shown."""
     study = run_study(config.parse(f"{SHORT}[driveline]\nJ4 = 20\n"), tmp_path)
     loop, drive = study.statics.loops["mean inertia"], study.drive
-    assert loop.inertia > drive.parameters.rotor.J + 20.0 / 25.0**2
+    assert loop.inertia > drive.fmu_parameters.rotor.J + 20.0 / 25.0**2
     assert loop.crossover == pytest.approx(study.tuning.crossover, rel=0.05)
 
 
@@ -276,7 +276,7 @@ damping_ratio = 0.04
     feed = config.parse(SHORT).feed
     J = cycle(drive.machine, 6.0, feed).outputs.J
     c = 1.0 / (1.0 / line.c2 + 1.0 / line.c3)
-    J1, J4 = drive.parameters.rotor.J * line.ratio**2, line.J4 + float(np.mean(J)) * line.ratio**2
+    J1, J4 = drive.fmu_parameters.rotor.J * line.ratio**2, line.J4 + float(np.mean(J)) * line.ratio**2
     k = np.sqrt(c * (1.0 / J1 + 1.0 / J4))
     d = 1.0 / (1.0 / line.d2 + 1.0 / line.d3)
     # of one degree of freedom with the reduced inertia

@@ -56,7 +56,7 @@ def test_twins_are_systems():
     stiff = rigid(graph, "driveline")
     assert set(stiff.components) == {"machine", "motor", "model"} and stiff.wires == graph.wires
     assert [(bond.driver, bond.machine) for bond in stiff.bonds] == [("motor", "machine")]
-    rotor = drive.parameters.rotor.J
+    rotor = drive.fmu_parameters.rotor.J
     assert stiff.values["motor.rotor.J"] == pytest.approx(rotor + 2.0 / 25.0**2) and drive.rotor_inertia == (
         pytest.approx(stiff.values["motor.rotor.J"])
     )

@@ -54,10 +54,18 @@ def catalogue_drive(
     surroundings = p.ambient if ambient is None else dataclasses.replace(p.ambient, T=ambient)
     p = dataclasses.replace(
         p,
-        rotor=dataclasses.replace(p.rotor, J=p.rotor.J + gear.J, d=p.rotor.d + drag),
         soft_start=soft,
         inverter=inverter,
         ambient=surroundings,
     )
     machine = config.machine.replace({"ratio": ratio})
-    return Drive(model, p, machine, follows, rated_current=plate.rated_current, chain=config.chain)
+    return Drive(
+        model,
+        p,
+        machine,
+        follows,
+        rated_current=plate.rated_current,
+        chain=config.chain,
+        gear_inertia=gear.J,
+        gear_friction=drag,
+    )

@@ -59,8 +59,8 @@ def _given(config: Config) -> Drive:
     else:
         motor, p = config.motor_type, config.motor
         drive = Drive(motor, p, config.machine, motor.follows(p), chain=config.chain)
-    drive = replace(drive, feed_forward=config.feed_forward)
-    return drive if config.flywheel is None else drive.with_flywheel(config.flywheel.J)
+    flywheel = 0.0 if config.flywheel is None else config.flywheel.J
+    return replace(drive, feed_forward=config.feed_forward, flywheel=flywheel)
 
 
 def check_files(config: Config) -> None:

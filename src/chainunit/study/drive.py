@@ -68,6 +68,13 @@ class Drive:
     line: Any = None
     """parameters of the driveline between motor and machine, if there is one; its `ratio` is the gear before it"""
 
+    flywheel: float = 0.0
+    """inertia of a flywheel on the motor's shaft [kg m2]"""
+
+    gear_inertia: float = 0.0
+    gear_friction: float = 0.0
+    """of the gear of a motor of the catalogue, at the motor's shaft [kg m2], [N m s/rad]"""
+
     foreign: FmuComponent | None = None
     """the motor, where it is an FMU of somebody else: then `motor` is `Motor`, of which no more is known than its
     terminals, and there are no `parameters`"""
@@ -82,17 +89,22 @@ class Drive:
         """The machine as its FMU is: with the gear that is left behind the driveline."""
         return self.machine if self.line is None else self.machine.replace(ratio=self.ratio / self.line.ratio)
 
+    @cached_property
+    def fmu_parameters(self) -> Any:
+        """Parameters of the motor's FMU: those of the motor, whose rotor takes along the gear and the flywheel."""
+        p = self.parameters
+        if not (self.flywheel or self.gear_inertia or self.gear_friction):
+            return p
+        J = p.rotor.J + self.gear_inertia + self.flywheel
+        return replace(p, rotor=replace(p.rotor, J=J, d=p.rotor.d + self.gear_friction))
+
     @property
     def rotor_inertia(self) -> float:
-        """Inertia of the rotor, and of the driveline where there is one, at the motor [kg m2]."""
+        """Inertia that turns with the rotor at the motor [kg m2]: its own, that of gear and flywheel, and the
+        driveline's where there is one."""
         self.needs_own("the inertia of its rotor")
         line = 0.0 if self.line is None else self.line.J4 / self.line.ratio**2
-        return float(self.parameters.rotor.J + line)
-
-    def with_flywheel(self, J: float) -> Drive:
-        """The drive with a flywheel of the inertia `J` [kg m2] on the motor's shaft."""
-        p = self.parameters
-        return replace(self, parameters=replace(p, rotor=replace(p.rotor, J=p.rotor.J + J)))
+        return float(self.fmu_parameters.rotor.J + line)
 
     def needs_own(self, quantity: str) -> None:
         """Refuse what only a motor of this package can tell.
@@ -209,7 +221,7 @@ class Drive:
             {
                 "machine": outsider.component if outsider else ModelComponent(*self.load_model()),
                 **between,
-                "motor": self.foreign or ModelComponent(self.motor, self.parameters),
+                "motor": self.foreign or ModelComponent(self.motor, self.fmu_parameters),
             }
         )
         if not self.feed_forward:
@@ -338,7 +350,7 @@ class Drive:
             unit = resolution * max(float(np.max(np.abs(x))), 1e-9)
             columns.append(np.round(x / unit) * unit)
         instants, which = np.unique(np.stack(columns), axis=1, return_inverse=True)
-        limits = [self.motor.largest_torque(self.parameters, T, *map(float, at)) for at in instants.T]
+        limits = [self.motor.largest_torque(self.fmu_parameters, T, *map(float, at)) for at in instants.T]
         return np.array(limits)[np.reshape(which, -1)]
 
     def pull_out(self, run: xr.Dataset, T: float) -> float:
@@ -346,7 +358,7 @@ class Drive:
         it stalls, with the winding at `T` [K]; see `Motor.pull_out`."""
         self.needs_own("the pull-out torque")
         at = (float(np.mean(run[f"motor.{name}"].values)) for name in self.motor.limited_by)
-        return self.motor.pull_out(self.parameters, T, *at) * self.ratio
+        return self.motor.pull_out(self.fmu_parameters, T, *at) * self.ratio
 
     @property
     def coasting_model(self) -> type[DirectMachine]:

@@ -166,7 +166,7 @@ class FlywheelAnalysis(Analysis):
             permitted=table.fluctuation,
             swing=turn.energy_swing,
             speed=config.run.crank_speed * drive.ratio,
-            bare=drive.rotor_inertia - table.J + turn.inertia_mean / drive.ratio**2,
+            bare=drive.rotor_inertia - drive.flywheel + turn.inertia_mean / drive.ratio**2,
             mean_torque=turn.torque_mean / drive.ratio,
         )
         study.findings[FlywheelAnalysis.name] = found
@@ -195,7 +195,7 @@ def _own(study: Study, found: FlywheelFindings) -> Wheel:
 def _run(study: Study, rig: Rig, found: FlywheelFindings, flywheel: float) -> Wheel:
     """The start-up and steady running of the study with another flywheel [kg m2], without its safety coupling."""
     config = study.config
-    drive, _ = tune(config, study.drive.with_flywheel(flywheel - found.own))
+    drive, _ = tune(config, replace(study.drive, flywheel=flywheel))
     sides = drive.machine.loaded_sides(config.feed)
     rig = replace(rig, drive=drive, fed_from=None)
     with rig.from_rest() as simulation:

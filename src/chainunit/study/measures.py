@@ -124,7 +124,7 @@ class Window:
         drive.needs_own("the temperature of the winding")
         names = ("heat", drive.motor.temperature, "w")
         heat, temperature, w = (self.mean(f"motor.{name}") for name in names)
-        return drive.motor.settled_temperature(drive.parameters, heat, temperature, w)
+        return drive.motor.settled_temperature(drive.fmu_parameters, heat, temperature, w)
 
     @property
     def warm(self) -> float:

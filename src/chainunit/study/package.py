@@ -72,7 +72,7 @@ def start_of(
     if drive.motor is not model:
         title = drive.graph.components["motor"].title
         raise InputError(f"the study's motor is {title}, not {model.name}")
-    return model.parameter_layout.named(drive.parameters)
+    return model.parameter_layout.named(drive.fmu_parameters)
 
 
 def with_rods(number: int, start: Mapping[str, float]) -> type[Model]:

@@ -102,7 +102,7 @@ def two_masses(drive: Drive, inertia: float) -> Cardan:
     the line's shafts."""
     line = drive.line
     shafts = {v.name: getattr(line, v.name) for v in variables(ShaftLine)}
-    J1 = drive.parameters.rotor.J * line.ratio**2
+    J1 = drive.fmu_parameters.rotor.J * line.ratio**2
     return Cardan(**shafts, J1=J1, J4=line.J4 + inertia * line.ratio**2)
 
 

@@ -58,8 +58,6 @@ class Candidate:
 
     motor: CatalogueMotor
     drive: Drive
-    flywheel: float
-    """[kg m2], on the motor shaft"""
     checks: dict[str, Check]
     peak_torque: float = math.nan
     """of the crank, over start and steady running with either load [N m]"""
@@ -130,7 +128,7 @@ class SizingResult:
         return {
             "asked": entries(self.config.sizing, titled=True),
             **self.duty.as_dict(),
-            "flywheel": entries(Flywheel(J=best.flywheel, fluctuation=best.fluctuation), titled=True),
+            "flywheel": entries(Flywheel(J=best.drive.flywheel, fluctuation=best.fluctuation), titled=True),
             "tried": {"value": len(self.candidates), "unit": "1"},
             "motors": {"value": self.motors, "unit": "1"},
             "weak": {"value": self.weak, "unit": "1"},
@@ -222,11 +220,10 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
 
     The largest tried is that of the hand formula, which leaves out that a motor's torque falls with speed and evens
     it, too."""
-    whole = max(0.0, duty.numbers.inertia_wanted / bare.drive.ratio**2 - bare.drive.parameters.rotor.J)
+    whole = max(0.0, duty.numbers.inertia_wanted / bare.drive.ratio**2 - bare.drive.fmu_parameters.rotor.J)
 
     def trial_with(share: float) -> Candidate:
-        drive = bare.drive.with_flywheel(share * whole)
-        candidate = dataclasses.replace(bare, drive=drive, flywheel=share * whole)
+        candidate = dataclasses.replace(bare, drive=dataclasses.replace(bare.drive, flywheel=share * whole))
         judge(config, candidate, duty, files)
         return candidate
 
@@ -262,7 +259,7 @@ def proposed(config: Config, motor: CatalogueMotor, duty: Duty) -> Candidate:
     """A motor with the gear ratio at which the crank has its speed, without a flywheel."""
     assert config.sizing is not None
     drive = catalogue_drive(config, motor, duty.normal.crank_torque, config.sizing.ambient)
-    return Candidate(motor, drive, 0.0, {})
+    return Candidate(motor, drive, {})
 
 
 def judge(config: Config, c: Candidate, duty: Duty, files: Mapping[str, Path]) -> None:
@@ -297,8 +294,8 @@ def rank(candidates: list[Candidate]) -> None:
             c.verdict, c.reason = Standing.REJECTED, "it does not bring the machine up to speed"
         else:
             c.verdict, c.reason = Standing.REJECTED, "; ".join(check.passed for check in over)
-        if c.flywheel:
-            c.reason += f", with a flywheel of {c.flywheel:.3g} kg m2"
+        if c.drive.flywheel:
+            c.reason += f", with a flywheel of {c.drive.flywheel:.3g} kg m2"
     candidates.sort(
         key=lambda c: (
             not c.fits,

@@ -63,7 +63,7 @@ def _loops(drive: Drive, inertia: Any) -> dict[str, Loop]:
         "largest inertia": np.max(inertia),
     }
     loops = {
-        name: drive.motor.speed_loop(drive.parameters, drive.rotor_inertia + float(size))
+        name: drive.motor.speed_loop(drive.fmu_parameters, drive.rotor_inertia + float(size))
         for name, size in sizes.items()
     }
     return {name: loop for name, loop in loops.items() if loop is not None}

@@ -126,7 +126,7 @@ class Trial:
         """Of the motor [N m], as warm as it may become, at the frequency at which it runs: above the corner an
         inverter has no more voltage."""
         assert self.config.sizing is not None
-        p = self.drive.parameters
+        p = self.drive.fmu_parameters
         voltage = float(volts_per_hertz(MATH, p, self.frequency)) if self.drive.follows else 1.0
         T = self.config.sizing.temperature
         return float(self.drive.motor.largest_torque(p, T, voltage * p.supply.V, self.frequency))
@@ -137,14 +137,14 @@ class Trial:
         assert self.config.sizing is not None
         steady, extra = self._heat
         mean = steady + self.config.sizing.starts_per_hour * extra / 3600.0
-        p, motor = self.drive.parameters, self.drive.motor
+        p, motor = self.drive.fmu_parameters, self.drive.motor
         return min(BURNT, motor.settled_temperature(p, mean, self._ran_at, self.speed))
 
     @cached_property
     def permitted_starts(self) -> float:
         """Starts per hour that the winding permits, and of a motor on the line the catalogue."""
         assert self.config.sizing is not None
-        p, plate = self.drive.parameters, self.motor.nameplate
+        p, plate = self.drive.fmu_parameters, self.motor.nameplate
         warm, cold = (
             1.0 + p.stator.alpha * (T - T_RATED) for T in (self.config.sizing.temperature, self._ran_at)
         )
@@ -159,7 +159,7 @@ class Trial:
 
     @property
     def _cooling(self) -> float:
-        return float(self.drive.motor.cooling(MATH, self.drive.parameters, self.speed))
+        return float(self.drive.motor.cooling(MATH, self.drive.fmu_parameters, self.speed))
 
     @cached_property
     def _ran_at(self) -> float:
@@ -184,7 +184,7 @@ class Trial:
 
     def checks(self) -> dict[str, Check]:
         """Each value beside its limit, by name; without a value where the machine does not get up to speed."""
-        asked, plate, p = self.config.sizing, self.motor.nameplate, self.drive.parameters
+        asked, plate, p = self.config.sizing, self.motor.nameplate, self.drive.fmu_parameters
         assert asked is not None
 
         def check(title: str, value: float, limit: float, unit: str, kind: str = "") -> Check:
@@ -250,7 +250,7 @@ def try_motor(
     ramp = config.run.ramp if drive.follows else 0.0
     # three times as long as the rated torque takes to bring everything up to speed, and at least the ramp of the
     # start
-    inertia = drive.parameters.rotor.J + duty.numbers.inertia_mean / drive.ratio**2
+    inertia = drive.fmu_parameters.rotor.J + duty.numbers.inertia_mean / drive.ratio**2
     rise = config.starter.soft_start.time if config.start == "soft" else ramp
     window = max(1.0, 3.0 * inertia * plate.speed / plate.torque, 1.5 * rise)
     rig = Rig(config, drive, files)
