@@ -62,12 +62,15 @@ def test_a_setting_lies_between_normal_duty_and_what_opens_it():
     assert found.torque == 250.0 and found.obstacle is None and found.opens == jam | blocked
     # what the motor cannot give, what the gear may not carry, and what no overload reaches
     for least, obstacle in (
-        (Setting(500.0, 600.0, 1000.0, jam | blocked), Obstacle.MOTOR),
+        (Setting(500.0, 600.0, 1000.0, jam), Obstacle.MOTOR),
         (Setting(200.0, 600.0, 240.0, jam | blocked), Obstacle.GEAR),
         (Setting(350.0, 600.0, 1000.0, jam), Obstacle.OVERLOADS),
         (Setting(350.0, 600.0, 1000.0, {}), Obstacle.OVERLOADS),
     ):
         assert least.torque is None and least.obstacle is obstacle
+    # with the inertia of rotor and flywheel a shock reaches more than the motor gives
+    flywheel = Setting(500.0, 600.0, 1000.0, jam | blocked)
+    assert flywheel.torque == 625.0 and flywheel.opens == blocked and flywheel.stalls and not found.stalls
     # a dip of the voltage that opens it is no protection
     dip = Setting(200.0, 600.0, 1000.0, {"jam_left": 240.0}, {"dip": 300.0})
     assert dip.obstacle is Obstacle.OVERLOADS and dip.opens == {} and dip.nuisances == {"dip": 300.0}

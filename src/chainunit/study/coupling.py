@@ -92,10 +92,14 @@ def coupling_sentence(study: Study) -> str:
         )
     shut = {name: peak for name, peak in setting.overloads.items() if name not in setting.opens}
     text = (
-        f"Recommended safety coupling{caveat}: {above}, below the {_torque(setting.motor)} that the motor gives at "
-        f"the crank. It opens where {listed(setting.opens)}"
+        f"Recommended safety coupling{caveat}: {above}, {'above' if setting.stalls else 'below'} the "
+        f"{_torque(setting.motor)} that the motor gives at the crank. It opens where {listed(setting.opens)}"
     )
     text += f"; it stays shut where {listed(shut)}." if shut else "."
+    if setting.stalls:
+        text += (
+            " A load that rises slowly stalls the motor and does not open it: the relay has to trip there."
+        )
     if setting.nuisances:
         text += f" A nuisance trip, which protects nothing: it opens, too, where {listed(setting.nuisances)}."
     if study.start_torque is not None and study.start_torque > setting.least:

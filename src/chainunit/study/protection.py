@@ -69,11 +69,11 @@ class Obstacle(StrEnum):
 class Setting:
     """A safety coupling between motor and gear, judged by the torques in a study; all at the crank [N m].
 
-    The setting is `MARGIN` times the largest torque of `normal` duty: below the largest torque of the `motor` in
-    steady running, so that it opens before the motor stalls, below the limit of the `gear`, and below the torque of
-    at least one of the `overloads`, by name their peaks: the shocks that a coupling is for. Otherwise
-    `obstacle` says why there is none. `disturbances` are the peaks that it has to ride out, by name, such as a dip
-    of the voltage.
+    The setting is `MARGIN` times the largest torque of `normal` duty: below the limit of the `gear`, and below the
+    torque of at least one of the `overloads`, by name their peaks: the shocks that a coupling is for. Otherwise
+    `obstacle` says why there is none. The largest torque of the `motor` in steady running may be less, as rotor and
+    flywheel, too, give torque in a shock: then what brakes slowly stalls the motor. `disturbances` are the peaks that
+    it has to ride out, by name, such as a dip of the voltage.
     """
 
     normal: float
@@ -90,9 +90,11 @@ class Setting:
     @property
     def obstacle(self) -> Obstacle | None:
         """Why there is no setting."""
-        if self.least >= min(self.motor, self.gear):
-            return Obstacle.MOTOR if self.motor <= self.gear else Obstacle.GEAR
-        return None if self.opens else Obstacle.OVERLOADS
+        if self.least >= self.gear:
+            return Obstacle.GEAR
+        if self.opens:
+            return None
+        return Obstacle.MOTOR if self.least >= self.motor else Obstacle.OVERLOADS
 
     @property
     def torque(self) -> float | None:
@@ -103,6 +105,11 @@ class Setting:
     def opens(self) -> dict[str, float]:
         """The overloads in which a coupling of the least setting opens, with their peaks."""
         return {name: peak for name, peak in self.overloads.items() if peak > self.least}
+
+    @property
+    def stalls(self) -> bool:
+        """Whether the motor stalls before it opens, where the load rises slowly."""
+        return self.least >= self.motor
 
     @property
     def nuisances(self) -> dict[str, float]:
