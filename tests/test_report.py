@@ -124,13 +124,13 @@ def test_what_the_file_does_not_give_is_marked():
     given = S.given("Run", Run, "run")[1]
     assert [(value.name, value.origin) for value in given] == [
         ("run.crank_speed", "file"),
-        ("run.turns", "example"),
+        ("run.turns", "declared"),
     ]
     page, document = html.render(a_report()), markdown(a_report(), [])
-    assert page.count('<abbr class="from" title="the example&#x27;s">e</abbr>') == 1
-    assert "Not in the study file: e: the example's." in page and "t: tuned" not in page
+    assert page.count('<abbr class="from" title="the declared start value">d</abbr>') == 1
+    assert "Not in the study file: d: the declared start value." in page and "t: tuned" not in page
     rows = [line for line in document.splitlines() if line.startswith("| run.")]
-    assert rows[0].endswith("| file |") and rows[1].endswith("| example |")
+    assert rows[0].endswith("| file |") and rows[1].endswith("| declared |")
 
 
 def test_a_remark_that_was_printed_before_is_not_repeated():

@@ -19,7 +19,7 @@ from .motion import Animation
 
 Form = Literal["both", "short", "long"]
 Severity = Literal["good", "partly", "bad", "warning", "alarm", "remark"]
-Origin = Literal["", "file", "example", "tuned", "sizing", "default"]
+Origin = Literal["", "file", "example", "declared", "tuned", "catalogue", "sizing"]
 
 
 @dataclass(frozen=True)
@@ -300,5 +300,5 @@ class Source:
         """Where a given value is from, if the result says it."""
         if "origins" not in self.result:
             return ""
-        origin: Origin = self.result["origins"].get(path, "example")
+        origin: Origin = self.result["origins"].get(path, "declared")
         return origin

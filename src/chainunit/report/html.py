@@ -35,8 +35,9 @@ _ORIGIN = {
     "file": "the study file's",
     "example": "the example's",
     "tuned": "tuned to the machine",
+    "catalogue": "of the motor of the catalogue",
     "sizing": "found by sizing",
-    "default": "the default",
+    "declared": "the declared start value",
 }
 
 

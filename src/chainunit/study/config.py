@@ -99,7 +99,11 @@ class Config:
     """the motor, where it is an FMU of somebody else; `motor` is then of no meaning"""
     source: str
     given: frozenset[str]
-    """names of all that the file sets, such as "machine.crank.m"; everything else is the example's"""
+    """names of all that the file sets, such as "machine.crank.m"; see `of_example`"""
+    of_example: frozenset[str] = frozenset()
+    """names of all that it leaves out and the example sets; everything else is at its declared start value"""
+    packaged: bool = False
+    """whether the file is the packaged example"""
     slips: tuple[Slip, ...] = ()
     """values that look like a slip of the unit"""
     units: Units = dataclasses.field(default_factory=lambda: DEFAULT_UNITS)
@@ -149,7 +153,7 @@ def load(file: Path | None = None) -> Config:
     InputError
         in one line: the file, the field, its value and the allowed range.
     """
-    return read(file, example, parse)
+    return dataclasses.replace(read(file, example, parse), packaged=file is None)
 
 
 def parse(text: str, source: str = "config") -> Config:
@@ -164,7 +168,8 @@ def parse(text: str, source: str = "config") -> Config:
     data = toml(text)
     parts = parts_of(data, source)
     read_table(parts.form, data)
-    checked = read_table(parts.form, over_example(data, parts))
+    whole = over_example(data, parts)
+    checked = read_table(parts.form, whole)
     declared = {name: section.declared for name, section in parts.sections.items()}
     unusual = tuple(slips(declared, data, {"run.crank_speed": parts.machine.usual_speed}))
     try:
@@ -173,7 +178,9 @@ def parse(text: str, source: str = "config") -> Config:
             kinds = {f"event.{name}": event.Parameters for name, event in events.items()}
             tables = dict(zip(events, data["event"], strict=True))
             unusual += tuple(slips(kinds, {"event": tables}))
-        return _config(data, checked, parts, events, source, unusual)
+        config = _config(data, checked, parts, events, source, unusual)
+        given, names = frozenset(_names(data, events)), frozenset(_names(whole, events))
+        return dataclasses.replace(config, given=given, of_example=names - given - {"title"})
     except InputError as error:
         # values that do not fit together may be a slip of the unit
         hints = [f'was {slip.variable.name} = "{slip.meant}" meant?' for slip in unusual if slip.meant]
@@ -231,7 +238,7 @@ def _config(
         if parts.file
         else None,
         source=source,
-        given=frozenset(_names(data, events)),
+        given=frozenset(),
         slips=unusual,
         units=chosen_units(checked.report.units),
         **of_study,

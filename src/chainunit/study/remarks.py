@@ -25,15 +25,20 @@ from .verdict import RESIDUAL, STEADY
 def conclude(study: Study) -> None:
     """Judge the model, and add every remark to the study."""
     config, note = study.config, partial(study.remark, "note")
-    packaged = "Masses, pins, feed and drive are assumed; the papers print none."
-    own = "What the study file does not name is the packaged example's, whose masses and drive are assumed."
-    if study.drive.outsider:
+    own = "What the study file does not name is at its declared start value, which is assumed."
+    if config.packaged:
+        own = "Masses, pins, feed and drive are assumed; the papers print none."
+    elif config.of_example:
+        own = (
+            "What the study file does not name is the packaged example's, whose masses and drive are assumed."
+        )
+    elif study.drive.outsider:
         own = (
             f"The machine is an FMU, {study.drive.outsider.model.description}. What the study file does not name of "
             "it is at the start value of its FMU. The turn at constant speed is by that FMU alone; bearings, and the "
             "machine behind an open coupling, are not known of it."
         )
-    note("assumed", packaged if config.source == "packaged example" else own)
+    note("assumed", own)
     note(
         "smoothed friction",
         "Friction is smoothed: at rest nothing sticks, so that the torque to break away from a loaded stop is not in "

@@ -71,7 +71,7 @@ def as_dict(study: Study) -> dict[str, Any]:
 
 
 def _given(study: Study) -> dict[str, Any]:
-    """What the study was given; `origins` says where values come from that are not the example's, by their names."""
+    """What the study was given; `origins` says where values come from that are not at their declared start value."""
     config = study.config
     sections = {
         "machine": study.drive.machine.p,
@@ -87,7 +87,7 @@ def _given(study: Study) -> dict[str, Any]:
     }
     names = [v.name for section, p in sections.items() if p for v in variables(type(p), f"{section}.")]
     return {
-        "origins": {name: origin for name in names if (origin := study.origin(name)) != "example"},
+        "origins": {name: origin for name in names if (origin := study.origin(name)) != "declared"},
         "machine": entries(study.drive.machine.p),
         "motor": _motor(study),
         "feed": entries(config.feed),

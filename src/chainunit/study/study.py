@@ -35,6 +35,10 @@ Amount: TypeAlias = (
 """A number, its unit, and perhaps how people show it, and with how many digits."""
 
 
+Origins: TypeAlias = Literal["file", "example", "declared", "tuned", "catalogue", "sizing"]
+"""Where a value comes from."""
+
+
 @dataclass(frozen=True)
 class Remark:
     """Something that the reader has to know beside the numbers: a `warning` of a fault, or of a demand that
@@ -164,18 +168,43 @@ class Study:
         """How sentences call a run."""
         return self.titles.get(run, run.replace("_", " "))
 
-    def origin(self, name: str) -> Literal["file", "example", "tuned", "sizing"]:
+    def origin(self, name: str) -> Origins:
         """Where the value of a quantity comes from, by its name in a study file ("motor.rotor.J"): the file, the
-        example, tuning, or sizing."""
+        example, tuning, the catalogue with the motor that the file names or that sizing chose, or its declaration."""
         section, _, parameter = name.partition(".")
-        of_ratios = section == "machine" and parameter in LENGTHS and self.config.gives("ratios")
-        if name in self.config.given or of_ratios:
-            return "file"
-        if self.sizing is not None and (section == "motor" or name == "machine.ratio"):
-            return "sizing"
         if section == "motor" and self.tuning is not None and parameter in self.tuning.parameters:
-            return "tuned"
-        return "example"
+            return "file" if name in self.config.given else "tuned"
+        of_catalogue = self.config.plate is not None or self.sizing is not None
+        if section == "machine" and parameter in LENGTHS and self.config.gives("ratios"):
+            return "file"
+        if section == "machine" and parameter in LENGTHS and "ratios.rho" in self.config.of_example:
+            return "example"
+        if of_catalogue and (name == "machine.ratio" or section == "motor"):
+            told = self._told(parameter)
+            if not told:
+                return "catalogue" if self.sizing is None else "sizing"
+            name = told
+        return self._of(name)
+
+    def _of(self, name: str) -> Origins:
+        """Of a value that only the study file and the example tell."""
+        if name in self.config.given:
+            return "file"
+        return "example" if name in self.config.of_example else "declared"
+
+    def _told(self, parameter: str) -> str:
+        """The name in a study file of a parameter that the motor of the catalogue does not set, else ""."""
+        config = self.config
+        if parameter == "ratio":
+            return "gear.ratio" if self._of("gear.ratio") != "declared" else ""
+        group = parameter.partition(".")[0]
+        if parameter == "inverter.on":
+            return "start"
+        if parameter == "inverter.slip" and config.start == "inverter" and not config.starter.inverter.slip:
+            return ""
+        if group in ("soft_start", "inverter"):
+            return f"starter.{parameter}"
+        return "sizing.ambient" if parameter == "ambient.T" else ""
 
     @property
     def kind(self) -> str:
