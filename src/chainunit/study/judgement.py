@@ -62,6 +62,10 @@ def _residuals(study: Study) -> dict[str, float]:
     }
 
 
+AMPLE = 0.02
+"""Reserve of torque from which on the motor counts as strong enough: with less it stands at its limit."""
+
+
 def motor_verdict(study: Study) -> dict[str, Any] | None:
     """Whether the motor reaches the speed ("false" where not), and its least reserve of torque with the run of it
     ("in part" where none is left or known, or sizing found it insufficient), ready for JSON; None without steady
@@ -95,13 +99,13 @@ def motor_verdict(study: Study) -> dict[str, Any] | None:
     else:
         over = number(-reserves[run], "1", "percent") + (" or more" if reserves[run] <= -1.0 else "")
         text += (
-            f"; no torque is left in reserve: for a moment it gives {over} more than it can give for long "
+            f"; no reserve of torque: for a moment it passes the largest torque of a steady state by {over} "
             f"({study.called(run)})"
         )
     if left_out:
         names = ", ".join(study.called(name) for name in left_out)
         text += f"; runs whose energy balance is not kept are left out ({names})"
-    enough = reserve is not None and reserve > 0.0 and not study.insufficient
+    enough = reserve is not None and reserve >= AMPLE and not study.insufficient
     holds: Holds = "false" if not kept else "true" if enough else "in part"
     return {
         "holds": holds,
