@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray as xr
 from event_tables import HEAVY_MACHINE, event_line
 from systems import component
 from typer.testing import CliRunner
@@ -24,12 +25,12 @@ from chainunit.fmu.backends import export
 from chainunit.machines.chain_unit import Feed, SideLoads
 from chainunit.study import sizing
 from chainunit.study.config import parse
-from chainunit.study.cycle import cycle
+from chainunit.study.cycle import cycle, energy_swing, needed_inertia
 from chainunit.study.drive import Drive
-from chainunit.study.duty import flywheel, rms
+from chainunit.study.duty import rms
 from chainunit.study.rig import Rig
 from chainunit.study.sizing import Standing
-from chainunit.study.trial import Check, permitted_starts, start_time
+from chainunit.study.trial import Check, Trial, permitted_starts, start_time
 from chainunit.system import CoSimulation, Profile, System
 
 ANGLE = np.linspace(0.0, 2.0 * math.pi, 7200, endpoint=False)
@@ -46,8 +47,15 @@ def test_flywheel_by_hand():
     """A torque M0 + M1 sin(n a): the energy swings by 2 M1/n, so J = 2 M1/(n delta w^2)."""
     for n in (1, 2, 5):
         torque = 40.0 + 12.0 * np.sin(n * ANGLE)
-        assert flywheel(torque, 6.0, 0.05) == pytest.approx(2.0 * 12.0 / (n * 0.05 * 36.0), rel=1e-3)
-    assert flywheel(np.full(360, 40.0), 6.0, 0.05) == pytest.approx(0.0, abs=1e-12)
+        assert needed_inertia(energy_swing(torque), 6.0, 0.05) == pytest.approx(
+            2.0 * 12.0 / (n * 0.05 * 36.0), rel=1e-3
+        )
+    assert needed_inertia(energy_swing(np.full(360, 40.0)), 6.0, 0.05) == pytest.approx(0.0, abs=1e-12)
+    # what the machine has is not asked for again
+    assert (
+        needed_inertia(1.8, 6.0, 0.05, 0.4) == pytest.approx(0.6)
+        and needed_inertia(1.8, 6.0, 0.05, 2.0) == 0.0
+    )
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +72,7 @@ def test_a_flywheel_of_that_size_keeps_the_speed(dc):
     """The co-simulated shaft with a constant inertia, a constant drive torque and a load that swings with time."""
     mean, swing, w, delta = 1.0, 0.4, 100.0, 0.02
     # one swing of the load a turn of the shaft
-    J = flywheel(mean + swing * np.sin(ANGLE), w, delta)
+    J = needed_inertia(energy_swing(mean + swing * np.sin(ANGLE)), w, delta)
     k, limit = 1.27, (mean + 0.001 * w) / 1.27
     start = {
         "w_start": w,
@@ -101,6 +109,78 @@ def test_permitted_starts_by_hand():
     # 80 K over 0.1 K/W leaves 800 W; 300 W are taken; a start brings 36 kJ: 3600*500/36000
     assert permitted_starts(p, 300.0, 36000.0, 1.0, 393.15) == pytest.approx(50.0)
     assert permitted_starts(p, 900.0, 36000.0, 1.0, 393.15) == pytest.approx(1e-4)
+
+
+def trial_of(config, time, heat):
+    """A trial whose start heats the winding so much [W]; loaded it takes 400 W."""
+    start, steady = (
+        xr.Dataset({"motor.heat": ("time", x)}, {"time": t})
+        for t, x in ((time, heat), (time[-1] + np.linspace(0.0, 4.0, 401), np.full(401, 400.0)))
+    )
+    drive = Drive(DcMotor, config.motor, config.machine)
+    return Trial(config, catalogue()[0], drive, None, start, steady, (), {})
+
+
+@pytest.mark.parametrize("window", [3.0, 9.0])
+def test_the_heat_of_a_start_does_not_depend_on_how_long_the_machine_idles(window):
+    """1000 W for half a second, then 50 W without feed: 475 J for the start."""
+    config = dataclasses.replace(parse(HEAVY), empty_start=True)
+    time = np.linspace(0.0, window, int(1000 * window) + 1)
+    running, start = trial_of(config, time, np.where(time < 0.5, 1000.0, 50.0))._heat
+    assert running == 400.0 and start == pytest.approx(475.0, rel=2e-3)
+
+
+@dataclasses.dataclass
+class Wheeled:
+    """Stands for the drive of a candidate: the inertia on the motor's shaft."""
+
+    flywheel: float = 0.0
+    ratio = 10.0
+
+    @property
+    def rotor_inertia(self):
+        return 0.25 + self.flywheel
+
+
+def wheel_of(monkeypatch, wanted, inertia, sizes):
+    """What the search for a flywheel comes to, and the flywheels tried, where the checks use so much of their limits
+    with a flywheel; there are 0.25 kg m2 on the shaft, and `inertia` at the crank."""
+    tried = []
+
+    def judge(config, candidate, duty, files):
+        tried.append(candidate.drive.flywheel)
+        candidate.checks = {
+            name: Check(name, used, 1.0, "1") for name, used in sizes(candidate.drive.flywheel).items()
+        }
+
+    monkeypatch.setattr(sizing, "judge", judge)
+    numbers = SimpleNamespace(inertia_wanted=wanted, inertia_mean=inertia, torque_mean=1.0)
+    motor = SimpleNamespace(nameplate=SimpleNamespace(torque=10.0))
+    bare = sizing.Candidate(motor, Wheeled(), {})
+    return sizing.with_flywheel(None, bare, SimpleNamespace(numbers=numbers), {}), tried
+
+
+def test_the_flywheels_tried_go_as_far_as_the_hand_formula_with_the_machine(monkeypatch):
+    """200 kg m2 are wanted at the crank, and 25 + 75 are there: 1 kg m2 on the shaft."""
+    best, tried = wheel_of(monkeypatch, 200.0, 75.0, lambda J: {"speed": 1.5})
+    assert tried == [0.0, *(pytest.approx(share) for share in (0.03, 0.1, 0.3, 1.0))]
+    best, _ = wheel_of(monkeypatch, 200.0, 75.0, lambda J: {"rms_torque": 1.5 - J})
+    assert best.drive.flywheel == pytest.approx(0.5, abs=0.1) and best.fits
+
+
+def test_no_flywheel_is_tried_that_is_small_beside_what_is_there(monkeypatch):
+    best, tried = wheel_of(monkeypatch, 105.0, 75.0, lambda J: {"rms_torque": 1.2})
+    assert tried == [best.drive.flywheel] == [0.0]
+
+
+def test_of_flywheels_that_are_too_heavy_the_nearest_is_kept(monkeypatch):
+    """None evens the speed before it passes the inertia that is permitted."""
+    best, tried = wheel_of(
+        monkeypatch, 200.0, 75.0, lambda J: {"speed": 3.0 - J, "inertia": 0.5 + 1000.0 * J}
+    )
+    assert len(tried) == 5 and best.drive.flywheel == 0.0
+    best, tried = wheel_of(monkeypatch, 200.0, 75.0, lambda J: {"speed": 3.0 - J, "inertia": 0.5 + 3.0 * J})
+    assert best.violation == pytest.approx(2.7) and best.drive.flywheel == max(tried)
 
 
 def test_a_check_is_what_is_used_of_what_is_permitted():

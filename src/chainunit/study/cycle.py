@@ -40,6 +40,16 @@ def energy_swing(torque: Any) -> float:
     return float(np.ptp(excess))
 
 
+def needed_inertia(swing: float, speed: float, fluctuation: float, there: float = 0.0) -> float:
+    """Inertia [kg m2] that a shaft needs beside the one that is `there` to keep (largest - least)/mean of its `speed`
+    [rad/s] at `fluctuation`; 0 where it needs none.
+
+    The drive gives a constant torque, and the masses lend the energy `swing` [J], see `energy_swing`:
+    J = dE/(fluctuation w^2).
+    """
+    return max(0.0, swing / (fluctuation * speed * speed) - there)
+
+
 def no_feed(feed: Any) -> Any:
     """A feed of that kind with nothing in it; a quantity that cannot be zero is at its start."""
     layout = Layout(type(feed))

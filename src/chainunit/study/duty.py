@@ -22,7 +22,7 @@ from ..text import entries
 from .chain import HIGH
 from .chain import duty as chain_duty
 from .config import Config
-from .cycle import Cycle, cycle, energy_swing
+from .cycle import Cycle, cycle, energy_swing, needed_inertia
 from .drive import Drive
 from .one_sided import all_on_one
 
@@ -31,15 +31,6 @@ def rms(*parts: tuple[float, Any]) -> float:
     """RMS over parts of the time: pairs of (share of the time, values evenly spaced in that part)."""
     whole = sum(share for share, _ in parts)
     return math.sqrt(sum(share * float(np.mean(np.square(x))) for share, x in parts) / whole)
-
-
-def flywheel(torque: Any, speed: float, fluctuation: float) -> float:
-    """Inertia [kg m2] on the shaft that keeps (largest - least)/mean of its speed at `fluctuation`.
-
-    `torque` [N m] is that of the shaft over a turn at constant `speed` [rad/s], evenly spaced in angle, shape
-    (n,), against a drive that gives its mean: J = dE/(fluctuation w^2), see `energy_swing`.
-    """
-    return energy_swing(torque) / (fluctuation * speed * speed)
 
 
 @declaration
@@ -56,7 +47,7 @@ class CycleNumbers:
     inertia_largest: Value = quantity("kg.m2", "reflected inertia, largest")
     inertia_wanted: Value = quantity(
         "kg.m2",
-        "inertia at the crank that the wanted fluctuation takes by the hand formula: rotor, gear and flywheel",
+        "inertia at the crank that the wanted fluctuation takes by hand: machine, rotor, gear and flywheel",
     )
 
 
@@ -127,10 +118,9 @@ def cycle_numbers(
         inertia_least=float(np.min(inertia)),
         inertia_mean=float(np.mean(inertia)),
         inertia_largest=float(np.max(inertia)),
-        inertia_wanted=float(
-            np.quantile(
-                [flywheel(turn, w, config.sizing.fluctuation) for turn in np.atleast_2d(normal.crank_torque)],
-                HIGH,
-            )
+        inertia_wanted=needed_inertia(
+            float(np.quantile([energy_swing(turn) for turn in np.atleast_2d(normal.crank_torque)], HIGH)),
+            w,
+            config.sizing.fluctuation,
         ),
     )

@@ -15,6 +15,7 @@ from ..text import entries, entry, number
 from .analysis import Analysis, Findings, Report
 from .choice import tune
 from .config import Config
+from .cycle import needed_inertia
 from .drive import Drive
 from .measures import Answers, Phase, Window, read_answers, same_measure, whole_turns
 from .rig import CLOSED, Rig
@@ -101,7 +102,7 @@ class FlywheelFindings(Findings):
     @property
     def flywheel_by_hand(self) -> float:
         """Flywheel that keeps the permitted fluctuation by the hand formula [kg m2]; 0 where none is needed."""
-        return max(0.0, self.bare * (self.by_hand(0.0) / self.permitted - 1.0))
+        return needed_inertia(self.swing, self.speed, self.permitted, self.bare)
 
     @property
     def rows(self) -> list[tuple[str, Wheel, str]]:

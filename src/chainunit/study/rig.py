@@ -37,7 +37,7 @@ _LONGEST_START = 30.0
 """Time after the ramp after which an empty machine is fed, however slowly it turns [s]."""
 _FEED_RISE = 0.1
 """Part of a turn in which the feed comes."""
-_PATIENCE = 20.0
+PATIENCE = 20.0
 """Turns, at the speed that is asked, that a study runs on until the motor has settled and made its turns; of a fast
 machine at least as many seconds as `_SETTLES`."""
 _SETTLES = 5.0
@@ -218,7 +218,7 @@ class Rig:
             stop, steady_from = stop + later, steady_from + later
             if any(abs(float(run[name][-1])) >= limit for name, limit in guards.items()):
                 return StartUp(run, steady_from, stop, rig)
-        longest = stop + max(_PATIENCE * self.config.turn, _SETTLES)
+        longest = stop + max(PATIENCE * self.config.turn, _SETTLES)
         run = joined([*pieces, simulation.run(stop, self.step, progress, guards=guards)])
         while stop - 0.5 * self.step <= simulation.time < longest:
             lack, steady_from = self._missing(run, steady_from)

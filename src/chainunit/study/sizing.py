@@ -50,6 +50,8 @@ _EVENED = ("speed", "rms_torque", "peak_torque", "temperature")
 """Checks that a flywheel eases: it evens the speed, and with it the torque of a load that comes and goes."""
 _WORSE_WITH_INERTIA = ("start", "inertia")
 """Checks that it makes worse."""
+_SMALL = 0.1
+"""Share of the inertia that is there below which a flywheel evens next to nothing."""
 
 
 @dataclass
@@ -216,43 +218,59 @@ def size(
 
 def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[str, Path]) -> Candidate:
     """The candidate as it is, or with the least flywheel, to about a tenth, that keeps the speed as asked and the
-    motor within its torque and temperature; as it is, too, where it misses a limit that no flywheel heals.
+    motor within its torque and temperature; as it is, too, where it misses a limit that no flywheel heals. Where the
+    flywheels that do so miss another limit, the one that comes nearest to all.
 
     The largest tried is that of the hand formula, which leaves out that a motor's torque falls with speed and evens
-    it, too."""
-    whole = max(0.0, duty.numbers.inertia_wanted / bare.drive.ratio**2 - bare.drive.fmu_parameters.rotor.J)
+    it, too; none is where that is a small part of the inertia which is there."""
+    there = bare.drive.rotor_inertia + duty.numbers.inertia_mean / bare.drive.ratio**2
+    whole = max(0.0, duty.numbers.inertia_wanted / bare.drive.ratio**2 - there)
+    tried: list[Candidate] = []
 
     def trial_with(share: float) -> Candidate:
         candidate = dataclasses.replace(bare, drive=dataclasses.replace(bare.drive, flywheel=share * whole))
         judge(config, candidate, duty, files)
+        tried.append(candidate)
         return candidate
 
-    def even(candidate: Candidate) -> bool:
-        sizes = {name: candidate.sizes.get(name, 0.0) for name in (*_EVENED, *_WORSE_WITH_INERTIA, "starts")}
-        hopeless = any(sizes[name] > 1.0 for name in _WORSE_WITH_INERTIA)
-        # a winding that is too hot from running alone permits no starts either
-        hopeless |= sizes["starts"] > 1.0 >= sizes["temperature"]
-        return hopeless or not any(1.0 < sizes[name] < math.inf for name in _EVENED)
+    def heavy_enough(candidate: Candidate) -> bool:
+        return too_heavy(candidate) or evened(candidate)
 
-    best, below = trial_with(0.0), 0.0
+    first = trial_with(0.0)
     mean = duty.numbers.torque_mean / bare.drive.ratio
-    if even(best) or mean > bare.motor.nameplate.torque:
-        return best
+    if heavy_enough(first) or mean > bare.motor.nameplate.torque or whole < _SMALL * there:
+        return first
+    below = 0.0
     for share in (0.03, 0.1, 0.3, 1.0):
-        best = trial_with(share)
-        if even(best):
+        if heavy_enough(trial_with(share)):
             break
         below = share
     else:
-        return best
+        return min(tried, key=lambda c: c.violation)
     for _ in range(3):
         middle = 0.5 * (below + share)
-        candidate = trial_with(middle)
-        if even(candidate):
-            best, share = candidate, middle
+        if heavy_enough(trial_with(middle)):
+            share = middle
         else:
             below = middle
-    return best
+    healed = [c for c in tried if evened(c) and not too_heavy(c)]
+    return min(healed, key=lambda c: c.drive.flywheel) if healed else min(tried, key=lambda c: c.violation)
+
+
+def evened(c: Candidate) -> bool:
+    """Whether no check is passed that a flywheel eases."""
+    return not any(1.0 < c.sizes.get(name, 0.0) < math.inf for name in _EVENED)
+
+
+def too_heavy(c: Candidate) -> bool:
+    """Whether a check is passed that a flywheel makes worse, or the run failed."""
+    sizes = {name: c.sizes.get(name, 0.0) for name in (*_WORSE_WITH_INERTIA, "starts", "temperature")}
+    # a winding that is too hot from running alone permits no starts either
+    return (
+        not c.checks
+        or any(sizes[name] > 1.0 for name in _WORSE_WITH_INERTIA)
+        or sizes["starts"] > 1.0 >= sizes["temperature"]
+    )
 
 
 def proposed(config: Config, motor: CatalogueMotor, duty: Duty) -> Candidate:

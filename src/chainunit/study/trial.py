@@ -18,12 +18,13 @@ from ..drives.induction_motor import volts_per_hertz
 from ..drives.motor import T_RATED
 from ..engines import MATH
 from ..machines.chain_unit import SideName
+from ..system import Simulation
 from ..text import entry, number
 from .config import Config
 from .drive import Drive
 from .duty import Duty, rms
-from .measures import BURNT, peak
-from .rig import Rig
+from .measures import BURNT, end_gap, peak
+from .rig import CLOSED, PATIENCE, Rig
 
 _SPEED_DEVIATION = 0.03  # of the crank speed that is asked for
 _GAP = "motor.air_gap_tau"
@@ -73,8 +74,8 @@ class Check:
 
 @dataclass(frozen=True)
 class Trial:
-    """Runs of a motor from the catalogue in a `drive`: a start under load, steady running, and with all feed on each
-    side, while it moves there and a turn of the crank after."""
+    """Runs of a motor from the catalogue in a `drive`: a start, steady running, and with all feed on each side;
+    between them those (`shifts`) in which the feed comes or moves and the motor settles."""
 
     config: Config
     motor: CatalogueMotor
@@ -106,7 +107,7 @@ class Trial:
 
     @cached_property
     def duty_torque(self) -> float:
-        """Peak at the crank in steady running, and while all feed moves to either side and runs there [N m]."""
+        """Peak at the crank in steady running, and while feed comes, moves to either side and runs there [N m]."""
         runs = (self.steady, *self.shifts, *self.one_sided.values())
         return max(peak(self.drive.crank_torque(run)) for run in runs)
 
@@ -168,10 +169,13 @@ class Trial:
 
     @cached_property
     def _heat(self) -> tuple[float, float]:
-        """Heat of the duty [W], and that of a start beyond it [J]."""
-        steady = sum(share * float(np.mean(run["motor.heat"])) for share, run in self._cases)
+        """Heat of the duty [W], and that of a start [J] beyond the running that it leads to: the duty or, of a
+        machine that starts empty, a turn without feed."""
+        steady = after = sum(share * float(np.mean(run["motor.heat"])) for share, run in self._cases)
         time, heat = self.start["time"].values, self.start["motor.heat"].values
-        return steady, max(0.0, float(np.trapezoid(heat - steady, time)))
+        if self.config.empty_start:
+            after = float(np.mean(heat[time >= time[-1] - self.config.turn]))
+        return steady, max(0.0, float(np.trapezoid(heat - after, time)))
 
     @property
     def _cases(self) -> list[tuple[float, xr.Dataset]]:
@@ -253,19 +257,38 @@ def try_motor(
     inertia = drive.fmu_parameters.rotor.J + duty.numbers.inertia_mean / drive.ratio**2
     rise = config.starter.soft_start.time if config.start == "soft" else ramp
     window = max(1.0, 3.0 * inertia * plate.speed / plate.torque, 1.5 * rise)
+    if config.empty_start:
+        # with a turn without feed at its end
+        window += turn
     rig = Rig(config, drive, files)
+    shifts, one_sided = [], {}
     with rig.from_rest() as simulation:
         start = simulation.run(window, rig.step)
         if config.empty_start:
             rig = dataclasses.replace(rig, fed_from=simulation.time)
             simulation.signals = rig.signals(ramp=True)
-        steady = simulation.run(window + 2.0 * turn, rig.step)
-        event, shifts, one_sided = simulation.save(), [], {}
+            window += max(1.0, config.run.settle_turns) * turn
+            shifts.append(simulation.run(window, rig.step))
+        *settling, steady = _until_settled(rig, simulation, window + 2.0 * turn)
+        shifts += settling
+        event = simulation.save()
         for side in duty.one_sided:
             feed = config.one_sided(side)
             shifts.append(rig.follow(simulation, feed, event, event + feed.p.shift + turn).run)
             one_sided[side] = simulation.run(simulation.time + turn, rig.step)
     return Trial(config, motor, drive, duty.heavier, start, steady, tuple(shifts), one_sided)
+
+
+def _until_settled(rig: Rig, simulation: Simulation, stop: float) -> list[xr.Dataset]:
+    """Runs of two turns, the first to the time `stop` [s], until the ends of one meet; chains' turns never do."""
+    turn, drive = rig.config.turn, rig.drive
+    runs = [simulation.run(stop, rig.step)]
+    while drive.chain is None and simulation.time < stop + PATIENCE * turn:
+        turns = drive.whole_turns(runs[-1])
+        if turns is None or end_gap(drive, turns) <= CLOSED:
+            break
+        runs.append(simulation.run(simulation.time + 2.0 * turn, rig.step))
+    return runs
 
 
 def permitted_starts(
