@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
+import dataclasses
+import json
+
 import pytest
 from test_foreign_machine import MACHINE, SCRIPT
 from test_foreign_machine import STUDY as PUMP
 from test_foreign_system import build
 
+from chainunit.report import blocks
+from chainunit.report.study import report
 from chainunit.study.choice import choose
 from chainunit.study.config import load, parse
+from chainunit.study.given import given
 from chainunit.study.parts import example
 from chainunit.study.remarks import conclude
 from chainunit.study.result import as_dict
@@ -77,3 +84,103 @@ def test_what_no_example_gives_is_at_its_declared_start_value(tmp_path):
     (note,) = (str(each) for each in study.notes if each.kind == "assumed")
     assert "example" not in note and "An eccentric pump" in note
     assert "machine.throw" not in as_dict(study)["origins"]
+
+
+ALL = """
+empty_start = true
+simulation = "me"
+start = "soft"
+[system]
+motor = "IE3 4-pole 2.2 kW, 100L"
+[run]
+crank_speed = 2.5
+[gear]
+efficiency = 0.9
+J = 0.004
+[starter.soft_start]
+voltage = 0.4
+[flywheel]
+J = 0.3
+compare = [0.0, 1.0]
+[coupling]
+trip_torque = 1500
+[monte_carlo]
+runs = 20
+event = { type = "jam", side = "left", force = ["1 kN", "3 kN"], duration = 0.2 }
+[driveline]
+damping_ratio = 0.02
+place = "motor"
+[[event]]
+type = "jam"
+side = "right"
+force = "2.5 kN"
+"""
+
+
+def toml_of(result):
+    """A study file by what a result says of its study, but for what follows from the rest."""
+    lines = [f"title = {json.dumps(result['title'])}"]
+
+    def text(value):
+        return json.dumps(value["value"] if isinstance(value, dict) else value)
+
+    def at(name):
+        table, _, inner = name.partition(".")
+        for place in (name, f"{table}.asked.{inner}"):
+            with contextlib.suppress(KeyError):
+                return text(blocks.at(result, place))
+        raise KeyError(name)
+
+    lines += [
+        f"{name} = {at(name)}"
+        for name, origin in result["origins"].items()
+        if origin in ("file", "example") and name not in NOT_OF_A_FILE and not name.startswith("event.")
+    ]
+    for name, event in result["events"].items():
+        lines += ["[[event]]", f'type = "{event["type"]}"', f'name = "{name}"']
+        lines += [f'side = "{event["side"]}"'] if event["side"] else []
+        lines += [f"{key} = {text(value)}" for key, value in result["event"][name].items()]
+    return "\n".join(lines)
+
+
+NOT_OF_A_FILE = (
+    "motor.inverter.on",
+    "motor.inverter.slip",
+    "motor.soft_start.voltage",
+    "motor.soft_start.time",
+)
+
+
+@pytest.mark.parametrize(
+    "text", [ALL, KNIFE, "[run]\ncrank_speed = 2", 'organ = "chain"\n[chain]\nrods = 12']
+)
+def test_a_study_can_be_repeated_from_its_result(text, tmp_path):
+    study = study_of(parse(text), tmp_path)
+    again = parse(toml_of(json.loads(json.dumps(as_dict(study)))))
+    for each in dataclasses.fields(again):
+        if each.name in ("source", "given", "of_example", "slips", "choices", "machine", "events", "random"):
+            continue
+        assert getattr(again, each.name) == getattr(study.config, each.name), each.name
+    assert again.machine.named == pytest.approx(study.config.machine.named, rel=1e-12)
+    assert again.random.as_dict() == study.config.random.as_dict()
+    for name, event in study.config.events.items():
+        assert (again.events[name].p, again.events[name].side) == (event.p, event.side)
+
+
+def test_the_page_shows_all_that_was_given_and_used(tmp_path):
+    study = study_of(parse(ALL), tmp_path)
+    (section,) = (each for each in report(study).sections if each.name == "given")
+    rows = {value.name: value for _, values in section.blocks[0].sections for value in values}
+    wanted = {"gear.J", "starter.soft_start.voltage", "flywheel.J", "flywheel.compare", "monte_carlo.runs"}
+    wanted |= {"monte_carlo.event.force", "monte_carlo.event.type", "start", "empty_start", "simulation"}
+    wanted |= {"feed_forward", "system.machine", "system.motor", "driveline.place", "driveline.damping_ratio"}
+    wanted |= {"organ", "event.jam_right.force", "coupling.trip_torque", "machine.ratio", "motor.rotor.J"}
+    assert wanted <= set(rows)
+    assert rows["gear.J"].origin == "file" and rows["system.machine"].origin == "declared"
+    assert rows["motor.rotor.J"].origin == "catalogue"
+    assert not [name for name in rows if name.startswith(("chain.", "sizing.", "ratios."))]
+    names = [name for each in given(study) for name in each.names]
+    assert len(names) == len(set(names))
+    # what a DC motor of the file's own does not use
+    plain = {name for each in given(study_of(parse(""), tmp_path)) for name in each.names}
+    assert not [name for name in plain if name.startswith(("gear.", "starter.", "monte_carlo.", "start"))]

@@ -71,7 +71,7 @@ def a_report(units=DEFAULT_UNITS):
         b.Text(S.estimate("band")),
         *S.conclusions(),
         b.Text("fine", "fine", "long"),
-        b.Given((S.given("Run", Run, "run"),)),
+        b.Given((("Run", tuple(S.given(Run, "run"))),)),
         a_figure(),
     )
     sections = (b.Section("answer", "The answer", blocks), b.Section("none", "Empty", ()))
@@ -121,7 +121,7 @@ def test_each_number_of_a_page_names_its_place():
 
 
 def test_what_the_file_does_not_give_is_marked():
-    given = S.given("Run", Run, "run")[1]
+    given = list(S.given(Run, "run"))
     assert [(value.name, value.origin) for value in given] == [
         ("run.crank_speed", "file"),
         ("run.turns", "declared"),

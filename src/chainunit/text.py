@@ -157,6 +157,16 @@ def entry(value: float | None, unit: str, kind: str = "") -> dict[str, Any]:
     return {"value": finite(value), "unit": unit} | ({"kind": kind} if kind else {})
 
 
+def array_entry(x: Any, unit: str, kind: str = "") -> dict[str, Any]:
+    """An array as `entry` gives a number; null where it is not finite."""
+
+    def listed(x: Any) -> Any:
+        return [listed(each) for each in x] if isinstance(x, list | tuple) else finite(float(x))
+
+    value = listed(x.tolist() if hasattr(x, "tolist") else x)
+    return {"value": value, "unit": unit} | ({"kind": kind} if kind else {})
+
+
 def entries(declared: Any, *, titled: bool = False) -> dict[str, Any]:
     """The declared values of an instance as ``{name: entry}``; with their descriptions where `titled`."""
     layout = Layout(type(declared))

@@ -21,7 +21,7 @@ from ..machines import hanging
 from ..report.blocks import Column, Report, Section, Table, TableRow, Text
 from ..report.figure import Axis, Curve, Field, Figure, Item, Panel
 from ..report.print_figures import contours
-from ..study.result import array_entry
+from ..text import array_entry
 
 NAME, PICTURE = "two_bar_error", "two_bar_error.png"
 MU = tuple(np.round(np.arange(0.30, 0.801, 0.05), 2))

@@ -19,6 +19,8 @@ from .motion import Animation
 
 Form = Literal["both", "short", "long"]
 Severity = Literal["good", "partly", "bad", "warning", "alarm", "remark"]
+Shown: TypeAlias = "Number | Words | str"
+"""A given value: a number, words of the result, or what a switch or a list says."""
 Origin = Literal["", "file", "example", "declared", "tuned", "catalogue", "sizing"]
 
 
@@ -122,7 +124,7 @@ class GivenValue:
 
     name: str
     description: str
-    value: Number | Words
+    value: Shown
     origin: Origin = ""
 
 
@@ -281,22 +283,24 @@ class Source:
             if v.name in have and only in ("", v.name)
         )
 
-    def given(self, title: str, declared: Any, path: str, leave_out: Iterable[str] = ()) -> tuple[str, Any]:
-        """A section of given values: the declared quantities of an instance or class that stand at `path`."""
+    def given(self, declared: Any, name: str, path: str = "") -> Iterator[GivenValue]:
+        """Given values: the declared quantities of an instance or class that stand at `path`, by default at `name`;
+        of a range both ends."""
+        path = path or name
         have = at(self.result, path)
         cls = declared if isinstance(declared, type) else type(declared)
-        return title, tuple(
-            GivenValue(
-                f"{path}.{v.name}",
-                v.description,
-                self.number(f"{path}.{v.name}", given=True, none="none"),
-                self._origin(f"{path}.{v.name}"),
-            )
-            for v in Layout(cls).variables
-            if v.name in have and v.name not in leave_out
-        )
+        for v in Layout(cls).variables:
+            if v.name in have:
+                full, origin = f"{name}.{v.name}", self.origin(f"{name}.{v.name}")
+                if isinstance(have[v.name]["value"], list):
+                    for i, end in enumerate(("least", "most")):
+                        value = self.number(f"{path}.{v.name}", i, given=True)
+                        yield GivenValue(full, f"{v.description}, {end}", value, origin)
+                else:
+                    value = self.number(f"{path}.{v.name}", given=True, none="none")
+                    yield GivenValue(full, v.description, value, origin)
 
-    def _origin(self, path: str) -> Origin:
+    def origin(self, path: str) -> Origin:
         """Where a given value is from, if the result says it."""
         if "origins" not in self.result:
             return ""

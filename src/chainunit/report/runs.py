@@ -27,7 +27,7 @@ def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
         yield b.Table(tuple(map(b.TableRow, start)), title="What the start-up asks of the drive", form="long")
     if s.result["pins"]:
         yield _pins(s, study)
-    if s.result.get("monte_carlo"):
+    if study.monte_carlo is not None:
         yield from _random(s)
     if loops := s.result.get("speed_loop"):
         title = "The speed loop, linearised; deviation and settling: after a step of the load torque"

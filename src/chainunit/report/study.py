@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from importlib import metadata
 from typing import Any
 
+from ..study.given import GivenSection, description, given
 from ..study.result import as_dict
 from ..study.rig import DIFFERENCE
 from ..study.study import Study
@@ -78,27 +79,28 @@ def _opening(s: b.Source, study: Study) -> Iterator[b.Block]:
 
 def _given(s: b.Source, study: Study) -> Iterator[b.Block]:
     """All values of the study, by section."""
-    config = study.config
     # a motor on the line follows no reference
-    unused = () if study.drive.follows else ("ramp",)
-    sections = (
-        ("run", config.run, "Run"),
-        ("feed", config.feed, "Feed in normal running"),
-        *((f"event.{name}", event.p, read.title(study, name)) for name, event in config.events.items()),
-        ("coupling", config.coupling, "Safety coupling"),
-        ("flywheel", config.flywheel, "Flywheel"),
-        ("machine", study.drive.machine.p, "Machine"),
-        ("chain", config.chain, "Chains"),
-        ("driveline", config.driveline, "Driveline"),
-        ("torsion", config.torsion if "torsion" in study.findings else None, "Torsion of the driveline"),
-        ("motor", study.drive.parameters, "Motor"),
-    )
-    given = (
-        s.given(title, declared, section, unused if section == "run" else ())
-        for section, declared, title in sections
-        if declared is not None
-    )
-    yield b.Given(tuple(given))
+    unused = () if study.drive.follows else ("run.ramp",)
+    yield b.Given(tuple((section.title, tuple(_values(s, section, unused))) for section in given(study)))
+
+
+def _values(s: b.Source, section: GivenSection, unused: Iterable[str]) -> Iterator[b.GivenValue]:
+    """Quantities and choices of a section."""
+    if section.values is not None:
+        for value in s.given(section.values, section.name, section.place):
+            if value.name not in unused:
+                yield value
+    for key, choice in section.choices.items():
+        name, place = (".".join(filter(None, (of, key))) for of in (section.name, section.place))
+        if isinstance(choice, str):
+            shown: b.Shown = s.words(place)
+        elif isinstance(choice, bool):
+            shown = "yes" if choice else "no"
+        elif isinstance(choice, float):
+            shown = s.number(place, given=True)
+        else:
+            shown = ", ".join(f"{x:g}" for x in choice)
+        yield b.GivenValue(name, description(name), shown, s.origin(name))
 
 
 # -- what it rests on

@@ -14,12 +14,11 @@ import numpy as np
 from ..errors import InputError
 from ..machines.knife_drive import KnifeDrive, Stack
 from ..quantities import Value, declaration, quantity
-from ..text import entries, number
+from ..text import array_entry, entries, number
 from .analysis import Analysis, Findings, Report
 from .config import Config
 from .cycle import Cycle, cycle
 from .drive import Drive
-from .result import array_entry
 from .rig import Rig
 from .study import Study
 from .turn import EVERY, POINTS

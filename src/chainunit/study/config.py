@@ -35,6 +35,7 @@ from .events import Event, OneSidedFeed
 from .foreign_machine import ForeignMachine, ForeignModel
 from .parts import Parts, beside, check_company, example, over_example, parts_of
 from .sections import (
+    CHOICES,
     ChainOrgans,
     Coupling,
     Driveline,
@@ -102,6 +103,8 @@ class Config:
     """names of all that the file sets, such as "machine.crank.m"; see `of_example`"""
     of_example: frozenset[str] = frozenset()
     """names of all that it leaves out and the example sets; everything else is at its declared start value"""
+    choices: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    """by name all that is no quantity of a table, such as "start" or "driveline.place", given or not"""
     packaged: bool = False
     """whether the file is the packaged example"""
     slips: tuple[Slip, ...] = ()
@@ -130,6 +133,16 @@ class Config:
     def stop(self) -> float:
         """Time to which start-up and steady running are run [s], where the motor settles at once."""
         return float(self.settled + (self.run.turns + 0.1) * self.turn)
+
+    @property
+    def of_catalogue(self) -> bool:
+        """Whether the motor is one of the catalogue."""
+        return self.plate is not None or self.sizing is not None
+
+    @property
+    def has_organs(self) -> bool:
+        """Whether the machine is a chain unit."""
+        return isinstance(self.machine, ChainUnit)
 
     def gives(self, section: str) -> bool:
         """Whether the file sets anything in that table."""
@@ -239,6 +252,7 @@ def _config(
         else None,
         source=source,
         given=frozenset(),
+        choices=_choices(checked, parts),
         slips=unusual,
         units=chosen_units(checked.report.units),
         **of_study,
@@ -248,6 +262,20 @@ def _config(
     _check_loads(config)
     _check_steps(config)
     return config
+
+
+def _choices(checked: Any, parts: Parts) -> dict[str, Any]:
+    """All of a file that is no quantity of a table."""
+    known = {name: getattr(checked, name) for name in CHOICES}
+    for name, section in parts.sections.items():
+        known |= {f"{name}.{key}": getattr(getattr(checked, name), key) for key in section.keys}
+    if checked.driveline.damping_ratio is not None:
+        known["driveline.damping_ratio"] = checked.driveline.damping_ratio
+    known |= {"system.machine": checked.system.machine, "system.motor": parts.named_motor}
+    for table in ("machine_names", "motor_names"):
+        names = given_values(getattr(checked.system, table))
+        known |= {f"system.{table}.{name}": x for name, x in names.items()}
+    return known
 
 
 def _plate(designation: str, file: Path | None) -> CatalogueMotor | None:

@@ -7,9 +7,9 @@ import dataclasses
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, StrictBool
+from pydantic import BaseModel, ConfigDict
 
 from ..drives.line_table import SHAFTS
 from ..drives.motor import Motor
@@ -20,7 +20,7 @@ from ..mechanism.models import InverseMachine
 from ..models import MACHINES
 from ..reading import file_form, given_values, merged, packaged, read_table, toml
 from .foreign_machine import ForeignModel, foreign_model
-from .sections import ORGANS, SIMULATIONS, STARTS, FileSection, SystemTable, sections_of
+from .sections import CHOICES, FileSection, SystemTable, sections_of
 
 
 class ReportTable(BaseModel):
@@ -54,6 +54,11 @@ class Parts:
     """of a motor that is an FMU of somebody else"""
 
     @property
+    def named_motor(self) -> str:
+        """The motor as a file names it."""
+        return self.file or self.designation or self.motor.name
+
+    @property
     def gives_motor(self) -> bool:
         """Whether the table [motor] gives the motor."""
         return not self.designation and not self.file
@@ -74,12 +79,7 @@ class Parts:
                 for name, section in self.sections.items()
             }
             | {"report": ReportTable, "system": SystemTable},
-            feed_forward=(StrictBool, False),
-            empty_start=(StrictBool, False),
-            start=(Literal[STARTS], "direct"),
-            simulation=(Literal[SIMULATIONS], "cs"),
-            organ=(Literal[ORGANS], "two-bar"),
-            catalogue=(str, ""),
+            **CHOICES,
             event=(list[Any], []),
         )
 

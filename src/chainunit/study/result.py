@@ -5,24 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from .. import __version__
 from ..drives.catalogue import CatalogueMotor
 from ..quantities import variables
 from ..text import entries, entry
 from .coupling import coupling_sentence
+from .given import given
 from .judgement import motor_verdict
 from .measures import Phase, measures_of
 from .study import Study
-
-
-def array_entry(x: Any, unit: str, kind: str = "") -> dict[str, Any]:
-    """An array as `entry` gives a number; null where it is not finite."""
-    array = np.asarray(x, dtype=float)
-    values = array.astype(object)
-    values[~np.isfinite(array)] = None
-    return {"value": values.tolist(), "unit": unit} | ({"kind": kind} if kind else {})
 
 
 def _motor(study: Study) -> dict[str, Any]:
@@ -62,40 +53,31 @@ def as_dict(study: Study) -> dict[str, Any]:
         "warnings": [remark.as_dict() for remark in study.warnings],
         "notes": [remark.as_dict() for remark in study.notes],
         "slips": [slip.as_dict() for slip in config.slips],
-        **_given(study),
+        **(found := _given(study)),
         **_statics(study),
         **_runs(study),
-        **_parts(study),
+        **{name: found.get(name, {}) | part for name, part in _parts(study).items()},
         "fmus": {name: str(origin) for name, origin in study.fmus.items()},
     }
 
 
 def _given(study: Study) -> dict[str, Any]:
     """What the study was given; `origins` says where values come from that are not at their declared start value."""
-    config = study.config
-    sections = {
-        "machine": study.drive.machine.p,
-        "motor": study.motor,
-        "feed": config.feed,
-        "run": config.run,
-        **{f"event.{name}": event.p for name, event in config.events.items()},
-        "coupling": config.coupling,
-        "flywheel": config.flywheel,
-        "chain": config.chain,
-        "driveline": config.driveline,
-        "torsion": config.torsion if "torsion" in study.findings else None,
-    }
-    names = [v.name for section, p in sections.items() if p for v in variables(type(p), f"{section}.")]
-    return {
-        "origins": {name: origin for name in names if (origin := study.origin(name)) != "declared"},
-        "machine": entries(study.drive.machine.p),
-        "motor": _motor(study),
-        "feed": entries(config.feed),
-        "run": entries(config.run),
-        "event": {name: entries(event.p) for name, event in config.events.items()},
-        "coupling": entries(config.coupling) if config.coupling else None,
-        **({"flywheel": entries(config.flywheel)} if config.flywheel else {}),
-    }
+    sections = given(study)
+    names = [name for section in sections for name in section.names]
+    found: dict[str, Any] = {"event": {}, "motor": _motor(study)}
+    for section in sections:
+        if section.name != "motor":
+            _put(found, section.place, section.as_dict())
+    origins = {name: origin for name in names if (origin := study.origin(name)) != "declared"}
+    return {"origins": origins} | found
+
+
+def _put(tree: dict[str, Any], place: str, values: dict[str, Any]) -> None:
+    """Add values at the dotted `place` of a tree."""
+    for key in filter(None, place.split(".")):
+        tree = tree.setdefault(key, {})
+    tree |= values
 
 
 def _statics(study: Study) -> dict[str, Any]:
@@ -175,7 +157,7 @@ def _parts(study: Study) -> dict[str, Any]:
     if study.statics.torsion is not None:
         parts |= _driveline(study)
     if config.chain:
-        parts["chain"] = entries(config.chain) | (study.chain.as_dict() if study.chain else {})
+        parts["chain"] = study.chain.as_dict() if study.chain else {}
     return parts
 
 
@@ -227,9 +209,7 @@ def _driveline(study: Study) -> dict[str, Any]:
     largest = max(answers.range_largest for answers in study.shaft.values()) if study.shaft else 0.0
     return {
         "driveline": {
-            "place": study.config.place,
             "damping_ratio": {"value": study.config.damping_ratio, "unit": "1"},
-            **entries(study.config.driveline),
             **entries(study.drive.line),
             **entries(study.statics.torsion),
         },

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool, create_model
 
 from ..drives.driveline import Mounted
 from ..drives.gearing import KINDS, Transmission
@@ -262,6 +262,19 @@ SIMULATIONS = ("cs", "me")
 
 STARTS = ("direct", "soft", "inverter")
 
+CHOICES: Mapping[str, Any] = {
+    "feed_forward": (
+        StrictBool,
+        Field(False, description="whether the control is told the machine's torque"),
+    ),
+    "empty_start": (StrictBool, Field(False, description="whether the feed comes once the machine runs")),
+    "start": (Literal[STARTS], Field("direct", description="how a motor of the catalogue is started")),
+    "simulation": (Literal[SIMULATIONS], Field("cs", description="how the system runs")),
+    "organ": (Literal[ORGANS], Field("two-bar", description="how the organs are modelled")),
+    "catalogue": (str, Field("", description="file of motors of one's own")),
+}
+"""Keys of a study file that stand before all tables, as pydantic fields."""
+
 
 def _names_form(title: str, names: Sequence[str]) -> type[BaseModel]:
     """The form of a table with a text for each of the `names`; dotted ones stand in tables of their own."""
@@ -279,8 +292,8 @@ _MachineNames = _names_form("machine_names", NAMES["machine"])
 SystemTable = create_model(
     "system",
     __config__=ConfigDict(extra="forbid"),
-    machine=(str, Field("ChamberForces", min_length=1)),
-    motor=(str, Field("", min_length=1)),
+    machine=(str, Field("ChamberForces", min_length=1, description="the machine")),
+    motor=(str, Field("", min_length=1, description="the motor")),
     motor_names=(_MotorNames, Field(default_factory=_MotorNames)),
     machine_names=(_MachineNames, Field(default_factory=_MachineNames)),
 )
@@ -308,39 +321,67 @@ class FileSection:
     whole: tuple[str, ...] = ()
     """quantities that are whole numbers"""
     keys: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    """other keys than quantities, as pydantic fields"""
+    """other keys than quantities, as pydantic fields with their descriptions"""
+    title: str = ""
+    """of the table in a report"""
+    used: Callable[[Any], bool] = lambda config: True
+    """whether a study, by its configuration, uses a table that it has"""
+    apart: bool = False
+    """whether the result has other things of the same names"""
     form: Callable[..., type[BaseModel]] = schema
     values: Callable[[Any], dict[str, Any]] = given_values
     """the values of a checked table, by the name of the quantity"""
 
 
 SECTIONS: Mapping[str, FileSection] = {
-    "run": FileSection(Run, whole=("turns",)),
-    "coupling": FileSection(Coupling, optional=True),
-    "monte_carlo": FileSection(MonteCarlo, whole=("runs", "seed"), keys={"event": (dict[str, Any], {})}),
-    "sizing": FileSection(Sizing, optional=True),
+    "run": FileSection(Run, whole=("turns",), title="Run"),
+    "coupling": FileSection(Coupling, optional=True, title="Safety coupling"),
+    "monte_carlo": FileSection(
+        MonteCarlo,
+        whole=("runs", "seed"),
+        keys={"event": (dict[str, Any], Field({}, description="the event"))},
+        title="Overloads at random",
+        used=lambda config: config.monte_carlo.runs > 0,
+        apart=True,
+    ),
+    "sizing": FileSection(Sizing, optional=True, title="Demands on the motor", apart=True),
     "flywheel": FileSection(
         FlywheelTable,
         optional=True,
-        keys={"compare": (numbers(FlywheelTable, "J", "flywheel.compare", 12), [])},
+        keys={
+            "compare": (
+                numbers(FlywheelTable, "J", "flywheel.compare", 12),
+                Field([], description="flywheels that are compared [kg m2]"),
+            )
+        },
+        title="Flywheel",
     ),
-    "gear": FileSection(Transmission, default=KINDS["gear"]),
-    "starter": FileSection(Starter),
-    "chain": FileSection(ChainOrgans, whole=("rods", "sweep_points", "starts", "turns")),
+    "gear": FileSection(
+        Transmission, default=KINDS["gear"], title="Gear", used=lambda config: config.of_catalogue
+    ),
+    "starter": FileSection(
+        Starter, title="Starter", used=lambda config: config.of_catalogue and config.start != "direct"
+    ),
+    "chain": FileSection(ChainOrgans, whole=("rods", "sweep_points", "starts", "turns"), title="Chains"),
     "driveline": FileSection(
         Driveline,
         optional=True,
-        keys={"place": (Literal[PLACES], "crank")},
+        keys={"place": (Literal[PLACES], Field("crank", description="shaft that it is on"))},
         form=form,
         values=partial(line_values, prefix="driveline."),
+        title="Driveline",
     ),
     "torsion": FileSection(
         TorsionTable,
         whole=("points", "speeds", "bends"),
         keys={
-            "joint": (Literal[JOINTS], "alpha1"),
-            "damping_ratios": (numbers(Damping, "damping_ratio", "torsion.damping_ratios", 4), []),
+            "joint": (Literal[JOINTS], Field("alpha1", description="bend that the map of stability varies")),
+            "damping_ratios": (
+                numbers(Damping, "damping_ratio", "torsion.damping_ratios", 4),
+                Field([], description="damping ratios of the map"),
+            ),
         },
+        title="Torsion of the driveline",
     ),
 }
 """Tables of every study file, besides those of its machine, its feed, and its motor."""

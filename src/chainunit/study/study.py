@@ -174,12 +174,11 @@ class Study:
         section, _, parameter = name.partition(".")
         if section == "motor" and self.tuning is not None and parameter in self.tuning.parameters:
             return "file" if name in self.config.given else "tuned"
-        of_catalogue = self.config.plate is not None or self.sizing is not None
         if section == "machine" and parameter in LENGTHS and self.config.gives("ratios"):
             return "file"
         if section == "machine" and parameter in LENGTHS and "ratios.rho" in self.config.of_example:
             return "example"
-        if of_catalogue and (name == "machine.ratio" or section == "motor"):
+        if self.config.of_catalogue and (name == "machine.ratio" or section == "motor"):
             told = self._told(parameter)
             if not told:
                 return "catalogue" if self.sizing is None else "sizing"

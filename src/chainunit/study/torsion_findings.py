@@ -12,11 +12,10 @@ import numpy as np
 from ..drives.cardan import ORDERS, frequency_band
 from ..drives.torsion import SteadyMotion
 from ..errors import InputError
-from ..text import entries
+from ..text import array_entry, entries
 from .analysis import Analysis, Findings, Report
 from .config import Config
 from .drive import Drive
-from .result import array_entry
 from .rig import Rig
 from .shaft import two_masses
 from .study import Amount, Remark, Study

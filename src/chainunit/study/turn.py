@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 
 from ..quantities import Value, declaration, quantity
-from ..text import entries
+from ..text import array_entry, entries
 from .analysis import Analysis, Findings, Report
 from .config import Config
 from .cycle import Cycle, cycle, energy_swing, no_feed
 from .drive import Drive
-from .result import array_entry
 from .rig import Rig
 from .study import Study
 

@@ -1,0 +1,123 @@
+"""What a study was given, section by section as in a study file: only what the study uses."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..drives.line_table import Damping
+from ..quantities import variables
+from ..text import entries, entry
+from .analyses import ANALYSES
+from .config import Config
+from .sections import CHOICES, SECTIONS, SystemTable
+from .study import Study
+
+
+@dataclass(frozen=True)
+class GivenSection:
+    """A table of the file, or with "" for a name what stands before all tables."""
+
+    name: str
+    title: str
+    values: Any = None
+    """declared quantities, None where there are none"""
+    choices: Mapping[str, Any] = field(default_factory=dict)
+    """words, switches and lists, by key"""
+    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """of the quantities that are drawn at random"""
+
+    @property
+    def place(self) -> str:
+        """Where it stands in the result; apart where the result has other things of the same names there."""
+        table, _, inner = self.name.partition(".")
+        if table not in SECTIONS or not SECTIONS[table].apart:
+            return self.name
+        return f"{table}.asked.{inner}" if inner else f"{table}.asked"
+
+    @property
+    def names(self) -> list[str]:
+        """Names of all in it, as in a study file."""
+        prefix = f"{self.name}." if self.name else ""
+        quantities = variables(type(self.values)) if self.values is not None else ()
+        return [*(prefix + v.name for v in quantities), *(prefix + key for key in self.choices)]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Ready for JSON, each number with its unit."""
+        own = {} if self.values is None else entries(self.values)
+        drawn = {name: {**own[name], "value": list(ends)} for name, ends in self.ranges.items()}
+        return own | drawn | {key: _choice(value) for key, value in self.choices.items()}
+
+
+def _choice(value: Any) -> Any:
+    if isinstance(value, float):
+        return entry(value, "1")
+    return list(value) if isinstance(value, tuple) else value
+
+
+def given(study: Study) -> list[GivenSection]:
+    """All that a study was given, from which it can be repeated."""
+    config = study.config
+    sections = [
+        GivenSection("", "Study", None, _of_study(config)),
+        GivenSection("system", "System", None, _system(config)),
+        GivenSection("machine", "Machine", study.drive.machine.p),
+        GivenSection("feed", "Feed in normal running", config.feed),
+        *(
+            GivenSection(f"event.{name}", study.called(name)[:1].upper() + study.called(name)[1:], event.p)
+            for name, event in config.events.items()
+        ),
+        *_tables(study),
+        GivenSection("motor", "Motor", study.motor),
+    ]
+    return [section for section in sections if section.values is not None or section.choices]
+
+
+def _of_study(config: Config) -> dict[str, Any]:
+    used = {name: x for name, x in config.choices.items() if name in CHOICES and x != ""}
+    unused = () if config.has_organs else ("organ",)
+    if not config.of_catalogue:
+        unused += ("start", "catalogue")
+    return {name: x for name, x in used.items() if name not in unused}
+
+
+def _system(config: Config) -> dict[str, Any]:
+    """Names of machine and motor, and what their FMUs call our variables."""
+    own = {
+        name.removeprefix("system."): x for name, x in config.choices.items() if name.startswith("system.")
+    }
+    return {name: x for name, x in own.items() if x and (name != "motor" or config.sizing is None)}
+
+
+def _tables(study: Study) -> Iterator[GivenSection]:
+    config, analyses = study.config, {analysis.name for analysis in ANALYSES}
+    for name, section in SECTIONS.items():
+        values = getattr(config, name)
+        if values is None or not section.used(config) or (name in analyses and name not in study.findings):
+            continue
+        prefix = f"{name}."
+        keys = {full.removeprefix(prefix): x for full, x in config.choices.items() if full.startswith(prefix)}
+        event = keys.pop("event", None)
+        yield GivenSection(name, section.title, values, {key: x for key, x in keys.items() if x})
+        if event is not None:
+            random = config.random
+            side = {"side": random.side} if random.side else {}
+            title = f"Overload at random: {random.of.heading}"
+            yield GivenSection(
+                f"{name}.event", title, random.p, {"type": random.of.kind} | side, random.ranges
+            )
+
+
+def description(name: str) -> str:
+    """What a key that is no quantity says, by its name in a study file."""
+    table, _, key = name.partition(".")
+    if name in CHOICES:
+        return str(CHOICES[name][1].description)
+    if table == "system":
+        known = SystemTable.model_fields.get(key)
+        return str(known.description) if known else "name of it in the FMU"
+    keys = SECTIONS[table].keys if table in SECTIONS else {}
+    if key in keys:
+        return str(keys[key][1].description)
+    return next((v.description for v in variables(Damping) if v.name == key), "")
