@@ -75,11 +75,10 @@ def given(study: Study) -> list[GivenSection]:
 
 
 def _of_study(config: Config) -> dict[str, Any]:
-    used = {name: x for name, x in config.choices.items() if name in CHOICES and x != ""}
-    unused = () if config.has_organs else ("organ",)
-    if not config.of_catalogue:
-        unused += ("start", "catalogue")
-    return {name: x for name, x in used.items() if name not in unused}
+    used = {"organ": config.has_organs, "start": config.of_catalogue, "catalogue": config.of_catalogue}
+    return {
+        name: x for name, x in config.choices.items() if name in CHOICES and x != "" and used.get(name, True)
+    }
 
 
 def _system(config: Config) -> dict[str, Any]:
