@@ -154,10 +154,34 @@ def wheel_of(monkeypatch, wanted, inertia, sizes):
         }
 
     monkeypatch.setattr(sizing, "judge", judge)
-    numbers = SimpleNamespace(inertia_wanted=wanted, inertia_mean=inertia, torque_mean=1.0)
-    motor = SimpleNamespace(nameplate=SimpleNamespace(torque=10.0))
-    bare = sizing.Candidate(motor, Wheeled(), {})
-    return sizing.with_flywheel(None, bare, SimpleNamespace(numbers=numbers), {}), tried
+    # of the mean alone, so that the range follows from the speed
+    numbers = SimpleNamespace(
+        inertia_wanted=wanted, inertia_mean=inertia, torque_mean=1.0, torque_rms=1.0, torque_peak=1.0
+    )
+    numbers.torque_peak_one_sided = None
+    plate = SimpleNamespace(torque=10.0, synchronous=105.0, speed=100.0)
+    bare = sizing.Candidate(SimpleNamespace(nameplate=plate), Wheeled(), {})
+    config = SimpleNamespace(run=SimpleNamespace(crank_speed=2.0))
+    return sizing.with_flywheel(config, bare, SimpleNamespace(numbers=numbers), {}), tried
+
+
+def test_the_inertia_that_evens_the_torque():
+    """A motor of D = 2 N m s/rad under 6 N m + 8 N m sin(2 t), with 7 N m RMS permitted: of the swing 32 N2 m2 the
+    shaft may pass 13."""
+    plate = SimpleNamespace(torque=10.0, synchronous=105.0, speed=100.0)
+    numbers = SimpleNamespace(
+        torque_mean=60.0, torque_rms=math.sqrt(6800.0), torque_peak=140.0, torque_peak_one_sided=None
+    )
+    motor = SimpleNamespace(nameplate=plate)
+
+    def inertia(**checks):
+        return sizing.torque_evening_inertia(sizing.Candidate(motor, Wheeled(), checks), numbers, 2.0)
+
+    J = inertia(rms_torque=Check("", 8.0, 7.0, "N.m"))
+    assert 32.0 / (1.0 + (2.0 * J / 2.0) ** 2) == pytest.approx(13.0)
+    J = inertia(peak_torque=Check("", 14.0, 10.0, "N.m"))
+    assert 8.0 / math.sqrt(1.0 + (2.0 * J / 2.0) ** 2) == pytest.approx(4.0)
+    assert inertia(peak_torque=Check("", 14.0, 15.0, "N.m"), rms_torque=Check("", 8.0, 5.0, "N.m")) == 0.0
 
 
 def test_the_flywheels_tried_go_as_far_as_the_hand_formula_with_the_machine(monkeypatch):

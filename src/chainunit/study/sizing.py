@@ -24,7 +24,7 @@ from .catalogue_drive import catalogue_drive
 from .chain import HIGH
 from .config import Config
 from .drive import Drive
-from .duty import Duty, duty_of
+from .duty import CycleNumbers, Duty, duty_of
 from .trial import Check, try_motor
 
 
@@ -221,14 +221,13 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
     motor within its torque and temperature; as it is, too, where it misses a limit that no flywheel heals. Where the
     flywheels that do so miss another limit, the one that comes nearest to all.
 
-    The largest tried is that of the hand formula, which leaves out that a motor's torque falls with speed and evens
-    it, too; none is where that is a small part of the inertia which is there."""
+    The largest tried is that of the hand formulas for the speed, which leaves out that a motor's torque falls with
+    speed and evens it, too, and for the torque; none is where that is a small part of the inertia which is there."""
     there = bare.drive.rotor_inertia + duty.numbers.inertia_mean / bare.drive.ratio**2
-    whole = max(0.0, duty.numbers.inertia_wanted / bare.drive.ratio**2 - there)
     tried: list[Candidate] = []
 
-    def trial_with(share: float) -> Candidate:
-        candidate = dataclasses.replace(bare, drive=dataclasses.replace(bare.drive, flywheel=share * whole))
+    def trial_with(flywheel: float) -> Candidate:
+        candidate = dataclasses.replace(bare, drive=dataclasses.replace(bare.drive, flywheel=flywheel))
         judge(config, candidate, duty, files)
         tried.append(candidate)
         return candidate
@@ -238,23 +237,50 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
 
     first = trial_with(0.0)
     mean = duty.numbers.torque_mean / bare.drive.ratio
-    if heavy_enough(first) or mean > bare.motor.nameplate.torque or whole < _SMALL * there:
+    if heavy_enough(first) or mean > bare.motor.nameplate.torque:
+        return first
+    wanted = duty.numbers.inertia_wanted / bare.drive.ratio**2
+    whole = max(wanted, torque_evening_inertia(first, duty.numbers, config.run.crank_speed)) - there
+    if whole < _SMALL * there:
         return first
     below = 0.0
     for share in (0.03, 0.1, 0.3, 1.0):
-        if heavy_enough(trial_with(share)):
+        if heavy_enough(trial_with(share * whole)):
             break
         below = share
     else:
         return min(tried, key=lambda c: c.violation)
     for _ in range(3):
         middle = 0.5 * (below + share)
-        if heavy_enough(trial_with(middle)):
+        if heavy_enough(trial_with(middle * whole)):
             share = middle
         else:
             below = middle
     healed = [c for c in tried if evened(c) and not too_heavy(c)]
     return min(healed, key=lambda c: c.drive.flywheel) if healed else min(tried, key=lambda c: c.violation)
+
+
+def torque_evening_inertia(c: Candidate, numbers: CycleNumbers, crank_speed: float) -> float:
+    """Inertia on the motor's shaft [kg m2] that brings the RMS and peak torque of a candidate, where it passes their
+    limits, down to them by hand; 0 where it passes none, or the mean torque does alone.
+
+    A motor whose torque falls by D [N m s/rad] with speed gives 1/sqrt(1 + (n w J/D)^2) of the n-th harmonic of the
+    load, w the crank speed [rad/s]; that of the first is taken for all, which is on the safe side."""
+    plate, ratio = c.motor.nameplate, c.drive.ratio
+    mean, rms = numbers.torque_mean / ratio, numbers.torque_rms / ratio
+    peak = max(numbers.torque_peak, numbers.torque_peak_one_sided or 0.0) / ratio
+    limit = {
+        name: c.checks[name].limit for name in ("rms_torque", "peak_torque") if c.sizes.get(name, 0.0) > 1.0
+    }
+    # of load and limit what is beyond the mean
+    beyond = []
+    if "rms_torque" in limit:
+        beyond.append((rms**2 - mean**2, limit["rms_torque"] ** 2 - mean**2))
+    if "peak_torque" in limit:
+        beyond.append(((peak - mean) ** 2, max(0.0, limit["peak_torque"] - mean) ** 2))
+    asked = max((load / permitted for load, permitted in beyond if permitted > 0.0), default=0.0)
+    slope = plate.torque / (plate.synchronous - plate.speed)
+    return float(slope / crank_speed * math.sqrt(max(0.0, asked - 1.0)))
 
 
 def evened(c: Candidate) -> bool:
