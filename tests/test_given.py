@@ -53,6 +53,7 @@ def test_values_of_a_motor_of_the_catalogue_are_the_catalogues(tmp_path):
     origin = study_of(parse(KNIFE), tmp_path).origin
     assert origin("motor.rotor.J") == origin("motor.stator.R") == origin("machine.ratio") == "catalogue"
     assert origin("machine.r") == "file" and origin("motor.ambient.T") == "declared"
+    assert origin("motor.w_start") == "declared"
     soft = KNIFE.replace("[system]", 'start = "inverter"\n[starter.inverter]\nramp = 2\n[system]')
     soft = soft.replace("[gear]\n", "[gear]\nratio = 25\n")
     origin = study_of(parse(soft), tmp_path).origin

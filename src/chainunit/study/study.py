@@ -203,6 +203,8 @@ class Study:
             return ""
         if group in ("soft_start", "inverter"):
             return f"starter.{parameter}"
+        if parameter in ("phi_start", "w_start") or group == "solver":
+            return f"motor.{parameter}"
         return "sizing.ambient" if parameter == "ambient.T" else ""
 
     @property
