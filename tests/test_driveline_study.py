@@ -509,14 +509,14 @@ def test_the_tongue_lies_at_the_natural_frequency(study):
 
 
 def test_peaks_are_compared_with_the_load_alone(study):
-    (warning,) = said(study, "Shaft 2 carries")
+    (warning,) = said(study, "With a motor of constant torque shaft 2 carries")
     analysis = study.analysis
     peak = float(analysis.operating.peak2[0])
     # the brake of the machine is smoothed near rest
     assert analysis.static2 == pytest.approx(375.0 * np.max(analysis.ratio), rel=1e-7)
     assert number(peak, "N.m", digits=4) in str(warning)
     assert f"{number(peak / analysis.static2, '1')} times" in str(warning)
-    assert said(study, "The torque of shaft 2 falls to")
+    assert said(study, "With a motor of constant torque that of shaft 2 falls to")
 
 
 def test_what_would_even_the_joints():

@@ -412,7 +412,7 @@ def test_a_study_with_a_motor_of_somebody_else(folder):
     assert set(foreign["certificate"]) == {"start_up", "jam_left"}
     for shares in foreign["certificate"].values():
         assert shares["energy_residual_share"]["value"] < 1e-2
-    assert foreign["motor"] == {"kind": "ForeignMotor.fmu"}
+    assert foreign["motor"] == {"kind": "ForeignMotor.fmu", "title": "ForeignMotor.fmu"}
     assert "its reserve of torque is not known" in foreign["verdict"]["motor"]["text"]
     for text in ((folder / "foreign.txt").read_text(), (folder.parent / "foreign/result.md").read_text()):
         for title in ("motor torque, peak", "motor current, RMS", "reserve of torque"):

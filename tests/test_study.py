@@ -61,6 +61,10 @@ def test_study_writes_numbers_series_plots_and_fmus(done):
         "chain_sweep.png",
         "blade_path.png",
         "flywheel.png",
+        "campbell.png",
+        "stability.png",
+        "resonance.png",
+        "ratio.png",
     }
     for name in ("ChamberForces", "DcMotor"):
         assert validate_fmu(str(folder / "fmu" / f"{name}.fmu")) == []
@@ -560,9 +564,10 @@ def test_a_slow_motor_still_makes_its_turns(tmp_path):
 
 
 def test_whole_turns_of_whole_turns_are_the_same():
+    from chainunit.drives.dc_motor import DcMotor
     from chainunit.study.drive import Drive
 
-    drive = Drive(None, None, ChainUnit(ratio=100.0))
+    drive = Drive(DcMotor, DcMotor.Parameters(), ChainUnit(ratio=100.0))
     for start in np.linspace(0.0, 700.0, 200):
         time = np.linspace(0.0, 5.0, 1235)
         angle = start + 1.6 * time + 0.01 * np.sin(time)
@@ -602,6 +607,7 @@ def test_a_cycle_that_does_not_close_is_told(text, told, there, tmp_path, monkey
     from chainunit.study import rig
 
     monkeypatch.setattr(rig, "PATIENCE", 0.0)
+    monkeypatch.setattr(rig, "_SETTLES", 0.0)
     study, _ = ran(text, tmp_path)
     assert any(warning.kind == told for warning in study.warnings)
     assert (tmp_path / "load_cycle.csv").exists() == there

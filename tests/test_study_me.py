@@ -46,9 +46,9 @@ def studies(tmp_path_factory):
 def test_me_is_near_the_equations_and_cs_comes_nearer_as_the_step_shrinks(of, run, studies):
     off = {name: study.certificate[run][f"{of}_difference_to_monolithic"] for name, study in studies.items()}
     assert off["me"] < 1e-6
-    assert off["me"] < 0.01 * off["fine"]
     if run != "jam_left":
         # in the jam the difference is that of the start-up before it
+        assert off["me"] < 0.01 * off["fine"]
         assert 1.4 < np.log2(off["coarse"] / off["fine"]) < 2.6, off
 
 

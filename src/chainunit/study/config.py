@@ -382,13 +382,13 @@ def _check_loads(config: Config) -> None:
     inputs = {v.name: v for v in model.input_layout.variables}
     normal = {name: v.quantity.start or 0.0 for name, v in inputs.items()} | Layout(model.Feed).named(feed)
     hardest = [(f"event.{name}", event) for name, event in config.events.items()]
-    if config.monte_carlo.runs:
-        hardest += [("monte_carlo.event", event) for event in config.random.hardest()]
+    hardest += [("monte_carlo.event", event) for event in config.random.hardest()]
     of_motors = {name for motor in MOTORS.values() for name in motor.input_layout.names}
     for where, event in hardest:
         needed = set(event.inputs(event.side))
         if not needed <= set(inputs):
-            if config.foreign is None and not needed <= {*inputs, *of_motors}:
+            asked = config.monte_carlo.runs or where != "monte_carlo.event"
+            if asked and config.foreign is None and not needed <= {*inputs, *of_motors}:
                 raise InputError(
                     f"{where}: the {model.name} has no {' or '.join(sorted(needed))}; leave it out"
                 )
