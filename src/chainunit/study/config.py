@@ -335,7 +335,7 @@ def _taken_over(
     """The lengths behind a refusal that neither file nor example give, as words to follow it."""
     names = error.names if isinstance(error, GeometryError) else ()
     declared = Layout(machine.Parameters).named(machine.Parameters())
-    taken = [f"{name} = {declared[name]:g}" for name in names if name not in given]
+    taken = [f"{name} = {declared[name]:g}" for name in names if name in declared and name not in given]
     return f"; not in the file, so at the declared start value: {', '.join(taken)}" if taken else ""
 
 
