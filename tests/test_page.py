@@ -23,7 +23,7 @@ from chainunit.machines.chain_unit import Feed
 from chainunit.report import html, page_figures, study_motion
 from chainunit.report import study as study_report
 from chainunit.report.blocks import at
-from chainunit.study import config
+from chainunit.study import config, judgement
 from chainunit.study.chain import rest_forces
 from chainunit.study.cycle import cycle
 from chainunit.study.result import as_dict
@@ -444,6 +444,9 @@ def test_the_speeds_at_which_a_web_goes_slack_are_a_sentence(study):
 
 
 def test_a_motor_that_sizing_found_insufficient_is_not_praised(study, monkeypatch):
+    # the jam of this study brings the motor near its limit
+    assert as_dict(study)["verdict"]["motor"]["holds"] == "in part"
+    monkeypatch.setattr(judgement, "AMPLE", 0.0)
     assert as_dict(study)["verdict"]["motor"]["holds"] == "true"
     monkeypatch.setattr(type(study), "insufficient", True)
     motor = as_dict(study)["verdict"]["motor"]
