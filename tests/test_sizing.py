@@ -441,7 +441,7 @@ def test_above_the_corner_an_inverter_has_less_torque(tmp_path, monkeypatch):
     # all feed on the right asks more than it has left, all on the left does not: a flywheel evens that
     assert c.verdict is Standing.CHOSEN and c.drive.flywheel > 0.0 and 0.9 < c.sizes["peak_torque"] <= 1.0
     monkeypatch.setattr(sizing, "torque_evening_inertia", lambda *of: 0.0)
-    (bare,) = sizing.size(config, tmp_path, lambda *said: None).candidates
+    (light,) = sizing.size(config, tmp_path, lambda *said: None).candidates
     assert (
         bare.verdict is Standing.INSUFFICIENT and bare.drive.flywheel == 0.0 and "peak torque" in bare.reason
     )
