@@ -442,9 +442,8 @@ def test_above_the_corner_an_inverter_has_less_torque(tmp_path, monkeypatch):
     assert c.verdict is Standing.CHOSEN and c.drive.flywheel > 0.0 and 0.9 < c.sizes["peak_torque"] <= 1.0
     monkeypatch.setattr(sizing, "torque_evening_inertia", lambda *of: 0.0)
     (light,) = sizing.size(config, tmp_path, lambda *said: None).candidates
-    assert (
-        bare.verdict is Standing.INSUFFICIENT and bare.drive.flywheel == 0.0 and "peak torque" in bare.reason
-    )
+    assert light.verdict is Standing.INSUFFICIENT and "peak torque" in light.reason
+    assert light.drive.flywheel < 0.1 * c.drive.flywheel
 
 
 def test_the_shift_of_the_feed_keeps_its_mass():
