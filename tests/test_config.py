@@ -13,7 +13,7 @@ from chainunit.machines.chain_unit import ChamberForces, Parameters
 from chainunit.models import MODELS
 from chainunit.reading import to_number
 from chainunit.study.config import load, parse
-from chainunit.study.events import TYPES, Event
+from chainunit.study.event import TYPES, Event
 from chainunit.study.parts import Parts, example
 
 

@@ -15,7 +15,7 @@ from chainunit.errors import InputError
 from chainunit.quantities import Layout, Value, declaration, quantity
 from chainunit.study import config
 from chainunit.study.drive import Drive
-from chainunit.study.events import TYPES, Event, Role, Timing, in_groups
+from chainunit.study.event import TYPES, Event, Role, Timing, in_groups
 from chainunit.study.result import as_dict
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study

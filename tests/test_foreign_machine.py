@@ -26,7 +26,7 @@ from chainunit.quantities import Value, declaration, quantity
 from chainunit.study import config
 from chainunit.study.choice import choose
 from chainunit.study.cycle import cycle
-from chainunit.study.events import TYPES, Event, Role, Timing
+from chainunit.study.event import TYPES, Event, Role, Timing
 from chainunit.study.package import study_system
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study

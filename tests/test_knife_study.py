@@ -24,7 +24,7 @@ from chainunit.study.blade import BladeAnalysis, in_stack
 from chainunit.study.choice import choose
 from chainunit.study.config import load, parse
 from chainunit.study.flywheels import FlywheelAnswers, FlywheelFindings, Wheel, least_flywheel
-from chainunit.study.measures import Phase, Window, read_answers
+from chainunit.study.measures import read_answers
 from chainunit.study.parts import example
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
@@ -32,6 +32,7 @@ from chainunit.study.statics import statics
 from chainunit.study.stored import cutting_power
 from chainunit.study.study import Study
 from chainunit.study.turn import TurnAnalysis
+from chainunit.study.window import Phase, Window
 from chainunit.system import CoSimulation, energy_residual, monolithic
 from chainunit.text import entry, number
 

@@ -12,18 +12,8 @@ from chainunit import ChainUnit
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.quantities import Layout
 from chainunit.study.drive import Drive
-from chainunit.study.measures import (
-    BURNT,
-    MEASURES,
-    Answers,
-    Phase,
-    Trip,
-    Window,
-    measures_of,
-    reaches,
-    read_answers,
-    read_measure,
-)
+from chainunit.study.measures import MEASURES, Answers, measures_of, read_answers, read_measure
+from chainunit.study.window import BURNT, Phase, Trip, Window, reaches
 
 RATIO, SPEED = 10.0, 2.0
 TIME = np.linspace(0.0, 4.0, 4001)

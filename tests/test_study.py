@@ -633,7 +633,7 @@ def test_each_overload_has_its_mirror_on_the_other_side():
     from chainunit.drives.dc_motor import DcMotor
     from chainunit.study import config
     from chainunit.study.drive import Drive
-    from chainunit.study.events import TYPES
+    from chainunit.study.event import TYPES
     from chainunit.study.rig import Rig
 
     lopsided = "[feed]\n%s = { material_mass = 30, processing_force = 10 }\n%s = { material_mass = 70 }\n"
@@ -692,7 +692,7 @@ def test_the_overloads_of_both_sides_are_readable(columns, tables):
     from chainunit.report import terminal
     from chainunit.report.blocks import Column, Table, TableRow
     from chainunit.study import config
-    from chainunit.study.events import in_groups
+    from chainunit.study.event import in_groups
 
     runs, events = ["steady", *STANDARD], config.load().events
     groups = tuple(tuple(runs.index(run) + 1 for run in group) for group in in_groups(events, runs))

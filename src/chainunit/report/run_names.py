@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from ..study.events import in_groups
+from ..study.event import in_groups
 from ..study.study import Study
 
 COASTING = "_coasting"

@@ -6,9 +6,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from ..quantities import Layout
-from ..study.measures import MEASURES, Answers, Phase, measures_of
+from ..study.measures import MEASURES, Answers, measures_of
 from ..study.monte_carlo import Sample
 from ..study.study import Study
+from ..study.window import Phase
 from . import blocks as b
 from . import run_names as read
 from .lines import Line, Number, joined, line, spoken

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from .drive import Drive
-from .measures import mean, whole_turns
+from .window import mean, whole_turns
 
 
 def pin_loads(drive: Drive, run: xr.Dataset) -> dict[str, dict[str, float]]:

@@ -30,8 +30,9 @@ from ..reading import (
 )
 from ..system.signals import Profile
 from ..text import DEFAULT_UNITS, Units, chosen_units
+from .event import Event
 from .event_table import RandomEvent, read_events, read_random_event
-from .events import Event, OneSidedFeed
+from .events import OneSidedFeed
 from .foreign_machine import ForeignMachine, ForeignModel
 from .parts import Parts, beside, check_company, example, over_example, parts_of
 from .sections import (

@@ -10,10 +10,10 @@ import xarray as xr
 
 from ..text import number
 from .drive import Drive
-from .events import Role
-from .measures import BURNT
+from .event import Role
 from .protection import MARGIN, Obstacle, Setting
 from .study import Study
+from .window import BURNT
 
 
 def on_coupling(drive: Drive, run: xr.Dataset) -> float:

@@ -23,7 +23,8 @@ from ..errors import InputError, shown
 from ..machines.chain_unit import SIDES
 from ..quantities import Layout, variables
 from ..reading import given_values, instance, read_table, schema, to_number
-from .events import TYPES, AnySide, Event
+from .event import TYPES, AnySide, Event
+from .events import Jam
 
 RESERVED = ("start_up", "steady", "constant", "unfinished")
 """Names of other runs of a study."""
@@ -91,7 +92,7 @@ def read_random_event(table: Mapping[str, Any], where: str) -> RandomEvent:
     InputError
         see `read_events`.
     """
-    of = _type({"type": "jam", **table}, where)
+    of = _type({"type": Jam.kind, **table}, where)
     if of.from_rest:
         raise InputError(f'{where}.type = "{of.kind}": must be an event in steady running')
     for name in (*_PLACED, "name"):

@@ -17,11 +17,12 @@ from .choice import tune
 from .config import Config
 from .cycle import needed_inertia
 from .drive import Drive
-from .measures import Answers, Phase, Window, read_answers, same_measure, whole_turns
+from .measures import Answers, read_answers, same_measure
 from .rig import CLOSED, Rig
 from .study import Amount, Study
 from .turn import Turn, TurnAnalysis
 from .verdict import RESIDUAL, STEADY
+from .window import Phase, Window, whole_turns
 
 CLOSE = 0.03
 """Relative width below the permitted fluctuation in which that of the least flywheel lies."""

@@ -8,11 +8,12 @@ from typing import Any
 from ..text import entry, number
 from . import verdict
 from .chain import HIGH
-from .measures import Answers, reaches
+from .measures import Answers
 from .organs import OrganAnalysis
 from .quantiles import runs_needed
 from .study import Study
 from .verdict import RESIDUAL, STEADY, Holds, Verdict
+from .window import reaches
 
 
 def model_verdict(study: Study) -> Verdict:

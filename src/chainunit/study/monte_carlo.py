@@ -35,10 +35,11 @@ from ..system.instance import remove_unpacked
 from ..text import entry
 from .config import Config
 from .drive import Drive
-from .events import AnySide, Event
-from .measures import MEASURES, Phase, Window, read_measure, same_measure
+from .event import AnySide, Event
+from .measures import MEASURES, read_measure, same_measure
 from .quantiles import CONFIDENCE, Estimate, quantile, runs_needed, share
 from .rig import Rig
+from .window import Phase, Window
 
 
 @declaration

@@ -12,8 +12,9 @@ from ..text import entries, entry
 from .coupling import coupling_sentence
 from .given import given
 from .judgement import motor_verdict
-from .measures import Phase, measures_of
+from .measures import measures_of
 from .study import Study
+from .window import Phase
 
 
 def _motor(study: Study) -> dict[str, Any]:

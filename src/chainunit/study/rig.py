@@ -29,8 +29,9 @@ from ..system import (
 from .config import Config
 from .cycle import no_feed
 from .drive import Drive
-from .events import Event, OverTime
-from .measures import STARTED, end_gap, whole_turns
+from .event import Event, OverTime
+from .measures import STARTED
+from .window import end_gap, whole_turns
 
 Progress = Callable[[float], None]
 _LONGEST_START = 30.0

@@ -22,8 +22,8 @@ from .chain import study_chain
 from .choice import choose
 from .config import Config
 from .coupling import on_coupling, recommended
-from .events import Event
-from .measures import Phase, Trip, read_answers, read_measure, whole_turns
+from .event import Event
+from .measures import read_answers, read_measure
 from .monte_carlo import Task
 from .monte_carlo import run as run_monte_carlo
 from .remarks import conclude
@@ -31,6 +31,7 @@ from .rig import Progress, Rig, Transient
 from .shaft import shaft_answers, with_rigid
 from .statics import statics
 from .study import Spread, Study
+from .window import Phase, Trip, whole_turns
 
 _PEAKS = ("crank_torque", "motor_torque", "rocker_torque")
 """What is told over the range of an assumption."""

@@ -16,7 +16,7 @@ from . import verdict
 from .chain import ChainResult
 from .config import Config
 from .drive import Drive
-from .measures import Answers, Phase, Trip, Window, not_known, reaches, whole_turns
+from .measures import Answers, not_known
 from .monte_carlo import MonteCarloResult
 from .parts import LENGTHS
 from .protection import Setting
@@ -24,6 +24,7 @@ from .shaft import Cycles, ShaftAnswers
 from .sizing import SizingResult
 from .statics import DriveStatics
 from .verdict import STEADY, Verdict
+from .window import Phase, Trip, Window, reaches, whole_turns
 
 LOAD_CYCLE = "load_cycle.csv"
 """File with the steady turns as the motor's shaft sees them."""

@@ -23,8 +23,8 @@ from ..text import entry, number
 from .config import Config
 from .drive import Drive
 from .duty import Duty, rms
-from .measures import BURNT, end_gap, peak
 from .rig import CLOSED, PATIENCE, Rig
+from .window import BURNT, end_gap, peak
 
 _SPEED_DEVIATION = 0.03  # of the crank speed that is asked for
 _GAP = "motor.air_gap_tau"
