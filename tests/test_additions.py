@@ -64,7 +64,7 @@ title = "A six-bar with a motor of another type"
 
 [system]
 machine = "SixBar"
-motor = "SlipMotor"
+motor = "ServoMotor"
 
 [machine]
 ratio = 10
@@ -127,11 +127,11 @@ def result(house):
     assert files_of(house, lambda: house.add("machines/six_bar.py", HERE / "six_bar.py")) == 1
 
     def motor():
-        house.add("drives/slip_motor.py", HERE / "slip_motor.py")
-        house.insert("drives/motors.py", "\nMOTORS:", "from .slip_motor import SlipMotor\n")
+        house.add("drives/servo_motor.py", HERE / "servo_motor.py")
+        house.insert("drives/motors.py", "\nMOTORS:", "from .servo_motor import ServoMotor\n")
         path = house.package / "drives" / "motors.py"
         types = "(DcMotor, InductionMotor)"
-        path.write_text(path.read_text("utf-8").replace(types, types[:-1] + ", SlipMotor)"), "utf-8")
+        path.write_text(path.read_text("utf-8").replace(types, types[:-1] + ", ServoMotor)"), "utf-8")
 
     assert files_of(house, motor) == 2
     assert files_of(house, lambda: house.insert("study/events.py", "", EVENT)) == 1
@@ -162,11 +162,11 @@ def test_a_machine_is_a_file_and_has_fmu_and_study(house, result):
 
 
 def test_a_motor_type_is_a_file_and_a_line(result):
-    assert result["motor"]["kind"] == "SlipMotor"
+    assert result["motor"]["kind"] == "ServoMotor"
     steady = result["answers"]["steady"]
-    # the straight line gives the speed that belongs to the mean torque
-    torque = 3.0 * (157.0 - 10.0 * steady["speed_mean"]["value"])
-    assert steady["current_rms"]["value"] >= 0.3 * torque > 0.0
+    # the torque constant is 1, and the control follows the speed that is asked for
+    assert steady["current_rms"]["value"] == pytest.approx(steady["motor_torque_rms"]["value"], rel=1e-9)
+    assert steady["speed_mean"]["value"] == pytest.approx(15.5, rel=1e-3)
 
 
 def test_an_event_is_a_class(result):

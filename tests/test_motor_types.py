@@ -1,4 +1,4 @@
-"""A third type of motor is one file, here `servo_motor`, and a line in the registry."""
+"""A third type of motor is one file, here `additions/servo_motor`, and a line in the registry."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import json
 
 import numpy as np
 import pytest
+from additions.servo_motor import ServoMotor
 from reports import page_of
-from servo_motor import ServoMotor
 from systems import pair
 
 from chainunit.drives.motors import MOTORS

@@ -60,6 +60,20 @@ class LoadInput:
 
 
 @declaration
+class ShaftMotion:
+    """Motion of the motor's shaft, as a model takes it that does not own the shaft."""
+
+    phi: Value = quantity("rad", "motor angle", default=0.0)
+    w: Value = quantity("rad/s", "motor speed", default=0.0)
+    a: Value = quantity("rad/s2", "motor acceleration", default=0.0)
+
+
+@declaration
+class ShaftInput(ShaftMotion, LoadInput):
+    """The motor's shaft, and the load of the machine: the inputs of a part between the two."""
+
+
+@declaration
 class LoadState:
     """The energy that a shaft has given to its load."""
 

@@ -145,10 +145,10 @@ class DcMotorPoint(MotorPoint):
 
     def rates(self, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
         """Time derivatives of the states behind those of the shaft."""
-        arm, speed, current = p.armature, p.speed_control, p.current_control
+        speed, current = p.speed_control, p.current_control
         return [
             self.di,
-            (self.heat - (x.armature.T - p.ambient.T) / arm.R_th) / arm.C,
+            self.warming(p, p.armature, x.armature.T),
             speed.ki * (self.error_w + self.cut_i / speed.kp),
             current.ki * (self.error_i + self.cut_v / current.kp),
         ]

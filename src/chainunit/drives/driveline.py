@@ -23,10 +23,10 @@ from typing import Any
 from ..engines import Dual, dual, slope
 from ..model import Model, Part, Requirement
 from ..ports import (
-    LoadInput,
     LoadState,
     PortSlopes,
     PortValues,
+    ShaftInput,
     Start,
     flange,
     flanges,
@@ -60,15 +60,6 @@ class Parameters(Start, Mounted):
     ratio: Value = quantity(
         "1", "gear ratio, motor turns per turn of shaft 2", default=1.0, above=0.0, max=1e6
     )
-
-
-@declaration
-class Inputs(LoadInput):
-    """The motor's shaft, and the load of the machine."""
-
-    phi: Value = quantity("rad", "motor angle", default=0.0)
-    w: Value = quantity("rad/s", "motor speed", default=0.0)
-    a: Value = quantity("rad/s2", "motor acceleration", default=0.0)
 
 
 @declaration
@@ -196,7 +187,7 @@ class CardanDriveline(Model):
         "takes a load port and shows one"
     )
     Parameters = Parameters
-    Inputs = Inputs
+    Inputs = ShaftInput
     States = States
     terminals = (
         *flanges("inflow"),

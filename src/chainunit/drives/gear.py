@@ -6,9 +6,9 @@ from typing import Any
 
 from ..model import Model, Part
 from ..ports import (
-    LoadInput,
     PortSlopes,
     PortValues,
+    ShaftInput,
     flange,
     flanges,
     load_inertia,
@@ -25,15 +25,6 @@ class GearParameters:
     ratio: Value = quantity(
         "1", "gear ratio, motor turns per turn of the machine", default=1.0, above=0.0, max=1e6
     )
-
-
-@declaration
-class GearInputs(LoadInput):
-    """The motor's shaft, and the load of the machine."""
-
-    phi: Value = quantity("rad", "motor angle", default=0.0)
-    w: Value = quantity("rad/s", "motor speed", default=0.0)
-    a: Value = quantity("rad/s2", "motor acceleration", default=0.0)
 
 
 @declaration
@@ -81,7 +72,7 @@ class Gear(Model):
         "Rigid gear without mass and loss between motor and machine: takes a load port and shows one"
     )
     Parameters = GearParameters
-    Inputs = GearInputs
+    Inputs = ShaftInput
     terminals = (
         *flanges("inflow"),
         load_terminal(),

@@ -370,7 +370,7 @@ class InductionMotorPoint(MotorPoint):
         return [
             self.u - self.R_s * self.i_d + self.w_s * psi.q,
             -self.R_s * self.i_q - self.w_s * psi.d,
-            (self.heat - self.cooling * (x.stator.T - p.ambient.T) / p.stator.R_th) / p.stator.C,
+            self.warming(p, p.stator, x.stator.T, self.cooling),
             -self.R_r * self.ir_d + self.slip_speed * psi_r.q,
             -self.R_r * self.ir_q - self.slip_speed * psi_r.d,
             p.inverter.on * self.df,

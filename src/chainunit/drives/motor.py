@@ -67,11 +67,17 @@ class MotorPoint:
 
     __slots__ = ("a", "air_gap", "tau")
     air_gap: Any
+    heat: Any
 
     def turn(self, p: Any, u: Any, x: Any) -> None:
         """Acceleration, and torque given to the load."""
         driving = self.air_gap - p.rotor.d * x.w
         self.a, self.tau = shaft_motion(u.load, x.phi, x.w, p.rotor.J, driving)
+
+    def warming(self, p: Any, winding: Any, T: Any, cooling: Any = 1.0) -> Any:
+        """Rise of the temperature `T` [K] of a winding with the heat capacity `C` and the resistance `R_th` [K/s];
+        see `Motor.cooling`."""
+        return (self.heat - cooling * (T - p.ambient.T) / winding.R_th) / winding.C
 
     def outputs(self) -> dict[str, Any]:
         """The fields of `MotorOutputs` that follow from it."""
@@ -110,7 +116,7 @@ class Motor(Model):
     temperature: ClassVar[str]
     """Output that is the temperature of the winding [K]."""
     winding: ClassVar[str]
-    """Parameters that heat and cool the winding: among them `alpha` [1/K] and `R_th` [K/W]."""
+    """Parameters that heat and cool the winding: among them `alpha` [1/K], `C` [J/K] and `R_th` [K/W]."""
 
     @staticmethod
     def cooling(xp: Any, p: Any, w: Any) -> Any:

@@ -14,7 +14,7 @@ from ..groups.driver import Crank
 from ..groups.loads import Brake, PinLosses, Weight
 from ..mechanism.linkage import Linkage
 from ..mechanism.machine import MachineState
-from ..mechanism.models import InverseMachine, ShaftMotion
+from ..mechanism.models import CrankMotion, InverseMachine
 from ..planar import ZERO
 from ..ports import PortValues
 from ..quantities import Value, declaration, group, quantity
@@ -48,7 +48,7 @@ class Parameters:
 
 
 @declaration
-class Inputs(ShaftMotion):
+class Inputs(CrankMotion):
     """Motion of the motor shaft and torque of the material."""
 
     load: Value = quantity(

@@ -22,7 +22,7 @@ from ..groups.dyad import Dyad
 from ..groups.loads import Block, PinLosses, Resistance, Weight
 from ..mechanism.linkage import Linkage
 from ..mechanism.machine import MachineState, Mechanism
-from ..mechanism.models import InverseMachine, ShaftMotion
+from ..mechanism.models import CrankMotion, InverseMachine
 from ..model import Requirement
 from ..planar import ZERO, Link, Vec2
 from ..ports import PortValues
@@ -125,7 +125,7 @@ class Feed:
 
 
 @declaration
-class Inputs(Feed, ShaftMotion):
+class Inputs(Feed, CrankMotion):
     """Motion of the motor shaft, loads of the organs, and the stop."""
 
     stop: Stop = group(Stop, "stop that blocks the rocker", default=Stop())

@@ -20,7 +20,7 @@ from ..groups.loads import Cut, PinLosses, Push, Weight
 from ..groups.triad import Pose, Triad
 from ..mechanism.linkage import Linkage
 from ..mechanism.machine import MachineState, Mechanism
-from ..mechanism.models import InverseMachine, ShaftMotion
+from ..mechanism.models import CrankMotion, InverseMachine
 from ..planar import Vec2
 from ..ports import PortValues
 from ..quantities import Value, declaration, group, quantity
@@ -128,7 +128,7 @@ class CutForce:
 
 
 @declaration
-class Inputs(CutForce, ShaftMotion):
+class Inputs(CutForce, CrankMotion):
     """Motion of the motor shaft and forces on the blade."""
 
     blade: Force = group(Force, "further force on the blade", default=Force(fx=0.0, fy=0.0))

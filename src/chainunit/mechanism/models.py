@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 
 from ..groups.loads import Joint
 from ..model import Model, Part, Requirement
-from ..ports import PortSlopes, PortValues, Start, flanges, load_terminal
+from ..ports import PortSlopes, PortValues, ShaftMotion, Start, flanges, load_terminal
 from ..quantities import Layout, Value, declaration, quantity
 from .linkage import Linkage, Topology
 from .machine import MachineState, Mechanism, derived_numbers
@@ -46,14 +46,12 @@ def names_of(declared: type) -> tuple[str, ...]:
 
 
 @declaration
-class ShaftMotion:
-    """Motion of the motor shaft."""
+class CrankMotion(ShaftMotion):
+    """Motion of the motor shaft that turns the crank."""
 
     phi: Value = quantity(
         "rad", "motor angle; crank angle is phi/ratio, from the upward vertical, clockwise", default=0.0
     )
-    w: Value = quantity("rad/s", "motor speed", default=0.0)
-    a: Value = quantity("rad/s2", "motor acceleration", default=0.0)
 
 
 class LinkageModel(Model):
@@ -90,7 +88,7 @@ class LinkageModel(Model):
 class InverseMachine(LinkageModel):
     """Motion of the motor shaft in, torque, load port and every reaction out.
 
-    A machine states its `Parameters`, `Inputs` (with those of `ShaftMotion`), `Outputs` (with `tau`, `PortValues` and
+    A machine states its `Parameters`, `Inputs` (with those of `CrankMotion`), `Outputs` (with `tau`, `PortValues` and
     those of `running`), its `linkage` and its `probes`; all else follows.
     """
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..machines.chain_unit import ChamberForces
 from ..machines.knife_drive import KnifeDrive
-from ..mechanism.models import ShaftMotion, names_of
+from ..mechanism.models import CrankMotion, names_of
 from ..study.study import Study
 from . import linkage
 from . import run_names as read
@@ -78,7 +78,7 @@ def _run(study: Study, name: str, interval: float, supplement: Supplement) -> Cl
     loads = {
         v.name: part[f"machine.{v.name}"].values
         for v in model.input_layout.variables
-        if f"machine.{v.name}" in part and v.name not in names_of(ShaftMotion)
+        if f"machine.{v.name}" in part and v.name not in names_of(CrankMotion)
     }
     state = machine.state(machine.inputs({"phi": angle * machine.ratio, "w": speed * machine.ratio, **loads}))
     details = supplement.details(part, state)

@@ -1,4 +1,4 @@
-"""A third type of motor, written outside the package: a servo motor whose current follows its reference at once.
+"""A third type of motor, which is no part of the package: a servo motor whose current follows its reference at once.
 
 i = the limit of kp (w_ref - w) + x        dx/dt = ki (w_ref - w), led back where the limit cuts
 (J_rotor + J_load) a = k i - d w - tau_load
@@ -72,7 +72,7 @@ class ServoPoint(MotorPoint):
 
     def rates(self, xp, p, u, x):
         return [
-            (self.heat - (x.T - p.ambient.T) / p.coil.R_th) / p.coil.C,
+            self.warming(p, p.coil, x.T),
             p.control.ki * (self.error + self.cut / p.control.kp),
         ]
 
