@@ -13,7 +13,8 @@ from chainunit.machines.chain_unit import ChamberForces, Parameters
 from chainunit.models import MODELS
 from chainunit.reading import to_number
 from chainunit.study.config import load, parse
-from chainunit.study.event import TYPES, Event
+from chainunit.study.event import TYPES
+from chainunit.study.events import Jam
 from chainunit.study.parts import Parts, example
 
 
@@ -59,7 +60,7 @@ def test_the_full_example_has_every_table_and_event():
     text, full = example("full"), parse(example("full"))
     tables = re.findall(r"^(?:# )?\[(\w+)\]", text, re.MULTILINE)
     assert sorted(tables) == sorted({*Parts(ChamberForces, DcMotor).sections, "report", "system"})
-    own = {name for name, of in TYPES.items() if of.__module__ == Event.__module__}
+    own = {name for name, of in TYPES.items() if of.__module__ == Jam.__module__}
     assert {event.kind for event in full.events.values()} == own - {"cut", "overload"}
     assert not full.slips and full.plate and full.driveline and full.coupling and full.monte_carlo.runs
     # what is in comments is taken, too

@@ -17,12 +17,15 @@ from chainunit import InputError, RunError
 from chainunit.drives.induction_motor import steady
 from chainunit.engines import MATH
 from chainunit.machines.knife_drive import KnifeDrive
+from chainunit.models import MACHINES
 from chainunit.quantities import Layout
 from chainunit.report.study import report
+from chainunit.report.study_motion import motion
 from chainunit.study import flywheels
 from chainunit.study.blade import BladeAnalysis, in_stack
 from chainunit.study.choice import choose
 from chainunit.study.config import load, parse
+from chainunit.study.drive import Drive
 from chainunit.study.flywheels import FlywheelAnswers, FlywheelFindings, Wheel, least_flywheel
 from chainunit.study.measures import read_answers
 from chainunit.study.parts import example
@@ -454,3 +457,22 @@ def test_refusals(text, message):
 def test_a_motor_of_the_catalogue_is_one_of_it():
     with pytest.raises(InputError, match="not in the catalogue; must be one"):
         parse(HEAD + 'motor = "IE3 4-pole 2 kW"\n')
+
+
+def test_the_blade_follows_from_the_declaration_and_not_from_the_machine(monkeypatch):
+    """A machine of another name that cuts has analysis and picture of the blade; one that does not cut has none."""
+    for name in ("OtherKnife", "Pusher"):
+        monkeypatch.setitem(MACHINES, name, None)
+
+    class OtherKnife(KnifeDrive):
+        name = "OtherKnife"
+
+    class Pusher(KnifeDrive):
+        name, cuts = "Pusher", False
+
+    for machine in (OtherKnife, Pusher):
+        chosen = parse(f'[system]\nmachine = "{machine.name}"')
+        drive = Drive(chosen.motor_type, chosen.motor, chosen.machine)
+        assert BladeAnalysis.applies(chosen, drive) == machine.cuts
+        drawn = motion(Study(chosen, drive, statics(chosen, drive)))
+        assert ("edge" in [link.name for link in drawn.links]) == machine.cuts

@@ -413,7 +413,7 @@ def _probes(xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
 class ChamberForces(InverseMachine):
     """The inverse model: motion of the motor shaft in, torque and every reaction out."""
 
-    name, noun = "ChamberForces", "chain unit"
+    name, noun, sides = "ChamberForces", "chain unit", SIDES
     description = (
         "Forces in a chain unit: crank, coupler, rocker and two working organs; "
         "from motor angle and speed to torque, load port and every support reaction"

@@ -224,7 +224,7 @@ def _probes(xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
 class KnifeDrive(InverseMachine):
     """The knife drive of a paper cutter: motion of the motor shaft in, torque and every reaction out."""
 
-    name, noun = "KnifeDrive", "knife drive"
+    name, noun, cuts = "KnifeDrive", "knife drive", True
     description = (
         "Knife drive of a paper cutter: crank, dyad and triad; from motor angle and speed to torque, load port, "
         "blade and every reaction"

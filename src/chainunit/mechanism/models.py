@@ -85,28 +85,42 @@ class LinkageModel(Model):
         return cls.linkage(cls.Parameters(), cls.Inputs()).topology
 
 
-class InverseMachine(LinkageModel):
+class MachineModel(Model):
+    """The model of a machine, as far as a study asks for it: of a linkage, or of an FMU of somebody else.
+
+    What a study does with a machine follows from what is declared here, not from which machine it is.
+    """
+
+    Feed: ClassVar[type]
+    """Its loads in normal running: inputs beside the motion of its shaft."""
+    feed_layout: ClassVar[Layout]
+    pins: ClassVar[Mapping[str, str]] = {}
+    """Output of each bearing by its title."""
+    noun: ClassVar[str] = "machine"
+    """What people call it."""
+    usual_speed: ClassVar[tuple[float, float]] = (0.05, 25.0)
+    """Of the crank [rad/s]; beyond, a slip of the unit is likely."""
+    sides: ClassVar[tuple[str, ...]] = ()
+    """Its sides, each with a working organ that may be a chain: so are called the groups of its loads, and of its
+    outputs, on them."""
+    cuts: ClassVar[bool] = False
+    """Whether it has a `blade` among its outputs, and a `stack` that the blade cuts among its parameters."""
+
+
+class InverseMachine(LinkageModel, MachineModel):
     """Motion of the motor shaft in, torque, load port and every reaction out.
 
     A machine states its `Parameters`, `Inputs` (with those of `CrankMotion`), `Outputs` (with `tau`, `PortValues` and
-    those of `running`), its `linkage` and its `probes`; all else follows.
+    those of `running`), its `linkage` and its `probes`; all else follows. Where it states none, its `Feed` are all
+    inputs beside `ShaftMotion`, and its `pins` have the names of pin and link.
     """
 
     Outputs: ClassVar[type]
-    Feed: ClassVar[type]
-    """Its loads in normal running: inputs beside `ShaftMotion`, all of them where a machine states none."""
-    feed_layout: ClassVar[Layout]
     joints: ClassVar[Mapping[str, Joint]] = {}
     """Joint of each reaction by the name of the output."""
-    pins: ClassVar[Mapping[str, str]] = {}
-    """Output of each bearing by its title, which is the name of pin and link where a machine states none."""
-    noun: ClassVar[str] = "machine"
-    """What people call it."""
     direct_name: ClassVar[str]
     """Name of the direct model, ``<name>Direct`` where a machine states none."""
     direct_description: ClassVar[str] = ""
-    usual_speed: ClassVar[tuple[float, float]] = (0.05, 25.0)
-    """Of the crank [rad/s]; beyond, a slip of the unit is likely."""
     by_differences: ClassVar[frozenset[str]] = frozenset()
     """Outputs whose own derivatives are taken by differences, see `chainunit.model.Part`."""
 

@@ -8,9 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..engines import numpy_
-from ..machines.knife_drive import KnifeDrive
-from ..mechanism.machine import Mechanism
+from ..machines.machine import Machine
 from ..study.blade import BladeFindings, Cutting
 from ..study.study import Study
 from ..text import number
@@ -29,10 +27,6 @@ def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
     """Table and figure."""
     yield b.Table(s.rows(Cutting, "blade", digits=4), title="The blade over a turn at constant speed")
     yield _figure(study, study.findings["blade"])
-
-
-def _mechanism(p: Any, q: Any) -> Mechanism:
-    return KnifeDrive.state(numpy_(), p, KnifeDrive.Inputs(), q, 0.0).m
 
 
 def _drawn(links: tuple[DrawnLink, ...], at: Mapping[str, tuple[Any, Any]]) -> tuple[Any, Any]:
@@ -62,7 +56,7 @@ def _figure(study: Study, found: BladeFindings) -> fig.Figure:
     panels = (
         fig.Panel(
             *metre,
-            tuple(_positions(study.drive.machine.p, found, fall)),
+            tuple(_positions(study.drive.machine, found, fall)),
             "The linkage in three positions",
             equal=True,
         ),
@@ -85,7 +79,7 @@ def _figure(study: Study, found: BladeFindings) -> fig.Figure:
     )
 
 
-def _positions(p: Any, found: BladeFindings, fall: float) -> Iterator[fig.Item]:
+def _positions(machine: Machine, found: BladeFindings, fall: float) -> Iterator[fig.Item]:
     """The linkage with its blade at the top, half-way and at the bottom, and the stack."""
     at: dict[str, tuple[Any, Any]] = {}
     for look, (name, q) in (
@@ -93,8 +87,8 @@ def _positions(p: Any, found: BladeFindings, fall: float) -> Iterator[fig.Item]:
         (1, ("half-way", found.top + 0.5 * fall)),
         (0, ("at its bottom", found.top + fall)),
     ):
-        m = _mechanism(p, q)
-        at = linkage.places(m) | edge(p, m.links)
+        m = machine.drive(q * machine.ratio)
+        at = linkage.places(m) | edge(machine.p, m.links)
         words = f"{name}, crank at {number(q % (2.0 * math.pi), 'rad')}"
         yield fig.Curve(words, *_drawn((*linkage.links(m.linkage, {}), _EDGE), at), look, "o")
     ends = sorted(float(at[name][0]) for name in ENDS)

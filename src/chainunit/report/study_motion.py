@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from ..machines.chain_unit import ChamberForces
-from ..machines.knife_drive import KnifeDrive
 from ..mechanism.models import CrankMotion, names_of
 from ..study.study import Study
 from . import linkage
@@ -21,11 +19,6 @@ from .motion import Animation, Clip, DrawnLink, Reading
 from .organ_motion import organ_motion
 from .supplement import Supplement
 
-SUPPLEMENTS: Mapping[type, Callable[[Study], Supplement]] = {
-    ChamberForces: organ_motion,
-    KnifeDrive: EdgeMotion,
-}
-"""By the model of a machine, what its picture has beside."""
 _PER_SECOND = 60
 _PER_TURN = 90
 MOST = 7000
@@ -40,7 +33,8 @@ def motion(study: Study) -> Animation:
     interval = min(1.0 / _PER_SECOND, turn / _PER_TURN)
     spans = (float(np.ptp(run["time"].values)) for run in study.runs.values())
     interval = max(interval, sum(spans) / MOST)
-    supplement = SUPPLEMENTS.get(machine.model, Supplement)(study)
+    model = machine.model
+    supplement = (organ_motion if model.sides else EdgeMotion if model.cuts else Supplement)(study)
     angles = np.linspace(0.0, 2.0 * math.pi, _PER_TURN + 1)
     whole = machine.state(machine.inputs({"phi": angles * machine.ratio})).m
     paths, crank = linkage.paths(whole), whole.linkage.crank

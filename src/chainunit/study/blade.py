@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..machines.knife_drive import KnifeDrive, Stack
+from ..machines.knife_drive import Stack
 from ..quantities import Value, declaration, quantity
 from ..text import array_entry, entries, number
 from .analysis import Analysis, Findings, Report
@@ -130,7 +130,7 @@ class BladeAnalysis(Analysis):
     @staticmethod
     def applies(config: Config, drive: Drive) -> bool:
         """Whether the machine has a blade."""
-        return issubclass(drive.machine.model, KnifeDrive)
+        return drive.machine.model.cuts
 
     @staticmethod
     def find(study: Study, rig: Rig, report: Report) -> BladeFindings:

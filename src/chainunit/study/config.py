@@ -14,10 +14,10 @@ from ..drives.gearing import Transmission
 from ..drives.motor import Motor
 from ..drives.motors import MOTORS
 from ..errors import GeometryError, InputError, refusal_prefix
-from ..machines.api import ChainUnit, ratios
-from ..machines.chain_unit import ChamberForces, SideLoads, SideName
+from ..machines.api import machine_of, ratios
+from ..machines.chain_unit import SideLoads, SideName
 from ..machines.machine import Machine
-from ..mechanism.models import InverseMachine
+from ..mechanism.models import MachineModel
 from ..quantities import Layout
 from ..reading import (
     Slip,
@@ -139,11 +139,6 @@ class Config:
     def of_catalogue(self) -> bool:
         """Whether the motor is one of the catalogue."""
         return self.plate is not None or self.sizing is not None
-
-    @property
-    def has_organs(self) -> bool:
-        """Whether the machine is a chain unit."""
-        return isinstance(self.machine, ChainUnit)
 
     def gives(self, section: str) -> bool:
         """Whether the file sets anything in that table."""
@@ -324,15 +319,13 @@ def _machine(parts: Parts, given: dict[str, float], of_papers: Mapping[str, floa
             )
         given = given | lengths
     try:
-        of: Any = ForeignMachine if issubclass(parts.machine, ForeignModel) else Machine
-        return ChainUnit(given) if parts.machine is ChamberForces else of(parts.machine, given)
+        of: Any = ForeignMachine if issubclass(parts.machine, ForeignModel) else machine_of
+        return of(parts.machine, given)
     except InputError as error:
         raise InputError(f"machine: {error}{_taken_over(error, parts.machine, given)}") from error
 
 
-def _taken_over(
-    error: InputError, machine: type[InverseMachine | ForeignModel], given: Mapping[str, float]
-) -> str:
+def _taken_over(error: InputError, machine: type[MachineModel], given: Mapping[str, float]) -> str:
     """The lengths behind a refusal that neither file nor example give, as words to follow it."""
     names = error.names if isinstance(error, GeometryError) else ()
     declared = Layout(machine.Parameters).named(machine.Parameters())
@@ -373,7 +366,7 @@ def _check_order(values: Mapping[str, Any], sections: Mapping[str, FileSection])
 def _check_loads(config: Config) -> None:
     """Refuse loads that, together, no machine reaches: all on one side, and at the height of each event."""
     feed, model = config.feed, config.machine.model
-    for v in Layout(SideLoads).variables if isinstance(config.machine, ChainUnit) else ():
+    for v in Layout(SideLoads).variables if model.sides else ():
         most = getattr(feed.left, v.name) + getattr(feed.right, v.name)
         if not v.quantity.admits(most):
             raise InputError(

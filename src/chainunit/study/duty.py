@@ -14,7 +14,6 @@ import numpy as np
 
 from ..drives.motor import Motor
 from ..fmu.backends import Backend
-from ..machines.api import ChainUnit
 from ..machines.chain_unit import SIDES, SideName
 from ..quantities import Value, declaration, quantity
 from ..system.instance import Fmu
@@ -72,8 +71,7 @@ class Duty:
 def duty_of(config: Config, folder: Path, backend: Backend | None) -> Duty:
     """The duty of a study with `sizing`; chains are run by their FMU, which is written to `folder`."""
     feed, w = config.feed, config.run.crank_speed
-    sides = SIDES if isinstance(config.machine, ChainUnit) else ()
-    loads = {side: all_on_one(side, feed) for side in sides}
+    loads = {side: all_on_one(side, feed) for side in SIDES if side in config.machine.model.sides}
     normal = cycle(config.machine, w, feed)
     one_sided = {side: cycle(config.machine, w, case) for side, case in loads.items()}
     sizes = [(rms((1.0, turn.crank_torque)), side) for side, turn in one_sided.items()]

@@ -14,15 +14,14 @@ import numpy as np
 from pydantic import BaseModel
 
 from ..machines.machine import Machine
-from ..mechanism.models import declared_class
-from ..model import Model
+from ..mechanism.models import MachineModel, declared_class
 from ..quantities import Layout, Value, base_units, group, quantity
 from ..system import Connector, CoSimulation, FmuComponent, System, foreign_component
 
 _GEAR = Connector("ratio", "parameter", "1", {}, 1.0, "gear ratio, motor turns per crank turn", 1e-4, 1e4)
 
 
-class ForeignModel(Model):
+class ForeignModel(MachineModel):
     """What a study knows of the machine in an FMU: its parameters, and as `Feed` its inputs beside its shaft.
 
     A machine whose FMU has a parameter `ratio` has the gear inside and shows the motor's shaft; else its shaft is the
@@ -30,11 +29,8 @@ class ForeignModel(Model):
     """
 
     component: ClassVar[FmuComponent]
-    Feed: ClassVar[type]
-    feed_layout: ClassVar[Layout]
-    pins: ClassVar[Mapping[str, str]] = {}
     parts = ()
-    usual_speed: ClassVar[tuple[float, float]] = (0.05, 1000.0)
+    usual_speed = (0.05, 1000.0)
 
     @classmethod
     def has_gear(cls) -> bool:

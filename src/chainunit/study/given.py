@@ -75,7 +75,11 @@ def given(study: Study) -> list[GivenSection]:
 
 
 def _of_study(config: Config) -> dict[str, Any]:
-    used = {"organ": config.has_organs, "start": config.of_catalogue, "catalogue": config.of_catalogue}
+    used = {
+        "organ": bool(config.machine.model.sides),
+        "start": config.of_catalogue,
+        "catalogue": config.of_catalogue,
+    }
     return {
         name: x for name, x in config.choices.items() if name in CHOICES and x != "" and used.get(name, True)
     }

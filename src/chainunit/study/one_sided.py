@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from ..machines.api import EMPTY, ChainUnit
 from ..machines.chain_unit import Feed, SideLoads, SideName, other
-from .cycle import Cycle, cycle
 
 
 def all_on_one(side: SideName, feed: Feed) -> Feed:
@@ -28,13 +27,12 @@ def alone(machine: ChainUnit, side: SideName) -> ChainUnit:
     return machine.replace({f"{gone}.wall_mass": 0.0, f"{gone}.web_mass": 0.0})
 
 
-def organ_cycles(machine: ChainUnit, crank_speed: float, feed: Feed) -> dict[str, Cycle]:
-    """Turns at constant speed, by how the organs are loaded."""
-    loads = {
+def one_sided_feeds(feed: Feed) -> dict[str, Feed]:
+    """The feed of both sides, and what may be left of it, by how the organs are loaded."""
+    return {
         "both sides": feed,
         "right side empty": without("right", feed),
         "left side empty": without("left", feed),
         "all feed on the left": all_on_one("left", feed),
         "all feed on the right": all_on_one("right", feed),
     }
-    return {name: cycle(machine, crank_speed, each) for name, each in loads.items()}

@@ -206,8 +206,8 @@ class OrganAnalysis(Analysis):
 
     @staticmethod
     def applies(config: Config, drive: Drive) -> bool:
-        """To a chain unit."""
-        return isinstance(drive.machine, ChainUnit)
+        """Whether the machine has working organs on its sides."""
+        return bool(drive.machine.model.sides)
 
     @staticmethod
     def find(study: Study, rig: Rig, report: Report) -> OrganFindings:

@@ -14,7 +14,7 @@ from ..errors import InputError, RunError
 from ..fmu.backends import Backend
 from ..machines.chain_organs import LEAST, MOST
 from ..machines.chain_unit import ChamberForces
-from ..machines.flexible import flexible
+from ..machines.flexible import ChainedModel, flexible
 from ..machines.hanging import split
 from ..machines.machine import Machine
 from ..mechanism.models import DirectMachine
@@ -68,7 +68,7 @@ def start_of(
         if not _is_of(model, drive):
             raise InputError(f"the study's machine is {drive.driven.model.name}, not {model.name}")
         given = _machine(config, model, drive.driven)
-        return given | (drive.organ() if model.name == "ChainUnitFlexible" else {})
+        return given | (drive.organ() if issubclass(model, ChainedModel) else {})
     if drive.motor is not model:
         title = drive.graph.components["motor"].title
         raise InputError(f"the study's motor is {title}, not {model.name}")
@@ -95,7 +95,7 @@ def _is_of(model: type[Model], drive: Drive) -> bool:
     if drive.outsider:
         return False
     own = drive.driven.model
-    chains = own is ChamberForces and model.name == "ChainUnitFlexible"
+    chains = bool(own.sides) and issubclass(model, ChainedModel)
     return model is own or chains or model is own.direct()
 
 

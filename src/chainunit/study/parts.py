@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +15,7 @@ from ..drives.line_table import SHAFTS
 from ..drives.motor import Motor
 from ..drives.motors import MOTORS
 from ..errors import InputError, refusal_prefix, shown
-from ..machines.chain_unit import ChamberForces
-from ..mechanism.models import InverseMachine
+from ..mechanism.models import MachineModel
 from ..models import MACHINES
 from ..reading import file_form, given_values, merged, packaged, read_table, toml
 from .foreign_machine import ForeignModel, foreign_model
@@ -37,15 +36,13 @@ EXAMPLES = {
     "full": "full.toml",
 }
 """Packaged study files by the names of the examples."""
-_OF_MACHINE = {"ChamberForces": "chain-unit", "KnifeDrive": "knife", "Accelerator": "driveline"}
-"""The example from which a study takes what its file leaves out, by machine."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Parts:
     """The kinds of machine and motor that the table [system] names, and the example that goes with the machine."""
 
-    machine: type[InverseMachine | ForeignModel]
+    machine: type[MachineModel]
     motor: type[Motor]
     """`Motor` itself where the motor is an FMU of somebody else"""
     designation: str = ""
@@ -86,7 +83,7 @@ class Parts:
     @property
     def example(self) -> dict[str, Any]:
         """The tables of the example, empty where there is none."""
-        name = _OF_MACHINE.get(self.machine.name)
+        name = _examples_of_machines().get(self.machine.name)
         return toml(example(name)) if name else {}
 
 
@@ -99,10 +96,11 @@ def parts_of(data: Mapping[str, Any], source: str) -> Parts:
     table = read_table(SystemTable, _table(data, "system"), "system.")
     machine = _machine_model(table, source)
     motor = table.motor
-    if not motor and "motor" not in data and "sizing" not in data and machine.name in _OF_MACHINE:
-        motor = toml(example(_OF_MACHINE[machine.name])).get("system", {}).get("motor", "")
+    parts = Parts(machine, MOTORS["DcMotor"])
+    if not motor and "motor" not in data and "sizing" not in data:
+        motor = parts.example.get("system", {}).get("motor", "")
     if not motor:
-        return Parts(machine, MOTORS["DcMotor"])
+        return parts
     if _is_fmu(motor):
         return Parts(machine, Motor, file=motor)
     if motor in MOTORS:
@@ -110,7 +108,7 @@ def parts_of(data: Mapping[str, Any], source: str) -> Parts:
     return Parts(machine, MOTORS["InductionMotor"], designation=motor)
 
 
-def _machine_model(table: Any, source: str) -> type[InverseMachine | ForeignModel]:
+def _machine_model(table: Any, source: str) -> type[MachineModel]:
     """The machine that the table [system] names."""
     if not _is_fmu(table.machine):
         if table.machine in MACHINES:
@@ -132,6 +130,13 @@ def _table(data: Mapping[str, Any], name: str) -> Mapping[str, Any]:
 def example(name: str = "chain-unit") -> str:
     """A packaged study file, by its name in `EXAMPLES`."""
     return packaged(EXAMPLES[name])
+
+
+@cache
+def _examples_of_machines() -> dict[str, str]:
+    """By machine, the first example that has it, from which a study takes what its file leaves out."""
+    tables = {name: _table(toml(example(name)), "system") for name in reversed(EXAMPLES)}
+    return {read_table(SystemTable, table, "system.").machine: name for name, table in tables.items()}
 
 
 def beside(name: str, source: str) -> Path:
@@ -191,7 +196,7 @@ def check_company(data: Mapping[str, Any], parts: Parts) -> None:
                     f"{name}: given beside system.motor = {shown(named)}, which is the motor; leave out one of "
                     "the two"
                 )
-    if parts.machine is not ChamberForces:
+    if not parts.machine.sides:
         for name in ("ratios", "chain", "organ"):
             if name in data:
                 raise InputError(

@@ -16,11 +16,10 @@ from ..drives.induction_motor import Inverter, SoftStart
 from ..drives.line_table import Damping, form, line_values
 from ..drives.motor import Motor
 from ..machines.chain_organs import LEAST, MOST, OrganLaw
-from ..mechanism.models import InverseMachine
+from ..mechanism.models import MachineModel
 from ..quantities import Value, declaration, group, quantity, variables
 from ..reading import given_values, schema, to_number
 from ..system import NAMES
-from .foreign_machine import ForeignModel
 
 
 @declaration
@@ -387,7 +386,7 @@ SECTIONS: Mapping[str, FileSection] = {
 """Tables of every study file, besides those of its machine, its feed, and its motor."""
 
 
-def sections_of(machine: type[InverseMachine | ForeignModel], motor: type[Motor]) -> dict[str, FileSection]:
+def sections_of(machine: type[MachineModel], motor: type[Motor]) -> dict[str, FileSection]:
     """The tables of a study with this machine and this kind of motor."""
     own = {"machine": machine.Parameters, "ratios": Ratios, "feed": machine.Feed, "motor": motor.Parameters}
     return {name: FileSection(declared) for name, declared in own.items()} | dict(SECTIONS)

@@ -9,11 +9,10 @@ import numpy as np
 
 from ..drives.speed_control import Loop
 from ..errors import InputError
-from ..machines.api import ChainUnit
 from .config import Config
 from .cycle import Cycle, cycle, no_feed
 from .drive import Drive
-from .one_sided import organ_cycles
+from .one_sided import one_sided_feeds
 from .shaft import Torsion, torsion
 
 
@@ -43,10 +42,12 @@ def statics(config: Config, drive: Drive) -> DriveStatics:
         where the communication step is too long for the driveline.
     """
     machine, feed, w = drive.machine, config.feed, config.run.crank_speed
-    if isinstance(machine, ChainUnit):
-        cycles = organ_cycles(machine, w, feed)
-    else:
-        cycles = {"normal running": cycle(machine, w, feed), "without feed": cycle(machine, w, no_feed(feed))}
+    feeds = (
+        one_sided_feeds(feed)
+        if machine.model.sides
+        else {"normal running": feed, "without feed": no_feed(feed)}
+    )
+    cycles = {name: cycle(machine, w, each) for name, each in feeds.items()}
     normal = next(iter(cycles.values())).outputs
     return DriveStatics(
         cycles=cycles,

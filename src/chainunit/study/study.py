@@ -215,8 +215,8 @@ class Study:
 
     @property
     def noun(self) -> str:
-        """What people call the machine; of one of somebody else no more is known than that it is one."""
-        return "machine" if self.drive.outsider else self.drive.machine.model.noun
+        """What people call the machine."""
+        return self.drive.machine.model.noun
 
     @property
     def reaches(self) -> bool:
