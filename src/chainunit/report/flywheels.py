@@ -22,6 +22,7 @@ PICTURE = "flywheel.png"
 _HEADS = {
     "start_time": "start",
     "speed_ripple": "ripple",
+    "motor_ripple": "at motor",
     "by_hand": "by hand",
     "motor_torque_peak": "torque, peak",
     "current_rms": "current, RMS",
@@ -39,6 +40,12 @@ def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
         yield b.Text(s.line(f"Motor: {{motor.title}}, rated {rated}; ratio {{machine.ratio:4}}."))
     if found.wheels:
         yield _table(s, found)
+        if found.retuned:
+            yield b.Text(
+                "The gains of the speed control are tuned anew to the inertia with each flywheel, but for those "
+                "that the file gives: the runs compare drives as they would be commissioned.",
+                "note",
+            )
     running = [wheel for _, wheel, _ in found.rows if wheel.answers.speed_ripple is not None]
     if running:
         yield _figure(study, found, running)

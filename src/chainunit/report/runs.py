@@ -12,7 +12,7 @@ from ..study.study import Study
 from ..study.window import Phase
 from . import blocks as b
 from . import run_names as read
-from .lines import Line, Number, joined, line, spoken
+from .lines import Line, Number, capital, joined, line, spoken
 from .terminal import plain_line
 
 
@@ -20,12 +20,9 @@ def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
     """Every answer of every run, what the pins carry, and where the model ends."""
     if s.result["answers"]:
         yield _table_of_runs(s, study)
-    if s.result.get("start_up"):
-        numbers = [(v, s.number(f"start_up.{v.name}")) for v in measures_of(Phase.START_UP)]
-        start = [(v.description, size) for v, size in numbers if size.value is not None]
-        sizes = joined((line(f"{title} ", size) for title, size in start), "; ")
-        yield b.Text(line("Start-up: ", sizes, "."), form="short")
-        yield b.Table(tuple(map(b.TableRow, start)), title="What the start-up asks of the drive", form="long")
+    for run, phase in (("start_up", Phase.START_UP), ("settling", Phase.SETTLING)):
+        if s.result.get(run):
+            yield from _begin(s, study, run, phase)
     if s.result["pins"]:
         yield _pins(s, study)
     if study.monte_carlo is not None:
@@ -33,6 +30,16 @@ def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
     if loops := s.result.get("speed_loop"):
         title = "The speed loop, linearised; deviation and settling: after a step of the load torque"
         yield matrix(s, "speed_loop", {loop: spoken(loop) for loop in loops}, title, first="")
+
+
+def _begin(s: b.Source, study: Study, run: str, phase: Phase) -> Iterator[b.Block]:
+    """What a part of the run before the steady turns asks."""
+    title = study.called(run)
+    numbers = [(v, s.number(f"{run}.{v.name}")) for v in measures_of(phase)]
+    rows = [(v.description, size) for v, size in numbers if size.value is not None]
+    sizes = joined((line(f"{words} ", size) for words, size in rows), "; ")
+    yield b.Text(line(f"{capital(title)}: ", sizes, "."), form="short")
+    yield b.Table(tuple(map(b.TableRow, rows)), title=f"What the {title} asks of the drive", form="long")
 
 
 def matrix(s: b.Source, path: str, rows: Mapping[str, str], title: str, first: str, **more: Any) -> b.Table:
@@ -59,7 +66,7 @@ def over_runs(
     study: Study, runs: list[str], rows: Iterable[b.TableRow], title: str, first: str = ""
 ) -> b.Table:
     """A table with a column for each run; those of the overloads of a side belong together."""
-    columns = (b.Column(read.title(study, run), read.short(study, run)) for run in runs)
+    columns = (b.Column(study.called(run), read.short(study, run)) for run in runs)
     groups = (tuple(runs.index(run) + 1 for run in group) for group in read.groups(study, runs))
     return b.Table(tuple(rows), (b.Column("", first), *columns), title=title, groups=tuple(groups))
 

@@ -8,9 +8,9 @@ from typing import Any
 from ..quantities import Layout
 from ..study.shaft import RIGID, ShaftAnswers, Torsion
 from ..study.study import Study
+from ..study.verdict import START, STEADY
 from . import blocks as b
 from . import figure as fig
-from . import run_names as read
 from .pictures import Pictures
 from .runs import ordered, over_runs
 
@@ -44,11 +44,12 @@ def _driveline(s: b.Source, study: Study) -> fig.Figure:
     largest = max(answers.range_largest for answers in study.shaft.values())
     above, below = [], []
     for name in study.shaft:
-        since = study.settled if name == "steady" else study.event[name]
-        run = study.runs["start_up" if name == "steady" else name].sel(time=slice(since, None))
+        since = 0.0 if name == START else study.settled if name == STEADY else study.event[name]
+        until = study.settled if name == START else None
+        run = study.runs[START if name == STEADY else name].sel(time=slice(since, until))
         time = run["time"].values - since
         x = fig.Axis("time", "s", low=0.0, high=float(time[-1]))
-        title = read.title(study, name)
+        title = study.called(name)
         above.append(fig.Panel(x, TORQUE, tuple(shaft_torque(run, time)), title))
         rows = study.cycles_of[name].classes(largest)
         middle, wide = (

@@ -259,6 +259,12 @@ class Drive:
         """Torque at the crank in a run [N m], shape (time,), also of a machine that turns by itself."""
         return shaft_torque(run, self._last_bond) * (self.driven.ratio / self.gear)
 
+    @property
+    def crank_speed(self) -> tuple[str, float]:
+        """Name of the output that turns the machine in a run, and how many times as fast as the crank it is."""
+        bond = self._last_bond
+        return f"{bond.driver}.{bond.flanges[0].members['w']}", self.driven.ratio / self.gear
+
     def crank_motion(self, run: xr.Dataset) -> tuple[Any, Any]:
         """Angle [rad] and speed [rad/s] of the crank in a run, shape (time,), also of a machine that turns by
         itself."""

@@ -26,7 +26,7 @@ from ..reading import given_values, instance, read_table, schema, to_number
 from .event import TYPES, AnySide, Event
 from .events import Jam
 
-RESERVED = ("start_up", "steady", "constant", "unfinished")
+RESERVED = ("start_up", "settling", "steady", "constant", "unfinished")
 """Names of other runs of a study."""
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 

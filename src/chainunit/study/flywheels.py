@@ -6,8 +6,10 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from ..quantities import Layout, Value, declaration, quantity
@@ -18,7 +20,8 @@ from .config import Config
 from .cycle import needed_inertia
 from .drive import Drive
 from .measures import Answers, read_answers, same_measure
-from .rig import CLOSED, Rig
+from .rig import CLOSED, Rig, worst_residual
+from .shaft import remedies
 from .study import Amount, Study
 from .turn import Turn, TurnAnalysis
 from .verdict import RESIDUAL, STEADY
@@ -31,6 +34,8 @@ START_LONG = 10.0
 CREEPS = 0.5
 """Share of the speed that is asked for below which a machine is said to stand."""
 _TRIALS = 8
+_WORSE = 1.1
+"""Times the fluctuation with a lighter flywheel from which on a heavier one is said to be worse."""
 
 
 @declaration
@@ -43,6 +48,7 @@ class FlywheelAnswers:
     speed_mean: Value = same_measure("speed_mean")
     speed_least: Value = same_measure("speed_least")
     speed_ripple: Value = same_measure("speed_ripple")
+    motor_ripple: Value = quantity("1", "ripple of the motor's speed, before the shaft line", kind="percent")
     by_hand: Value = quantity("1", "ripple by hand, dE/(J w2)", kind="percent")
     motor_torque_peak: Value = same_measure("motor_torque_peak")
     motor_torque_rms: Value = same_measure("motor_torque_rms")
@@ -95,6 +101,8 @@ class FlywheelFindings(Findings):
     wheels: list[Wheel] = field(default_factory=list)
     least: Wheel | None = None
     searched: bool = False
+    retuned: bool = False
+    """whether gains of the speed control differ, as they are tuned to the inertia with each flywheel"""
 
     def by_hand(self, flywheel: float) -> float:
         """Fluctuation with that flywheel [kg m2] where the drive gives a constant torque."""
@@ -125,6 +133,7 @@ class FlywheelFindings(Findings):
             "compared": [entries(wheel.answers) | {"stalls": wheel.stalls} for wheel in self.wheels],
             "least": None if self.least is None else entries(self.least.answers),
             "permitted": entry(self.permitted, "1", "percent"),
+            "retuned": self.retuned,
             "by_hand": entry(self.flywheel_by_hand, "kg.m2"),
         }
 
@@ -189,7 +198,7 @@ class FlywheelAnalysis(Analysis):
 def _own(study: Study, found: FlywheelFindings) -> Wheel:
     """The flywheel of the study, whose run has been made."""
     assert study.start is not None
-    residual = study.certificate["start_up"]["energy_residual_share"]
+    residual = worst_residual(study.certificate["start_up"])
     turns = study.steady
     return _wheel(study, found, found.own, study.answers[STEADY], study.start, turns, residual)
 
@@ -198,12 +207,13 @@ def _run(study: Study, rig: Rig, found: FlywheelFindings, flywheel: float) -> Wh
     """The start-up and steady running of the study with another flywheel [kg m2], without its safety coupling."""
     config = study.config
     drive, _ = tune(config, replace(study.drive, flywheel=flywheel))
+    found.retuned = found.retuned or drive.parameters != study.drive.parameters
     sides = drive.machine.loaded_sides(config.feed)
     rig = replace(rig, drive=drive, fed_from=None)
     with rig.from_rest() as simulation:
         start_up = rig.start_up(simulation, config.stop, lambda time: None, {})
     run = start_up.run
-    residual = rig.residuals(run)["energy_residual_share"]
+    residual = worst_residual(rig.residuals(run))
     turns = whole_turns(drive, run.sel(time=slice(start_up.steady_from, None)), config.run.turns)
     start, steady = (
         read_answers(Window(phase, rows, drive, sides, config.run.crank_speed))
@@ -227,12 +237,16 @@ def _wheel(
     """A flywheel with what was read from its run; a machine that stands or creeps has no answers in steady
     running."""
     turning = steady.speed_mean > CREEPS * study.config.run.crank_speed
+    drive, motor_ripple = study.drive, None
+    if drive.line is not None and turning:
+        motor_ripple = float(np.ptp(w := turns[drive.motor_speed].values) / np.mean(w))
     own = {
         "flywheel": flywheel,
         "inertia": found.bare + flywheel,
         "start_time": start.start_time,
         # a ripple of more than 2 is none: the formula does not hold there
         "by_hand": by_hand if (by_hand := found.by_hand(flywheel)) < 2.0 else None,
+        "motor_ripple": motor_ripple,
         "residual": residual,
     }
     names = Layout(FlywheelAnswers).names
@@ -406,8 +420,45 @@ def _on_fluctuation(found: FlywheelFindings, study: Study) -> None:
             "no flywheel keeps it",
             f"no flywheel of the list keeps the speed within {permitted}{more}",
         )
+        _on_line(found, study)
+    _on_heavier(found, study)
     if found.least is not None:
         _on_least(found, found.least, partial(study.remark, "note", "least flywheel"))
+
+
+def _on_line(found: FlywheelFindings, study: Study) -> None:
+    """That the ripple is made behind the flywheel, where the motor runs even enough and the crank does not."""
+    ripples = [(wheel, wheel.answers.motor_ripple) for wheel in found.wheels]
+    even = [wheel for wheel, ripple in ripples if ripple is not None and ripple <= found.permitted]
+    if not even:
+        return
+    best = min(even, key=lambda wheel: float(wheel.answers.speed_ripple))
+    causes = remedies(study.drive.line)
+    study.remark(
+        "warning",
+        "ripple behind flywheel",
+        "with a flywheel of {flywheel} the motor's speed fluctuates by {motor_ripple}, the crank's by "
+        "{speed_ripple}: the shaft line makes the rest, which no flywheel on the motor's shaft evens; {remedy}.",
+        flywheel=(best.flywheel, "kg.m2"),
+        motor_ripple=(best.answers.motor_ripple, "1", "percent"),
+        speed_ripple=(best.answers.speed_ripple, "1", "percent"),
+        remedy=", and ".join([*causes, "stiffen the shafts"] if causes else ["stiffer shafts help"]),
+    )
+
+
+def _on_heavier(found: FlywheelFindings, study: Study) -> None:
+    """The flywheels that keep the speed less even than a lighter one."""
+    running = [wheel for wheel in found.wheels if wheel.answers.speed_ripple is not None]
+    amounts: dict[str, Amount] = {
+        f"{heavier.flywheel:g}.speed_ripple": (heavier.answers.speed_ripple, "1", "percent")
+        for lighter, heavier in pairwise(running)
+        if heavier.answers.speed_ripple > max(found.permitted, _WORSE * lighter.answers.speed_ripple)
+    }
+    if amounts:
+        sizes = [(float(name.rpartition(".")[0]), amount) for name, amount in amounts.items()]
+        where = ", ".join(f"{number(size, 'kg.m2')} ({number(*amount)})" for size, amount in sizes)
+        text = "the speed fluctuates more, not less, with the heavier flywheel of {where}: the drive swings with it."
+        study.remark("warning", "heavier flywheel worse", text, where=where, **amounts)
 
 
 def _on_least(found: FlywheelFindings, least: Wheel, note: Callable[..., None]) -> None:
@@ -420,6 +471,8 @@ def _on_least(found: FlywheelFindings, least: Wheel, note: Callable[..., None]) 
     text += "the hand formula asks for {by_hand}" if by_hand else "nor is it by hand"
     if by_hand > least.flywheel:
         text += ", as it leaves out that the motor's torque rises where the speed falls"
+    elif a.motor_ripple is not None and by_hand < least.flywheel:
+        text += ", as it leaves out the shaft line"
     parts: Mapping[str, tuple[str, Amount]] = {
         "stored": (
             "flywheel and moving masses lend {stored} of a cut's work",

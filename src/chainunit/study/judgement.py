@@ -11,6 +11,7 @@ from .chain import HIGH
 from .measures import Answers
 from .organs import OrganAnalysis
 from .quantiles import runs_needed
+from .rig import worst_residual
 from .study import Study
 from .verdict import RESIDUAL, STEADY, Holds, Verdict
 from .window import reaches
@@ -25,6 +26,8 @@ def model_verdict(study: Study) -> Verdict:
     runs: dict[str, Answers] = {**answers}
     if study.start is not None:
         runs[verdict.START] = study.start
+    if study.settling is not None:
+        runs[verdict.SETTLING] = study.settling
     if study.drive.outsider:
         return verdict.outsider(speed, residuals, reached=mean)
     if organs is None:
@@ -56,9 +59,7 @@ def model_verdict(study: Study) -> Verdict:
 def _residuals(study: Study) -> dict[str, float]:
     """By run, the largest energy residual over the energy moved; the start-up and steady running are one."""
     return {
-        STEADY if name == verdict.START else name: max(
-            x for kind, x in shares.items() if kind.endswith("energy_residual_share")
-        )
+        STEADY if name == verdict.START else name: worst_residual(shares)
         for name, shares in study.certificate.items()
     }
 

@@ -20,7 +20,7 @@ STARTED = 0.95
 """Share of the speed that is asked for at which a start is over."""
 
 _ALL = frozenset(Phase)
-_RUNNING = _ALL - {Phase.START_UP}
+_RUNNING = _ALL - {Phase.START_UP, Phase.SETTLING}
 _STEADY = frozenset({Phase.STEADY})
 _EVENTS = frozenset({Phase.EVENT, Phase.LOADED_START})
 # a start begins at rest, and its motor gives for a moment more than it ever does in running

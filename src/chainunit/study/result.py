@@ -105,11 +105,7 @@ def _statics(study: Study) -> dict[str, Any]:
 
 def _runs(study: Study) -> dict[str, Any]:
     """What was read from the runs, by their names."""
-    start = (
-        {v.name: entry(getattr(study.start, v.name), v.unit, v.kind) for v in measures_of(Phase.START_UP)}
-        if study.start
-        else None
-    )
+    begins = {"start_up": (Phase.START_UP, study.start), "settling": (Phase.SETTLING, study.settling)}
     return {
         "events": {
             name: {
@@ -121,7 +117,11 @@ def _runs(study: Study) -> dict[str, Any]:
             for name, event in study.config.events.items()
         },
         "answers": {name: entries(answers) for name, answers in study.answers.items()},
-        "start_up": start,
+        **{
+            name: answers
+            and {v.name: entry(getattr(answers, v.name), v.unit, v.kind) for v in measures_of(phase)}
+            for name, (phase, answers) in begins.items()
+        },
         "pins": {
             run: {pin: {k: entry(v, "N") for k, v in sizes.items()} for pin, sizes in table.items()}
             for run, table in study.pins.items()

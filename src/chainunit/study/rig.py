@@ -195,9 +195,11 @@ class Rig:
     def start_empty(
         self, simulation: Simulation, progress: Progress, guards: Mapping[str, float]
     ) -> tuple[xr.Dataset, Rig]:
-        """The start of an empty machine, until it turns at `STARTED` of its speed or a guard ends it; and the rig
-        that is fed from then on."""
-        goal = {self.drive.motor_speed: STARTED * self.config.run.crank_speed * self.drive.ratio}
+        """The start of an empty machine, until its crank turns at `STARTED` of its speed or a guard ends it; and the
+        rig that is fed from then on."""
+        # behind a shaft line the crank is not where the motor is
+        name, ratio = self.drive.crank_speed
+        goal = {name: STARTED * self.config.run.crank_speed * ratio}
         longest = self.config.started + _LONGEST_START
         run = simulation.run(longest, self.step, progress, guards={**guards, **goal})
         fed = replace(self, fed_from=simulation.time)
@@ -295,7 +297,7 @@ class Rig:
         for driven, (residual, share) in certify(run, self.graph, feed).items():
             prefix = "" if driven == "machine" else f"{driven}_"
             run[f"{prefix}residual"] = residual
-            shares[f"{prefix}energy_residual_share"] = share
+            shares[prefix + _SHARE] = share
         return shares
 
     def _held(self, per_unit: Callable[[Mapping[str, Any]], Any], run: xr.Dataset) -> Any:
@@ -330,6 +332,14 @@ class Rig:
         torque, speed = (release[name] for name in (self.drive.motor_torque, self.drive.motor_speed))
         energy = float(np.trapezoid(torque * speed, release["time"]))
         return joined([run, release]), energy
+
+
+_SHARE = "energy_residual_share"
+
+
+def worst_residual(shares: Mapping[str, float]) -> float:
+    """The largest energy residual of a run over the energy moved, among its certificates by name."""
+    return max(share for name, share in shares.items() if name.endswith(_SHARE))
 
 
 DIFFERENCE = "_difference_to_monolithic"

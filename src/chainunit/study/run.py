@@ -213,10 +213,15 @@ class Runner:
         study.answers["steady"] = read_answers(study.window(Phase.STEADY, steady))
         self._bearings("steady", steady)
         # the start of an empty machine ends where the feed comes
-        end = steady["time"].values[0] if rig.fed_from is None else rig.fed_from
+        begin = steady["time"].values[0]
+        end = begin if rig.fed_from is None else rig.fed_from
         start = run.sel(time=slice(None, end))
         study.start = read_answers(study.window(Phase.START_UP, start))
         self._bearings(verdict.START, start)
+        if rig.fed_from is not None:
+            settling = run.sel(time=slice(end, begin))
+            study.settling = read_answers(study.window(Phase.SETTLING, settling))
+            self._bearings(verdict.SETTLING, settling)
         if study.start_apart:
             end = study.settled if rig.fed_from is None else rig.fed_from
             study.start_torque = on_coupling(rig.drive, run.sel(time=slice(None, end)))
@@ -342,12 +347,19 @@ class Runner:
         """What each run asks of the driveline."""
         study, line = self.study, self.study.config.driveline
         assert line is not None
+        for name, twin in rigid.items():
+            study.runs[name] = with_rigid(study.drive, study.runs[name], twin)
+        steady = study.steady
+        ended = slice(None, steady["time"].values[0])
+        # the damage of steady running is the measure of the others
+        parts = [("steady", steady, rigid["start_up"].sel(time=slice(study.settled, None)))]
+        parts.append(("start_up", study.runs["start_up"].sel(time=ended), rigid["start_up"].sel(time=ended)))
+        for name, begin in study.event.items():
+            since = slice(begin, None)
+            parts.append((name, study.runs[name].sel(time=since), rigid[name].sel(time=since)))
         per_turn = None
-        for name, run in [("steady", "start_up"), *((name, name) for name in study.event)]:
-            study.runs[run] = with_rigid(study.drive, study.runs[run], rigid[run])
-            since = slice(study.settled if name == "steady" else study.event[name], None)
-            elastic = study.steady if name == "steady" else study.runs[run].sel(time=since)
+        for name, run, twin in parts:
             study.shaft[name], study.cycles_of[name], damage = shaft_answers(
-                study.drive, elastic, rigid[run].sel(time=since), line.exponent, per_turn
+                study.drive, run, twin, line.exponent, per_turn
             )
             per_turn = damage if per_turn is None else per_turn

@@ -111,6 +111,8 @@ class Study:
     answers: dict[str, Answers] = field(default_factory=dict)
     start: Answers | None = None
     """what the start-up asks, once the machine ran steadily"""
+    settling: Answers | None = None
+    """what the coming of the feed asks of a machine that starts empty, until it runs steadily"""
     pins: dict[str, dict[str, dict[str, float]]] = field(default_factory=dict)
     """By run and pin: peak, RMS and equivalent (ISO 281) load."""
     certificate: dict[str, dict[str, float]] = field(default_factory=dict)
@@ -162,7 +164,8 @@ class Study:
     @property
     def titles(self) -> dict[str, str]:
         """Runs by name, as sentences call them."""
-        named = {STEADY: "steady running", verdict.START: "start-up", "constant": "chains at constant speed"}
+        named = {STEADY: "steady running", verdict.START: "start-up"}
+        named |= {verdict.SETTLING: "settling under the feed", "constant": "chains at constant speed"}
         return named | {name: event.title for name, event in self.config.events.items()}
 
     def called(self, run: str) -> str:

@@ -23,7 +23,9 @@ RESIDUAL = 1e-3
 STEADY = "steady"
 """Run of normal running; what spoils it leaves nothing that the model is good for."""
 START = "start_up"
-"""Run from rest to normal running."""
+"""Run from rest to normal running, or to the coming of the feed."""
+SETTLING = "settling"
+"""Run of a machine that starts empty, from the coming of its feed to normal running."""
 
 _CHAINS = 'take organ = "chain"'
 
@@ -226,8 +228,9 @@ def _where(runs: Collection[str]) -> str:
     if STEADY in runs:
         return ", in steady running, too"
     places = ["the start-up"] if START in runs else []
-    places += ["overloads"] if set(runs) - {START} else []
-    return f", in {' and in '.join(places)}"
+    places += ["the settling under the feed"] if SETTLING in runs else []
+    places += ["overloads"] if set(runs) - {START, SETTLING} else []
+    return f", in {', '.join(places[:-1])}{' and in ' if places[1:] else ''}{places[-1]}"
 
 
 def two_bars(

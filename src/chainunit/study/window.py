@@ -22,6 +22,8 @@ class Phase(Enum):
     """Which part of a study a run is."""
 
     START_UP = auto()
+    SETTLING = auto()
+    """of a machine that starts empty: from the coming of its feed to steady running"""
     STEADY = auto()
     EVENT = auto()
     LOADED_START = auto()

@@ -1,0 +1,137 @@
+"""A machine that starts empty, behind a shaft line and with flywheels: its start, the settling under its feed,
+and the flywheels."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from event_tables import event_line
+from reports import said_of, write
+
+from chainunit.study.config import parse
+from chainunit.study.measures import STARTED
+from chainunit.study.run import run_study
+
+DIP = event_line("dip", turns=1)
+LINE = """
+empty_start = true
+start = "inverter"
+[system]
+machine = "ChamberForces"
+motor = "IE3 4-pole 0.75 kW, 80M"
+[gear]
+ratio = 50
+[starter]
+inverter = { ramp = "30 Hz/s" }
+[flywheel]
+J = 0.002
+compare = [0.1]
+fluctuation = 0.02
+[driveline]
+place = "crank"
+alpha1 = "12 deg"
+alpha2 = "8 deg"
+c2 = 8000
+d2 = 20
+c3 = 8000
+d3 = 20
+[run]
+crank_speed = "30 rev/min"
+settle_turns = 1
+turns = 1
+step = "2 ms"
+"""
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("begin")
+    study = run_study(parse(DIP + LINE), folder)
+    assert study.failure is None
+    write(study, folder)
+    return study, folder, json.loads((folder / "result.json").read_text())
+
+
+def test_the_feed_comes_once_the_crank_turns_behind_its_line(done):
+    """The motor is ahead of the crank by the twist of the shafts: the start is over where the crank is at speed."""
+    study, _, result = done
+    time = study.start.start_time
+    assert time is not None and result["start_up"]["start_time"]["value"] == time
+    run = study.runs["start_up"].sel(time=time)
+    assert float(run["machine.w0"]) >= STARTED * study.config.run.crank_speed
+    assert float(run["machine.left.processing_force"]) == 0.0
+    # the flywheel that the study has starts as the others do
+    own, other = study.findings["flywheels"].wheels
+    assert own.answers.start_time == time and other.answers.start_time is not None
+    assert "flywheel does not start" not in {warning.kind for warning in study.warnings}
+
+
+def test_every_peak_of_the_run_is_in_a_table(done):
+    """From rest to the end: the start, the settling under the feed, the steady turns."""
+    study, folder, result = done
+    with xr.open_dataset(folder / "result.nc", group="start_up") as run:
+        time, torque = run["time"].values, np.abs(run["machine.tau"].values)
+    rows = [result["start_up"], result["settling"], result["answers"]["steady"]]
+    told = [row["crank_torque_peak"]["value"] for row in rows]
+    assert max(told) == pytest.approx(np.max(torque), rel=1e-9)
+    # the largest comes with the feed: neither in the start nor in the steady turns
+    assert told[1] > 1.005 * max(told[0], told[2])
+    fed = time > study.start.start_time
+    assert told[0] == pytest.approx(np.max(torque[~fed]), rel=1e-9)
+    words = said_of(study)
+    assert "Settling under the feed: crank torque, peak" in words
+    assert "What the settling under the feed asks of the drive" in (folder / "result.md").read_text()
+    # and so are those of the bearings
+    assert set(result["pins"]) == {"start_up", "settling", "steady", "dip"}
+
+
+def test_the_driveline_has_its_start(done):
+    study, folder, result = done
+    steady = study.steady["time"].values[0]
+    tau2 = np.abs(study.runs["start_up"]["driveline.tau2"].sel(time=slice(None, steady)).values)
+    assert result["shaft"]["start_up"]["tau2_peak"]["value"] == np.max(tau2)
+    assert study.shaft["start_up"].tau2_peak > study.shaft["steady"].tau2_peak
+    assert study.shaft["start_up"].turns_of_steady > 0.0
+    table = (folder / "result.md").read_text().partition("What the driveline carries")[2]
+    assert "start-up" in table[:200]
+
+
+def test_a_ripple_that_the_line_makes_is_not_the_flywheels(done):
+    """The motor runs evenly, the crank behind the joints does not: no flywheel is asked for, the joints are named."""
+    study, _, _ = done
+    found = study.findings["flywheels"]
+    own, heavy = (wheel.answers for wheel in found.wheels)
+    w, crank = (study.steady[name].values for name in ("motor.w", "machine.w0"))
+    assert own.motor_ripple == pytest.approx(np.ptp(w) / np.mean(w), rel=1e-12) and own.motor_ripple < 0.01
+    assert own.speed_ripple == pytest.approx(np.ptp(crank) / np.mean(crank), rel=1e-2)
+    assert own.speed_ripple > found.permitted > own.motor_ripple and found.least is None
+    said = {warning.kind: warning.text for warning in study.warnings}
+    assert "make the bends equal" in said["ripple behind flywheel"]
+    # nor is a heavier one praised with which the drive swings
+    assert heavy.speed_ripple > 2.0 * own.speed_ripple and "0.100 kg m" in said["heavier flywheel worse"]
+    assert " at motor " in said_of(study)
+
+
+@pytest.mark.parametrize(("gains", "told"), [("", True), ("speed_control = { kp = 0.1, ki = 0.6 }", False)])
+def test_it_is_said_where_the_gains_follow_the_flywheel(gains, told, tmp_path):
+    text = f"""
+{event_line("right_empties", turns=1)}
+[flywheel]
+J = 0.002
+fluctuation = 0.2
+compare = [0.004]
+[motor]
+{gains}
+[run]
+turns = 1
+settle_turns = 1
+step = 0.002
+"""
+    study = run_study(parse(text), tmp_path)
+    assert study.failure is None
+    words = "tuned anew to the inertia with each flywheel"
+    assert (words in said_of(study)) is told
+    assert study.findings["flywheels"].as_dict()["retuned"] is told
