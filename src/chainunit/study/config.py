@@ -30,17 +30,17 @@ from ..reading import (
 )
 from ..system.signals import Profile
 from ..text import DEFAULT_UNITS, Units, chosen_units
+from .checks import check_company, check_order
 from .event import Event
 from .event_table import RandomEvent, read_events, read_random_event
 from .events import OneSidedFeed
 from .foreign_machine import ForeignMachine, ForeignModel
-from .parts import Parts, beside, check_company, example, over_example, parts_of
+from .parts import Parts, beside, example, over_example, parts_of
 from .sections import (
     CHOICES,
     ChainOrgans,
     Coupling,
     Driveline,
-    FileSection,
     FlywheelTable,
     ForeignMotor,
     MonteCarlo,
@@ -215,7 +215,7 @@ def _config(
         )
         for name, section in sections.items()
     }
-    _check_order(values, sections)
+    check_order(values, sections)
     of_study = {name: values[name] for name in ("feed", "run", "monte_carlo", "gear", "starter", "torsion")}
     of_study |= {
         name: values[name] if name in data else None for name, each in sections.items() if each.optional
@@ -331,36 +331,6 @@ def _taken_over(error: InputError, machine: type[MachineModel], given: Mapping[s
     declared = Layout(machine.Parameters).named(machine.Parameters())
     taken = [f"{name} = {declared[name]:g}" for name in names if name in declared and name not in given]
     return f"; not in the file, so at the declared start value: {', '.join(taken)}" if taken else ""
-
-
-_ORDER = (
-    ("sizing.poles_least", ">=", "sizing.poles_most"),
-    ("sizing.ambient", ">", "sizing.temperature"),
-    ("chain.sweep_lowest", ">", "chain.sweep_highest"),
-    ("torsion.slowest", ">", "torsion.fastest"),
-    ("torsion.bend_low", ">", "torsion.bend_high"),
-)
-"""Quantities of which the second has to be more than the first."""
-
-
-def _check_order(values: Mapping[str, Any], sections: Mapping[str, FileSection]) -> None:
-    """Limits that leave nothing between them, and counts that are none."""
-
-    def value(name: str) -> tuple[float, str]:
-        section, _, key = name.partition(".")
-        x, declared = getattr(values[section], key), type(values[section])
-        unit = next(v.unit for v in Layout(declared).variables if v.name == key)
-        return x, f"{x:g}" + ("" if unit == "1" else f" {unit}")
-
-    for low, relation, high in _ORDER:
-        (least, limit), (most, shown) = value(low), value(high)
-        if most < least or (most == least and relation == ">"):
-            raise InputError(f"{high} = {shown}: must be {relation} {low}, {limit}")
-    for section, table in sections.items():
-        for key in table.whole:
-            number, shown = value(f"{section}.{key}")
-            if number != int(number):
-                raise InputError(f"{section}.{key} = {shown}: must be a whole number")
 
 
 def _check_loads(config: Config) -> None:

@@ -18,7 +18,7 @@ from ..errors import InputError, refusal_prefix, shown
 from ..mechanism.models import MachineModel
 from ..models import MACHINES
 from ..reading import file_form, given_values, merged, packaged, read_table, toml
-from .foreign_machine import ForeignModel, foreign_model
+from .foreign_machine import foreign_model
 from .sections import CHOICES, FileSection, SystemTable, sections_of
 
 
@@ -93,7 +93,7 @@ def _is_fmu(name: str) -> bool:
 
 def parts_of(data: Mapping[str, Any], source: str) -> Parts:
     """Machine and motor of a file, checked before all else: the other tables depend on them."""
-    table = read_table(SystemTable, _table(data, "system"), "system.")
+    table = read_table(SystemTable, named_table(data, "system"), "system.")
     machine = _machine_model(table, source)
     motor = table.motor
     parts = Parts(machine, MOTORS["DcMotor"])
@@ -120,7 +120,14 @@ def _machine_model(table: Any, source: str) -> type[MachineModel]:
         return foreign_model(beside(table.machine, source), given_values(table.machine_names))
 
 
-def _table(data: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+def named_table(data: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    """The table of that name in a file, empty where there is none.
+
+    Raises
+    ------
+    InputError
+        where it is no table.
+    """
     table = data.get(name, {})
     if not isinstance(table, Mapping):
         raise InputError(f"{name} = {shown(table)}: must be a table")
@@ -135,7 +142,7 @@ def example(name: str = "chain-unit") -> str:
 @cache
 def _examples_of_machines() -> dict[str, str]:
     """By machine, the first example that has it, from which a study takes what its file leaves out."""
-    tables = {name: _table(toml(example(name)), "system") for name in reversed(EXAMPLES)}
+    tables = {name: named_table(toml(example(name)), "system") for name in reversed(EXAMPLES)}
     return {read_table(SystemTable, table, "system.").machine: name for name, table in tables.items()}
 
 
@@ -151,15 +158,15 @@ def over_example(data: Mapping[str, Any], parts: Parts) -> dict[str, Any]:
     """A study file laid over the example of its machine: a value that is not named is the example's. Its ratios give
     way to lengths of the user's own, its motor to another one, its shafts and their damping to the user's."""
     base = parts.example
-    if any(name in _table(data, "machine") for name in LENGTHS) and "ratios" not in data:
+    if any(name in named_table(data, "machine") for name in LENGTHS) and "ratios" not in data:
         base.pop("ratios", None)
     if parts.motor is not parts_of(base, "").motor:
         base.pop("motor", None)
-    if "motor" in _table(data, "system") or "sizing" in data or "motor" in data:
+    if "motor" in named_table(data, "system") or "sizing" in data or "motor" in data:
         base.get("system", {}).pop("motor", None)
         for name in ("gear", "start", "starter"):
             base.pop(name, None)
-    line = _table(data, "driveline")
+    line = named_table(data, "driveline")
     for shaft, stiffness in SHAFTS.items():
         if shaft in line or stiffness in line:
             base.get("driveline", {}).pop(shaft, None)
@@ -167,65 +174,3 @@ def over_example(data: Mapping[str, Any], parts: Parts) -> dict[str, Any]:
         base.get("driveline", {}).pop("damping_ratio", None)
     base["title"] = ""
     return merged(base, data)
-
-
-def check_company(data: Mapping[str, Any], parts: Parts) -> None:
-    """Refuse values that would be passed over in silence."""
-    named = data.get("system", {}).get("motor")
-    if data.get("system") == {}:
-        raise InputError('system: names nothing; add motor = "file.fmu", or leave [system] out')
-    foreign = {"motor": bool(parts.file), "machine": issubclass(parts.machine, ForeignModel)}
-    for part, is_foreign in foreign.items():
-        if f"{part}_names" in data.get("system", {}) and not is_foreign:
-            raise InputError(
-                f'system.{part}_names: are of an FMU of somebody else; add {part} = "file.fmu", or leave them out'
-            )
-    if foreign["machine"] and data.get("feed_forward"):
-        raise InputError("feed_forward: needs a model of the machine, which is an FMU; leave it out")
-    told = foreign["motor"] or "sizing" in data or "tau_ff" in parts.motor.input_layout.names
-    if data.get("feed_forward") and not told:
-        raise InputError(
-            f"feed_forward: a motor of the type {parts.motor.name} has no input for the torque; leave it out"
-        )
-    if foreign["machine"] and _table(data, "monte_carlo").get("runs"):
-        raise InputError("monte_carlo.runs: needs a model of the machine, which is an FMU; leave it out")
-    if named is not None:
-        for name in ("motor", "sizing"):
-            if name in data and not (name == "motor" and parts.gives_motor):
-                raise InputError(
-                    f"{name}: given beside system.motor = {shown(named)}, which is the motor; leave out one of "
-                    "the two"
-                )
-    if not parts.machine.sides:
-        for name in ("ratios", "chain", "organ"):
-            if name in data:
-                raise InputError(
-                    f"{name}: is of the chain unit, and the machine is {parts.machine.name}; leave it out"
-                )
-        if "one_sided_share" in data.get("sizing", {}):
-            raise InputError(f"sizing.one_sided_share: the {parts.machine.name} has no sides; leave it out")
-    if "sizing" in data:
-        for name in ("motor", "feed_forward", "flywheel"):
-            if data.get(name):
-                words = (
-                    "sizing finds its own"
-                    if name == "flywheel"
-                    else "is of the DC motor, and [sizing] picks another"
-                )
-                raise InputError(f"{name}: {words}; leave out one of the two")
-        if "ratio" in data.get("machine", {}):
-            raise InputError("machine.ratio: [sizing] finds it; to have it kept, give gear.ratio")
-    elif not parts.designation:
-        for name in ("gear", "start", "starter", "catalogue"):
-            if name in data:
-                raise InputError(
-                    f"{name}: is of a motor of the catalogue; add [sizing] or system.motor, or leave it out"
-                )
-    elif "ratio" in data.get("machine", {}):
-        raise InputError(
-            "machine.ratio: follows from the motor's rated speed; to have another, give gear.ratio"
-        )
-    if "torsion" in data and "driveline" not in data:
-        raise InputError("torsion: is of a driveline; add [driveline], or leave it out")
-    if "chain" in data and data.get("organ") != "chain":
-        raise InputError('chain: is of organs that are chains; add organ = "chain", or leave it out')

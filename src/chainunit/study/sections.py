@@ -270,7 +270,7 @@ CHOICES: Mapping[str, Any] = {
     "start": (Literal[STARTS], Field("direct", description="how a motor of the catalogue is started")),
     "simulation": (Literal[SIMULATIONS], Field("cs", description="how the system runs")),
     "organ": (Literal[ORGANS], Field("two-bar", description="how the organs are modelled")),
-    "catalogue": (str, Field("", description="file of motors of one's own")),
+    "catalogue": (str, Field("", description="file with motors of the user")),
 }
 """Keys of a study file that stand before all tables, as pydantic fields."""
 
