@@ -207,6 +207,46 @@ def test_of_flywheels_that_are_too_heavy_the_nearest_is_kept(monkeypatch):
     assert best.violation == pytest.approx(2.7) and best.drive.flywheel == max(tried)
 
 
+def ranked(*candidates):
+    """Designations by rank, and why each stands there, of (designation, power, flywheel, ratio, used)."""
+    made = []
+    for designation, power, flywheel, ratio, used in candidates:
+        motor = SimpleNamespace(designation=designation, nameplate=SimpleNamespace(power=power))
+        drive = SimpleNamespace(flywheel=flywheel, ratio=ratio)
+        made.append(sizing.Candidate(motor, drive, {"temperature": Check("heat", used, 1.0, "1")}))
+    sizing.rank(made)
+    return {c.motor.designation: c.reason for c in made}
+
+
+@pytest.mark.parametrize("noise", [-0.015, 0.0, 0.015])
+def test_the_noise_of_the_search_chooses_no_motor(noise):
+    """Of a knife drive: flywheels of nearly the same energy that are just sufficient, of motors of 2.2 kW."""
+    six, two = (
+        ("b, 6-pole", 2200.0, 1.24, 24.4, 0.967 + noise),
+        ("a, 2-pole", 2200.0, 0.149, 73.4, 0.982 - noise),
+    )
+    for order in ((six, two), (two, six)):
+        assert list(ranked(*order)) == ["a, 2-pole", "b, 6-pole"]
+    assert ranked(six, two)["b, 6-pole"].startswith("as good as the chosen one; most used: heat")
+
+
+def test_motors_of_equal_power_rank_by_flywheel_then_by_margin():
+    told = ranked(
+        ("a, larger", 3000.0, 0.0, 50.0, 0.3),
+        ("b, much flywheel", 2200.0, 1.0, 50.0, 0.5),
+        ("c, used", 2200.0, 0.0, 50.0, 0.95),
+        ("d, cool", 2200.0, 0.0, 50.0, 0.6),
+        ("e, misses", 2200.0, 0.0, 50.0, 1.2),
+        ("f, small, with a flywheel", 1500.0, 2.0, 50.0, 0.99),
+    )
+    assert [name[0] for name in told] == ["f", "d", "c", "b", "a", "e"]
+    told = ranked(*[("b, much flywheel", 2200.0, 1.0, 50.0, 0.5), ("c", 2200.0, 0.0, 50.0, 0.95)])
+    assert told["b, much flywheel"].startswith("takes more flywheel at the crank than the chosen one")
+    assert "with a flywheel of 1.00 kg m" in told["b, much flywheel"]
+    told = ranked(("c", 2200.0, 0.0, 50.0, 0.95), ("d", 2200.0, 0.0, 50.0, 0.6))
+    assert told["c"].startswith("more used than the chosen one")
+
+
 def test_a_check_is_what_is_used_of_what_is_permitted():
     assert Check("x", 3.0, 4.0, "N.m").utilisation == 0.75
     assert Check("x", None, 4.0, "N.m").utilisation is None

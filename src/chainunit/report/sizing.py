@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -12,7 +11,6 @@ from . import blocks as b
 from .lines import Aside, Line, Strong, capital, line, spoken
 
 _NAMED = 5  # of the candidates that do not fit; the table has all
-_RANK = {standing.value: i for i, standing in enumerate(Standing)}
 _SIGN = {Standing.CHOSEN: "✓", Standing.FITS: "○", Standing.INSUFFICIENT: "✗", Standing.REJECTED: "✗"}
 _SEVERITY: dict[str, b.Severity] = {Standing.CHOSEN: "good", Standing.FITS: "partly"}
 
@@ -24,7 +22,6 @@ def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
     section = s.result["sizing"]
     choice, nearest, candidates = (section.get(name) for name in ("chosen", "nearest", "candidates"))
     best = nearest if choice is None else choice
-    ranked = _ranked(candidates, best) if candidates else []
     if choice is None and candidates:
         reasons = (
             line(
@@ -32,7 +29,7 @@ def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
                 ": ",
                 s.words(f"sizing.candidates.{i}.reason"),
             )
-            for i in ranked[:_NAMED]
+            for i in range(min(_NAMED, len(candidates)))
         )
         words = Strong("No candidate fits, because")
         yield b.Judgement("alarm", words, items=tuple(reasons), form="long")
@@ -49,7 +46,7 @@ def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
             tried = "Tried: {=sizing.tried} of {=sizing.motors} motors of the catalogue"
             yield b.Text(s.line(f"{tried}{weak}."))
         listed = int(study.config.sizing.candidates) if study.config.sizing else len(candidates)
-        yield _candidates(s, ranked, listed)
+        yield _candidates(s, listed)
         if len(candidates) > listed:
             yield b.Text(f"{len(candidates) - listed} more were tried; report.html lists them.", form="short")
     tables = []
@@ -119,20 +116,7 @@ def _leaf(s: b.Source, path: str) -> Line:
     return s.number(path, given=path.startswith("sizing.asked."), none="none")
 
 
-def _ranked(candidates: list[Any], choice: int | None) -> list[int]:
-    """The chosen candidate, the ones that fit, then the rest by how much it fails."""
-
-    def utilisation(candidate: Any) -> float:
-        sizes = [check["utilisation"]["value"] for check in candidate["checks"].values()]
-        return max((math.inf if size is None else size for size in sizes), default=0.0)
-
-    return sorted(
-        range(len(candidates)),
-        key=lambda i: (i != choice, _RANK.get(candidates[i]["verdict"], 9), utilisation(candidates[i])),
-    )
-
-
-def _candidates(s: b.Source, ranked: list[int], listed: int) -> b.Table:
+def _candidates(s: b.Source, listed: int) -> b.Table:
     """The table of candidates, best first."""
     candidates = s.result["sizing"]["candidates"]
     checks: dict[str, str] = {}
@@ -140,8 +124,8 @@ def _candidates(s: b.Source, ranked: list[int], listed: int) -> b.Table:
         for name, check in candidate["checks"].items():
             checks.setdefault(name, check.get("title", spoken(name)))
     rows = []
-    for place, i in enumerate(ranked):
-        candidate, path = candidates[i], f"sizing.candidates.{i}"
+    for i, candidate in enumerate(candidates):
+        path = f"sizing.candidates.{i}"
         verdict = candidate["verdict"]
         motor = line(s.words(f"{path}.motor"), Aside(s.line(f"ratio {{={path}.ratio:4}}")))
         cells = (_check(s, f"{path}.checks.{name}") if name in candidate["checks"] else "" for name in checks)
@@ -150,7 +134,7 @@ def _candidates(s: b.Source, ranked: list[int], listed: int) -> b.Table:
                 (motor, s.words(f"{path}.verdict"), *cells),
                 line(f"{_SIGN.get(verdict, '')} ", s.words(f"{path}.reason")),
                 _SEVERITY.get(verdict, "bad"),
-                "both" if place < listed else "long",
+                "both" if i < listed else "long",
             )
         )
     title = "Candidates, best first. Cell: the share of its limit that a check takes; a line in the bar is the limit."

@@ -52,6 +52,11 @@ _WORSE_WITH_INERTIA = ("start", "inertia")
 """Checks that it makes worse."""
 _SMALL = 0.1
 """Share of the inertia that is there below which a flywheel evens next to nothing."""
+_NEAR = 0.2
+"""Relative difference of flywheels that decides nothing between motors: the search finds each to a tenth or so."""
+_ALIKE = 0.05
+"""Difference of utilisations that decides nothing between motors: one that is just sufficient leaves a limit used by
+90 to 100 %, as the search has it."""
 
 
 @dataclass
@@ -81,6 +86,11 @@ class Candidate:
     def violation(self) -> float:
         """Utilisation of the check that is used most; infinite where its run failed."""
         return max(self.sizes.values(), default=math.inf)
+
+    @property
+    def flywheel_at_crank(self) -> float:
+        """Inertia of the flywheel as the crank feels it [kg m2]: behind any gear, a measure of its energy."""
+        return float(self.drive.flywheel * self.drive.ratio**2)
 
     @property
     def fits(self) -> bool:
@@ -321,8 +331,8 @@ def judge(config: Config, c: Candidate, duty: Duty, files: Mapping[str, Path]) -
 
 
 def rank(candidates: list[Candidate]) -> None:
-    """Order by rank and say why: what fits by size, then what does not by how far it is off, which is the utilisation
-    of its most used check; of those that do not start at all the larger is nearer."""
+    """Order by rank and say why: what fits as `in_rank` has it, then what does not by how far it is off, which is the
+    utilisation of its most used check; of those that do not start at all the larger is nearer."""
     for c in candidates:
         over = [check for name, check in c.checks.items() if c.sizes[name] > 1.0]
         if c.fits:
@@ -339,14 +349,10 @@ def rank(candidates: list[Candidate]) -> None:
         else:
             c.verdict, c.reason = Standing.REJECTED, "; ".join(check.passed for check in over)
         if c.drive.flywheel:
-            c.reason += f", with a flywheel of {c.drive.flywheel:.3g} kg m2"
-    candidates.sort(
-        key=lambda c: (
-            not c.fits,
-            c.motor.nameplate.power if c.fits else c.violation,
-            c.violation if c.fits else -c.motor.nameplate.power,
-        )
-    )
+            c.reason += f", with a flywheel of {number(c.drive.flywheel, 'kg.m2')}"
+    others = [c for c in candidates if not c.fits]
+    others.sort(key=lambda c: (c.violation, -c.motor.nameplate.power, c.motor.designation))
+    candidates[:] = in_rank([c for c in candidates if c.fits]) + others
     best = candidates[0]
     if not best.fits:
         best.verdict = Standing.INSUFFICIENT
@@ -355,5 +361,30 @@ def rank(candidates: list[Candidate]) -> None:
     best.verdict, best.reason = Standing.CHOSEN, f"the smallest that fits; {best.reason}"
     for c in candidates[1:]:
         if c.fits:
-            larger = c.motor.nameplate.power > best.motor.nameplate.power
-            c.reason = f"{'larger than needed' if larger else 'more used than the chosen one'}; {c.reason}"
+            c.reason = f"{_behind(c, best)}; {c.reason}"
+
+
+def in_rank(fitting: list[Candidate]) -> list[Candidate]:
+    """Candidates that fit, best first: the smaller power; of equal power the lighter flywheel beyond `_NEAR`; of
+    equal flywheels the one whose limits are less used beyond `_ALIKE`; else by designation."""
+    rest, ordered = sorted(fitting, key=lambda c: c.motor.designation), []
+    while rest:
+        power = min(c.motor.nameplate.power for c in rest)
+        small = [c for c in rest if c.motor.nameplate.power == power]
+        lightest = min(c.flywheel_at_crank for c in small)
+        light = [c for c in small if c.flywheel_at_crank <= (1.0 + _NEAR) * lightest]
+        least = min(c.violation for c in light)
+        ordered.append(next(c for c in light if c.violation <= least + _ALIKE))
+        rest.remove(ordered[-1])
+    return ordered
+
+
+def _behind(c: Candidate, best: Candidate) -> str:
+    """Why a candidate that fits comes after the best."""
+    if c.motor.nameplate.power > best.motor.nameplate.power:
+        return "larger than needed"
+    if c.flywheel_at_crank > (1.0 + _NEAR) * best.flywheel_at_crank:
+        return "takes more flywheel at the crank than the chosen one"
+    if c.violation > best.violation + _ALIKE:
+        return "more used than the chosen one"
+    return "as good as the chosen one"
