@@ -109,6 +109,31 @@ def test_python_api_gives_the_recorded_outputs(fmus):
     assert run["machine.tau"].attrs["units"] == "N.m" and run["machine.tau"].attrs["long_name"]
 
 
+def test_energy_residual_of_a_power_that_jumps():
+    """A brake of 60 N m comes at 0.1 s: each side is integrated by itself; energy from nowhere is still missing."""
+    time, w = np.linspace(0.0, 0.2, 21), 10.0
+    after = time >= 0.1 - 1e-12
+
+    def rows(braked, extra=0.0):
+        values = {
+            "machine.tau": 60.0 * braked,
+            "motor.w": np.full(21, w),
+            "motor.load_energy": 600.0 * np.maximum(time - 0.1, 0.0),
+            "machine.dissipated_power": 600.0 * braked,
+            "machine.kinetic_energy": np.full(21, 7.0) + extra * after,
+            "machine.potential_energy": np.zeros(21),
+        }
+        return xr.Dataset({name: ("time", x) for name, x in values.items()}, {"time": time})
+
+    run, lead = rows(after), rows(np.zeros(21)).isel(time=slice(0, 11))
+    gap, share = energy_residual(run, BOND, lead=lead)
+    assert np.max(np.abs(gap)) < 1e-9 and share < 1e-11
+    # smeared over the step before it
+    assert energy_residual(run, BOND)[1] > 0.02
+    gap, _ = energy_residual(rows(after, extra=5.0), BOND, lead=lead)
+    assert float(gap[-1]) == pytest.approx(-5.0) and float(gap[9]) == 0.0
+
+
 def test_energy_residual_with_friction_processing_and_feed(fmus):
     """Mass flows from right to left while the machine runs: the feed's energy closes the balance."""
     machine = ChainUnit(ratio=RATIO)

@@ -50,13 +50,14 @@ CLOSED = 0.01
 @dataclass(frozen=True)
 class Transient:
     """A run with an event that began at `begin` [s]; `signals` are those that it had from there on, `jumps`
-    those among them that are numbers which an event sets at its begin."""
+    those among them that are numbers which an event sets at its begin; `lead` is then the run up to there."""
 
     event: Event
     begin: float
     run: xr.Dataset
     signals: dict[str, OverTime]
     jumps: dict[str, Jump]
+    lead: xr.Dataset | None = None
 
 
 @dataclass(frozen=True)
@@ -273,7 +274,7 @@ class Rig:
             for full, value in before.items()
             if not isinstance(after := signals[full], Profile)
         }
-        return Transient(event, begin, joined(pieces), signals, jumps)
+        return Transient(event, begin, joined(pieces), signals, jumps, pieces[0] if jumps else None)
 
     def coast(self, transient: Transient, run: xr.Dataset, stop: float, file: Path) -> xr.Dataset:
         """The machine of the FMU `file` behind the coupling that opened at the end of the `run`, with the loads that
@@ -288,13 +289,13 @@ class Rig:
         with self.simulation(alone, {**loads, "machine.tau": 0.0}, begin) as simulation:
             return simulation.run(max(stop, begin) + 1.0, self.step)
 
-    def residuals(self, run: xr.Dataset) -> dict[str, float]:
+    def residuals(self, run: xr.Dataset, lead: xr.Dataset | None = None) -> dict[str, float]:
         """Writes the energy residual of each shaft into the run, named after what it drives, where that is not the
-        machine; its share of the energy moved."""
+        machine; its share of the energy moved. `lead` as of `Transient`."""
         stored = self.drive.simulated.stored_per_unit
         feed = {f"machine.{name}": partial(self._held, per_unit) for name, per_unit in stored.items()}
         shares = {}
-        for driven, (residual, share) in certify(run, self.graph, feed).items():
+        for driven, (residual, share) in certify(run, self.graph, feed, lead).items():
             prefix = "" if driven == "machine" else f"{driven}_"
             run[f"{prefix}residual"] = residual
             shares[prefix + _SHARE] = share

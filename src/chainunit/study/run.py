@@ -263,7 +263,7 @@ class Runner:
             if coasting is not None:
                 study.runs[f"{name}_coasting"] = coasting
             trip = Trip(time, passed, coasting)
-        self._certify(name, run)
+        self._certify(name, run, transient.lead)
         after = run.sel(time=slice(transient.begin, None))
         study.answers[name] = read_answers(study.window(phase, after, transient.begin, trip))
         self._bearings(name, after)
@@ -272,8 +272,8 @@ class Runner:
         if loads := pin_loads(self.rig.drive, run):
             self.study.pins[name] = loads
 
-    def _certify(self, name: str, run: xr.Dataset) -> None:
-        self.study.certificate[name] = self.rig.residuals(run)
+    def _certify(self, name: str, run: xr.Dataset, lead: xr.Dataset | None = None) -> None:
+        self.study.certificate[name] = self.rig.residuals(run, lead)
         self.study.runs[name] = run
 
     def _assumption(self, simulation: Simulation, transient: Transient, done: float) -> None:

@@ -21,41 +21,51 @@ Feed = Mapping[str, Callable[[xr.Dataset], Any]]
 that a kilogram has on its place in the machine."""
 
 
-def energy_residual(run: xr.Dataset, bond: Bond, feed: Feed | None = None) -> tuple[xr.DataArray, float]:
+def energy_residual(
+    run: xr.Dataset, bond: Bond, feed: Feed | None = None, lead: xr.Dataset | None = None
+) -> tuple[xr.DataArray, float]:
     """The energy that is missing at each instant [J], shape (time,), and its largest size in relation to the
     energy that went to and fro through the bond (integral of |tau w|), or to a millionth of the energy that the
     machine holds, where that is more: in a machine that stands nothing but rounding moves.
 
-    Powers are integrated by Simpson's rule over the communication points.
+    Powers are integrated by Simpson's rule over the communication points. Where they jump at an instant, `lead` is
+    the run up to there with the values before the jump, of which the `run` has those after it: each side is
+    integrated by itself.
     """
-    time = run["time"].values
-    tau, w = through(run, bond)
-    supply = _supply(run, bond, tau, w)
-    storage, loss_power = _storage(run, bond)
+    parts = [run] if lead is None else [lead, run.sel(time=slice(float(lead["time"][-1]), None))]
+    given, throughput = np.zeros(1), 0.0
+    for part in parts:
+        time = part["time"].values
+        tau, w = through(part, bond)
+        supply = _supply(part, bond, tau, w)
+        loss_power = _storage(part, bond)[1]
+        if loss_power is None:
+            # what the machine does with the energy is not known: its own torque against that of the driver
+            loss_power = _shaft_power(part, bond.machine, bond.flanges[1], tau, w)
+        net = supply - supply[0] - cumulative_simpson(loss_power, x=time, initial=0.0)
+        for mass, per_kg in (feed or {}).items():
+            if mass.partition(".")[0] == bond.machine:
+                net = net + _stieltjes(per_kg(part), part[mass].values)
+        given = np.concatenate([given[:-1], given[-1] + net])
+        throughput += float(np.trapezoid(np.abs(tau * w), time))
+    storage = _storage(run, bond)[0]
     if storage is None:
-        # what the machine does with the energy is not known: its own torque against that of the driver
-        storage, loss_power = np.zeros_like(supply), _shaft_power(run, bond.machine, bond.flanges[1], tau, w)
-    feed_energy = np.zeros_like(supply)
-    for mass, per_kg in (feed or {}).items():
-        if mass.partition(".")[0] == bond.machine:
-            feed_energy += _stieltjes(per_kg(run), run[mass].values)
-    losses = cumulative_simpson(loss_power, x=time, initial=0.0)
-    gap = (supply - supply[0]) - (storage - storage[0]) - losses + feed_energy
+        storage = np.zeros_like(given)
+    gap = given - (storage - storage[0])
     residual = xr.DataArray(
         gap,
         dims="time",
         attrs={"units": "J", "long_name": f"energy residual of the bond {bond.driver} - {bond.machine}"},
     )
-    throughput = float(np.trapezoid(np.abs(tau * w), time))
     throughput = max(throughput, 1e-6 * float(np.max(np.abs(storage))), 1e-300)
     return residual, float(np.max(np.abs(gap))) / throughput
 
 
 def certify(
-    run: xr.Dataset, system: System, feed: Feed | None = None
+    run: xr.Dataset, system: System, feed: Feed | None = None, lead: xr.Dataset | None = None
 ) -> dict[str, tuple[xr.DataArray, float]]:
     """`energy_residual` of every power bond of the system, by the name of the machine that the bond drives."""
-    return {bond.machine: energy_residual(run, bond, feed) for bond in system.bonds}
+    return {bond.machine: energy_residual(run, bond, feed, lead) for bond in system.bonds}
 
 
 def shaft_torque(run: xr.Dataset, bond: Bond) -> Any:
