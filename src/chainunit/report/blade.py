@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..machines.machine import Machine
+from ..study.arrays import stretches
 from ..study.blade import BladeFindings, Cutting
 from ..study.study import Study
 from ..text import number
@@ -42,10 +43,8 @@ def _spans(found: BladeFindings) -> list[fig.Shade]:
     """Where the blade goes down in the stack."""
     y, stack = found.y, found.stack
     inside = (np.roll(y, -1) < y) & (y < stack.top) & (y > stack.table)
-    edge = np.diff(np.concatenate([[False], inside, [False]]).astype(int))
     angle = np.append(found.turn.angle, 2.0 * math.pi)
-    ends = zip(angle[edge > 0], angle[edge < 0], strict=True)
-    return [fig.Shade(float(low), float(high), "in the stack") for low, high in ends]
+    return [fig.Shade(float(angle[a]), float(angle[b]), "in the stack") for a, b in stretches(inside)]
 
 
 def _figure(study: Study, found: BladeFindings) -> fig.Figure:

@@ -29,7 +29,7 @@ _CAPTION = "An arrow is the force on a part of the machine from its support or n
 def motion(study: Study) -> Animation:
     """Every run at about 60 pictures a second of machine time, more where the crank is fast."""
     machine = study.drive.machine
-    turn = 2.0 * math.pi / study.config.run.crank_speed
+    turn = study.config.turn
     interval = min(1.0 / _PER_SECOND, turn / _PER_TURN)
     spans = (float(np.ptp(run["time"].values)) for run in study.runs.values())
     interval = max(interval, sum(spans) / MOST)

@@ -27,7 +27,9 @@ from ..machines.flexible import flexible
 from ..quantities import Layout, Value, declaration, quantity
 from ..system.instance import Fmu, Instance
 from ..system.simulation import stoppable
-from ..text import entry
+from ..text import entries, entry
+from .analysis import Report
+from .arrays import peak
 from .config import Config
 from .cycle import Cycle, cycle
 from .drive import Drive
@@ -158,13 +160,6 @@ class ChainResult:
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON, each number with its unit."""
 
-        def row(numbers: SpeedNumbers) -> dict[str, Any]:
-            layout = Layout(SpeedNumbers)
-            return {
-                v.name: entry(x, v.unit, v.kind)
-                for v, x in zip(layout.variables, layout.values(numbers), strict=True)
-            }
-
         def pure(value: float | None, kind: str = "") -> dict[str, Any]:
             return entry(value, "1", kind)
 
@@ -175,10 +170,10 @@ class ChainResult:
             "turns": pure(self.turns),
             "quantile": pure(HIGH, "percent"),
             "confidence": pure(CONFIDENCE, "percent"),
-            "own_speed": row(self.own),
+            "own_speed": entries(self.own),
             "resonance": entry(self.resonance, "rad/s", "speed"),
             "distance_to_resonance": pure(self.distance, "percent"),
-            "sweep": [row(numbers) for numbers in self.sweep],
+            "sweep": [entries(numbers) for numbers in self.sweep],
             "avoid": [
                 {
                     "from": entry(b.low, "rad/s", "speed"),
@@ -346,33 +341,31 @@ def numbers_at(
     crank, rocker = values["tau"] * ratio, values["rocker.tau"]
     medians = np.median(snatched, axis=1)
     of_turns = {"crank_torque": peaks(crank), "rocker_torque": peaks(rocker), "snatch": snatched}
-    ends: dict[str, float] = {}
+    of_peaks: dict[str, float] = {}
     for name, sizes in of_turns.items():
         estimate = quantile(sizes, HIGH)
-        ends |= {f"{name}_high_from": estimate.low if estimate else math.nan}
-        ends |= {f"{name}_high_to": estimate.high if estimate else math.nan}
+        of_peaks |= {
+            f"{name}_median": float(np.median(sizes)),
+            f"{name}_high": float(np.quantile(sizes, HIGH)),
+            f"{name}_high_from": estimate.low if estimate else math.nan,
+            f"{name}_high_to": estimate.high if estimate else math.nan,
+        }
     return (
         SpeedNumbers(
             speed=crank_speed,
-            crank_torque_median=float(np.median(peaks(crank))),
-            crank_torque_high=float(np.quantile(peaks(crank), HIGH)),
             crank_torque_rms=float(np.sqrt(np.mean(crank**2))),
-            rocker_torque_median=float(np.median(peaks(rocker))),
-            rocker_torque_high=float(np.quantile(peaks(rocker), HIGH)),
-            snatch_median=float(np.median(snatched)),
-            snatch_high=float(np.quantile(snatched, HIGH)),
             snatch_spread=float(np.max(medians) / np.min(medians)),
             slack_time=float(np.mean(np.any(all_rods, axis=-1))),
             slack_rods=float(np.mean(all_rods)),
             fold_largest=float(max(np.max(values[f"{side}.fold_largest"]) for side in SIDES)),
-            two_bar_crank_torque=float(np.max(np.abs(two.crank_torque))),
+            two_bar_crank_torque=peak(two.crank_torque),
             two_bar_crank_torque_rms=float(np.sqrt(np.mean(two.crank_torque**2))),
-            two_bar_rocker_torque=float(np.max(np.abs(two.outputs.rocker.tau))),
+            two_bar_rocker_torque=peak(two.outputs.rocker.tau),
             two_bar_snatch=float(max(two_bar_snatch)),
             two_bar_slack_time=float(np.mean(np.any(pushed, axis=0))),
             energy_residual=gap / max(energy, 1e-300),
             independent_turns=float(min(counted(sizes, HIGH) for sizes in of_turns.values())),
-            **ends,
+            **of_peaks,
         ),
         {side: np.mean(slack[side], axis=(0, 1, 2)) for side in SIDES},
     )
@@ -392,7 +385,7 @@ def study_chain(
     config: Config,
     drive: Drive,
     file: Path,
-    report: Callable[[str, float, float], None],
+    report: Report,
 ) -> tuple[ChainResult, RunError | None]:
     """The study's own speed and the sweep of a study whose organs are chains, by the FMU `file` of the machine; and
     why the sweep ended early, if it did. A speed of the sweep whose run fails is left out and named in `failed`.
@@ -455,7 +448,7 @@ def study_chain(
 def _rocker_at_rest(config: Config, drive: Drive) -> float:
     """The rocker torque of two bars, largest of a turn that takes for ever [N.m]."""
     slowly = cycle(drive.machine, 1e-6, config.feed)
-    return float(np.max(np.abs(slowly.outputs.rocker.tau)))
+    return peak(slowly.outputs.rocker.tau)
 
 
 def bands(rows: Sequence[SpeedNumbers], at_rest: float, reach: float = math.inf) -> list[Band]:

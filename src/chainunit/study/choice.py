@@ -3,7 +3,7 @@ that it names."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from ..errors import InputError, refusal_prefix
 from ..fmu.backends import Backend
 from ..quantities import Layout
 from ..system import foreign_component
+from .analysis import Report
 from .catalogue_drive import catalogue_drive
 from .config import Config
 from .cycle import cycle
@@ -38,7 +39,7 @@ class Choice:
 def choose(
     config: Config,
     folder: Path,
-    report: Callable[[str, float, float], None],
+    report: Report,
     backend: Backend | None = None,
 ) -> Choice:
     """The drive of a study, with the nearest motor where sizing finds none that fits; FMUs that sizing needs are

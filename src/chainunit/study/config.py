@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -228,7 +228,7 @@ def _config(
         title=checked.title,
         machine=_machine(parts, tables["machine"], tables["ratios"]),
         motor_type=parts.motor,
-        motor=_checked("motor: ", parts.motor.check, values["motor"]) if parts.gives_motor else None,
+        motor=values["motor"] if parts.gives_motor else None,
         plate=_plate(parts.designation, own_motors),
         flywheels=tuple(sorted(set(tables["flywheel"].get("compare", [])))),
         events=events,
@@ -253,8 +253,12 @@ def _config(
         units=chosen_units(checked.report.units),
         **of_study,
     )
-    if config.driveline is not None:
-        _checked("driveline.", check, config.driveline)
+    with refusal_prefix("driveline."):
+        if config.driveline is not None:
+            check(config.driveline)
+    with refusal_prefix("motor: "):
+        if parts.gives_motor:
+            parts.motor.check(config.motor)
     _check_loads(config)
     _check_steps(config)
     return config
@@ -284,15 +288,6 @@ def _plate(designation: str, file: Path | None) -> CatalogueMotor | None:
         return motor_of_catalogue(designation, file)
 
 
-def _checked(prefix: str, check: Callable[[Any], object], values: Any) -> Any:
-    """The `values`, which `check` does not refuse; `prefix` goes before its words."""
-    try:
-        check(values)
-    except InputError as error:
-        raise InputError(f"{prefix}{error}") from error
-    return values
-
-
 def _names(data: Mapping[str, Any], events: Mapping[str, Event], prefix: str = "") -> Iterator[str]:
     """Names of all values that a file gives, events by the names of their runs."""
     for name, value in data.items():
@@ -308,10 +303,8 @@ def _names(data: Mapping[str, Any], events: Mapping[str, Event], prefix: str = "
 def _machine(parts: Parts, given: dict[str, float], of_papers: Mapping[str, float]) -> Machine:
     """The machine by its lengths, or by the papers' ratios in their place."""
     if of_papers:
-        try:
+        with refusal_prefix("ratios: "):
             lengths = ratios(**filled(Ratios, of_papers))
-        except InputError as error:
-            raise InputError(f"ratios: {error}") from error
         twice = sorted(set(lengths) & set(given))
         if twice:
             raise InputError(

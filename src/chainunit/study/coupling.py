@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import partial
 
-import numpy as np
 import xarray as xr
 
 from ..text import number
+from .arrays import peak
 from .drive import Drive
 from .event import Role
 from .protection import MARGIN, Obstacle, Setting
@@ -18,7 +18,7 @@ from .window import BURNT
 
 def on_coupling(drive: Drive, run: xr.Dataset) -> float:
     """Peak torque on a coupling on the motor shaft in a run, at the crank [N m]."""
-    return float(np.max(np.abs(run["motor.tau"].values))) * drive.ratio
+    return peak(run["motor.tau"].values) * drive.ratio
 
 
 def peaks_on_coupling(study: Study, *roles: Role) -> dict[str, float]:

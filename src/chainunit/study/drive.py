@@ -37,6 +37,7 @@ from ..system import (
     shaft_torque,
     through,
 )
+from .arrays import peak
 from .foreign_machine import ForeignMachine
 
 
@@ -353,7 +354,7 @@ class Drive:
             x = run[f"motor.{name}"].values
             if name == "w":
                 x = np.where(braking, -np.abs(x), np.abs(x))
-            unit = resolution * max(float(np.max(np.abs(x))), 1e-9)
+            unit = resolution * max(peak(x), 1e-9)
             columns.append(np.round(x / unit) * unit)
         instants, which = np.unique(np.stack(columns), axis=1, return_inverse=True)
         limits = [self.motor.largest_torque(self.fmu_parameters, T, *map(float, at)) for at in instants.T]

@@ -12,9 +12,10 @@ import xarray as xr
 
 from ..quantities import Layout, Value, Variable, declaration, quantity
 from . import protection
+from .arrays import peak
 from .drive import AbsentError
 from .stored import stored_shares
-from .window import Phase, Window, end_gap, peak, reaches
+from .window import Phase, Window, end_gap, reaches
 
 STARTED = 0.95
 """Share of the speed that is asked for at which a start is over."""

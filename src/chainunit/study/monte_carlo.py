@@ -13,7 +13,7 @@ import json
 import math
 import os
 import signal
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass, fields
@@ -33,6 +33,7 @@ from ..quantities import Layout, Value, declaration, quantity
 from ..system import Simulation
 from ..system.instance import remove_unpacked
 from ..text import entry
+from .analysis import Report
 from .config import Config
 from .drive import Drive
 from .event import AnySide, Event
@@ -321,9 +322,7 @@ class MonteCarloResult:
         }
 
 
-def run(
-    task: Task, folder: Path, report: Callable[[str, float, float], None], workers: int | None = None
-) -> MonteCarloResult:
+def run(task: Task, folder: Path, report: Report, workers: int | None = None) -> MonteCarloResult:
     """Run the missing ones of the task's runs, on all processors, and append each row to the file in `folder` when
     its run ends.
 

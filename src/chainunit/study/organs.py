@@ -14,6 +14,7 @@ from ..machines.chain_unit import SIDES, Feed, SideName, other
 from ..quantities import Value, declaration, quantity
 from ..text import entries, entry
 from .analysis import Analysis, Findings, Report
+from .arrays import peak
 from .config import Config
 from .cycle import Cycle, cycle
 from .drive import Drive
@@ -83,8 +84,8 @@ def overload_factors(
     one = _cycle_alone(machine, side, crank_speed, feed)
 
     def ratio(x: Any, y: Any) -> float:
-        whole = float(np.max(np.abs(y)))
-        return float(np.max(np.abs(x))) / whole if whole > 0.0 else math.nan
+        whole = peak(y)
+        return peak(x) / whole if whole > 0.0 else math.nan
 
     return OverloadFactors(
         feed_crank_torque=ratio(fed.crank_torque, both.crank_torque),
@@ -150,8 +151,8 @@ def sides_over_speed(machine: ChainUnit, feed: Feed, highest: float = 15.0, poin
             side: _cycle_alone(machine, side, float(w), feed, 360) for side in SIDES
         }
         for which, turn in turns.items():
-            peaks[f"rocker_{which}"].append(float(np.max(np.abs(turn.outputs.rocker.tau))))
-            peaks[f"crank_{which}"].append(float(np.max(np.abs(turn.crank_torque))))
+            peaks[f"rocker_{which}"].append(peak(turn.outputs.rocker.tau))
+            peaks[f"crank_{which}"].append(peak(turn.crank_torque))
     return Sides(speed, **{name: np.array(found) for name, found in peaks.items()})
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import tempfile
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -132,7 +131,7 @@ def export_study(
     """
     drive = _drive(config, backend, report)
     run = config.run
-    stop = config.settled + run.turns * 2.0 * math.pi / run.crank_speed
+    stop = config.settled + run.turns * config.turn
     return export(
         study_system(config, drive),
         file,

@@ -17,6 +17,7 @@ from ..drives.torsion import largest_frequency
 from ..engines import MATH
 from ..quantities import Value, declaration, quantity, variables
 from ..text import number
+from .arrays import peak
 from .drive import Drive
 
 LONGEST_STEP = 0.3
@@ -158,20 +159,19 @@ def shaft_answers(
     turn of the crank, in the unit (N m)^exponent. Without the damage of steady running it is steady running itself:
     then its cycles close."""
     tau2 = run["driveline.tau2"].values
-    peak2, peak_rigid = float(np.max(np.abs(tau2))), float(np.max(np.abs(rigid_torque(drive, rigid))))
+    peak2, peak_rigid = peak(tau2), peak(rigid_torque(drive, rigid))
     steady = steady_damage_per_turn is None
     cycles = rainflow(from_peak(tau2) if steady else tau2)
-    angle, _ = drive.crank_motion(run)
-    turns = max(float(angle[-1] - angle[0]) / (2.0 * np.pi), 1e-9)
+    turns = max(drive.turns(run), 1e-9)
     damage = cycles.damage(exponent)
     twist = run["driveline.twist2"].values + run["driveline.twist3"].values
     return (
         ShaftAnswers(
             tau2_peak=peak2,
-            tau3_peak=float(np.max(np.abs(run["driveline.tau3"].values))),
+            tau3_peak=peak(run["driveline.tau3"].values),
             tau2_rigid=peak_rigid,
             amplification=peak2 / peak_rigid if peak_rigid > 0.0 else None,
-            twist_peak=float(np.max(np.abs(twist))),
+            twist_peak=peak(twist),
             range_largest=float(np.max(cycles.range, initial=0.0)),
             cycles=float(np.sum(cycles.count)),
             range_equivalent=(damage / turns) ** (1.0 / exponent) if steady else None,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -20,6 +20,7 @@ from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
 from ..quantities import Value, declaration, quantity
 from ..text import entries, number
+from .analysis import Report
 from .catalogue_drive import catalogue_drive
 from .chain import HIGH
 from .config import Config
@@ -163,7 +164,7 @@ class SizingResult:
 def size(
     config: Config,
     folder: Path,
-    report: Callable[[str, float, float], None],
+    report: Report,
     backend: Backend | None = None,
 ) -> SizingResult:
     """Choose a motor of the catalogue for the study: at least `sizing.candidates` are tried, from small to large, and

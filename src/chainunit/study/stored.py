@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from .arrays import stretches
+
 
 def cutting_power(run: xr.Dataset) -> Any:
     """Power that the stack takes from the blade [W], shape (time,)."""
@@ -33,10 +35,8 @@ def stored_shares(turns: xr.Dataset, inertia: float) -> tuple[float | None, floa
     # a cut that begins before the last row ends in the turns after it
     time = np.append(time, time[1:] + time[-1] - time[0])
     power, stored = (np.append(x, x[1:]) for x in (power, stored))
-    inside = power > 0.01 * np.max(power)
-    edge = np.diff(np.concatenate([[False], inside, [False]]).astype(int))
     net = most = work = 0.0
-    for a, b in zip(np.flatnonzero(edge > 0), np.flatnonzero(edge < 0), strict=True):
+    for a, b in stretches(power > 0.01 * np.max(power)):
         if 0 < a < rows:
             net += float(stored[a] - stored[b - 1])
             most += float(stored[a] - np.min(stored[a:b]))

@@ -38,6 +38,7 @@ from ..drives.torsion import (
 from ..engines import numpy_
 from ..quantities import Value, declaration, quantity
 from .analysis import Report
+from .arrays import stretches
 from .sections import TorsionTable
 
 TONGUES = (1, 2, 3, 4)
@@ -207,9 +208,7 @@ def _refined(line: Cardan, load: float, speed: Any, curve: SteadyMotion) -> tupl
 def _ranges(x: Any, inside: Any) -> list[tuple[float, float]]:
     """Ends of the runs of points that are `inside`, half-way to their neighbours outside."""
     middle = np.concatenate([x[:1], 0.5 * (x[1:] + x[:-1]), x[-1:]])
-    edge = np.diff(np.concatenate([[False], inside, [False]]).astype(int))
-    begins, ends = np.flatnonzero(edge > 0), np.flatnonzero(edge < 0)
-    return [(float(middle[a]), float(middle[b])) for a, b in zip(begins, ends, strict=True)]
+    return [(float(middle[a]), float(middle[b])) for a, b in stretches(inside)]
 
 
 def analyse(

@@ -20,11 +20,12 @@ from ..engines import MATH
 from ..machines.chain_unit import SideName
 from ..system import Simulation
 from ..text import entry, number
+from .arrays import peak
 from .config import Config
 from .drive import Drive
 from .duty import Duty, rms
 from .rig import CLOSED, PATIENCE, Rig
-from .window import BURNT, end_gap, peak
+from .window import BURNT, end_gap
 
 _SPEED_DEVIATION = 0.03  # of the crank speed that is asked for
 _GAP = "motor.air_gap_tau"

@@ -11,6 +11,7 @@ import numpy as np
 from ..quantities import Value, declaration, quantity
 from ..text import array_entry, entries
 from .analysis import Analysis, Findings, Report
+from .arrays import peak
 from .config import Config
 from .cycle import Cycle, cycle, energy_swing, no_feed
 from .drive import Drive
@@ -104,8 +105,8 @@ def turn_of(config: Config, drive: Drive) -> TurnFindings:
         free,
         inertia,
         Turn(
-            torque_peak=float(np.max(np.abs(fed.crank_torque))),
-            torque_peak_free=float(np.max(np.abs(free.crank_torque))),
+            torque_peak=peak(fed.crank_torque),
+            torque_peak_free=peak(free.crank_torque),
             torque_mean=float(np.mean(fed.crank_torque)),
             lost=_lost(fed, config.turn),
             lost_free=_lost(free, config.turn),

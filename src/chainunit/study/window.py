@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from .arrays import peak
 from .drive import Drive
 
 BURNT = 2000.0
@@ -140,11 +141,6 @@ class Window:
         assert self.drive.chain_unit
         pulls = (float(np.min(self.value(f"machine.{side}.{rod}_pull"))) for side in self.sides)
         return min(pulls, default=math.inf)
-
-
-def peak(x: Any) -> float:
-    """Largest size of an array."""
-    return float(np.max(np.abs(x)))
 
 
 def mean(run: xr.Dataset, x: Any) -> float:

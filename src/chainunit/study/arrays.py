@@ -1,0 +1,18 @@
+"""Numbers of arrays, over time or over a turn."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+
+def peak(x: Any) -> float:
+    """Largest size of an array."""
+    return float(np.max(np.abs(x)))
+
+
+def stretches(inside: Any) -> list[tuple[int, int]]:
+    """Begin and end, as of a slice, of each stretch of an array of shape (n,) in which all are true."""
+    edge = np.diff(np.concatenate([[False], inside, [False]]).astype(int))
+    return list(zip(np.flatnonzero(edge > 0).tolist(), np.flatnonzero(edge < 0).tolist(), strict=True))
