@@ -73,11 +73,7 @@ class Part:
     """
 
     def __init__(
-        self,
-        declared: type,
-        equations: Callable[..., Any],
-        *,
-        by_differences: frozenset[str] = frozenset(),
+        self, declared: type, equations: Callable[..., Any], *, by_differences: frozenset[str] = frozenset()
     ) -> None:
         """`by_differences` names outputs that are derivatives themselves and whose own derivatives it takes by
         central differences: exact ones would be the largest part of its code."""

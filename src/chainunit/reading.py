@@ -268,11 +268,7 @@ def first_line(error: ValidationError, file: type[BaseModel], prefix: str = "") 
     return f"{where} = {shown(first['input'])}: {_allowed(first, where.removeprefix(prefix))}"
 
 
-_KINDS = {
-    "string_type": "a text",
-    "bool_type": "true or false",
-    "dict_type": "a table",
-}
+_KINDS = {"string_type": "a text", "bool_type": "true or false", "dict_type": "a table"}
 """What a value must be, by the kind of pydantic's error."""
 
 

@@ -122,12 +122,7 @@ class _Point:
     __slots__ = ("a4", "ends", "tau4", "twist")
 
     def __init__(self, xp: Any, p: Any, u: Any, x: Any) -> None:
-        self.ends = (
-            p.gamma1 + u.phi / p.ratio,
-            u.w / p.ratio,
-            _assembled(xp, p) + x.driven.phi,
-            x.driven.w,
-        )
+        self.ends = (p.gamma1 + u.phi / p.ratio, u.w / p.ratio, _assembled(xp, p) + x.driven.phi, x.driven.w)
         self.twist = Twist(xp, p, *self.ends)
         self.a4, self.tau4 = shaft_motion(u.load, x.driven.phi, x.driven.w, p.J4, self.twist.tau4)
 

@@ -95,12 +95,7 @@ def _dot(a: tuple[Any, Any, Any], b: tuple[Any, Any, Any]) -> Any:
 
 
 def corrected(
-    xp: Any,
-    pins: Sequence[Vec2],
-    lengths: Sequence[Any],
-    arms: Sequence[Vec2],
-    near: Pose,
-    steps: int,
+    xp: Any, pins: Sequence[Vec2], lengths: Sequence[Any], arms: Sequence[Vec2], near: Pose, steps: int
 ) -> Pose:
     """The pose after `steps` of Newton's method from `near`. From a pose that is nearly right each step doubles the
     number of right digits, and the order to which derivatives by what the pins depend on are right."""
@@ -263,12 +258,7 @@ class SolvedTriad(SolvedGroup):
 
     @classmethod
     def at(
-        cls,
-        xp: Any,
-        outer: Sequence[Motion],
-        lengths: Sequence[Any],
-        arms: Sequence[Vec2],
-        pose: Pose,
+        cls, xp: Any, outer: Sequence[Motion], lengths: Sequence[Any], arms: Sequence[Vec2], pose: Pose
     ) -> SolvedTriad:
         """
         Parameters

@@ -106,7 +106,4 @@ class Accelerator(InverseMachine):
     @classmethod
     def probes(cls, xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
         """Rim and bearing."""
-        return {
-            "rim_speed": p.radius * s.w,
-            "bearing": force(s.reactions(a)[cls.joints["bearing"]]),
-        }
+        return {"rim_speed": p.radius * s.w, "bearing": force(s.reactions(a)[cls.joints["bearing"]])}

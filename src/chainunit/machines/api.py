@@ -104,12 +104,7 @@ class ChainUnit(Machine):
         return out
 
     def slopes(
-        self,
-        phi: Any,
-        w: Any = 0.0,
-        left: SideLoads = EMPTY,
-        right: SideLoads = EMPTY,
-        stop: Stop = FREE,
+        self, phi: Any, w: Any = 0.0, left: SideLoads = EMPTY, right: SideLoads = EMPTY, stop: Stop = FREE
     ) -> PortSlopes:
         """Exact derivatives of `tau_bias` by motor angle and speed."""
         u = self._inputs(phi, w, 0.0, left, right, stop)
@@ -129,12 +124,7 @@ class ChainUnit(Machine):
         return self.state(u).torque_by_reactions(u.a / self.p.ratio) / self.p.ratio
 
     def friction_torque(
-        self,
-        phi: Any,
-        w: Any,
-        left: SideLoads = EMPTY,
-        right: SideLoads = EMPTY,
-        stop: Stop = FREE,
+        self, phi: Any, w: Any, left: SideLoads = EMPTY, right: SideLoads = EMPTY, stop: Stop = FREE
     ) -> Any:
         """The part of `tau` that pin friction and joint damping take [N m]."""
         state = self.state(self._inputs(phi, w, 0.0, left, right, stop))

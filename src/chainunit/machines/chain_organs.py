@@ -24,16 +24,7 @@ from ..mechanism.models import declared_class, running
 from ..planar import Vec2
 from ..quantities import Layout, Value, declaration, group, quantity
 from . import chain_unit
-from .chain_unit import (
-    NAMES,
-    SIDES,
-    ChamberForces,
-    Rocker,
-    on_drive,
-    on_side,
-    rocker_load,
-    rocker_motion,
-)
+from .chain_unit import NAMES, SIDES, ChamberForces, Rocker, on_drive, on_side, rocker_load, rocker_motion
 
 _CLOSED = 1e-6
 """Gap at the start above which a chain does not hang [m]."""
@@ -112,20 +103,13 @@ class ChainSide(chain_unit.Side):
         "J", "potential energy, of weights zero at the level of C, and of folded rods", nominal=100.0
     )
     energy_residual: Value = quantity(
-        "J",
-        "energy that is there beyond that at the start and what came and went since",
-        nominal=1000.0,
+        "J", "energy that is there beyond that at the start and what came and went since", nominal=1000.0
     )
     energy_per_kg: Value = quantity("J/kg", "energy of a kilogram of material on its place")
 
 
 def _numbered(
-    name: str,
-    number: int,
-    unit: str,
-    words: str,
-    nominal: float | None = None,
-    default: float | None = None,
+    name: str, number: int, unit: str, words: str, nominal: float | None = None, default: float | None = None
 ) -> list[Any]:
     return [
         (f"{name}_{k}", Value, quantity(unit, words.format(k, k + 1), nominal=nominal, default=default))

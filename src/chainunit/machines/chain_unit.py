@@ -376,11 +376,7 @@ def on_drive(
 def rocker_motion(xp: Any, s: Any, a: Any) -> dict[str, Any]:
     """The motion of the rocker at crank acceleration `a`, as `Rocker` has it; it never reaches the horizontal."""
     link = s.m.links["rocker"]
-    return {
-        "psi": xp.asin(link.u.x),
-        "w": link.t1 * s.w,
-        "a": link.t1 * a + link.t2 * (s.w * s.w),
-    }
+    return {"psi": xp.asin(link.u.x), "w": link.t1 * s.w, "a": link.t1 * a + link.t2 * (s.w * s.w)}
 
 
 def drive(p: Any, u: Any, organs: tuple[Any, ...], processing: Mapping[str, Any]) -> Linkage:

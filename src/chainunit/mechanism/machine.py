@@ -31,12 +31,7 @@ class Mechanism:
     __slots__ = ("_groups", "bodies", "linkage", "links", "pins", "q", "topology", "turns")
 
     def __init__(
-        self,
-        xp: Any,
-        linkage: Linkage,
-        q: Any,
-        derived: Sequence[Any] = (),
-        topology: Topology | None = None,
+        self, xp: Any, linkage: Linkage, q: Any, derived: Sequence[Any] = (), topology: Topology | None = None
     ) -> None:
         """
         Parameters
@@ -202,11 +197,7 @@ class Steadiness:
 
 
 def _effects(
-    xp: Any,
-    m: Moving,
-    w: Any,
-    loads: Mapping[str, Any],
-    reactions: dict[Joint, Vec2] | None = None,
+    xp: Any, m: Moving, w: Any, loads: Mapping[str, Any], reactions: dict[Joint, Vec2] | None = None
 ) -> dict[str, Effect]:
     """Effects of the loads that act on links; or, with the reactions, of those that follow from them."""
     late = reactions is not None

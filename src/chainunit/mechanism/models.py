@@ -344,12 +344,7 @@ class DirectMachine(LinkageModel):
         # the motor drives what is on its shaft, too
         fields["kinetic_energy"] += 0.5 * p.J_added * (x.w * x.w)
         fields["power"] = u.tau * x.w
-        return cls.Outputs(
-            a=a,
-            tau_bias=s.bias / p.ratio,
-            J=s.J / (p.ratio * p.ratio),
-            **fields,
-        )
+        return cls.Outputs(a=a, tau_bias=s.bias / p.ratio, J=s.J / (p.ratio * p.ratio), **fields)
 
 
 def acceleration(p: Any, u: Any, s: MachineState) -> Any:

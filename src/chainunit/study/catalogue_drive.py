@@ -52,12 +52,7 @@ def catalogue_drive(
         slip = inverter.slip or slip_hz / rated_torque
         inverter = dataclasses.replace(inverter, on=1.0, slip=slip)
     surroundings = p.ambient if ambient is None else dataclasses.replace(p.ambient, T=ambient)
-    p = dataclasses.replace(
-        p,
-        soft_start=soft,
-        inverter=inverter,
-        ambient=surroundings,
-    )
+    p = dataclasses.replace(p, soft_start=soft, inverter=inverter, ambient=surroundings)
     machine = config.machine.replace({"ratio": ratio})
     return Drive(
         model,

@@ -175,11 +175,7 @@ class ChainResult:
             "distance_to_resonance": pure(self.distance, "percent"),
             "sweep": [entries(numbers) for numbers in self.sweep],
             "avoid": [
-                {
-                    "from": entry(b.low, "rad/s", "speed"),
-                    "to": entry(b.high, "rad/s", "speed"),
-                    "why": b.why,
-                }
+                {"from": entry(b.low, "rad/s", "speed"), "to": entry(b.high, "rad/s", "speed"), "why": b.why}
                 for b in self.avoid
             ],
             "critical_speeds": [
@@ -308,15 +304,7 @@ def numbers_at(
     outputs = ("tau", "power", "rocker.tau", *others, *forces)
     starts, turns = int(chain.starts), int(chain.turns)
     sample = run_turns(
-        fmu,
-        drive,
-        crank_speed,
-        feed,
-        outputs,
-        starts=starts,
-        turns=turns,
-        progress=progress,
-        stopped=stopped,
+        fmu, drive, crank_speed, feed, outputs, starts=starts, turns=turns, progress=progress, stopped=stopped
     )
     values, ratio = sample.values, drive.driven.p.ratio
 
@@ -382,10 +370,7 @@ def rest_forces(machine: ChainUnit, side: str, feed: Any, rods: int) -> tuple[fl
 
 
 def study_chain(
-    config: Config,
-    drive: Drive,
-    file: Path,
-    report: Report,
+    config: Config, drive: Drive, file: Path, report: Report
 ) -> tuple[ChainResult, RunError | None]:
     """The study's own speed and the sweep of a study whose organs are chains, by the FMU `file` of the machine; and
     why the sweep ended early, if it did. A speed of the sweep whose run fails is left out and named in `failed`.

@@ -36,12 +36,7 @@ class Choice:
     sizing: SizingResult | None = None
 
 
-def choose(
-    config: Config,
-    folder: Path,
-    report: Report,
-    backend: Backend | None = None,
-) -> Choice:
+def choose(config: Config, folder: Path, report: Report, backend: Backend | None = None) -> Choice:
     """The drive of a study, with the nearest motor where sizing finds none that fits; FMUs that sizing needs are
     written to `folder`."""
     if config.foreign is not None:

@@ -19,15 +19,7 @@ from ..machines.chain_unit import SideLoads, SideName
 from ..machines.machine import Machine
 from ..mechanism.models import MachineModel
 from ..quantities import Layout
-from ..reading import (
-    Slip,
-    filled,
-    given_values,
-    read,
-    read_table,
-    slips,
-    toml,
-)
+from ..reading import Slip, filled, given_values, read, read_table, slips, toml
 from ..system.signals import Profile
 from ..text import DEFAULT_UNITS, Units, chosen_units
 from .checks import check_company, check_order

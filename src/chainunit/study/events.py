@@ -230,10 +230,7 @@ class Blocked(Event):
         """Stops over a decade of stiffness, the damping with its root, as in a swing of the same damping ratio."""
         p = self.p
         return tuple(
-            replace(
-                self,
-                p=replace(p, stiffness=factor * p.stiffness, damping=math.sqrt(factor) * p.damping),
-            )
+            replace(self, p=replace(p, stiffness=factor * p.stiffness, damping=math.sqrt(factor) * p.damping))
             for factor in (1.0 / math.sqrt(10.0), math.sqrt(10.0))
         )
 

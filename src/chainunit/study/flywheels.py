@@ -255,11 +255,7 @@ def _wheel(
 
 
 def least_flywheel(
-    wheels: Sequence[Wheel],
-    permitted: float,
-    bare: float,
-    by_hand: float,
-    run: Callable[[float], Wheel],
+    wheels: Sequence[Wheel], permitted: float, bare: float, by_hand: float, run: Callable[[float], Wheel]
 ) -> Wheel | None:
     """The least flywheel that keeps the `permitted` fluctuation, to `CLOSE` of the fluctuation.
 

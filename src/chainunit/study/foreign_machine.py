@@ -121,10 +121,7 @@ class ForeignMachine(Machine):
         terminals = self.model.component.terminals
         shaft, load = terminals["flange"].members, terminals["load"].members
         signals = {f"machine.{name}": x for name, x in self._named(feed).items()}
-        signals |= {
-            f"machine.{shaft['phi']}": lambda t: first + w * t,
-            f"machine.{shaft['w']}": w,
-        }
+        signals |= {f"machine.{shaft['phi']}": lambda t: first + w * t, f"machine.{shaft['w']}": w}
         names = {"tau": f"machine.{load['tau_bias']}", "J": f"machine.{load['J']}"}
         step = float(times[1] - times[0])
         with CoSimulation(System({"machine": self.component}), signals, -turn) as alone:

@@ -222,10 +222,7 @@ class Answers:
         "rad/s", "least", lambda w: float(np.min(w.speed)), kind="speed", of="crank speed", minor=True
     )
     start_time: Value = measure(
-        "s",
-        "start-up time",
-        _start_time,
-        during=frozenset({Phase.START_UP, Phase.LOADED_START}),
+        "s", "start-up time", _start_time, during=frozenset({Phase.START_UP, Phase.LOADED_START})
     )
     speed_ripple: Value = measure(
         "1",

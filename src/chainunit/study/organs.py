@@ -24,11 +24,7 @@ from .study import Study
 
 
 def _cycle_alone(
-    machine: ChainUnit,
-    side: SideName,
-    crank_speed: float,
-    feed: Feed,
-    points: int = 720,
+    machine: ChainUnit, side: SideName, crank_speed: float, feed: Feed, points: int = 720
 ) -> Cycle:
     """A turn with the organ of that side alone, which keeps its load."""
     return cycle(alone(machine, side), crank_speed, without(other(side), feed), points)

@@ -257,10 +257,7 @@ def _on_shaft(study: Study) -> None:
     if line.d2 == 0.0 and line.d3 == 0.0:
         undamped = "The driveline has no damping: a vibration that was set off goes on; give d2 and d3."
         note("undamped line", undamped)
-    ends: dict[str, Amount] = {
-        "k_least": (modes.k_least, "rad/s"),
-        "k_largest": (modes.k_largest, "rad/s"),
-    }
+    ends: dict[str, Amount] = {"k_least": (modes.k_least, "rad/s"), "k_largest": (modes.k_largest, "rad/s")}
     fastest = max((loop.crossover for loop in study.statics.loops.values()), default=0.0)
     if fastest > modes.antiresonance / 3.0:
         warn(

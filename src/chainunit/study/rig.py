@@ -305,10 +305,7 @@ class Rig:
         return per_unit(self.drive.machine_series(run))
 
     def compare(
-        self,
-        run: xr.Dataset,
-        transient: Transient | None = None,
-        start: Mapping[str, float] | None = None,
+        self, run: xr.Dataset, transient: Transient | None = None, start: Mapping[str, float] | None = None
     ) -> tuple[dict[str, float], dict[str, float]]:
         """Compare a run with the monolithic solution of the same signals, from the states `start` on or from rest:
         the differences of torque and speed in parts of their peaks, and the states at its end."""

@@ -39,12 +39,7 @@ class Run:
     """How the machine is run."""
 
     crank_speed: Value = quantity(
-        "rad/s",
-        "speed of the crank in normal running",
-        default=3.0,
-        min=0.01,
-        max=1000.0,
-        kind="speed",
+        "rad/s", "speed of the crank in normal running", default=3.0, min=0.01, max=1000.0, kind="speed"
     )
     ramp: Value = quantity(
         "s",

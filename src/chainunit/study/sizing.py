@@ -161,12 +161,7 @@ class SizingResult:
         }
 
 
-def size(
-    config: Config,
-    folder: Path,
-    report: Report,
-    backend: Backend | None = None,
-) -> SizingResult:
+def size(config: Config, folder: Path, report: Report, backend: Backend | None = None) -> SizingResult:
     """Choose a motor of the catalogue for the study: at least `sizing.candidates` are tried, from small to large, and
     then more until one fits or the catalogue ends.
 

@@ -55,13 +55,7 @@ class Remark:
 
     @classmethod
     def of(
-        cls,
-        severity: Literal["warning", "note"],
-        kind: str,
-        text: str,
-        /,
-        *runs: str,
-        **parts: Amount | str,
+        cls, severity: Literal["warning", "note"], kind: str, text: str, /, *runs: str, **parts: Amount | str
     ) -> Remark:
         """A remark; in its `text` the names of the `parts`, amounts and words, stand in braces."""
         amounts = {name: part for name, part in parts.items() if not isinstance(part, str)}
@@ -150,13 +144,7 @@ class Study:
         return [remark for remark in self.remarks if remark.severity == "note"]
 
     def remark(
-        self,
-        severity: Literal["warning", "note"],
-        kind: str,
-        text: str,
-        /,
-        *runs: str,
-        **parts: Amount | str,
+        self, severity: Literal["warning", "note"], kind: str, text: str, /, *runs: str, **parts: Amount | str
     ) -> None:
         """Add a remark, see `Remark.of`."""
         self.remarks.append(Remark.of(severity, kind, text, *runs, **parts))

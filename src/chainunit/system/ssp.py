@@ -252,8 +252,5 @@ def _component(elements: Element, name: str, part: _Part, source: str) -> None:
         _real(node, "ssc:Real", c)
     bindings = SubElement(component, "ssd:ParameterBindings")
     SubElement(
-        bindings,
-        "ssd:ParameterBinding",
-        type="application/x-ssp-parameter-set",
-        source=_parameter_file(name),
+        bindings, "ssd:ParameterBinding", type="application/x-ssp-parameter-set", source=_parameter_file(name)
     )
