@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -27,6 +27,7 @@ import numpy as np
 
 from ..engines import Dual, dual, numpy_, value
 from ..integrate import rk4
+from ..progress import Progress
 from .cardan import Cardan, Twist, frozen_frequency, middle_angle, two_joints
 
 HALF_TURN = np.array([math.pi, 0.0, math.pi, 0.0])
@@ -42,8 +43,6 @@ _CLOSED = 1e-9
 _NOISE = 1e-5  # of a multiplier: that of an undamped line is 1 but for the steps
 _LARGEST_STEP = 0.3  # of the unknowns of shooting, in rad and shares of the speed
 _NEWTON = 2  # from the twist of the stage before, 1e-3 away: to 1e-12
-
-Progress = Callable[[float], None]
 
 
 def _nothing(_: float) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import itertools
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +17,7 @@ import numpy as np
 from .. import __version__
 from ..errors import GeometryError
 from ..machines import hanging
+from ..progress import Progress
 from ..report.blocks import Column, Report, Section, Table, TableRow, Text
 from ..report.figure import Axis, Curve, Field, Figure, Item, Panel
 from ..report.print_figures import contours
@@ -79,7 +79,7 @@ def loads(mu: float, zeta: float, psi: float, counts: tuple[int, int] | None) ->
 
 
 def two_bar_error(
-    progress: Callable[[float], None] = lambda done: None,
+    progress: Progress = lambda done: None,
     mu: tuple[float, ...] = MU,
     zeta: tuple[float, ...] = ZETA,
     psi: tuple[float, ...] = PSI,

@@ -7,17 +7,15 @@ is a function of the same name in `chainunit.report.analyses`.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, ClassVar
+
+from ..progress import Report
 
 if TYPE_CHECKING:
     from .config import Config
     from .drive import Drive
     from .rig import Rig
     from .study import Study
-
-Report = Callable[[str, float, float], None]
-"""Called with what is running, how much is done, and all that there is to do."""
 
 
 class Findings(ABC):

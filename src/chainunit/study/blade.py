@@ -13,9 +13,10 @@ import numpy as np
 
 from ..errors import InputError
 from ..machines.knife_drive import Stack
+from ..progress import Report
 from ..quantities import Value, declaration, quantity
 from ..text import array_entry, entries, number
-from .analysis import Analysis, Findings, Report
+from .analysis import Analysis, Findings
 from .config import Config
 from .cycle import Cycle, cycle
 from .drive import Drive

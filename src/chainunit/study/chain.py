@@ -24,11 +24,11 @@ from ..errors import InterruptedRunError, RunError
 from ..machines.api import ChainUnit
 from ..machines.chain_unit import SIDES, ChamberForces, Feed
 from ..machines.flexible import flexible
+from ..progress import Progress, Report
 from ..quantities import Layout, Value, declaration, quantity
 from ..system.instance import Fmu, Instance
 from ..system.simulation import stoppable
 from ..text import entries, entry
-from .analysis import Report
 from .arrays import peak
 from .config import Config
 from .cycle import Cycle, cycle
@@ -200,7 +200,7 @@ def run_turns(
     turns: int,
     settle: int = SETTLE,
     points: int = POINTS,
-    progress: Callable[[float], None] = lambda share: None,
+    progress: Progress = lambda share: None,
     stopped: Callable[[], bool] | None = None,
 ) -> Turns:
     """Steady running at a prescribed constant speed of the crank, from the hanging position at several angles.
@@ -293,7 +293,7 @@ def numbers_at(
     drive: Drive,
     config: Config,
     crank_speed: float,
-    progress: Callable[[float], None] = lambda share: None,
+    progress: Progress = lambda share: None,
     stopped: Callable[[], bool] | None = None,
 ) -> tuple[SpeedNumbers, dict[str, Any]]:
     """The numbers at one speed with the study's feed, and by side the share of time in which each rod is slack."""

@@ -16,9 +16,9 @@ from ..drives.speed_control import Tuning
 from ..drives.torsion import with_damping_ratio
 from ..errors import InputError, refusal_prefix
 from ..fmu.backends import Backend
+from ..progress import Report
 from ..quantities import Layout
 from ..system import foreign_component
-from .analysis import Report
 from .catalogue_drive import catalogue_drive
 from .config import Config
 from .cycle import cycle

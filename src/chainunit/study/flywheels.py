@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ..progress import Report
 from ..quantities import Layout, Value, declaration, quantity
 from ..text import entries, entry, number
-from .analysis import Analysis, Findings, Report
+from .analysis import Analysis, Findings
 from .choice import tune
 from .config import Config
 from .cycle import needed_inertia

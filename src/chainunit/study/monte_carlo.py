@@ -29,11 +29,11 @@ from .. import __version__
 from ..errors import InterruptedRunError, RunError
 from ..files import whole, writing
 from ..machines.chain_unit import SIDES, SideName
+from ..progress import Report
 from ..quantities import Layout, Value, declaration, quantity
 from ..system import Simulation
 from ..system.instance import remove_unpacked
 from ..text import entry
-from .analysis import Report
 from .config import Config
 from .drive import Drive
 from .event import AnySide, Event

@@ -11,9 +11,10 @@ import numpy as np
 
 from ..machines.api import ChainUnit
 from ..machines.chain_unit import SIDES, Feed, SideName, other
+from ..progress import Report
 from ..quantities import Value, declaration, quantity
 from ..text import entries, entry
-from .analysis import Analysis, Findings, Report
+from .analysis import Analysis, Findings
 from .arrays import peak
 from .config import Config
 from .cycle import Cycle, cycle

@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 
 from ..errors import refusal_prefix
+from ..progress import Progress
 from ..system import (
     CoSimulation,
     Jump,
@@ -33,7 +34,6 @@ from .event import Event, OverTime
 from .measures import STARTED
 from .window import end_gap, whole_turns
 
-Progress = Callable[[float], None]
 _LONGEST_START = 30.0
 """Time after the ramp after which an empty machine is fed, however slowly it turns [s]."""
 _FEED_RISE = 0.1

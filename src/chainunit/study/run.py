@@ -13,10 +13,10 @@ import xarray as xr
 
 from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
+from ..progress import Progress, Report
 from ..system import Simulation
 from . import verdict
 from .analyses import ANALYSES
-from .analysis import Report
 from .bearings import pin_loads
 from .chain import study_chain
 from .choice import choose
@@ -27,7 +27,7 @@ from .measures import read_answers, read_measure
 from .monte_carlo import Task
 from .monte_carlo import run as run_monte_carlo
 from .remarks import conclude
-from .rig import Progress, Rig, Transient
+from .rig import Rig, Transient
 from .shaft import shaft_answers, with_rigid
 from .statics import statics
 from .study import Spread, Study

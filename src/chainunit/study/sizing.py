@@ -18,9 +18,9 @@ from typing import Any
 from ..drives.catalogue import CatalogueMotor, catalogue
 from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
+from ..progress import Report
 from ..quantities import Value, declaration, quantity
 from ..text import entries, number
-from .analysis import Report
 from .catalogue_drive import catalogue_drive
 from .chain import HIGH
 from .config import Config

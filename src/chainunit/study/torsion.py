@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -36,8 +35,8 @@ from ..drives.torsion import (
     with_damping_ratio,
 )
 from ..engines import numpy_
+from ..progress import Progress, Report
 from ..quantities import Value, declaration, quantity
-from .analysis import Report
 from .arrays import stretches
 from .sections import TorsionTable
 
@@ -273,9 +272,7 @@ def _excitation(lead: Any, angle: Any) -> dict[int, float]:
     return {n: size if size > ROUNDOFF else 0.0 for n, size in amplitudes.items()}
 
 
-def _simulated(
-    line: Cardan, speed: Any, load: float, progress: Callable[[float], None]
-) -> SimulatedPeaks | None:
+def _simulated(line: Cardan, speed: Any, load: float, progress: Progress) -> SimulatedPeaks | None:
     """The peaks in time simulation; None where transients take too long to die."""
     settle = settling_time(line, 0.01)
     if damping_ratio(line) < LEAST_DAMPING or simulation_steps(line, speed, settle) > MOST_STEPS:
@@ -290,7 +287,7 @@ def stability_map(
     load: float,
     joint: str,
     damping_ratios: tuple[float, ...],
-    progress: Callable[[float], None] = lambda done: None,
+    progress: Progress = lambda done: None,
 ) -> StabilityMap:
     """Floquet stability over speed [rad/s], bend [rad] and damping, under the mean load [N.m]."""
     ratios = np.array(damping_ratios)

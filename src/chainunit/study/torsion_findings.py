@@ -12,8 +12,9 @@ import numpy as np
 from ..drives.cardan import ORDERS, frequency_band
 from ..drives.torsion import SteadyMotion
 from ..errors import InputError
+from ..progress import Report
 from ..text import array_entry, entries
-from .analysis import Analysis, Findings, Report
+from .analysis import Analysis, Findings
 from .config import Config
 from .drive import Drive
 from .rig import Rig

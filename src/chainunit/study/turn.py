@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from ..progress import Report
 from ..quantities import Value, declaration, quantity
 from ..text import array_entry, entries
-from .analysis import Analysis, Findings, Report
+from .analysis import Analysis, Findings
 from .arrays import peak
 from .config import Config
 from .cycle import Cycle, cycle, energy_swing, no_feed

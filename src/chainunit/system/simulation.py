@@ -21,13 +21,11 @@ import xarray as xr
 
 from ..errors import InputError, InterruptedRunError, RunError
 from ..files import whole
+from ..progress import Progress
 from . import rows
 from .graph import FmuComponent, System, direct_inputs, order
 from .instance import Fmu, Instance, Kind
 from .signals import Profile, at_time
-
-Progress = Callable[[float], None]
-"""Called with the simulated time [s] now and then."""
 
 Watch = tuple[Instance, Any, list[float]]
 """An instance, the handle of its outputs that are guarded, and their limits."""
