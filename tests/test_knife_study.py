@@ -290,7 +290,7 @@ def test_the_files_of_the_study(done, tmp_path):
         for v in Layout(FlywheelAnswers).variables:
             assert entries[v.name] == entry(getattr(wheel.answers, v.name), v.unit, v.kind)
     text = (tmp_path / "result.md").read_text()
-    assert "1.20 kg m2" in text and "(given)" in text and "(least)" in text and "](flywheel.png)" in text
+    assert "1.20 kg m²" in text and "(given)" in text and "(least)" in text and "](flywheel.png)" in text
     page = (tmp_path / "report.html").read_text()
     assert all(f'id="{name}"' in page for name in ("constant_speed", "blade", "flywheels", "motion"))
     # a row for each flywheel on the terminal
@@ -386,9 +386,9 @@ def test_words_for_a_slow_start_and_a_poor_run():
     given = sound | {"flywheel": 5.0, "start_time": 12.0, "residual": 0.03, "cycle_gap": 0.4}
     FlywheelFindings(5.0, 0.05, 1.0, 150.0, 0.1, 1.0, [Wheel(FlywheelAnswers(**given), None)]).remark(study)
     assert [str(remark) for remark in study.warnings] == [
-        "The start takes more than 10 s with a flywheel of 5.00 kg m2 (12.0 s).",
-        "Energy is missing with a flywheel of 5.00 kg m2 (3.00 %): a shorter run.step is needed.",
-        "The turns do not close with a flywheel of 5.00 kg m2 (40.0 %): raise run.settle_turns.",
+        "The start takes more than 10 s with a flywheel of 5.00 kg m² (12.0 s).",
+        "Energy is missing with a flywheel of 5.00 kg m² (3.00 %): a shorter run.step is needed.",
+        "The turns do not close with a flywheel of 5.00 kg m² (40.0 %): raise run.settle_turns.",
     ]
     assert study.warnings[0].quantities["5.start_time"] == (12.0, "s", "")
 

@@ -257,7 +257,7 @@ def test_every_axis_says_what_it_shows_in_which_unit(study, written):
             k: v["title"]["text"] for k, v in figure["layout"].items() if k[1:5] == "axis" and "title" in v
         }
         for axis, title in axes.items():
-            assert re.fullmatch(r".+ \[(N m|N|rad/s|A|s|deg|1|kg m2|rad/\(N m s\))\]|pin", title), (
+            assert re.fullmatch(r".+ \[(N m|N|rad/s|A|s|deg|1|kg m²|rad/\(N m s\))\]|pin", title), (
                 name,
                 axis,
             )

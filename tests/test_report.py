@@ -311,5 +311,5 @@ def test_a_table_on_a_narrow_terminal_keeps_its_right_edge_and_its_numbers_whole
     assert drawn and all(line[-1] in "┓┃┩│┘" and len(line) <= width for line in drawn), out.getvalue()
     # at 66 letters three numbers with their units do not stand beside each other: a unit goes to the next line
     text = out.getvalue()
-    assert (width == 66 and not grouped) or text.count("0.00431 kg m2") == 9, text
+    assert (width == 66 and not grouped) or text.count("0.00431 kg m²") == 9, text
     assert text.count("0.00431") == 9 and text.count("machine") == (3 if text.count("Inertias") == 1 else 6)

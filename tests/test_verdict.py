@@ -166,7 +166,7 @@ def test_words_and_data():
         "Crank speed above that up to which two bars give the rocker torque to 10 %: 3.00 rad/s, limit 2.00 rad/s.",
     ]
     data = verdict.as_dict()
-    assert data["holds"] == "in part" and data["speed"] == {"value": 3.0, "unit": "rad/s"}
+    assert data["holds"] == "in part" and data["speed"] == {"value": 3.0, "unit": "rad/s", "kind": "speed"}
     assert data["reasons"][2] == {
         "topic": "pushed",
         "quantity": "wall_pull",

@@ -16,7 +16,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from types import MappingProxyType
 from typing import Any, TypeAlias
 
@@ -40,6 +42,7 @@ Units: TypeAlias = Mapping[str, tuple[str, ...]]
 DEFAULT_UNITS: Units = MappingProxyType(
     {"speed": ("rad/s", "rev/min"), "frequency": ("rad/s", "Hz"), "power": ("kW",), "millimetres": ("mm",)}
 )
+_WRITTEN_IN: ContextVar[Units] = ContextVar("units of words", default=DEFAULT_UNITS)
 _KIND_OF = {"W": "power", "N.m": "torque", "N": "force"}
 """Kind of a quantity that declares none, by its unit."""
 _SCALES: dict[str, dict[str, tuple[float, float]]] = {
@@ -70,6 +73,16 @@ def chosen_units(given: Mapping[str, str]) -> Units:
             allowed = " or ".join(f'"{name}"' for name in CHOICES[kind])
             raise InputError(f'report.units.{kind} = "{unit}": must be {allowed}')
     return {**DEFAULT_UNITS, **{kind: (unit,) for kind, unit in given.items()}}
+
+
+@contextmanager
+def written_in(units: Units) -> Iterator[None]:
+    """Within it the numbers in sentences are in these units, as those of a study are in the units of its reader."""
+    token = _WRITTEN_IN.set(units)
+    try:
+        yield
+    finally:
+        _WRITTEN_IN.reset(token)
 
 
 def scales(unit: str, kind: str = "", units: Units = DEFAULT_UNITS) -> list[tuple[str, float, float]]:
@@ -184,25 +197,30 @@ def number(
     *,
     full: bool = True,
     none: str = "-",
-    units: Units = DEFAULT_UNITS,
+    units: Units | None = None,
+    beside: bool = True,
 ) -> str:
-    """The same in one piece and in plain letters, for a terminal or a message, the second unit in brackets; `none`
-    stands for a number that is not there."""
+    """The same in one piece and in plain letters, for a terminal or a message, the second unit in brackets where that
+    is wanted `beside`; `none` stands for a number that is not there. The units are those of `written_in`, unless
+    others are given."""
     if value is None or math.isnan(value):
         return none
     shown = [
         plain(f"{text} {follows}" if follows else text)
-        for text, follows in forms(value, unit, kind, digits, full=full, units=units)
+        for text, follows in forms(value, unit, kind, digits, full=full, units=units or _WRITTEN_IN.get())
     ]
-    return shown[0] + "".join(f" ({other})" for other in shown[1:])
+    return shown[0] + "".join(f" ({other})" for other in shown[1:] if beside)
 
 
 _PLAIN = {"−": "-", _THIN: "", "°C": "degC", "°": "deg", "Ω": "Ohm", "∞": "inf"}
 
 
 def plain(text: str) -> str:
-    """A number and its unit in ASCII: 2.34 × 10⁻⁷ kg m² -> 2.34e-7 kg m2."""
+    """A number and its unit in letters that can be typed, but for the powers of units: 2.34 × 10⁻⁷ kg m² ->
+    2.34e-7 kg m²."""
     for sign, letters in _PLAIN.items():
         text = text.replace(sign, letters)
-    text = text.replace(f"{_SPACE}×{_SPACE}10", "e").replace(_SPACE, " ")
-    return text.translate({ord("⁻⁰¹²³⁴⁵⁶⁷⁸⁹"[k]): "-0123456789"[k] for k in range(11)})
+    typed = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+    exponent = f"{_SPACE}×{_SPACE}10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)"
+    text = re.sub(exponent, lambda power: f"e{power[1].translate(typed)}", text)
+    return text.replace(_SPACE, " ")

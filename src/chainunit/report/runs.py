@@ -29,7 +29,8 @@ def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
         yield from _random(s)
     if loops := s.result.get("speed_loop"):
         title = "The speed loop, linearised; deviation and settling: after a step of the load torque"
-        yield matrix(s, "speed_loop", {loop: spoken(loop) for loop in loops}, title, first="")
+        rows = {loop: spoken(loop) if len(loops) > 1 else "constant inertia" for loop in loops}
+        yield matrix(s, "speed_loop", rows, title, first="")
 
 
 def _begin(s: b.Source, study: Study, run: str, phase: Phase) -> Iterator[b.Block]:

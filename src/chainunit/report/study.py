@@ -11,6 +11,7 @@ from ..study.given import GivenSection, description, given
 from ..study.result import as_dict
 from ..study.rig import DIFFERENCE
 from ..study.study import Study
+from ..text import written_in
 from . import answer, chains, figures, runs, shaft, sizing
 from . import blocks as b
 from . import run_names as read
@@ -24,20 +25,21 @@ _VERSIONS = ("numpy", "casadi", "fmpy", "plotly")
 def report(study: Study, result: Mapping[str, Any] | None = None) -> b.Report:
     """The report; `result` are its numbers, by default those of `as_dict`."""
     s = b.Source(as_dict(study) if result is None else result)
-    return b.Report(
-        study.config.title,
-        study.kind,
-        s.result,
-        tuple(_opening(s, study)),
-        tuple(
-            b.Section(name, each.heading, tuple(each.blocks(s, study)))
-            for name, each in _SECTIONS.items()
-            if name in study.findings or name not in ANALYSES
-        ),
-        source=s.line("Study file: {source} · chainunit {chainunit}"),
-        failure=s.words("failure") if study.failure is not None else (),
-        units=study.config.units,
-    )
+    with written_in(study.config.units):
+        return b.Report(
+            study.config.title,
+            study.kind,
+            s.result,
+            tuple(_opening(s, study)),
+            tuple(
+                b.Section(name, each.heading, tuple(each.blocks(s, study)))
+                for name, each in _SECTIONS.items()
+                if name in study.findings or name not in ANALYSES
+            ),
+            source=s.line("Study file: {source} · chainunit {chainunit}"),
+            failure=s.words("failure") if study.failure is not None else (),
+            units=study.config.units,
+        )
 
 
 def _motion(study: Study) -> list[b.Block]:

@@ -28,7 +28,7 @@ from ..progress import Progress, Report
 from ..quantities import Layout, Value, declaration, quantity
 from ..system.instance import Fmu, Instance
 from ..system.simulation import stoppable
-from ..text import entries, entry
+from ..text import entries, entry, number
 from .arrays import peak
 from .config import Config
 from .cycle import Cycle, cycle
@@ -111,7 +111,8 @@ class Band:
 
     def __str__(self) -> str:
         """From where to where, in words; a study without a sweep has but one speed."""
-        return f"{self.low:.4g}" + (f" to {self.high:.4g}" if self.high > self.low else "") + " rad/s"
+        ends = [self.low, self.high] if self.high > self.low else [self.low]
+        return " to ".join(number(end, "rad/s", "speed", 4, full=False, beside=False) for end in ends)
 
 
 @dataclass(frozen=True)

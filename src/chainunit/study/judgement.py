@@ -85,7 +85,8 @@ def motor_verdict(study: Study) -> dict[str, Any] | None:
     }
     run = min(reserves, key=lambda name: float(reserves[name]), default=None)
     reserve = None if run is None else reserves[run]
-    speed, wanted = number(steady.speed_mean, "rad/s"), number(asked, "rad/s", full=False)
+    speed = number(steady.speed_mean, "rad/s", "speed", beside=False)
+    wanted = number(asked, "rad/s", "speed", full=False, beside=False)
     if kept:
         text = f"The motor keeps the crank at {speed}"
     elif steady.speed_mean > asked:
@@ -112,8 +113,8 @@ def motor_verdict(study: Study) -> dict[str, Any] | None:
     return {
         "holds": holds,
         "text": f"{text}.",
-        "speed": entry(steady.speed_mean, "rad/s"),
-        "asked": entry(asked, "rad/s"),
+        "speed": entry(steady.speed_mean, "rad/s", "speed"),
+        "asked": entry(asked, "rad/s", "speed"),
         "least_reserve": entry(reserve, "1", "percent"),
         "run": run,
         "left_out": left_out,

@@ -39,11 +39,18 @@ def conclude(study: Study) -> None:
             "machine behind an open coupling, are not known of it."
         )
     note("assumed", own)
-    note(
-        "smoothed friction",
-        "Friction is smoothed: at rest nothing sticks, so that the torque to break away from a loaded stop is not in "
-        "the start-up.",
-    )
+    if any(value for name, value in study.drive.machine.named.items() if name.endswith("friction")):
+        note(
+            "smoothed friction",
+            "Friction is smoothed: at rest nothing sticks, so that the torque to break away from a loaded stop is "
+            "not in the start-up.",
+        )
+    if left_out := list(_left_out(study)):
+        note(
+            "values left out",
+            "The file leaves out {what}: the packaged values stand for them, and the result hangs on them.",
+            what=" and ".join(left_out),
+        )
     if study.answers:
         study.verdict = model_verdict(study)
         for line in study.verdict.details(study.titles):
@@ -69,6 +76,28 @@ def conclude(study: Study) -> None:
         found.remark(study)
 
 
+_RATING = ("limit.i", "limit.v", "armature.k")
+"""Parameters of a motor without a nameplate that set what it can give."""
+
+
+def _left_out(study: Study) -> Iterator[str]:
+    """Values that decide the result and that the file leaves to the packaged ones."""
+    config, coupling = study.config, study.config.coupling
+    if config.packaged:
+        return
+    if coupling is not None and "coupling.trip_torque" not in config.given:
+        yield f"coupling.trip_torque ({number(coupling.trip_torque, 'N.m', full=False)})"
+    if config.plate is not None and "system.motor" in config.of_example:
+        yield f"the motor ({config.plate.designation})"
+    elif config.sizing is None and config.foreign is None:
+        values = study.drive.motor.parameter_layout.named(study.drive.parameters)
+        units = {v.name: v.unit for v in study.drive.motor.parameter_layout.variables}
+        names = [name for name in _RATING if f"motor.{name}" in config.of_example]
+        if names:
+            sizes = (f"{name} = {number(values[name], units[name], full=False)}" for name in names)
+            yield f"the rating of the motor ({', '.join(sizes)})"
+
+
 def _on_steady_running(study: Study, steady: Answers) -> None:
     asked, warn = study.config.run.crank_speed, partial(study.remark, "warning")
     if not study.reaches:
@@ -79,9 +108,9 @@ def _on_steady_running(study: Study, steady: Answers) -> None:
             "steady running: the crank turns at {speed_mean} in place of {wanted}; {why} Overloads are those of this "
             "state.",
             STEADY,
-            speed_mean=(steady.speed_mean, "rad/s"),
-            asked=(asked, "rad/s"),
-            wanted=number(asked, "rad/s", full=False),
+            speed_mean=(steady.speed_mean, "rad/s", "speed"),
+            asked=(asked, "rad/s", "speed"),
+            wanted=number(asked, "rad/s", "speed", full=False),
             why=limit if study.drive.follows else slip,
         )
     if study.drive.whole_turns(study.steady) is None:
@@ -234,10 +263,10 @@ def _on_chains(study: Study, chain: ChainOrgans) -> None:
     for band in result.avoid:
         if band.low <= speed <= band.high:
             text = "chains: the crank speed lies among those to avoid, {band}: {why}."
-            warn("speed to avoid", text, band=str(band), why=band.why, speed=(speed, "rad/s"))
+            warn("speed to avoid", text, band=str(band), why=band.why, speed=(speed, "rad/s", "speed"))
     for missing, why in result.failed.items():
         text = "chains: {speed} is missing in the sweep: {why}"
-        warn("speed missing", text, why=str(why), speed=(missing, "rad/s"))
+        warn("speed missing", text, why=str(why), speed=(missing, "rad/s", "speed"))
     residual = max(n.energy_residual for n in result.sweep)
     if not residual < RESIDUAL:
         text = (
@@ -257,7 +286,10 @@ def _on_shaft(study: Study) -> None:
     if line.d2 == 0.0 and line.d3 == 0.0:
         undamped = "The driveline has no damping: a vibration that was set off goes on; give d2 and d3."
         note("undamped line", undamped)
-    ends: dict[str, Amount] = {"k_least": (modes.k_least, "rad/s"), "k_largest": (modes.k_largest, "rad/s")}
+    ends: dict[str, Amount] = {
+        "k_least": (modes.k_least, "rad/s", "frequency"),
+        "k_largest": (modes.k_largest, "rad/s", "frequency"),
+    }
     fastest = max((loop.crossover for loop in study.statics.loops.values()), default=0.0)
     if fastest > modes.antiresonance / 3.0:
         warn(

@@ -8,7 +8,7 @@ from typing import Any
 from .. import __version__
 from ..drives.catalogue import CatalogueMotor
 from ..quantities import variables
-from ..text import entries, entry
+from ..text import entries, entry, written_in
 from .coupling import coupling_sentence
 from .given import given
 from .judgement import motor_verdict
@@ -40,6 +40,11 @@ def _rating(motor: CatalogueMotor | None) -> dict[str, Any]:
 
 def as_dict(study: Study) -> dict[str, Any]:
     """Everything but the time series, ready for JSON: each number with its unit."""
+    with written_in(study.config.units):
+        return _as_dict(study)
+
+
+def _as_dict(study: Study) -> dict[str, Any]:
     config = study.config
     return {
         "chainunit": __version__,

@@ -15,6 +15,7 @@ from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
 from ..progress import Progress, Report
 from ..system import Simulation
+from ..text import number, written_in
 from . import verdict
 from .analyses import ANALYSES
 from .bearings import pin_loads
@@ -57,7 +58,12 @@ def run_study(
         overloads that the drive has no inputs for, and a motor of somebody else that does not fit or cannot save its
         state.
     """
-    report = report or (lambda what, done, todo: None)
+    with written_in(config.units):
+        return _run_study(config, folder, report or (lambda what, done, todo: None), check, backend)
+
+
+def _run_study(config: Config, folder: Path, report: Report, check: bool, backend: Backend | None) -> Study:
+    """See `run_study`."""
     choice = choose(config, folder / "fmu", report, backend)
     drive = choice.drive
     if check and drive.outsiders:
@@ -228,7 +234,7 @@ class Runner:
         asked = on_coupling(rig.drive, steady)
         if config.coupling and asked > config.coupling.trip_torque:
             raise RunError(
-                f"the safety coupling opens in steady running, which puts {asked:.4g} N m on it; "
+                f"the safety coupling opens in steady running, which puts {number(asked, 'N.m', digits=4)} on it; "
                 "coupling.trip_torque must be above that"
             )
 

@@ -204,8 +204,8 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
     strong = [m for m in motors if m.nameplate.power >= 0.7 * power]
     if not strong:
         notes.append(
-            f"No motor of the catalogue has 0.7 times the power of the cycle, {0.7 * power:.3g} W: the largest were "
-            "tried."
+            "No motor of the catalogue has 0.7 times the power of the cycle, "
+            f"{number(0.7 * power, 'W')}: the largest were tried."
         )
         strong = [m for m in motors if m.nameplate.power == motors[-1].nameplate.power]
     candidates: list[Candidate] = []

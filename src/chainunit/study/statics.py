@@ -56,13 +56,16 @@ def statics(config: Config, drive: Drive) -> DriveStatics:
     )
 
 
+_CONSTANT = 1e-9
+"""Relative variation of the inertia in a turn up to which it is constant."""
+
+
 def _loops(drive: Drive, inertia: Any) -> dict[str, Loop]:
-    """The speed loop with the mean, the least and the largest inertia of the turn, where the motor has one."""
-    sizes = {
-        "mean inertia": np.mean(inertia),
-        "least inertia": np.min(inertia),
-        "largest inertia": np.max(inertia),
-    }
+    """The speed loop with the mean, the least and the largest inertia of the turn, where the motor has one; with the
+    mean alone where the inertia is constant."""
+    sizes = {"mean inertia": np.mean(inertia)}
+    if np.ptp(inertia) > _CONSTANT * np.max(inertia):
+        sizes |= {"least inertia": np.min(inertia), "largest inertia": np.max(inertia)}
     loops = {
         name: drive.motor.speed_loop(drive.fmu_parameters, drive.rotor_inertia + float(size))
         for name, size in sizes.items()

@@ -110,10 +110,11 @@ class Reason:
         """Its value in words, and the limit where the words of the topic do not say it."""
         rod = {"web_pull": "web ", "wall_pull": "wall "}.get(self.quantity, "")
         said = self.topic in ("pushed", "slack")
-        limit = "" if said else f", limit {number(self.limit, self.unit, self.kind)}"
+        value, limit = (number(x, self.unit, self.kind, beside=False) for x in (self.value, self.limit))
+        limit = "" if said else f", limit {limit}"
         if self.topic == "slack speed" and self.limit == 0.0:
             limit = ", and it is slack at rest already"
-        return f"{rod}{number(self.value, self.unit, self.kind)}{limit}"
+        return f"{rod}{value}{limit}"
 
 
 @dataclass(frozen=True)
@@ -138,11 +139,11 @@ class Verdict:
 
     @property
     def _judged(self) -> str:
-        return number(self.speed, "rad/s")
+        return _speed(self.speed)
 
     @property
     def _turns(self) -> str:
-        return number(self.speed if self.reached is None else self.reached, "rad/s")
+        return _speed(self.speed if self.reached is None else self.reached)
 
     @property
     def _asked(self) -> bool:
@@ -206,8 +207,8 @@ class Verdict:
             "holds": self.holds,
             "caveat": self.caveat or None,
             "text": self.text,
-            "speed": entry(self.speed, "rad/s"),
-            "reached": entry(self.speed if self.reached is None else self.reached, "rad/s"),
+            "speed": entry(self.speed, "rad/s", "speed"),
+            "reached": entry(self.speed if self.reached is None else self.reached, "rad/s", "speed"),
             "reasons": [
                 {
                     "topic": r.topic,
@@ -219,6 +220,15 @@ class Verdict:
                 for r in self.reasons
             ],
         }
+
+
+def _speed(speed: float) -> str:
+    return number(speed, "rad/s", "speed", beside=False)
+
+
+def _at_speed(topic: str, speed: float, limit: float, run: str = "", grave: bool = False) -> Reason:
+    """A crank speed [rad/s] that passes a limit."""
+    return Reason(topic, "crank_speed", speed, limit, "rad/s", run, "speed", grave)
 
 
 def _where(runs: Collection[str]) -> str:
@@ -262,15 +272,15 @@ def two_bars(
         if pull < 0.0
     ]
     if speed >= slack_speed:
-        reasons.append(Reason("slack speed", "crank_speed", speed, slack_speed, "rad/s", grave=True))
+        reasons.append(_at_speed("slack speed", speed, slack_speed, grave=True))
     if speed > CRANK_GOOD * mode:
-        reasons.append(Reason("crank torque", "crank_speed", speed, CRANK_GOOD * mode, "rad/s", grave=True))
+        reasons.append(_at_speed("crank torque", speed, CRANK_GOOD * mode, grave=True))
     elif speed > ROCKER_GOOD * mode:
-        reasons.append(Reason("rocker torque", "crank_speed", speed, ROCKER_GOOD * mode, "rad/s"))
+        reasons.append(_at_speed("rocker torque", speed, ROCKER_GOOD * mode))
     elif speed > ROCKER_GOOD_EMPTY * mode:
         limit = ROCKER_GOOD_EMPTY * mode
         runs = [""] if "" in empty else sorted(empty)
-        reasons += [Reason("rocker torque", "crank_speed", speed, limit, "rad/s", run) for run in runs]
+        reasons += [_at_speed("rocker torque", speed, limit, run) for run in runs]
     return Verdict("organs", "two bars", speed, (*reasons, *_unbalanced(residuals)), reached)
 
 
