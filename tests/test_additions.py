@@ -33,9 +33,7 @@ class Sticking(Event):
 
         factor: Value = quantity("1", "resistance over that of normal running", default=3.0, min=1.0)
 
-    def signals(
-        self, normal: Mapping[str, float], at: float, state: Mapping[str, float]
-    ) -> dict[str, OverTime]:
+    def signals(self, normal: Values, at: float, state: Values) -> Signals:
         """More from the begin on."""
         usual = normal["resistance"]
         return {"resistance": Profile(usual, ((at, 0.01, self.p.factor * usual),))}

@@ -71,7 +71,7 @@ def _sides(s: b.Source, study: Study) -> fig.Figure:
 
     def items(of: str) -> Iterator[fig.Item]:
         for look, (which, name) in enumerate(words.items()):
-            yield fig.Curve(name, sides.speed, getattr(sides, f"{of}_{which}"), look)
+            yield fig.Curve(name, sides.speed, sides.peaks[f"{of}_{which}"], look)
         yield from (fig.Mark(at, look="thin") for speeds in sides.crossings()[of].values() for at in speeds)
         yield fig.Mark(study.config.run.crank_speed, "normal running")
 

@@ -20,6 +20,10 @@ from ..system.signals import Profile, corners
 
 OverTime: TypeAlias = float | Profile
 """Value of an input, or its values over time."""
+Values: TypeAlias = Mapping[str, float]
+"""Values of inputs or outputs by name."""
+Signals: TypeAlias = dict[str, OverTime]
+"""Values of inputs, over time, by name."""
 AnySide: TypeAlias = SideName | Literal[""]
 """A side, or none."""
 
@@ -137,9 +141,7 @@ class Event:
         """Why a system without its inputs leaves it out, in words."""
         return f"the system has no {' or '.join(self.inputs(self.side))}"
 
-    def signals(
-        self, normal: Mapping[str, float], at: float, state: Mapping[str, float]
-    ) -> dict[str, OverTime]:
+    def signals(self, normal: Values, at: float, state: Values) -> Signals:
         """Values of the inputs that it changes, from its begin `at` [s] on.
 
         `normal` are all inputs in steady running, `state` the outputs that it `reads`, at its begin.

@@ -11,7 +11,7 @@ from ..machines.chain_unit import other
 from ..quantities import Value, declaration, quantity
 from ..system.signals import Profile
 from ..text import number
-from .event import AnySide, Event, OverTime, Role, Timing, on_side
+from .event import AnySide, Event, Role, Signals, Timing, Values, on_side
 
 
 def _pulses(normal: float, height: float, begins: list[float], rise: float, hold: float) -> Profile:
@@ -49,9 +49,7 @@ class Jam(Event):
             usual=(1e-4, 60.0),
         )
 
-    def signals(
-        self, normal: Mapping[str, float], at: float, state: Mapping[str, float]
-    ) -> dict[str, OverTime]:
+    def signals(self, normal: Values, at: float, state: Values) -> Signals:
         """The force on the web, on top of that of normal running."""
         (name,), p = self.inputs(self.side), self.p
         return {name: _pulses(normal[name], p.force, self._begins(at), p.rise, p.duration)}
@@ -132,9 +130,7 @@ class Empties(Event):
         """The side that it is named after."""
         return True
 
-    def signals(
-        self, normal: Mapping[str, float], at: float, state: Mapping[str, float]
-    ) -> dict[str, OverTime]:
+    def signals(self, normal: Values, at: float, state: Values) -> Signals:
         """Its material and processing force go away."""
         return {name: Profile(normal[name], ((at, self.p.shift, 0.0),)) for name in self.inputs(self.side)}
 
@@ -165,9 +161,7 @@ class OneSidedFeed(Event):
             ends[here] = normal[here] + share * normal[there]
         return ends
 
-    def signals(
-        self, normal: Mapping[str, float], at: float, state: Mapping[str, float]
-    ) -> dict[str, OverTime]:
+    def signals(self, normal: Values, at: float, state: Values) -> Signals:
         """Material and processing force leave one side for the other, at the same time."""
         return {
             name: Profile(normal[name], ((at, self.p.shift, end),)) for name, end in self.ends(normal).items()
@@ -185,9 +179,7 @@ class LoadedStart(OneSidedFeed):
     class Parameters(FeedShare):
         """Of the feed in the start; it begins at rest and is followed as long as the start-up."""
 
-    def signals(
-        self, normal: Mapping[str, float], at: float, state: Mapping[str, float]
-    ) -> dict[str, OverTime]:
+    def signals(self, normal: Values, at: float, state: Values) -> Signals:
         """The feed on one side from rest on."""
         return dict(self.ends(normal))
 
@@ -216,9 +208,7 @@ class Blocked(Event):
             "N.m.s/rad", "damping of the stop that blocks the rocker", default=2e3, min=0.0, max=1e9
         )
 
-    def signals(
-        self, normal: Mapping[str, float], at: float, state: Mapping[str, float]
-    ) -> dict[str, OverTime]:
+    def signals(self, normal: Values, at: float, state: Values) -> Signals:
         """The stop where the rocker stands."""
         return {
             "stop.stiffness": self.p.stiffness,
@@ -275,9 +265,7 @@ class Dip(Event):
         """A DC motor has a supply of its own."""
         return "this motor's drive has no line voltage of its own"
 
-    def signals(
-        self, normal: Mapping[str, float], at: float, state: Mapping[str, float]
-    ) -> dict[str, OverTime]:
+    def signals(self, normal: Values, at: float, state: Values) -> Signals:
         """The voltage falls and comes back within a millisecond."""
         edge = 1e-3
         whole = normal["voltage"]
@@ -303,9 +291,7 @@ class HardCut(Event):
             "s", "time for which the stack is hard", default=1.5, min=1e-3, max=1e4, usual=(1e-2, 600.0)
         )
 
-    def signals(
-        self, normal: Mapping[str, float], at: float, state: Mapping[str, float]
-    ) -> dict[str, OverTime]:
+    def signals(self, normal: Values, at: float, state: Values) -> Signals:
         """The resistance of the hard stack in place of the usual one; it changes within 10 ms."""
         edge, usual = 1e-2, normal["cut_force"]
         changes = ((at, edge, self.p.force), (at + self.p.duration, edge, usual))
@@ -335,9 +321,7 @@ class Overload(Event):
             "s", "time in which it rises and falls", default=0.005, min=1e-4, max=1e4, usual=(1e-4, 60.0)
         )
 
-    def signals(
-        self, normal: Mapping[str, float], at: float, state: Mapping[str, float]
-    ) -> dict[str, OverTime]:
+    def signals(self, normal: Values, at: float, state: Values) -> Signals:
         """The torque of the material, on top of that of normal running."""
         p = self.p
         return {"load": _pulses(normal["load"], p.torque, [at], p.rise, p.duration)}

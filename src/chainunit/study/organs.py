@@ -13,7 +13,7 @@ from ..machines.api import ChainUnit
 from ..machines.chain_unit import SIDES, Feed, SideName, other
 from ..progress import Report
 from ..quantities import Value, declaration, quantity
-from ..text import entries, entry
+from ..text import array_entry, entries, entry
 from .analysis import Analysis, Findings
 from .arrays import peak
 from .config import Config
@@ -95,16 +95,11 @@ def overload_factors(
 
 @dataclass(frozen=True)
 class Sides:
-    """Cycle maxima of the torques [N m] over crank speed [rad/s], each of shape (speeds,): with both organs, with the
-    left one alone, with the right one alone; and where one alone and both are alike."""
+    """Cycle maxima of the torques [N m] over crank speed [rad/s], each of shape (speeds,), as `rocker_both`: of the
+    rocker or crank, with both organs, the left or the right one alone; and where one alone and both are alike."""
 
     speed: Any
-    rocker_both: Any
-    rocker_left: Any
-    rocker_right: Any
-    crank_both: Any
-    crank_left: Any
-    crank_right: Any
+    peaks: Mapping[str, Any]
 
     def crossings(self) -> dict[str, dict[SideName, list[float]]]:
         """Crank speeds at which one side alone and both ask the same [rad/s], linear between the points, by torque
@@ -113,7 +108,7 @@ class Sides:
         for torque in _TORQUES:
             speeds[torque] = {}
             for side in SIDES:
-                excess = getattr(self, f"{torque}_{side}") - getattr(self, f"{torque}_both")
+                excess = self.peaks[f"{torque}_{side}"] - self.peaks[f"{torque}_both"]
                 at = np.flatnonzero(np.diff(np.sign(excess)) != 0)
                 slope = np.diff(excess)[at]
                 speeds[torque][side] = [
@@ -125,8 +120,8 @@ class Sides:
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON, with units."""
         return {
-            "speed": {"value": self.speed.tolist(), "unit": "rad/s"},
-            **{name: {"value": getattr(self, name).tolist(), "unit": "N.m"} for name in _MAXIMA},
+            "speed": array_entry(self.speed, "rad/s"),
+            **{name: array_entry(x, "N.m") for name, x in self.peaks.items()},
             "crossings": {
                 torque: {side: [entry(w, "rad/s", "speed") for w in speeds] for side, speeds in of.items()}
                 for torque, of in self.crossings().items()
@@ -135,14 +130,15 @@ class Sides:
 
 
 _TORQUES = ("rocker", "crank")
-_MAXIMA = tuple(f"{torque}_{which}" for torque in _TORQUES for which in ("both", *SIDES))
 
 
 def sides_over_speed(machine: ChainUnit, feed: Feed, highest: float = 15.0, points: int = 30) -> Sides:
     """Two-sided against one-sided over crank speeds up to `highest` [rad/s]: at low speed one side alone is the
     heavier case, since nothing balances its weight; at high speed both are, since inertia adds up."""
     speed = np.linspace(highest / points, highest, points)
-    peaks: dict[str, list[float]] = {name: [] for name in _MAXIMA}
+    peaks: dict[str, list[float]] = {
+        f"{torque}_{which}": [] for torque in _TORQUES for which in ("both", *SIDES)
+    }
     for w in speed:
         turns = {"both": cycle(machine, float(w), feed, 360)} | {
             side: _cycle_alone(machine, side, float(w), feed, 360) for side in SIDES
@@ -150,7 +146,7 @@ def sides_over_speed(machine: ChainUnit, feed: Feed, highest: float = 15.0, poin
         for which, turn in turns.items():
             peaks[f"rocker_{which}"].append(peak(turn.outputs.rocker.tau))
             peaks[f"crank_{which}"].append(peak(turn.crank_torque))
-    return Sides(speed, **{name: np.array(found) for name, found in peaks.items()})
+    return Sides(speed, {name: np.array(sizes) for name, sizes in peaks.items()})
 
 
 @declaration

@@ -172,11 +172,8 @@ def _protection(study: Study) -> dict[str, Any]:
     assert study.sizing is not None
     if study.insufficient:
         return {}
-    relay = {
-        "value": study.sizing.best.motor.nameplate.rated_current,
-        "unit": "A",
-        "title": "thermal relay, setting",
-    }
+    current = study.sizing.best.motor.nameplate.rated_current
+    relay = entry(current, "A") | {"title": "thermal relay, setting"}
     setting = study.setting
     if setting is None:
         return {"relay_current": relay}
@@ -215,15 +212,13 @@ def _driveline(study: Study) -> dict[str, Any]:
     largest = max(answers.range_largest for answers in study.shaft.values()) if study.shaft else 0.0
     return {
         "driveline": {
-            "damping_ratio": {"value": study.config.damping_ratio, "unit": "1"},
+            "damping_ratio": entry(study.config.damping_ratio, "1"),
             **entries(study.drive.line),
             **entries(study.statics.torsion),
         },
         "shaft": {name: entries(answers) for name, answers in study.shaft.items()},
         "torque_cycles": {
-            name: [
-                {k: {"value": x, "unit": units[k]} for k, x in row.items()} for row in cycles.classes(largest)
-            ]
+            name: [{k: entry(x, units[k]) for k, x in row.items()} for row in cycles.classes(largest)]
             for name, cycles in study.cycles_of.items()
         },
     }

@@ -30,7 +30,7 @@ from ..system import (
 from .config import Config
 from .cycle import no_feed
 from .drive import Drive
-from .event import Event, OverTime
+from .event import Event, OverTime, Signals, Values
 from .measures import STARTED
 from .window import end_gap, whole_turns
 
@@ -55,7 +55,7 @@ class Transient:
     event: Event
     begin: float
     run: xr.Dataset
-    signals: dict[str, OverTime]
+    signals: Signals
     jumps: dict[str, Jump]
     lead: xr.Dataset | None = None
 
@@ -137,15 +137,13 @@ class Rig:
         machine = self.graph.components["machine"].connectors
         return set(event.inputs(event.side)) <= set(self._inputs) and set(event.reads) <= set(machine)
 
-    def event_signals(self, event: Event, begin: float, state: Mapping[str, float]) -> dict[str, OverTime]:
+    def event_signals(self, event: Event, begin: float, state: Values) -> Signals:
         """The signals of the event, by full name, where it begins at `begin` [s] with the outputs `state`."""
         normal = {name: value for name, (_, value) in self._inputs.items()}
         signals = event.signals(normal, begin, state)
         return {self._inputs[name][0]: signal for name, signal in signals.items()}
 
-    def signals(
-        self, given: Mapping[str, OverTime] | None = None, *, ramp: bool = False
-    ) -> dict[str, OverTime]:
+    def signals(self, given: Mapping[str, OverTime] | None = None, *, ramp: bool = False) -> Signals:
         """Loads of normal running with what is `given` in their place, and the speed reference, from rest with
         `ramp`."""
         run = self.config.run
