@@ -9,10 +9,12 @@ import pytest
 from event_tables import event_line
 from reports import said_of
 
+from chainunit.report.markdown import markdown
+from chainunit.report.study import report
 from chainunit.study.config import parse
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
-from chainunit.text import chosen_units, number, written_in
+from chainunit.text import chosen_units, number, turning, written_in
 
 UNITS = 'units = { speed = "rev/min", torque = "kN.m", force = "kN", power = "W" }\n'
 SHORT = """
@@ -21,6 +23,10 @@ turns = 1
 settle_turns = 1
 step = "2 ms"
 """
+
+
+def study_words(study):
+    return " ".join(sentences(study))
 
 
 def sentences(study):
@@ -54,6 +60,15 @@ trip_torque = 300
     # and not those of another study
     other = run_study(parse(event_line("jam_left", turns=1) + SHORT), tmp_path)
     assert any("the crank at 3.00 rad/s" in words for words in sentences(other))
+
+
+def test_a_word_in_place_of_crank():
+    assert (
+        turning("Crank torque over a crank turn", "accelerator")
+        == "Accelerator torque over an accelerator turn"
+    )
+    assert turning("crank_speed of a crank", "rotor") == "crank_speed of a rotor"
+    assert turning("a crank turn", "crank") == "a crank turn"
 
 
 def test_the_units_of_words_end_where_they_are_written():
@@ -90,6 +105,11 @@ def test_what_the_machine_does_not_have_is_not_spoken_of(friction, tmp_path):
     assert study.failure is None
     kinds = {note.kind for note in study.notes}
     assert ("smoothed friction" in kinds) is (friction > 0.0)
+    # nor has it a crank
+    shown = said_of(study) + markdown(report(study), [])
+    assert not re.search(r"\bcrank\b", shown, re.I)
+    assert "accelerator torque, peak" in shown
+    assert "the accelerator at " in study_words(study)
     # its inertia is constant: one row of the speed loop
     loops = json.loads(json.dumps(as_dict(study)["speed_loop"]))
     assert len(loops) == 1

@@ -215,6 +215,16 @@ def number(
 _PLAIN = {"−": "-", _THIN: "", "°C": "degC", "°": "deg", "Ω": "Ohm", "∞": "inf"}
 
 
+def turning(text: str, word: str) -> str:
+    """The text, written for a machine with a crank, for one whose motor turns something else, the `word` for it."""
+
+    def named(found: re.Match[str]) -> str:
+        article = f"{found[1]}{'n' if word[0] in 'aeiou' else ''} " if found[1] else ""
+        return article + (word.capitalize() if found[2] == "C" else word)
+
+    return text if word == "crank" else re.sub(r"\b(?:([Aa]) )?([Cc])rank\b", named, text)
+
+
 def plain(text: str) -> str:
     """A number and its unit in letters that can be typed, but for the powers of units: 2.34 × 10⁻⁷ kg m² ->
     2.34e-7 kg m²."""

@@ -98,6 +98,8 @@ class MachineModel(Model):
     """Output of each bearing by its title."""
     noun: ClassVar[str] = "machine"
     """What people call it."""
+    turning: ClassVar[str] = "crank"
+    """What people call the link that the motor turns."""
     usual_speed: ClassVar[tuple[float, float]] = (0.05, 25.0)
     """Of the crank [rad/s]; beyond, a slip of the unit is likely."""
     sides: ClassVar[tuple[str, ...]] = ()

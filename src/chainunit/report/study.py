@@ -12,7 +12,7 @@ from ..study.result import as_dict
 from ..study.rig import DIFFERENCE
 from ..study.study import Study
 from ..text import written_in
-from . import answer, chains, figures, runs, shaft, sizing
+from . import answer, chains, figures, runs, shaft, sizing, wording
 from . import blocks as b
 from . import run_names as read
 from .analyses import ANALYSES, Contents
@@ -26,16 +26,17 @@ def report(study: Study, result: Mapping[str, Any] | None = None) -> b.Report:
     """The report; `result` are its numbers, by default those of `as_dict`."""
     s = b.Source(as_dict(study) if result is None else result)
     with written_in(study.config.units):
+        sections = [
+            b.Section(name, each.heading, tuple(each.blocks(s, study)))
+            for name, each in _SECTIONS.items()
+            if name in study.findings or name not in ANALYSES
+        ]
         return b.Report(
             study.config.title,
             study.kind,
             s.result,
-            tuple(_opening(s, study)),
-            tuple(
-                b.Section(name, each.heading, tuple(each.blocks(s, study)))
-                for name, each in _SECTIONS.items()
-                if name in study.findings or name not in ANALYSES
-            ),
+            wording.of_machine(tuple(_opening(s, study)), study.turning),
+            wording.of_machine(tuple(sections), study.turning),
             source=s.line("Study file: {source} · chainunit {chainunit}"),
             failure=s.words("failure") if study.failure is not None else (),
             units=study.config.units,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from ..text import entry, number
+from ..text import entry, number, turning
 from . import verdict
 from .chain import HIGH
 from .measures import Answers
@@ -112,7 +112,7 @@ def motor_verdict(study: Study) -> dict[str, Any] | None:
     holds: Holds = "false" if not kept else "true" if enough else "in part"
     return {
         "holds": holds,
-        "text": f"{text}.",
+        "text": turning(f"{text}.", study.turning),
         "speed": entry(steady.speed_mean, "rad/s", "speed"),
         "asked": entry(asked, "rad/s", "speed"),
         "least_reserve": entry(reserve, "1", "percent"),

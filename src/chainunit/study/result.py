@@ -8,7 +8,7 @@ from typing import Any
 from .. import __version__
 from ..drives.catalogue import CatalogueMotor
 from ..quantities import variables
-from ..text import entries, entry, written_in
+from ..text import entries, entry, turning, written_in
 from .coupling import coupling_sentence
 from .given import given
 from .judgement import motor_verdict
@@ -53,7 +53,7 @@ def _as_dict(study: Study) -> dict[str, Any]:
         "status": f"failed: {study.failure}" if study.failure else "complete",
         "failure": str(study.failure) if study.failure else None,
         "verdict": {
-            "model": study.verdict.as_dict() if study.verdict else None,
+            "model": _on_model(study),
             "motor": motor_verdict(study),
         },
         "warnings": [remark.as_dict() for remark in study.warnings],
@@ -65,6 +65,13 @@ def _as_dict(study: Study) -> dict[str, Any]:
         **{name: found.get(name, {}) | part for name, part in _parts(study).items()},
         "fmus": {name: str(origin) for name, origin in study.fmus.items()},
     }
+
+
+def _on_model(study: Study) -> dict[str, Any] | None:
+    if study.verdict is None:
+        return None
+    found = study.verdict.as_dict()
+    return found | {"text": turning(found["text"], study.turning)}
 
 
 def _given(study: Study) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, TypeAlias
 
 import xarray as xr
@@ -11,7 +11,7 @@ import xarray as xr
 from ..drives.speed_control import Tuning
 from ..errors import RunError
 from ..fmu.backends import Origin
-from ..text import entry, number
+from ..text import entry, number, turning
 from . import verdict
 from .chain import ChainResult
 from .config import Config
@@ -147,7 +147,8 @@ class Study:
         self, severity: Literal["warning", "note"], kind: str, text: str, /, *runs: str, **parts: Amount | str
     ) -> None:
         """Add a remark, see `Remark.of`."""
-        self.remarks.append(Remark.of(severity, kind, text, *runs, **parts))
+        remark = Remark.of(severity, kind, text, *runs, **parts)
+        self.remarks.append(replace(remark, text=turning(remark.text, self.turning)))
 
     @property
     def titles(self) -> dict[str, str]:
@@ -208,6 +209,11 @@ class Study:
     def noun(self) -> str:
         """What people call the machine."""
         return self.drive.machine.model.noun
+
+    @property
+    def turning(self) -> str:
+        """What people call the link of the machine that the motor turns: "crank", but of a machine that has none."""
+        return "crank" if self.drive.outsider else self.drive.machine.model.turning
 
     @property
     def reaches(self) -> bool:
