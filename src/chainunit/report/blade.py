@@ -41,7 +41,7 @@ def _drawn(links: tuple[DrawnLink, ...], at: Mapping[str, tuple[Any, Any]]) -> t
 
 def _spans(found: BladeFindings) -> list[fig.Shade]:
     """Where the blade goes down in the stack."""
-    y, stack = found.y, found.stack
+    y, stack = found.blade.y, found.stack
     inside = (np.roll(y, -1) < y) & (y < stack.top) & (y > stack.table)
     angle = np.append(found.turn.angle, 2.0 * math.pi)
     return [fig.Shade(float(angle[a]), float(angle[b]), "in the stack") for a, b in stretches(inside)]
@@ -49,9 +49,9 @@ def _spans(found: BladeFindings) -> list[fig.Shade]:
 
 def _figure(study: Study, found: BladeFindings) -> fig.Figure:
     angle = found.turn.angle
-    fall = (float(angle[np.argmin(found.y)]) - found.top) % (2.0 * math.pi)
+    fall = (float(angle[np.argmin(found.blade.y)]) - found.top) % (2.0 * math.pi)
     metre, small = ((fig.Axis("x", "m", kind), fig.Axis("y", "m", kind)) for kind in ("", "millimetres"))
-    tilt: tuple[fig.Item, ...] = (fig.Curve("tilt", angle, found.tilt, listed=False), *_spans(found))
+    tilt: tuple[fig.Item, ...] = (fig.Curve("tilt", angle, found.blade.tilt, listed=False), *_spans(found))
     panels = (
         fig.Panel(
             *metre,
@@ -93,19 +93,19 @@ def _positions(machine: Machine, found: BladeFindings, fall: float) -> Iterator[
     ends = sorted(float(at[name][0]) for name in ENDS)
     low, high = ([each, each] for each in (found.stack.table, found.stack.top))
     yield fig.Between("stack", ends, low, high, "hatched")
-    yield fig.Curve("path of the edge's middle", found.x, found.y, "path")
+    yield fig.Curve("path of the edge's middle", found.blade.x, found.blade.y, "path")
     yield from (fig.Label(float(x), float(y), name) for name, (x, y) in at.items() if len(name) < 3)
 
 
 def _path(found: BladeFindings, fall: float) -> Iterator[fig.Item]:
     """The path of the edge's middle, with crank angles on the way down alone: the way up may run along the same
     line."""
-    x, y = (np.append(each, each[0]) for each in (found.x, found.y))
+    x, y = (np.append(each, each[0]) for each in (found.blade.x, found.blade.y))
     yield fig.Shade(found.stack.table, found.stack.top, "stack", "y", "hatched")
     yield fig.Curve("path of the edge's middle", x, y, listed=False)
     angle = found.turn.angle
     for k in range(7):
         i = round((found.top + fall * k / 6.0) / (2.0 * math.pi) * len(angle)) % len(angle)
-        at = float(found.x[i]), float(found.y[i])
+        at = float(found.blade.x[i]), float(found.blade.y[i])
         yield fig.Curve("", [at[0]], [at[1]], marker="o", joined=False, listed=False)
         yield fig.Label(at[0], at[1], number(float(angle[i]), "rad"), "left" if k == 6 else "right")

@@ -50,32 +50,23 @@ class BladeFindings(Findings):
     numbers: Cutting
 
     @property
-    def x(self) -> Any:
-        """Of the middle of the edge [m], shape (POINTS,)."""
-        return self.turn.outputs.blade.x
-
-    @property
-    def y(self) -> Any:
-        """Of the middle of the edge [m], shape (POINTS,)."""
-        return self.turn.outputs.blade.y
-
-    @property
-    def tilt(self) -> Any:
-        """[rad], shape (POINTS,)."""
-        return self.turn.outputs.blade.tilt
+    def blade(self) -> Any:
+        """Place `x` and `y` [m] of the middle of the edge, and `tilt` [rad], each of shape (POINTS,)."""
+        return self.turn.outputs.blade
 
     @property
     def top(self) -> float:
         """Crank angle at which the blade is highest [rad]."""
-        return float(self.turn.angle[np.argmax(self.y)])
+        return float(self.turn.angle[np.argmax(self.blade.y)])
 
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON."""
+        blade = self.blade
         curves = {
             "angle": (self.turn.angle, "rad"),
-            "x": (self.x, "m"),
-            "y": (self.y, "m"),
-            "tilt": (self.tilt, "rad"),
+            "x": (blade.x, "m"),
+            "y": (blade.y, "m"),
+            "tilt": (blade.tilt, "rad"),
         }
         over_turn = {name: array_entry(x[::EVERY], unit) for name, (x, unit) in curves.items()}
         return {**entries(self.numbers), "over_turn": over_turn}

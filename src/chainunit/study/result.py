@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 from .. import __version__
@@ -138,7 +137,10 @@ def _runs(study: Study) -> dict[str, Any]:
             run: {pin: {k: entry(v, "N") for k, v in sizes.items()} for pin, sizes in table.items()}
             for run, table in study.pins.items()
         },
-        "certificate": {name: _pure(shares) for name, shares in study.certificate.items()},
+        "certificate": {
+            name: {of: entry(share, "1") for of, share in shares.items()}
+            for name, shares in study.certificate.items()
+        },
         "block_peaks": {name: _spread(study, name) for name in study.spreads},
         "ripple_without_feed_forward": entry(study.ripple_without, "1", "percent"),
     }
@@ -229,7 +231,3 @@ def _driveline(study: Study) -> dict[str, Any]:
             for name, cycles in study.cycles_of.items()
         },
     }
-
-
-def _pure(values: Mapping[str, float]) -> dict[str, Any]:
-    return {name: entry(value, "1") for name, value in values.items()}

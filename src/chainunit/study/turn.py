@@ -13,9 +13,7 @@ from ..quantities import Value, declaration, quantity
 from ..text import array_entry, entries
 from .analysis import Analysis, Findings
 from .arrays import peak
-from .config import Config
 from .cycle import Cycle, cycle, energy_swing, no_feed
-from .drive import Drive
 from .rig import Rig
 from .study import Study
 
@@ -86,39 +84,30 @@ class TurnAnalysis(Analysis):
     name = "constant_speed"
 
     @staticmethod
-    def applies(config: Config, drive: Drive) -> bool:
-        """Every machine turns."""
-        return True
-
-    @staticmethod
     def find(study: Study, rig: Rig, report: Report) -> TurnFindings:
-        """The turn at the crank speed of the study."""
-        return turn_of(study.config, study.drive)
-
-
-def turn_of(config: Config, drive: Drive) -> TurnFindings:
-    """The turn at the crank speed of a study, by inverse dynamics."""
-    machine, feed, w = drive.machine, config.feed, config.run.crank_speed
-    fed, free = (cycle(machine, w, each, POINTS) for each in (feed, no_feed(feed)))
-    inertia = np.broadcast_to(fed.outputs.J * machine.ratio**2, fed.angle.shape)
-    return TurnFindings(
-        fed,
-        free,
-        inertia,
-        Turn(
-            torque_peak=peak(fed.crank_torque),
-            torque_peak_free=peak(free.crank_torque),
-            torque_mean=float(np.mean(fed.crank_torque)),
-            lost=_lost(fed, config.turn),
-            lost_free=_lost(free, config.turn),
-            energy_swing=energy_swing(fed.crank_torque),
-            inertia_least=float(np.min(inertia)),
-            inertia_largest=float(np.max(inertia)),
-            inertia_mean=float(np.mean(inertia)),
-            margin=float(np.min(fed.outputs.margin)) if hasattr(fed.outputs, "margin") else None,
-        ),
-        {title: _reaction(fed, free, output) for title, output in machine.model.pins.items()},
-    )
+        """The turn at the crank speed of the study, by inverse dynamics."""
+        config, machine = study.config, study.drive.machine
+        feed, w = config.feed, config.run.crank_speed
+        fed, free = (cycle(machine, w, each, POINTS) for each in (feed, no_feed(feed)))
+        inertia = np.broadcast_to(fed.outputs.J * machine.ratio**2, fed.angle.shape)
+        return TurnFindings(
+            fed,
+            free,
+            inertia,
+            Turn(
+                torque_peak=peak(fed.crank_torque),
+                torque_peak_free=peak(free.crank_torque),
+                torque_mean=float(np.mean(fed.crank_torque)),
+                lost=_lost(fed, config.turn),
+                lost_free=_lost(free, config.turn),
+                energy_swing=energy_swing(fed.crank_torque),
+                inertia_least=float(np.min(inertia)),
+                inertia_largest=float(np.max(inertia)),
+                inertia_mean=float(np.mean(inertia)),
+                margin=float(np.min(fed.outputs.margin)) if hasattr(fed.outputs, "margin") else None,
+            ),
+            {title: _reaction(fed, free, output) for title, output in machine.model.pins.items()},
+        )
 
 
 def _lost(cycle: Cycle, turn: float) -> float:
