@@ -135,3 +135,53 @@ step = 0.002
     words = "tuned anew to the inertia with each flywheel"
     assert (words in said_of(study)) is told
     assert study.findings["flywheels"].as_dict()["retuned"] is told
+
+
+HEAVY = """
+empty_start = true
+[system]
+machine = "KnifeDrive"
+motor = "IE3 4-pole 2.2 kW, 100L"
+[feed]
+cut_force = "20 kN"
+[gear]
+efficiency = 1
+J = {J}
+[run]
+crank_speed = "40 rev/min"
+settle_turns = 4
+turns = 4
+step = "4 ms"
+"""
+
+
+def _heavy(J: float, folder):
+    study = run_study(parse(DIP + HEAVY.format(J=J)), folder)
+    assert study.failure is None
+    return study
+
+
+def test_a_heavy_machine_is_waited_for_until_it_has_its_speed(tmp_path):
+    """A rotor that speeds up for 40 s is fed at speed, and the turns that are evaluated gain nothing: a change of the
+    speed that is small in itself takes power that is not of the load."""
+    study = _heavy(10.0, tmp_path)
+    steady, start = study.answers["steady"], study.start
+    assert start.start_time == pytest.approx(study.fed_from) and 35.0 < start.start_time < 45.0
+    assert not {"fed before speed", "speed drifts"} & {each.kind for each in study.warnings}
+    turns, J = study.steady, study.drive.fmu_parameters.rotor.J
+    energy = 0.5 * J * turns["motor.w"].values ** 2
+    work = steady.power_mean * float(turns["time"][-1] - turns["time"][0])
+    assert abs(energy[-1] - energy[0]) < 0.05 * work
+    # the energy of a cut goes to and fro between rotor and blade
+    swing = study.findings["constant_speed"].numbers.energy_swing
+    by_hand = swing / (J * float(np.mean(turns["motor.w"])) ** 2)
+    assert steady.speed_ripple == pytest.approx(by_hand, rel=0.15)
+
+
+def test_a_feed_that_comes_before_the_speed_is_told(tmp_path):
+    """A machine that would take minutes to speed up is fed, and the study says with which speed."""
+    study = _heavy(400.0, tmp_path)
+    (told,) = [each for each in study.warnings if each.kind == "fed before speed"]
+    assert told.quantities["fed"][0] == study.fed_from and study.start.start_time is None
+    assert told.quantities["speed"][0] < 0.5 * study.config.run.crank_speed
+    assert "larger motor" in told.text

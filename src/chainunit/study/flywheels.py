@@ -21,12 +21,12 @@ from .config import Config
 from .cycle import needed_inertia
 from .drive import Drive
 from .measures import Answers, read_answers, same_measure
-from .rig import CLOSED, Rig, worst_residual
+from .rig import Rig, worst_residual
 from .shaft import remedies
 from .study import Amount, Study
 from .turn import Turn, TurnAnalysis
 from .verdict import RESIDUAL, STEADY
-from .window import Phase, Window, whole_turns
+from .window import Phase, Window, closes, whole_turns
 
 CLOSE = 0.03
 """Relative width below the permitted fluctuation in which that of the least flywheel lies."""
@@ -60,6 +60,7 @@ class FlywheelAnswers:
     stored_share: Value = same_measure("stored_share")
     stored_share_most: Value = same_measure("stored_share_most")
     cycle_gap: Value = same_measure("cycle_gap")
+    speed_drift: Value = same_measure("speed_drift")
     residual: Value = quantity("1", "energy residual", kind="percent")
 
 
@@ -80,9 +81,15 @@ class Wheel:
         """Whether the machine starts, and then stands or creeps under its load."""
         return self.answers.start_time is not None and self.answers.speed_ripple is None
 
+    @property
+    def settled(self) -> bool:
+        """Whether its turns close."""
+        return closes(self.answers.cycle_gap or 0.0, self.answers.speed_drift or 0.0)
+
     def keeps(self, permitted: float) -> bool:
-        """Whether it runs and keeps the `permitted` fluctuation."""
-        return self.answers.speed_ripple is not None and self.answers.speed_ripple <= permitted
+        """Whether it runs steadily, not on the way to a stall, and keeps the `permitted` fluctuation."""
+        ripple = self.answers.speed_ripple
+        return ripple is not None and ripple <= permitted and self.settled
 
 
 @dataclass
@@ -200,8 +207,7 @@ def _own(study: Study, found: FlywheelFindings) -> Wheel:
     """The flywheel of the study, whose run has been made."""
     assert study.start is not None
     residual = worst_residual(study.certificate["start_up"])
-    turns = study.steady
-    return _wheel(study, found, found.own, study.answers[STEADY], study.start, turns, residual)
+    return _wheel(study, found, found.own, study.answers[STEADY], study.start, study.steady, residual)
 
 
 def _run(study: Study, rig: Rig, found: FlywheelFindings, flywheel: float) -> Wheel:
@@ -235,8 +241,7 @@ def _wheel(
     turns: xr.Dataset,
     residual: float,
 ) -> Wheel:
-    """A flywheel with what was read from its run; a machine that stands or creeps has no answers in steady
-    running."""
+    """A flywheel with its answers; a machine that stands or creeps has none in steady running."""
     turning = steady.speed_mean > CREEPS * study.config.run.crank_speed
     drive, motor_ripple = study.drive, None
     if drive.line is not None and turning:
@@ -360,7 +365,7 @@ _TROUBLES = (
     ),
     Trouble(
         "flywheel not settled",
-        lambda wheel, rated: _over(wheel.answers.cycle_gap, CLOSED),
+        lambda wheel, rated: not wheel.settled,
         "the turns do not close with a flywheel of {where}: raise run.settle_turns.",
         "cycle_gap",
     ),
@@ -380,7 +385,6 @@ def _on_wheels(found: FlywheelFindings, study: Study) -> None:
             mean=(found.mean_torque, "N.m"),
             rated=(plate.nameplate.torque, "N.m"),
         )
-
     parts: dict[str, Amount] = {"rated": (rated, "A"), "long": (START_LONG, "s")}
     for trouble in _TROUBLES:
         wheels = [wheel for wheel in found.wheels if trouble.has(wheel, rated)]
@@ -399,7 +403,11 @@ def _on_fluctuation(found: FlywheelFindings, study: Study) -> None:
     """Whether the flywheel of the study keeps the fluctuation, and the least that does."""
     permitted = number(found.permitted, "1", "percent")
     own = next((wheel for wheel in found.wheels if wheel.flywheel == found.own), None)
-    if own is not None and own.answers.speed_ripple is not None and not own.keeps(found.permitted):
+    if (
+        own is not None
+        and own.answers.speed_ripple is not None
+        and own.answers.speed_ripple > found.permitted
+    ):
         study.remark(
             "warning",
             "fluctuation",
@@ -479,9 +487,8 @@ def _on_least(found: FlywheelFindings, least: Wheel, note: Callable[..., None]) 
         "start": ("the start takes {start}", (a.start_time, "s")),
     }
     known = {name: part for name, part in parts.items() if part[1][0] is not None}
-    text += (
-        f". {'With it' if least.flywheel else 'Without'} {', '.join(words for words, _ in known.values())}."
-    )
+    beside = "With it" if least.flywheel else "Without"
+    text += f". {beside} {', '.join(words for words, _ in known.values())}."
     note(
         text,
         permitted=(found.permitted, "1", "percent"),

@@ -15,7 +15,7 @@ from . import protection
 from .arrays import peak
 from .drive import AbsentError
 from .stored import stored_shares
-from .window import Phase, Window, end_gap, reaches
+from .window import Phase, Window, drift, end_gap, reaches
 
 STARTED = 0.95
 """Share of the speed that is asked for at which a start is over."""
@@ -165,6 +165,7 @@ class Answers:
     it, None in a start;
     `winding_temperature` is where the winding comes to rest if the steady turns go on for ever;
     `cycle_gap` is the difference between the ends of the steady turns, of speed or torque, over the largest value;
+    `speed_drift` the change of the speed from one to the other over its ripple, 0 where it hardly changes;
     times count from the event; `energy_after_trip` passes the safety coupling while it opens, `energy_behind`
     stays in the machine."""
 
@@ -235,6 +236,14 @@ class Answers:
         "1",
         "gap between the ends of the steady turns",
         lambda w: end_gap(w.drive, w.turns),
+        kind="percent",
+        during=_STEADY,
+        minor=True,
+    )
+    speed_drift: Value = measure(
+        "1",
+        "change of the speed over the steady turns, over its ripple",
+        lambda w: drift(w.drive, w.turns),
         kind="percent",
         during=_STEADY,
         minor=True,

@@ -13,13 +13,13 @@ from ..engines import numpy_
 from ..text import number
 from .coupling import peaks_on_coupling, remark_on_coupling
 from .judgement import model_verdict
-from .measures import Answers
-from .rig import CLOSED
+from .measures import STARTED, Answers
 from .sections import ChainOrgans
 from .shaft import AMPLIFIED, UNEVEN, remedies
 from .study import LOAD_CYCLE, Amount, Study
 from .torsion_findings import TorsionAnalysis
-from .verdict import RESIDUAL, STEADY
+from .verdict import RESIDUAL, START, STEADY
+from .window import CLOSED, DRIFT
 
 
 def conclude(study: Study) -> None:
@@ -58,6 +58,7 @@ def conclude(study: Study) -> None:
     if config.chain is not None:
         _on_chains(study, config.chain)
     if STEADY in study.answers:
+        _on_start(study)
         _on_steady_running(study, study.answers[STEADY])
     if study.sizing is not None:
         for text in study.sizing.notes:
@@ -98,6 +99,27 @@ def _left_out(study: Study) -> Iterator[str]:
             yield f"the rating of the motor ({', '.join(sizes)})"
 
 
+def _on_start(study: Study) -> None:
+    """That the feed came to a machine that had not its speed."""
+    run, fed = study.runs["start_up"], study.fed_from
+    if fed is None:
+        return
+    speed = float(np.interp(fed, run["time"].values, study.drive.crank_motion(run)[1]))
+    asked = study.config.run.crank_speed
+    # the row at which the speed is passed is the last of the start
+    if speed < STARTED * asked:
+        study.remark(
+            "warning",
+            "fed before speed",
+            "start-up: the motor does not bring the empty machine to its speed in reasonable time: the feed comes "
+            "after {fed}, with the crank at {speed} in place of {wanted}; a larger motor, or a lighter flywheel.",
+            START,
+            fed=(fed, "s"),
+            speed=(speed, "rad/s"),
+            wanted=number(asked, "rad/s", full=False),
+        )
+
+
 def _on_steady_running(study: Study, steady: Answers) -> None:
     asked, warn = study.config.run.crank_speed, partial(study.remark, "warning")
     if not study.reaches:
@@ -128,6 +150,16 @@ def _on_steady_running(study: Study, steady: Answers) -> None:
             STEADY,
             cycle_gap=(steady.cycle_gap, "1", "percent"),
             repeats="chains do not repeat a turn" if study.config.chain else "the machine has not settled",
+        )
+    elif abs(steady.speed_drift) > DRIFT and not study.config.chain:
+        warn(
+            "speed drifts",
+            "steady running: the machine still {moves}: the change of its speed over the turns that are evaluated is "
+            "{speed_drift} of the ripple, so that ripple, power and RMS are not those of steady running; raise "
+            "run.settle_turns.",
+            STEADY,
+            moves="speeds up" if steady.speed_drift > 0.0 else "slows down",
+            speed_drift=(abs(steady.speed_drift), "1", "percent"),
         )
     if steady.winding_temperature is not None and not math.isfinite(steady.winding_temperature):
         warn(

@@ -32,9 +32,11 @@ from .cycle import no_feed
 from .drive import Drive
 from .event import Event, OverTime, Signals, Values
 from .measures import STARTED
-from .window import end_gap, whole_turns
+from .window import settled, whole_turns
 
 _LONGEST_START = 30.0
+"""Time after the ramp after which an empty machine is fed, unless it would reach its speed in `_LONGEST_RISE` [s]."""
+_LONGEST_RISE = 600.0
 """Time after the ramp after which an empty machine is fed, however slowly it turns [s]."""
 _FEED_RISE = 0.1
 """Part of a turn in which the feed comes."""
@@ -43,8 +45,6 @@ PATIENCE = 20.0
 machine at least as many seconds as `_SETTLES`."""
 _SETTLES = 5.0
 """Time in which a drive settles, whatever the speed of its crank [s]."""
-CLOSED = 0.01
-"""Gap between the ends of the steady turns up to which they count as closed."""
 
 
 @dataclass(frozen=True)
@@ -194,13 +194,22 @@ class Rig:
     def start_empty(
         self, simulation: Simulation, progress: Progress, guards: Mapping[str, float]
     ) -> tuple[xr.Dataset, Rig]:
-        """The start of an empty machine, until its crank turns at `STARTED` of its speed or a guard ends it; and the
-        rig that is fed from then on."""
+        """The start of an empty machine, until its crank turns at `STARTED` of its speed or a guard ends it, or it
+        speeds up too slowly to get there in time; and the rig that is fed from then on."""
         # behind a shaft line the crank is not where the motor is
         name, ratio = self.drive.crank_speed
-        goal = {name: STARTED * self.config.run.crank_speed * ratio}
-        longest = self.config.started + _LONGEST_START
-        run = simulation.run(longest, self.step, progress, guards={**guards, **goal})
+        goal = STARTED * self.config.run.crank_speed * ratio
+        watched = {**guards, name: goal}
+        longest, piece = self.config.started + _LONGEST_RISE, max(self.config.turn, 1.0)
+        stop = self.config.started + _LONGEST_START
+        run = simulation.run(stop, self.step, progress, guards=watched)
+        while stop - 0.5 * self.step <= simulation.time < longest:
+            speed = float(run[name][-1])
+            before = float(run[name].sel(time=stop - piece, method="nearest"))
+            if goal - speed > (speed - before) / piece * (longest - stop):
+                break
+            stop = min(stop + piece, longest)
+            run = joined([run, simulation.run(stop, self.step, progress, guards=watched)])
         fed = replace(self, fed_from=simulation.time)
         simulation.signals = fed.signals(ramp=True)
         return run, fed
@@ -238,7 +247,7 @@ class Rig:
         since = run.sel(time=slice(steady_from, None))
         turns = self.drive.whole_turns(since, turns_asked)
         if turns is not None and self.drive.turns(turns) > turns_asked - 0.5:
-            if self.drive.chain is not None or end_gap(self.drive, turns) <= CLOSED:
+            if self.drive.chain is not None or settled(self.drive, turns):
                 return None, steady_from
             # as if one turn more had been waited for
             steady_from = float(whole_turns(self.drive, since, 1)["time"][-1])

@@ -7,6 +7,7 @@ same steady state, saved once.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import xarray as xr
@@ -222,7 +223,11 @@ class Runner:
         begin = steady["time"].values[0]
         end = begin if rig.fed_from is None else rig.fed_from
         start = run.sel(time=slice(None, end))
-        study.start = read_answers(study.window(Phase.START_UP, start))
+        # where the feed comes before it is at speed, the start goes on under the feed
+        whole = study.window(Phase.START_UP, run.sel(time=slice(None, begin)))
+        started = read_measure("start_time", whole)
+        study.start = replace(read_answers(study.window(Phase.START_UP, start)), start_time=started)
+        study.fed_from = rig.fed_from
         self._bearings(verdict.START, start)
         if rig.fed_from is not None:
             settling = run.sel(time=slice(end, begin))

@@ -100,6 +100,8 @@ class Study:
     runs: dict[str, xr.Dataset] = field(default_factory=dict)
     steady_from: float | None = None
     """when running became steady [s], where that was later than `config.settled`"""
+    fed_from: float | None = None
+    """when the feed came to a machine that starts empty [s]"""
     event: dict[str, float] = field(default_factory=dict)
     """when each event that was run began [s]"""
     answers: dict[str, Answers] = field(default_factory=dict)

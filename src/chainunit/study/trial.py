@@ -24,8 +24,8 @@ from .arrays import peak
 from .config import Config
 from .drive import Drive
 from .duty import Duty, rms
-from .rig import CLOSED, PATIENCE, Rig
-from .window import BURNT, end_gap
+from .rig import PATIENCE, Rig
+from .window import BURNT, settled
 
 _SPEED_DEVIATION = 0.03  # of the crank speed that is asked for
 _GAP = "motor.air_gap_tau"
@@ -286,7 +286,7 @@ def _until_settled(rig: Rig, simulation: Simulation, stop: float) -> list[xr.Dat
     runs = [simulation.run(stop, rig.step)]
     while drive.chain is None and simulation.time < stop + PATIENCE * turn:
         turns = drive.whole_turns(runs[-1])
-        if turns is None or end_gap(drive, turns) <= CLOSED:
+        if turns is None or settled(drive, turns):
             break
         runs.append(simulation.run(simulation.time + 2.0 * turn, rig.step))
     return runs

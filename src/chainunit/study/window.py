@@ -17,6 +17,12 @@ from .drive import Drive
 
 BURNT = 2000.0
 """Temperature that stands for a winding without a thermal steady state [K]."""
+CLOSED = 0.01
+"""Gap between the ends of the steady turns up to which they count as closed."""
+DRIFT = 0.1
+"""Change of the speed over the steady turns, in parts of its ripple, up to which it counts as steady."""
+_EVEN = 1e-4
+"""Change of the speed over the steady turns, in parts of itself, that is none."""
 
 
 class Phase(Enum):
@@ -160,6 +166,26 @@ def end_gap(drive: Drive, turns: xr.Dataset) -> float:
     _, speed = drive.crank_motion(turns)
     sizes = ((x[-1] - x[0]) / max(np.max(np.abs(x)), 1e-9) for x in (speed, drive.crank_torque(turns)))
     return max(abs(float(size)) for size in sizes)
+
+
+def drift(drive: Drive, turns: xr.Dataset) -> float:
+    """Change of the crank speed from one end of `turns` to the other in parts of its ripple, 1 where it only rises or
+    falls; positive where it rises, 0 where it hardly changes."""
+    _, speed = drive.crank_motion(turns)
+    change = float(speed[-1] - speed[0])
+    return change / float(np.ptp(speed)) if abs(change) > _EVEN * float(np.max(np.abs(speed))) else 0.0
+
+
+def closes(gap: float, drifts: float) -> bool:
+    """Whether turns close, by their `end_gap` and `drift`. A heavy flywheel that still speeds up hardly changes its
+    speed in a turn, but may take more power for that than the machine: the change has to be small beside the ripple,
+    too."""
+    return gap <= CLOSED and abs(drifts) <= DRIFT
+
+
+def settled(drive: Drive, turns: xr.Dataset) -> bool:
+    """Whether `turns` close."""
+    return closes(end_gap(drive, turns), drift(drive, turns))
 
 
 def reaches(speed: float, asked: float) -> bool:
