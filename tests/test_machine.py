@@ -13,10 +13,12 @@ from chainunit import ChainUnit, InputError
 from chainunit.engines import MATH
 from chainunit.machines import api, machine
 from chainunit.machines.api import machine_of
+from chainunit.machines.chain_unit import ChamberForces
 from chainunit.machines.flexible import flexible
 from chainunit.machines.machine import Machine
 from chainunit.models import MACHINES
 from chainunit.quantities import Layout
+from chainunit.study.config import parse
 
 MODELS = {**MACHINES, "SixBar": SixBar}
 
@@ -118,3 +120,15 @@ def test_what_a_chain_unit_has_beside_others():
         for out in (machine.outputs(0.4, 3.0, feed=f) for f in (feed, more))
     ]
     assert 2.0 * energy == pytest.approx(float(stored[1] - stored[0]), rel=1e-9)
+
+
+def test_a_machine_derived_from_the_chain_unit_is_one(monkeypatch):
+    monkeypatch.setitem(MACHINES, "OtherUnit", None)
+
+    class OtherUnit(ChamberForces):
+        name = "OtherUnit"
+
+    machine = parse('[system]\nmachine = "OtherUnit"\n[machine]\nratio = 20').machine
+    assert isinstance(machine, ChainUnit) and machine.model is OtherUnit and machine.ratio == 20.0
+    assert machine.loaded_sides(OtherUnit.Feed()) == OtherUnit.sides == ("left", "right")
+    assert machine.slack_speed() == ChainUnit(ratio=20.0).slack_speed()

@@ -51,9 +51,14 @@ class ChainUnit(Machine):
     p: Parameters
 
     def __init__(
-        self, parameters: Parameters | Mapping[str, float] | None = None, /, **values: float
+        self,
+        parameters: Parameters | Mapping[str, float] | None = None,
+        /,
+        *,
+        model: type[ChamberForces] = ChamberForces,
+        **values: float,
     ) -> None:
-        super().__init__(ChamberForces, parameters, **values)
+        super().__init__(model, parameters, **values)
 
     @classmethod
     def from_ratios(
@@ -323,8 +328,8 @@ class ChainedUnit(Machine):
 
 def machine_of(model: type[InverseMachine], parameters: Any = None, /, **values: float) -> Machine:
     """The machine of a model with what its kind has beside others; arguments and errors as of `Machine`."""
-    if model is ChamberForces:
-        return ChainUnit(parameters, **values)
+    if issubclass(model, ChamberForces):
+        return ChainUnit(parameters, model=model, **values)
     if issubclass(model, ChainedModel):
         return ChainedUnit(model, parameters, **values)
     return Machine(model, parameters, **values)
