@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
 
 from chainunit import InputError
+from chainunit.report.markdown import markdown
+from chainunit.report.study import report
 from chainunit.study.config import parse
 from chainunit.study.monte_carlo import read
 from chainunit.study.result import as_dict
@@ -56,7 +59,8 @@ def test_a_flywheel_makes_a_small_motor_fit_a_load_that_comes_and_goes(sized):
     # it starts without a cut; it is judged once it has settled to its cuts
     settled = np.sqrt(np.mean(study.steady["motor.air_gap_tau"].values ** 2))
     assert best.checks["rms_torque"].value == pytest.approx(settled, rel=0.01)
-    # the duty has one feed, and no sides
+    # the duty has one feed, and no sides, nor is there a word on them
+    assert not re.search(r"\bsides?\b", markdown(report(study), []))
     numbers = as_dict(study)
     assert "one_sided" not in numbers["sizing"]
     assert numbers["sizing"]["cycle"]["torque_peak_one_sided"]["value"] is None

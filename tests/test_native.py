@@ -38,6 +38,7 @@ from chainunit.fmu.native.generate import rules
 from chainunit.fmu.native.platforms import compile_code, compiler
 from chainunit.fmu.recipe import Experiment, script_of
 from chainunit.fmu.reference import INPUTS, READ, REFERENCE, STANDARD, STEPPED, excitation
+from chainunit.fmu.reference import reference_results as reference_results_of
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.models import MODELS
 from chainunit.quantities import TYPES
@@ -831,6 +832,18 @@ def test_an_export_does_not_follow_states_without_end(tmp_path, caplog, monkeypa
     file = export_python(MODELS["CardanDriveline"], tmp_path / "x.fmu", {"c2": 1e12, "c3": 1e12})
     assert not [n for n in zipfile.ZipFile(file).namelist() if n.startswith("extra/")]
     assert "CardanDriveline: no reference results inside: the states are too fast" in caplog.text
+
+
+@pytest.mark.parametrize("ratio", [1.0, 40.0])
+def test_a_machine_that_turns_by_itself_has_reference_results(ratio):
+    """Behind a gear its shaft is light: the torque of the reference results is of its size."""
+    interface = Interface(MODELS["KnifeDrive"].direct(), {"ratio": ratio})
+    files = reference_results_of(interface)
+    assert len(files) == 4, files
+    stepped = next(text for name, text in files.items() if name.endswith(f"_{STEPPED}.csv"))
+    head, *rows = stepped.decode().splitlines()
+    w = [float(row.split(",")[head.split(",").index("w")]) for row in rows]
+    assert len(rows) == 26 and 0.1 < max(map(abs, w)) < 1e4
 
 
 def test_the_command_says_where_an_fmu_comes_without_reference_results(tmp_path):

@@ -173,7 +173,8 @@ def _csv(head: Sequence[str], rows: Sequence[Sequence[float]]) -> bytes:
 _SIZES = {"rad": 0.1, "rad/s": 50.0, "kg": 10.0, "N": 100.0}
 """of an input whose declaration shows none, by unit; others 1"""
 _PUSH = 300.0
-"""rad/s2: the torque of a load is what gives the shaft that takes it this acceleration"""
+"""rad/s2: the torque of a load is what gives the shaft that takes it this acceleration; a torque that turns a shaft
+gives no more"""
 _RUN = 4.0
 """rad/s: mean speed of a shaft that runs from rest"""
 
@@ -181,8 +182,8 @@ _RUN = 4.0
 def excitation(interface: Interface) -> Callable[[float], dict[str, float]]:
     """The inputs as functions of time [s], for the reference results: all move smoothly, within their bounds.
 
-    A shaft runs from rest, unevenly. A load is of the size that suits the shaft that takes it. Everything else swings
-    about its start value, or about its usual size where that is 0.
+    A shaft runs from rest, unevenly. A load, or a torque, is of the size that suits the shaft that takes it.
+    Everything else swings about its start value, or about its usual size where that is 0.
     """
     model = interface.model
     sizes = interface.script.sizes
@@ -193,6 +194,12 @@ def excitation(interface: Interface) -> Callable[[float], dict[str, float]]:
             moving = _load(sizes.get(terminal.members["tau_bias"], _PUSH * inertia), inertia)
         elif terminal.kind == FLANGE:
             moving = _SHAFT
+            turning = [s for s in interface.of("input") if s.name == terminal.members.get("tau")]
+            if turning and model.state_layout:
+                # a torque that is usual for one shaft lets the states of a light one run away
+                tau, most = turning[0], _PUSH * _inertia(interface, turning[0].name)
+                usual = _size(tau.variable.quantity, tau.start, sizes.get(tau.name))
+                sizes = {**sizes, tau.name: min(usual, most)}
         else:
             continue
         courses |= {terminal.members[member]: course for member, course in moving.items()}

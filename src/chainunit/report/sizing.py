@@ -50,12 +50,14 @@ def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
         if len(candidates) > listed:
             yield b.Text(f"{len(candidates) - listed} more were tried; report.html lists them.", form="short")
     tables = []
+    # of a machine without sides no feed is on one of them
+    sided = () if study.config.machine.model.sides else ("one_sided_share", "torque_peak_one_sided")
     for name in ("asked", "cycle", "flywheel", "protection"):
         # the sentence on the coupling stands above, and is no cell of a narrow table
         leaves = [
             leaf
             for key, below in (section.get(name) or {}).items()
-            if not isinstance(below, str)
+            if not isinstance(below, str) and key not in sided
             for leaf in _leaves(below, f"sizing.{name}.{key}", spoken(key))
         ]
         rows = tuple(b.TableRow((title, _leaf(s, path))) for title, path in leaves)

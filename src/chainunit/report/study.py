@@ -82,8 +82,9 @@ def _opening(s: b.Source, study: Study) -> Iterator[b.Block]:
 
 def _given(s: b.Source, study: Study) -> Iterator[b.Block]:
     """All values of the study, by section."""
-    # a motor on the line follows no reference
-    unused = () if study.drive.follows else ("run.ramp",)
+    # a motor on the line follows no reference, and a machine without sides has no feed on one
+    unused = [] if study.drive.follows else ["run.ramp"]
+    unused += [] if study.config.machine.model.sides else ["sizing.one_sided_share"]
     yield b.Given(tuple((section.title, tuple(_values(s, section, unused))) for section in given(study)))
 
 

@@ -40,7 +40,7 @@ class CycleNumbers:
     torque_mean: Value = quantity("N.m", "mean torque, normal feed")
     torque_peak: Value = quantity("N.m", "peak torque, normal feed")
     torque_peak_one_sided: Value = quantity("N.m", "peak torque, all feed on one side, the larger of both")
-    torque_rms: Value = quantity("N.m", "RMS torque of the duty, each feed in its share of time")
+    torque_rms: Value = quantity("N.m", "RMS torque of the duty")
     inertia_least: Value = quantity("kg.m2", "reflected inertia, least")
     inertia_mean: Value = quantity("kg.m2", "reflected inertia, mean")
     inertia_largest: Value = quantity("kg.m2", "reflected inertia, largest")
