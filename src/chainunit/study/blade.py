@@ -6,7 +6,6 @@ The mechanics are in `machines.knife_drive`.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -73,7 +72,7 @@ class BladeFindings(Findings):
 
     def remark(self, study: Study) -> None:
         """Where the blade does not go through the stack, and what the work of a cut rests on."""
-        n, warn = self.numbers, partial(study.remark, "warning")
+        n, warn = self.numbers, study.warn
         top, table = (float(x) for x in (self.stack.top, self.stack.table))
         if n.blade_bottom > top:
             warn(
@@ -100,8 +99,7 @@ class BladeFindings(Findings):
                 blade_top=(n.blade_top, "m", "millimetres"),
             )
         if n.cut_path > 0.0:
-            study.remark(
-                "note",
+            study.note(
                 "work of a cut",
                 "Work of a cut {cut_work}; force times path through the stack {cut_work_by_path}. The resistance "
                 "rises and falls over stack.edge, and fades below stack.v_smooth.",

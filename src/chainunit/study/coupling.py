@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 
 import xarray as xr
 
@@ -116,7 +115,7 @@ def remark_on_coupling(study: Study, trip: float) -> None:
     most = None if study.drive.foreign else pull_out(study)
     peaks, shocks = peaks_on_coupling(study), peaks_on_coupling(study, Role.SHOCK)
     amounts = {"trip": (trip, "N.m")} | ({} if most is None else {"motor": (most, "N.m")})
-    warn = partial(study.remark, "warning")
+    warn = study.warn
     if study.start_torque is not None and study.start_torque > trip:
         warn(
             "coupling held shut",

@@ -150,8 +150,7 @@ class FlywheelFindings(Findings):
         _on_wheels(self, study)
         _on_fluctuation(self, study)
         if not study.drive.follows:
-            study.remark(
-                "note",
+            study.note(
                 "cold windings",
                 "The windings begin cold and have no time to warm up in these runs; warm, the motor slips more.",
             )
@@ -377,8 +376,7 @@ def _on_wheels(found: FlywheelFindings, study: Study) -> None:
     plate = study.config.plate
     rated = math.inf if plate is None else plate.nameplate.rated_current
     if plate is not None and found.mean_torque > plate.nameplate.torque:
-        study.remark(
-            "warning",
+        study.warn(
             "motor too small",
             "the load takes {mean} of the motor on average, rated is {rated}: a larger motor helps, no flywheel "
             "does.",
@@ -396,7 +394,7 @@ def _on_wheels(found: FlywheelFindings, study: Study) -> None:
             }
             where = ", ".join(map(trouble.words, wheels))
             words = {name: number(*part, full=False) for name, part in parts.items()}
-            study.remark("warning", trouble.kind, trouble.text, where=where, **words, **amounts)
+            study.warn(trouble.kind, trouble.text, where=where, **words, **amounts)
 
 
 def _on_fluctuation(found: FlywheelFindings, study: Study) -> None:
@@ -408,8 +406,7 @@ def _on_fluctuation(found: FlywheelFindings, study: Study) -> None:
         and own.answers.speed_ripple is not None
         and own.answers.speed_ripple > found.permitted
     ):
-        study.remark(
-            "warning",
+        study.warn(
             "fluctuation",
             "the speed fluctuates by {speed_ripple} with the study's flywheel, {flywheel}; permitted is {permitted}.",
             STEADY,
@@ -420,15 +417,13 @@ def _on_fluctuation(found: FlywheelFindings, study: Study) -> None:
     # a flywheel without a run is not judged
     if found.searched and not any(wheel.keeps(found.permitted) for wheel in found.wheels):
         more = "." if found.least is not None else ", nor does a larger one that was tried."
-        study.remark(
-            "warning",
-            "no flywheel keeps it",
-            f"no flywheel of the list keeps the speed within {permitted}{more}",
+        study.warn(
+            "no flywheel keeps it", f"no flywheel of the list keeps the speed within {permitted}{more}"
         )
         _on_line(found, study)
     _on_heavier(found, study)
     if found.least is not None:
-        _on_least(found, found.least, partial(study.remark, "note", "least flywheel"))
+        _on_least(found, found.least, partial(study.note, "least flywheel"))
 
 
 def _on_line(found: FlywheelFindings, study: Study) -> None:
@@ -439,8 +434,7 @@ def _on_line(found: FlywheelFindings, study: Study) -> None:
         return
     best = min(even, key=lambda wheel: float(wheel.answers.speed_ripple))
     causes = remedies(study.drive.line)
-    study.remark(
-        "warning",
+    study.warn(
         "ripple behind flywheel",
         "with a flywheel of {flywheel} the motor's speed fluctuates by {motor_ripple}, the crank's by "
         "{speed_ripple}: the shaft line makes the rest, which no flywheel on the motor's shaft evens; {remedy}.",
@@ -463,7 +457,7 @@ def _on_heavier(found: FlywheelFindings, study: Study) -> None:
         sizes = [(float(name.rpartition(".")[0]), amount) for name, amount in amounts.items()]
         where = ", ".join(f"{number(size, 'kg.m2')} ({number(*amount)})" for size, amount in sizes)
         text = "the speed fluctuates more, not less, with the heavier flywheel of {where}: the drive swings with it."
-        study.remark("warning", "heavier flywheel worse", text, where=where, **amounts)
+        study.warn("heavier flywheel worse", text, where=where, **amounts)
 
 
 def _on_least(found: FlywheelFindings, least: Wheel, note: Callable[..., None]) -> None:

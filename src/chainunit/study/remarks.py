@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from functools import partial
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from .window import CLOSED, DRIFT
 
 def conclude(study: Study) -> None:
     """Judge the model, and add every remark to the study."""
-    config, note = study.config, partial(study.remark, "note")
+    config, note = study.config, study.note
     own = "What the study file does not name is at its declared start value, which is assumed."
     if config.packaged:
         own = "Masses, pins, feed and drive are assumed; the papers print none."
@@ -54,7 +53,7 @@ def conclude(study: Study) -> None:
     if study.answers:
         study.verdict = model_verdict(study)
         for line in study.verdict.details(study.titles):
-            study.remark("warning", "model", "{line}", line=line)
+            study.warn("model", "{line}", line=line)
     if config.chain is not None:
         _on_chains(study, config.chain)
     if STEADY in study.answers:
@@ -65,7 +64,7 @@ def conclude(study: Study) -> None:
             note("sizing", "{text}", text=text)
         if study.insufficient:
             answer = study.sizing.answer
-            study.remark("warning", "insufficient motor", "{answer}. All runs are with it.", answer=answer)
+            study.warn("insufficient motor", "{answer}. All runs are with it.", answer=answer)
     if config.coupling is not None and STEADY in study.answers:
         remark_on_coupling(study, config.coupling.trip_torque)
     _on_runs(study)
@@ -108,8 +107,7 @@ def _on_start(study: Study) -> None:
     asked = study.config.run.crank_speed
     # the row at which the speed is passed is the last of the start
     if speed < STARTED * asked:
-        study.remark(
-            "warning",
+        study.warn(
             "fed before speed",
             "start-up: the motor does not bring the empty machine to its speed in reasonable time: the feed comes "
             "after {fed}, with the crank at {speed} in place of {wanted}; a larger motor, or a lighter flywheel.",
@@ -121,7 +119,7 @@ def _on_start(study: Study) -> None:
 
 
 def _on_steady_running(study: Study, steady: Answers) -> None:
-    asked, warn = study.config.run.crank_speed, partial(study.remark, "warning")
+    asked, warn = study.config.run.crank_speed, study.warn
     if not study.reaches:
         limit = "the motor's voltage or current is at its limit, or the run is too short to settle."
         slip = "a motor on the line takes the speed that gear ratio and slip give."
@@ -168,8 +166,7 @@ def _on_steady_running(study: Study, steady: Answers) -> None:
             STEADY,
         )
     if study.ripple_without is not None:
-        study.remark(
-            "note",
+        study.note(
             "feed-forward",
             "Feed-forward of the machine's torque brings the ripple of the speed from {without} to {speed_ripple}.",
             STEADY,
@@ -200,8 +197,7 @@ def _on_runs(study: Study) -> None:
         runs = {name: (shown, amounts) for name, each, shown, amounts in happenings if each == kind}
         where = (f"{study.called(name)}{f' ({shown})' if shown else ''}" for name, (shown, _) in runs.items())
         limit = {"passed": limits[kind]} if kind in limits else {}
-        study.remark(
-            "warning",
+        study.warn(
             kind,
             f"{_HAPPENED[kind]}: {{where}}.",
             *runs,
@@ -242,7 +238,7 @@ def _happenings(study: Study, name: str) -> Iterator[tuple[str, str, dict[str, A
 
 
 def _on_random_overloads(study: Study) -> None:
-    random, note = study.monte_carlo, partial(study.remark, "note")
+    random, note = study.monte_carlo, study.note
     if random and random.remark:
         note("too few runs", "overloads at random: {text}", text=random.remark)
     if random and random.left_out:
@@ -262,8 +258,7 @@ def _on_assumptions(study: Study) -> None:
         event = study.config.events[name]
         without = " These peaks are without the safety coupling, which opens at {trip}." if coupling else ""
         low, high = spread.peaks["crank_torque"]
-        study.remark(
-            "note",
+        study.note(
             "assumption",
             "{title}: {text}" + without,
             name,
@@ -278,7 +273,7 @@ def _on_assumptions(study: Study) -> None:
 def _on_chains(study: Study, chain: ChainOrgans) -> None:
     """What the reader has to know of the chains."""
     (walls, webs), result = study.drive.rods, study.chain
-    warn, note = (partial(study.remark, severity) for severity in ("warning", "note"))
+    warn, note = study.warn, study.note
     note(
         "chains",
         f"The organs are chains of {walls} + {webs} rods; their damping (eta {chain.eta:g} N m2 s, ends "
@@ -311,7 +306,7 @@ def _on_shaft(study: Study) -> None:
     """What the reader has to know of the driveline."""
     line, modes = study.drive.line, study.statics.torsion
     assert modes is not None
-    warn, note = (partial(study.remark, severity) for severity in ("warning", "note"))
+    warn, note = study.warn, study.note
     if study.sizing is not None:
         rigid = "Sizing took the shafts for rigid and the driveline for massless; the runs have it."
         note("sized without line", rigid)
@@ -336,8 +331,8 @@ def _on_shaft(study: Study) -> None:
     _, i, _ = two_joints(numpy_(), line, np.linspace(0.0, np.pi, 361))
     unevenness = float(np.ptp(i))
     if unevenness > UNEVEN:
-        study.remark(
-            "warning" if TorsionAnalysis.name in study.findings else "note",
+        say = warn if TorsionAnalysis.name in study.findings else note
+        say(
             "uneven joints",
             "The joints turn unevenly: shaft 3 turns {least} to {largest} times as fast as shaft 2 (ratio i23), and "
             "this varies by {unevenness} twice a turn; {remedies}.",

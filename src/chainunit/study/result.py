@@ -51,10 +51,7 @@ def _as_dict(study: Study) -> dict[str, Any]:
         "source": config.source,
         "status": f"failed: {study.failure}" if study.failure else "complete",
         "failure": str(study.failure) if study.failure else None,
-        "verdict": {
-            "model": _on_model(study),
-            "motor": motor_verdict(study),
-        },
+        "verdict": {"model": _on_model(study), "motor": motor_verdict(study)},
         "warnings": [remark.as_dict() for remark in study.warnings],
         "notes": [remark.as_dict() for remark in study.notes],
         "slips": [slip.as_dict() for slip in config.slips],

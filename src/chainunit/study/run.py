@@ -116,8 +116,7 @@ def _check_random(config: Config, rig: Rig) -> None:
 def _chains(study: Study, file: Path, report: Report) -> None:
     """Chains at constant speed; left out where an FMU in Python would take hours for their many turns."""
     if study.fmus["machine"].backend != "native":
-        study.remark(
-            "note",
+        study.note(
             "chains left out",
             "chains at constant speed and the sweep are left out: they need native code, that is a C compiler.",
         )
@@ -190,11 +189,8 @@ class Runner:
         """Remarks of events for which the system has no input."""
         for event in self.study.config.events.values():
             if event not in (*self.events, *self.starts):
-                self.study.remark(
-                    "note",
-                    "event left out",
-                    f"{event.title}: it was left out, as {event.without}.",
-                    event.name,
+                self.study.note(
+                    "event left out", f"{event.title}: it was left out, as {event.without}.", event.name
                 )
 
     def _start_up(self, simulation: Simulation) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
 
 import xarray as xr
@@ -11,7 +11,7 @@ import xarray as xr
 from ..drives.speed_control import Tuning
 from ..errors import RunError
 from ..fmu.backends import Origin
-from ..text import entry, number, turning
+from ..text import entry, number
 from . import verdict
 from .chain import ChainResult
 from .config import Config
@@ -145,12 +145,13 @@ class Study:
         """Remarks on the assumptions behind the numbers."""
         return [remark for remark in self.remarks if remark.severity == "note"]
 
-    def remark(
-        self, severity: Literal["warning", "note"], kind: str, text: str, /, *runs: str, **parts: Amount | str
-    ) -> None:
-        """Add a remark, see `Remark.of`."""
-        remark = Remark.of(severity, kind, text, *runs, **parts)
-        self.remarks.append(replace(remark, text=turning(remark.text, self.turning)))
+    def warn(self, kind: str, text: str, /, *runs: str, **parts: Amount | str) -> None:
+        """Add a warning, see `Remark.of`."""
+        self.remarks.append(Remark.of("warning", kind, text, *runs, **parts))
+
+    def note(self, kind: str, text: str, /, *runs: str, **parts: Amount | str) -> None:
+        """Add a note, see `Remark.of`."""
+        self.remarks.append(Remark.of("note", kind, text, *runs, **parts))
 
     @property
     def titles(self) -> dict[str, str]:

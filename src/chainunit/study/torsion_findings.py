@@ -54,8 +54,7 @@ class TorsionAnalysis(Analysis):
         ends = modes.k_least, modes.k_largest
         wanted = config.gives("torsion")
         if not wanted and speed < SLOW * ends[0]:
-            study.remark(
-                "note",
+            study.note(
                 "torsion left out",
                 "The line's shaft turns at {speed}, far below its natural frequency of {k_least}: no order of the "
                 "joints comes near it, and the analysis in rotation is left out; a table [torsion] asks for it.",
@@ -101,8 +100,7 @@ class TorsionFindings(Findings):
         steady = study.shaft.get(STEADY)
         peak = float(self.analysis.operating.peak2[0])
         if steady is not None and not 1.0 / APART < steady.tau2_peak / peak < APART:
-            study.remark(
-                "note",
+            study.note(
                 "torque of the motor",
                 "In steady running shaft 2 peaks at {run}, in the analysis of the line in rotation at {peak}: there "
                 "the motor gives a constant torque, while speed control, slip and the machine's own unevenness act "
