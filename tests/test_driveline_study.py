@@ -20,8 +20,10 @@ from chainunit import InputError, cli
 from chainunit.drives import shafts, torsion
 from chainunit.drives.cardan import Cardan, Twist, frozen_frequency, two_joints
 from chainunit.drives.torsion import rigid, settling_time, simulate, steady, with_damping_ratio
-from chainunit.engines import MATH
+from chainunit.engines import MATH, numpy_
 from chainunit.quantities import Layout
+from chainunit.report import blocks, figure
+from chainunit.report import torsion as torsion_report
 from chainunit.report.torsion import PICTURES
 from chainunit.study import config, parts, torsion_findings
 from chainunit.study.choice import choose
@@ -495,6 +497,57 @@ def test_crossings_are_where_the_orders_meet_the_band(study):
     assert f"is {number(near, '1', 'percent')} from where order 2" in str(warning)
     assert " to ".join(ends) in str(warning)
     assert warning.quantities["near"][0] == pytest.approx(near)
+
+
+SLOW_LINE = """
+[driveline]
+place = "crank"
+alpha1 = "12 deg"
+c2 = 9000
+c3 = 9000
+damping_ratio = 0.05
+J4 = 0.5
+[torsion]
+slowest = 6
+fastest = 10
+points = 20
+speeds = 4
+bends = 2
+damping_ratios = [0.05]
+"""
+
+
+def test_ranges_of_the_natural_frequency_say_over_what_they_are():
+    """The inertia of a chain unit varies over its turn, i23 over that of the shaft; an order meets both."""
+    study = study_of(SLOW_LINE)
+    found = TorsionAnalysis.find(study, Rig(study.config, study.drive, {}), lambda *_: None)
+    J = study.statics.normal.outputs.J
+    ratio = found.analysis.ratio
+    low, high = (
+        [
+            pick(frozen_frequency(numpy_(), two_masses(study.drive, float(x)), ratio))
+            for pick in (np.min, np.max)
+        ]
+        for x in (np.max(J), np.min(J))
+    )
+    assert found.analysis.crossings()[2] == pytest.approx((low[0] / 2.0, high[1] / 2.0), rel=1e-6)
+    band = found.analysis.band
+    assert high[1] - low[0] > 2.0 * (band.largest - band.least)
+    study.findings["torsion"] = found
+    source = blocks.Source({"torsion": found.as_dict()})
+    shown = list(torsion_report.blocks(source, study))
+    table = next(each for each in shown if isinstance(each, blocks.Table) and "ranges" in each.title)
+    rows = {row.cells[0]: [cell.value for cell in row.cells[1:]] for row in table.rows if row.cells[2]}
+    assert rows["natural frequency, over a turn of the shaft"] == pytest.approx([band.least, band.largest])
+    over_both = "over the turns of shaft and machine"
+    assert rows[f"natural frequency, {over_both}"] == pytest.approx([low[0], high[1]], rel=1e-6)
+    assert rows[f"speed at which order 2 meets it, {over_both}"] == pytest.approx(
+        [low[0] / 2.0, high[1] / 2.0], rel=1e-6
+    )
+    campbell = next(each for each in shown if isinstance(each, figure.Figure) and each.name == "campbell")
+    (band_shown,) = (item for item in campbell.panels[0][0].items if isinstance(item, figure.Shade))
+    assert (band_shown.low, band_shown.high) == found.analysis.span
+    assert band_shown.name == f"natural frequency {over_both}"
 
 
 def test_the_tongue_lies_at_the_natural_frequency(study):

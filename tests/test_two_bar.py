@@ -59,6 +59,17 @@ def test_the_statement_is_that_of_the_table(comparison):
     assert statement(hopeless)[0].startswith("Nowhere in the range are two bars good to 2 %")
 
 
+def test_the_range_of_zeta_has_both_its_ends(comparison):
+    """Two bars fail towards zeta = 1, too, where the organ is nearly straight."""
+    for limit in (0.02, 0.05, 0.10):
+        for row, ranges in zip(comparison.largest, comparison.good_zeta(limit), strict=True):
+            good = [any(low <= zeta <= high for low, high in ranges) for zeta in comparison.zeta]
+            assert good == (row < limit).tolist()
+    first, last = comparison.good_zeta(0.10)[0], comparison.good_zeta(0.10)[-1]
+    assert first[0][0] > 0.15 and first[0][1] < 0.95 and last[0][1] < first[0][1]
+    assert "zeta" not in " ".join(statement(comparison)).replace("mu and zeta", "")
+
+
 def test_command(tmp_path):
     done = chainunit("two-bar-error", "-o", "out", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
@@ -67,6 +78,8 @@ def test_command(tmp_path):
     }  # fmt: skip
     numbers = json.loads((tmp_path / "out" / "two_bar_error.json").read_text())
     assert numbers["error_t"]["unit"] == "1" and numbers["psi"]["unit"] == "rad"
+    (low, high), *_ = numbers["good_zeta"]["10 %"]["mu = 0.70"]["value"]
+    assert high < 0.85 and "│ 0.70 │" in done.stdout and f"{low:.2f} to {high:.2f}" in done.stdout
     assert all(line in " ".join(done.stdout.split()) for line in numbers["statement"])
     (tmp_path / "file").write_text("")
     wrong = chainunit("two-bar-error", "-o", "file", cwd=tmp_path)

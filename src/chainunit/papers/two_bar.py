@@ -21,6 +21,7 @@ from ..progress import Progress
 from ..report.blocks import Column, Report, Section, Table, TableRow, Text
 from ..report.figure import Axis, Curve, Field, Figure, Item, Panel
 from ..report.print_figures import contours
+from ..study.arrays import stretches
 from ..text import array_entry
 
 NAME, PICTURE = "two_bar_error", "two_bar_error.png"
@@ -57,6 +58,12 @@ class TwoBarError:
     def good(self, limit: float) -> Any:
         """Where the error stays below the limit at every rocker angle, shape (mu, zeta)."""
         return self.largest < limit
+
+    def good_zeta(self, limit: float) -> list[list[tuple[float, float]]]:
+        """For each mu the ranges of zeta, least and largest of the grid, over which the error stays below the
+        limit."""
+        ends = map(stretches, self.good(limit))
+        return [[(float(self.zeta[a]), float(self.zeta[b - 1])) for a, b in each] for each in ends]
 
 
 def loads(mu: float, zeta: float, psi: float, counts: tuple[int, int] | None) -> tuple[float, float]:
@@ -108,11 +115,9 @@ def statement(comparison: TwoBarError) -> list[str]:
             )
             continue
         share = 100.0 * good.sum() / both_hang.sum()
-        zetas = [comparison.zeta[row].min() for row in good if row.any()]
         lines.append(
             f"Two bars are good to {100 * limit:.0f} % of the organ's weight, at rocker angles within "
-            f"{math.degrees(comparison.psi.max()):.0f} deg, in {share:.0f} % of the range of mu and zeta; "
-            f"zeta at least {min(zetas):.2f} to {max(zetas):.2f}, by mu."
+            f"{math.degrees(comparison.psi.max()):.0f} deg, in {share:.0f} % of the range of mu and zeta."
         )
     middle = int(np.argmin(np.abs(comparison.psi)))
     share = comparison.error_t[:, :, middle] / comparison.load_t[:, :, middle]
@@ -138,6 +143,13 @@ def as_dict(comparison: TwoBarError) -> dict[str, Any]:
             name: array_entry(getattr(comparison, name), "1") | {"description": text, "axes": list(axes)}
             for name, text in tables.items()
         },
+        "good_zeta": {
+            f"{100 * limit:.0f} %": {
+                f"mu = {mu:.2f}": array_entry(ranges, "1")
+                for mu, ranges in zip(comparison.mu, comparison.good_zeta(limit), strict=True)
+            }
+            for limit in LIMITS
+        },
         "statement": statement(comparison),
     }
 
@@ -151,7 +163,7 @@ def report(comparison: TwoBarError) -> Report:
         (),
         (
             Section("statement", "Statement", tuple(Text((line,)) for line in statement(comparison))),
-            Section("errors", "Errors", (_table(comparison), _figure(comparison))),
+            Section("errors", "Errors", (_table(comparison), _good_table(comparison), _figure(comparison))),
         ),
     )
 
@@ -169,6 +181,28 @@ def _table(comparison: TwoBarError) -> Table:
         f'{math.degrees(comparison.psi.max()):.0f} deg; "-": one of the two does not hang'
     )
     return Table(tuple(rows), tuple(columns), (title,))
+
+
+def _good_table(comparison: TwoBarError) -> Table:
+    """The ranges of zeta over which two bars are good, by mu."""
+
+    def words(ranges: list[tuple[float, float]]) -> str:
+        ends = (f"{low:.2f} to {high:.2f}" if high > low else f"{low:.2f}" for low, high in ranges)
+        return " and ".join(ends) or "nowhere"
+
+    columns = (Column(("mu",)), *(Column((f"zeta, to {100 * limit:.0f} %",)) for limit in LIMITS))
+    good = zip(*(comparison.good_zeta(limit) for limit in LIMITS), strict=True)
+    rows = [
+        TableRow(((f"{mu:.2f}",), *((words(ranges),) for ranges in each)))
+        for mu, each in zip(comparison.mu, good, strict=True)
+    ]
+    step = comparison.zeta[1] - comparison.zeta[0]
+    title = (
+        "Range of zeta over which two bars are good, % of the organ's weight, rocker within "
+        f"{math.degrees(comparison.psi.max()):.0f} deg; zeta from {comparison.zeta[0]:.2f} to "
+        f"{comparison.zeta[-1]:.2f} in steps of {step:.2f}"
+    )
+    return Table(tuple(rows), columns, (title,), numeric=False)
 
 
 def _figure(comparison: TwoBarError) -> Figure:

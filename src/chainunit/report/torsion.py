@@ -15,6 +15,8 @@ from . import figure as fig
 from .lines import Line, line
 
 PICTURES = ("campbell.png", "stability.png", "resonance.png", "ratio.png")
+_OVER_BOTH = "over the turns of shaft and machine"
+"""For natural frequencies that an order may meet: i23 varies over a turn of the shaft, the inertia over the other."""
 _JOINTS = {
     "alpha1": "bend of the joint on shaft 2",
     "alpha2": "bend of the joint on shaft 3",
@@ -70,8 +72,8 @@ def _numbers(s: b.Source, analysis: LineAnalysis) -> Iterator[tuple[Line, Line]]
 def _ranges(s: b.Source, analysis: LineAnalysis) -> Iterator[tuple[Line, Line, Line]]:
     """Two ends in each row."""
 
-    def ends(path: str, *item: int) -> tuple[Line, Line]:
-        low, high = (s.number(f"torsion.{path}", *item, end, digits=4) for end in (0, 1))
+    def ends(path: str, *item: int, digits: int = 4) -> tuple[Line, Line]:
+        low, high = (s.number(f"torsion.{path}", *item, end, digits=digits) for end in (0, 1))
         return low, high
 
     def extremes(path: str, *item: int, digits: int = 4) -> tuple[Line, Line]:
@@ -80,11 +82,12 @@ def _ranges(s: b.Source, analysis: LineAnalysis) -> Iterator[tuple[Line, Line, L
         )
         return low, high
 
-    yield "ratio i23 over a turn", *extremes("ratio.{}", digits=5)
-    yield "natural frequency over a turn, at a frozen angle", *extremes("natural_frequency.{}", digits=5)
+    yield "ratio i23, over a turn of the shaft", *extremes("ratio.{}", digits=5)
+    yield "natural frequency, over a turn of the shaft", *extremes("natural_frequency.{}", digits=5)
+    yield f"natural frequency, {_OVER_BOTH}", *ends("natural_frequency.over_both_turns", digits=5)
     for n in ORDERS:
         if analysis.excitation[n]:
-            yield f"speed at which order {n} meets it", *ends(f"crossings.speed = k/{n}")
+            yield f"speed at which order {n} meets it, {_OVER_BOTH}", *ends(f"crossings.speed = k/{n}")
     if analysis.operating.exists[0]:
         for shaft in (2, 3):
             torques = extremes(f"operating.{{}}_torque{shaft}", 0)
@@ -115,7 +118,7 @@ def _campbell(analysis: LineAnalysis) -> fig.Figure:
     damped, frequency = "damped frequency in rotation (Floquet)", analysis.steady.frequency
     crossed = {n: 0.5 * (first + last) for n, (first, last) in analysis.crossings().items()}
     items: tuple[fig.Item, ...] = (
-        fig.Shade(low, high, "natural frequency over a turn, frozen angle", "y", "band"),
+        fig.Shade(low, high, f"natural frequency {_OVER_BOTH}", "y", "band"),
         fig.Curve(damped, analysis.speed[places], frequency[places], 2, "+", joined=False),
         *(fig.Curve(f"order {n} of i23", ends, n * ends, look) for look, n in enumerate(ORDERS)),
         fig.Curve("order 1: parametric resonance at speed = k", ends, ends, 3),
@@ -219,8 +222,8 @@ def _ratio(analysis: LineAnalysis) -> fig.Figure:
     )
     return fig.Figure(
         "ratio",
-        f"The driveline over a turn: bends {' and '.join(bends)}",
-        "Ratio i23 and frozen-angle natural frequency over a turn.",
+        f"The driveline over a turn of the shaft: bends {' and '.join(bends)}",
+        "Ratio i23 and frozen-angle natural frequency over a turn of the shaft, with the machine's mean inertia.",
         tuple(
             (fig.Panel(angle, y, (fig.Curve(y.label, analysis.angle, values, listed=False),), title),)
             for title, y, values in panels

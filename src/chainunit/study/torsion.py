@@ -109,8 +109,9 @@ class LineAnalysis:
     ranges: TorsionTable
     damping_ratio: float
     band: FrequencyBand
+    """over a turn of the shaft, with the inertia J4 of `line`"""
     span: tuple[float, float]
-    """least and largest natural frequency [rad/s] over a turn of the shaft and over the inertia of the machine"""
+    """least and largest natural frequency [rad/s] over a turn of the shaft and a turn of the machine"""
     at_even: float
     """natural frequency at i23 = 1 [rad/s]"""
     excitation: dict[int, float]
@@ -220,8 +221,8 @@ def analyse(
     varied: tuple[float, ...] = (),
 ) -> LineAnalysis:
     """Compute everything. `joint` is the bend of the map, for each of the `damping_ratios`, by default that of the
-    line; `varied` are natural frequencies that the line has, too [rad/s]; `report` gets the present task, and how
-    much of it is done."""
+    line; `varied` are natural frequencies that the line has, too, as the machine's inertia varies [rad/s]; `report`
+    gets the present task, and how much of it is done."""
     xp = numpy_()
     k = float(frozen_frequency(xp, line, 1.0))
     angle = np.linspace(0.0, 2.0 * math.pi, 721)

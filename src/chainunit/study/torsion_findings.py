@@ -51,19 +51,21 @@ class TorsionAnalysis(Analysis):
         assert modes is not None
         turn = study.statics.normal
         speed = float(config.run.crank_speed * drive.driven.ratio)
-        ends = modes.k_least, modes.k_largest
         wanted = config.gives("torsion")
-        if not wanted and speed < SLOW * ends[0]:
+        if not wanted and speed < SLOW * modes.k_least:
             study.note(
                 "torsion left out",
                 "The line's shaft turns at {speed}, far below its natural frequency of {k_least}: no order of the "
                 "joints comes near it, and the analysis in rotation is left out; a table [torsion] asks for it.",
                 speed=(speed, "rad/s", "speed"),
-                k_least=(ends[0], "rad/s", "frequency"),
+                k_least=(modes.k_least, "rad/s", "frequency"),
             )
             return None
         line = two_masses(drive, float(np.mean(turn.outputs.J)))
-        slowest = SLOWEST * max(frequency_band(line).largest, ends[1])
+        inertia = float(np.min(turn.outputs.J)), float(np.max(turn.outputs.J))
+        bands = [frequency_band(two_masses(drive, J)) for J in inertia]
+        span = min(band.least for band in bands), max(band.largest for band in bands)
+        slowest = SLOWEST * span[1]
         if config.torsion.slowest * speed < slowest:
             raise InputError(
                 f"torsion.slowest = {config.torsion.slowest:g}: the shaft turns at {speed:.4g} rad/s; must be >= "
@@ -72,7 +74,7 @@ class TorsionAnalysis(Analysis):
         load = float(np.mean(turn.crank_torque)) / drive.driven.ratio
         rotation = Rotation(speed=speed, load=load)
         return TorsionFindings(
-            analyse(line, rotation, config.torsion, config.joint, config.damping_ratios, report, ends)
+            analyse(line, rotation, config.torsion, config.joint, config.damping_ratios, report, span)
         )
 
 
@@ -138,8 +140,8 @@ class TorsionFindings(Findings):
                     "warning",
                     "order near line",
                     f"Running at {{speed}} is {{near}} from where order {n} of the joints ({n} times a turn) meets "
-                    "the natural frequency of torsion, {low} to {high}; permitted is {margin}: change the speed or "
-                    "the shafts. The order moves shaft 3 by {amplitude}.",
+                    "the natural frequency of torsion, {low} to {high} over the turns of shaft and machine; "
+                    "permitted is {margin}: change the speed or the shafts. The order moves shaft 3 by {amplitude}.",
                     speed=_speed(at),
                     near=(near, "1", "percent"),
                     low=_speed(low),
@@ -311,6 +313,7 @@ def as_dict(analysis: LineAnalysis) -> dict[str, Any]:
             "even": _frequency(analysis.at_even),
             "least": _frequency(band.least),
             "largest": _frequency(band.largest),
+            "over_both_turns": _frequency(analysis.span),
             "at_ratio_zero": _frequency(band.at_zero),
             "at_ratio_infinite": _frequency(band.at_infinity),
         },
