@@ -174,6 +174,10 @@ def test_temperatures():
             "[monte_carlo]\nevent = { force = [5000, 100] }",
             "monte_carlo.event.force = [5000, 100]: the second must be >= the first",
         ),
+        (
+            '[monte_carlo]\nruns = 2\nevent = { force = ["3 kN", "1 kN"] }',
+            'monte_carlo.event.force = ["3 kN", "1 kN"]: the second must be >= the first',
+        ),
         ("[monte_carlo]\nruns = 2.7", "monte_carlo.runs = 2.7: must be a whole number"),
         (
             'event = [{ type = "lumps", side = "left", number = 1000, pause = 1e4 }]',

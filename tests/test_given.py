@@ -65,6 +65,18 @@ def test_values_of_a_motor_of_the_catalogue_are_the_catalogues(tmp_path):
     assert origin("machine.r") == origin("flywheel.J") == "example" and origin("run.crank_speed") == "file"
 
 
+def test_the_ratio_is_shown_that_is_used(tmp_path):
+    """Without one of its own, the gear has the ratio at which the crank has its speed: no start value beside it."""
+
+    def shown(text):
+        return {name for section in given(study_of(parse(text), tmp_path)) for name in section.names}
+
+    assert "gear.ratio" not in shown(KNIFE) and {"machine.ratio", "gear.efficiency"} <= shown(KNIFE)
+    result = as_dict(study_of(parse(KNIFE), tmp_path))
+    assert "ratio" not in result["gear"] and result["machine"]["ratio"]["value"] > 30.0
+    assert "gear.ratio" in shown(KNIFE.replace("[gear]\n", "[gear]\nratio = 25\n"))
+
+
 def test_what_no_example_gives_is_at_its_declared_start_value(tmp_path):
     study = study_of(parse("[run]\ncrank_speed = 2"), tmp_path)
     assert study.origin("machine.r") == study.origin("motor.rotor.J") == "example"

@@ -10,6 +10,7 @@ from importlib import metadata
 import pytest
 
 import chainunit
+from chainunit.models import MODELS
 
 DEPENDENCIES = {
     re.match(r"[\w-]+", line)[0].lower()
@@ -43,3 +44,13 @@ def test_public_names():
         chainunit.Chainunit  # noqa: B018
     with pytest.raises(ImportError):
         from chainunit import nothing  # noqa: F401
+
+
+def test_the_package_runs_as_a_module_and_names_all_models():
+    def printed(*words):
+        command = [sys.executable, "-m", "chainunit", *words]
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+    assert printed("--version").startswith("chainunit ")
+    said = " ".join(printed("export", "--help").split())
+    assert ", ".join(MODELS) in said and "Accelerator" in said

@@ -854,8 +854,9 @@ def test_the_command_says_where_an_fmu_comes_without_reference_results(tmp_path)
     assert done.returncode == 0, done.stderr
     (line,) = done.stderr.splitlines()
     assert line.startswith(
-        "DcMotor: no reference results inside: the states are too fast to be followed from t = 0 s"
+        "The FMU DcMotor: no reference results inside: the states are too fast to be followed from t = 0 s"
     )
+    assert "no run of this package needs them" in line
     names = zipfile.ZipFile(tmp_path / "DcMotor.fmu").namelist()
     assert not [n for n in names if n.startswith("extra/")]
 

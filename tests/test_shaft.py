@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 
 import numpy as np
@@ -15,6 +16,7 @@ from test_page import Reader, check_traced
 from chainunit import InputError
 from chainunit.drives.shafts import hollow, stiffness
 from chainunit.models import MODELS
+from chainunit.report.shaft import _driveline
 from chainunit.report.study_motion import motion
 from chainunit.study import config
 from chainunit.study.choice import choose
@@ -169,6 +171,41 @@ def test_damage_of_a_steady_swing(study, turns, phase):
     assert answers.amplification == pytest.approx(2.0)
     event, _, _ = shaft_answers(study.drive, run, run, 5.0, damage)
     assert event.turns_of_steady == pytest.approx(turns, abs=0.6) and event.range_equivalent is None
+
+
+def test_rounding_is_no_cycle(study):
+    """Equal bends: the torque of steady running is even but for rounding, and has no cycle whose damage could be the
+    measure of an event."""
+    angle = np.linspace(0.0, 2.0, 801)
+    even = 375.0 + 8e-7 * np.sin(2.0 * np.pi * 49.0 * angle)
+    zero, gear = np.zeros_like(angle), study.drive.driven.p.ratio
+    series = {"driveline.tau2": even, "driveline.tau3": even, "machine.tau": even}
+    series |= dict.fromkeys(("driveline.twist2", "driveline.twist3", "machine.w0", "motor.a"), zero)
+    series["machine.phi0"] = 2.0 * np.pi * angle * gear
+    run = xr.Dataset({name: ("time", y) for name, y in series.items()}, {"time": angle})
+    answers, cycles, damage = shaft_answers(study.drive, run, run, 5.0)
+    assert (answers.cycles, answers.range_largest, answers.range_equivalent, damage) == (0.0, 0.0, 0.0, 0.0)
+    assert cycles.classes(answers.range_largest) == []
+    shaken = run.assign({"driveline.tau2": ("time", even + 50.0 * np.sin(2.0 * np.pi * angle))})
+    event, _, _ = shaft_answers(study.drive, shaken, run, 5.0, damage)
+    assert event.cycles > 0.0 and event.turns_of_steady is None
+
+
+def test_no_more_runs_are_drawn_beside_each_other_than_fit(study):
+    names = [f"jam_{k}" for k in range(6)]
+    more = dataclasses.replace(
+        study,
+        shaft={"steady": study.shaft["steady"]} | dict.fromkeys(names, study.shaft["jam_left"]),
+        cycles_of={"steady": study.cycles_of["steady"]} | dict.fromkeys(names, study.cycles_of["jam_left"]),
+        event=study.event | dict.fromkeys(names, study.event["jam_left"]),
+        runs=study.runs | dict.fromkeys(names, study.runs["jam_left"]),
+    )
+    drawn = _driveline(None, more)
+    panels = list(drawn.all_panels())
+    assert len(panels) == 2 * 7 and max(c for _, c, _ in panels) == 2
+    # torque above cycles, each with the labels of its own axes
+    assert all(drawn.sharing(r, c) == [r] for r, c, _ in panels)
+    assert [panel.title for r, _, panel in panels if r % 2 == 0] == [more.called(name) for name in more.shaft]
 
 
 def test_the_report_shows_it(study, tmp_path):

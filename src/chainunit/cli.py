@@ -57,6 +57,18 @@ class _Commands(typer.core.TyperGroup):
             raise InterruptedRunError("interrupted before all was written") from None
 
 
+class _Export(typer.core.TyperCommand):
+    """The command that writes a model; its help names all of them."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        # a module of `machines` adds its machine by itself: they are known once all are imported
+        from .models import MODELS
+
+        (name,) = (each for each in self.params if each.name == "name")
+        name.help = f"{', '.join(MODELS)}."  # type: ignore[attr-defined]
+        super().format_help(ctx, formatter)
+
+
 app = typer.Typer(
     cls=_Commands,
     no_args_is_help=True,
@@ -270,15 +282,9 @@ def two_bar_error(
         _finish(contents, output, two_bar.NAME)
 
 
-@app.command()
+@app.command(cls=_Export)
 def export(
-    name: Annotated[
-        str,
-        typer.Argument(
-            help="ChamberForces, ChainUnitFlexible (organs as chains), ChainUnit, DcMotor, InductionMotor, "
-            "CardanDriveline or KnifeDrive."
-        ),
-    ],
+    name: Annotated[str, typer.Argument(help="The model.")],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="FMU file; NAME.fmu by default.")
     ] = None,

@@ -70,6 +70,8 @@ class _Brief(reprlib.Repr):
 
 def shown(given: Any) -> str:
     """A value from outside, as a refusal cites it: in one short line, a text in quotation marks."""
+    if isinstance(given, list) and len(given) <= 4 and all(isinstance(x, str | int | float) for x in given):
+        return f"[{', '.join(map(shown, given))}]"
     if not isinstance(given, str):
         return printable(_Brief().repr(given), 100)
     most = 60

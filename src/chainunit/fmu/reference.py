@@ -42,7 +42,12 @@ def reference_results(interface: Interface) -> dict[str, bytes]:
     try:
         tables = _tables(interface)
     except ArithmeticError as reason:
-        log.warning("%s: no reference results inside: %s", name, reason)
+        log.warning(
+            "The FMU %s: no reference results inside: %s; no run of this package needs them, an importer is checked "
+            "by them",
+            name,
+            reason,
+        )
         return {}
     words = {
         INPUTS: f"inputs, set at each time and held for {STEP * 1e3:g} ms",

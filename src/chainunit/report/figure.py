@@ -153,12 +153,15 @@ class Figure:
     form: ClassVar[str] = "long"
 
     def sharing(self, row: int, column: int) -> list[int]:
-        """The rows whose panels in this column have the x axis of the one in `row`."""
+        """The rows around `row`, one upon the other, whose panels in this column have the x axis of the one in it."""
         panels = [each[column] for each in self.panels]
         own = panels[row]
-        return [
-            r for r, panel in enumerate(panels) if panel is not None and own is not None and panel.x == own.x
-        ]
+        if own is None:
+            return []
+        alike = [panel is not None and panel.x == own.x for panel in panels]
+        first = max((r + 1 for r in range(row) if not alike[r]), default=0)
+        last = next((r for r in range(row, len(panels)) if not alike[r]), len(panels))
+        return list(range(first, last))
 
     def all_panels(self) -> Iterator[tuple[int, int, Panel]]:
         """Row, column and panel of each."""

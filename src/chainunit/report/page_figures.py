@@ -126,7 +126,7 @@ class _Drawing:
         domains = _domains(spec.heights or (1.0,) * rows, gap / (height(spec) - _ENDS))
         self.rows = [(1.0 - last, 1.0 - first) for first, last in domains]
         self.samples = _thin_groups(spec)
-        self.x_axes: dict[tuple[int, Axis], str] = {}
+        self.x_axes: dict[tuple[int, int], str] = {}
         self.y_axes: dict[int, list[str]] = {}
         self.axes: dict[str, dict[str, Any]] = {}
         self.listed: set[str] = set()
@@ -136,7 +136,9 @@ class _Drawing:
         count = sum(map(len, self.y_axes.values())) + 1
         y = f"y{count if count > 1 else ''}"
         self.y_axes.setdefault(r, []).append(y)
-        x = self.x_axes.setdefault((c, panel.x), f"x{len(self.x_axes) + 1 if self.x_axes else ''}")
+        x = self.x_axes.setdefault(
+            (c, self.spec.sharing(r, c)[0]), f"x{len(self.x_axes) + 1 if self.x_axes else ''}"
+        )
         across = self.axes.setdefault(_long(x), {"domain": self.columns[c], **_axis(panel.x)})
         if r == self.spec.sharing(r, c)[-1]:
             across |= {"anchor": y, "title": {"text": panel.x.label}}

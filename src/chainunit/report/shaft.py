@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from ..quantities import Layout
-from ..study.shaft import RIGID, ShaftAnswers, Torsion
+from ..study.shaft import CLASSES, RIGID, ShaftAnswers, Torsion
 from ..study.study import Study
 from ..study.verdict import START, STEADY
 from . import blocks as b
@@ -16,6 +16,8 @@ from .runs import ordered, over_runs
 
 PICTURES = Pictures()
 TORQUE = fig.Axis("torque in shaft 2", "N.m")
+_BESIDE = 3
+"""Runs beside each other in the figure: with more no label is legible on the page."""
 
 
 def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
@@ -51,21 +53,24 @@ def _driveline(s: b.Source, study: Study) -> fig.Figure:
         x = fig.Axis("time", "s", low=0.0, high=float(time[-1]))
         title = study.called(name)
         above.append(fig.Panel(x, TORQUE, tuple(shaft_torque(run, time)), title))
-        rows = study.cycles_of[name].classes(largest)
-        middle, wide = (
-            [0.5 * (row["from"] + row["to"]) for row in rows],
-            0.9 * (rows[0]["to"] - rows[0]["from"]),
-        )
-        bars = fig.Bars("cycles", middle, [row["count"] for row in rows], wide, 1)
+        classes = study.cycles_of[name].classes(largest)
+        middle = [0.5 * (row["from"] + row["to"]) for row in classes]
+        wide = 0.9 * largest / CLASSES
+        bars = fig.Bars("cycles", middle, [row["count"] for row in classes], wide, 1)
         cycles = fig.Axis("cycles counted (rainflow)", low=0.0), fig.Axis("range of torque", "N.m", low=0.0)
         below.append(fig.Panel(*cycles, (bars,)))
+    rows = [
+        (*kind[k : k + _BESIDE], *(None for _ in range(k + _BESIDE - len(kind) if k else 0)))
+        for k in range(0, len(above), _BESIDE)
+        for kind in (above, below)
+    ]
     return fig.Figure(
         "driveline",
         "The torque in the driveline, and its cycles",
         "Torque in shaft 2 over time, with this driveline and with a rigid shaft, and below the cycles that are "
         "counted in each class of torque range.",
-        (tuple(above), tuple(below)),
-        heights=(1.3, 0.9),
+        tuple(rows),
+        heights=(1.3, 0.9) * (len(rows) // 2),
         level=True,
     )
 

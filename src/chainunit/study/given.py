@@ -27,6 +27,8 @@ class GivenSection:
     """words, switches and lists, by key"""
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """of the quantities that are drawn at random"""
+    unused: frozenset[str] = frozenset()
+    """quantities that something else stands in for"""
 
     @property
     def place(self) -> str:
@@ -40,12 +42,14 @@ class GivenSection:
     def names(self) -> list[str]:
         """Names of all in it, as in a study file."""
         prefix = f"{self.name}." if self.name else ""
-        quantities = variables(type(self.values)) if self.values is not None else ()
-        return [*(prefix + v.name for v in quantities), *(prefix + key for key in self.choices)]
+        quantities = [v.name for v in variables(type(self.values))] if self.values is not None else []
+        used = [name for name in quantities if name not in self.unused]
+        return [*(prefix + name for name in used), *(prefix + key for key in self.choices)]
 
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON, each number with its unit."""
         own = {} if self.values is None else entries(self.values)
+        own = {name: x for name, x in own.items() if name not in self.unused}
         drawn = {name: {**own[name], "value": list(ends)} for name, ends in self.ranges.items()}
         return own | drawn | {key: _choice(value) for key, value in self.choices.items()}
 
@@ -102,7 +106,10 @@ def _tables(study: Study) -> Iterator[GivenSection]:
         prefix = f"{name}."
         keys = {full.removeprefix(prefix): x for full, x in config.choices.items() if full.startswith(prefix)}
         event = keys.pop("event", None)
-        yield GivenSection(name, section.title, values, {key: x for key, x in keys.items() if x})
+        # without a ratio of its own the gear has that of the machine, which follows from the motor's speed
+        follows = frozenset({"ratio"} if name == "gear" and "gear.ratio" not in config.given else ())
+        chosen = {key: x for key, x in keys.items() if x}
+        yield GivenSection(name, section.title, values, chosen, unused=follows)
         if event is not None:
             random = config.random
             side = {"side": random.side} if random.side else {}

@@ -28,6 +28,8 @@ UNEVEN = 1e-6
 """Variation of i23 up to which the line counts as even."""
 AMPLIFIED = 1.2
 """Amplification that is worth a word."""
+ROUNDING = 1e-6
+"""Range of a cycle, in parts of the largest torque, up to which it is rounding and no cycle."""
 CLASSES = 10
 """Classes of torque range that a table of cycles has."""
 
@@ -37,7 +39,8 @@ class ShaftAnswers:
     """The load of the shaft line in a run. The rigid drive is the same without elasticity and uneven ratio, inertia
     kept. `amplification` is the peak torque over that of the rigid drive. `range_equivalent` does, once a turn of
     the crank, the damage of steady running by Woehler's line with the exponent `driveline.exponent`;
-    `turns_of_steady` is the number of turns of steady running that do the damage of an event."""
+    `turns_of_steady` is the number of turns of steady running that do the damage of an event; none where it has no
+    cycles."""
 
     tau2_peak: Value = quantity("N.m", "shaft 2, peak torque")
     tau3_peak: Value = quantity("N.m", "shaft 3, peak torque")
@@ -71,12 +74,19 @@ class Cycles:
     mean: Any
     count: Any
 
+    def above(self, least: float) -> Cycles:
+        """Those with a range of more than `least` [N m]."""
+        counted = self.range > least
+        return Cycles(self.range[counted], self.mean[counted], self.count[counted])
+
     def damage(self, exponent: float) -> float:
         """Sum of count times range to the power of `exponent`."""
         return float(np.sum(self.count * self.range**exponent))
 
     def classes(self, largest: float) -> list[dict[str, float]]:
         """Number of cycles in equal classes of range up to the `largest`, from above; empty ones are left out."""
+        if not largest > 0.0:
+            return []
         edges = np.linspace(0.0, largest, CLASSES + 1)
         counts, _ = np.histogram(self.range, edges, weights=self.count)
         rows = zip(edges[:-1], edges[1:], counts, strict=True)
@@ -161,7 +171,7 @@ def shaft_answers(
     tau2 = run["driveline.tau2"].values
     peak2, peak_rigid = peak(tau2), peak(rigid_torque(drive, rigid))
     steady = steady_damage_per_turn is None
-    cycles = rainflow(from_peak(tau2) if steady else tau2)
+    cycles = rainflow(from_peak(tau2) if steady else tau2).above(ROUNDING * peak2)
     turns = max(drive.turns(run), 1e-9)
     damage = cycles.damage(exponent)
     twist = run["driveline.twist2"].values + run["driveline.twist3"].values

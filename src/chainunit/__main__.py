@@ -1,0 +1,5 @@
+"""``python -m chainunit``: the command line."""
+
+from .cli import main
+
+main()
