@@ -12,6 +12,7 @@ from event_tables import event_line
 from reports import said_of, write
 
 from chainunit.study.config import parse
+from chainunit.study.judgement import motor_verdict
 from chainunit.study.measures import STARTED
 from chainunit.study.run import run_study
 
@@ -167,7 +168,13 @@ def test_a_heavy_machine_is_waited_for_until_it_has_its_speed(tmp_path):
     study = _heavy(10.0, tmp_path)
     steady, start = study.answers["steady"], study.start
     assert start.start_time == pytest.approx(study.fed_from) and 35.0 < start.start_time < 45.0
-    assert not {"fed before speed", "speed drifts"} & {each.kind for each in study.warnings}
+    warnings = {each.kind: each for each in study.warnings}
+    assert not {"fed before speed", "speed drifts"} & set(warnings)
+    # as long as that no rotor may be locked
+    long, locked = warnings["motor start"].quantities, study.config.plate.nameplate.locked_time
+    assert long["value"][0] == start.start_time > 2.0 * locked and long["limit"][0] == locked
+    verdict = motor_verdict(study)
+    assert verdict["holds"] == "in part" and "its start takes too long" in verdict["text"]
     turns, J = study.steady, study.drive.fmu_parameters.rotor.J
     energy = 0.5 * J * turns["motor.w"].values ** 2
     work = steady.power_mean * float(turns["time"][-1] - turns["time"][0])

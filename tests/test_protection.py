@@ -82,6 +82,7 @@ fluctuation = 0.3
 """
 
 
+MOTOR = "IE3 4-pole 1.1 kW, 90S"
 SIX = ("feed_left", "feed_right", "jam_left", "jam_right", "blocked", "dip")
 
 
@@ -104,11 +105,18 @@ def test_the_recommended_coupling_is_tried_in_its_own_study(tmp_path, monkeypatc
     steady = study.answers["steady"].crank_torque_peak
     assert 1.2 * steady < found.torque < found.motor < study.start_torque
     said = coupling_sentence(study)
-    assert "held shut in the start" in said
+    assert "held shut in the start (coupling.held_in_start = true)" in said
+    assert "softly" not in said
     # all feed on the right is normal duty, and its torque the larger
     assert found.normal > 1.15 * max(study.sizing.duty.numbers.torque_peak, 208.0)
     monkeypatch.undo()
-    tried = ran(heavy(*SIX) + f"[coupling]\ntrip_torque = {found.torque}\n", tmp_path, monkeypatch)
+    coupling = f"[coupling]\ntrip_torque = {found.torque}\n"
+    open_start = ran(heavy(*SIX) + coupling, tmp_path, monkeypatch)
+    monkeypatch.undo()
+    assert "opens in the start-up" in str(open_start.failure)
+    assert "coupling.held_in_start = true" in str(open_start.failure)
+    coupling += "held_in_start = true\n"
+    tried = ran(heavy(*SIX) + coupling, tmp_path, monkeypatch)
     assert tried.failure is None
     opened = {n for n, a in tried.answers.items() if a.coupling_trip_time is not None}
     assert set(found.opens) == {"jam_left", "jam_right", "blocked"} and set(found.nuisances) == {"dip"}
@@ -125,7 +133,12 @@ def test_the_recommended_coupling_is_tried_in_its_own_study(tmp_path, monkeypatc
     (note,) = [note.text for note in tried.notes if note.kind == "assumption"]
     assert "These peaks are without the safety coupling" in note
     (warning,) = [warning.text for warning in tried.warnings if warning.kind == "coupling held shut"]
-    assert "held shut in the start" in warning
+    assert "held shut in the start (coupling.held_in_start)." in warning
+    # the same motor, named by the file, with the same coupling
+    named = heavy(*SIX).partition("[sizing]")[0] + f'[system]\nmotor = "{MOTOR}"\n' + coupling
+    given = run_study(config.parse(named), tmp_path)
+    assert given.failure is None and {w.kind for w in given.warnings} >= {"coupling held shut"}
+    assert {n for n, a in given.answers.items() if a.coupling_trip_time is not None} == opened
 
 
 def test_without_a_shock_no_coupling_is_recommended(tmp_path, monkeypatch):

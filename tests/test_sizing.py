@@ -28,9 +28,10 @@ from chainunit.study.config import parse
 from chainunit.study.cycle import cycle, energy_swing, needed_inertia
 from chainunit.study.drive import Drive
 from chainunit.study.duty import rms
+from chainunit.study.limits import Check
 from chainunit.study.rig import Rig
 from chainunit.study.sizing import Standing
-from chainunit.study.trial import Check, Trial, permitted_starts, start_time
+from chainunit.study.trial import Trial, permitted_starts, start_time
 from chainunit.system import CoSimulation, Profile, System
 
 ANGLE = np.linspace(0.0, 2.0 * math.pi, 7200, endpoint=False)

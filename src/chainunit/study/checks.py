@@ -56,6 +56,8 @@ def check_company(data: Mapping[str, Any], parts: Parts) -> None:
                     else "is of the DC motor, and [sizing] picks another"
                 )
                 raise InputError(f"{name}: {words}; leave out one of the two")
+        if "winding_temperature" in data.get("run", {}):
+            raise InputError("run.winding_temperature: is sizing.temperature with [sizing]; leave it out")
         if "ratio" in data.get("machine", {}):
             raise InputError("machine.ratio: [sizing] finds it; to have it kept, give gear.ratio")
     elif not parts.designation:

@@ -59,6 +59,8 @@ class Config:
     run: Run
     events: Mapping[str, Event]
     coupling: Coupling | None
+    held_in_start: bool
+    """whether the coupling is held shut in the start"""
     monte_carlo: MonteCarlo
     random: RandomEvent
     feed_forward: bool
@@ -126,6 +128,13 @@ class Config:
     def stop(self) -> float:
         """Time to which start-up and steady running are run [s], where the motor settles at once."""
         return float(self.settled + (self.run.turns + 0.1) * self.turn)
+
+    @property
+    def permitted_temperature(self) -> tuple[str, float]:
+        """Of the winding if the steady turns go on for ever [K], with its name in the study file."""
+        if self.sizing is not None:
+            return "sizing.temperature", float(self.sizing.temperature)
+        return "run.winding_temperature", float(self.run.winding_temperature)
 
     @property
     def of_catalogue(self) -> bool:
@@ -227,6 +236,7 @@ def _config(
         random=read_random_event(checked.monte_carlo.event, "monte_carlo.event"),
         feed_forward=checked.feed_forward,
         empty_start=checked.empty_start,
+        held_in_start=checked.coupling.held_in_start,
         start=checked.start,
         simulation=checked.simulation,
         catalogue=own_motors,

@@ -103,8 +103,8 @@ def coupling_sentence(study: Study) -> str:
         text += f" A nuisance trip, which protects nothing: it opens, too, where {listed(setting.nuisances)}."
     if study.start_torque is not None and study.start_torque > setting.least:
         text += (
-            f" A start direct on line puts {_torque(study.start_torque)} on it: it has to be held shut in the start, "
-            "or the motor started softly."
+            f" A start direct on line puts {_torque(study.start_torque)} on it: it has to be held shut in the start "
+            "(coupling.held_in_start = true)."
         )
     return text
 
@@ -116,11 +116,12 @@ def remark_on_coupling(study: Study, trip: float) -> None:
     peaks, shocks = peaks_on_coupling(study), peaks_on_coupling(study, Role.SHOCK)
     amounts = {"trip": (trip, "N.m")} | ({} if most is None else {"motor": (most, "N.m")})
     warn = study.warn
-    if study.start_torque is not None and study.start_torque > trip:
-        warn(
+    if study.start_torque is not None:
+        over = study.start_torque > trip
+        (warn if over else study.note)(
             "coupling held shut",
-            "A start direct on line puts {start} on the safety coupling, which opens at {trip}: it is taken to be "
-            "held shut in the start.",
+            "The start puts {start} on the safety coupling, which opens at {trip}: it is held shut in the start "
+            "(coupling.held_in_start)" + ("." if over else ", which is not needed."),
             "start_up",
             start=(study.start_torque, "N.m"),
             **amounts,

@@ -8,6 +8,7 @@ from typing import Any
 from ..text import entry, number, turning
 from . import verdict
 from .chain import HIGH
+from .limits import Check, heating, lasting_current, starting
 from .measures import Answers
 from .organs import OrganAnalysis
 from .quantiles import runs_needed
@@ -64,14 +65,37 @@ def _residuals(study: Study) -> dict[str, float]:
     }
 
 
+def motor_limits(study: Study) -> dict[str, Check]:
+    """What the motor does in its start and in steady running beside its limits, by name; of a motor that sizing chose
+    the temperature alone, as its starts and its duty are among the checks of sizing."""
+    steady, config, drive = study.answers.get(STEADY), study.config, study.drive
+    if steady is None or drive.foreign is not None:
+        return {}
+    ambient, (_, permitted) = drive.fmu_parameters.ambient.T, config.permitted_temperature
+    checks = {"temperature": heating(steady.winding_temperature, ambient, permitted)}
+    if config.plate is not None:
+        checks["current"] = lasting_current(steady.current_rms, config.plate.nameplate)
+        if study.start is not None and not drive.follows:
+            checks["start"] = starting(study.start.start_time, config.plate.nameplate)
+    return checks
+
+
+_PASSED = {
+    "temperature": "its winding becomes too hot in steady running",
+    "current": "its RMS current in steady running passes the rated one",
+    "start": "its start takes too long",
+}
+"""What it means that a limit of the motor is passed."""
+
 AMPLE = 0.02
 """Reserve of torque from which on the motor counts as strong enough: with less it stands at its limit."""
 
 
 def motor_verdict(study: Study) -> dict[str, Any] | None:
-    """Whether the motor reaches the speed ("false" where not), and its least reserve of torque with the run of it
-    ("in part" where none is left or known, or sizing found it insufficient), ready for JSON; None without steady
-    running. Runs whose energy balance is not kept say nothing of the motor: they are left out."""
+    """Whether the motor reaches the speed and stays cool ("false" where not), and its least reserve of torque with
+    the run of it ("in part" where none is left or known, another limit is passed, or sizing found it insufficient),
+    ready for JSON; None without steady running. Runs whose energy balance is not kept say nothing of the motor: they
+    are left out."""
     steady, asked = study.answers.get(STEADY), study.config.run.crank_speed
     if steady is None:
         return None
@@ -95,6 +119,10 @@ def motor_verdict(study: Study) -> dict[str, Any] | None:
         text = f"The motor does NOT reach the speed: {speed} in place of {wanted}"
     if study.insufficient:
         text += f"{', but it' if kept else '; it'} is insufficient by the limits of the sizing"
+    limits = {} if STEADY in left_out else motor_limits(study)
+    passed = [name for name, check in limits.items() if check.utilisation is None or check.utilisation > 1.0]
+    if passed:
+        text += f"{', but' if kept and not study.insufficient else ';'} {', '.join(_PASSED[name] for name in passed)}"
     if run is None:
         text += "; its reserve of torque is not known"
     elif reserve is not None and reserve >= 0.0:
@@ -108,8 +136,9 @@ def motor_verdict(study: Study) -> dict[str, Any] | None:
     if left_out:
         names = ", ".join(study.called(name) for name in left_out)
         text += f"; runs whose energy balance is not kept are left out ({names})"
-    enough = reserve is not None and reserve >= AMPLE and not study.insufficient
-    holds: Holds = "false" if not kept else "true" if enough else "in part"
+    enough = reserve is not None and reserve >= AMPLE and not study.insufficient and not passed
+    burns = not kept or "temperature" in passed
+    holds: Holds = "false" if burns else "true" if enough else "in part"
     return {
         "holds": holds,
         "text": turning(f"{text}.", study.turning),
@@ -118,4 +147,5 @@ def motor_verdict(study: Study) -> dict[str, Any] | None:
         "least_reserve": entry(reserve, "1", "percent"),
         "run": run,
         "left_out": left_out,
+        "limits": {name: check.as_dict() for name, check in limits.items()},
     }

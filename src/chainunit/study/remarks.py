@@ -11,7 +11,7 @@ from ..drives.cardan import two_joints
 from ..engines import numpy_
 from ..text import number
 from .coupling import peaks_on_coupling, remark_on_coupling
-from .judgement import model_verdict
+from .judgement import model_verdict, motor_limits
 from .measures import STARTED, Answers
 from .sections import ChainOrgans
 from .shaft import AMPLIFIED, UNEVEN, remedies
@@ -58,6 +58,7 @@ def conclude(study: Study) -> None:
         _on_chains(study, config.chain)
     if STEADY in study.answers:
         _on_start(study)
+        _on_limits(study)
         _on_steady_running(study, study.answers[STEADY])
     if study.sizing is not None:
         for text in study.sizing.notes:
@@ -113,8 +114,54 @@ def _on_start(study: Study) -> None:
             "after {fed}, with the crank at {speed} in place of {wanted}; a larger motor, or a lighter flywheel.",
             START,
             fed=(fed, "s"),
-            speed=(speed, "rad/s"),
-            wanted=number(asked, "rad/s", full=False),
+            speed=(speed, "rad/s", "speed"),
+            wanted=number(asked, "rad/s", "speed", full=False, beside=False),
+        )
+
+
+_LIMITS = {
+    "temperature": "steady running: the winding comes to {value} if it goes on for ever, permitted is {limit} "
+    "({key}): a larger motor, less load, or for a load that comes and goes a heavier flywheel.",
+    "current": "steady running: the RMS current is {value}, rated is {limit}: what lasts heats the motor too much; a "
+    "larger motor, less load, or for a load that comes and goes a heavier flywheel.",
+    "start": "start-up: it takes {value}, with up to {peak}; the rotor of a warm motor may be locked for {limit}, "
+    "and a start that takes longer overheats it as a locked rotor does: a lighter flywheel, a larger motor, or "
+    'start = "inverter".',
+}
+"""What is said where a limit of the motor is passed."""
+
+
+def _on_limits(study: Study) -> None:
+    """That the motor does not stand its start or its steady running."""
+    steady, warn = study.answers[STEADY], study.warn
+    key, permitted = study.config.permitted_temperature
+    for name, check in motor_limits(study).items():
+        if check.utilisation is None or not check.utilisation > 1.0:
+            continue
+        value, limit = check.value, check.limit
+        if name == "temperature":
+            value, limit = steady.winding_temperature, permitted
+            if not math.isfinite(value):
+                # there is a remark of its own
+                continue
+        peak = 0.0 if study.start is None else study.start.current_peak
+        unit = check.unit
+        warn(
+            f"motor {name}",
+            _LIMITS[name],
+            START if name == "start" else STEADY,
+            value=(value, unit),
+            limit=(limit, unit),
+            peak=number(peak, "A"),
+            key=key,
+        )
+    if steady.torque_reserve is not None and steady.torque_reserve < 0.0:
+        warn(
+            "no reserve",
+            "steady running: for a moment the motor gives {over} more than the largest torque of a steady state: a "
+            "heavier load or a dip of the voltage stalls it; a larger motor or a heavier flywheel.",
+            STEADY,
+            over=(-steady.torque_reserve, "1", "percent"),
         )
 
 

@@ -210,7 +210,7 @@ class Runner:
         if simulation.time < self.stop - 0.5 * rig.step:
             raise RunError(
                 f"the safety coupling opens in the start-up, at t = {simulation.time:.3g} s; coupling.trip_torque "
-                "must be above what starting takes"
+                "must be above what starting takes, or the coupling held shut in it (coupling.held_in_start = true)"
             )
         steady = study.steady
         study.answers["steady"] = read_answers(study.window(Phase.STEADY, steady))

@@ -59,6 +59,13 @@ class Run:
         min=1.0,
         max=1e4,
     )
+    winding_temperature: Value = quantity(
+        "K",
+        "permitted temperature of the winding if the steady turns go on for ever; with sizing its own",
+        default=393.15,
+        min=330.0,
+        max=1000.0,
+    )
     step: Value = quantity("s", "communication step of the co-simulation", default=0.001, min=1e-5, max=0.02)
 
 
@@ -329,7 +336,17 @@ class FileSection:
 
 SECTIONS: Mapping[str, FileSection] = {
     "run": FileSection(Run, whole=("turns",), title="Run"),
-    "coupling": FileSection(Coupling, optional=True, title="Safety coupling"),
+    "coupling": FileSection(
+        Coupling,
+        optional=True,
+        keys={
+            "held_in_start": (
+                StrictBool,
+                Field(False, description="whether it is held shut in the start, until running is steady"),
+            )
+        },
+        title="Safety coupling",
+    ),
     "monte_carlo": FileSection(
         MonteCarlo,
         whole=("runs", "seed"),

@@ -26,7 +26,8 @@ from .chain import HIGH
 from .config import Config
 from .drive import Drive
 from .duty import CycleNumbers, Duty, duty_of
-from .trial import Check, try_motor
+from .limits import Check
+from .trial import try_motor
 
 
 @declaration

@@ -248,8 +248,12 @@ class Study:
     @property
     def start_apart(self) -> bool:
         """Whether the start is judged apart: switched on to the line, a motor gives more for a moment than it ever
-        does in running, and a coupling has to be held shut."""
-        return self.config.sizing is not None and self.config.start == "direct"
+        does in running. A coupling that is given is held shut where the file says so; one that is recommended has to
+        be."""
+        config = self.config
+        if config.coupling is not None:
+            return config.held_in_start
+        return config.sizing is not None and config.start == "direct"
 
     @property
     def not_known(self) -> frozenset[str]:

@@ -19,11 +19,11 @@ from ..drives.motor import T_RATED
 from ..engines import MATH
 from ..machines.chain_unit import SideName
 from ..system import Simulation
-from ..text import entry, number
 from .arrays import peak
 from .config import Config
 from .drive import Drive
 from .duty import Duty, rms
+from .limits import Check, heating, starting
 from .rig import PATIENCE, Rig
 from .window import BURNT, settled
 
@@ -39,38 +39,6 @@ def start_time(time: Any, speed: Any, share: float = 0.95) -> float | None:
     if not final > 0.0:
         return None
     return float(time[int(np.argmax(speed >= share * final))])
-
-
-@dataclass(frozen=True)
-class Check:
-    """A value beside its limit, in one unit."""
-
-    title: str
-    value: float | None
-    limit: float
-    unit: str
-    kind: str = ""
-
-    @property
-    def utilisation(self) -> float | None:
-        """value/limit; None where there is no value: the candidate does not get that far."""
-        return None if self.value is None else self.value / self.limit
-
-    @property
-    def passed(self) -> str:
-        """A limit that is passed, in words."""
-        value, limit = (number(x, self.unit, self.kind, full=False) for x in (self.value, self.limit))
-        used = number(self.utilisation, "1", "used")
-        return f"{self.title} {value}, {used}{' of' if used.endswith('%') else ''} the permitted {limit}"
-
-    def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON."""
-        return {
-            "title": self.title,
-            "utilisation": entry(self.utilisation, "1", "used"),
-            "value": entry(self.value, self.unit, self.kind),
-            "limit": entry(self.limit, self.unit, self.kind),
-        }
 
 
 @dataclass(frozen=True)
@@ -192,16 +160,21 @@ class Trial:
         asked, plate, p = self.config.sizing, self.motor.nameplate, self.drive.fmu_parameters
         assert asked is not None
 
-        def check(title: str, value: float, limit: float, unit: str, kind: str = "") -> Check:
-            return Check(title, value if self.started is not None else None, limit, unit, kind)
+        def reached(check: Check) -> Check:
+            return check if self.started is not None else dataclasses.replace(check, value=None)
 
-        longest = 1.0 + 1.2 * self.config.run.ramp if self.drive.follows else plate.locked_time
+        def check(title: str, value: float, limit: float, unit: str, kind: str = "") -> Check:
+            return reached(Check(title, value, limit, unit, kind))
+
+        start = starting(self.started, plate)
+        if self.drive.follows:
+            start = dataclasses.replace(start, limit=1.0 + 1.2 * self.config.run.ramp)
         weaker = min(1.0, plate.frequency / self.frequency)
         cooled = min(1.0, self._cooling / self.drive.motor.cooling(MATH, p, plate.speed))
         breakdown = self.breakdown_torque / asked.breakdown_margin
         asked_speed = self.drive.ratio * self.config.run.crank_speed
         checks = {
-            "start": Check("time to start", self.started, longest, "s"),
+            "start": start,
             "rms_torque": check(
                 "RMS torque",
                 rms(*((share, run[_GAP].values) for share, run in self._cases)),
@@ -214,13 +187,7 @@ class Trial:
                 breakdown,
                 "N.m",
             ),
-            "temperature": check(
-                "rise of temperature",
-                self.temperature - p.ambient.T,
-                asked.temperature - p.ambient.T,
-                "K",
-                "difference",
-            ),
+            "temperature": reached(heating(self.temperature, p.ambient.T, asked.temperature)),
             "starts": Check("starts per hour", asked.starts_per_hour, self.permitted_starts, "1"),
             "crank_speed": check(
                 "deviation of the crank speed",

@@ -1,0 +1,81 @@
+"""A motor that the file gives is judged by its limits, as those that sizing tries are."""
+
+from __future__ import annotations
+
+import pytest
+from event_tables import event_line
+
+from chainunit import InputError
+from chainunit.study.config import parse
+from chainunit.study.judgement import motor_limits, motor_verdict
+from chainunit.study.run import run_study
+
+KNIFE = f"""{event_line("dip", turns=1)}
+empty_start = true
+[system]
+machine = "KnifeDrive"
+motor = "IE3 4-pole 1.5 kW, 90L"
+[feed]
+cut_force = "14 kN"
+[gear]
+efficiency = 1
+[run]
+crank_speed = "40 rev/min"
+step = "4 ms"
+"""
+CHAIN_UNIT = """
+[motor]
+armature = {{ R_th = {R_th} }}
+[run]
+ramp = 0.5
+settle_turns = 1
+step = "2 ms"
+"""
+
+
+JAM = event_line("jam_left", turns=1)
+
+
+def studied(text, folder):
+    study = run_study(parse(text), folder)
+    assert study.failure is None
+    return study, motor_verdict(study), {each.kind: each for each in study.warnings}
+
+
+def test_a_motor_that_burns_in_steady_running_is_no_good(tmp_path):
+    """It keeps the speed of a load that comes and goes, with 129 % of its rated current and no reserve of torque."""
+    study, verdict, warnings = studied(KNIFE, tmp_path)
+    steady, plate = study.answers["steady"], study.config.plate.nameplate
+    assert study.reaches and steady.current_share > 1.2 and steady.winding_temperature > 450.0
+    assert verdict["holds"] == "false" and "keeps the crank" in verdict["text"]
+    assert "its winding becomes too hot in steady running" in verdict["text"]
+    assert verdict["limits"]["temperature"]["utilisation"]["value"] > 1.5
+    hot, current = warnings["motor temperature"], warnings["motor current"]
+    assert hot.quantities["value"][0] == steady.winding_temperature and hot.quantities["limit"][0] == 393.15
+    assert "(run.winding_temperature)" in hot.text and "a larger motor" in hot.text
+    assert current.quantities["limit"][0] == plate.rated_current
+    assert current.quantities["value"][0] == pytest.approx(steady.current_share * plate.rated_current)
+    assert warnings["no reserve"].quantities["over"][0] == -steady.torque_reserve > 0.1
+
+
+def test_the_permitted_temperature_of_a_dc_motor(tmp_path):
+    """One that is badly cooled passes the permitted temperature, which the file may set."""
+    study, verdict, warnings = studied(JAM + CHAIN_UNIT.format(R_th=60), tmp_path)
+    T = study.answers["steady"].winding_temperature
+    assert T > 500.0 and verdict["holds"] == "false" and set(motor_limits(study)) == {"temperature"}
+    assert warnings["motor temperature"].quantities["value"] == (T, "K")
+    hot = JAM + CHAIN_UNIT.format(R_th=60).replace(
+        "ramp = 0.5", f"ramp = 0.5\nwinding_temperature = {T + 1.0}"
+    )
+    _, verdict, warnings = studied(hot, tmp_path / "hot")
+    assert verdict["holds"] != "false" and "too hot" not in verdict["text"]
+    assert not any(kind.startswith("motor ") for kind in warnings)
+    _, verdict, warnings = studied(JAM + CHAIN_UNIT.format(R_th=0.9), tmp_path / "cool")
+    assert verdict["holds"] != "false" and "too hot" not in verdict["text"]
+    assert not any(kind.startswith("motor ") for kind in warnings)
+
+
+def test_sizing_has_the_permitted_temperature():
+    assert parse("[sizing]\ntemperature = 400").permitted_temperature == ("sizing.temperature", 400.0)
+    with pytest.raises(InputError, match=r"run.winding_temperature: is sizing.temperature"):
+        parse("[sizing]\n[run]\nwinding_temperature = 400")
