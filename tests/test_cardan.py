@@ -227,9 +227,9 @@ def test_energy_over_a_thousand_periods(speed):
     [
         ({"alpha1": math.pi / 2}, "alpha1 = 1.5708 rad (90 deg): a Hooke joint turns only below 90 deg"),
         ({"alpha2": 2.0}, "alpha2 = 2 rad"),
-        ({"c2": 0.0}, "c2 = 0 N.m/rad: must be > 0 N.m/rad"),
-        ({"c3": -5.0}, "c3 = -5 N.m/rad: must be > 0 N.m/rad"),
-        ({"J1": 0.0}, "J1 = 0 kg.m2: must be > 0 kg.m2"),
+        ({"c2": 0.0}, "c2 = 0 N m/rad: must be > 0 N m/rad"),
+        ({"c3": -5.0}, "c3 = -5 N m/rad: must be > 0 N m/rad"),
+        ({"J1": 0.0}, "J1 = 0 kg m2: must be > 0 kg m2"),
         ({"J4": math.nan}, "J4 = nan"),
     ],
 )

@@ -117,7 +117,7 @@ def test_temperatures():
             "[feed]\nleft = { material_mass = inf }",
             "feed.left.material_mass = inf kg: must be finite, >= 0 kg",
         ),
-        ('[machine]\nr = "3 kg"', 'machine.r = "3 kg": must be a number in m, or a text such as "2 m"'),
+        ('[machine]\nr = "3 kg"', 'machine.r = "3 kg": must be a number in m, or a text such as "2 mm"'),
         ('[machine]\nr = "long"', 'machine.r = "long": must be a number in m'),
         ('[machine]\nweb_share = "1 m"', 'machine.web_share = "1 m": must be a pure number'),
         ("[machine]\nweb_share = 1.5", "machine.web_share = 1.5: must be >= 0 and <= 1"),
@@ -145,9 +145,6 @@ def test_temperatures():
         *(
             (f'[run]\ncrank_speed = "{text}"', f'run.crank_speed = "{text}": must be a number in rad/s')
             for text in (
-                "30 1/min",
-                "30 min^-1",
-                "0.5 Hz",
                 "30 m",
                 "rpm",
                 "1/0 rpm",
@@ -184,7 +181,7 @@ def test_temperatures():
             "run.step = 0.001 s: the study would take",
         ),
         ("[motor]\nambient = { T = 20 }", "motor.ambient.T = 20 K: must be >= 200 K"),
-        ("[motor]\nrotor = { J = -1 }", "motor.rotor.J = -1 kg.m2: must be > 0 kg.m2"),
+        ("[motor]\nrotor = { J = -1 }", "motor.rotor.J = -1 kg m2: must be > 0 kg m2"),
         ("[motor]\narmature = { L = 1e-6 }", "motor: armature.L = 1e-06 H: the current changes faster"),
         ("[run]\ncrank_speed = 0.01\nstep = 1e-5", "run.step = 1e-05 s: the study would take"),
         ("[ratios]\nrho = 1.0", "ratios: rho = 1, mu = 0.6"),

@@ -283,9 +283,9 @@ def test_the_speed_loop_is_tuned_and_shown_with_the_line(tmp_path):
     ("text", "line"),
     [
         ("[driveline]\nalpha1 = \"90 deg\"", "driveline.alpha1 = 1.5708 rad (90 deg): a Hooke joint turns only"),
-        ("[driveline]\nc2 = 0", "driveline.c2 = 0 N.m/rad: must be > 0 N.m/rad"),
-        ("[driveline]\nc3 = -1", "driveline.c3 = -1 N.m/rad: must be > 0 N.m/rad"),
-        ("[driveline]\nJ4 = 0", "driveline.J4 = 0 kg.m2: must be > 0 kg.m2"),
+        ("[driveline]\nc2 = 0", "driveline.c2 = 0 N m/rad: must be > 0 N m/rad"),
+        ("[driveline]\nc3 = -1", "driveline.c3 = -1 N m/rad: must be > 0 N m/rad"),
+        ("[driveline]\nJ4 = 0", "driveline.J4 = 0 kg m2: must be > 0 kg m2"),
         ("[driveline]\nJ1 = 2", "driveline.J1: unknown key; known here: alpha1"),
         ("[driveline]\nc2 = 1\nshaft2 = { section = \"round\" }", "driveline.c2: given beside driveline.shaft2"),
         ("[driveline]\nd2 = 1\ndamping_ratio = 0.1", "driveline.d2: given beside driveline.damping_ratio"),

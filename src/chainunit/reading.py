@@ -1,18 +1,16 @@
 """TOML tables read by declarations, through pydantic models that are generated from them.
 
-A number is in the declared SI unit; a text may carry a unit ("150 mm", "30 rev/min", "20 degC") and is
-converted. Every refusal is one line that names the field, its value and the allowed range.
+A number is in the declared SI unit; a text may carry a unit ("150 mm", "30 rev/min", "4 kNm"), see `units`.
+Every refusal is one line that names the field, its value and the allowed range.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import math
-import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
 from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
@@ -29,40 +27,12 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails
 
+from . import units
 from .errors import InputError, printable, refusal_prefix, shown
-from .quantities import Layout, Variable, base_units, complaint, variables
+from .quantities import Layout, Variable, complaint, variables
+from .refusals import unit_behind
 
 T = TypeVar("T")
-
-_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*")
-_POWER = r"[A-Za-zµΩ°]+(?:\^|\*\*)?-?\d?"
-_UNIT = re.compile(
-    rf"1|(?:1/)?{_POWER}(?:\s*[.*/·]\s*{_POWER})*(?:\s*/\s*\(\s*{_POWER}(?:\s*[.*·]\s*{_POWER})*\s*\))?"
-)
-_ANGLES = frozenset(
-    "rad mrad radian radians deg degree degrees ° rev revolution revolutions turn turns rpm".split()
-)
-
-
-@cache
-def _unit_registry() -> Any:
-    import pint
-
-    registry: Any = pint.UnitRegistry()
-    registry.define("@alias revolution = rev")
-    registry.define("@alias ohm = Ohm")
-    return registry
-
-
-def _pint_unit(unit: str) -> str:
-    """A unit as FMI or an engineer writes it ("kg.m2", "rev/min"), as pint reads it."""
-    if unit in ("", "1"):
-        return "dimensionless"
-    spaced = re.sub(r"\s*[.·]\s*", "*", unit).replace("^", "**")
-    powers = re.sub(r"([A-Za-zµΩ°])(-?\d)", r"\1**\2", spaced)
-    # in FMI everything behind a stroke is below it
-    top, *below = powers.split("/")
-    return top + "".join(f"/({part})" for part in below)
 
 
 def to_number(variable: Variable, given: Any) -> float:
@@ -86,40 +56,16 @@ def to_number(variable: Variable, given: Any) -> float:
 
 
 def _converted(variable: Variable, text: str) -> float:
-    import pint
-
-    refusal = ValueError(f"{variable.name} = {shown(text)}: must be {_kind(variable)}")
-    match = _NUMBER.fullmatch(text)
-    if match is None:
-        raise refusal
-    number, unit = float(match[1]), match[2]
-    if not unit:
-        return number
-    if _UNIT.fullmatch(unit) is None:
-        raise refusal
-    # pint takes an angle for a pure number: "1/min" would pass for an angular speed, in radians
-    angular = base_units(variable.unit).get("rad", 0)
-    named = set(re.findall(r"[A-Za-zµΩ°]+", unit)) & _ANGLES
-    if (angular > 0 and not named) or (angular == 0 and named):
-        raise refusal
+    parts = units.split(text)
     try:
-        return float(
-            _unit_registry().Quantity(number, _pint_unit(unit)).to(_pint_unit(variable.unit)).magnitude
-        )
-    except (pint.PintError, ValueError, TypeError, AttributeError, AssertionError) as error:
-        raise refusal from error
-
-
-_TAKEN_FOR = {
-    "m": ("mm", "cm"),
-    "kg": ("kg", "g"),
-    "N": ("N",),
-    "s": ("ms",),
-    "rad": ("deg",),
-    "rad/s": ("rev/min", "deg/s"),
-    "K": ("degC",),
-}
-"""Units that are taken for another one of their kind, the likely ones first, by declared unit."""
+        if parts is not None:
+            number, written = parts
+            return units.convert(number, written, variable.unit, variable.kind) if written else number
+    except ValueError:
+        pass
+    meant = units.meant(text, variable.unit, variable.kind)
+    hint = f'; was "{meant}" meant?' if meant else ""
+    raise ValueError(f"{variable.name} = {shown(text)}: must be {_kind(variable)}{hint}")
 
 
 @dataclass(frozen=True)
@@ -148,7 +94,7 @@ class Slip:
 
     def __str__(self) -> str:
         v, (low, high) = self.variable, self.variable.quantity.usual or (0.0, 0.0)
-        unit = "" if v.unit == "1" else f" {v.unit}"
+        unit = unit_behind(v.unit)
         hint = f'; was "{self.meant}" meant?' if self.meant else ""
         usual = f"usual: {low:g} to {high:g}{unit}"
         return f"{v.name} = {self.value:g}{unit}: is unusual ({v.description}; {usual}){hint}"
@@ -178,21 +124,23 @@ def slips(
 
 def _meant(variable: Variable, given: Any) -> str:
     """The number that was given, with the unit in which it is allowed and usual; empty where there is none."""
-    match = _NUMBER.fullmatch(str(given))
-    if match is None or not math.isfinite(float(match[1])):
+    parts = units.split(str(given))
+    if parts is None or not math.isfinite(parts[0]):
         return ""
-    for unit in _TAKEN_FOR.get(variable.unit, ()):
-        text = f"{float(match[1]):.15g} {unit}"
-        value = _converted(variable, text)
+    for unit in units.fitting(variable.unit, variable.kind):
+        value = units.convert(parts[0], unit, variable.unit, variable.kind)
         if variable.quantity.admits(value) and variable.quantity.is_usual(value):
-            return text
+            return f"{parts[0]:.15g} {unit}"
     return ""
 
 
 def _kind(variable: Variable) -> str:
+    fitting = units.fitting(variable.unit, variable.kind)
     if variable.unit == "1":
-        return f"a pure number ({variable.description})"
-    return f'a number in {variable.unit}, or a text such as "2 {variable.unit}" ({variable.description})'
+        share = ', or a text such as "8 %"' if fitting else ""
+        return f"a pure number{share} ({variable.description})"
+    declared = variable.unit.replace(".", " ")
+    return f'a number in {declared}, or a text such as "2 {fitting[0]}" ({variable.description})'
 
 
 Title = Annotated[str, AfterValidator(printable)]

@@ -43,5 +43,5 @@ STATE_OF_ANOTHER = "it belongs to another model, another version or kind of simu
 
 
 def unit_behind(unit: str) -> str:
-    """The unit as it stands behind a number."""
-    return "" if unit == "1" else f" {unit}"
+    """The unit as it stands behind a number: ``N.m`` -> N m."""
+    return "" if unit == "1" else " " + unit.replace(".", " ")

@@ -1,0 +1,217 @@
+"""Numbers with units as engineers write them: ``4 kNm``, ``30 rev/min``, ``0.5 kg m²``, ``8 %``, ``40 °C``.
+
+A product is a point, a star or a blank, or nothing where the names are those of a torque or an inertia (``Nm``,
+``kgm2``). What follows a stroke is below it, as in FMI. Numbers and units that the program prints are read again.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from functools import cache
+from typing import Any
+
+from .quantities import base_units
+
+_NUMBER = re.compile(
+    r"([+-]?(?:\d{1,3}(?: \d{3})+(?:\.\d*)?|\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3}| ?[x*] ?10\^?[+-]?\d{1,3}(?!\d))?)"
+    r" ?(\D.*|)"
+)
+_COMMA = re.compile(r"([+-]?\d+),(\d+)(?![\d,.])(.*)")
+_TOKEN = re.compile(r" ?([A-Za-zµ%‰]+(?:\^|\*\*)?(?:[+-]?\d)?|[*./()]|1(?!\d)) ?")
+_FACTOR = re.compile(r"([A-Za-zµ%‰]+)(?:\^|\*\*)?([+-]?\d)?")
+_GLUED = re.compile(r"([kMmµ]?N|k?g|[kM]?[AVW])(mm|cm|m)?(s)?")
+_SIGNS = {
+    "−": "-",
+    "°C": "degC",
+    "°F": "degF",
+    "°": "deg",
+    "Ω": "ohm",
+    "Ohm": "ohm",
+    "·": "*",
+    "⋅": "*",
+    "×": "x",
+    "µ": "µ",
+}
+_PINT = {
+    "rev": "revolution",
+    "revs": "revolution",
+    "U": "revolution",
+    "r": "revolution",
+    "PS": "metric_horsepower",
+    "kp": "kilogram_force",
+    "sec": "second",
+    "%": "percent",
+    "‰": "permille",
+}
+"""Names that pint does not know, or takes for something else."""
+_ANGLES = frozenset(
+    "rad mrad radian radians deg degree degrees arcmin arcsec revolution revolutions turn turns rpm".split()
+)
+
+FITTING: dict[str, tuple[str, ...]] = {
+    "m": ("mm", "cm", "m"),
+    "m/s": ("m/s", "mm/s"),
+    "m/s2": ("m/s2",),
+    "kg": ("kg", "g", "t"),
+    "kg.m2": ("kg m2", "kg cm2"),
+    "N": ("N", "kN"),
+    "N.m": ("N m", "kN m"),
+    "N.m/rad": ("N m/rad", "kN m/rad", "N m/deg"),
+    "s": ("s", "ms", "min", "h"),
+    "rad": ("deg", "rad"),
+    "rad/s": ("rev/min", "rad/s", "Hz", "rpm"),
+    "K": ("degC", "K"),
+    "W": ("kW", "W"),
+    "V": ("V", "kV"),
+    "A": ("A", "mA"),
+    "H": ("mH", "H"),
+    "Ohm": ("Ohm", "mOhm"),
+    "J/K": ("J/K", "kJ/K"),
+    "1/K": ("%/K", "1/K"),
+}
+"""Units in which people give a quantity, the usual one first, by its declared unit."""
+
+
+def fitting(unit: str, kind: str = "") -> tuple[str, ...]:
+    """Units that fit a quantity of the declared `unit` and `kind`, as a file takes them, the usual one first."""
+    if unit == "1":
+        return ("%",) if kind == "percent" else ()
+    return FITTING.get(unit, (unit.replace(".", " "),))
+
+
+def split(text: str) -> tuple[float, str] | None:
+    """The number with which a text begins, and the unit behind it; None where it begins with none.
+
+    Blanks between thousands are read (``10 500 N``), as is a power of ten (``2.3 × 10⁻⁷``).
+    """
+    match = _NUMBER.fullmatch(_ascii(text))
+    if match is None:
+        return None
+    number = re.sub(r" ?[x*] ?10\^?", "e", match[1]).replace(" ", "")
+    return float(number), match[2]
+
+
+def with_point(text: str) -> str:
+    """The text with a point in place of a decimal comma; empty where it has none."""
+    match = _COMMA.fullmatch(_ascii(text))
+    return f"{match[1]}.{match[2]}{match[3]}" if match else ""
+
+
+def _ascii(text: str) -> str:
+    """The text in one spelling: raised digits, signs and blanks of all kinds in plain letters."""
+    plain = text
+    for sign, letters in _SIGNS.items():
+        plain = plain.replace(sign, letters)
+    plain = unicodedata.normalize("NFKC", plain.replace("µ", "\0")).replace("\0", "µ").replace("μ", "µ")
+    return " ".join(plain.replace("−", "-").replace("Ω", "ohm").split())
+
+
+@cache
+def _registry() -> Any:
+    import pint
+
+    return pint.UnitRegistry()
+
+
+def convert(number: float, written: str, unit: str, kind: str = "") -> float:
+    """The `number` in the unit that is `written` behind it, in the declared `unit`.
+
+    Raises
+    ------
+    ValueError
+        for a unit of another kind, or one that is not known.
+    """
+    import pint
+
+    wanted = base_units(unit)
+    factors = _of_temperature(_of_angle(_factors(_ascii(written)), wanted), wanted, kind)
+    try:
+        return float(
+            _registry().Quantity(number, _joined(factors)).to(_joined(_factors(_ascii(unit)))).magnitude
+        )
+    except (pint.PintError, TypeError, AttributeError, AssertionError) as error:
+        raise ValueError(f"{written}: is no unit of {unit}") from error
+
+
+def meant(text: str, unit: str, kind: str = "") -> str:
+    """A text that fits a quantity of that `unit` and `kind`, where the given one likely means it: a point in place of
+    a comma, the right case of letters; else empty."""
+    text = with_point(text) or text
+    parts = split(text)
+    if parts is None:
+        return ""
+    number, written = parts
+    for usual in ("", *fitting(unit, kind)):
+        if usual.lower().replace(" ", "") == written.lower().replace(" ", ""):
+            return f"{number:.15g} {usual}".strip()
+    return ""
+
+
+def _joined(factors: list[tuple[str, int]]) -> str:
+    """Factors as pint reads them."""
+    return "*".join(f"{name}**({power})" for name, power in factors) or "dimensionless"
+
+
+def _of_angle(factors: list[tuple[str, int]], wanted: dict[str, int]) -> list[tuple[str, int]]:
+    """Factors with the angle that the quantity has: a machine's 15 1/min or 0.25 Hz are turns. Pint takes an angle
+    for a pure number, so that "1/s" would pass for an angular speed.
+
+    Raises
+    ------
+    ValueError
+        where one names an angle and the other does not.
+    """
+    named = any(name in _ANGLES for name, _ in factors)
+    if named and not wanted.get("rad"):
+        raise ValueError("an angle is named, and the quantity has none")
+    if named or wanted.get("rad", 0) <= 0:
+        return factors
+    if ("Hz", 1) in factors or factors[:1] == [("min", -1)]:
+        return [*factors, ("revolution", 1)]
+    raise ValueError("no angle is named, and the quantity has one")
+
+
+def _of_temperature(
+    factors: list[tuple[str, int]], wanted: dict[str, int], kind: str
+) -> list[tuple[str, int]]:
+    """Factors in which a temperature alone is one from zero Celsius, and one in a product or of a difference a
+    number of kelvins."""
+    if "K" not in wanted:
+        return factors
+    if kind != "difference" and factors == [("C", 1)]:
+        return [("degC", 1)]
+    if kind != "difference" and len(factors) == 1:
+        return factors
+    return [("kelvin" if name in ("degC", "C") else name, power) for name, power in factors]
+
+
+def _factors(written: str) -> list[tuple[str, int]]:
+    """Names of pint and their powers in a unit without special signs."""
+    factors: list[tuple[str, int]] = []
+    sign, depth, at = 1, 0, 0
+    while at < len(written):
+        match = _TOKEN.match(written, at)
+        if match is None:
+            raise ValueError(f"{written}: cannot be read")
+        token, at = match[1], match.end()
+        if token == "/":
+            sign = -1
+        elif token in "()":
+            depth += 1 if token == "(" else -1
+        elif token not in ("*", ".", "1"):
+            factors += _of_name(token, sign)
+    if depth:
+        raise ValueError(f"{written}: brackets do not close")
+    return factors
+
+
+def _of_name(token: str, sign: int) -> list[tuple[str, int]]:
+    match = _FACTOR.fullmatch(token)
+    assert match is not None  # a token of a name is a factor
+    name, power = match[1], sign * int(match[2] or 1)
+    glued = _GLUED.fullmatch(name)
+    if glued is None or (glued[2] is None and glued[3] is None) or name == "gs":
+        return [(_PINT.get(name, name), power)]
+    parts = [part for part in glued.groups() if part]
+    return [*((part, sign) for part in parts[:-1]), (parts[-1], power)]
