@@ -1,0 +1,88 @@
+"""Where the keys of a TOML text stand: tomllib gives values alone."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Statement:
+    """A heading or a key with its value: a piece of a TOML text that is complete by itself."""
+
+    line: int
+    """the first of its lines, from 1"""
+    table: str
+    """the table that it is in, or that it opens; of an array with its number from 1: ``event.2``"""
+    keys: tuple[str, ...] = ()
+    """full names of all that it sets, inner tables included; none for a heading"""
+
+
+def statements(text: str) -> Iterator[Statement]:
+    """The statements of a valid TOML text, in its order.
+
+    A statement ends with the first line up to which it is valid TOML by itself.
+    """
+    lines = text.splitlines()
+    table, numbers, first = "", dict[str, int](), 0
+    while first < len(lines):
+        last = first + 1
+        while (data := _loaded("\n".join(lines[first:last]))) is None and last < len(lines):
+            last += 1
+        opens = lines[first].lstrip().startswith("[")
+        if opens:
+            table = _heading(data or {}, numbers)
+            yield Statement(first + 1, table)
+        elif data:
+            yield Statement(first + 1, table, tuple(_names(data, f"{table}." if table else "")))
+        first = last
+
+
+def lines_of(text: str) -> dict[str, int]:
+    """The line of each key and table of a TOML text by its full name (``machine.crank.m``, ``event.2.force``); the
+    entries of an array of tables count from 1."""
+    found: dict[str, int] = {}
+    for statement in statements(text):
+        for name in statement.keys or (statement.table,):
+            # a table counts as standing where the first of its keys stands
+            parts = name.split(".")
+            for k in range(1, len(parts) + 1):
+                found.setdefault(".".join(parts[:k]), statement.line)
+    return found
+
+
+def _loaded(text: str) -> dict[str, Any] | None:
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError:
+        return None
+
+
+def _heading(data: Mapping[str, Any], numbers: dict[str, int]) -> str:
+    """The name of the table that a heading opens; entries of arrays are counted in `numbers`."""
+    parts: list[str] = []
+    inner: Any = data
+    while isinstance(inner, Mapping) and inner:
+        (name, inner), *_ = inner.items()
+        parts.append(name)
+        path = ".".join(parts)
+        if isinstance(inner, list):
+            numbers[path] = numbers.get(path, 0) + 1
+            inner = inner[0]
+        if path in numbers:
+            parts.append(str(numbers[path]))
+    return ".".join(parts)
+
+
+def _names(data: Mapping[str, Any], prefix: str) -> Iterator[str]:
+    for key, value in data.items():
+        yield prefix + key
+        if isinstance(value, Mapping):
+            yield from _names(value, f"{prefix}{key}.")
+        elif isinstance(value, list):
+            for k, entry in enumerate(value, 1):
+                if isinstance(entry, Mapping):
+                    yield f"{prefix}{key}.{k}"
+                    yield from _names(entry, f"{prefix}{key}.{k}.")
