@@ -818,7 +818,8 @@ def test_the_page_in_a_browser(study, written, tmp_path):
     assert done.returncode == 0
     assert not [line for line in done.stderr.splitlines() if "CONSOLE" in line]
     figures = done.stdout.split('data-figure="')[1:]
-    assert len(figures) == 8
+    declared = [figure.name for figure in study_report.report(study).figures if figure.on_page]
+    assert [figure.partition('"')[0] for figure in figures] == declared and "sides" in declared
     for figure in figures:
         box = figure.partition("<figcaption>")[0]
         assert 'class="main-svg"' in box and ('class="scatterlayer' in box or 'class="barlayer' in box)

@@ -1,7 +1,8 @@
-"""The command line: ``study``, ``reproduce``, ``export``, ``export-ssp``."""
+"""The command line."""
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import sys
@@ -239,6 +240,34 @@ def _stopped_early(failure: RunError, output: Path, errors: Console) -> None:
     sentence = f"The run stopped early: {failure}. What was computed before is in {output}."
     errors.print(printable(sentence, 2000), soft_wrap=True)
     raise typer.Exit(_status(failure))
+
+
+@app.command()
+def keys(
+    table: Annotated[
+        str | None, typer.Argument(help="Table of a study file, type of event, machine or motor.")
+    ] = None,
+) -> None:
+    """Show the keys of study files and catalogues: what each means, allows, and is where a file leaves it out."""
+    from .report import reference, terminal
+
+    terminal.show(reference.keys_of(table) if table else reference.overview(), _console())
+
+
+@app.command()
+def schema(
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="File; chainunit.schema.json by default.")
+    ] = None,
+) -> None:
+    """Write the JSON Schema of study files, by which an editor completes keys and marks mistakes."""
+    from .files import whole
+    from .study.schema import FILE, json_schema
+
+    file = output or Path(FILE)
+    with whole(file) as part:
+        part.write_text(json.dumps(json_schema(), indent=1, ensure_ascii=False) + "\n", "utf-8")
+    print(f"{file}: schema of study files")
 
 
 @app.command()

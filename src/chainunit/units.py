@@ -73,6 +73,10 @@ FITTING: dict[str, tuple[str, ...]] = {
 """Units in which people give a quantity, the usual one first, by its declared unit."""
 
 
+_RARE = ("cm", "g", "t", "h", "kg cm2", "mOhm", "rpm", "Hz")
+"""Units that are read, and not written."""
+
+
 def fitting(unit: str, kind: str = "") -> tuple[str, ...]:
     """Units that fit a quantity of the declared `unit` and `kind`, as a file takes them, the usual one first."""
     if unit == "1":
@@ -215,3 +219,19 @@ def _of_name(token: str, sign: int) -> list[tuple[str, int]]:
         return [(_PINT.get(name, name), power)]
     parts = [part for part in glued.groups() if part]
     return [*((part, sign) for part in parts[:-1]), (parts[-1], power)]
+
+
+def written(value: float, unit: str, kind: str = "") -> str:
+    """The value of a quantity as a file may state it, as TOML, in the unit in which it is shortest and exact:
+    0.06 m -> ``"60 mm"``; a pure number stands alone, a share in percent."""
+    if value == 0.0 and unit != "1":
+        return f'"0 {fitting(unit, kind)[0]}"'
+    texts = []
+    for name in fitting(unit, kind):
+        if name in _RARE:
+            continue
+        factor = convert(1.0, name, unit, kind) - (zero := convert(0.0, name, unit, kind))
+        number = f"{(value - zero) / factor:.12g}"
+        if abs(convert(float(number), name, unit, kind) - value) <= 1e-12 * abs(value):
+            texts.append(f'"{number} {name}"')
+    return min(texts, key=len) if texts else f"{value:.15g}"

@@ -45,7 +45,8 @@ class CatalogueData(Nameplate):
 
 LAYOUT = Layout(CatalogueData)
 _VARIABLES = {v.name: v for v in LAYOUT.variables}
-_TEXTS = ("designation", "source")
+TEXTS = {"designation": "name of the motor, as [system] names it", "source": "where its values are from"}
+"""Columns of words, with their descriptions."""
 _LONGEST = 200
 _HEADING = re.compile(r"\s*(\w+)\s*(?:\[\s*(.*?)\s*\])?\s*")
 
@@ -151,10 +152,10 @@ def _motors(rows: Iterator[tuple[str, Mapping[str, Any]]], others: set[str]) -> 
 
 def _motor(origin: str, row: Mapping[str, Any], others: set[str]) -> CatalogueMotor:
     for name in row:
-        if name not in _VARIABLES and name not in _TEXTS:
-            raise InputError(f"{shown(name)}: unknown; known here: {', '.join((*_TEXTS, *_VARIABLES))}")
+        if name not in _VARIABLES and name not in TEXTS:
+            raise InputError(f"{shown(name)}: unknown; known here: {', '.join((*TEXTS, *_VARIABLES))}")
     texts = {}
-    for name in _TEXTS:
+    for name in TEXTS:
         text = row.get(name, origin if name == "source" else "")
         if not isinstance(text, str) or not text.strip() or not text.isprintable() or len(text) > _LONGEST:
             raise InputError(
@@ -205,8 +206,8 @@ def _csv_rows(text: str, file: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
 
 def _column(cell: str, file: str) -> tuple[str, str]:
     match = _HEADING.fullmatch(cell)
-    if match is None or (match[1] not in _VARIABLES and match[1] not in _TEXTS):
-        names = ", ".join((*_TEXTS, *(heading(v) for v in _VARIABLES.values())))
+    if match is None or (match[1] not in _VARIABLES and match[1] not in TEXTS):
+        names = ", ".join((*TEXTS, *(heading(v) for v in _VARIABLES.values())))
         raise InputError(f"{file}: heading {shown(cell)}: unknown; known here: {names}")
     return match[1], match[2] or ""
 

@@ -1,0 +1,223 @@
+"""Every key that a study file or a catalogue may have, from the declarations: the source of the reference, of the
+commented example, and of the schema for editors."""
+
+from __future__ import annotations
+
+import typing
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from pydantic.fields import FieldInfo
+
+from ..drives.catalogue import LAYOUT as CATALOGUE
+from ..drives.catalogue import TEXTS
+from ..drives.line_table import SHAFTS, Damping
+from ..drives.motors import MOTORS
+from ..drives.shafts import SECTIONS as PROFILES
+from ..drives.shafts import Shaft
+from ..models import MACHINES
+from ..quantities import Layout, Variable, variables
+from ..text import CHOICES as UNITS
+from ..units import written
+from .config import Config, parse
+from .event import TYPES, Event
+from .sections import CHOICES, SECTIONS, Ratios, SystemTable
+
+_FOLLOWS = {
+    "gear.ratio": "from the rated speed of the motor",
+    "sizing.inertia_ratio": '10 with start = "inverter", else none',
+    "motor.speed_control.kp": "tuned",
+    "motor.speed_control.ki": "tuned",
+    "motor.current_control.kp": "tuned",
+    "motor.current_control.ki": "tuned",
+    "driveline.d2": "from damping_ratio",
+    "driveline.d3": "from damping_ratio",
+}
+"""Keys whose value, where a file leaves them out, follows from others."""
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key of a file; `name` is its full name within its table (``crank.m``)."""
+
+    name: str
+    description: str
+    variable: Variable | None = None
+    """its quantity; None for a word, a switch or a list"""
+    words: tuple[str, ...] = ()
+    """the values that it may have, as a file states them; none where any text will do"""
+    sort: typing.Literal["number", "text", "switch", "list", "table"] = "number"
+    left_out: str = ""
+    """the value, as a file states it, that it has where a file leaves it out; empty where there is none"""
+
+    @property
+    def unit(self) -> str:
+        """The declared unit, empty of a pure number and of what is no quantity."""
+        return "" if self.variable is None or self.variable.unit == "1" else self.variable.unit
+
+    @property
+    def allowed(self) -> str:
+        """The range, or the values to choose from, in words."""
+        if self.variable is not None:
+            return self.variable.quantity.allowed
+        if self.words:
+            return ", ".join(self.words)
+        return {"text": "a text", "list": "a list", "table": "a table"}.get(self.sort, "")
+
+
+@dataclass(frozen=True)
+class KeyTable:
+    """A table of a study file, or the columns of a catalogue."""
+
+    name: str
+    """as in the file, empty for what stands before all tables"""
+    title: str
+    keys: tuple[Key, ...]
+    of: str = ""
+    """the machine, the motor or the type of event whose table it is, where others have another"""
+
+    @property
+    def heading(self) -> str:
+        """As a heading: ``[motor] of DcMotor``."""
+        name = f"[[{self.name}]]" if self.name == "event" else f"[{self.name}]"
+        return " ".join(
+            filter(None, (name if self.name else "before all tables", self.of and f"of {self.of}"))
+        )
+
+
+@cache
+def key_tables() -> tuple[KeyTable, ...]:
+    """All tables of a study file, in the order in which a file has them."""
+    return (
+        KeyTable(
+            "", "Study", (Key("title", "title of the study", sort="text"), *_of_fields(CHOICES, _study()))
+        ),
+        KeyTable("system", "Machine and motor", tuple(_of_system())),
+        *(KeyTable("machine", "Machine", tuple(_of_machine(name, "machine")), name) for name in MACHINES),
+        KeyTable("ratios", "The papers' ratios", tuple(_numbers(Ratios, Ratios())), "ChamberForces"),
+        *(
+            KeyTable("feed", "Feed in normal running", tuple(_of_machine(name, "feed")), name)
+            for name in MACHINES
+        ),
+        *(KeyTable("motor", "Motor", tuple(_of_motor(name)), name) for name in MOTORS),
+        *(KeyTable(name, SECTIONS[name].title, tuple(_of_section(name))) for name in SECTIONS),
+        KeyTable("report", "Report", tuple(_of_report())),
+        *(KeyTable("event", _first_sentence(of), tuple(_of_event(of)), name) for name, of in TYPES.items()),
+    )
+
+
+def catalogue_columns() -> KeyTable:
+    """The columns of a catalogue of motors, and keys of its [[motor]] tables."""
+    texts = (Key(name, description, sort="text") for name, description in TEXTS.items())
+    return KeyTable("motor", "Catalogue of motors", (*texts, *_numbers(CATALOGUE.cls)), "a catalogue")
+
+
+@cache
+def _study(machine: str = "ChamberForces", motor: str = "") -> Config:
+    """The study of a file that names machine and motor alone: what it leaves out."""
+    names = [f'machine = "{machine}"'] + ([f'motor = "{motor}"'] if motor else [])
+    return parse("\n".join(["[system]", *names]))
+
+
+def _numbers(declared: type, values: Any = None, prefix: str = "", table: str = "") -> Iterator[Key]:
+    """Keys of declared quantities; `values` are those of a file that leaves them out."""
+    known = Layout(declared).named(values) if values is not None else {}
+    for v in variables(declared):
+        value = known.get(v.name, v.quantity.start)
+        left_out = "" if value is None else written(value, v.unit, v.kind)
+        left_out = _FOLLOWS.get(f"{table}.{v.name}", left_out)
+        yield Key(prefix + v.name, v.description, v, left_out=left_out)
+
+
+def _of_machine(name: str, table: str) -> Iterator[Key]:
+    config = _study(name)
+    if table == "feed":
+        return _numbers(config.machine.model.Feed, config.feed)
+    return _numbers(config.machine.model.Parameters, config.machine.p)
+
+
+def _of_motor(name: str) -> Iterator[Key]:
+    return _numbers(MOTORS[name].Parameters, _study(motor=name).motor, table="motor")
+
+
+def _of_section(name: str) -> Iterator[Key]:
+    section = SECTIONS[name]
+    values = getattr(_study(), name)
+    if values is None:
+        values = section.default or section.declared()
+    yield from _numbers(section.declared, values, table=name)
+    yield from _of_fields(section.keys)
+    if name == "driveline":
+        yield from _numbers(Damping)
+        for shaft, stiffness in SHAFTS.items():
+            words = f"its profile, in place of {stiffness}"
+            yield Key(f"{shaft}.section", words, words=tuple(f'"{name}"' for name in PROFILES), sort="text")
+            yield from _numbers(Shaft, prefix=f"{shaft}.")
+            yield Key(f"{shaft}.outline", "corners of a profile of any form, as pairs [m]", sort="list")
+            yield Key(f"{shaft}.holes", "outlines of the holes in it", sort="list")
+
+
+def _of_system() -> Iterator[Key]:
+    machines = tuple(f'"{name}"' for name in MACHINES)
+    motors = tuple(f'"{name}"' for name in MOTORS)
+    words = {
+        "machine": (*machines, "an FMU (.fmu)"),
+        "motor": (*motors, "a designation of the catalogue", "an FMU (.fmu)"),
+    }
+    for name, field in SystemTable.model_fields.items():
+        if name in words:
+            left_out = '"ChamberForces"' if name == "machine" else "that of the machine's example"
+            yield Key(name, str(field.description), words=words[name], sort="text", left_out=left_out)
+        else:
+            inner: Any = field.annotation
+            for key, below in inner.model_fields.items():
+                named = isinstance(below.annotation, type) and hasattr(below.annotation, "model_fields")
+                for each in below.annotation.model_fields if named else ("",):
+                    full = f"{key}.{each}" if each else key
+                    yield Key(f"{name}.{full}", f"name of {full} in the FMU", sort="text")
+
+
+def _of_report() -> Iterator[Key]:
+    for kind, names in UNITS.items():
+        words = tuple(f'"{name}"' for name in names)
+        yield Key(f"units.{kind}", f"unit of each {kind} in the report", words=words, sort="text")
+
+
+def _of_event(of: type[Event]) -> Iterator[Key]:
+    yield Key("type", "type of the event", words=(f'"{of.kind}"',), sort="text")
+    if of.sided:
+        yield Key("side", "side that it comes on", words=('"left"', '"right"'), sort="text")
+    yield Key("name", "name of its run, in small letters, digits and _", sort="text", left_out=f'"{of.run}"')
+    yield from _numbers(of.Parameters, of.Parameters())
+
+
+def _of_fields(fields: Mapping[str, Any], config: Config | None = None) -> Iterator[Key]:
+    """Keys that are no quantities, from their pydantic fields."""
+    for name, (annotation, field) in fields.items():
+        yield _of_field(name, annotation, field, config.choices.get(name) if config else field.default)
+
+
+def _of_field(name: str, annotation: Any, field: FieldInfo, value: Any) -> Key:
+    base = annotation
+    while typing.get_origin(base) is typing.Annotated:
+        base = typing.get_args(base)[0]
+    words: tuple[str, ...] = ()
+    sort: typing.Literal["text", "switch", "list", "table"] = "text"
+    if typing.get_origin(base) is typing.Literal:
+        words = tuple(f'"{word}"' for word in typing.get_args(base))
+    elif base is bool:
+        words, sort = ("true", "false"), "switch"
+    elif typing.get_origin(base) in (list, dict):
+        sort = "list" if typing.get_origin(base) is list else "table"
+    shown = (
+        {True: "true", False: "false"}.get(value, "") if sort == "switch" else f'"{value}"' if value else ""
+    )
+    return Key(
+        name, str(field.description), words=words, sort=sort, left_out=shown if sort != "table" else ""
+    )
+
+
+def _first_sentence(of: type) -> str:
+    return (of.__doc__ or "").split(".")[0]
