@@ -141,7 +141,11 @@ def study(
     from .study import parts
 
     if example:
-        print(parts.example(example.value), end="")
+        from .study.commented import commented
+        from .study.schema import FILE
+
+        text = parts.example(example.value)
+        print(commented(text) if example is Example.full else f"#:schema {FILE}\n{text}", end="")
         return
     loaded = _study_file(config)
     from .study.choice import check_files

@@ -14,6 +14,8 @@ class Statement:
 
     line: int
     """the first of its lines, from 1"""
+    last: int
+    """the last of its lines"""
     table: str
     """the table that it is in, or that it opens; of an array with its number from 1: ``event.2``"""
     keys: tuple[str, ...] = ()
@@ -34,9 +36,9 @@ def statements(text: str) -> Iterator[Statement]:
         opens = lines[first].lstrip().startswith("[")
         if opens:
             table = _heading(data or {}, numbers)
-            yield Statement(first + 1, table)
+            yield Statement(first + 1, last, table)
         elif data:
-            yield Statement(first + 1, table, tuple(_names(data, f"{table}." if table else "")))
+            yield Statement(first + 1, last, table, tuple(_names(data, f"{table}." if table else "")))
         first = last
 
 

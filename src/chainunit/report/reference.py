@@ -48,7 +48,7 @@ def _block(table: KeyTable, title: str = "") -> Table:
 
 
 def _row(key: Key) -> TableRow:
-    return TableRow((key.name, key.left_out or "-", key.allowed or "-", key.description))
+    return TableRow((key.name, key.left_out or key.follows or "-", key.allowed or "-", key.description))
 
 
 def reference(commands: Iterable[tuple[str, str, Iterable[tuple[str, str]]]]) -> Report:

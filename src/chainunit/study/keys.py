@@ -51,6 +51,8 @@ class Key:
     sort: typing.Literal["number", "text", "switch", "list", "table"] = "number"
     left_out: str = ""
     """the value, as a file states it, that it has where a file leaves it out; empty where there is none"""
+    follows: str = ""
+    """from what its value follows, where a file leaves it out"""
 
     @property
     def unit(self) -> str:
@@ -127,8 +129,8 @@ def _numbers(declared: type, values: Any = None, prefix: str = "", table: str = 
     for v in variables(declared):
         value = known.get(v.name, v.quantity.start)
         left_out = "" if value is None else written(value, v.unit, v.kind)
-        left_out = _FOLLOWS.get(f"{table}.{v.name}", left_out)
-        yield Key(prefix + v.name, v.description, v, left_out=left_out)
+        follows = _FOLLOWS.get(f"{table}.{v.name}", "")
+        yield Key(prefix + v.name, v.description, v, left_out="" if follows else left_out, follows=follows)
 
 
 def _of_machine(name: str, table: str) -> Iterator[Key]:
@@ -168,8 +170,15 @@ def _of_system() -> Iterator[Key]:
     }
     for name, field in SystemTable.model_fields.items():
         if name in words:
-            left_out = '"ChamberForces"' if name == "machine" else "that of the machine's example"
-            yield Key(name, str(field.description), words=words[name], sort="text", left_out=left_out)
+            left_out, follows = ('"ChamberForces"', "") if name == "machine" else ("", "the example's")
+            yield Key(
+                name,
+                str(field.description),
+                words=words[name],
+                sort="text",
+                left_out=left_out,
+                follows=follows,
+            )
         else:
             inner: Any = field.annotation
             for key, below in inner.model_fields.items():
@@ -189,7 +198,7 @@ def _of_event(of: type[Event]) -> Iterator[Key]:
     yield Key("type", "type of the event", words=(f'"{of.kind}"',), sort="text")
     if of.sided:
         yield Key("side", "side that it comes on", words=('"left"', '"right"'), sort="text")
-    yield Key("name", "name of its run, in small letters, digits and _", sort="text", left_out=f'"{of.run}"')
+    yield Key("name", "name of its run, in small letters, digits and _", sort="text", follows="type and side")
     yield from _numbers(of.Parameters, of.Parameters())
 
 

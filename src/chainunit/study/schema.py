@@ -121,6 +121,6 @@ def _sentence(key: Key) -> str:
     parts: Iterable[str] = (
         key.description,
         f"[{key.unit.replace('.', ' ')}]" if key.unit else "",
-        f"(left out: {key.left_out})" if key.left_out else "",
+        f"(left out: {left_out})" if (left_out := key.left_out or key.follows) else "",
     )
     return " ".join(filter(None, parts))

@@ -266,13 +266,35 @@ STARTS = ("direct", "soft", "inverter")
 CHOICES: Mapping[str, Any] = {
     "feed_forward": (
         StrictBool,
-        Field(False, description="whether the control is told the machine's torque"),
+        Field(
+            False,
+            description="whether the control of a DC motor is given the torque of a model of the machine",
+        ),
     ),
     "empty_start": (StrictBool, Field(False, description="whether the feed comes once the machine runs")),
-    "start": (Literal[STARTS], Field("direct", description="how a motor of the catalogue is started")),
-    "simulation": (Literal[SIMULATIONS], Field("cs", description="how the system runs")),
-    "organ": (Literal[ORGANS], Field("two-bar", description="how the organs are modelled")),
-    "catalogue": (str, Field("", description="file with motors of the user")),
+    "start": (
+        Literal[STARTS],
+        Field(
+            "direct",
+            description="start of a motor of the catalogue: on line, by a soft starter, or by an inverter",
+        ),
+    ),
+    "simulation": (
+        Literal[SIMULATIONS],
+        Field(
+            "cs", description="how the system runs: as a co-simulation, or as one ODE of Model Exchange FMUs"
+        ),
+    ),
+    "organ": (
+        Literal[ORGANS],
+        Field(
+            "two-bar", description="model of the organs: two rigid bars each, or chains of rods, see [chain]"
+        ),
+    ),
+    "catalogue": (
+        str,
+        Field("", description="file with motors of your own, beside the packaged ones (CSV or TOML)"),
+    ),
 }
 """Keys of a study file that stand before all tables, as pydantic fields."""
 
@@ -293,8 +315,11 @@ _MachineNames = _names_form("machine_names", NAMES["machine"])
 SystemTable = create_model(
     "system",
     __config__=ConfigDict(extra="forbid"),
-    machine=(str, Field("ChamberForces", min_length=1, description="the machine")),
-    motor=(str, Field("", min_length=1, description="the motor")),
+    machine=(str, Field("ChamberForces", min_length=1, description="machine: a model, or an FMU")),
+    motor=(
+        str,
+        Field("", min_length=1, description="motor: a model, a designation of the catalogue, or an FMU"),
+    ),
     motor_names=(_MotorNames, Field(default_factory=_MotorNames)),
     machine_names=(_MachineNames, Field(default_factory=_MachineNames)),
 )
@@ -350,7 +375,15 @@ SECTIONS: Mapping[str, FileSection] = {
     "monte_carlo": FileSection(
         MonteCarlo,
         whole=("runs", "seed"),
-        keys={"event": (dict[str, Any], Field({}, description="the event"))},
+        keys={
+            "event": (
+                dict[str, Any],
+                Field(
+                    {},
+                    description="event that comes at random: keys of an [[event]], quantities may be ranges",
+                ),
+            )
+        },
         title="Overloads at random",
         used=lambda config: config.monte_carlo.runs > 0,
         apart=True,

@@ -1,0 +1,73 @@
+"""A study file with every key that it may have, and what each means: those that it leaves out as comments."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from itertools import groupby
+
+from ..drives.motors import MOTORS
+from ..places import Statement, statements
+from ..reading import toml
+from .keys import Key, KeyTable, key_tables
+from .schema import FILE
+
+_OF_OTHERS = ("motor_names.", "machine_names.")
+"""Keys for FMUs of somebody else, of which an example has none."""
+_COLUMN = 34
+"""The column at which comments begin, where there is room."""
+
+
+def commented(text: str, machine: str = "ChamberForces") -> str:
+    """The study file `text` of that machine, with a comment from the declarations on each line that has none. Keys
+    that it leaves out follow in comments at the end of their tables, tables that it leaves out at its end."""
+    lines = text.splitlines()
+    types = [str(event["type"]) for event in toml(text).get("event", [])]
+    found = [*statements(text)]
+    named = {name for each in found for name in each.keys}
+    below: dict[int, list[str]] = {}
+    for table, group in groupby(found, key=lambda each: each.table):
+        own = [*group]
+        keys = {f"{table}.{key.name}".lstrip("."): key for key in _keys(table, machine, types)}
+        for each in own:
+            _comment(lines, each, keys)
+        below[own[-1].last] = [_line(key) for name, key in keys.items() if name not in named]
+    written = [f"#:schema {FILE}"]
+    for number, line in enumerate(lines, 1):
+        written += [line, *below.get(number, [])]
+    for each in _absent({each.table.split(".")[0] for each in found}, machine):
+        title = f"{each.title} of {each.of}" if each.of else each.title
+        written += ["", f"{f'# [{each.name}]':<{_COLUMN}} # {title}", *map(_line, each.keys)]
+    return "\n".join(written) + "\n"
+
+
+def _keys(table: str, machine: str, types: list[str]) -> Iterator[Key]:
+    """The keys of a table of the file; of an event, those of its type."""
+    name, _, number = table.partition(".")
+    of = types[int(number) - 1] if name == "event" else machine
+    for each in key_tables():
+        if each.name == name and each.of in ("", of):
+            yield from (key for key in each.keys if not key.name.startswith(_OF_OTHERS))
+
+
+def _absent(present: set[str], machine: str) -> Iterable[KeyTable]:
+    return (
+        each
+        for each in key_tables()
+        if each.name and each.name not in {*present, "event"} and each.of in ("", machine, *MOTORS)
+    )
+
+
+def _comment(lines: list[str], statement: Statement, keys: dict[str, Key]) -> None:
+    """Put the meaning of what a statement sets behind it, where its line has no comment."""
+    meanings = [keys[name].description for name in statement.keys if name in keys]
+    line = lines[statement.line - 1]
+    if meanings and "#" not in line:
+        lines[statement.line - 1] = f"{line:<{_COLUMN}} # {'; '.join(meanings)}"
+
+
+def _line(key: Key) -> str:
+    """A key that the file leaves out, with the value that it has then, if that is one."""
+    allowed = f" ({', '.join(key.words)})" if key.words else ""
+    follows = f"; left out: {key.follows}" if key.follows else ""
+    text = f"# {key.name} = {key.left_out}".rstrip()
+    return f"{text:<{_COLUMN}} # {key.description}{allowed}{follows}"

@@ -1,0 +1,191 @@
+"""The reference of keys, the commented example and the schema, against the reader of study files itself."""
+
+import json
+import re
+import tomllib
+from pathlib import Path
+
+import jsonschema
+import pytest
+from command import chainunit
+
+from chainunit.drives.dc_motor import DcMotor
+from chainunit.drives.motors import MOTORS
+from chainunit.errors import InputError
+from chainunit.machines.chain_unit import ChamberForces
+from chainunit.models import MACHINES
+from chainunit.quantities import Layout
+from chainunit.study.commented import commented
+from chainunit.study.config import parse
+from chainunit.study.event import TYPES
+from chainunit.study.keys import catalogue_columns, key_tables
+from chainunit.study.parts import EXAMPLES, Parts, example
+from chainunit.study.schema import json_schema
+
+ROOT = Path(__file__).parents[1]
+
+
+def _leaves(form, prefix=""):
+    """Names of all keys of a pydantic form."""
+    for name, field in form.model_fields.items():
+        below = field.annotation
+        if hasattr(below, "model_fields"):
+            yield from _leaves(below, f"{prefix}{name}.")
+        else:
+            yield prefix + name
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+@pytest.mark.parametrize("motor", MOTORS)
+def test_each_key_of_the_form_is_documented(machine, motor):
+    form = Parts(MACHINES[machine], MOTORS[motor]).form
+    documented = {
+        f"{table.name}.{key.name}".lstrip(".")
+        for table in key_tables()
+        if table.of in ("", machine, motor) or table.name == "ratios"
+        for key in table.keys
+    }
+    asked = {name for name in _leaves(form) if name not in ("event", "report.units")}
+    assert asked <= documented
+    assert {name for name in documented - asked if not name.startswith(("event.", "report.units."))} == set()
+
+
+def test_each_type_of_event_has_a_table():
+    assert {table.of for table in key_tables() if table.name == "event"} == set(TYPES)
+
+
+def test_each_key_says_what_it_means():
+    for table in (*key_tables(), catalogue_columns()):
+        assert table.title
+        for key in table.keys:
+            assert key.description and key.allowed, (table.heading, key.name)
+
+
+def _one_key(table, key):
+    """A study file with that key alone, at the value that it has where it is left out."""
+    if table.name == "event":
+        side = 'side = "left"\n' if TYPES[table.of].sided else ""
+        own = "" if key.name in ("type", "side") else f"{key.name} = {key.left_out}\n"
+        machine = {"cut": "KnifeDrive", "overload": "Accelerator"}.get(table.of, "ChamberForces")
+        return f'[system]\nmachine = "{machine}"\n[[event]]\ntype = "{table.of}"\n{side}{own}'
+    system = f'[system]\nmachine = "{table.of}"\n' if table.of in MACHINES else ""
+    system += f'[system]\nmotor = "{table.of}"\n' if table.of in MOTORS else ""
+    if table.name in ("gear", "starter"):
+        system = '[system]\nmotor = "IE3 4-pole 0.75 kW, 80M"\n'
+    if table.name == "torsion":
+        system = "[driveline]\n"
+    if table.name == "chain":
+        system = 'organ = "chain"\n'
+    if not table.name:
+        return f"{key.name} = {key.left_out}"
+    if table.name == "system":
+        return f"title = 'x'\nsystem.{key.name} = {key.left_out}"
+    heading = "" if table.name == "driveline" and key.name.startswith("shaft") else f"[{table.name}]\n"
+    return f"{system}{heading}{key.name} = {key.left_out}\n"
+
+
+_WITH_VALUES = [
+    (table, key) for table in key_tables() for key in table.keys if key.left_out and ".shaft" not in key.name
+]
+
+
+@pytest.mark.parametrize(
+    ("table", "key"), _WITH_VALUES, ids=[f"{table.heading} {key.name}" for table, key in _WITH_VALUES]
+)
+def test_a_key_at_its_value_changes_nothing(table, key):
+    """The value that the reference states for a key that is left out is taken, and is the one that the file has."""
+    if table.name == "driveline" and (key.name.startswith("shaft") or key.name in ("c2", "c3")):
+        pytest.skip("a shaft's profile goes with others of its keys")
+    if table.name == "machine" and key.name in ("r", "l", "h", "c", "hy", "e", "l1", "l2", "z", "ratio"):
+        pytest.skip("lengths come from ratios or from other lengths, see test_config")
+    text = _one_key(table, key)
+    lines = text.splitlines()
+    own = (f"{key.name} =", f"system.{key.name} =")
+    without = "\n".join(line for line in lines if not line.startswith(own) or key.name == "type")
+    try:
+        given, left_out = parse(text), parse(without)
+    except InputError as error:
+        # a start or a catalogue is of a motor of the catalogue alone
+        assert "is of" in str(error) and not table.name
+        return
+    for part in ("machine", "feed", "motor", "run", "coupling", "monte_carlo", "sizing", "flywheel", "gear"):
+        assert _values(getattr(given, part)) == pytest.approx(_values(getattr(left_out, part)), rel=1e-11)
+    for one, other in zip(given.events.values(), left_out.events.values(), strict=True):
+        assert _values(one) == pytest.approx(_values(other), rel=1e-11) and one.name == other.name
+    for part in ("starter", "driveline", "torsion", "chain", "simulation", "damping_ratios", "place"):
+        assert getattr(given, part) == getattr(left_out, part)
+
+
+def _values(part):
+    """The numbers of a part of a study, by name."""
+    declared = getattr(part, "p", part)
+    return Layout(type(declared)).named(declared) if declared is not None else {}
+
+
+def test_the_full_example_names_every_key_once():
+    text = commented(example("full"))
+    assert parse(text).machine.p == parse(example("full")).machine.p
+    tables = re.findall(r"^(?:# )?\[(\w+)\]", text, re.MULTILINE)
+    assert sorted({*tables}) == sorted({*Parts(ChamberForces, DcMotor).sections, "report", "system"})
+    for table in key_tables():
+        if table.name in ("", "event", "system") or table.of not in ("", "ChamberForces"):
+            continue
+        own = re.split(rf"^(?:# )?\[{table.name}\]", text, flags=re.MULTILINE)[1]
+        own = re.split(r"^(?:# )?\[", own, flags=re.MULTILINE)[0]
+        set_here = tomllib.loads(text).get(table.name, {})
+        for key in table.keys:
+            first, *below = key.name.split(".")
+            here = set_here.get(first)
+            for name in below:
+                here = here.get(name) if isinstance(here, dict) else None
+            said = re.findall(rf"^# {re.escape(key.name)} =", own, re.MULTILINE)
+            assert len(said) == (here is None), (table.name, key.name)
+
+
+def test_each_line_of_the_full_example_has_a_comment():
+    for line in commented(example("full")).splitlines():
+        if "=" in line:
+            assert "#" in line.lstrip("# "), line
+
+
+VALIDATOR = jsonschema.Draft7Validator(json_schema())
+
+
+@pytest.mark.parametrize("file", [*sorted((ROOT / "examples").glob("*.toml")), *EXAMPLES], ids=str)
+def test_examples_meet_the_schema(file):
+    text = file.read_text("utf-8") if isinstance(file, Path) else example(file)
+    assert [error.message for error in VALIDATOR.iter_errors(tomllib.loads(text))] == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[machine]\nradus = 3",
+        "[machine]\nr = -1",
+        "[machin]",
+        'organ = "belt"',
+        'empty_start = "yes"',
+        '[[event]]\nforce = "3 kN"',
+        '[[event]]\ntype = "jam"\nspeed = 3',
+        "[run]\nstep = 1",
+        '[machine]\nr = "long"',
+        "[monte_carlo]\nevent = { force = [1, 2, 3] }",
+    ],
+)
+def test_the_schema_marks_what_the_reader_refuses(text):
+    data = tomllib.loads(text)
+    assert list(VALIDATOR.iter_errors(data))
+    with pytest.raises(InputError):
+        parse(text)
+
+
+def test_the_commands(tmp_path):
+    said = chainunit("keys", "jam", cwd=tmp_path).stdout
+    assert "processing force of the lump" in said and '"2 kN"' in said
+    assert "[[event]] of jam" in chainunit("keys", cwd=tmp_path).stdout
+    refused = chainunit("keys", "jams", cwd=tmp_path)
+    assert refused.returncode == 2 and "there are system, machine" in refused.stderr
+    assert chainunit("schema", cwd=tmp_path).returncode == 0
+    assert json.loads((tmp_path / "chainunit.schema.json").read_text("utf-8")) == json_schema()
+    first, *_ = chainunit("study", "--example", "knife", cwd=tmp_path).stdout.splitlines()
+    assert first == "#:schema chainunit.schema.json"
