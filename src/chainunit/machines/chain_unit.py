@@ -14,7 +14,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any, Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 from ..groups.body import Bar, Mass
 from ..groups.driver import Crank
@@ -425,6 +425,7 @@ class ChamberForces(InverseMachine):
     Feed = Feed
     joints = JOINTS
     pins = PINS
+    angles: ClassVar[Mapping[str, str]] = {"ψ": "rocker"}
     probes = staticmethod(_probes)
 
     required = (

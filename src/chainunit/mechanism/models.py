@@ -120,6 +120,8 @@ class InverseMachine(LinkageModel, MachineModel):
     Outputs: ClassVar[type]
     joints: ClassVar[Mapping[str, Joint]] = {}
     """Joint of each reaction by the name of the output."""
+    angles: ClassVar[Mapping[str, str]] = {}
+    """Links by the symbols of their angles from the downward vertical, positive towards +x."""
     direct_name: ClassVar[str]
     """Name of the direct model, ``<name>Direct`` where a machine states none."""
     direct_description: ClassVar[str] = ""

@@ -136,7 +136,18 @@ class Given:
     form: Form = "long"
 
 
-Block: TypeAlias = "Text | Judgement | Cards | Table | Tables | Given | Figure | Animation"
+@dataclass(frozen=True)
+class Drawing:
+    """A picture as SVG, with its file's name; `alt` tells it to a reader who does not see it."""
+
+    svg: str
+    alt: str
+    file: str
+    caption: Line = ()
+    form: Form = "long"
+
+
+Block: TypeAlias = "Text | Judgement | Cards | Table | Tables | Given | Drawing | Figure | Animation"
 
 
 def of_form(blocks: Iterable[Block], form: Form) -> list[Block]:
@@ -171,6 +182,11 @@ class Report:
     def blocks(self, form: Form) -> list[Block]:
         """The blocks of one form, in order."""
         return of_form((*self.opening, *(block for s in self.sections for block in s.blocks)), form)
+
+    @property
+    def drawings(self) -> list[Drawing]:
+        """All drawings, in order."""
+        return [block for block in self.blocks("long") if isinstance(block, Drawing)]
 
     @property
     def figures(self) -> list[Figure]:

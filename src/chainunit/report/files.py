@@ -24,6 +24,10 @@ def writers(report: Report, folder: Path, name: str) -> list[Callable[[], list[P
         return [file]
 
     def draw() -> list[Path]:
+        for drawing in report.drawings:
+            with whole(folder / drawing.file) as part:
+                part.write_text(drawing.svg, "utf-8")
+            pictures.append(folder / drawing.file)
         pictures.extend(print_figures.write(report.figures, folder, report.units))
         return pictures
 

@@ -201,6 +201,9 @@ class _Page:
             case b.Given():
                 tables = "".join(self._given(title, values) for title, values in block.sections if values)
                 return f'{_marks(block)}<div class="given">{tables}</div>'
+            case b.Drawing():
+                caption = f"<figcaption>{self.line(block.caption)}</figcaption>" if block.caption else ""
+                return f'<figure class="drawing">{block.svg}{caption}</figure>'
             case Figure():
                 return self._figure(block) if block.on_page else ""
             case motion.Animation():

@@ -6,7 +6,7 @@ import re
 from collections.abc import Collection, Iterable, Iterator
 
 from ..text import Units
-from .blocks import Block, Cards, Given, Judgement, Report, Table, Tables, Text, of_form
+from .blocks import Block, Cards, Drawing, Given, Judgement, Report, Table, Tables, Text, of_form
 from .figure import Figure
 from .lines import Line, capital
 from .terminal import plain_cell, plain_line
@@ -77,6 +77,8 @@ def block_lines(block: Block, units: Units, pictures: Collection[str] = ()) -> l
                 for value in values
             ]
             return list(_grid(entries, ("name", "value", "meaning", "from")))
+        case Drawing():
+            return [f"![{block.alt}]({block.file})", ""] if block.file in pictures else []
         case Figure():
             return [f"![{block.title}]({block.file})", ""] if block.file in pictures else []
         case _:

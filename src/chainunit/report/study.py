@@ -16,9 +16,15 @@ from . import answer, chains, figures, runs, shaft, sizing, wording
 from . import blocks as b
 from . import run_names as read
 from .analyses import ANALYSES, Contents
+from .drawing import drawing
 from .lines import Line, joined, line, spoken
 from .study_motion import motion
 
+DRAWING = "machine.svg"
+_DRAWN = (
+    "Pins and links, and dimensions by their names in a study file. φ is the crank angle, clockwise from the upward "
+    "vertical."
+)
 _VERSIONS = ("numpy", "casadi", "fmpy", "plotly")
 
 
@@ -78,6 +84,9 @@ def _opening(s: b.Source, study: Study) -> Iterator[b.Block]:
         *s.rows(type(feed), "feed", given=True),
     ]
     yield b.Table(tuple(rows), title="In short", form="long")
+    if not study.drive.outsider:
+        alt = f"The {noun}: its pins, links and dimensions"
+        yield b.Drawing(drawing(study.drive.machine), alt, DRAWING, _DRAWN)
 
 
 def _given(s: b.Source, study: Study) -> Iterator[b.Block]:
@@ -177,5 +186,5 @@ _SECTIONS: Mapping[str, Contents] = {
     "basis": Contents("What this rests on", _basis),
     "given": Contents("All that was given", _given),
 }
-PICTURES = tuple(picture for each in _SECTIONS.values() for picture in each.pictures)
+PICTURES = (DRAWING, *(picture for each in _SECTIONS.values() for picture in each.pictures))
 """Files of all figures that a report may have."""

@@ -34,9 +34,9 @@ def commented(text: str, machine: str = "ChamberForces") -> str:
     written = [f"#:schema {FILE}"]
     for number, line in enumerate(lines, 1):
         written += [line, *below.get(number, [])]
-    for each in _absent({each.table.split(".")[0] for each in found}, machine):
-        title = f"{each.title} of {each.of}" if each.of else each.title
-        written += ["", f"{f'# [{each.name}]':<{_COLUMN}} # {title}", *map(_line, each.keys)]
+    for absent in _absent({each.table.split(".")[0] for each in found}, machine):
+        title = f"{absent.title} of {absent.of}" if absent.of else absent.title
+        written += ["", f"{f'# [{absent.name}]':<{_COLUMN}} # {title}", *map(_line, absent.keys)]
     return "\n".join(written) + "\n"
 
 

@@ -1,0 +1,372 @@
+"""A labelled drawing of a linkage machine, as SVG: pins, links and dimensions by their names, the frame, the angles.
+
+All follows from the linkage. Which parameter is the length of a link or the place of a pin is found by giving each
+parameter a value of its own.
+"""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import Any
+from xml.sax.saxutils import escape
+
+import numpy as np
+
+from ..machines.machine import Machine
+from ..mechanism.machine import Mechanism
+from ..quantities import Layout
+from ..text import number
+from . import linkage
+from .motion import DrawnLink
+
+WIDTH, HEIGHT, MARGIN, COLUMN = 620.0, 450.0, 60.0, 345.0
+"""Room for the machine, its margin, and the column of dimensions beside it [px]."""
+_LETTER, _LINE = 7.2, 15.0
+"""Width of a letter and height of a line of text [px]."""
+_LOOKS = {"crank": ("#c1440e", 7), "heavy": ("#3d3d3d", 7), "light": ("#0b6fa4", 5)}
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """A parameter that is a length in the drawing."""
+
+    name: str
+    description: str
+    value: float
+
+
+@dataclass
+class _Canvas:
+    """The pieces of the picture, and the room that its labels take."""
+
+    pieces: list[str] = field(default_factory=list)
+    taken: list[tuple[float, float, float, float]] = field(default_factory=list)
+
+    def add(self, tag: str, text: str = "", **attributes: Any) -> None:
+        named = "".join(f' {name.replace("_", "-")}="{_shown(x)}"' for name, x in attributes.items())
+        self.pieces.append(f"<{tag}{named}>{escape(text)}</{tag}>" if text else f"<{tag}{named}/>")
+
+    def label(self, text: str, places: list[Point], lines: list[tuple[Point, Point]], **look: Any) -> None:
+        """A label at the one of the places (of its middle) that is clearest of others and of the `lines`."""
+        boxes = [_box(text, place) for place in places]
+        clear = [
+            min(
+                [_gap(box, other) for other in self.taken]
+                + [_from_line(box, line) for line in lines]
+                + [box[0] - 4.0, WIDTH + COLUMN - box[2]]
+            )
+            for box in boxes
+        ]
+        # the first of the places that has room enough, else the one with most
+        best = next((k for k, room in enumerate(clear) if room >= 3.0), int(np.argmax(clear)))
+        self.taken.append(boxes[best])
+        x, y = places[best]
+        self.add("text", text, x=x, y=y + 4.5, text_anchor="middle", **look)
+
+
+def _shown(value: Any) -> str:
+    return f"{value:.2f}" if isinstance(value, float) else str(value)
+
+
+def _box(text: str, middle: Point) -> tuple[float, float, float, float]:
+    half = 0.5 * _LETTER * len(text) + 1.0
+    return (middle[0] - half, middle[1] - 0.5 * _LINE, middle[0] + half, middle[1] + 0.5 * _LINE)
+
+
+def _gap(box: tuple[float, ...], other: tuple[float, ...]) -> float:
+    """The distance between two boxes; negative where they overlap."""
+    return max(box[0] - other[2], other[0] - box[2], box[1] - other[3], other[1] - box[3])
+
+
+def _from_line(box: tuple[float, ...], line: tuple[Point, Point]) -> float:
+    """The distance of a line from a box, by some points of it."""
+    (x0, y0), (x1, y1) = line
+    gaps = []
+    for t in np.linspace(0.0, 1.0, 25):
+        x, y = x0 + t * (x1 - x0), y0 + t * (y1 - y0)
+        gaps.append(max(box[0] - x, x - box[2], box[1] - y, y - box[3]))
+    return min(gaps) - 3.0
+
+
+def dimensions(machine: Machine) -> dict[tuple[str, ...], Dimension]:
+    """The parameters that are lengths in the drawing: of links by ``("link", name)``, of points on links by
+    ``("point", link, name)``, of ground pins by ``("x", pin)`` and ``("y", pin)``."""
+    layout, model = machine.model.parameter_layout, machine.model
+    marks = {v.name: 1.0 + k / 7919.0 for k, v in enumerate(layout.variables)}
+    of = {value: name for name, value in marks.items()}
+    declared = {v.name: v for v in layout.variables}
+    marked = model.linkage(layout.from_names(dict(marks)), Layout(model.Inputs).from_names({}))
+    values = layout.named(machine.p)
+
+    def known(x: Any) -> Dimension | None:
+        name = of.get(abs(float(x)))
+        v = declared.get(name or "")
+        return None if v is None or v.unit != "m" else Dimension(v.name, v.description, values[v.name])
+
+    found: dict[tuple[str, ...], Dimension | None] = {}
+    for group in (marked.crank, *marked.groups):
+        for bar in group.bars:
+            found["link", bar.name] = known(getattr(bar, "length", 0.0) or 0.0)
+            for name, (s, _) in bar.points.items():
+                found["point", bar.name, name] = known(s)
+    for pin, place in marked.ground.items():
+        found["x", pin], found["y", pin] = known(place.x), known(place.y)
+    return {key: each for key, each in found.items() if each is not None}
+
+
+def drawing(machine: Machine, phi: float = 1.0) -> str:
+    """The machine at the crank angle `phi` [rad] as an SVG picture.
+
+    A name that two links of mirrored organs share, such as A1, stands at both.
+    """
+    whole = machine.state(machine.inputs({"phi": phi * machine.ratio})).m
+    turns = np.linspace(0.0, 2.0 * math.pi, 73)
+    orbit = machine.state(machine.inputs({"phi": turns * machine.ratio})).m
+    places = {name: (float(x), float(y)) for name, (x, y) in linkage.places(whole).items()}
+    crank, canvas = whole.linkage.crank, _Canvas()
+    to_page = _scale([*places.values(), *_curve(linkage.places(orbit)[crank.end])])
+    at = {name: to_page(place) for name, place in places.items()}
+    links = [_straightened(link, at) for link in linkage.links(whole.linkage, {})]
+    sizes = dimensions(machine)
+    canvas.add("rect", width=WIDTH + COLUMN, height=HEIGHT, fill="#ffffff", rx=8)
+    # the way of the crank pin
+    radius = math.dist(at[crank.bar.pin], at[crank.end])
+    x, y = at[crank.bar.pin]
+    canvas.add("circle", cx=x, cy=y, r=radius, fill="none", stroke="#999999", stroke_dasharray="4 4")
+    hanging = linkage.hanging(orbit)
+    for pin in whole.linkage.ground:
+        _support(canvas, at[pin], -1.0 if pin in hanging else 1.0)
+    lines = [(at[a], at[b]) for link in links for a, b in _sides(link)]
+    for link in links:
+        colour, weight = _LOOKS[link.look]
+        tag, more = ("polygon", {"fill": "#dfe8ee"}) if link.closed else ("polyline", {"fill": "none"})
+        points = " ".join(f"{x:.2f},{y:.2f}" for x, y in (at[joint] for joint in link.joints))
+        canvas.add(tag, points=points, stroke=colour, stroke_width=weight, stroke_linejoin="round",
+                   stroke_linecap="round", **more)  # fmt: skip
+    for name, place in at.items():
+        if any(name in link.joints for link in links):
+            canvas.add(
+                "circle", cx=place[0], cy=place[1], r=4.5, fill="#ffffff", stroke="#1b1b1b", stroke_width=2
+            )
+            canvas.taken.append((place[0] - 6, place[1] - 6, place[0] + 6, place[1] + 6))
+    _angle(canvas, at[crank.bar.pin], phi, radius)
+    of = {link.name: link for link in links}
+    for symbol, swinging in machine.model.angles.items():
+        _swing(canvas, at, of[swinging], symbol)
+    lines += _sizes(canvas, sizes, at, to_page((0.0, 0.0)), whole, hanging)
+    for name, place in at.items():
+        around = [
+            (place[0] + 19 * math.cos(t), place[1] + 17 * math.sin(t)) for t in np.arange(-0.8, 5.5, 0.4)
+        ]
+        canvas.label(_short(name), around, lines, font_weight="bold", fill="#1b1b1b")
+    for link in links:
+        size = sizes.get(("link", link.name))
+        words = f"{_short(link.name)} {size.name}" if size else _short(link.name)
+        canvas.label(words, _beside(link, at), lines, fill=_LOOKS[link.look][0])
+    _frame(canvas)
+    _column(canvas, sizes, whole.linkage.ground)
+    return _svg(canvas, f"{machine.model.noun}: pins, links and dimensions")
+
+
+def _short(name: str) -> str:
+    """The name of a part without its side."""
+    return " ".join(word for word in name.replace("_", " ").split() if word not in ("left", "right"))
+
+
+def _curve(place: tuple[Any, Any]) -> Iterator[Point]:
+    yield from zip(np.atleast_1d(place[0]).tolist(), np.atleast_1d(place[1]).tolist(), strict=True)
+
+
+def _scale(points: list[Point]) -> Any:
+    """From places in the machine [m] to the page [px], y down."""
+    xs, ys = [x for x, _ in points], [y for _, y in points]
+    room = (WIDTH - 2.0 * MARGIN, HEIGHT - 2.0 * MARGIN)
+    factor = min(room[0] / (max(xs) - min(xs)), room[1] / (max(ys) - min(ys)))
+    left = 0.5 * (WIDTH - factor * (max(xs) - min(xs)))
+    top = 0.5 * (HEIGHT - factor * (max(ys) - min(ys)))
+    return lambda p: (left + factor * (p[0] - min(xs)), top + factor * (max(ys) - p[1]))
+
+
+def _sides(link: DrawnLink) -> Iterator[tuple[str, str]]:
+    joints = [*link.joints, link.joints[0]] if link.closed else [*link.joints]
+    yield from pairwise(joints)
+
+
+def _beside(link: DrawnLink, at: Mapping[str, Point]) -> list[Point]:
+    """Places for the name of a link: beside its middle, then elsewhere along it."""
+    if link.closed:
+        corners = [at[joint] for joint in link.joints]
+        return [(sum(x for x, _ in corners) / len(corners), sum(y for _, y in corners) / len(corners))]
+    places = []
+    for t in (0.5, 0.4, 0.6, 0.3, 0.7):
+        for away in (18.0, 26.0, 40.0):
+            for a, b in _sides(link):
+                (x0, y0), (x1, y1) = at[a], at[b]
+                length = math.hypot(x1 - x0, y1 - y0) or 1.0
+                across = ((y0 - y1) / length, (x1 - x0) / length)
+                # a name is wide: beside an upright link it stands further off
+                off = away * (1.0 + 1.3 * abs(across[0]))
+                for sign in (1.0, -1.0):
+                    places.append(
+                        (
+                            x0 + t * (x1 - x0) + sign * off * across[0],
+                            y0 + t * (y1 - y0) + sign * off * across[1],
+                        )
+                    )
+    return places
+
+
+def _support(canvas: _Canvas, at: Point, down: float) -> None:
+    """The bearing of a ground pin, below it, or above where its links hang from it."""
+    x, y = at
+    canvas.add("polygon", points=f"{x:.2f},{y:.2f} {x - 11:.1f},{y + 17 * down:.1f} {x + 11:.1f},{y + 17 * down:.1f}",
+               fill="#ffffff", stroke="#777777", stroke_width=1.5)  # fmt: skip
+    for k in range(-14, 14, 6):
+        canvas.add("line", x1=x + k + 5, y1=y + 17 * down, x2=x + k, y2=y + 23 * down, stroke="#777777")
+    canvas.add(
+        "line", x1=x - 15, y1=y + 17 * down, x2=x + 15, y2=y + 17 * down, stroke="#777777", stroke_width=1.5
+    )
+    canvas.taken.append((x - 15, min(y, y + 23 * down), x + 15, max(y, y + 23 * down)))
+
+
+def _angle(canvas: _Canvas, at: Point, phi: float, radius: float) -> None:
+    """The crank angle: an arc from the upward vertical, clockwise, with an arrow."""
+    x, y = at
+    r = min(radius + 14.0, 70.0)
+    end = (x + r * math.sin(phi), y - r * math.cos(phi))
+    canvas.add("line", x1=x, y1=y, x2=x, y2=y - r - 8, stroke="#999999", stroke_dasharray="2 3")
+    canvas.add("path", d=f"M {x:.1f} {y - r:.1f} A {r:.1f} {r:.1f} 0 0 1 {end[0]:.1f} {end[1]:.1f}", fill="none",
+               stroke="#c1440e", stroke_width=1.5, marker_end="url(#drawing-tip)")  # fmt: skip
+    canvas.taken.append((x - 3, y - r - 10, end[0] + 4, y - radius + 2))
+    middle = (x + (r + 12) * math.sin(0.5 * phi), y - (r + 12) * math.cos(0.5 * phi))
+    canvas.label("φ", [middle], [], fill="#c1440e", font_style="italic")
+
+
+def _frame(canvas: _Canvas) -> None:
+    """The directions of the frame's axes, in a corner of the picture."""
+    x, y = 26.0, HEIGHT - 26.0
+    for dx, dy, name in ((34.0, 0.0, "x"), (0.0, -34.0, "y")):
+        canvas.add(
+            "line", x1=x, y1=y, x2=x + dx, y2=y + dy, stroke="#555555", marker_end="url(#drawing-axis)"
+        )
+        canvas.add("text", name, x=x + 1.35 * dx, y=y + 1.35 * dy + 4, fill="#555555", text_anchor="middle")
+
+
+def _straightened(link: DrawnLink, at: Mapping[str, Point]) -> DrawnLink:
+    """A link as it is drawn: one whose pins lie on a line is a line from its first pin to the furthest."""
+    if not link.closed:
+        return link
+    (x0, y0), *others = (at[joint] for joint in link.joints)
+    across = [(x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0) for x1, y1 in others for x2, y2 in others]
+    if max(map(abs, across)) > 1.0:
+        return link
+    ordered = sorted(link.joints, key=lambda joint: math.dist(at[link.joints[0]], at[joint]))
+    return replace(link, joints=tuple(ordered), closed=False)
+
+
+def _swing(canvas: _Canvas, at: Mapping[str, Point], link: DrawnLink, name: str) -> None:
+    """The angle of a link from the downward vertical, positive towards +x."""
+    x, y = at[link.joints[0]]
+    end = at[link.joints[-1]]
+    r = 0.45 * math.dist((x, y), end)
+    angle = math.atan2(end[0] - x, end[1] - y)
+    canvas.add("line", x1=x, y1=y, x2=x, y2=y + r + 14, stroke="#999999", stroke_dasharray="2 3")
+    tip = (x + r * math.sin(angle), y + r * math.cos(angle))
+    sweep = 0 if angle > 0 else 1
+    canvas.add("path", d=f"M {x:.1f} {y + r:.1f} A {r:.1f} {r:.1f} 0 0 {sweep} {tip[0]:.1f} {tip[1]:.1f}",
+               fill="none", stroke="#c1440e", stroke_width=1.5)  # fmt: skip
+    side = -1.0 if angle > 0 else 1.0
+    canvas.label(name, [(x + 10 * side, y + r)], [], fill="#c1440e", font_style="italic")
+
+
+def _sizes(
+    canvas: _Canvas,
+    sizes: Mapping[tuple[str, ...], Dimension],
+    at: Mapping[str, Point],
+    origin: Point,
+    whole: Mechanism,
+    hanging: Collection[str],
+) -> list[tuple[Point, Point]]:
+    """Lines of the dimensions that are no length of a link: places of ground pins from the origin of the frame, and
+    places of points along a link."""
+    lines: list[tuple[Point, Point]] = []
+    for (kind, *of), size in sizes.items():
+        if "." in size.name or kind == "link":
+            continue
+        if kind == "point":
+            link, point = of
+            a, b = at[whole.topology.links[link][0]], at[point]
+            length = math.dist(a, b) or 1.0
+            off = (-(a[1] - b[1]) / length * 18.0, (a[0] - b[0]) / length * 18.0)
+            ends = (a[0] + off[0], a[1] + off[1]), (b[0] + off[0], b[1] + off[1])
+        elif kind == "x":
+            x, y = at[of[0]]
+            level = y - 34.0 if of[0] in hanging else y + 62.0
+            ends = (origin[0], level), (x, level)
+        else:
+            x, y = at[of[0]]
+            ends = (x - 44.0, origin[1]), (x - 44.0, y)
+        _line(canvas, *ends, size.name)
+        lines.append(ends)
+    return lines
+
+
+def _line(canvas: _Canvas, a: Point, b: Point, name: str) -> None:
+    """A dimension: a thin line with an arrow at each end, and its symbol."""
+    canvas.add("line", x1=a[0], y1=a[1], x2=b[0], y2=b[1], stroke="#777777", stroke_width=0.9,
+               marker_start="url(#drawing-begin)", marker_end="url(#drawing-end)")  # fmt: skip
+    length = math.dist(a, b) or 1.0
+    across = ((b[1] - a[1]) / length * 10.0, (a[0] - b[0]) / length * 10.0)
+    middle = (0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]))
+    places = [(middle[0] + sign * across[0], middle[1] + sign * across[1]) for sign in (1.0, -1.0)]
+    canvas.label(name, places, [], fill="#555555", font_style="italic")
+
+
+def _column(canvas: _Canvas, sizes: Mapping[tuple[str, ...], Dimension], ground: Mapping[str, Any]) -> None:
+    """The dimensions beside the picture, each once, in the order of the drawing; of a ground pin whose coordinates
+    are parameters, both in a row."""
+    rows = [
+        (size.name, number(size.value, "m", "millimetres", 4, full=False), size.description)
+        for size in dict.fromkeys(sizes.values())
+        if "." not in size.name
+    ]
+    for pin, place in ground.items():
+        if "." in getattr(sizes.get(("x", pin)), "name", ""):
+            first, second = (
+                number(float(each), "m", "millimetres", 4, full=False) for each in (place.x, place.y)
+            )
+            rows.append((pin, f"{first.removesuffix(' mm')}, {second}", "bearing: x, y in the frame"))
+    x, y = WIDTH + 4.0, 40.0
+    for name, value, words in rows:
+        canvas.add("text", name, x=x, y=y, font_style="italic", fill="#1b1b1b")
+        canvas.add("text", value, x=x + 116, y=y, text_anchor="end", fill="#1b1b1b")
+        for line in textwrap.wrap(words, 36):
+            canvas.add("text", line, x=x + 126, y=y, fill="#555555", font_size="11.5")
+            y += 15.0
+        y += 7.0
+
+
+def _svg(canvas: _Canvas, title: str) -> str:
+    tips = "".join(
+        f'<marker id="drawing-{name}" viewBox="0 0 8 8" refX="6" refY="4" markerWidth="7" markerHeight="7" '
+        f'orient="auto"><path d="M0 0L8 4L0 8z" fill="{colour}"/></marker>'
+        for name, colour in (("tip", "#c1440e"), ("axis", "#555555"), ("end", "#777777"))
+    )
+    tips += (
+        tips[tips.rindex("<marker") :]
+        .replace("drawing-end", "drawing-begin")
+        .replace('"auto"', '"auto-start-reverse"')
+    )
+    size = f"{WIDTH + COLUMN:.0f} {HEIGHT:.0f}"
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size}" role="img" font-family="Helvetica, Arial, '
+        f'sans-serif" font-size="13">\n<title>{escape(title)}</title>\n<defs>{tips}</defs>\n'
+        + "\n".join(canvas.pieces)
+        + "\n</svg>\n"
+    )
