@@ -115,7 +115,7 @@ def test_temperatures():
         ('[report]\nunits = "imperial"', 'report.units = "imperial": must be a table'),
         ("[machine]\nradius = 1", "machine.radius: unknown key; known here: r, l, h,"),
         ("[machine]\ncrank = { q = 1 }", "machine.crank.q: unknown key; known here: m, s, I"),
-        ("[machin]\nr = 1", "machin: unknown key; known here: title, machine, ratios"),
+        ("[machin]\nr = 1", 'machin: unknown key; was "machine" meant? known here: title, machine, ratios'),
         ("[machine]\ncrank = 3", "machine.crank = 3: must be a table"),
         ("[machine]\nr = 0.9", "machine: r = 0.9 m: the crank cannot turn"),
         ("[machine]\nz = 0.1", "machine: z = 0.1 m: the organs cannot follow the rocker over its swing"),
@@ -189,7 +189,7 @@ def test_every_refusal_names_the_file(tmp_path):
     with pytest.raises(InputError, match=r"mine\.toml: is not UTF-8"):
         load(file)
     file.write_text("[run]\nstep = 1")
-    with pytest.raises(InputError, match=r"mine\.toml: run\.step"):
+    with pytest.raises(InputError, match=r"mine\.toml:2: run\.step"):
         load(file)
 
 

@@ -58,7 +58,7 @@ def test_events_are_named_after_type_and_side():
         ),
         (
             '[[event]]\ntype = "jam"\nside = "left"\nforc = 1',
-            "event.jam_left.forc: unknown key; known here: crank_angle, turns, force",
+            'event.jam_left.forc: unknown key; was "force" meant? known here: crank_angle, turns, force',
         ),
         ('[[event]]\nside = "left"', "event 1: type: must be given, one of jam, lumps, "),
         ('[[event]]\ntype = "dip"\nname = "Dip 1"', 'event 1 (dip): name = "Dip 1": must be small letters'),

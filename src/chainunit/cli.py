@@ -466,7 +466,8 @@ def main() -> None:
 
 
 def _end(message: str, status: int) -> None:
-    print("chainunit: " + printable(" ".join(message.split()), 2000), file=sys.stderr)
+    for line in message.splitlines():
+        print("chainunit: " + printable(" ".join(line.split()), 2000), file=sys.stderr)
     sys.exit(status)
 
 

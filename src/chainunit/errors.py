@@ -2,16 +2,31 @@
 
 from __future__ import annotations
 
+import difflib
 import json
 import reprlib
 import unicodedata
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 
 class InputError(ValueError):
-    """A value of the user is outside its allowed range; the message is one line."""
+    """A value of the user is outside its allowed range; the message is one line.
+
+    `key` is the full name of what is refused, as its file has it; `faults` are the refusals of which it consists,
+    where it stands for several: its message has a line for each.
+    """
+
+    def __init__(self, message: str = "", key: str = "", faults: Sequence[InputError] = ()) -> None:
+        super().__init__(message)
+        self.key = key
+        self.faults: tuple[InputError, ...] = tuple(faults) or (self,)
+
+    @classmethod
+    def of(cls, faults: Sequence[InputError]) -> InputError:
+        """One for several."""
+        return faults[0] if len(faults) == 1 else InputError("\n".join(map(str, faults)), faults=faults)
 
 
 class GeometryError(InputError):
@@ -35,12 +50,52 @@ class WriteError(RunError):
 
 
 @contextmanager
-def refusal_prefix(prefix: str) -> Iterator[None]:
-    """Put `prefix`, which says where a value stands, before the line of an InputError."""
+def refusal_prefix(prefix: str, key: str = "") -> Iterator[None]:
+    """Put `prefix`, which says where a value stands, before each line of an InputError; `key` names the value where
+    the error does not."""
     try:
         yield
     except InputError as error:
-        raise InputError(f"{prefix}{error}") from error
+        raise InputError.of(
+            [InputError(f"{prefix}{fault}", key=fault.key or key) for fault in error.faults]
+        ) from error
+
+
+class Faults:
+    """Refusals that are collected, to be raised together."""
+
+    def __init__(self) -> None:
+        self._errors: list[InputError] = []
+
+    @contextmanager
+    def collected(self) -> Iterator[None]:
+        """Take the InputErrors of the block, and go on behind it."""
+        try:
+            yield
+        except InputError as error:
+            self._errors += error.faults
+
+    def add(self, errors: Iterable[InputError]) -> None:
+        """Take some more."""
+        self._errors += errors
+
+    def refuse(self) -> None:
+        """Raise what was collected, if there is anything.
+
+        Raises
+        ------
+        InputError
+            with all of it.
+        """
+        if self._errors:
+            raise InputError.of(self._errors)
+
+
+def near_name(given: str, known: Iterable[str]) -> str:
+    """What to add to a refusal of a name that is near one of the `known`; else empty."""
+    names = {name.lower(): name for name in known}
+    near = difflib.get_close_matches(given.lower(), names, n=1, cutoff=0.75)
+    return f'; was "{names[near[0]]}" meant?' if near else ""
 
 
 _JOINERS = "\u200c\u200d"  # some scripts and signs need them inside a word

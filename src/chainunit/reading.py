@@ -10,6 +10,7 @@ import dataclasses
 import math
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -27,8 +28,8 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails
 
-from . import units
-from .errors import InputError, printable, refusal_prefix, shown
+from . import places, units
+from .errors import InputError, near_name, printable, shown
 from .quantities import Layout, Variable, complaint, variables
 from .refusals import unit_behind
 
@@ -179,12 +180,12 @@ def read_table(form: type[BaseModel], table: Mapping[str, Any], prefix: str = ""
     Raises
     ------
     InputError
-        in one line, for a key that is not known or a value that is not allowed.
+        with a line for each key that is not known and each value that is not allowed.
     """
     try:
         return form.model_validate(dict(table))
     except ValidationError as error:
-        raise InputError(first_line(error, form, prefix)) from error
+        raise InputError.of(refusals(error, form, prefix)) from error
 
 
 def given_values(section: BaseModel) -> dict[str, Any]:
@@ -199,21 +200,40 @@ def given_values(section: BaseModel) -> dict[str, Any]:
     return flat
 
 
-def first_line(error: ValidationError, file: type[BaseModel], prefix: str = "") -> str:
-    """The line that says what is wrong with a table of the form `file`; `prefix` goes before the names of its
-    keys."""
-    first = error.errors()[0]
-    where = prefix + printable(".".join(str(part) for part in first["loc"]), 80)
-    if first["type"] == "extra_forbidden":
-        section: Any = file
-        for part in first["loc"][:-1]:
-            section = section.model_fields[part].annotation
-        return f"{where}: unknown key; known here: {', '.join(section.model_fields)}"
-    if first["type"] == "model_type":
-        return f"{where} = {shown(first['input'])}: must be a table"
-    if first["type"] == "value_error":
-        return str(first["ctx"]["error"])
-    return f"{where} = {shown(first['input'])}: {_allowed(first, where.removeprefix(prefix))}"
+def refusals(error: ValidationError, file: type[BaseModel], prefix: str = "") -> list[InputError]:
+    """What is wrong with a table of the form `file`, in the order of its keys; `prefix` goes before their names."""
+    return [
+        InputError(_line(each, file, prefix), key=prefix + ".".join(map(str, each["loc"])))
+        for each in error.errors()
+    ]
+
+
+def _line(error: ErrorDetails, file: type[BaseModel], prefix: str) -> str:
+    path = error["loc"]
+    where = prefix + printable(".".join(map(str, path)), 80)
+    if error["type"] == "extra_forbidden":
+        table: Any = file
+        for part in path[:-1]:
+            table = table.model_fields[part].annotation
+        known = f"known here: {', '.join(table.model_fields)}"
+        hint = near_name(str(path[-1]), table.model_fields) or _elsewhere(str(path[-1]), file)
+        return f"{where}: unknown key{hint}{' ' if hint.endswith('?') else '; '}{known}"
+    if error["type"] == "model_type":
+        return f"{where} = {shown(error['input'])}: must be a table"
+    if error["type"] == "value_error":
+        return str(error["ctx"]["error"])
+    return f"{where} = {shown(error['input'])}: {_allowed(error, where.removeprefix(prefix))}"
+
+
+def _elsewhere(key: str, file: type[BaseModel]) -> str:
+    """The tables of a file that have a key, as words to follow a refusal."""
+    tables = {name: field.annotation for name, field in file.model_fields.items()}
+    places = [f"[{name}]" for name, form in tables.items() if key in getattr(form, "model_fields", ())]
+    if key in file.model_fields:
+        places = ["before all tables"]
+    return (
+        f"; it stands {'in ' if key not in file.model_fields else ''}{' or '.join(places)}" if places else ""
+    )
 
 
 _KINDS = {"string_type": "a text", "bool_type": "true or false", "dict_type": "a table"}
@@ -224,7 +244,8 @@ def _allowed(error: ErrorDetails, key: str) -> str:
     """What a value must be that pydantic refuses, in the words of a file."""
     kind, value = error["type"], error["input"]
     if kind == "literal_error":
-        return "must be " + error["ctx"]["expected"].replace("'", '"')
+        expected = error["ctx"]["expected"].replace("'", '"')
+        return f"must be {expected}{near_name(str(value), expected.split(chr(34))[1::2])}"
     if kind == "list_type":
         return "must be a list" + (f" of tables, each below [[{key}]]" if isinstance(value, Mapping) else "")
     return f"must be {_KINDS[kind]}" if kind in _KINDS else error["msg"].lower()
@@ -265,7 +286,8 @@ def toml(text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except ValueError as error:  # TOMLDecodeError, and numbers that are too long
-        raise InputError(f"no valid TOML: {printable(str(error))}") from error
+        kind = "; it is JSON" if text.lstrip().startswith("{") else ""
+        raise InputError(f"no valid TOML: {printable(str(error))}{kind}") from error
     except RecursionError as error:
         raise InputError("no valid TOML: tables or lists are nested too deeply") from error
 
@@ -280,8 +302,40 @@ def read(file: Path | None, example: Callable[[], str], parse: Callable[[str, st
     """
     source = str(file) if file else "packaged example"
     text = file_text(file) if file else example()
-    with refusal_prefix(f"{source}: "):
+    with in_file(source, text):
         return parse(text, source)
+
+
+@contextmanager
+def in_file(source: str, text: str = "") -> Iterator[None]:
+    """Name the file `source`, and the line of what is refused in its `text`, before each line of an InputError."""
+    try:
+        yield
+    except InputError as error:
+        lines = places.lines_of(text) if any(fault.key for fault in error.faults) else {}
+        raise InputError.of(
+            [
+                InputError(f"{source}:{f'{line}:' if (line := _line_of(fault.key, lines)) else ''} {fault}")
+                for fault in sorted(error.faults, key=lambda fault: _line_of(fault.key, lines))
+            ]
+        ) from error
+
+
+def _line_of(key: str, lines: Mapping[str, int]) -> int:
+    """The line in which a key stands, or the innermost table that it is in; 0 where there is neither."""
+    while key and key not in lines:
+        key = key.rpartition(".")[0]
+    return lines.get(key, 0)
+
+
+_OTHER_KINDS = {
+    b"PK\x03\x04": "a ZIP archive, such as an FMU or an SSP package",
+    b"\x89HDF": "a NetCDF or HDF5 file, such as result.nc",
+    b"CDF": "a NetCDF file",
+    b"%PDF": "a PDF file",
+    b"\x89PNG": "a picture",
+}
+"""By their first bytes, files that are taken for another kind."""
 
 
 def file_text(file: Path) -> str:
@@ -293,7 +347,11 @@ def file_text(file: Path) -> str:
         in one line that begins with the name of the file.
     """
     try:
-        return file.read_text("utf-8-sig")
+        data = file.read_bytes()
+        for begin, kind in _OTHER_KINDS.items():
+            if data.startswith(begin):
+                raise InputError(f"{file}: is {kind}; must be a text file")
+        return data.decode("utf-8-sig")
     except OSError as error:
         raise InputError(f"{file}: cannot be read ({error.strerror or error})") from error
     except UnicodeDecodeError as error:

@@ -22,7 +22,7 @@ from contextvars import ContextVar
 from types import MappingProxyType
 from typing import Any, TypeAlias
 
-from .errors import InputError
+from .errors import InputError, near_name
 from .quantities import DISPLAY_UNITS, Layout, finite
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -68,10 +68,13 @@ def chosen_units(given: Mapping[str, str]) -> Units:
     """
     for kind, unit in given.items():
         if kind not in CHOICES:
-            raise InputError(f"report.units.{kind}: unknown kind; must be one of {', '.join(CHOICES)}")
+            key = f"report.units.{kind}"
+            raise InputError(
+                f"{key}: unknown kind; must be one of {', '.join(CHOICES)}{near_name(kind, CHOICES)}", key
+            )
         if unit not in CHOICES[kind]:
             allowed = " or ".join(f'"{name}"' for name in CHOICES[kind])
-            raise InputError(f'report.units.{kind} = "{unit}": must be {allowed}')
+            raise InputError(f'report.units.{kind} = "{unit}": must be {allowed}', f"report.units.{kind}")
     return {**DEFAULT_UNITS, **{kind: (unit,) for kind, unit in given.items()}}
 
 

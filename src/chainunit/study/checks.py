@@ -1,52 +1,62 @@
-"""What of a study file does not go together, before any of it is built."""
+"""The values of a study file that do not go together."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ..errors import InputError, shown
 from ..quantities import Layout
+from ..refusals import unit_behind
 from .foreign_machine import ForeignModel
 from .parts import Parts, named_table
 from .sections import FileSection
 
 
-def check_company(data: Mapping[str, Any], parts: Parts) -> None:
-    """Refuse values that would be passed over in silence."""
+def check_company(data: Mapping[str, Any], parts: Parts) -> list[InputError]:
+    """Refusals of values that would be passed over in silence."""
+    return [InputError(f"{key}: {words}", key=key) for key, words in _company(data, parts)]
+
+
+def _company(data: Mapping[str, Any], parts: Parts) -> Iterator[tuple[str, str]]:
+    """The key that is refused, and why."""
     named = data.get("system", {}).get("motor")
     if data.get("system") == {}:
-        raise InputError('system: names nothing; add motor = "file.fmu", or leave [system] out')
+        yield ("system", 'names nothing; add motor = "file.fmu", or leave [system] out')
     foreign = {"motor": bool(parts.file), "machine": issubclass(parts.machine, ForeignModel)}
     for part, is_foreign in foreign.items():
         if f"{part}_names" in data.get("system", {}) and not is_foreign:
-            raise InputError(
-                f'system.{part}_names: are of an FMU of somebody else; add {part} = "file.fmu", or leave them out'
+            yield (
+                f"system.{part}_names",
+                f'are of an FMU of somebody else; add {part} = "file.fmu", or leave them out',
             )
     if foreign["machine"] and data.get("feed_forward"):
-        raise InputError("feed_forward: needs a model of the machine, which is an FMU; leave it out")
+        yield ("feed_forward", "needs a model of the machine, which is an FMU; leave it out")
     told = foreign["motor"] or "sizing" in data or "tau_ff" in parts.motor.input_layout.names
     if data.get("feed_forward") and not told:
-        raise InputError(
-            f"feed_forward: a motor of the type {parts.motor.name} has no input for the torque; leave it out"
+        yield (
+            "feed_forward",
+            f"a motor of the type {parts.motor.name} has no input for the torque; leave it out",
         )
     if foreign["machine"] and named_table(data, "monte_carlo").get("runs"):
-        raise InputError("monte_carlo.runs: needs a model of the machine, which is an FMU; leave it out")
+        yield ("monte_carlo.runs", "needs a model of the machine, which is an FMU; leave it out")
     if named is not None:
         for name in ("motor", "sizing"):
             if name in data and not (name == "motor" and parts.gives_motor):
-                raise InputError(
-                    f"{name}: given beside system.motor = {shown(named)}, which is the motor; leave out one of "
-                    "the two"
+                yield (
+                    name,
+                    f"given beside system.motor = {shown(named)}, which is the motor; leave out one of "
+                    "the two",
                 )
     if not parts.machine.sides:
         for name in ("ratios", "chain", "organ"):
             if name in data:
-                raise InputError(
-                    f"{name}: is of the chain unit, and the machine is {parts.machine.name}; leave it out"
+                yield (
+                    name,
+                    f"is of the chain unit, and the machine is {parts.machine.name}; leave it out",
                 )
         if "one_sided_share" in data.get("sizing", {}):
-            raise InputError(f"sizing.one_sided_share: the {parts.machine.name} has no sides; leave it out")
+            yield ("sizing.one_sided_share", f"the {parts.machine.name} has no sides; leave it out")
     if "sizing" in data:
         for name in ("motor", "feed_forward", "flywheel"):
             if data.get(name):
@@ -55,25 +65,24 @@ def check_company(data: Mapping[str, Any], parts: Parts) -> None:
                     if name == "flywheel"
                     else "is of the DC motor, and [sizing] picks another"
                 )
-                raise InputError(f"{name}: {words}; leave out one of the two")
+                yield (name, f"{words}; leave out one of the two")
         if "winding_temperature" in data.get("run", {}):
-            raise InputError("run.winding_temperature: is sizing.temperature with [sizing]; leave it out")
+            yield ("run.winding_temperature", "is sizing.temperature with [sizing]; leave it out")
         if "ratio" in data.get("machine", {}):
-            raise InputError("machine.ratio: [sizing] finds it; to have it kept, give gear.ratio")
+            yield ("machine.ratio", "[sizing] finds it; to have it kept, give gear.ratio")
     elif not parts.designation:
         for name in ("gear", "start", "starter", "catalogue"):
             if name in data:
-                raise InputError(
-                    f"{name}: is of a motor of the catalogue; add [sizing] or system.motor, or leave it out"
+                yield (
+                    name,
+                    "is of a motor of the catalogue; add [sizing] or system.motor, or leave it out",
                 )
     elif "ratio" in data.get("machine", {}):
-        raise InputError(
-            "machine.ratio: follows from the motor's rated speed; to have another, give gear.ratio"
-        )
+        yield ("machine.ratio", "follows from the motor's rated speed; to have another, give gear.ratio")
     if "torsion" in data and "driveline" not in data:
-        raise InputError("torsion: is of a driveline; add [driveline], or leave it out")
+        yield ("torsion", "is of a driveline; add [driveline], or leave it out")
     if "chain" in data and data.get("organ") != "chain":
-        raise InputError('chain: is of organs that are chains; add organ = "chain", or leave it out')
+        yield ("chain", 'is of organs that are chains; add organ = "chain", or leave it out')
 
 
 _ORDER = (
@@ -86,21 +95,22 @@ _ORDER = (
 """Quantities of which the second has to be more than the first."""
 
 
-def check_order(values: Mapping[str, Any], sections: Mapping[str, FileSection]) -> None:
-    """Limits that leave nothing between them, and counts that are none."""
+def check_order(values: Mapping[str, Any], sections: Mapping[str, FileSection]) -> Iterator[InputError]:
+    """Refusals of limits that leave nothing between them, and of counts that are none."""
 
     def value(name: str) -> tuple[float, str]:
         section, _, key = name.partition(".")
         x, declared = getattr(values[section], key), type(values[section])
         unit = next(v.unit for v in Layout(declared).variables if v.name == key)
-        return x, f"{x:g}" + ("" if unit == "1" else f" {unit}")
+        return x, f"{x:g}" + unit_behind(unit)
 
     for low, relation, high in _ORDER:
         (least, limit), (most, given) = value(low), value(high)
         if most < least or (most == least and relation == ">"):
-            raise InputError(f"{high} = {given}: must be {relation} {low}, {limit}")
+            yield InputError(f"{high} = {given}: must be {relation} {low}, {limit}", key=high)
     for section, table in sections.items():
         for key in table.whole:
             number, given = value(f"{section}.{key}")
             if number != int(number):
-                raise InputError(f"{section}.{key} = {given}: must be a whole number")
+                name = f"{section}.{key}"
+                yield InputError(f"{name} = {given}: must be a whole number", key=name)

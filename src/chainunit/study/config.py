@@ -13,13 +13,15 @@ from ..drives.catalogue import CatalogueMotor, catalogue, motor_of_catalogue
 from ..drives.gearing import Transmission
 from ..drives.motor import Motor
 from ..drives.motors import MOTORS
-from ..errors import GeometryError, InputError, refusal_prefix
+from ..errors import Faults, GeometryError, InputError, refusal_prefix
 from ..machines.api import machine_of, ratios
 from ..machines.chain_unit import SideLoads, SideName
 from ..machines.machine import Machine
 from ..mechanism.models import MachineModel
+from ..places import lines_of
 from ..quantities import Layout
 from ..reading import Slip, filled, given_values, read, read_table, slips, toml
+from ..refusals import unit_behind
 from ..system.signals import Profile
 from ..text import DEFAULT_UNITS, Units, chosen_units
 from .checks import check_company, check_order
@@ -27,7 +29,7 @@ from .event import Event
 from .event_table import RandomEvent, read_events, read_random_event
 from .events import OneSidedFeed
 from .foreign_machine import ForeignMachine, ForeignModel
-from .parts import Parts, beside, example, over_example, parts_of
+from .parts import Parts, beside, example, named_table, over_example, parts_of
 from .sections import (
     CHOICES,
     ChainOrgans,
@@ -106,6 +108,8 @@ class Config:
     """values that look like a slip of the unit"""
     units: Units = dataclasses.field(default_factory=lambda: DEFAULT_UNITS)
     """that the report shows numbers in"""
+    lines: Mapping[str, int] = dataclasses.field(default_factory=dict)
+    """the line of each key in the file"""
 
     @property
     def turn(self) -> float:
@@ -175,9 +179,19 @@ def parse(text: str, source: str = "config") -> Config:
     InputError
         see `load`.
     """
-    data = toml(text)
+    data, faults = toml(text), Faults()
     parts = parts_of(data, source)
-    read_table(parts.form, data)
+    with faults.collected():
+        read_table(parts.form, data)
+    with faults.collected():
+        if isinstance(data.get("event", []), list):
+            read_events(data.get("event", []))
+    with faults.collected():
+        units = named_table(data, "report").get("units", {})
+        if isinstance(units, Mapping):
+            chosen_units(units)
+    faults.add(check_company(data, parts))
+    faults.refuse()
     whole = over_example(data, parts)
     checked = read_table(parts.form, whole)
     declared = {name: section.declared for name, section in parts.sections.items()}
@@ -190,11 +204,17 @@ def parse(text: str, source: str = "config") -> Config:
             unusual += tuple(slips(kinds, {"event": tables}))
         config = _config(data, checked, parts, events, source, unusual)
         given, names = frozenset(_names(data, events)), frozenset(_names(whole, events))
-        return dataclasses.replace(config, given=given, of_example=names - given - {"title"})
+        return dataclasses.replace(
+            config, given=given, of_example=names - given - {"title"}, lines=lines_of(text)
+        )
     except InputError as error:
         # values that do not fit together may be a slip of the unit
         hints = [f'was {slip.variable.name} = "{slip.meant}" meant?' for slip in unusual if slip.meant]
-        raise type(error)("; ".join([str(error), *hints])) from error
+        if not hints:
+            raise
+        *others, last = error.faults
+        hinted = InputError("; ".join([str(last), *hints]), key=last.key)
+        raise InputError.of([*others, hinted]) from error
 
 
 def _config(
@@ -206,9 +226,12 @@ def _config(
     unusual: tuple[Slip, ...],
 ) -> Config:
     """The study of a file whose values are each allowed."""
-    sections = parts.sections
-    check_company(data, parts)
-    tables = {name: section.values(getattr(checked, name)) for name, section in sections.items()}
+    sections, faults = parts.sections, Faults()
+    tables: dict[str, dict[str, Any]] = {}
+    for name, section in sections.items():
+        tables[name] = {}
+        with faults.collected():
+            tables[name] = section.values(getattr(checked, name))
     values = {
         name: Layout(section.declared).from_names(
             {key: x for key, x in tables[name].items() if key in Layout(section.declared).names},
@@ -216,7 +239,7 @@ def _config(
         )
         for name, section in sections.items()
     }
-    check_order(values, sections)
+    faults.add(check_order(values, sections))
     of_study = {name: values[name] for name in ("feed", "run", "monte_carlo", "gear", "starter", "torsion")}
     of_study |= {
         name: values[name] if name in data else None for name, each in sections.items() if each.optional
@@ -225,15 +248,30 @@ def _config(
         # of motors on the line only where it is given
         of_study["sizing"] = dataclasses.replace(of_study["sizing"], inertia_ratio=math.inf)
     own_motors = beside(checked.catalogue, source) if checked.catalogue else None
+    machine: Any = None
+    plate = None
+    with faults.collected():
+        machine = _machine(parts, tables["machine"], tables["ratios"])
+    with faults.collected():
+        plate = _plate(parts.designation, own_motors)
+    with faults.collected(), refusal_prefix("driveline.", "driveline"):
+        if "driveline" in data:
+            check(values["driveline"])
+    with faults.collected(), refusal_prefix("motor: ", "motor"):
+        if parts.gives_motor:
+            parts.motor.check(values["motor"])
+    with faults.collected(), refusal_prefix("", "monte_carlo.event"):
+        random = read_random_event(checked.monte_carlo.event, "monte_carlo.event")
+    faults.refuse()
     config = Config(
         title=checked.title,
-        machine=_machine(parts, tables["machine"], tables["ratios"]),
+        machine=machine,
         motor_type=parts.motor,
         motor=values["motor"] if parts.gives_motor else None,
-        plate=_plate(parts.designation, own_motors),
+        plate=plate,
         flywheels=tuple(sorted(set(tables["flywheel"].get("compare", [])))),
         events=events,
-        random=read_random_event(checked.monte_carlo.event, "monte_carlo.event"),
+        random=random,
         feed_forward=checked.feed_forward,
         empty_start=checked.empty_start,
         held_in_start=checked.coupling.held_in_start,
@@ -255,14 +293,9 @@ def _config(
         units=chosen_units(checked.report.units),
         **of_study,
     )
-    with refusal_prefix("driveline."):
-        if config.driveline is not None:
-            check(config.driveline)
-    with refusal_prefix("motor: "):
-        if parts.gives_motor:
-            parts.motor.check(config.motor)
-    _check_loads(config)
-    _check_steps(config)
+    faults.add(_loads_beyond(config))
+    faults.add(_endless(config))
+    faults.refuse()
     return config
 
 
@@ -284,9 +317,9 @@ def _plate(designation: str, file: Path | None) -> CatalogueMotor | None:
     """The motor of the catalogue that [system] names."""
     if not designation:
         return None
-    with refusal_prefix("catalogue = "):
+    with refusal_prefix("catalogue = ", "catalogue"):
         catalogue(file)
-    with refusal_prefix("system.motor = "):
+    with refusal_prefix("system.motor = ", "system.motor"):
         return motor_of_catalogue(designation, file)
 
 
@@ -305,19 +338,23 @@ def _names(data: Mapping[str, Any], events: Mapping[str, Event], prefix: str = "
 def _machine(parts: Parts, given: dict[str, float], of_papers: Mapping[str, float]) -> Machine:
     """The machine by its lengths, or by the papers' ratios in their place."""
     if of_papers:
-        with refusal_prefix("ratios: "):
+        with refusal_prefix("ratios: ", "ratios"):
             lengths = ratios(**filled(Ratios, of_papers))
         twice = sorted(set(lengths) & set(given))
         if twice:
+            key = f"machine.{twice[0]}"
             raise InputError(
-                f"machine.{twice[0]}: given beside [ratios], which sets it; leave out one of the two"
+                f"{key}: given beside [ratios], which sets it; leave out one of the two", key=key
             )
         given = given | lengths
     try:
         of: Any = ForeignMachine if issubclass(parts.machine, ForeignModel) else machine_of
         return of(parts.machine, given)
     except InputError as error:
-        raise InputError(f"machine: {error}{_taken_over(error, parts.machine, given)}") from error
+        names = error.names if isinstance(error, GeometryError) else ()
+        key = next((f"machine.{name}" for name in names if name in given), "machine")
+        line = f"machine: {error}{_taken_over(error, parts.machine, given)}"
+        raise InputError(line, key="ratios" if of_papers else key) from error
 
 
 def _taken_over(error: InputError, machine: type[MachineModel], given: Mapping[str, float]) -> str:
@@ -328,28 +365,32 @@ def _taken_over(error: InputError, machine: type[MachineModel], given: Mapping[s
     return f"; not in the file, so at the declared start value: {', '.join(taken)}" if taken else ""
 
 
-def _check_loads(config: Config) -> None:
-    """Refuse loads that, together, no machine reaches: all on one side, and at the height of each event."""
+def _loads_beyond(config: Config) -> Iterator[InputError]:
+    """Refusals of loads that, together, no machine reaches: all on one side, and at the height of each event."""
     feed, model = config.feed, config.machine.model
     for v in Layout(SideLoads).variables if model.sides else ():
         most = getattr(feed.left, v.name) + getattr(feed.right, v.name)
         if not v.quantity.admits(most):
-            raise InputError(
-                f"feed: {v.name} of both sides = {most:.9g} {v.unit}: must be <= {v.quantity.high:g} {v.unit} "
-                "together, as an overload may lay all of it on one side"
+            unit = unit_behind(v.unit)
+            yield InputError(
+                f"feed: {v.name} of both sides = {most:.9g}{unit}: must be <= {v.quantity.high:g}{unit} "
+                "together, as an overload may lay all of it on one side",
+                key="feed",
             )
     inputs = {v.name: v for v in model.input_layout.variables}
     normal = {name: v.quantity.start or 0.0 for name, v in inputs.items()} | Layout(model.Feed).named(feed)
-    hardest = [(f"event.{name}", event) for name, event in config.events.items()]
-    hardest += [("monte_carlo.event", event) for event in config.random.hardest()]
+    hardest = [
+        (f"event.{name}", f"event.{k}", event) for k, (name, event) in enumerate(config.events.items(), 1)
+    ]
+    hardest += [("monte_carlo.event", "monte_carlo.event", event) for event in config.random.hardest()]
     of_motors = {name for motor in MOTORS.values() for name in motor.input_layout.names}
-    for where, event in hardest:
+    for where, key, event in hardest:
         needed = set(event.inputs(event.side))
         if not needed <= set(inputs):
             asked = config.monte_carlo.runs or where != "monte_carlo.event"
             if asked and config.foreign is None and not needed <= {*inputs, *of_motors}:
-                raise InputError(
-                    f"{where}: the {model.name} has no {' or '.join(sorted(needed))}; leave it out"
+                yield InputError(
+                    f"{where}: the {model.name} has no {' or '.join(sorted(needed))}; leave it out", key=key
                 )
             # of a motor: the study says whether it has the input
             continue
@@ -361,22 +402,25 @@ def _check_loads(config: Config) -> None:
             )
             v = inputs[name]
             if not v.quantity.admits(most):
-                raise InputError(
-                    f"{where}: {name} comes to {most:.9g} {v.unit} with the feed: must be {v.quantity.allowed}"
+                yield InputError(
+                    f"{where}: {name} comes to {most:.9g}{unit_behind(v.unit)} with the feed: must be "
+                    f"{v.quantity.allowed}",
+                    key=key,
                 )
 
 
 MOST_STEPS = 1e6
 
 
-def _check_steps(config: Config) -> None:
-    """Refuse a study that would never end."""
+def _endless(config: Config) -> Iterator[InputError]:
+    """The refusal of a study that would never end."""
     run, turn = config.run, config.turn
     seconds = config.settled + run.turns * turn
     seconds += sum(event.follow(turn) + 2.0 * turn for event in config.events.values())
     steps = max(seconds, config.monte_carlo.duration) / run.step
     if not steps <= MOST_STEPS:
-        raise InputError(
+        yield InputError(
             f"run.step = {run.step:g} s: the study would take {steps:.2g} steps, more than {MOST_STEPS:.0e}; "
-            "lengthen the step, raise the speed, or lessen the turns"
+            "lengthen the step, raise the speed, or lessen the turns",
+            key="run.step",
         )

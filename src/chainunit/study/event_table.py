@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, shown
+from ..errors import Faults, InputError, near_name, refusal_prefix, shown
 from ..machines.chain_unit import SIDES
 from ..quantities import Layout, variables
 from ..reading import given_values, instance, read_table, schema, to_number
@@ -37,17 +37,20 @@ def read_events(tables: Sequence[Any]) -> dict[str, Event]:
     Raises
     ------
     InputError
-        in one line that names the event, the key, its value and the allowed range.
+        with a line for each fault that names the event, the key, its value and the allowed range.
     """
     events: dict[str, Event] = {}
+    faults = Faults()
     for k, table in enumerate(tables, 1):
-        where = f"event {k}"
-        of = _type(table, where)
-        side = _side(of, table, f"{where} ({of.kind})")
-        if not side and of.sided:
-            raise InputError(f'{where} ({of.kind}): side: must be given, "left" or "right"')
-        name = _name(table, of.on(side).name, events, f"{where} ({of.kind})")
-        events[name] = of.on(side, _parameters(of, table, f"event.{name}."), name)
+        with faults.collected(), refusal_prefix("", f"event.{k}"):
+            of = _type(table, f"event {k}")
+            where = f"event {k} ({of.kind})"
+            side = _side(of, table, where)
+            if not side and of.sided:
+                raise InputError(f'{where}: side: must be given, "left" or "right"')
+            name = _name(table, of.on(side).name, events, where)
+            events[name] = of.on(side, _parameters(of, table, f"event.{name}.", f"event.{k}."), name)
+    faults.refuse()
     return events
 
 
@@ -97,7 +100,8 @@ def read_random_event(table: Mapping[str, Any], where: str) -> RandomEvent:
         raise InputError(f'{where}.type = "{of.kind}": must be an event in steady running')
     for name in (*_PLACED, "name"):
         if name in table:
-            raise InputError(f"{where}.{name}: is not of random overloads, which come at any crank angle")
+            key = f"{where}.{name}"
+            raise InputError(f"{key}: is not of random overloads, which come at any crank angle", key)
     ranges = {name: ends for name, ends in of.draws.items() if name not in table}
     for v in variables(of.Parameters):
         ends = table.get(v.name)
@@ -105,14 +109,14 @@ def read_random_event(table: Mapping[str, Any], where: str) -> RandomEvent:
             named = replace(v, name=f"{where}.{v.name}")
             if len(ends) != 2:
                 raise InputError(
-                    f"{named.name} = {shown(ends)}: must be a number, or two: from where to where"
+                    f"{named.name} = {shown(ends)}: must be a number, or two: from where to where", named.name
                 )
             try:
                 low, high = (to_number(named, end) for end in ends)
             except ValueError as error:
-                raise InputError(str(error)) from error
+                raise InputError(str(error), named.name) from error
             if high < low:
-                raise InputError(f"{named.name} = {shown(ends)}: the second must be >= the first")
+                raise InputError(f"{named.name} = {shown(ends)}: the second must be >= the first", named.name)
             ranges[v.name] = (low, high)
     fixed = {name: value for name, value in table.items() if name not in ranges}
     ordered = {name: ranges[name] for name in Layout(of.Parameters).names if name in ranges}
@@ -126,7 +130,7 @@ def _type(table: Any, where: str) -> type[Event]:
     of = TYPES.get(name) if isinstance(name, str) else None
     if of is None:
         refused = ": must be given," if name is None else f" = {shown(name)}: must be"
-        raise InputError(f"{where}: type{refused} one of {', '.join(TYPES)}")
+        raise InputError(f"{where}: type{refused} one of {', '.join(TYPES)}{near_name(str(name), TYPES)}")
     return of
 
 
@@ -155,13 +159,22 @@ def _name(table: Mapping[str, Any], usual: str, others: Mapping[str, Event], whe
     return name
 
 
-def _parameters(of: type[Event], table: Mapping[str, Any], prefix: str) -> Any:
+def _parameters(of: type[Event], table: Mapping[str, Any], prefix: str, place: str = "") -> Any:
+    """The quantities of an event; a refusal begins with `prefix`, and its key with `place`, by default with that,
+    too."""
     texts: dict[str, Any] = dict.fromkeys(("type", "side", "name"), (str, ""))
     form = schema(of.Parameters, "event", prefix, **texts)
-    given = given_values(read_table(form, table, prefix))
+    try:
+        given = given_values(read_table(form, table, prefix))
+    except InputError as error:
+        keys = [(place or prefix) + fault.key.removeprefix(prefix) for fault in error.faults]
+        raise InputError.of(
+            [InputError(str(fault), key) for fault, key in zip(error.faults, keys, strict=True)]
+        ) from error
     values = {name: x for name, x in given.items() if name not in texts}
     p = instance(of.Parameters, values)
     for name in of.counts:
         if getattr(p, name) != int(getattr(p, name)):
-            raise InputError(f"{prefix}{name} = {getattr(p, name):g}: must be a whole number")
+            line = f"{prefix}{name} = {getattr(p, name):g}: must be a whole number"
+            raise InputError(line, (place or prefix) + name)
     return p

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict
 from ..drives.line_table import SHAFTS
 from ..drives.motor import Motor
 from ..drives.motors import MOTORS
-from ..errors import InputError, refusal_prefix, shown
+from ..errors import InputError, near_name, refusal_prefix, shown
 from ..mechanism.models import MachineModel
 from ..models import MACHINES
 from ..reading import file_form, given_values, merged, packaged, read_table, toml
@@ -115,8 +115,10 @@ def _machine_model(table: Any, source: str) -> type[MachineModel]:
             return MACHINES[table.machine]
         raise InputError(
             f"system.machine = {shown(table.machine)}: must be one of {', '.join(MACHINES)}, or a file .fmu"
+            + near_name(table.machine, MACHINES),
+            key="system.machine",
         )
-    with refusal_prefix("system.machine: "):
+    with refusal_prefix("system.machine: ", "system.machine"):
         return foreign_model(beside(table.machine, source), given_values(table.machine_names))
 
 
@@ -130,7 +132,11 @@ def named_table(data: Mapping[str, Any], name: str) -> Mapping[str, Any]:
     """
     table = data.get(name, {})
     if not isinstance(table, Mapping):
-        raise InputError(f"{name} = {shown(table)}: must be a table")
+        if name == "motor" and isinstance(table, list):
+            raise InputError(
+                "motor: tables [[motor]] are of a catalogue; name its file by catalogue", key=name
+            )
+        raise InputError(f"{name} = {shown(table)}: must be a table", key=name)
     return table
 
 
