@@ -286,7 +286,10 @@ def toml(text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except ValueError as error:  # TOMLDecodeError, and numbers that are too long
-        kind = "; it is JSON" if text.lstrip().startswith("{") else ""
+        first = text.lstrip().partition("\n")[0]
+        kind = (
+            "; it is JSON" if first.startswith("{") else "; it is a CSV table" if first.count(",") > 2 else ""
+        )
         raise InputError(f"no valid TOML: {printable(str(error))}{kind}") from error
     except RecursionError as error:
         raise InputError("no valid TOML: tables or lists are nested too deeply") from error

@@ -15,13 +15,13 @@ import csv
 import difflib
 import io
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError, refusal_prefix, shown
+from ..errors import InputError, near_name, refusal_prefix, shown
 from ..quantities import DISPLAY_UNITS, Layout, Value, Variable, declaration, quantity
 from ..reading import file_text, packaged, to_number, toml
 from .induction_motor import InductionMotor
@@ -103,8 +103,11 @@ def catalogue(extra: Path | None = None) -> list[CatalogueMotor]:
     return motors
 
 
-def motor_of_catalogue(designation: str, extra: Path | None = None) -> CatalogueMotor:
-    """The motor with this `designation`, of the packaged ones and those of the file `extra`.
+def motor_of_catalogue(
+    designation: str, extra: Path | None = None, others: Collection[str] = ()
+) -> CatalogueMotor:
+    """The motor with this `designation`, of the packaged ones and those of the file `extra`; `others` are names that
+    may have been meant.
 
     Raises
     ------
@@ -114,9 +117,11 @@ def motor_of_catalogue(designation: str, extra: Path | None = None) -> Catalogue
     motors = {m.designation: m for m in catalogue(extra)}
     if designation not in motors:
         near = difflib.get_close_matches(designation, motors, n=3, cutoff=0.0)
+        hint = near_name(designation, (*motors, *others))
         raise InputError(
             f"{shown(designation)}: not in the catalogue; must be one of its designations, such as "
             + ", ".join(f'"{name}"' for name in near)
+            + hint
         )
     return motors[designation]
 

@@ -82,14 +82,16 @@ def line_values(table: BaseModel, prefix: str) -> dict[str, Any]:
             continue
         if stiffness in numbers:
             raise InputError(
-                f"{prefix}{stiffness}: given beside {prefix}{shaft}, which sets it; leave out one of the two"
+                f"{prefix}{stiffness}: given beside {prefix}{shaft}, which sets it; leave out one of the two",
+                prefix + stiffness,
             )
         keys = {name: getattr(described, name) for name in described.model_fields_set}
-        with refusal_prefix(f"{prefix}{shaft}."):
+        with refusal_prefix(f"{prefix}{shaft}.", prefix + shaft):
             numbers[stiffness] = stiffness_of(keys)
     for name in ("d2", "d3"):
         if name in numbers and "damping_ratio" in numbers:
             raise InputError(
-                f"{prefix}{name}: given beside {prefix}damping_ratio, which sets it; leave out one of the two"
+                f"{prefix}{name}: given beside {prefix}damping_ratio, which sets it; leave out one of the two",
+                prefix + name,
             )
     return numbers

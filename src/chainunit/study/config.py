@@ -180,6 +180,10 @@ def parse(text: str, source: str = "config") -> Config:
         see `load`.
     """
     data, faults = toml(text), Faults()
+    if isinstance(data.get("motor"), list):
+        raise InputError(
+            "motor: tables [[motor]] make a catalogue; name this file in a study file by catalogue", "motor"
+        )
     parts = parts_of(data, source)
     with faults.collected():
         read_table(parts.form, data)
@@ -320,7 +324,7 @@ def _plate(designation: str, file: Path | None) -> CatalogueMotor | None:
     with refusal_prefix("catalogue = ", "catalogue"):
         catalogue(file)
     with refusal_prefix("system.motor = ", "system.motor"):
-        return motor_of_catalogue(designation, file)
+        return motor_of_catalogue(designation, file, MOTORS)
 
 
 def _names(data: Mapping[str, Any], events: Mapping[str, Event], prefix: str = "") -> Iterator[str]:

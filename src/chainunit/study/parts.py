@@ -132,10 +132,6 @@ def named_table(data: Mapping[str, Any], name: str) -> Mapping[str, Any]:
     """
     table = data.get(name, {})
     if not isinstance(table, Mapping):
-        if name == "motor" and isinstance(table, list):
-            raise InputError(
-                "motor: tables [[motor]] are of a catalogue; name its file by catalogue", key=name
-            )
         raise InputError(f"{name} = {shown(table)}: must be a table", key=name)
     return table
 
