@@ -694,4 +694,4 @@ def test_the_command_writes_everything(monkeypatch, capsys, tmp_path):
 
 def test_the_example_is_printed(monkeypatch, capsys):
     status, out, _ = run(monkeypatch, capsys, "--example", "driveline")
-    assert not status and out == parts.example("driveline")
+    assert not status and out == f"#:schema chainunit.schema.json\n{parts.example('driveline')}"

@@ -206,8 +206,19 @@ def check_traced(reader, result):
         assert w["text"] == at(result, w["data-path"]), w
 
 
+_DRAWING = re.compile(r'<figure class="drawing">.*?</figure>', re.S)
+
+
+def test_the_drawing_has_the_dimensions_of_the_machine(study, written):
+    (drawing,) = _DRAWING.findall(written.read_text("utf-8"))
+    p = study.drive.machine.p
+    shown = re.findall(r">(\w+)</text>\s*<text[^>]*>([\d.]+) mm</text>", drawing)
+    assert [name for name, _ in shown] == "r l h e l1 l2 c hy z".split()
+    assert all(float(x) == pytest.approx(1e3 * getattr(p, name), rel=5e-4) for name, x in shown)
+
+
 def test_every_number_is_traced_to_result_json(study, written):
-    reader = Reader(written.read_text("utf-8"))
+    reader = Reader(_DRAWING.sub("", written.read_text("utf-8")))
     result = json.loads(json.dumps(as_dict(study)))
     assert json.loads(reader.scripts["result"]) == result
     check_traced(reader, result)
@@ -236,7 +247,7 @@ def test_the_page_needs_nothing_else(written):
     reader = Reader(text)
     assert reader.loads and all(link.startswith(("#", "data:")) for link in reader.loads)
     own = text.replace(reader.scripts["plotly"], "")
-    assert "@import" not in own and "url(" not in own
+    assert "@import" not in own and "url(" not in own.replace("url(#", "")
     assert set(re.findall(r"https?://[\w./]+", own)) == {"http://www.w3.org/2000/svg"}
     assert "default-src 'none'" in text.replace("&#x27;", "'")
     assert "A mill &lt;b&gt;&amp; more&lt;/b&gt;" in text and "<b>& more" not in own
@@ -493,7 +504,7 @@ def test_the_study_file_chooses_the_units(study):
     assert told == own
     for table, words in (
         ('units = { speed = "rpm" }', 'report.units.speed = "rpm": must be "rad/s" or "rev/min"'),
-        ("unit = 1", "report.unit: unknown key; known here: units"),
+        ("unit = 1", 'report.unit: unknown key; was "units" meant? known here: units'),
     ):
         with pytest.raises(InputError) as refused:
             config.parse(f"{SHORT}[report]\n{table}\n")

@@ -18,7 +18,7 @@ import typer.core
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from .errors import InputError, InterruptedRunError, RunError, WriteError, printable, refusal_prefix
+from .errors import InputError, InterruptedRunError, RunError, WriteError, printable
 from .files import claimed, full, leftovers
 
 if TYPE_CHECKING:
@@ -148,10 +148,11 @@ def study(
         print(commented(text) if example is Example.full else f"#:schema {FILE}\n{text}", end="")
         return
     loaded = _study_file(config)
+    from .reading import in_file
     from .study.choice import check_files
 
     # before anything of an earlier run is taken away
-    with refusal_prefix(f"{loaded.source}: "):
+    with in_file(loaded.source, lambda: loaded.lines):
         check_files(loaded)
     with claimed(output):
         from .report import files, series
@@ -162,7 +163,7 @@ def study(
         _clear(output, *files.names("result", contents.PICTURES), series.SERIES, LOAD_CYCLE)
         errors = _console(stderr=True)
         with (
-            refusal_prefix(f"{loaded.source}: "),
+            in_file(loaded.source, lambda: loaded.lines),
             _progress("the machine at constant speed", errors) as progress,
         ):
             result = run_study(

@@ -305,17 +305,18 @@ def read(file: Path | None, example: Callable[[], str], parse: Callable[[str, st
     """
     source = str(file) if file else "packaged example"
     text = file_text(file) if file else example()
-    with in_file(source, text):
+    with in_file(source, lambda: places.lines_of(text)):
         return parse(text, source)
 
 
 @contextmanager
-def in_file(source: str, text: str = "") -> Iterator[None]:
-    """Name the file `source`, and the line of what is refused in its `text`, before each line of an InputError."""
+def in_file(source: str, lines_of: Callable[[], Mapping[str, int]]) -> Iterator[None]:
+    """Name the file `source`, and the line of what is refused, before each line of an InputError; `lines_of` gives
+    the lines of its keys."""
     try:
         yield
     except InputError as error:
-        lines = places.lines_of(text) if any(fault.key for fault in error.faults) else {}
+        lines = lines_of() if any(fault.key for fault in error.faults) else {}
         raise InputError.of(
             [
                 InputError(f"{source}:{f'{line}:' if (line := _line_of(fault.key, lines)) else ''} {fault}")

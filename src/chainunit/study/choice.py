@@ -68,7 +68,8 @@ def check_files(config: Config) -> None:
         see `chainunit.drives.catalogue.check_own` and `with_motor`.
     """
     if config.sizing is not None:
-        check_own(config.catalogue)
+        with refusal_prefix("catalogue = ", "catalogue"):
+            check_own(config.catalogue)
     if config.foreign is not None:
         _with_foreign(config)
 
@@ -76,7 +77,7 @@ def check_files(config: Config) -> None:
 def _with_foreign(config: Config) -> Choice:
     """The drive of a study that names its motor."""
     assert config.foreign is not None
-    with refusal_prefix("system.motor: "):
+    with refusal_prefix("system.motor: ", "system.motor"):
         return with_motor(config, config.foreign.file, config.foreign.names)
 
 
