@@ -1,5 +1,6 @@
 """The reference of keys, the commented example and the schema, against the reader of study files itself."""
 
+import importlib.util
 import json
 import re
 import tomllib
@@ -189,3 +190,15 @@ def test_the_commands(tmp_path):
     assert json.loads((tmp_path / "chainunit.schema.json").read_text("utf-8")) == json_schema()
     first, *_ = chainunit("study", "--example", "knife", cwd=tmp_path).stdout.splitlines()
     assert first == "#:schema chainunit.schema.json"
+
+
+def test_the_page_of_reference_is_that_of_the_declarations():
+    """Else run docs/make_reference.py."""
+    spec = importlib.util.spec_from_file_location("make_reference", ROOT / "docs" / "make_reference.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert module.PAGE.read_text("utf-8") == module.text()
+    for command in ("study", "keys", "schema", "reproduce", "two-bar-error", "export", "export-ssp"):
+        assert f"## chainunit {command}\n" in module.text()
+    for name in ("ChamberForces", "KnifeDrive", "DcMotor", "CardanDriveline"):
+        assert f"## FMU {name}\n" in module.text()

@@ -1,0 +1,44 @@
+"""Writes docs/reference.md: every key, every variable of an FMU, every command with its options."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import typer.main
+
+from chainunit.cli import app
+from chainunit.report.markdown import markdown
+from chainunit.report.reference import reference
+
+PAGE = Path(__file__).parent / "reference.md"
+
+
+def commands() -> Iterator[tuple[str, str, list[tuple[str, str]]]]:
+    """Name of each command, the first paragraph of its help, and its arguments and options with their help."""
+    group = typer.main.get_command(app)
+    for name, command in {"": group, **group.commands}.items():
+        options = [
+            (
+                ", ".join(option.opts) if option.param_type_name == "option" else option.name.upper(),
+                getattr(option, "help", None) or "",
+            )
+            for option in command.params
+            if option.name not in ("help", "install_completion", "show_completion")
+        ]
+        yield name, " ".join((command.help or "").split()), options
+
+
+def text() -> str:
+    """The page."""
+    head = (
+        "# Reference\n\nMade by `python docs/make_reference.py` from the declarations. A number is in the declared "
+        'SI unit; a text may carry\nany unit of the same kind: `"150 mm"`, `"4 kNm"`, `"30 rev/min"`, `"8 %"`. '
+        "`chainunit keys TABLE` shows the same on the terminal;\n`chainunit schema` writes a JSON Schema by which "
+        "editors complete and check a study file.\n"
+    )
+    return head + markdown(reference(commands()), ()).removeprefix("# Reference\n")
+
+
+if __name__ == "__main__":
+    PAGE.write_text(text(), "utf-8")
