@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import base64
 import copy
 import dataclasses
+import gzip
 import itertools
 import json
 import math
@@ -504,7 +506,10 @@ def test_the_study_file_chooses_the_units(study):
     assert told == own
     for table, words in (
         ('units = { speed = "rpm" }', 'report.units.speed = "rpm": must be "rad/s" or "rev/min"'),
-        ("unit = 1", 'report.unit: unknown key; was "units" meant? known here: units'),
+        (
+            "unit = 1",
+            'report.unit: unknown key; was "units" meant? known here: units, project, author, date, revision',
+        ),
     ):
         with pytest.raises(InputError) as refused:
             config.parse(f"{SHORT}[report]\n{table}\n")
@@ -619,13 +624,33 @@ def test_a_run_that_stopped_early_has_a_page(study, tmp_path):
     assert json.loads(Reader(page_of(stopped)).scripts["pictures"]) is None
 
 
+def test_the_head_names_project_author_date_and_revision(study):
+    text = '[report]\nproject = "Mill 3"\nauthor = "A. <b>"\ndate = 2026-11-22\nrevision = "B"\n'
+    labels = config.parse(text).labels
+    assert labels == {"project": "Mill 3", "author": "A. <b>", "date": "2026-11-22", "revision": "B"}
+    named = dataclasses.replace(study, config=dataclasses.replace(study.config, labels=labels))
+    page = html.render(study_report.report(named))
+    head = re.search(r'<p class="from">.*?</p>', page)[0]
+    plain = re.sub(r"<[^>]*>", "", head)
+    assert plain.startswith(
+        "Project: Mill 3 · Author: A. &lt;b&gt; · Date: 2026-11-22 · Revision: B · Study file"
+    )
+    assert as_dict(named)["report"] == labels
+
+
+def test_the_page_carries_the_library_packed(written):
+    packed = Reader(written.read_text("utf-8")).scripts["plotly"]
+    assert gzip.decompress(base64.b64decode(packed)).decode() == html.get_plotlyjs()
+    assert written.stat().st_size < 3.5e6
+
+
 def test_an_error_leaves_the_old_page(study, tmp_path, monkeypatch):
     (tmp_path / "report.html").write_text("old")
 
     def fails():
         raise OSError("no plotly")
 
-    monkeypatch.setattr(html, "get_plotlyjs", fails)
+    monkeypatch.setattr(html, "_packed_plotly", fails)
     with pytest.raises(OSError):
         html.write(study_report.report(study), tmp_path)
     assert [(p.name, p.read_text()) for p in tmp_path.iterdir()] == [("report.html", "old")]
@@ -818,7 +843,7 @@ def test_two_bars_have_no_row_of_chains(study, written):
 @pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium here")
 def test_the_page_in_a_browser(study, written, tmp_path):
     arguments = (
-        "--headless --no-sandbox --disable-gpu --enable-logging=stderr --virtual-time-budget=1000 --dump-dom"
+        "--headless --no-sandbox --disable-gpu --enable-logging=stderr --virtual-time-budget=10000 --dump-dom"
     )
     done = subprocess.run(
         ["chromium", *arguments.split(), f"--user-data-dir={tmp_path}", written.as_uri() + "#play=jam_left"],

@@ -6,8 +6,11 @@ Every number in its text is an element that names its place in the result, which
 
 from __future__ import annotations
 
+import base64
+import gzip
 import json
 from collections.abc import Iterable, Sequence
+from functools import cache
 from html import escape
 from importlib import resources
 from itertools import groupby
@@ -99,12 +102,18 @@ def render(report: b.Report) -> str:
                 f'<script type="application/json" id="{name}">{text.replace("<", chr(92) + "u003c")}</script>'
                 for name, text in embedded.items()
             ),
-            f'<script id="plotly">{get_plotlyjs()}</script>',
+            f'<script type="application/octet-stream" id="plotly">{_packed_plotly()}</script>',
             f"<script>\n{_resource('page.js')}</script>",
             "</body>",
             "</html>\n",
         ]
     )
+
+
+@cache
+def _packed_plotly() -> str:
+    """The library of plots, by gzip, in letters; the page unpacks it."""
+    return base64.b64encode(gzip.compress(get_plotlyjs().encode(), 9, mtime=0)).decode()
 
 
 def _resource(name: str) -> str:

@@ -17,7 +17,7 @@ from . import blocks as b
 from . import run_names as read
 from .analyses import ANALYSES, Contents
 from .drawing import drawing
-from .lines import Line, joined, line, spoken
+from .lines import Line, capital, joined, line, spoken
 from .study_motion import motion
 
 DRAWING = "machine.svg"
@@ -43,10 +43,16 @@ def report(study: Study, result: Mapping[str, Any] | None = None) -> b.Report:
             s.result,
             wording.of_machine(tuple(_opening(s, study)), study.turning),
             wording.of_machine(tuple(sections), study.turning),
-            source=s.line("Study file: {source} · chainunit {chainunit}"),
+            source=_head(s),
             failure=s.words("failure") if study.failure is not None else (),
             units=study.config.units,
         )
+
+
+def _head(s: b.Source) -> Line:
+    """Project, author, date and revision, where they are given; the study file, and the version."""
+    named = [s.line(f"{capital(name)}: {{report.{name}}} · ") for name in s.result.get("report", ())]
+    return line(*named, s.line("Study file: {source} · chainunit {chainunit}"))
 
 
 def _motion(study: Study) -> list[b.Block]:

@@ -108,6 +108,8 @@ class Config:
     """values that look like a slip of the unit"""
     units: Units = dataclasses.field(default_factory=lambda: DEFAULT_UNITS)
     """that the report shows numbers in"""
+    labels: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    """project, author, date and revision, as far as the file gives them"""
     lines: Mapping[str, int] = dataclasses.field(default_factory=dict)
     """the line of each key in the file"""
 
@@ -295,6 +297,7 @@ def _config(
         choices=_choices(checked, parts),
         slips=unusual,
         units=chosen_units(checked.report.units),
+        labels=checked.report.labels,
         **of_study,
     )
     faults.add(_loads_beyond(config))

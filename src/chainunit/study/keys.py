@@ -23,6 +23,7 @@ from ..text import CHOICES as UNITS
 from ..units import written
 from .config import Config, parse
 from .event import TYPES, Event
+from .parts import ReportTable
 from .sections import CHOICES, SECTIONS, Ratios, SystemTable
 
 _FOLLOWS = {
@@ -192,6 +193,9 @@ def _of_report() -> Iterator[Key]:
     for kind, names in UNITS.items():
         words = tuple(f'"{name}"' for name in names)
         yield Key(f"units.{kind}", f"unit of each {kind} in the report", words=words, sort="text")
+    for name, field in ReportTable.model_fields.items():
+        if name != "units":
+            yield Key(name, str(field.description), sort="text")
 
 
 def _of_event(of: type[Event]) -> Iterator[Key]:

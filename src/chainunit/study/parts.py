@@ -5,11 +5,12 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from datetime import date
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from ..drives.line_table import SHAFTS
 from ..drives.motor import Motor
@@ -17,9 +18,14 @@ from ..drives.motors import MOTORS
 from ..errors import InputError, near_name, refusal_prefix, shown
 from ..mechanism.models import MachineModel
 from ..models import MACHINES
-from ..reading import file_form, given_values, merged, packaged, read_table, toml
+from ..reading import Title, file_form, given_values, merged, packaged, read_table, toml
 from .foreign_machine import foreign_model
 from .sections import CHOICES, FileSection, SystemTable, sections_of
+
+
+def _as_text(given: Any) -> Any:
+    """A date of TOML as text."""
+    return given.isoformat() if isinstance(given, date) else given
 
 
 class ReportTable(BaseModel):
@@ -27,6 +33,16 @@ class ReportTable(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
     units: dict[str, str] = {}
+    project: Title = Field("", description="project that the study is for")
+    author: Title = Field("", description="author of the study")
+    date: Annotated[Title, BeforeValidator(_as_text)] = Field("", description="date of the study")
+    revision: Title = Field("", description="revision of the study")
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """What stands at the head of the report, by its name; only what is given."""
+        named = {name: getattr(self, name) for name in type(self).model_fields if name != "units"}
+        return {name: text for name, text in named.items() if text}
 
 
 EXAMPLES = {

@@ -49,6 +49,7 @@ def _as_dict(study: Study) -> dict[str, Any]:
         "chainunit": __version__,
         "title": config.title,
         "source": config.source,
+        "report": dict(config.labels),
         "status": f"failed: {study.failure}" if study.failure else "complete",
         "failure": str(study.failure) if study.failure else None,
         "verdict": {"model": _on_model(study), "motor": motor_verdict(study)},
