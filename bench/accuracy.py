@@ -16,7 +16,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from chainunit import ChainUnit, SideLoads
+from chainunit import ChainUnitMachine, SideLoads
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.drives.speed_control import tune
 from chainunit.machines.chain_unit import ChamberForces
@@ -40,7 +40,7 @@ def motors():
     """The packaged drive behind its gear, and a motor straight on the crank whose rotor has 1/50 of the
     machine's largest inertia."""
     feed = SideLoads()
-    J = ChainUnit().forces(np.linspace(0.0, 2.0 * math.pi, 720), 0.0, 0.0, feed, feed).J
+    J = ChainUnitMachine().forces(np.linspace(0.0, 2.0 * math.pi, 720), 0.0, 0.0, feed, feed).J
     geared = {}
     direct = {
         "rotor.J": float(np.max(J)) / 50.0,

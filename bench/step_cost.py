@@ -20,7 +20,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from chainunit import ChainUnit, engines
+from chainunit import ChainUnitMachine, engines
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.fmu.backends import export
 from chainunit.fmu.native import export as native
@@ -109,7 +109,7 @@ def from_c(folder: Path) -> list[tuple[str, float]]:
 
 
 def main() -> None:
-    p = ChainUnit().p
+    p = ChainUnitMachine().p
     u = ChamberForces.Inputs(phi=0.5, w=6.0, a=1.0)
     outputs, slopes = (part.equations for part in ChamberForces.parts)
     rows: list[tuple[str, float]] = []

@@ -11,7 +11,7 @@ from pathlib import Path
 import fmpy
 import numpy as np
 
-from chainunit import ChainUnit, SideLoads
+from chainunit import ChainUnitMachine, SideLoads
 from chainunit.fmu.backends import export
 from chainunit.machines.flexible import flexible
 
@@ -45,7 +45,7 @@ steady = result[200:]
 
 # %%
 feed = SideLoads(material_mass=30.0, processing_force=0.0)
-two_bars = ChainUnit().forces(np.linspace(0.0, 2.0 * np.pi, 361), speed, 0.0, feed, feed)
+two_bars = ChainUnitMachine().forces(np.linspace(0.0, 2.0 * np.pi, 361), speed, 0.0, feed, feed)
 peaks = np.abs(steady["rocker.tau"][: 100 * (turns - 2)]).reshape(turns - 2, 100).max(axis=1)
 print("peak of the rocker torque in each turn:", " ".join(f"{peak:.0f}" for peak in peaks), "N m")
 print(f"two bars: {np.abs(two_bars.rocker.tau).max():.0f} N m")

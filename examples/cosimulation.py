@@ -8,7 +8,7 @@
 import tempfile
 from pathlib import Path
 
-from chainunit import ChainUnit
+from chainunit import ChainUnitMachine
 from chainunit.models import MODELS
 from chainunit.system import CoSimulation, ModelComponent, Profile, System, certify, export, shaft_joints
 
@@ -39,7 +39,7 @@ print(
 # The energy from the motor is stored and dissipated by the machine, less the energy that the moving feed brings.
 
 # %%
-machine = ChainUnit(ratio=RATIO)
+machine = ChainUnitMachine(ratio=RATIO)
 feed = {
     f"machine.{side}.material_mass": lambda run, side=side: machine.energy_per_kg(
         side, run["machine.phi0"].values, run["machine.w0"].values

@@ -7,9 +7,9 @@
 # %%
 import numpy as np
 
-from chainunit import ChainUnit, InputError, SideLoads
+from chainunit import ChainUnitMachine, InputError, SideLoads
 
-machine = ChainUnit.from_ratios(rho=0.1, lam=2 / 3, mu=0.6, zeta=0.5, l1=1.35)
+machine = ChainUnitMachine.from_ratios(rho=0.1, lam=2 / 3, mu=0.6, zeta=0.5, l1=1.35)
 
 # %% [markdown]
 # Paper 000, Figs 17-22: the left organ at psi = -12, 0, +12 degrees, in parts of its weight.
@@ -41,6 +41,6 @@ print(f"a web goes slack from {machine.slack_speed(feed, feed):.2f} rad/s on")
 
 # %%
 try:
-    ChainUnit(r=0.9)
+    ChainUnitMachine(r=0.9)
 except InputError as error:
     print(error)

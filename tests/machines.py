@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from chainunit import ChainUnit, InputError, SideLoads
+from chainunit import ChainUnitMachine, InputError, SideLoads
 
 
-def random_machine(rng: np.random.Generator, *, lossless: bool = False) -> ChainUnit:
+def random_machine(rng: np.random.Generator, *, lossless: bool = False) -> ChainUnitMachine:
     """An admissible machine with masses, material shares, losses and a gear, sizes over a decade."""
     while True:
         scale = 10.0 ** rng.uniform(-1.0, 0.3)
@@ -35,10 +35,10 @@ def random_machine(rng: np.random.Generator, *, lossless: bool = False) -> Chain
             values[f"{body}.s"] = length * rng.uniform(-0.2, 1.1)
             values[f"{body}.I"] = values[f"{body}.m"] * length**2 * rng.uniform(0.0, 0.3)
         try:
-            machine = ChainUnit.from_ratios(rho, lam, mu, zeta, values, l=l, l1=l1)
+            machine = ChainUnitMachine.from_ratios(rho, lam, mu, zeta, values, l=l, l1=l1)
             # off the papers' frame, too
             p = machine.p
-            return ChainUnit(p, c=p.c * rng.uniform(0.97, 1.03), hy=p.hy * rng.uniform(0.95, 1.05))
+            return ChainUnitMachine(p, c=p.c * rng.uniform(0.97, 1.03), hy=p.hy * rng.uniform(0.95, 1.05))
         except InputError:
             continue
 
@@ -50,7 +50,7 @@ def random_loads(rng: np.random.Generator, *, lossless: bool = False) -> SideLoa
     )
 
 
-def random_state(rng: np.random.Generator, machine: ChainUnit) -> tuple[float, float, float]:
+def random_state(rng: np.random.Generator, machine: ChainUnitMachine) -> tuple[float, float, float]:
     """(phi, w, a) of the motor; a tenth of the states are at rest."""
     w = rng.choice([0.0, 1.0], p=[0.1, 0.9]) * rng.uniform(-30.0, 30.0)
     return (

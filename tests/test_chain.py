@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from chainunit import ChainUnit, GeometryError, SideLoads
+from chainunit import ChainUnitMachine, GeometryError, SideLoads
 from chainunit.engines import MATH
 from chainunit.groups.chain import Chain, Rods, closed, end_motion
 from chainunit.groups.driver import crank
@@ -88,7 +88,7 @@ def test_a_catenary_is_the_textbooks():
 
 def test_two_bars_are_the_machines_statics():
     """With two rods the chain is the dyad of the chain unit, at any rocker angle, with material on it."""
-    machine, feed = ChainUnit(), SideLoads(material_mass=30.0, processing_force=0.0)
+    machine, feed = ChainUnitMachine(), SideLoads(material_mass=30.0, processing_force=0.0)
     for psi in np.radians([-12.0, 0.0, 7.0]):
         chamber = machine.chamber(psi, left=feed, right=feed)
         for side, hand in (("left", 1.0), ("right", -1.0)):
@@ -256,7 +256,7 @@ def test_two_rods_in_motion_are_the_two_bar_machine():
     from chainunit.machines.chain_unit import Inputs, organ
     from chainunit.planar import Link
 
-    machine, feed = ChainUnit(), SideLoads(material_mass=30.0, processing_force=0.0)
+    machine, feed = ChainUnitMachine(), SideLoads(material_mass=30.0, processing_force=0.0)
     p = machine.p
     lengths, masses = machine.organ_rods("left", feed, 2)
     rods = Rods(lengths, masses, [0.0] * 3)

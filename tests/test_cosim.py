@@ -13,7 +13,7 @@ import xarray as xr
 from machines import random_machine
 from systems import component, pair
 
-from chainunit import ChainUnit, InputError, RunError, SideLoads
+from chainunit import ChainUnitMachine, InputError, RunError, SideLoads
 from chainunit.errors import InterruptedRunError
 from chainunit.fmu.native.export import export as export_native
 from chainunit.fmu.native.platforms import compiler
@@ -101,7 +101,7 @@ def test_every_row_belongs_to_one_instant(fmus):
 def test_python_api_gives_the_recorded_outputs(fmus):
     with CoSimulation(system(fmus), {"motor.w_ref": 150.0}) as simulation:
         run = simulation.run(0.02, 0.001)
-    out = ChainUnit(ratio=RATIO).forces(
+    out = ChainUnitMachine(ratio=RATIO).forces(
         run["motor.phi"].values, run["motor.w"].values, run["motor.a"].values, FEED, FEED
     )
     np.testing.assert_allclose(run["machine.tau"].values, out.tau, rtol=1e-9)
@@ -136,7 +136,7 @@ def test_energy_residual_of_a_power_that_jumps():
 
 def test_energy_residual_with_friction_processing_and_feed(fmus):
     """Mass flows from right to left while the machine runs: the feed's energy closes the balance."""
-    machine = ChainUnit(ratio=RATIO)
+    machine = ChainUnitMachine(ratio=RATIO)
 
     def per_kg(side):
         return lambda run: machine.energy_per_kg(side, run["machine.phi0"].values, run["machine.w0"].values)
@@ -193,7 +193,7 @@ def test_native_fmus_run_as_the_python_ones(fmus, tmp_path):
 
 def test_stable_with_a_light_rotor(fmus):
     """Rotor inertia 1/50 of the machine's largest J, driven directly."""
-    J = float(np.max(ChainUnit().forces(np.linspace(0.0, 6.3, 400), 0.0, 0.0, FEED, FEED).J))
+    J = float(np.max(ChainUnitMachine().forces(np.linspace(0.0, 6.3, 400), 0.0, 0.0, FEED, FEED).J))
     light = {
         "machine.ratio": 1.0,
         "motor.rotor.J": J / 50.0,

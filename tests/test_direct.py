@@ -10,7 +10,7 @@ import pytest
 from machines import random_loads, random_machine, random_state
 from scipy.integrate import solve_ivp
 
-from chainunit import EMPTY, ChainUnit, GeometryError, engines
+from chainunit import EMPTY, ChainUnitMachine, GeometryError, engines
 from chainunit.fmu.native.export import export
 from chainunit.fmu.native.platforms import compiler
 from chainunit.machines.chain_unit import ChamberForces
@@ -52,7 +52,7 @@ def test_it_is_the_inverse_of_the_inverse_model(seed):
 
 
 def test_energy_is_kept_when_nothing_drives_or_brakes():
-    machine = ChainUnit({"pin.friction": 0.0})
+    machine = ChainUnitMachine({"pin.friction": 0.0})
     p, u = parameters(machine, w_start=4.0), MODEL.Inputs(tau=0.0, left=EMPTY, right=EMPTY)
     layout = MODEL.state_layout
     x0 = layout.values(MODEL.initial_states(engines.MATH, p))
@@ -68,8 +68,8 @@ def test_energy_is_kept_when_nothing_drives_or_brakes():
 
 def test_a_machine_without_inertia_at_its_dead_points_is_refused():
     with pytest.raises(GeometryError, match=r"inertia of the crank .* must be > 0 kg\.m2"):
-        MODEL.check(parameters(ChainUnit({"crank.m": 0.0, "crank.I": 0.0})))
-    MODEL.check(parameters(ChainUnit({"crank.m": 0.0, "crank.I": 0.0}), J_added=0.1))
+        MODEL.check(parameters(ChainUnitMachine({"crank.m": 0.0, "crank.I": 0.0})))
+    MODEL.check(parameters(ChainUnitMachine({"crank.m": 0.0, "crank.I": 0.0}), J_added=0.1))
 
 
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
@@ -96,7 +96,7 @@ def test_the_fmu_falls_and_swings_as_the_equations(tmp_path):
     unit.step(0.0, 0.1)
     phi, w, a, power = unit.get(["phi", "w", "a", "power"])
     loads = {f"{side}.material_mass": 30.0 for side in ("left", "right")}
-    need = ChainUnit(ratio=2.0).evaluate({"phi": phi, "w": w, "a": a} | loads)
+    need = ChainUnitMachine(ratio=2.0).evaluate({"phi": phi, "w": w, "a": a} | loads)
     assert float(need["tau"]) == pytest.approx(5.0, rel=1e-9)
     assert power == pytest.approx(5.0 * w, rel=1e-9) and math.isfinite(a)
     unit.close()

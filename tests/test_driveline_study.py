@@ -27,11 +27,11 @@ from chainunit.report import torsion as torsion_report
 from chainunit.report.torsion import PICTURES
 from chainunit.study import config, parts, torsion_findings
 from chainunit.study.choice import choose
+from chainunit.study.record import StudyRecord
 from chainunit.study.rig import Rig
 from chainunit.study.sections import TorsionTable
 from chainunit.study.shaft import UNEVEN, remedies, two_masses
 from chainunit.study.statics import statics
-from chainunit.study.study import Study
 from chainunit.study.torsion import Rotation, analyse
 from chainunit.study.torsion_findings import TorsionAnalysis, as_dict
 from chainunit.system import CoSimulation
@@ -59,7 +59,7 @@ def parse(text):
 def study_of(text):
     given = config.parse(text)
     drive = choose(given, Path(), lambda *_: None).drive
-    return Study(given, drive, statics(given, drive))
+    return StudyRecord(given, drive, statics(given, drive))
 
 
 def findings(text):

@@ -19,7 +19,7 @@ from scipy.integrate import cumulative_simpson, solve_ivp
 from systems import pair
 from test_chain import DATA, M
 
-from chainunit import ChainUnit, GeometryError, InputError, RunError
+from chainunit import ChainUnitMachine, GeometryError, InputError, RunError
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.engines import MATH
 from chainunit.errors import InterruptedRunError
@@ -164,7 +164,7 @@ def test_two_rods_run_as_the_two_bar_machine(files):
     with Run(files(1, 1), start) as run:
         got = run.over(2.0, h, names)
     inputs = {n: v for n, v in start.items() if n in ChamberForces.input_layout.names}
-    exact = ChainUnit().evaluate({"phi": W * h * np.arange(121), "w": W} | inputs)
+    exact = ChainUnitMachine().evaluate({"phi": W * h * np.arange(121), "w": W} | inputs)
     for name, column in zip(names, got.T, strict=True):
         wanted = np.broadcast_to(exact[name], 121)
         assert np.max(np.abs(column - wanted)) < 1e-8 * np.max(np.abs(wanted)), name
@@ -341,7 +341,7 @@ def test_starts_where_it_hangs():
     another method, and the same without weight."""
     rng = np.random.default_rng(32)
     for _ in range(300):
-        machine = ChainUnit(random_machine(rng).p, g=9.81)
+        machine = ChainUnitMachine(random_machine(rng).p, g=9.81)
         number = int(rng.integers(2, 11))
         model = flexible(*hanging.split((machine.p.l1, machine.p.l2), number))
         p = model.check(chains(model, machine.p))
@@ -688,7 +688,7 @@ def sampled(rng):
         values["rod_inertia"] = rng.choice([0.0, 1.0, rng.uniform(0.0, 1.0)])
         shape = (rng.uniform(low, high) for low, high in ((0.03, 0.35), (0.3, 1.4), (0.3, 0.75), (0.3, 0.8)))
         try:
-            p = ChainUnit.from_ratios(*shape, values, l=l, l1=l * rng.uniform(0.5, 1.5)).p
+            p = ChainUnitMachine.from_ratios(*shape, values, l=l, l1=l * rng.uniform(0.5, 1.5)).p
             break
         except InputError:
             continue
@@ -703,10 +703,10 @@ def sampled(rng):
 
 @native
 def test_random_machines_run(files):
-    """100 machines of four rods an organ, drawn from `SAMPLED`, geometry as `ChainUnit` admits it, half of the sides
-    with processing force and half with material, 20 turns in steps of 20 ms: none fails, every output is finite, and
-    the energy of each organ is missing by at most 1e-6 of what went through the shaft. (Six hundred others came to
-    8e-7, where rods at 15 rad/s are thrown far into their stops.)"""
+    """100 machines of four rods an organ, drawn from `SAMPLED`, geometry as `ChainUnitMachine` admits it, half of the
+    sides with processing force and half with material, 20 turns in steps of 20 ms: none fails, every output is
+    finite, and the energy of each organ is missing by at most 1e-6 of what went through the shaft. (Six hundred
+    others came to 8e-7, where rods at 15 rad/s are thrown far into their stops.)"""
     rng, fmu, slack = np.random.default_rng(4), files(3, 1), 0
     names = ["power", "left.energy_residual", "right.energy_residual", "left.slack_share"]
     for _ in range(100):
@@ -965,7 +965,7 @@ def test_two_rods_stand_where_a_hanging_chain_would_not():
         "r": 0.1635, "l": 0.56, "h": 0.204, "e": 0.1884, "l1": 0.5069, "l2": 0.3186, "z": 0.3699, "c": 0.5451,
         "hy": 0.2065,
     }  # fmt: skip
-    machine = ChainUnit(lengths)
+    machine = ChainUnitMachine(lengths)
     with pytest.raises(GeometryError, match="would lie across"):
         machine.hanging("right", float(machine.rocker_extremes()[0][0]), number=2)
     model, free = flexible(1, 1), {"organ.eta": 0.0, "organ.end_damping": 0.0, "pin.friction": 0.0}

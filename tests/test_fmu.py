@@ -18,7 +18,7 @@ import pytest
 from fmpy.validation import validate_fmu
 from test_reference import POINTS, deviation
 
-from chainunit import ChainUnit, GeometryError, InputError, RunError
+from chainunit import ChainUnitMachine, GeometryError, InputError, RunError
 from chainunit.fmu.description import Interface
 from chainunit.fmu.export import export
 from chainunit.machines.chain_unit import ChamberForces
@@ -122,7 +122,7 @@ def test_dependencies_are_true(fmus):
     interface = Interface(ChamberForces, {})
     names = [s.name for s in interface.of("input")]
     offset = len(interface.parameters)
-    machine = ChainUnit({"joint_damping": 1.0, "ratio": 3.0, "web_share": 0.4})
+    machine = ChainUnitMachine({"joint_damping": 1.0, "ratio": 3.0, "web_share": 0.4})
     declared = {
         s.name: {names[i - offset] for i in known if i - offset < len(names)}
         for s, (known, _) in zip(interface.of("output"), interface.dependencies, strict=True)
@@ -572,7 +572,7 @@ def test_reset(chamber):
         unit.initialize({"r": 0.14}, 0.0)
         unit.finish_initialization()
         loads = {f"{side}.material_mass": 30.0 for side in ("left", "right")}
-        want = ChainUnit(r=0.14).evaluate(loads)["tau"]
+        want = ChainUnitMachine(r=0.14).evaluate(loads)["tau"]
         assert unit.get(["r", "tau"]) == pytest.approx([0.14, float(want)], rel=1e-12)
 
 

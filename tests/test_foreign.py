@@ -108,14 +108,14 @@ def test_titles_are_harmless_wherever_they_go():
     from chainunit.drives.dc_motor import DcMotor
     from chainunit.report.markdown import markdown_text
     from chainunit.study.drive import Drive
+    from chainunit.study.record import StudyRecord
     from chainunit.study.statics import statics
-    from chainunit.study.study import Study
 
     given = config.parse(f"title = {toml_text(EVIL)}")
     assert harmless(given.title) and "\n" not in given.title
     assert not re.search(r"(?<!\\)[<>\[\]|`*_]", markdown_text(given.title))
     drive = Drive(DcMotor, given.motor, given.machine)
-    assert harmless(said_of(Study(given, drive, statics(given, drive))))
+    assert harmless(said_of(StudyRecord(given, drive, statics(given, drive))))
     assert "\\<script\\>" in markdown_text(EVIL)
 
 

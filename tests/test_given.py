@@ -17,10 +17,10 @@ from chainunit.study.choice import choose
 from chainunit.study.config import load, parse
 from chainunit.study.given import given
 from chainunit.study.parts import example
+from chainunit.study.record import StudyRecord
 from chainunit.study.remarks import conclude
 from chainunit.study.result import as_dict
 from chainunit.study.statics import statics
-from chainunit.study.study import Study
 
 KNIFE = example("knife")
 
@@ -28,7 +28,7 @@ KNIFE = example("knife")
 def study_of(config, folder):
     """The study before anything of it is run."""
     chosen = choose(config, folder, lambda *_: None)
-    study = Study(config, chosen.drive, statics(config, chosen.drive), chosen.tuning, chosen.sizing)
+    study = StudyRecord(config, chosen.drive, statics(config, chosen.drive), chosen.tuning, chosen.sizing)
     conclude(study)
     return study
 

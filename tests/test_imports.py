@@ -24,7 +24,7 @@ DEPENDENCIES = {
     [
         ("import chainunit", set()),
         ("from chainunit.cli import app; app(['--help'], standalone_mode=False)", {"typer", "rich"}),
-        ("import chainunit; chainunit.ChainUnit", {"numpy", "scipy"}),
+        ("import chainunit; chainunit.ChainUnitMachine", {"numpy", "scipy"}),
     ],
 )
 def test_imports_no_more_than_is_needed(code, needed):
@@ -36,7 +36,7 @@ def test_imports_no_more_than_is_needed(code, needed):
 
 
 def test_public_names():
-    assert {"ChainUnit", "ChamberForces", "SideLoads", "InputError"} <= set(chainunit.__all__)
+    assert {"ChainUnitMachine", "ChamberForces", "SideLoads", "InputError"} <= set(chainunit.__all__)
     for name in chainunit.__all__:
         assert getattr(chainunit, name) is getattr(chainunit, name) and name in dir(chainunit)
     assert chainunit.__version__ == metadata.version("chainunit")

@@ -29,11 +29,11 @@ from chainunit.study.drive import Drive
 from chainunit.study.flywheels import FlywheelAnswers, FlywheelFindings, Wheel, least_flywheel
 from chainunit.study.measures import read_answers
 from chainunit.study.parts import example
+from chainunit.study.record import StudyRecord
 from chainunit.study.rig import Rig
 from chainunit.study.run import run_study
 from chainunit.study.statics import statics
 from chainunit.study.stored import cutting_power
-from chainunit.study.study import Study
 from chainunit.study.turn import TurnAnalysis
 from chainunit.study.window import Phase, Window
 from chainunit.system import CoSimulation, energy_residual, monolithic
@@ -54,7 +54,7 @@ def bare(text=""):
     """A study before its runs, with what needs none."""
     config = parse(HEAD + text)
     drive = choose(config, Path(), lambda *_: None).drive
-    study = Study(config, drive, statics(config, drive))
+    study = StudyRecord(config, drive, statics(config, drive))
     rig = Rig(config, drive, {})
     for analysis in (TurnAnalysis, BladeAnalysis):
         study.findings[analysis.name] = analysis.find(study, rig, lambda *_: None)
@@ -474,5 +474,5 @@ def test_the_blade_follows_from_the_declaration_and_not_from_the_machine(monkeyp
         chosen = parse(f'[system]\nmachine = "{machine.name}"')
         drive = Drive(chosen.motor_type, chosen.motor, chosen.machine)
         assert BladeAnalysis.applies(chosen, drive) == machine.cuts
-        drawn = motion(Study(chosen, drive, statics(chosen, drive)))
+        drawn = motion(StudyRecord(chosen, drive, statics(chosen, drive)))
         assert ("edge" in [link.name for link in drawn.links]) == machine.cuts

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from test_linkage import SixBar
 
-from chainunit import ChainUnit, InputError
+from chainunit import ChainUnitMachine, InputError
 from chainunit.engines import MATH
 from chainunit.machines import api, machine
 from chainunit.machines.api import machine_of
@@ -109,7 +109,7 @@ def test_the_examples_of_docstrings(module):
 
 def test_what_a_chain_unit_has_beside_others():
     machine, other = machine_of(MACHINES["ChamberForces"]), machine_of(MACHINES["KnifeDrive"])
-    assert isinstance(machine, ChainUnit) and type(other) is Machine
+    assert isinstance(machine, ChainUnitMachine) and type(other) is Machine
     assert other.loaded_sides(None) == () and other.stored_per_unit == {}
     feed = machine.model.Feed()
     assert machine.loaded_sides(feed) == ("left", "right")
@@ -129,6 +129,6 @@ def test_a_machine_derived_from_the_chain_unit_is_one(monkeypatch):
         name = "OtherUnit"
 
     machine = parse('[system]\nmachine = "OtherUnit"\n[machine]\nratio = 20').machine
-    assert isinstance(machine, ChainUnit) and machine.model is OtherUnit and machine.ratio == 20.0
+    assert isinstance(machine, ChainUnitMachine) and machine.model is OtherUnit and machine.ratio == 20.0
     assert machine.loaded_sides(OtherUnit.Feed()) == OtherUnit.sides == ("left", "right")
-    assert machine.slack_speed() == ChainUnit(ratio=20.0).slack_speed()
+    assert machine.slack_speed() == ChainUnitMachine(ratio=20.0).slack_speed()

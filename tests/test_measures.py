@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from chainunit import ChainUnit
+from chainunit import ChainUnitMachine
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.quantities import Layout
 from chainunit.study.drive import Drive
@@ -45,7 +45,7 @@ def window(phase=Phase.STEADY, *, begin=0.0, steady=None, trip=None, **changed):
         **changed,
     }
     run = xr.Dataset({name: ("time", x) for name, x in series.items()}, {"time": TIME})
-    drive = Drive(DcMotor, DcMotor.Parameters(), ChainUnit(ratio=RATIO))
+    drive = Drive(DcMotor, DcMotor.Parameters(), ChainUnitMachine(ratio=RATIO))
     return Window(phase, run, drive, ("left", "right"), SPEED, begin, steady, trip)
 
 

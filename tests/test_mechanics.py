@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from machines import random_loads, random_machine, random_state
 
-from chainunit import EMPTY, ChainUnit, GeometryError, InputError, SideLoads, engines
+from chainunit import EMPTY, ChainUnitMachine, GeometryError, InputError, SideLoads, engines
 from chainunit.machines.api import FREE
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.machines.crank_rocker import half_width_range
@@ -193,14 +193,14 @@ def test_conservative_forces_do_no_work_over_a_turn():
 
 def test_mirrored_machine():
     """A rocker that hangs still loads both sides alike."""
-    chamber = ChainUnit().chamber(0.0)
+    chamber = ChainUnitMachine().chamber(0.0)
     assert float(chamber.left.tangential_load) == pytest.approx(float(chamber.right.tangential_load))
     assert float(chamber.left.support.fx) == pytest.approx(-float(chamber.right.support.fx))
     assert float(chamber.rocker.tau) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_massless_side_carries_nothing():
-    machine = ChainUnit({"right.wall_mass": 0.0, "right.web_mass": 0.0})
+    machine = ChainUnitMachine({"right.wall_mass": 0.0, "right.web_mass": 0.0})
     out = machine.forces(np.linspace(0, 6, 50), 3.0, 1.0)
     for force in (out.right.support, out.right.hinge, out.right.rocker_joint):
         assert np.all(force.fx == 0.0) and np.all(force.fy == 0.0)
@@ -208,17 +208,19 @@ def test_a_massless_side_carries_nothing():
 
 
 def test_nothing_is_infinite_at_rest():
-    out = ChainUnit().evaluate({"phi": 0.3, "left.processing_force": 100.0})
+    out = ChainUnitMachine().evaluate({"phi": 0.3, "left.processing_force": 100.0})
     assert all(np.isfinite(v) for v in out.values())
     assert out["dissipated_power"] == 0.0
 
 
 def test_outputs_have_the_common_shape():
     phi, w = np.linspace(0.0, 6.0, 4)[:, None], np.array([1.0, 2.0, 3.0])
-    out = ChainUnit().forces(phi, w, left=SideLoads(material_mass=[1.0, 2.0, 3.0], processing_force=0.0))
+    out = ChainUnitMachine().forces(
+        phi, w, left=SideLoads(material_mass=[1.0, 2.0, 3.0], processing_force=0.0)
+    )
     part = ChamberForces.parts[0]
     assert {np.shape(v) for v in part.layout.values(out)} == {(4, 3)}
-    assert {np.shape(v) for v in ChainUnit().evaluate({"phi": phi, "w": w}).values()} == {(4, 3)}
+    assert {np.shape(v) for v in ChainUnitMachine().evaluate({"phi": phi, "w": w}).values()} == {(4, 3)}
 
 
 def test_half_widths_that_close_are_those_of_brute_force():
@@ -245,7 +247,7 @@ def test_half_widths_that_close_are_those_of_brute_force():
 
 @pytest.mark.parametrize(("l1", "l2", "z"), [(1.0, 0.9, 0.1), (1.35, 0.545, 0.02)])
 def test_a_machine_that_is_narrower_than_its_swing_turns(l1, l2, z):
-    machine = ChainUnit(l1=l1, l2=l2, z=z)
+    machine = ChainUnitMachine(l1=l1, l2=l2, z=z)
     (psi, _), _ = machine.rocker_extremes()
     assert z < machine.p.e * np.sin(psi)
     phi = np.linspace(0.0, 2.0 * np.pi, 721)
@@ -256,15 +258,15 @@ def test_a_machine_that_is_narrower_than_its_swing_turns(l1, l2, z):
 
 def test_a_gap_of_half_widths_is_refused_with_its_limits():
     with pytest.raises(GeometryError, match=r"z = 0\.1 m: .* must be > 0 and < (\S+) m") as refused:
-        ChainUnit(l1=1.35, l2=0.545, z=0.1)
+        ChainUnitMachine(l1=1.35, l2=0.545, z=0.1)
     limit = float(re.search(r"< (\S+) m$", str(refused.value))[1])
-    assert ChainUnit(l1=1.35, l2=0.545, z=limit - 1e-5).p.z > 0.0
+    assert ChainUnitMachine(l1=1.35, l2=0.545, z=limit - 1e-5).p.z > 0.0
     with pytest.raises(GeometryError, match=r"z = 0\.2 m: .* must be > (\S+) and < (\S+) m"):
-        ChainUnit(l1=1.35, l2=0.545, z=0.2)
+        ChainUnitMachine(l1=1.35, l2=0.545, z=0.2)
 
 
 def test_a_side_that_is_not_there_cannot_go_slack():
-    one_sided = ChainUnit({"right.wall_mass": 0.0, "right.web_mass": 0.0})
+    one_sided = ChainUnitMachine({"right.wall_mass": 0.0, "right.web_mass": 0.0})
     assert 1.0 < one_sided.slack_speed() < 10.0
     bare = one_sided.replace({"left.wall_mass": 0.0, "left.web_mass": 0.0})
     assert bare.slack_speed() == np.inf
@@ -272,7 +274,7 @@ def test_a_side_that_is_not_there_cannot_go_slack():
 
 def test_frozen_declarations():
     with pytest.raises(dataclasses.FrozenInstanceError):
-        ChainUnit().p.r = 1.0
+        ChainUnitMachine().p.r = 1.0
 
 
 BAD = [
@@ -285,7 +287,7 @@ BAD = [
 
 @pytest.mark.parametrize(("name", "value", "told"), BAD)
 def test_loads_out_of_bounds_are_refused_by_name(name, value, told):
-    machine = ChainUnit()
+    machine = ChainUnitMachine()
     loads = dataclasses.replace(EMPTY, **{name: value})
     for call in (
         lambda: machine.forces(0.5, 3.0, left=loads),
@@ -306,7 +308,7 @@ def test_loads_out_of_bounds_are_refused_by_name(name, value, told):
     "bad", [math.nan, math.inf, np.array([0.0, math.nan]), np.array([[1.0], [-math.inf]])]
 )
 def test_motion_that_is_not_finite_is_refused_by_name(bad):
-    machine = ChainUnit()
+    machine = ChainUnitMachine()
     for name in ("phi", "w", "a"):
         state = {"phi": 0.5, "w": 3.0, "a": 0.0, name: bad}
         with pytest.raises(InputError, match=rf"^{name} = (nan|inf|-inf) .*must be a finite number"):
@@ -319,7 +321,7 @@ def test_motion_that_is_not_finite_is_refused_by_name(bad):
 
 
 def test_what_is_beyond_a_bound_by_rounding_counts_as_the_bound():
-    machine = ChainUnit()
+    machine = ChainUnitMachine()
     off = SideLoads(material_mass=-1e-12, processing_force=np.array([-1e-9, 0.0]))
     none = machine.forces(0.5, 3.0, left=EMPTY)
     assert np.array_equal(machine.forces(0.5, 3.0, left=off).tau, np.full(2, none.tau))
@@ -327,7 +329,7 @@ def test_what_is_beyond_a_bound_by_rounding_counts_as_the_bound():
 
 def test_a_rocker_angle_at_which_no_organ_can_be_assembled():
     """Refused alone, NaN in an array; nearer than the limit on either side both are there."""
-    machine = ChainUnit()
+    machine = ChainUnitMachine()
     with pytest.raises(GeometryError, match=r"psi = 2 rad: the right organ cannot be assembled, A1-A2 = "):
         machine.chamber(2.0)
     psi = np.linspace(-2.5, 2.5, 101)

@@ -28,7 +28,7 @@ from scipy.integrate import solve_ivp
 from test_fmu import Running
 from test_reference import POINTS, deviation
 
-from chainunit import ChainUnit, GeometryError, InputError, RunError, integrate, refusals
+from chainunit import ChainUnitMachine, GeometryError, InputError, RunError, integrate, refusals
 from chainunit.engines import MATH
 from chainunit.fmu.description import Interface
 from chainunit.fmu.export import export as export_python
@@ -60,7 +60,7 @@ def host_arguments(folder, library):
 def host_torque():
     """The torque that host.c prints, by the Python kernels, at the FMU's start values."""
     loads = {f"{side}.material_mass": 30.0 for side in ("left", "right")}
-    return ChainUnit().evaluate({"phi": 0.5 * np.arange(10), "w": 6.0} | loads)["tau"]
+    return ChainUnitMachine().evaluate({"phi": 0.5 * np.arange(10), "w": 6.0} | loads)["tau"]
 
 
 @pytest.fixture
@@ -376,13 +376,13 @@ def test_states_are_saved_and_serialised(native):
 
 def test_a_geometry_that_cannot_turn_fails_the_initialisation_in_the_same_words(native):
     with pytest.raises(GeometryError) as refused:
-        ChainUnit(r=0.9)
+        ChainUnitMachine(r=0.9)
     with pytest.raises(RunError) as failed:
         with running(native, "ChamberForces", {"r": 0.9}):
             pass
     assert str(refused.value) in str(failed.value)
     with pytest.raises(GeometryError) as refused:
-        ChainUnit(z=0.1)
+        ChainUnitMachine(z=0.1)
     with pytest.raises(RunError) as failed:
         with running(native, "ChamberForces", {"z": 0.1}):
             pass
@@ -416,7 +416,7 @@ def test_python_and_native_code_refuse_in_the_same_words(native, fmus):
         assert of_native in of_python
     parameters = {"r": 1.0}
     with pytest.raises(GeometryError) as refused:
-        ChainUnit(parameters)
+        ChainUnitMachine(parameters)
     with pytest.raises(RunError) as failed, running(native, "ChamberForces", parameters):
         pass
     assert str(refused.value) in str(failed.value)

@@ -167,13 +167,13 @@ def test_what_is_refused_for_a_slip_says_so(text, told):
 
 def test_the_remark_stands_on_terminal_page_and_in_json():
     from chainunit.study.drive import Drive
+    from chainunit.study.record import StudyRecord
     from chainunit.study.result import as_dict
     from chainunit.study.statics import statics
-    from chainunit.study.study import Study
 
     given = config.parse("[machine]\npin = { diameter = 60 }")
     drive = Drive(DcMotor, given.motor, given.machine)
-    study = Study(given, drive, statics(given, drive))
+    study = StudyRecord(given, drive, statics(given, drive))
     result = as_dict(study)
     said = str(given.slips[0])
     assert result["slips"] == [

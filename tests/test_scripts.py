@@ -158,7 +158,7 @@ def test_a_script_with_a_class_and_imports_of_its_own(tmp_path):
 @pytest.mark.parametrize(
     "line",
     [
-        "from chainunit import ChainUnit",
+        "from chainunit import ChainUnitMachine",
         "import chainunit.drives.cardan",
         "from chainunit.machines.chain_unit import ChamberForces; import chainunit",
     ],

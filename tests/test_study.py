@@ -16,7 +16,7 @@ from event_tables import STANDARD, event_line
 from fmpy.validation import validate_fmu
 from reports import write
 
-from chainunit import EMPTY, ChainUnit, SideLoads
+from chainunit import EMPTY, ChainUnitMachine, SideLoads
 from chainunit.machines.chain_unit import Feed
 from chainunit.report import study as study_report
 from chainunit.study.cycle import cycle
@@ -387,7 +387,7 @@ def test_export_with_a_config_has_the_motor_of_the_study(tmp_path):
 def test_overload_factors_are_the_erratas():
     """Errata, paper 000, item 14b: left alone to both, cycle maxima; uniform rods, no drive masses."""
     bare = {f"{body}.{x}": 0.0 for body in ("crank", "coupler", "rocker") for x in ("m", "I")}
-    machine = ChainUnit.from_ratios(0.1, 2 / 3, 0.6, 0.5, bare | {"pin.friction": 0.0})
+    machine = ChainUnitMachine.from_ratios(0.1, 2 / 3, 0.6, 0.5, bare | {"pin.friction": 0.0})
     rocker, crank = {}, {}
     for speed in (1e-6, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 20.0, 50.0):
         factors = overload_factors(machine, speed, NONE)
@@ -401,7 +401,7 @@ def test_overload_factors_are_the_erratas():
 
 
 def test_cycle_and_the_side_that_is_gone():
-    machine = ChainUnit(ratio=7.0)
+    machine = ChainUnitMachine(ratio=7.0)
     loads = SideLoads(material_mass=10.0, processing_force=0.0)
     c = cycle(machine, 3.0, Feed(left=loads, right=EMPTY))
     out = machine.forces(7.0 * c.angle[100], 21.0, 0.0, loads, EMPTY)
@@ -430,7 +430,7 @@ def peaks(machine, speed, left, right, points):
 
 def test_each_side_alone_has_its_overload_factors():
     """Against the machine without the masses and the load of the other side."""
-    machine = ChainUnit(ratio=7.0)
+    machine = ChainUnitMachine(ratio=7.0)
     both = peaks(machine, 4.0, *FED, 720)
     found = {side: overload_factors(machine, 4.0, FEED, side) for side in ("left", "right")}
     for side, gone, loads in (("left", "right", (FED[0], EMPTY)), ("right", "left", (EMPTY, FED[1]))):
@@ -444,7 +444,7 @@ def test_each_side_alone_has_its_overload_factors():
 
 def test_what_sizes_the_drive_is_the_feed_on_one_side_with_both_organs():
     """Against a second route to the crank torque, by the reactions and the pins' friction."""
-    machine, speed = ChainUnit(), 4.0
+    machine, speed = ChainUnitMachine(), 4.0
     loads = {
         "both": FED,
         "left": (SideLoads(material_mass=50.0, processing_force=400.0), EMPTY),
@@ -470,7 +470,7 @@ def test_what_sizes_the_drive_is_the_feed_on_one_side_with_both_organs():
 
 def test_the_static_factor_of_the_right_organ_belongs_to_the_left_extreme():
     """The organs mirror each other: the right one at -psi is the left one at psi, with the loads exchanged."""
-    machine = ChainUnit()
+    machine = ChainUnitMachine()
     (right, _), (left, _) = machine.rocker_extremes()
     assert abs(left) < 0.95 * right
     for extreme, side, loads in ((right, "left", FED), (-left, "right", FED[::-1])):
@@ -484,7 +484,7 @@ def test_the_static_factor_of_the_right_organ_belongs_to_the_left_extreme():
 
 
 def test_each_side_alone_over_the_speed():
-    machine = ChainUnit()
+    machine = ChainUnitMachine()
     sides = sides_over_speed(machine, FEED, highest=12.0, points=12)
     both, crossed = [peaks(machine, w, *FED, 360) for w in sides.speed], 0
     for side, gone, loads in (("left", "right", (FED[0], EMPTY)), ("right", "left", (EMPTY, FED[1]))):
@@ -570,7 +570,7 @@ def test_whole_turns_of_whole_turns_are_the_same():
     from chainunit.drives.dc_motor import DcMotor
     from chainunit.study.drive import Drive
 
-    drive = Drive(DcMotor, DcMotor.Parameters(), ChainUnit(ratio=100.0))
+    drive = Drive(DcMotor, DcMotor.Parameters(), ChainUnitMachine(ratio=100.0))
     for start in np.linspace(0.0, 700.0, 200):
         time = np.linspace(0.0, 5.0, 1235)
         angle = start + 1.6 * time + 0.01 * np.sin(time)

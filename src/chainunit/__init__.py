@@ -1,6 +1,6 @@
 """Forces in a chain unit, as Python and as FMUs.
 
-``ChainUnit`` is the machine for scripts and sweeps; ``ChamberForces`` and ``DcMotor`` are the models
+``ChainUnitMachine`` is the machine for scripts and sweeps; ``ChamberForces`` and ``DcMotor`` are the models
 that become FMUs; the command ``chainunit study`` runs the main job.
 """
 
@@ -11,7 +11,7 @@ from .errors import GeometryError, InputError, RunError
 
 __all__ = [
     "EMPTY",
-    "ChainUnit",
+    "ChainUnitMachine",
     "ChamberForces",
     "GeometryError",
     "InputError",
@@ -21,7 +21,7 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
-    from .machines.api import EMPTY, ChainUnit
+    from .machines.api import EMPTY, ChainUnitMachine
     from .machines.chain_unit import ChamberForces, SideLoads
 
     __version__: str
@@ -29,7 +29,7 @@ else:
     # numpy and scipy take longer to import than the command line to answer: not before they are needed
     _HOMES = {
         "EMPTY": ".machines.api",
-        "ChainUnit": ".machines.api",
+        "ChainUnitMachine": ".machines.api",
         "ChamberForces": ".machines.chain_unit",
         "SideLoads": ".machines.chain_unit",
     }

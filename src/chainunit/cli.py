@@ -157,8 +157,8 @@ def study(
     with claimed(output):
         from .report import files, series
         from .report import study as contents
+        from .study.record import LOAD_CYCLE
         from .study.run import run_study
-        from .study.study import LOAD_CYCLE
 
         _clear(output, *files.names("result", contents.PICTURES), series.SERIES, LOAD_CYCLE)
         errors = _console(stderr=True)

@@ -1,4 +1,4 @@
-"""`ChainUnit`: the machine for Python - arrays in, arrays out."""
+"""`ChainUnitMachine`: the machine for Python - arrays in, arrays out."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ _ROCKER = {
 }
 
 
-class ChainUnit(Machine):
+class ChainUnitMachine(Machine):
     """A chain unit with its parameters checked; arguments, arrays and errors as of `Machine`.
 
     Examples
     --------
-    >>> machine = ChainUnit.from_ratios(rho=0.1, lam=2 / 3, mu=0.6, zeta=0.5)
+    >>> machine = ChainUnitMachine.from_ratios(rho=0.1, lam=2 / 3, mu=0.6, zeta=0.5)
     >>> round(float(machine.forces(phi=0.5, w=3.0).tau), 2)
     -10.53
     """
@@ -287,7 +287,7 @@ class ChainUnit(Machine):
 
 
 def ratios(rho: float, lam: float, mu: float, zeta: float, l: float, l1: float) -> dict[str, float]:
-    """Lengths [m] from the papers' ratios, by parameter name; see `ChainUnit.from_ratios`."""
+    """Lengths [m] from the papers' ratios, by parameter name; see `ChainUnitMachine.from_ratios`."""
     r, h, e = rho * l, lam * l, mu * l1
     if not abs(rho) < 1.0 or not mu < 1.0:
         raise GeometryError(
@@ -329,7 +329,7 @@ class ChainedUnit(Machine):
 def machine_of(model: type[InverseMachine], parameters: Any = None, /, **values: float) -> Machine:
     """The machine of a model with what its kind has beside others; arguments and errors as of `Machine`."""
     if issubclass(model, ChamberForces):
-        return ChainUnit(parameters, model=model, **values)
+        return ChainUnitMachine(parameters, model=model, **values)
     if issubclass(model, ChainedModel):
         return ChainedUnit(model, parameters, **values)
     return Machine(model, parameters, **values)

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..engines import MATH
-from ..machines.api import EMPTY, ChainUnit
+from ..machines.api import EMPTY, ChainUnitMachine
 from ..machines.chain_unit import Feed
 from ..machines.crank_rocker import half_width_range
 from ..study.organs import overload_factors
@@ -30,15 +30,15 @@ _BARE = {f"{body}.{x}": 0.0 for body in ("crank", "coupler", "rocker") for x in 
 
 
 @cache
-def machine(rod_inertia: float = 0.0, zeta: float = ZETA, mu: float = MU) -> ChainUnit:
+def machine(rod_inertia: float = 0.0, zeta: float = ZETA, mu: float = MU) -> ChainUnitMachine:
     """The papers' machine: organs alone, uniform mass per length, no losses; point masses unless asked."""
     organ = {"wall_mass": 10.0, "web_mass": (1.0 - mu) * 10.0}
     masses = {f"{side}.{rod}": mass for side in ("left", "right") for rod, mass in organ.items()}
     others = {"rod_inertia": rod_inertia, "pin.friction": 0.0, "g": G}
-    return ChainUnit.from_ratios(RHO, LAM, mu, zeta, _BARE | masses | others, l1=L1)
+    return ChainUnitMachine.from_ratios(RHO, LAM, mu, zeta, _BARE | masses | others, l1=L1)
 
 
-def weight(unit: ChainUnit) -> float:
+def weight(unit: ChainUnitMachine) -> float:
     """Weight of an organ, (2 - mu) G1 [N]."""
     return float((unit.p.left.wall_mass + unit.p.left.web_mass) * unit.p.g)
 
@@ -54,7 +54,7 @@ class Components:
     R_t: Any
 
 
-def of_side(side: Any, hand: float, unit: ChainUnit) -> Components:
+def of_side(side: Any, hand: float, unit: ChainUnitMachine) -> Components:
     """The papers' components from a side of the model; `hand` is +1 on the left, -1 on the right."""
     w = weight(unit)
     return Components(

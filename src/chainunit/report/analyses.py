@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
-from ..study.study import Study
+from ..study.record import StudyRecord
 from . import blade, flywheels, organs, torsion, turn
 from .blocks import Block, Source
 
@@ -15,7 +15,7 @@ class Contents:
     """A section: its heading, its blocks (tables, words, figures), and the files of its figures."""
 
     heading: str
-    blocks: Callable[[Source, Study], Iterator[Block]]
+    blocks: Callable[[Source, StudyRecord], Iterator[Block]]
     pictures: tuple[str, ...] = ()
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..study.measures import MEASURES
-from ..study.study import Study
+from ..study.record import StudyRecord
 from . import blocks as b
 from . import run_names as read
 from .lines import Line, Strong, joined, line
@@ -14,7 +14,7 @@ from .runs import number
 _HOLDS: dict[str, b.Severity] = {"true": "good", "in part": "partly", "false": "bad"}
 
 
-def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
+def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """Verdicts, cards and warnings."""
     for of in ("model", "motor"):
         verdict = s.result["verdict"][of]
@@ -43,7 +43,7 @@ def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
         yield b.Text("No run gives cause for a warning.", "fine", "long")
 
 
-def _speed(s: b.Source, study: Study, run: str) -> Line:
+def _speed(s: b.Source, study: StudyRecord, run: str) -> Line:
     """The crank speed that a run has: the one asked for, or the one reached and marked where it is another."""
     if run != "steady" or study.reaches:
         return s.line("{=run.crank_speed}")
@@ -51,7 +51,7 @@ def _speed(s: b.Source, study: Study, run: str) -> Line:
     return line(reached, s.line(", not the {=run.crank_speed} asked for"))
 
 
-def _cards(s: b.Source, study: Study, run: str) -> Iterator[b.Card]:
+def _cards(s: b.Source, study: StudyRecord, run: str) -> Iterator[b.Card]:
     """Families of answers, large: of each the first two numbers in the run `run`, and the worst overload."""
     families: dict[str, list[str]] = {}
     for name in s.result["answers"][run]:
@@ -64,7 +64,7 @@ def _cards(s: b.Source, study: Study, run: str) -> Iterator[b.Card]:
             yield b.Card(of, cards, (*lines, *_worst(s, study, names[0])))
 
 
-def _worst(s: b.Source, study: Study, name: str) -> Iterator[Line]:
+def _worst(s: b.Source, study: StudyRecord, name: str) -> Iterator[Line]:
     """An answer in the overload that asks most."""
     sizes = {run: s.value(f"answers.{run}.{name}") for run in study.overloads}
     magnitudes = {run: abs(size) for run, size in sizes.items() if size is not None}

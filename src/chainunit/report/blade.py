@@ -11,7 +11,7 @@ import numpy as np
 from ..machines.machine import Machine
 from ..study.arrays import stretches
 from ..study.blade import BladeFindings, Cutting
-from ..study.study import Study
+from ..study.record import StudyRecord
 from ..text import number
 from . import blocks as b
 from . import figure as fig
@@ -24,7 +24,7 @@ PICTURE = "blade_path.png"
 _EDGE = DrawnLink("edge", ENDS, "heavy")
 
 
-def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
+def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """Table and figure."""
     yield b.Table(s.rows(Cutting, "blade", digits=4), title="The blade over a turn at constant speed")
     yield _figure(study, study.findings["blade"])
@@ -47,7 +47,7 @@ def _spans(found: BladeFindings) -> list[fig.Shade]:
     return [fig.Shade(float(angle[a]), float(angle[b]), "in the stack") for a, b in stretches(inside)]
 
 
-def _figure(study: Study, found: BladeFindings) -> fig.Figure:
+def _figure(study: StudyRecord, found: BladeFindings) -> fig.Figure:
     angle = found.turn.angle
     fall = (float(angle[np.argmin(found.blade.y)]) - found.top) % (2.0 * math.pi)
     metre, small = ((fig.Axis("x", "m", kind), fig.Axis("y", "m", kind)) for kind in ("", "millimetres"))

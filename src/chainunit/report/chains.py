@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..study.chain import HIGH
-from ..study.study import Study
+from ..study.record import StudyRecord
 from . import blocks as b
 from . import figure as fig
 from .lines import Line, joined, line
@@ -30,7 +30,7 @@ _OWN = (
 )
 
 
-def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
+def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """Words, tables and figure."""
     if study.chain is None:
         return
@@ -124,7 +124,7 @@ def _sweep(s: b.Source, chain: Mapping[str, Any]) -> b.Table:
     )
 
 
-def _critical(s: b.Source, chain: Mapping[str, Any], study: Study) -> Iterator[b.Block]:
+def _critical(s: b.Source, chain: Mapping[str, Any], study: StudyRecord) -> Iterator[b.Block]:
     """Critical crank speeds: all in a table, those within the sweep in a sentence."""
     path = "chain.critical_speeds"
     places: dict[float, dict[float, int]] = {}
@@ -152,7 +152,7 @@ def _critical(s: b.Source, chain: Mapping[str, Any], study: Study) -> Iterator[b
 
 
 @PICTURES.declare(lambda study: study.chain is not None and len(study.chain.sweep) > 1, "chain_sweep.png")
-def _over_speed(s: b.Source, study: Study) -> fig.Figure:
+def _over_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
     """Torques of chains and two bars, and the time slack."""
     result = study.chain
     assert result is not None

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..mechanism.machine import MachineState
 from ..planar import Link
-from ..study.study import Study
+from ..study.record import StudyRecord
 from .supplement import Details, Supplement
 
 ENDS = ("first end of the edge", "last end of the edge")
@@ -23,7 +23,7 @@ def edge(p: Any, links: Mapping[str, Link]) -> dict[str, tuple[Any, Any]]:
 class EdgeMotion(Supplement):
     """The picture of a knife drive has its edge."""
 
-    def __init__(self, study: Study) -> None:
+    def __init__(self, study: StudyRecord) -> None:
         super().__init__(study, links={"edge": ENDS}, names=dict.fromkeys(ENDS, ""))
 
     def details(self, part: Any, state: MachineState) -> Details:

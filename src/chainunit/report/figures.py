@@ -12,7 +12,7 @@ import numpy as np
 from ..engines import numpy_
 from ..study.cycle import Cycle
 from ..study.drive import Drive
-from ..study.study import Study
+from ..study.record import StudyRecord
 from ..text import forms
 from . import blocks as b
 from . import figure as fig
@@ -29,7 +29,7 @@ _CURRENT = fig.Axis("motor current", "A")
 
 
 @PICTURES.declare(lambda study: read.driven(study) and study.drive.foreign is None, "torque_speed.png")
-def _torque_speed(s: b.Source, study: Study) -> fig.Figure:
+def _torque_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
     """The start, and beside it the overloads of each side, at a scale of their own."""
     names, panels = read.driven(study), []
     for group in [[name for name in names if not read.is_event(study, name)], *read.groups(study, names)]:
@@ -67,7 +67,7 @@ def _torque_speed(s: b.Source, study: Study) -> fig.Figure:
     )
 
 
-def _group_title(study: Study, runs: list[str]) -> str:
+def _group_title(study: StudyRecord, runs: list[str]) -> str:
     """What the runs of a panel have in common."""
     sides = [study.config.events[run].loaded_side for run in runs if read.is_event(study, run)]
     if not sides:
@@ -76,7 +76,7 @@ def _group_title(study: Study, runs: list[str]) -> str:
 
 
 @PICTURES.declare(lambda study: study.statics.cycles, "torque_angle.png")
-def _turn(s: b.Source, study: Study) -> fig.Figure:
+def _turn(s: b.Source, study: StudyRecord) -> fig.Figure:
     torques: dict[str, Callable[[Cycle], Any]] = {"crank": lambda c: c.crank_torque}
     organs = "organs" in study.findings
     if organs:
@@ -99,7 +99,7 @@ def _turn(s: b.Source, study: Study) -> fig.Figure:
 
 
 @PICTURES.declare(lambda study: study.statics.loops, "speed_loop.png")
-def _speed_loop(s: b.Source, study: Study) -> fig.Figure:
+def _speed_loop(s: b.Source, study: StudyRecord) -> fig.Figure:
     loops = list(enumerate(study.statics.loops.items()))
     frequency = fig.Axis("frequency", "rad/s", log=True)
     longest = 1.5 * max(loop.settling for loop in study.statics.loops.values())
@@ -137,17 +137,17 @@ def _speed_loop(s: b.Source, study: Study) -> fig.Figure:
 
 
 @PICTURES.declare(lambda study: "start_up" in study.runs, "start_up.png")
-def _start_up(s: b.Source, study: Study) -> fig.Figure:
+def _start_up(s: b.Source, study: StudyRecord) -> fig.Figure:
     return _transient(s, study, "start_up")
 
 
 @PICTURES.declare(read.driven)
-def _others(s: b.Source, study: Study) -> Iterator[fig.Figure]:
+def _others(s: b.Source, study: StudyRecord) -> Iterator[fig.Figure]:
     return (_transient(s, study, name) for name in read.driven(study) if name != "start_up")
 
 
 @PICTURES.declare(lambda study: read.groups(study, study.overloads), "overload_time.png")
-def _overloads(s: b.Source, study: Study) -> fig.Figure:
+def _overloads(s: b.Source, study: StudyRecord) -> fig.Figure:
     """The overloads beside each other in print: a band of rows for each side, the scales alike in all."""
     groups = [[_transient(s, study, name) for name in group] for group in read.groups(study, study.overloads)]
     rows: list[list[fig.Panel | None]] = []
@@ -166,7 +166,7 @@ def _overloads(s: b.Source, study: Study) -> fig.Figure:
     )
 
 
-def _transient(s: b.Source, study: Study, name: str) -> fig.Figure:
+def _transient(s: b.Source, study: StudyRecord, name: str) -> fig.Figure:
     """Torque, speed and current of a run over time."""
     run, drive, event = study.runs[name], study.drive, read.event_time(study, name)
     time = run["time"].values - (event or 0.0)
@@ -215,7 +215,7 @@ def _current(drive: Drive, run: Any, time: Any) -> dict[fig.Axis, list[fig.Item]
     return {_CURRENT: items}
 
 
-def _marks(study: Study, name: str, event: float | None) -> Callable[[bool], list[fig.Item]]:
+def _marks(study: StudyRecord, name: str, event: float | None) -> Callable[[bool], list[fig.Item]]:
     """What is marked in each panel of a run; words only where they are asked for."""
     run = study.runs[name]
 
@@ -245,7 +245,7 @@ def _changing(run: Any, loads: Iterable[str]) -> tuple[float, float] | None:
     return float(time[places[0]]), float(time[places[-1] + 1])
 
 
-def _after(s: b.Source, study: Study, run: str) -> str:
+def _after(s: b.Source, study: StudyRecord, run: str) -> str:
     """What the speed does after the event, as a template."""
     caption = "Upright, dashed: the event. Shaded: the loads change."
     if run not in s.result["answers"]:
@@ -277,7 +277,7 @@ def _after(s: b.Source, study: Study, run: str) -> str:
 
 
 @PICTURES.declare(lambda study: study.pins, "reactions.png")
-def _reactions(s: b.Source, study: Study) -> fig.Figure:
+def _reactions(s: b.Source, study: StudyRecord) -> fig.Figure:
     runs, pins = list(study.pins), list(next(iter(study.pins.values())))
     height = 0.84 / len(runs)
     items = []

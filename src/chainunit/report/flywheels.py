@@ -10,7 +10,7 @@ import numpy as np
 
 from ..quantities import Layout
 from ..study.flywheels import FlywheelAnswers, FlywheelFindings, Wheel
-from ..study.study import Study
+from ..study.record import StudyRecord
 from ..text import number
 from . import blocks as b
 from . import figure as fig
@@ -32,7 +32,7 @@ _HEADS = {
 """The columns, with their heads on a terminal; result.json has every number."""
 
 
-def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
+def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """Table and figure."""
     found: FlywheelFindings = study.findings["flywheels"]
     if study.config.plate is not None:
@@ -73,7 +73,7 @@ def _table(s: b.Source, found: FlywheelFindings) -> b.Table:
     )
 
 
-def _figure(study: Study, found: FlywheelFindings, running: list[Wheel]) -> fig.Figure:
+def _figure(study: StudyRecord, found: FlywheelFindings, running: list[Wheel]) -> fig.Figure:
     drive, plate = study.drive, study.config.plate
     # as many as there are lines to tell apart, from the least to the largest
     some = [running[round(k)] for k in np.linspace(0, len(running) - 1, min(len(running), len(LINES)))]

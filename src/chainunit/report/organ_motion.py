@@ -10,7 +10,7 @@ from ..groups.loads import Resistance
 from ..machines.chain_unit import NAMES, ON_SIDE, OrganNames, SideName
 from ..mechanism.machine import MachineState
 from ..planar import Vec2
-from ..study.study import Study
+from ..study.record import StudyRecord
 from .motion import Arrow
 from .supplement import Details, Supplement
 
@@ -22,7 +22,7 @@ _CAPTION = (
 )
 
 
-def organ_motion(study: Study) -> Supplement:
+def organ_motion(study: StudyRecord) -> Supplement:
     """The organs of both sides, each in its colour."""
     walls, _ = rods = (1, 1) if study.drive.chain is None else study.drive.rods
     joints = {side: _joints(names, rods) for side, names in NAMES.items()}

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from ..machines.chain_unit import SIDES
 from ..quantities import Layout
 from ..study.organs import Limits, OverloadFactors
-from ..study.study import Study
+from ..study.record import StudyRecord
 from . import blocks as b
 from . import figure as fig
 from .lines import capital
@@ -16,14 +16,14 @@ from .pictures import Pictures
 PICTURES = Pictures()
 
 
-def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
+def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """Factors, limits and figure."""
     yield _factors(s, study)
     yield from _limits(s, study)
     yield from PICTURES.figures(s, study)
 
 
-def _factors(s: b.Source, study: Study) -> b.Table:
+def _factors(s: b.Source, study: StudyRecord) -> b.Table:
     sides = s.result["organs"]["overload_factors"]
     described = {v.name: v.description for v in Layout(OverloadFactors).variables}
     first = next(iter(sides))
@@ -43,7 +43,7 @@ def _factors(s: b.Source, study: Study) -> b.Table:
     return b.Table(tuple(rows), b.heads("way", *sides, "is for"), title=title, numeric=False)
 
 
-def _limits(s: b.Source, study: Study) -> Iterator[b.Block]:
+def _limits(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     swing = "Rocker swings from {organs.limits.rocker_extreme_left} to {organs.limits.rocker_extreme_right}; margin "
     yield b.Text(s.line(swing + "{organs.limits.margin}."), form="short")
     web = "a web" if study.drive.chain is None else "with two bars a web"
@@ -65,7 +65,7 @@ def _limits(s: b.Source, study: Study) -> Iterator[b.Block]:
 
 
 @PICTURES.declare(lambda study: True, "sides_over_speed.png")
-def _sides(s: b.Source, study: Study) -> fig.Figure:
+def _sides(s: b.Source, study: StudyRecord) -> fig.Figure:
     sides = study.findings["organs"].sides
     words = {"both": "both sides"} | {str(side): f"{side} side alone" for side in SIDES}
 

@@ -6,20 +6,20 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
-from ..study.study import Study
+from ..study.record import StudyRecord
 from .blocks import Source
 from .figure import Figure
 
-Draw: TypeAlias = "Callable[[Source, Study], Figure | Iterable[Figure]]"
+Draw: TypeAlias = "Callable[[Source, StudyRecord], Figure | Iterable[Figure]]"
 
 
 @dataclass(frozen=True)
 class Pictures:
     """Figures in the order of their declaration."""
 
-    _declared: list[tuple[Draw, Callable[[Study], Any], str]] = field(default_factory=list)
+    _declared: list[tuple[Draw, Callable[[StudyRecord], Any], str]] = field(default_factory=list)
 
-    def declare(self, needs: Callable[[Study], Any], file: str = "") -> Callable[[Draw], Draw]:
+    def declare(self, needs: Callable[[StudyRecord], Any], file: str = "") -> Callable[[Draw], Draw]:
         """Declare the function below as that of a figure, or of several, of all studies that have what it `needs`;
         `file` is the name of the picture in print, empty where there is none."""
 
@@ -34,7 +34,7 @@ class Pictures:
         """The pictures that they may leave."""
         return tuple(file for _, _, file in self._declared if file)
 
-    def figures(self, s: Source, study: Study) -> Iterator[Figure]:
+    def figures(self, s: Source, study: StudyRecord) -> Iterator[Figure]:
         """Those that the study has the data of."""
         for draw, needs, file in self._declared:
             if needs(study):

@@ -8,7 +8,7 @@ from typing import Any
 from ..quantities import Layout
 from ..study.measures import MEASURES, Answers, measures_of
 from ..study.monte_carlo import Sample
-from ..study.study import Study
+from ..study.record import StudyRecord
 from ..study.window import Phase
 from . import blocks as b
 from . import run_names as read
@@ -16,7 +16,7 @@ from .lines import Line, Number, capital, joined, line, spoken
 from .terminal import plain_line
 
 
-def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
+def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """Every answer of every run, what the pins carry, and where the model ends."""
     if s.result["answers"]:
         yield _table_of_runs(s, study)
@@ -33,7 +33,7 @@ def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
         yield matrix(s, "speed_loop", rows, title, first="")
 
 
-def _begin(s: b.Source, study: Study, run: str, phase: Phase) -> Iterator[b.Block]:
+def _begin(s: b.Source, study: StudyRecord, run: str, phase: Phase) -> Iterator[b.Block]:
     """What a part of the run before the steady turns asks."""
     title = study.called(run)
     numbers = [(v, s.number(f"{run}.{v.name}")) for v in measures_of(phase)]
@@ -56,7 +56,7 @@ def matrix(s: b.Source, path: str, rows: Mapping[str, str], title: str, first: s
     return b.Table(tuple(cells), b.heads(first, *map(spoken, names)), title=title, **more)
 
 
-def ordered(study: Study, runs: Iterable[str]) -> list[str]:
+def ordered(study: StudyRecord, runs: Iterable[str]) -> list[str]:
     """Runs with the overloads of each side beside each other."""
     runs = list(runs)
     by_side = [run for group in read.groups(study, runs) for run in group]
@@ -64,7 +64,7 @@ def ordered(study: Study, runs: Iterable[str]) -> list[str]:
 
 
 def over_runs(
-    study: Study, runs: list[str], rows: Iterable[b.TableRow], title: str, first: str = ""
+    study: StudyRecord, runs: list[str], rows: Iterable[b.TableRow], title: str, first: str = ""
 ) -> b.Table:
     """A table with a column for each run; those of the overloads of a side belong together."""
     columns = (b.Column(study.called(run), read.short(study, run)) for run in runs)
@@ -72,7 +72,7 @@ def over_runs(
     return b.Table(tuple(rows), (b.Column("", first), *columns), title=title, groups=tuple(groups))
 
 
-def _table_of_runs(s: b.Source, study: Study) -> b.Table:
+def _table_of_runs(s: b.Source, study: StudyRecord) -> b.Table:
     answers, unknown = s.result["answers"], study.not_known
     runs = ordered(study, answers)
     rows = (
@@ -93,7 +93,7 @@ def _table_of_runs(s: b.Source, study: Study) -> b.Table:
     return over_runs(study, runs, rows, title, plain_line(s.line(head), study.config.units))
 
 
-def _pins(s: b.Source, study: Study) -> b.Table:
+def _pins(s: b.Source, study: StudyRecord) -> b.Table:
     tables = s.result["pins"]
     reference = "steady" if "steady" in tables else next(iter(tables))
     sizes = list(next(iter(tables[reference].values())))
@@ -148,7 +148,7 @@ def _random(s: b.Source) -> Iterator[b.Block]:
         yield b.Table(rows, b.heads("", *heads), title=title)
 
 
-def number(s: b.Source, study: Study, run: str, name: str) -> Number:
+def number(s: b.Source, study: StudyRecord, run: str, name: str) -> Number:
     """An answer of a run."""
     back = name == "recovery_time" and run != "steady" and study.returns
     return s.number(f"answers.{run}.{name}", none="not reached" if back else "-")

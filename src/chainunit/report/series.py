@@ -9,13 +9,13 @@ import xarray as xr
 
 from .. import __version__
 from ..files import netcdf, whole
-from ..study.study import LOAD_CYCLE, Study
+from ..study.record import LOAD_CYCLE, StudyRecord
 from .run_names import title
 
 SERIES = "result.nc"
 
 
-def _load_cycle(study: Study, turns: xr.Dataset, file: Path) -> Path:
+def _load_cycle(study: StudyRecord, turns: xr.Dataset, file: Path) -> Path:
     """The load that the motor shaft sees in the steady turns, in the form that sizing tools import: a row per instant
     with time, speed, torque of the load and inertia of the load, units in the head. The last row is the first of the
     next turn."""
@@ -29,7 +29,7 @@ def _load_cycle(study: Study, turns: xr.Dataset, file: Path) -> Path:
     return file
 
 
-def write(study: Study, folder: Path) -> list[Path]:
+def write(study: StudyRecord, folder: Path) -> list[Path]:
     """Write the load cycle and the time series of a study; returns the files.
 
     ``result.nc`` is netCDF-4 with a group per run (open it with `xarray.open_datatree`); each variable has its

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from ..quantities import Layout
+from ..study.record import StudyRecord
 from ..study.shaft import CLASSES, RIGID, ShaftAnswers, Torsion
-from ..study.study import Study
 from ..study.verdict import START, STEADY
 from . import blocks as b
 from . import figure as fig
@@ -20,7 +20,7 @@ _BESIDE = 3
 """Runs beside each other in the figure: with more no label is legible on the page."""
 
 
-def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
+def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """Tables and figure."""
     if not study.shaft:
         return
@@ -30,7 +30,7 @@ def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
     yield from PICTURES.figures(s, study)
 
 
-def _shaft(s: b.Source, study: Study) -> b.Table:
+def _shaft(s: b.Source, study: StudyRecord) -> b.Table:
     """What each run asks of the driveline."""
     runs = ordered(study, s.result["shaft"])
     rows = (
@@ -41,7 +41,7 @@ def _shaft(s: b.Source, study: Study) -> b.Table:
 
 
 @PICTURES.declare(lambda study: study.shaft, "driveline.png")
-def _driveline(s: b.Source, study: Study) -> fig.Figure:
+def _driveline(s: b.Source, study: StudyRecord) -> fig.Figure:
     """Torque in the driveline beside that of a rigid one, and its rainflow cycles."""
     largest = max(answers.range_largest for answers in study.shaft.values())
     above, below = [], []

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from ..study.record import StudyRecord
 from ..study.sizing import Standing
-from ..study.study import Study
 from . import blocks as b
 from .lines import Aside, Line, Strong, capital, line, spoken
 
@@ -15,7 +15,7 @@ _SIGN = {Standing.CHOSEN: "✓", Standing.FITS: "○", Standing.INSUFFICIENT: "�
 _SEVERITY: dict[str, b.Severity] = {Standing.CHOSEN: "good", Standing.FITS: "partly"}
 
 
-def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
+def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """What a drive was sized for, its candidates with how much of each limit they take, and which was chosen."""
     if "sizing" not in s.result:
         return

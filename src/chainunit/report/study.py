@@ -8,9 +8,9 @@ from importlib import metadata
 from typing import Any
 
 from ..study.given import GivenSection, description, given
+from ..study.record import StudyRecord
 from ..study.result import as_dict
 from ..study.rig import DIFFERENCE
-from ..study.study import Study
 from ..text import written_in
 from . import answer, chains, figures, runs, shaft, sizing, wording
 from . import blocks as b
@@ -28,7 +28,7 @@ _DRAWN = (
 _VERSIONS = ("numpy", "casadi", "fmpy", "plotly")
 
 
-def report(study: Study, result: Mapping[str, Any] | None = None) -> b.Report:
+def report(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Report:
     """The report; `result` are its numbers, by default those of `as_dict`."""
     s = b.Source(as_dict(study) if result is None else result)
     with written_in(study.config.units):
@@ -55,7 +55,7 @@ def _head(s: b.Source) -> Line:
     return line(*named, s.line("Study file: {source} · chainunit {chainunit}"))
 
 
-def _motion(study: Study) -> list[b.Block]:
+def _motion(study: StudyRecord) -> list[b.Block]:
     # of an FMU of somebody else no links are known
     return [motion(study)] if study.runs and not study.drive.outsider else []
 
@@ -63,7 +63,7 @@ def _motion(study: Study) -> list[b.Block]:
 # -- what was asked
 
 
-def _opening(s: b.Source, study: Study) -> Iterator[b.Block]:
+def _opening(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     noun = study.noun
     question = s.line(
         f"Which motor, gear and flywheel does this {noun} need? Its crank turns at {{=run.crank_speed}}."
@@ -95,7 +95,7 @@ def _opening(s: b.Source, study: Study) -> Iterator[b.Block]:
         yield b.Drawing(drawing(study.drive.machine), alt, DRAWING, _DRAWN)
 
 
-def _given(s: b.Source, study: Study) -> Iterator[b.Block]:
+def _given(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """All values of the study, by section."""
     # a motor on the line follows no reference, and a machine without sides has no feed on one
     unused = [] if study.drive.follows else ["run.ramp"]
@@ -125,7 +125,7 @@ def _values(s: b.Source, section: GivenSection, unused: Iterable[str]) -> Iterat
 # -- what it rests on
 
 
-def _basis(s: b.Source, study: Study) -> Iterator[b.Block]:
+def _basis(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     yield from (b.Text(each, "note") for each in s.lines("notes"))
     if s.result["certificate"]:
         yield from _certificate(s, study, s.result["certificate"])
@@ -151,7 +151,7 @@ def _basis(s: b.Source, study: Study) -> Iterator[b.Block]:
 
 
 def _certificate(
-    s: b.Source, study: Study, certificate: Mapping[str, Mapping[str, Any]]
+    s: b.Source, study: StudyRecord, certificate: Mapping[str, Mapping[str, Any]]
 ) -> Iterator[b.Block]:
     words = (
         "What the motor gave to the shaft, computed in the motor, against what the machine stored and dissipated, "

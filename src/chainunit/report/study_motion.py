@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..mechanism.models import CrankMotion, names_of
-from ..study.study import Study
+from ..study.record import StudyRecord
 from . import linkage
 from . import run_names as read
 from .edge_motion import EdgeMotion
@@ -26,7 +26,7 @@ MOST = 7000
 _CAPTION = "An arrow is the force on a part of the machine from its support or neighbour{}."
 
 
-def motion(study: Study) -> Animation:
+def motion(study: StudyRecord) -> Animation:
     """Every run at about 60 pictures a second of machine time, more where the crank is fast."""
     machine = study.drive.machine
     turn = study.config.turn
@@ -62,7 +62,7 @@ def _links(whole: Any, supplement: Supplement) -> Iterator[DrawnLink]:
     )
 
 
-def _run(study: Study, name: str, interval: float, supplement: Supplement) -> Clip:
+def _run(study: StudyRecord, name: str, interval: float, supplement: Supplement) -> Clip:
     run, drive = study.runs[name], study.drive
     machine, model = drive.machine, drive.machine.model
     time = run["time"].values

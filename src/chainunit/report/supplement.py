@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ..mechanism.machine import MachineState
-from ..study.study import Study
+from ..study.record import StudyRecord
 from .lines import Line
 from .motion import Arrow
 
@@ -25,7 +25,7 @@ class Details:
 class Supplement:
     """What the pictures of all runs have beside; of most machines it is nothing."""
 
-    study: Study
+    study: StudyRecord
     caption: Line = ()
     links: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """joints of the links that are drawn otherwise, or beside those of the linkage"""

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..drives.cardan import ORDERS
-from ..study.study import Study
+from ..study.record import StudyRecord
 from ..study.torsion import LineAnalysis
 from ..text import number
 from . import blocks as b
@@ -24,7 +24,7 @@ _JOINTS = {
 }
 
 
-def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
+def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """What the line is, its numbers, and the figures."""
     analysis: LineAnalysis = study.findings["torsion"].analysis
     lead = (

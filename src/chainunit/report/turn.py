@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..quantities import Layout
-from ..study.study import Study
+from ..study.record import StudyRecord
 from ..study.turn import Reaction, Turn, TurnFindings
 from ..text import number
 from . import blocks as b
@@ -18,7 +18,7 @@ PICTURE = "turn.png"
 ANGLE = fig.Axis("crank angle from the upward vertical", "rad", low=0.0, high=2.0 * math.pi, step=45.0)
 
 
-def blocks(s: b.Source, study: Study) -> Iterator[b.Block]:
+def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """Table, reactions and figure."""
     turn: TurnFindings = study.findings["constant_speed"]
     lead = s.line("Inverse dynamics at {=run.crank_speed} of the crank, without a motor.")

@@ -14,8 +14,8 @@ from ..progress import Report
 if TYPE_CHECKING:
     from .config import Config
     from .drive import Drive
+    from .record import StudyRecord
     from .rig import Rig
-    from .study import Study
 
 
 class Findings(ABC):
@@ -26,7 +26,7 @@ class Findings(ABC):
         """Ready for JSON, each number with its unit: the part of the result that has the name of the analysis."""
 
     @abstractmethod
-    def remark(self, study: Study) -> None:
+    def remark(self, study: StudyRecord) -> None:
         """Add to the study what the reader has to know beside the numbers."""
 
 
@@ -44,7 +44,7 @@ class Analysis(ABC):
 
     @staticmethod
     @abstractmethod
-    def find(study: Study, rig: Rig, report: Report) -> Findings | None:
+    def find(study: StudyRecord, rig: Rig, report: Report) -> Findings | None:
         """Make it; before the runs the rig has no FMUs.
 
         Raises

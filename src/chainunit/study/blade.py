@@ -19,8 +19,8 @@ from .analysis import Analysis, Findings
 from .config import Config
 from .cycle import Cycle, cycle
 from .drive import Drive
+from .record import StudyRecord
 from .rig import Rig
-from .study import Study
 from .turn import EVERY, POINTS
 
 
@@ -70,7 +70,7 @@ class BladeFindings(Findings):
         over_turn = {name: array_entry(x[::EVERY], unit) for name, (x, unit) in curves.items()}
         return {**entries(self.numbers), "over_turn": over_turn}
 
-    def remark(self, study: Study) -> None:
+    def remark(self, study: StudyRecord) -> None:
         """Where the blade does not go through the stack, and what the work of a cut rests on."""
         n, warn = self.numbers, study.warn
         top, table = (float(x) for x in (self.stack.top, self.stack.table))
@@ -123,7 +123,7 @@ class BladeAnalysis(Analysis):
         return drive.machine.model.cuts
 
     @staticmethod
-    def find(study: Study, rig: Rig, report: Report) -> BladeFindings:
+    def find(study: StudyRecord, rig: Rig, report: Report) -> BladeFindings:
         """The turn at the crank speed of the study.
 
         Raises

@@ -21,7 +21,7 @@ import numpy as np
 
 from ..engines import numpy_
 from ..errors import InterruptedRunError, RunError
-from ..machines.api import ChainUnit
+from ..machines.api import ChainUnitMachine
 from ..machines.chain_unit import SIDES, ChamberForces, Feed
 from ..machines.flexible import flexible
 from ..progress import Progress, Report
@@ -274,7 +274,7 @@ def duty(fmu: Fmu, drive: Drive, crank_speed: float, feed: Feed) -> Cycle:
     return Cycle(sample.angle, tau * drive.driven.p.ratio, SimpleNamespace(J=J, tau=tau))
 
 
-def two_bar_pulls(machine: ChainUnit, angle: Any, crank_speed: float, feed: Feed) -> Any:
+def two_bar_pulls(machine: ChainUnitMachine, angle: Any, crank_speed: float, feed: Feed) -> Any:
     """Mean axial pull [N] in wall and web of both sides of two bars at crank angles `angle` [rad], shape (4, n): as
     two rods without damping, so that slack means the same of both."""
     model, xp = flexible(1, 1), numpy_()
@@ -360,7 +360,7 @@ def numbers_at(
     )
 
 
-def rest_forces(machine: ChainUnit, side: str, feed: Any, rods: int) -> tuple[float, float]:
+def rest_forces(machine: ChainUnitMachine, side: str, feed: Any, rods: int) -> tuple[float, float]:
     """Force at A2 with the machine at rest, the rocker in the middle [N], of a chain and of two bars: each snatch is
     in parts of its own. NaN without weight, as nothing is pulled at rest."""
     if machine.p.g == 0.0:

@@ -11,7 +11,7 @@ from .arrays import peak
 from .drive import Drive
 from .event import Role
 from .protection import MARGIN, Obstacle, Setting
-from .study import Study
+from .record import StudyRecord
 from .window import BURNT
 
 
@@ -20,7 +20,7 @@ def on_coupling(drive: Drive, run: xr.Dataset) -> float:
     return peak(run["motor.tau"].values) * drive.ratio
 
 
-def peaks_on_coupling(study: Study, *roles: Role) -> dict[str, float]:
+def peaks_on_coupling(study: StudyRecord, *roles: Role) -> dict[str, float]:
     """Peak on the coupling in each event of these roles, of any without, at the crank [N m]; a start direct on line
     is judged apart."""
     events = study.config.events
@@ -33,7 +33,7 @@ def peaks_on_coupling(study: Study, *roles: Role) -> dict[str, float]:
     }
 
 
-def recommended(study: Study) -> Setting | None:
+def recommended(study: StudyRecord) -> Setting | None:
     """The safety coupling that a sized drive should have, tried in the events of the study. None where no motor was
     chosen, or a coupling is given, or the study ended before the machine ran steadily."""
     if not study.sizing or study.insufficient or study.config.coupling or "steady" not in study.answers:
@@ -52,7 +52,7 @@ def recommended(study: Study) -> Setting | None:
     )
 
 
-def pull_out(study: Study) -> float:
+def pull_out(study: StudyRecord) -> float:
     """Most that the warm motor gives at the crank in steady running [N m]."""
     return study.drive.pull_out(study.steady, min(BURNT, study.answers["steady"].winding_temperature))
 
@@ -61,7 +61,7 @@ def _torque(value: float) -> str:
     return number(value, "N.m")
 
 
-def coupling_sentence(study: Study) -> str:
+def coupling_sentence(study: StudyRecord) -> str:
     """Which safety coupling the sized drive should have and what it does in the overloads, or why none protects
     it."""
     setting = study.setting
@@ -109,7 +109,7 @@ def coupling_sentence(study: Study) -> str:
     return text
 
 
-def remark_on_coupling(study: Study, trip: float) -> None:
+def remark_on_coupling(study: StudyRecord, trip: float) -> None:
     """Where the coupling that is given, set to `trip` [N m], does not do its work."""
     # of a motor of somebody else it is not known
     most = None if study.drive.foreign else pull_out(study)

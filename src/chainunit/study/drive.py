@@ -18,7 +18,7 @@ from ..drives.motor import Motor
 from ..errors import InputError
 from ..fmu.backends import Backend, Origin
 from ..fmu.backends import export as export_fmu
-from ..machines.api import ChainUnit, machine_of
+from ..machines.api import ChainUnitMachine, machine_of
 from ..machines.chain_organs import OrganLaw
 from ..machines.flexible import flexible
 from ..machines.hanging import split
@@ -121,7 +121,7 @@ class Drive:
             )
 
     @property
-    def chain_unit(self) -> ChainUnit:
+    def chain_unit(self) -> ChainUnitMachine:
         """The machine, where it is a chain unit.
 
         Raises
@@ -129,7 +129,7 @@ class Drive:
         AbsentError
             where it is another.
         """
-        if isinstance(self.machine, ChainUnit):
+        if isinstance(self.machine, ChainUnitMachine):
             return self.machine
         raise AbsentError("machine", f"{self.machine.model.name}: has no organs")
 

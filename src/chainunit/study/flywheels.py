@@ -21,9 +21,9 @@ from .config import Config
 from .cycle import needed_inertia
 from .drive import Drive
 from .measures import Answers, read_answers, same_measure
+from .record import Amount, StudyRecord
 from .rig import Rig, worst_residual
 from .shaft import remedies
-from .study import Amount, Study
 from .turn import Turn, TurnAnalysis
 from .verdict import RESIDUAL, STEADY
 from .window import Phase, Window, closes, whole_turns
@@ -145,7 +145,7 @@ class FlywheelFindings(Findings):
             "by_hand": entry(self.flywheel_by_hand, "kg.m2"),
         }
 
-    def remark(self, study: Study) -> None:
+    def remark(self, study: StudyRecord) -> None:
         """What an engineer should change, and what the least flywheel does."""
         _on_wheels(self, study)
         _on_fluctuation(self, study)
@@ -168,7 +168,7 @@ class FlywheelAnalysis(Analysis):
         return config.flywheel is not None and drive.foreign is None
 
     @staticmethod
-    def find(study: Study, rig: Rig, report: Report) -> FlywheelFindings:
+    def find(study: StudyRecord, rig: Rig, report: Report) -> FlywheelFindings:
         """Run them.
 
         Raises
@@ -202,14 +202,14 @@ class FlywheelAnalysis(Analysis):
         return found
 
 
-def _own(study: Study, found: FlywheelFindings) -> Wheel:
+def _own(study: StudyRecord, found: FlywheelFindings) -> Wheel:
     """The flywheel of the study, whose run has been made."""
     assert study.start is not None
     residual = worst_residual(study.certificate["start_up"])
     return _wheel(study, found, found.own, study.answers[STEADY], study.start, study.steady, residual)
 
 
-def _run(study: Study, rig: Rig, found: FlywheelFindings, flywheel: float) -> Wheel:
+def _run(study: StudyRecord, rig: Rig, found: FlywheelFindings, flywheel: float) -> Wheel:
     """The start-up and steady running of the study with another flywheel [kg m2], without its safety coupling."""
     config = study.config
     drive, _ = tune(config, replace(study.drive, flywheel=flywheel))
@@ -232,7 +232,7 @@ def _run(study: Study, rig: Rig, found: FlywheelFindings, flywheel: float) -> Wh
 
 
 def _wheel(
-    study: Study,
+    study: StudyRecord,
     found: FlywheelFindings,
     flywheel: float,
     steady: Answers,
@@ -371,7 +371,7 @@ _TROUBLES = (
 )
 
 
-def _on_wheels(found: FlywheelFindings, study: Study) -> None:
+def _on_wheels(found: FlywheelFindings, study: StudyRecord) -> None:
     """A warning for each kind of trouble, with all flywheels that have it; the study warns of its own."""
     plate = study.config.plate
     rated = math.inf if plate is None else plate.nameplate.rated_current
@@ -397,7 +397,7 @@ def _on_wheels(found: FlywheelFindings, study: Study) -> None:
             study.warn(trouble.kind, trouble.text, where=where, **words, **amounts)
 
 
-def _on_fluctuation(found: FlywheelFindings, study: Study) -> None:
+def _on_fluctuation(found: FlywheelFindings, study: StudyRecord) -> None:
     """Whether the flywheel of the study keeps the fluctuation, and the least that does."""
     permitted = number(found.permitted, "1", "percent")
     own = next((wheel for wheel in found.wheels if wheel.flywheel == found.own), None)
@@ -426,7 +426,7 @@ def _on_fluctuation(found: FlywheelFindings, study: Study) -> None:
         _on_least(found, found.least, partial(study.note, "least flywheel"))
 
 
-def _on_line(found: FlywheelFindings, study: Study) -> None:
+def _on_line(found: FlywheelFindings, study: StudyRecord) -> None:
     """That the ripple is made behind the flywheel, where the motor runs even enough and the crank does not."""
     ripples = [(wheel, wheel.answers.motor_ripple) for wheel in found.wheels]
     even = [wheel for wheel, ripple in ripples if ripple is not None and ripple <= found.permitted]
@@ -445,7 +445,7 @@ def _on_line(found: FlywheelFindings, study: Study) -> None:
     )
 
 
-def _on_heavier(found: FlywheelFindings, study: Study) -> None:
+def _on_heavier(found: FlywheelFindings, study: StudyRecord) -> None:
     """The flywheels that keep the speed less even than a lighter one."""
     running = [wheel for wheel in found.wheels if wheel.answers.speed_ripple is not None]
     amounts: dict[str, Amount] = {

@@ -11,8 +11,8 @@ from ..quantities import variables
 from ..text import entries, entry
 from .analyses import ANALYSES
 from .config import Config
+from .record import StudyRecord
 from .sections import CHOICES, SECTIONS, SystemTable
-from .study import Study
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def _choice(value: Any) -> Any:
     return list(value) if isinstance(value, tuple) else value
 
 
-def given(study: Study) -> list[GivenSection]:
+def given(study: StudyRecord) -> list[GivenSection]:
     """All that a study was given, from which it can be repeated."""
     config = study.config
     sections = [
@@ -97,7 +97,7 @@ def _system(config: Config) -> dict[str, Any]:
     return {name: x for name, x in own.items() if x and (name != "motor" or config.sizing is None)}
 
 
-def _tables(study: Study) -> Iterator[GivenSection]:
+def _tables(study: StudyRecord) -> Iterator[GivenSection]:
     config, analyses = study.config, {analysis.name for analysis in ANALYSES}
     for name, section in SECTIONS.items():
         values = getattr(config, name)

@@ -12,13 +12,13 @@ from .limits import Check, heating, lasting_current, starting
 from .measures import Answers
 from .organs import OrganAnalysis
 from .quantiles import runs_needed
+from .record import StudyRecord
 from .rig import worst_residual
-from .study import Study
 from .verdict import RESIDUAL, STEADY, Holds, Verdict
 from .window import reaches
 
 
-def model_verdict(study: Study) -> Verdict:
+def model_verdict(study: StudyRecord) -> Verdict:
     """Whether the model of the machine holds, from the numbers of the runs."""
     config, organs, answers = study.config, study.findings.get(OrganAnalysis.name), study.answers
     steady = answers.get(STEADY)
@@ -57,7 +57,7 @@ def model_verdict(study: Study) -> Verdict:
     )
 
 
-def _residuals(study: Study) -> dict[str, float]:
+def _residuals(study: StudyRecord) -> dict[str, float]:
     """By run, the largest energy residual over the energy moved; the start-up and steady running are one."""
     return {
         STEADY if name == verdict.START else name: worst_residual(shares)
@@ -65,7 +65,7 @@ def _residuals(study: Study) -> dict[str, float]:
     }
 
 
-def motor_limits(study: Study) -> dict[str, Check]:
+def motor_limits(study: StudyRecord) -> dict[str, Check]:
     """What the motor does in its start and in steady running beside its limits, by name; of a motor that sizing chose
     the temperature alone, as its starts and its duty are among the checks of sizing."""
     steady, config, drive = study.answers.get(STEADY), study.config, study.drive
@@ -91,7 +91,7 @@ AMPLE = 0.02
 """Reserve of torque from which on the motor counts as strong enough: with less it stands at its limit."""
 
 
-def motor_verdict(study: Study) -> dict[str, Any] | None:
+def motor_verdict(study: StudyRecord) -> dict[str, Any] | None:
     """Whether the motor reaches the speed and stays cool ("false" where not), and its least reserve of torque with
     the run of it ("in part" where none is left or known, another limit is passed, or sizing found it insufficient),
     ready for JSON; None without steady running. Runs whose energy balance is not kept say nothing of the motor: they

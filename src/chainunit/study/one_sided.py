@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..machines.api import EMPTY, ChainUnit
+from ..machines.api import EMPTY, ChainUnitMachine
 from ..machines.chain_unit import Feed, SideLoads, SideName, other
 
 
@@ -21,7 +21,7 @@ def without(side: SideName, feed: Feed) -> Feed:
     return Feed(left=feed.left, right=EMPTY) if side == "right" else Feed(left=EMPTY, right=feed.right)
 
 
-def alone(machine: ChainUnit, side: SideName) -> ChainUnit:
+def alone(machine: ChainUnitMachine, side: SideName) -> ChainUnitMachine:
     """The machine with its organ of that side alone: the papers' one-sided loading."""
     gone = other(side)
     return machine.replace({f"{gone}.wall_mass": 0.0, f"{gone}.web_mass": 0.0})

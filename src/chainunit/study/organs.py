@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..machines.api import ChainUnit
+from ..machines.api import ChainUnitMachine
 from ..machines.chain_unit import SIDES, Feed, SideName, other
 from ..progress import Report
 from ..quantities import Value, declaration, quantity
@@ -20,12 +20,12 @@ from .config import Config
 from .cycle import Cycle, cycle
 from .drive import Drive
 from .one_sided import all_on_one, alone, without
+from .record import StudyRecord
 from .rig import Rig
-from .study import Study
 
 
 def _cycle_alone(
-    machine: ChainUnit, side: SideName, crank_speed: float, feed: Feed, points: int = 720
+    machine: ChainUnitMachine, side: SideName, crank_speed: float, feed: Feed, points: int = 720
 ) -> Cycle:
     """A turn with the organ of that side alone, which keeps its load."""
     return cycle(alone(machine, side), crank_speed, without(other(side), feed), points)
@@ -59,7 +59,7 @@ def factors_for(factors: Mapping[SideName, OverloadFactors]) -> dict[str, str]:
 
 
 def overload_factors(
-    machine: ChainUnit, crank_speed: float, feed: Feed, side: SideName = "left"
+    machine: ChainUnitMachine, crank_speed: float, feed: Feed, side: SideName = "left"
 ) -> OverloadFactors:
     """The overload factors of the machine on its `side` against both.
 
@@ -132,7 +132,7 @@ class Sides:
 _TORQUES = ("rocker", "crank")
 
 
-def sides_over_speed(machine: ChainUnit, feed: Feed, highest: float = 15.0, points: int = 30) -> Sides:
+def sides_over_speed(machine: ChainUnitMachine, feed: Feed, highest: float = 15.0, points: int = 30) -> Sides:
     """Two-sided against one-sided over crank speeds up to `highest` [rad/s]: at low speed one side alone is the
     heavier case, since nothing balances its weight; at high speed both are, since inertia adds up."""
     speed = np.linspace(highest / points, highest, points)
@@ -189,7 +189,7 @@ class OrganFindings(Findings):
             "sides_over_speed": self.sides.as_dict(),
         }
 
-    def remark(self, study: Study) -> None:
+    def remark(self, study: StudyRecord) -> None:
         """The numbers say it all."""
 
 
@@ -204,7 +204,7 @@ class OrganAnalysis(Analysis):
         return bool(drive.machine.model.sides)
 
     @staticmethod
-    def find(study: Study, rig: Rig, report: Report) -> OrganFindings:
+    def find(study: StudyRecord, rig: Rig, report: Report) -> OrganFindings:
         """As two bars, also where they are chains."""
         machine, feed, speed = study.drive.chain_unit, study.config.feed, study.config.run.crank_speed
         (right, _), (left, _) = machine.rocker_extremes()

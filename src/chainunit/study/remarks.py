@@ -13,15 +13,15 @@ from ..text import number
 from .coupling import peaks_on_coupling, remark_on_coupling
 from .judgement import model_verdict, motor_limits
 from .measures import STARTED, Answers
+from .record import LOAD_CYCLE, Amount, StudyRecord
 from .sections import ChainOrgans
 from .shaft import AMPLIFIED, UNEVEN, remedies
-from .study import LOAD_CYCLE, Amount, Study
 from .torsion_findings import TorsionAnalysis
 from .verdict import RESIDUAL, START, STEADY
 from .window import CLOSED, DRIFT
 
 
-def conclude(study: Study) -> None:
+def conclude(study: StudyRecord) -> None:
     """Judge the model, and add every remark to the study."""
     config, note = study.config, study.note
     own = "What the study file does not name is at its declared start value, which is assumed."
@@ -81,7 +81,7 @@ _RATING = ("limit.i", "limit.v", "armature.k")
 """Parameters of a motor without a nameplate that set what it can give."""
 
 
-def _left_out(study: Study) -> Iterator[str]:
+def _left_out(study: StudyRecord) -> Iterator[str]:
     """Values that decide the result and that the file leaves to the packaged ones."""
     config, coupling = study.config, study.config.coupling
     if config.packaged:
@@ -99,7 +99,7 @@ def _left_out(study: Study) -> Iterator[str]:
             yield f"the rating of the motor ({', '.join(sizes)})"
 
 
-def _on_start(study: Study) -> None:
+def _on_start(study: StudyRecord) -> None:
     """That the feed came to a machine that had not its speed."""
     run, fed = study.runs["start_up"], study.fed_from
     if fed is None:
@@ -131,7 +131,7 @@ _LIMITS = {
 """What is said where a limit of the motor is passed."""
 
 
-def _on_limits(study: Study) -> None:
+def _on_limits(study: StudyRecord) -> None:
     """That the motor does not stand its start or its steady running."""
     steady, warn = study.answers[STEADY], study.warn
     key, permitted = study.config.permitted_temperature
@@ -165,7 +165,7 @@ def _on_limits(study: Study) -> None:
         )
 
 
-def _on_steady_running(study: Study, steady: Answers) -> None:
+def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
     asked, warn = study.config.run.crank_speed, study.warn
     if not study.reaches:
         limit = "the motor's voltage or current is at its limit, or the run is too short to settle."
@@ -234,7 +234,7 @@ _HAPPENED = {
 """What may happen in a run, by kind, with the limit that it passes."""
 
 
-def _on_runs(study: Study) -> None:
+def _on_runs(study: StudyRecord) -> None:
     """What happened in the runs, a remark for each kind of happening with all runs in which it did."""
     limits: dict[str, Amount] = {"gear passed": (study.config.gear.torque_limit, "N.m")}
     if (largest := study.drive.motor.current_limit(study.motor)) is not None:
@@ -255,7 +255,7 @@ def _on_runs(study: Study) -> None:
         )
 
 
-def _happenings(study: Study, name: str) -> Iterator[tuple[str, str, dict[str, Amount]]]:
+def _happenings(study: StudyRecord, name: str) -> Iterator[tuple[str, str, dict[str, Amount]]]:
     """What happened in a run: kind, numbers in words, the same as data."""
     config, answers = study.config, study.answers[name]
     pulls = answers.web_pull_least, answers.wall_pull_least
@@ -284,7 +284,7 @@ def _happenings(study: Study, name: str) -> Iterator[tuple[str, str, dict[str, A
         yield "not recovered", "", {}
 
 
-def _on_random_overloads(study: Study) -> None:
+def _on_random_overloads(study: StudyRecord) -> None:
     random, note = study.monte_carlo, study.note
     if random and random.remark:
         note("too few runs", "overloads at random: {text}", text=random.remark)
@@ -298,7 +298,7 @@ def _on_random_overloads(study: Study) -> None:
         )
 
 
-def _on_assumptions(study: Study) -> None:
+def _on_assumptions(study: StudyRecord) -> None:
     """What the assumption of an event makes of its peaks."""
     coupling = study.config.coupling
     for name, spread in study.spreads.items():
@@ -317,7 +317,7 @@ def _on_assumptions(study: Study) -> None:
         )
 
 
-def _on_chains(study: Study, chain: ChainOrgans) -> None:
+def _on_chains(study: StudyRecord, chain: ChainOrgans) -> None:
     """What the reader has to know of the chains."""
     (walls, webs), result = study.drive.rods, study.chain
     warn, note = study.warn, study.note
@@ -349,7 +349,7 @@ def _on_chains(study: Study, chain: ChainOrgans) -> None:
         warn("energy of chains", text, residual=(residual, "1"))
 
 
-def _on_shaft(study: Study) -> None:
+def _on_shaft(study: StudyRecord) -> None:
     """What the reader has to know of the driveline."""
     line, modes = study.drive.line, study.statics.torsion
     assert modes is not None

@@ -12,11 +12,11 @@ from .coupling import coupling_sentence
 from .given import given
 from .judgement import motor_verdict
 from .measures import measures_of
-from .study import Study
+from .record import StudyRecord
 from .window import Phase
 
 
-def _motor(study: Study) -> dict[str, Any]:
+def _motor(study: StudyRecord) -> dict[str, Any]:
     kind = study.drive.graph.components["motor"].title
     plate = study.sizing.best.motor if study.sizing else study.config.plate
     titles = {"kind": kind, "title": plate.designation if plate else kind}
@@ -37,13 +37,13 @@ def _rating(motor: CatalogueMotor | None) -> dict[str, Any]:
     }
 
 
-def as_dict(study: Study) -> dict[str, Any]:
+def as_dict(study: StudyRecord) -> dict[str, Any]:
     """Everything but the time series, ready for JSON: each number with its unit."""
     with written_in(study.config.units):
         return _as_dict(study)
 
 
-def _as_dict(study: Study) -> dict[str, Any]:
+def _as_dict(study: StudyRecord) -> dict[str, Any]:
     config = study.config
     return {
         "chainunit": __version__,
@@ -64,14 +64,14 @@ def _as_dict(study: Study) -> dict[str, Any]:
     }
 
 
-def _on_model(study: Study) -> dict[str, Any] | None:
+def _on_model(study: StudyRecord) -> dict[str, Any] | None:
     if study.verdict is None:
         return None
     found = study.verdict.as_dict()
     return found | {"text": turning(found["text"], study.turning)}
 
 
-def _given(study: Study) -> dict[str, Any]:
+def _given(study: StudyRecord) -> dict[str, Any]:
     """What the study was given; `origins` says where values come from that are not at their declared start value."""
     sections = given(study)
     names = [name for section in sections for name in section.names]
@@ -90,7 +90,7 @@ def _put(tree: dict[str, Any], place: str, values: dict[str, Any]) -> None:
     tree |= values
 
 
-def _statics(study: Study) -> dict[str, Any]:
+def _statics(study: StudyRecord) -> dict[str, Any]:
     """What needs no co-simulation."""
     statics = study.statics
     return {
@@ -112,7 +112,7 @@ def _statics(study: Study) -> dict[str, Any]:
     }
 
 
-def _runs(study: Study) -> dict[str, Any]:
+def _runs(study: StudyRecord) -> dict[str, Any]:
     """What was read from the runs, by their names."""
     begins = {"start_up": (Phase.START_UP, study.start), "settling": (Phase.SETTLING, study.settling)}
     return {
@@ -144,7 +144,7 @@ def _runs(study: Study) -> dict[str, Any]:
     }
 
 
-def _spread(study: Study, name: str) -> dict[str, Any]:
+def _spread(study: StudyRecord, name: str) -> dict[str, Any]:
     """The range that an event assumes, and the peaks over it."""
     spread, units = (
         study.spreads[name],
@@ -159,7 +159,7 @@ def _spread(study: Study, name: str) -> dict[str, Any]:
     }
 
 
-def _parts(study: Study) -> dict[str, Any]:
+def _parts(study: StudyRecord) -> dict[str, Any]:
     """What only some studies have."""
     config = study.config
     parts = {name: found.as_dict() for name, found in study.findings.items()}
@@ -174,7 +174,7 @@ def _parts(study: Study) -> dict[str, Any]:
     return parts
 
 
-def _protection(study: Study) -> dict[str, Any]:
+def _protection(study: StudyRecord) -> dict[str, Any]:
     """Settings of the protection of the drive that sizing chose; none for a motor that is insufficient."""
     assert study.sizing is not None
     if study.insufficient:
@@ -214,7 +214,7 @@ def _protection(study: Study) -> dict[str, Any]:
     }
 
 
-def _driveline(study: Study) -> dict[str, Any]:
+def _driveline(study: StudyRecord) -> dict[str, Any]:
     units = {"from": "N.m", "to": "N.m", "count": "1"}
     largest = max(answers.range_largest for answers in study.shaft.values()) if study.shaft else 0.0
     return {

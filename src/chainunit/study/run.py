@@ -28,11 +28,11 @@ from .event import Event
 from .measures import read_answers, read_measure
 from .monte_carlo import Task
 from .monte_carlo import run as run_monte_carlo
+from .record import Spread, StudyRecord
 from .remarks import conclude
 from .rig import Rig, Transient
 from .shaft import shaft_answers, with_rigid
 from .statics import statics
-from .study import Spread, Study
 from .window import Phase, Trip, whole_turns
 
 _PEAKS = ("crank_torque", "motor_torque", "rocker_torque")
@@ -46,7 +46,7 @@ def run_study(
     *,
     check: bool = False,
     backend: Backend | None = None,
-) -> Study:
+) -> StudyRecord:
     """Run the study; FMUs are written to ``folder/fmu``, by `backend` (see `chainunit.fmu.backends`).
 
     With `check`, every run is also compared with the monolithic solution.
@@ -63,14 +63,16 @@ def run_study(
         return _run_study(config, folder, report or (lambda what, done, todo: None), check, backend)
 
 
-def _run_study(config: Config, folder: Path, report: Report, check: bool, backend: Backend | None) -> Study:
+def _run_study(
+    config: Config, folder: Path, report: Report, check: bool, backend: Backend | None
+) -> StudyRecord:
     """See `run_study`."""
     choice = choose(config, folder / "fmu", report, backend)
     drive = choice.drive
     if check and drive.outsiders:
         titles = " and ".join(drive.outsiders)
         raise InputError(f"--check: the equations of {titles} are not known; leave --check out")
-    study = Study(config, drive, statics(config, drive), choice.tuning, choice.sizing)
+    study = StudyRecord(config, drive, statics(config, drive), choice.tuning, choice.sizing)
     if config.monte_carlo.runs:
         _check_random(config, Rig(config, drive, {}))
     _analyse(study, Rig(config, drive, {}), report, needs_runs=False)
@@ -97,7 +99,7 @@ def _run_study(config: Config, folder: Path, report: Report, check: bool, backen
     return study
 
 
-def _analyse(study: Study, rig: Rig, report: Report, *, needs_runs: bool) -> None:
+def _analyse(study: StudyRecord, rig: Rig, report: Report, *, needs_runs: bool) -> None:
     """Every analysis that the system has the parts for."""
     for analysis in ANALYSES:
         if analysis.needs_runs == needs_runs and analysis.applies(study.config, study.drive):
@@ -113,7 +115,7 @@ def _check_random(config: Config, rig: Rig) -> None:
             raise InputError(f'monte_carlo.event.type = "{event.kind}": {event.without}')
 
 
-def _chains(study: Study, file: Path, report: Report) -> None:
+def _chains(study: StudyRecord, file: Path, report: Report) -> None:
     """Chains at constant speed; left out where an FMU in Python would take hours for their many turns."""
     if study.fmus["machine"].backend != "native":
         study.note(
@@ -133,7 +135,7 @@ def _chains(study: Study, file: Path, report: Report) -> None:
 class Runner:
     """Runs a study on its rig, and writes into it what it reads."""
 
-    def __init__(self, study: Study, rig: Rig, report: Report) -> None:
+    def __init__(self, study: StudyRecord, rig: Rig, report: Report) -> None:
         config = study.config
         self.study, self.rig, self.report = study, rig, report
         self.stop = config.stop

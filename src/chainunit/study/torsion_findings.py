@@ -17,9 +17,9 @@ from ..text import array_entry, entries
 from .analysis import Analysis, Findings
 from .config import Config
 from .drive import Drive
+from .record import Amount, Remark, StudyRecord
 from .rig import Rig
 from .shaft import two_masses
-from .study import Amount, Remark, Study
 from .torsion import DRIFT, LineAnalysis, Rotation, analyse
 from .verdict import STEADY
 
@@ -45,7 +45,7 @@ class TorsionAnalysis(Analysis):
         return drive.line is not None
 
     @staticmethod
-    def find(study: Study, rig: Rig, report: Report) -> TorsionFindings | None:
+    def find(study: StudyRecord, rig: Rig, report: Report) -> TorsionFindings | None:
         """See `Analysis`."""
         config, drive, modes = study.config, study.drive, study.statics.torsion
         assert modes is not None
@@ -96,7 +96,7 @@ class TorsionFindings(Findings):
         """See `Findings`; null without a steady motion."""
         return as_dict(self.analysis)
 
-    def remark(self, study: Study) -> None:
+    def remark(self, study: StudyRecord) -> None:
         """See `Findings`."""
         study.remarks += self.remarks()
         steady = study.shaft.get(STEADY)

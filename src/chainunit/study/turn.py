@@ -14,8 +14,8 @@ from ..text import array_entry, entries
 from .analysis import Analysis, Findings
 from .arrays import peak
 from .cycle import Cycle, cycle, energy_swing, no_feed
+from .record import StudyRecord
 from .rig import Rig
-from .study import Study
 
 POINTS = 3600
 """Crank angles of the turn."""
@@ -74,7 +74,7 @@ class TurnFindings(Findings):
             "over_turn": {name: array_entry(x[::EVERY], unit) for name, (x, unit) in curves.items()},
         }
 
-    def remark(self, study: Study) -> None:
+    def remark(self, study: StudyRecord) -> None:
         """Its numbers speak for themselves."""
 
 
@@ -84,7 +84,7 @@ class TurnAnalysis(Analysis):
     name = "constant_speed"
 
     @staticmethod
-    def find(study: Study, rig: Rig, report: Report) -> TurnFindings:
+    def find(study: StudyRecord, rig: Rig, report: Report) -> TurnFindings:
         """The turn at the crank speed of the study, by inverse dynamics."""
         config, machine = study.config, study.drive.machine
         feed, w = config.feed, config.run.crank_speed

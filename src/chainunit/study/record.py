@@ -1,4 +1,4 @@
-"""A study: its drive, its runs, and the numbers read from them."""
+"""The record of a study: its drive, its runs, and the numbers read from them."""
 
 from __future__ import annotations
 
@@ -86,9 +86,9 @@ class Spread:
 
 
 @dataclass
-class Study:
-    """A study, with everything by the names of its runs: ``start_up``, ``steady`` (its last turns), one for each
-    event. `failure` says why it stopped early, if it did."""
+class StudyRecord:
+    """The record of a study, which `run_study` fills; everything is by the names of the runs: ``start_up``,
+    ``steady`` (its last turns), one for each event. `failure` says why the study stopped early, if it did."""
 
     config: Config
     drive: Drive
