@@ -49,7 +49,7 @@ def test_a_motor_that_burns_in_steady_running_is_no_good(tmp_path):
     assert study.reaches and steady.current_share > 1.2 and steady.winding_temperature > 450.0
     assert verdict["holds"] == "false" and "keeps the crank" in verdict["text"]
     assert "its winding becomes too hot in steady running" in verdict["text"]
-    assert verdict["limits"]["temperature"]["utilisation"]["value"] > 1.5
+    assert verdict["limits"]["temperature"]["value"] > 1.5
     hot, current = warnings["motor temperature"], warnings["motor current"]
     assert hot.quantities["value"][0] == steady.winding_temperature and hot.quantities["limit"][0] == 393.15
     assert "(run.winding_temperature)" in hot.text and "a larger motor" in hot.text

@@ -147,5 +147,5 @@ def motor_verdict(study: StudyRecord) -> dict[str, Any] | None:
         "least_reserve": entry(reserve, "1", "percent"),
         "run": run,
         "left_out": left_out,
-        "limits": {name: check.as_dict() for name, check in limits.items()},
+        "limits": {name: entry(check.utilisation, "1", "used") for name, check in limits.items()},
     }
