@@ -25,7 +25,7 @@ from chainunit.quantities import Layout
 from chainunit.report import blocks, figure
 from chainunit.report import torsion as torsion_report
 from chainunit.report.torsion import PICTURES
-from chainunit.study import config, parts, torsion_findings
+from chainunit.study import config, parts, remarks, torsion_findings
 from chainunit.study.choice import choose
 from chainunit.study.record import StudyRecord
 from chainunit.study.rig import Rig
@@ -497,6 +497,14 @@ def test_crossings_are_where_the_orders_meet_the_band(study):
     assert f"is {number(near, '1', 'percent')} from where order 2" in str(warning)
     assert " to ".join(ends) in str(warning)
     assert warning.quantities["near"][0] == pytest.approx(near)
+
+
+def test_lower_gains_are_no_advice_against_a_control_near_the_line():
+    """Of the packaged driveline lower gains raise the peaks: the control damps the torsion."""
+    study = study_of(parts.example("driveline"))
+    remarks._on_shaft(study)
+    (warning,) = (each.text for each in study.warnings if each.kind == "control near line")
+    assert "lower the gains" not in warning and "the control also damps the torsion" in warning
 
 
 SLOW_LINE = """

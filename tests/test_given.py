@@ -11,11 +11,15 @@ from test_foreign_machine import MACHINE, SCRIPT
 from test_foreign_machine import STUDY as PUMP
 from test_foreign_system import build
 
+from chainunit.errors import InputError
+from chainunit.quantities import Layout
 from chainunit.report import blocks
 from chainunit.report.study import report
+from chainunit.study import remarks
 from chainunit.study.choice import choose
 from chainunit.study.config import load, parse
 from chainunit.study.given import given
+from chainunit.study.measures import Answers
 from chainunit.study.parts import example
 from chainunit.study.record import StudyRecord
 from chainunit.study.remarks import conclude
@@ -59,6 +63,9 @@ def test_values_of_a_motor_of_the_catalogue_are_the_catalogues(tmp_path):
     origin = study_of(parse(soft), tmp_path).origin
     assert origin("machine.ratio") == origin("motor.inverter.on") == "file"
     assert origin("motor.inverter.slip") == "catalogue"
+    # the supply is what `start` says, and no other key
+    with pytest.raises(InputError, match=r"starter\.inverter\.on"):
+        parse(soft.replace("ramp = 2", "ramp = 2\non = 0"))
     # of the example, where the file leaves the system out
     origin = study_of(parse("[system]\nmachine = 'KnifeDrive'\n[run]\ncrank_speed = 4"), tmp_path).origin
     assert origin("motor.rotor.J") == "catalogue"
@@ -200,3 +207,23 @@ def test_the_page_shows_all_that_was_given_and_used(tmp_path):
     # what a DC motor of the file's own does not use
     plain = {name for each in given(study_of(parse(""), tmp_path)) for name in each.names}
     assert not [name for name in plain if name.startswith(("gear.", "starter.", "monte_carlo.", "start"))]
+
+
+def test_a_current_that_an_inverter_hardly_gives_has_a_note(tmp_path):
+    """The current limit of an inverter is not in the model of the motor."""
+    none = {v.name: None for v in Layout(Answers).variables}
+    for start, currents, noted in (
+        ("inverter", (1.2, 4.5), ("jam_left",)),
+        ("inverter", (1.2, 1.4), ()),
+        ("direct", (1.2, 4.5), ()),
+    ):
+        study = study_of(parse(KNIFE.replace("[system]", f'start = "{start}"\n[system]')), tmp_path)
+        rated = study.drive.rated_current
+        for name, times in zip(("steady", "jam_left"), currents, strict=True):
+            study.answers[name] = Answers(**none | {"current_peak": times * rated})
+        remarks._on_inverter(study)
+        notes = [remark for remark in study.remarks if remark.kind == "inverter current"]
+        assert [remark.runs for remark in notes] == ([noted] if noted else [])
+        if noted:
+            assert "own current limit is not in the model" in notes[0].text and "(4.50)" in notes[0].text
+            assert notes[0].quantities["jam_left.current_peak"] == (4.5 * rated, "A")

@@ -26,7 +26,7 @@ from chainunit.study.blade import BladeAnalysis, in_stack
 from chainunit.study.choice import choose
 from chainunit.study.config import load, parse
 from chainunit.study.drive import Drive
-from chainunit.study.flywheels import FlywheelAnswers, FlywheelFindings, Wheel, least_flywheel
+from chainunit.study.flywheels import FlywheelFindings, least_flywheel
 from chainunit.study.measures import read_answers
 from chainunit.study.parts import example
 from chainunit.study.record import StudyRecord
@@ -35,6 +35,7 @@ from chainunit.study.run import run_study
 from chainunit.study.statics import statics
 from chainunit.study.stored import cutting_power
 from chainunit.study.turn import TurnAnalysis
+from chainunit.study.wheel import FlywheelAnswers, Wheel
 from chainunit.study.window import Phase, Window
 from chainunit.system import CoSimulation, energy_residual, monolithic
 from chainunit.text import entry, number
@@ -324,6 +325,8 @@ def test_a_motor_that_stalls(tmp_path):
     said = " ".join(str(remark) for remark in study.warnings)
     assert "The motor stalls under the load" in said and "nor does a larger one that was tried" in said
     assert "of the motor on average, rated is 14.4 N m" in said
+    # no flywheel is advised beside
+    assert ": a larger motor, or less load." in said
     assert "flywheel.png" not in {figure.file for figure in report(study).figures}
     assert "(given, stalls)" in said_of(study)
 
@@ -378,6 +381,41 @@ def test_no_flywheel_is_needed_where_the_motor_alone_keeps_the_fluctuation():
     found.remark(study)
     said = next(remark.text for remark in study.remarks if remark.kind == "least flywheel")
     assert said.startswith("For a fluctuation of 5.00 % no flywheel is needed; nor is it by hand. Without ")
+
+
+@pytest.mark.parametrize(
+    ("current", "start", "mean", "heavier", "ending"),
+    [
+        (0.98, 5.0, 8.0, 0.9, "the start takes 5.00 s."),
+        (1.05, 5.0, 8.0, 1.02, "still over the limit: RMS current. No flywheel that was run keeps all."),
+        (1.05, 5.0, 8.0, 0.95, "still over the limit: RMS current. 2.00 kg m² keeps all."),
+        (
+            2.61,
+            27.9,
+            20.0,
+            2.0,
+            "RMS current, time of the start, mean torque. No flywheel that was run keeps all.",
+        ),
+    ],
+)
+def test_a_flywheel_is_recommended_where_it_keeps_every_limit(current, start, mean, heavier, ending):
+    study = bare()
+    assert 8.0 < study.config.plate.nameplate.torque < 20.0
+    sound = {v.name: 0.004 for v in Layout(FlywheelAnswers).variables}
+    sizes = (1.0, 0.049, current, start), (2.0, 0.03, heavier, 6.0)
+    least, heavy = (
+        Wheel(
+            FlywheelAnswers(
+                **sound | {"flywheel": J, "speed_ripple": ripple, "current_share": share, "start_time": time}
+            ),
+            None,
+        )
+        for J, ripple, share, time in sizes
+    )
+    FlywheelFindings(2.0, 0.05, 1e3, 150.0, 0.1, mean, [heavy], least, searched=True).remark(study)
+    said = next(remark.text for remark in study.remarks if remark.kind == "least flywheel")
+    assert said.endswith(ending)
+    assert ("It is not recommended" in said) == (current > 1.0)
 
 
 def test_words_for_a_slow_start_and_a_poor_run():

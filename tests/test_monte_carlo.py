@@ -16,6 +16,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
+from command import chainunit
 
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.errors import RunError, WriteError
@@ -23,6 +24,7 @@ from chainunit.study import monte_carlo, quantiles
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 from chainunit.system import CoSimulation
+from chainunit.text import number as shown
 
 STUDY = """
 [run]
@@ -359,3 +361,25 @@ def test_an_error_in_a_process_is_not_the_files(tmp_path, monkeypatch):
     with pytest.raises(RunError, match=r"a process .* failed .*\(Too many open files\)") as failed:
         monte_carlo.run(task, tmp_path, lambda *said: None, workers=1)
     assert not isinstance(failed.value, WriteError) and "jsonl" not in str(failed.value)
+
+
+def test_question_and_answer_tell_of_random_overloads(tmp_path):
+    """A coupling that opens in most runs must not stand in a table alone."""
+    (tmp_path / "study.toml").write_text("event = []\n" + STUDY.format(runs=6))
+    done = chainunit("study", "study.toml", "-o", "out", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    result = json.loads((tmp_path / "out" / "result.json").read_text())
+    quantiles_of = result["monte_carlo"]["quantiles"]
+    opens = shown(quantiles_of["trips"]["share"]["value"], "1", "percent")
+    assert quantiles_of["trips"]["share"]["value"] > 0.0
+    (warning,) = (each for each in result["warnings"] if each["kind"] == "random overload trips")
+    assert warning["text"] == f"Overloads at random: in {opens} of them the safety coupling opens."
+    text = " ".join((tmp_path / "out" / "result.md").read_text().split())
+    question, _, answer = text.partition("## The answer")
+    assert (
+        "Then come 6 overloads at random, each by itself: a lump jams the left or the right side." in question
+    )
+    assert f"the safety coupling opens in {opens} (" in answer.partition("##")[0]
+    peak = shown(quantiles_of["crank_torque_peak"]["q50"]["value"], "N.m")
+    assert f"Of 6 overloads at random: 50 % stay below a crank torque of {peak} (" in answer
+    assert f"the safety coupling opens in {opens} (" in " ".join(done.stdout.split())

@@ -416,6 +416,11 @@ def test_a_run_whose_energy_balance_is_not_kept_is_no_verdict_on_the_motor(study
     assert motor["text"].endswith(
         "runs whose energy balance is not kept are left out (a lump jams the left side)."
     )
+    # a torque that steady running has comes in each turn
+    steady = study.answers | {"steady": dataclasses.replace(study.answers["steady"], torque_reserve=-0.3)}
+    for worst, when in ((answers, "for a moment"), (steady, "in each turn")):
+        said = as_dict(dataclasses.replace(study, answers=worst))["verdict"]["motor"]["text"]
+        assert f"no reserve of torque: {when} it passes" in said
     # with none left nothing is known of the reserve
     nothing = {name: {"energy_residual_share": math.nan} for name in certificate}
     motor = as_dict(dataclasses.replace(study, certificate=nothing))["verdict"]["motor"]

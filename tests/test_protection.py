@@ -14,6 +14,8 @@ from chainunit.drives.induction_motor import InductionMotor, steady
 from chainunit.drives.motor import T_RATED
 from chainunit.engines import MATH
 from chainunit.machines.chain_unit import SIDES
+from chainunit.report import blocks, terminal
+from chainunit.report.sizing import _best
 from chainunit.study import config, sizing
 from chainunit.study.bearings import mean_load
 from chainunit.study.coupling import coupling_sentence
@@ -22,6 +24,7 @@ from chainunit.study.judgement import motor_verdict
 from chainunit.study.protection import Obstacle, Setting, relay_trip, stall
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
+from chainunit.text import entry
 
 
 def test_a_relay_of_class_10_trips_when_its_class_says():
@@ -163,6 +166,36 @@ def test_one_sided_feed_and_a_loaded_soft_start_are_normal_duty(tmp_path, monkey
     (warning,) = [warning for warning in study.warnings if warning.kind == "gear passed"]
     assert "the gear's permitted 450 N m" in warning.text and study.called("jam_right") in warning.text
     assert warning.runs == ("jam_right",) and warning.quantities["passed"] == (450.0, "N.m")
+
+
+@pytest.mark.parametrize(
+    ("protection", "ending"),
+    [
+        ({"trip_torque": (None, "N.m")}, "; flywheel 0.300 kg m²; no safety coupling; relay at 2.45 A."),
+        ({"trip_torque": (400.0, "N.m")}, "; trip torque 400 N m; relay at 2.45 A."),
+        ({}, "; thermal relay, setting 2.45 A."),
+    ],
+)
+def test_the_protection_of_a_chosen_motor_is_told_once(protection, ending):
+    """Neither a trip torque of none, nor the relay twice where a coupling is given."""
+    relay = {"relay_current": entry(2.45, "A") | {"title": "thermal relay, setting"}}
+    source = blocks.Source(
+        {
+            "verdict": {"model": None},
+            "sizing": {
+                "candidates": [
+                    {"motor": "M", "ratio": entry(50.0, "1"), "verdict": "chosen", "reason": "it fits"}
+                ],
+                "flywheel": {"J": entry(0.3, "kg.m2") | {"title": "flywheel"}},
+                "protection": {
+                    **{name: entry(*size) | {"title": "trip torque"} for name, size in protection.items()},
+                    **relay,
+                },
+            },
+        }
+    )
+    sentence = next(each for each in _best(source, "sizing.candidates.0", "Motor") if each.form == "short")
+    assert terminal.plain_line(sentence.line).endswith(ending)
 
 
 def test_an_insufficient_motor_gets_no_advice(tmp_path, monkeypatch):

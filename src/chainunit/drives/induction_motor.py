@@ -93,16 +93,9 @@ class SoftStart:
 
 
 @declaration
-class Inverter:
+class InverterControl:
     """V/f control with slip compensation."""
 
-    on: Value = quantity(
-        "1",
-        "1: an inverter feeds the motor and follows w_ref; 0: the line does",
-        default=0.0,
-        min=0.0,
-        max=1.0,
-    )
     ramp: Value = quantity("Hz/s", "fastest change of frequency", default=50.0, above=0.0, tunable=True)
     lag: Value = quantity("s", "lag of the frequency behind what is asked", default=0.02, above=0.0)
     boost: Value = quantity(
@@ -114,6 +107,19 @@ class Inverter:
         default=0.0,
         min=0.0,
         tunable=True,
+    )
+
+
+@declaration
+class Inverter(InverterControl):
+    """The inverter and whether it feeds the motor."""
+
+    on: Value = quantity(
+        "1",
+        "1: an inverter feeds the motor and follows w_ref; 0: the line does",
+        default=0.0,
+        min=0.0,
+        max=1.0,
     )
 
 

@@ -38,9 +38,33 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         yield b.Cards(tuple(_cards(s, study, reference)))
     else:
         yield b.Text("The study ended before any run could be evaluated.", "lead", "long")
+    if study.monte_carlo is not None:
+        yield b.Text(_random(s, study))
     yield from (b.Judgement("warning", each) for each in s.lines("warnings"))
     if answers and not s.result["warnings"]:
         yield b.Text("No run gives cause for a warning.", "fine", "long")
+
+
+_LARGEST, _ENDS = (
+    "crank_torque_peak",
+    {"trips": "the safety coupling opens", "stalls": "the crank stands at the end"},
+)
+"""Of overloads at random: the peak of the answer, and what may come of a run."""
+
+
+def _random(s: b.Source, study: StudyRecord) -> Line:
+    """What overloads at random ask: the largest quantile of the crank's torque, and how often a run ends badly."""
+    quantiles = s.result["monte_carlo"]["quantiles"]
+    ends = dict(_ENDS) if study.config.coupling else {"stalls": _ENDS["stalls"]}
+    parts: list[Line] = [
+        line(f"{words} in ", s.estimate(f"monte_carlo.quantiles.{name}.share", ".low", ".high"))
+        for name, words in ends.items()
+        if name in quantiles
+    ]
+    if known := list(quantiles.get(_LARGEST, ())):
+        peak = s.estimate(f"monte_carlo.quantiles.{_LARGEST}.{known[-1]}", ".low", ".high")
+        parts.insert(0, line(f"{known[-1][1:]} % stay below a crank torque of ", peak))
+    return s.line("Of {=monte_carlo.runs} overloads at random: {parts}.", parts=joined(parts, "; "))
 
 
 def _speed(s: b.Source, study: StudyRecord, run: str) -> Line:

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..quantities import Layout
-from ..study.flywheels import FlywheelAnswers, FlywheelFindings, Wheel
+from ..study.flywheels import FlywheelFindings
 from ..study.record import StudyRecord
+from ..study.wheel import FlywheelAnswers, Wheel
 from ..text import number
 from . import blocks as b
 from . import figure as fig

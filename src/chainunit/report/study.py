@@ -80,6 +80,11 @@ def _opening(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     if names := study.overloads:
         words = "; ".join(read.title(study, name) for name in names)
         question += line(f" Then come overloads, each by itself: {words}.")
+    if study.monte_carlo is not None:
+        question += s.line(
+            " Then come {=monte_carlo.runs} overloads at random, each by itself: {event}.",
+            event=study.config.random.title,
+        )
     yield b.Text(question, form="long")
     sized, feed = "sizing" in s.result, study.config.feed
     parts = {"machine": study.drive.machine.p, "run": study.config.run}

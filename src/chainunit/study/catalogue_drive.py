@@ -10,6 +10,7 @@ import numpy as np
 
 from ..drives.catalogue import CatalogueMotor
 from ..drives.gearing import motor_side
+from ..drives.induction_motor import Inverter
 from ..engines import numpy_
 from .config import Config
 from .drive import Drive
@@ -47,10 +48,10 @@ def catalogue_drive(
         drag = (mean - float(np.mean(crank_torque)) / ratio) / speed
     soft = config.starter.soft_start if config.start == "soft" else p.soft_start
     slip_hz = (synchronous - rated_speed) * plate.poles / (4.0 * math.pi)
-    inverter = config.starter.inverter
+    control = dataclasses.asdict(config.starter.inverter)
     if follows:
-        slip = inverter.slip or slip_hz / rated_torque
-        inverter = dataclasses.replace(inverter, on=1.0, slip=slip)
+        control["slip"] = control["slip"] or slip_hz / rated_torque
+    inverter = Inverter(on=float(follows), **control)
     surroundings = p.ambient if ambient is None else dataclasses.replace(p.ambient, T=ambient)
     p = dataclasses.replace(p, soft_start=soft, inverter=inverter, ambient=surroundings)
     machine = config.machine.replace({"ratio": ratio})

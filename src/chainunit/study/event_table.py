@@ -23,7 +23,7 @@ from ..errors import Faults, InputError, near_name, refusal_prefix, shown
 from ..machines.chain_unit import SIDES
 from ..quantities import Layout, variables
 from ..reading import given_values, instance, read_table, schema, to_number
-from .event import TYPES, AnySide, Event
+from .event import TYPES, AnySide, Event, on_side
 from .events import Jam
 
 RESERVED = ("start_up", "settling", "steady", "constant", "unfinished")
@@ -63,6 +63,13 @@ class RandomEvent:
     side: AnySide
     p: Any
     ranges: Mapping[str, tuple[float, float]]
+
+    @property
+    def title(self) -> str:
+        """What happens, as in a sentence."""
+        if self.side or not self.of.sided:
+            return on_side(self.of.words, self.side)
+        return self.of.words.format(side="left or the right", other="right or the left")
 
     def draw(self, random: np.random.Generator) -> dict[str, float]:
         """Values of the quantities that are drawn, evenly from their ranges."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -13,83 +12,29 @@ import numpy as np
 import xarray as xr
 
 from ..progress import Report
-from ..quantities import Layout, Value, declaration, quantity
+from ..quantities import Layout
 from ..text import entries, entry, number
 from .analysis import Analysis, Findings
 from .choice import tune
 from .config import Config
 from .cycle import needed_inertia
 from .drive import Drive
-from .measures import Answers, read_answers, same_measure
+from .measures import Answers, read_answers
 from .record import Amount, StudyRecord
 from .rig import Rig, worst_residual
 from .shaft import remedies
 from .turn import Turn, TurnAnalysis
 from .verdict import RESIDUAL, STEADY
-from .window import Phase, Window, closes, whole_turns
+from .wheel import START_LONG, FlywheelAnswers, Wheel, over
+from .window import Phase, Window, whole_turns
 
 CLOSE = 0.03
 """Relative width below the permitted fluctuation in which that of the least flywheel lies."""
-START_LONG = 10.0
-"""Time of a start from which on it is worth a word [s]."""
 CREEPS = 0.5
 """Share of the speed that is asked for below which a machine is said to stand."""
 _TRIALS = 8
 _WORSE = 1.1
 """Times the fluctuation with a lighter flywheel from which on a heavier one is said to be worse."""
-
-
-@declaration
-class FlywheelAnswers:
-    """The drive with a flywheel, in steady running; None where the motor does not start, or stalls under the load."""
-
-    flywheel: Value = quantity("kg.m2", "flywheel, on the motor shaft")
-    inertia: Value = quantity("kg.m2", "all inertia on the motor shaft, mean of the machine's")
-    start_time: Value = same_measure("start_time")
-    speed_mean: Value = same_measure("speed_mean")
-    speed_least: Value = same_measure("speed_least")
-    speed_ripple: Value = same_measure("speed_ripple")
-    motor_ripple: Value = quantity("1", "ripple of the motor's speed, before the shaft line", kind="percent")
-    by_hand: Value = quantity("1", "ripple by hand, dE/(J w2)", kind="percent")
-    motor_torque_peak: Value = same_measure("motor_torque_peak")
-    motor_torque_rms: Value = same_measure("motor_torque_rms")
-    current_peak: Value = same_measure("current_peak")
-    current_rms: Value = same_measure("current_rms")
-    current_share: Value = same_measure("current_share")
-    supply_power_mean: Value = same_measure("supply_power_mean")
-    stored_share: Value = same_measure("stored_share")
-    stored_share_most: Value = same_measure("stored_share_most")
-    cycle_gap: Value = same_measure("cycle_gap")
-    speed_drift: Value = same_measure("speed_drift")
-    residual: Value = quantity("1", "energy residual", kind="percent")
-
-
-@dataclass(frozen=True)
-class Wheel:
-    """A flywheel with its run; `turns` are the steady ones, or where it makes none all of the run."""
-
-    answers: FlywheelAnswers
-    turns: xr.Dataset
-
-    @property
-    def flywheel(self) -> float:
-        """[kg m2]"""
-        return float(self.answers.flywheel)
-
-    @property
-    def stalls(self) -> bool:
-        """Whether the machine starts, and then stands or creeps under its load."""
-        return self.answers.start_time is not None and self.answers.speed_ripple is None
-
-    @property
-    def settled(self) -> bool:
-        """Whether its turns close."""
-        return closes(self.answers.cycle_gap or 0.0, self.answers.speed_drift or 0.0)
-
-    def keeps(self, permitted: float) -> bool:
-        """Whether it runs steadily, not on the way to a stall, and keeps the `permitted` fluctuation."""
-        ripple = self.answers.speed_ripple
-        return ripple is not None and ripple <= permitted and self.settled
 
 
 @dataclass
@@ -115,6 +60,10 @@ class FlywheelFindings(Findings):
     def by_hand(self, flywheel: float) -> float:
         """Fluctuation with that flywheel [kg m2] where the drive gives a constant torque."""
         return self.swing / ((self.bare + flywheel) * self.speed * self.speed)
+
+    def permits(self, wheel: Wheel) -> bool:
+        """Whether a flywheel keeps the fluctuation and passes no other limit."""
+        return wheel.keeps(self.permitted) and not wheel.passed
 
     @property
     def flywheel_by_hand(self) -> float:
@@ -329,15 +278,11 @@ class Trouble:
         return f"{size} ({number(*self.amount(wheel))})" if self.number else size
 
 
-def _over(answer: float | None, limit: float) -> bool:
-    return answer is not None and answer > limit
-
-
 _TROUBLES = (
     Trouble(
         "flywheel stalls",
         lambda wheel, rated: wheel.stalls,
-        "the motor stalls under the load with a flywheel of {where}: a larger motor or flywheel, or less load.",
+        "the motor stalls under the load with a flywheel of {where}: {remedy}, or less load.",
     ),
     Trouble(
         "flywheel does not start",
@@ -346,13 +291,13 @@ _TROUBLES = (
     ),
     Trouble(
         "rated current",
-        lambda wheel, rated: _over(wheel.answers.current_rms, rated),
+        lambda wheel, rated: over(wheel.answers.current_rms, rated),
         "the RMS current passes the rated {rated}, so that the motor becomes too hot, with a flywheel of {where}.",
         "current_rms",
     ),
     Trouble(
         "long start",
-        lambda wheel, rated: _over(wheel.answers.start_time, START_LONG),
+        lambda wheel, rated: over(wheel.answers.start_time, START_LONG),
         "the start takes more than {long} with a flywheel of {where}.",
         "start_time",
     ),
@@ -375,7 +320,9 @@ def _on_wheels(found: FlywheelFindings, study: StudyRecord) -> None:
     """A warning for each kind of trouble, with all flywheels that have it; the study warns of its own."""
     plate = study.config.plate
     rated = math.inf if plate is None else plate.nameplate.rated_current
-    if plate is not None and found.mean_torque > plate.nameplate.torque:
+    too_small = plate is not None and found.mean_torque > plate.nameplate.torque
+    remedy = "a larger motor" if too_small else "a larger motor or flywheel"
+    if plate is not None and too_small:
         study.warn(
             "motor too small",
             "the load takes {mean} of the motor on average, rated is {rated}: a larger motor helps, no flywheel "
@@ -394,7 +341,7 @@ def _on_wheels(found: FlywheelFindings, study: StudyRecord) -> None:
             }
             where = ", ".join(map(trouble.words, wheels))
             words = {name: number(*part, full=False) for name, part in parts.items()}
-            study.warn(trouble.kind, trouble.text, where=where, **words, **amounts)
+            study.warn(trouble.kind, trouble.text, where=where, remedy=remedy, **words, **amounts)
 
 
 def _on_fluctuation(found: FlywheelFindings, study: StudyRecord) -> None:
@@ -423,7 +370,7 @@ def _on_fluctuation(found: FlywheelFindings, study: StudyRecord) -> None:
         _on_line(found, study)
     _on_heavier(found, study)
     if found.least is not None:
-        _on_least(found, found.least, partial(study.note, "least flywheel"))
+        _on_least(found, found.least, study)
 
 
 def _on_line(found: FlywheelFindings, study: StudyRecord) -> None:
@@ -460,7 +407,8 @@ def _on_heavier(found: FlywheelFindings, study: StudyRecord) -> None:
         study.warn("heavier flywheel worse", text, where=where, **amounts)
 
 
-def _on_least(found: FlywheelFindings, least: Wheel, note: Callable[..., None]) -> None:
+def _on_least(found: FlywheelFindings, least: Wheel, study: StudyRecord) -> None:
+    """The least flywheel that keeps the fluctuation; it is no recommendation where another limit stays passed."""
     a, by_hand, close = least.answers, found.flywheel_by_hand, number(CLOSE, "1", "percent")
     text = (
         f"A fluctuation of {{permitted}} takes a flywheel of {{flywheel}} at least, found to {close} of it; "
@@ -483,7 +431,17 @@ def _on_least(found: FlywheelFindings, least: Wheel, note: Callable[..., None]) 
     known = {name: part for name, part in parts.items() if part[1][0] is not None}
     beside = "With it" if least.flywheel else "Without"
     text += f". {beside} {', '.join(words for words, _ in known.values())}."
-    note(
+    plate = study.config.plate
+    too_small = plate is not None and found.mean_torque > plate.nameplate.torque
+    if passed := [*least.passed, *(["mean torque"] if too_small else [])]:
+        fit = None if too_small else next((w for _, w, _ in found.rows if found.permits(w)), None)
+        text += " It is not recommended; still" if least.flywheel else " Still"
+        text += f" over the limit: {', '.join(passed)}."
+        text += (
+            f" {number(fit.flywheel, 'kg.m2')} keeps all." if fit else " No flywheel that was run keeps all."
+        )
+    study.note(
+        "least flywheel",
         text,
         permitted=(found.permitted, "1", "percent"),
         flywheel=(least.flywheel, "kg.m2"),

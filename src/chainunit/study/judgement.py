@@ -129,8 +129,9 @@ def motor_verdict(study: StudyRecord) -> dict[str, Any] | None:
         text += f"; least reserve of torque {number(reserve, '1', 'percent')} ({study.called(run)})"
     else:
         over = number(-reserves[run], "1", "percent") + (" or more" if reserves[run] <= -1.0 else "")
+        when = "in each turn" if run == STEADY else "for a moment"
         text += (
-            f"; no reserve of torque: for a moment it passes the largest torque of a steady state by {over} "
+            f"; no reserve of torque: {when} it passes the largest torque of a steady state by {over} "
             f"({study.called(run)})"
         )
     if left_out:

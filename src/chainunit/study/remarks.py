@@ -69,6 +69,7 @@ def conclude(study: StudyRecord) -> None:
     if config.coupling is not None and STEADY in study.answers:
         remark_on_coupling(study, config.coupling.trip_torque)
     _on_runs(study)
+    _on_inverter(study)
     _on_random_overloads(study)
     _on_assumptions(study)
     if study.statics.torsion is not None:
@@ -284,8 +285,50 @@ def _happenings(study: StudyRecord, name: str) -> Iterator[tuple[str, str, dict[
         yield "not recovered", "", {}
 
 
+_SHORT_TIME = 1.5
+"""Times the rated current that an inverter gives for a short time; few give twice."""
+
+
+def _on_inverter(study: StudyRecord) -> None:
+    """The runs whose current an inverter hardly gives: its own limit is not in the model of the motor."""
+    rated = study.drive.rated_current
+    if rated is None or study.config.start != "inverter":
+        return
+    runs = {name: a.current_peak for name, a in (("start_up", study.start), *study.answers.items()) if a}
+    high = {name: peak for name, peak in runs.items() if peak is not None and peak > _SHORT_TIME * rated}
+    if high:
+        where = (f"{study.called(name)} ({number(peak / rated, '1')})" for name, peak in high.items())
+        study.note(
+            "inverter current",
+            "The inverter's own current limit is not in the model, and usual ones give {limit} to 2 times the rated "
+            "current of their motor for a short time. Take one for the peak current, or the motor gives less torque "
+            "than here. Times the rated {rated}: {where}.",
+            *high,
+            limit=f"{_SHORT_TIME:g}",
+            rated=(rated, "A"),
+            where="; ".join(where),
+            **{f"{name}.current_peak": (peak, "A") for name, peak in high.items()},
+        )
+
+
+_SPOILED = {
+    "trips": "in {share} of them the safety coupling opens",
+    "stalls": "in {share} of them the crank stands at the end",
+}
+"""What a run of a random overload may end in, by its quantity."""
+
+
 def _on_random_overloads(study: StudyRecord) -> None:
     random, note = study.monte_carlo, study.note
+    shares = random.quantiles() if random else {}
+    for name, words in _SPOILED.items():
+        ended = shares.get(name, {}).get("share")
+        if ended is not None and ended.value > 0.0:
+            study.warn(
+                f"random overload {name}",
+                f"overloads at random: {words}.",
+                share=(ended.value, "1", "percent"),
+            )
     if random and random.remark:
         note("too few runs", "overloads at random: {text}", text=random.remark)
     if random and random.left_out:
@@ -369,8 +412,9 @@ def _on_shaft(study: StudyRecord) -> None:
         warn(
             "control near line",
             "The speed loop crosses over at {crossover}, near {antiresonance}, at which the machine swings on the "
-            "shafts against a motor that stands: its margins are those of a rigid drive and do not hold here, "
-            "control and shaft disturb each other; lower the gains or stiffen the line.",
+            "shafts against a motor that stands: its margins are those of a rigid drive and do not hold here. A "
+            "stiffer line parts the two. Lower gains do, too, but the control also damps the torsion, and what they "
+            "make of the peaks is for a run to tell.",
             crossover=(fastest, "rad/s"),
             antiresonance=(modes.antiresonance, "rad/s"),
             **ends,

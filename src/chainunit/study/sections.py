@@ -12,7 +12,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool, 
 
 from ..drives.driveline import Mounted
 from ..drives.gearing import KINDS, Transmission
-from ..drives.induction_motor import Inverter, SoftStart
+from ..drives.induction_motor import InverterControl, SoftStart
 from ..drives.line_table import Damping, form, line_values
 from ..drives.motor import Motor
 from ..machines.chain_organs import LEAST, MOST, OrganLaw
@@ -165,10 +165,10 @@ class FlywheelTable:
 
 @declaration
 class Starter:
-    """How an induction motor is started, where `start` is "soft" or "inverter"."""
+    """How an induction motor is started, where `start` is "soft" or "inverter"; `start` alone says which feeds it."""
 
     soft_start: SoftStart = group(SoftStart, "soft starter", default=SoftStart(voltage=0.5, time=1.0))
-    inverter: Inverter = group(Inverter, "inverter", default=Inverter())
+    inverter: InverterControl = group(InverterControl, "inverter", default=InverterControl())
 
 
 @declaration

@@ -1,0 +1,79 @@
+"""A drive with one of the flywheels that a study compares: its answers and the limits that it keeps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import xarray as xr
+
+from ..quantities import Value, declaration, quantity
+from .measures import same_measure
+from .window import closes
+
+START_LONG = 10.0
+"""Time of a start from which on it is worth a word [s]."""
+
+
+def over(answer: float | None, limit: float) -> bool:
+    """Whether an answer is known and above a limit."""
+    return answer is not None and answer > limit
+
+
+@declaration
+class FlywheelAnswers:
+    """The drive with a flywheel, in steady running; None where the motor does not start, or stalls under the load."""
+
+    flywheel: Value = quantity("kg.m2", "flywheel, on the motor shaft")
+    inertia: Value = quantity("kg.m2", "all inertia on the motor shaft, mean of the machine's")
+    start_time: Value = same_measure("start_time")
+    speed_mean: Value = same_measure("speed_mean")
+    speed_least: Value = same_measure("speed_least")
+    speed_ripple: Value = same_measure("speed_ripple")
+    motor_ripple: Value = quantity("1", "ripple of the motor's speed, before the shaft line", kind="percent")
+    by_hand: Value = quantity("1", "ripple by hand, dE/(J w2)", kind="percent")
+    motor_torque_peak: Value = same_measure("motor_torque_peak")
+    motor_torque_rms: Value = same_measure("motor_torque_rms")
+    current_peak: Value = same_measure("current_peak")
+    current_rms: Value = same_measure("current_rms")
+    current_share: Value = same_measure("current_share")
+    supply_power_mean: Value = same_measure("supply_power_mean")
+    stored_share: Value = same_measure("stored_share")
+    stored_share_most: Value = same_measure("stored_share_most")
+    cycle_gap: Value = same_measure("cycle_gap")
+    speed_drift: Value = same_measure("speed_drift")
+    residual: Value = quantity("1", "energy residual", kind="percent")
+
+
+@dataclass(frozen=True)
+class Wheel:
+    """A flywheel with its run; `turns` are the steady ones, or where it makes none all of the run."""
+
+    answers: FlywheelAnswers
+    turns: xr.Dataset
+
+    @property
+    def flywheel(self) -> float:
+        """[kg m2]"""
+        return float(self.answers.flywheel)
+
+    @property
+    def stalls(self) -> bool:
+        """Whether the machine starts, and then stands or creeps under its load."""
+        return self.answers.start_time is not None and self.answers.speed_ripple is None
+
+    @property
+    def settled(self) -> bool:
+        """Whether its turns close."""
+        return closes(self.answers.cycle_gap or 0.0, self.answers.speed_drift or 0.0)
+
+    @property
+    def passed(self) -> list[str]:
+        """Limits of motor and start that its run passes, in words."""
+        a = self.answers
+        sizes = ("RMS current", a.current_share, 1.0), ("time of the start", a.start_time, START_LONG)
+        return [words for words, size, limit in sizes if over(size, limit)]
+
+    def keeps(self, permitted: float) -> bool:
+        """Whether it runs steadily, not on the way to a stall, and keeps the `permitted` fluctuation."""
+        ripple = self.answers.speed_ripple
+        return ripple is not None and ripple <= permitted and self.settled
