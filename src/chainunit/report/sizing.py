@@ -81,7 +81,7 @@ def _best(s: b.Source, path: str, word: str) -> Iterator[b.Block]:
             size = s.number(f"sizing.{section}.{leading}", none="none")
             cards.append(b.Card(section, ((size, title),)))
             sentence += line("; no safety coupling" if size.value is None else line(f"; {title} ", size))
-    if leading not in (None, "relay_current"):
+    if leading != "relay_current" and "relay_current" in s.result["sizing"].get("protection", {}):
         sentence += s.line("; relay at {sizing.protection.relay_current}")
     yield b.Cards(tuple(cards))
     model = s.result["verdict"]["model"]
