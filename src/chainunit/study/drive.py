@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -306,10 +306,14 @@ class Drive:
         )
 
     def export(
-        self, folder: Path, backend: Backend | None = None
+        self,
+        folder: Path,
+        backend: Backend | None = None,
+        report: Callable[[str], None] = lambda what: None,
     ) -> tuple[dict[str, Path], dict[str, Origin]]:
-        """Write the FMUs, with these start values; returns files by component, and how they were made."""
-        exported, origins = export(self.graph, folder, backend)
+        """Write the FMUs, with these start values; returns files by component, and how they were made. `report` is
+        called with what is done."""
+        exported, origins = export(self.graph, folder, backend, report)
         return {name: c.file for name, c in exported.components.items() if c.file}, origins
 
     def export_machine(self, folder: Path, backend: Backend | None = None) -> Path:

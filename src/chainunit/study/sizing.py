@@ -12,6 +12,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -217,10 +218,14 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
         report(f"co-simulating {motor.designation}", float(k), float(len(strong)))
         candidate = proposed(config, motor, duty)
         if not files:
-            files, _ = candidate.drive.export(folder, backend)
+            files, _ = candidate.drive.export(folder, backend, partial(_exporting, report))
         candidates.append(with_flywheel(config, candidate, duty, files))
     rank(candidates)
     return SizingResult(config, duty, candidates, notes, len(motors), len(motors) - len(strong))
+
+
+def _exporting(report: Report, what: str) -> None:
+    report(what, 0.0, 1.0)
 
 
 def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[str, Path]) -> Candidate:

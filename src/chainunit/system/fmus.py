@@ -22,7 +22,8 @@ def export(
 
     Returns
     -------
-    the system of these files, and how each component's was made.
+    the system of these files, and how each component's was made. `report` is called with the model and what is done
+    with it.
     """
     components: dict[str, Component] = {}
     origins: dict[str, Origin] = {}
@@ -34,8 +35,15 @@ def export(
                 file = folder / f"{model.name}.fmu"
                 if file in files.values():
                     file = folder / f"{model.name}_{name}.fmu"
-                origins[name] = export_fmu(model, file, component.start, backend=backend, report=report)
+                said = _of_model(model.name, report)
+                said("exporting")
+                origins[name] = export_fmu(model, file, component.start, backend=backend, report=said)
                 files[model] = file
             component = replace(component, file=files[model])
         components[name] = component
     return replace(system, components=components), origins
+
+
+def _of_model(name: str, report: Callable[[str], None]) -> Callable[[str], None]:
+    """A report that names the model."""
+    return lambda what: report(f"{name}: {what}")
