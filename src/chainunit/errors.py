@@ -14,7 +14,7 @@ from typing import Any
 class InputError(ValueError):
     """A value of the user is outside its allowed range; the message is one line.
 
-    `key` is the full name of what is refused, as its file has it; `faults` are the refusals of which it consists,
+    `key` is the full name of the refused value, as its file has it; `faults` are the refusals of which it consists,
     where it stands for several: its message has a line for each.
     """
 

@@ -311,7 +311,7 @@ def read(file: Path | None, example: Callable[[], str], parse: Callable[[str, st
 
 @contextmanager
 def in_file(source: str, lines_of: Callable[[], Mapping[str, int]]) -> Iterator[None]:
-    """Name the file `source`, and the line of what is refused, before each line of an InputError; `lines_of` gives
+    """Name the file `source`, and the line of the refused key, before each line of an InputError; `lines_of` gives
     the lines of its keys."""
     try:
         yield

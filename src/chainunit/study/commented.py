@@ -58,7 +58,7 @@ def _absent(present: set[str], machine: str) -> Iterable[KeyTable]:
 
 
 def _comment(lines: list[str], statement: Statement, keys: dict[str, Key]) -> None:
-    """Put the meaning of what a statement sets behind it, where its line has no comment."""
+    """Put the meaning of each key that a statement sets behind it, where its line has no comment."""
     meanings = [keys[name].description for name in statement.keys if name in keys]
     line = lines[statement.line - 1]
     if meanings and "#" not in line:

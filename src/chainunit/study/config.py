@@ -35,6 +35,7 @@ from .sections import (
     ChainOrgans,
     Coupling,
     Driveline,
+    FileSection,
     FlywheelTable,
     ForeignMotor,
     MonteCarlo,
@@ -233,18 +234,7 @@ def _config(
 ) -> Config:
     """The study of a file whose values are each allowed."""
     sections, faults = parts.sections, Faults()
-    tables: dict[str, dict[str, Any]] = {}
-    for name, section in sections.items():
-        tables[name] = {}
-        with faults.collected():
-            tables[name] = section.values(getattr(checked, name))
-    values = {
-        name: Layout(section.declared).from_names(
-            {key: x for key, x in tables[name].items() if key in Layout(section.declared).names},
-            section.default,
-        )
-        for name, section in sections.items()
-    }
+    tables, values = _read_sections(sections, checked, faults)
     faults.add(check_order(values, sections))
     of_study = {name: values[name] for name in ("feed", "run", "monte_carlo", "gear", "starter", "torsion")}
     of_study |= {
@@ -304,6 +294,22 @@ def _config(
     faults.add(_endless(config))
     faults.refuse()
     return config
+
+
+def _read_sections(
+    sections: Mapping[str, FileSection], checked: Any, faults: Faults
+) -> tuple[dict[str, dict[str, Any]], dict[str, Any]]:
+    """By table, all that the file gives, and the declared quantities with those that it leaves out."""
+    tables: dict[str, dict[str, Any]] = {}
+    values = {}
+    for name, section in sections.items():
+        tables[name] = {}
+        with faults.collected():
+            tables[name] = section.values(getattr(checked, name))
+        layout = Layout(section.declared)
+        own = {key: x for key, x in tables[name].items() if key in layout.names}
+        values[name] = layout.from_names(own, section.default)
+    return tables, values
 
 
 def _choices(checked: Any, parts: Parts) -> dict[str, Any]:

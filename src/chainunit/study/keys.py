@@ -57,7 +57,7 @@ class Key:
 
     @property
     def unit(self) -> str:
-        """The declared unit, empty of a pure number and of what is no quantity."""
+        """The declared unit, empty of a pure number, a text and a switch."""
         return "" if self.variable is None or self.variable.unit == "1" else self.variable.unit
 
     @property
