@@ -111,8 +111,8 @@ class InverterControl:
 
 
 @declaration
-class Inverter(InverterControl):
-    """The inverter and whether it feeds the motor."""
+class InverterSwitch:
+    """Whether an inverter feeds the motor."""
 
     on: Value = quantity(
         "1",
@@ -121,6 +121,11 @@ class Inverter(InverterControl):
         min=0.0,
         max=1.0,
     )
+
+
+@declaration
+class Inverter(InverterControl, InverterSwitch):
+    """The inverter; its switch is the first of its variables."""
 
 
 @declaration
