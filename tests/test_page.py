@@ -584,7 +584,7 @@ def test_a_long_study_is_thinned_out(study, monkeypatch):
     assert sum(counts) < 60 and min(counts) > 5
 
 
-def test_sizing_is_shown_after_the_answer(study):
+def test_the_drive_stands_first_with_its_shares(study):
     result = {**as_dict(study), "sizing": SIZING}
     text = page_of(study, result)
     reader = Reader(text)
@@ -601,6 +601,10 @@ def test_sizing_is_shown_after_the_answer(study):
     assert "0.37 kW &lt;IE3&gt;" in text
     # in the order of sizing, which ranked them: chosen, fits, rejected
     ratios = [p for p in paths if p.endswith(".ratio") and "candidates" in p]
+    first = text[text.index('id="answer"') : text.index('id="sizing"')]
+    assert first.index('class="large') < first.index('data-path="verdict.model.text"')
+    shares = re.findall(r'data-path="sizing.candidates.0.checks.(\w+).utilisation"', first)
+    assert shares == list(SIZING["candidates"][0]["checks"])
     assert ratios[1:] == [f"sizing.candidates.{i}.ratio" for i in (0, 1, 2)]
     over = re.findall(r"<strong><data[^>]*>([^<]*)", text[text.index('class="candidates"') :])
     assert over == ["▲ 131\u00a0"]

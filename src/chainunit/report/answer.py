@@ -8,6 +8,7 @@ from ..study.measures import MEASURES
 from ..study.record import StudyRecord
 from . import blocks as b
 from . import run_names as read
+from . import sizing
 from .lines import Line, Strong, joined, line
 from .runs import number
 
@@ -15,7 +16,8 @@ _HOLDS: dict[str, b.Severity] = {"true": "good", "in part": "partly", "false": "
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
-    """Verdicts, cards and warnings."""
+    """The drive that was found, verdicts, cards and warnings."""
+    yield from sizing.answer(s)
     for of in ("model", "motor"):
         verdict = s.result["verdict"][of]
         if verdict is not None:

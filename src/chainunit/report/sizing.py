@@ -8,11 +8,60 @@ from typing import Any
 from ..study.record import StudyRecord
 from ..study.sizing import Standing
 from . import blocks as b
-from .lines import Aside, Line, Strong, capital, line, spoken
+from .lines import Aside, Line, Number, Strong, capital, line, spoken
 
 _NAMED = 5  # of the candidates that do not fit; the table has all
 _SIGN = {Standing.CHOSEN: "✓", Standing.FITS: "○", Standing.INSUFFICIENT: "✗", Standing.REJECTED: "✗"}
 _SEVERITY: dict[str, b.Severity] = {Standing.CHOSEN: "good", Standing.FITS: "partly"}
+
+
+def answer(s: b.Source) -> Iterator[b.Block]:
+    """The motor that all runs are with, its gear, flywheel and protection, large; beside them the share of each limit
+    that it takes."""
+    path = _best_path(s)
+    if path is None:
+        return
+    motor, ratio = s.words(f"{path}.motor"), s.number(f"{path}.ratio", digits=4, given=True)
+    cards = [
+        b.Card("Motor", ((motor, str(b.at(s.result, f"{path}.verdict"))),)),
+        b.Card("Gear ratio", ((ratio, "motor turns per crank turn"),)),
+        *(
+            b.Card(capital(name), ((size, title),), tuple(_relay(s)) if name == "protection" else ())
+            for name, title, size in _sizes(s)
+        ),
+    ]
+    yield b.Cards(tuple(cards))
+    checks = b.at(s.result, f"{path}.checks")
+    rows = tuple(
+        b.TableRow((capital(check.get("title", spoken(name))), _check(s, f"{path}.checks.{name}")))
+        for name, check in checks.items()
+    )
+    if rows:
+        title = "Share of each limit that the drive takes; a line in the bar is the limit"
+        yield b.Table(rows, b.heads("check", "share"), title=title, numeric=False, form="long")
+
+
+def _best_path(s: b.Source) -> str | None:
+    """Where the motor stands that all runs are with."""
+    section = s.result.get("sizing", {})
+    best = section.get("nearest") if section.get("chosen") is None else section["chosen"]
+    return None if best is None else f"sizing.candidates.{best}"
+
+
+def _sizes(s: b.Source) -> Iterator[tuple[str, str, Number]]:
+    """The number that stands for the flywheel, and for the protection: section, title, size."""
+    for section in ("flywheel", "protection"):
+        leading = _leading(s.result["sizing"].get(section))
+        if leading:
+            title = s.result["sizing"][section][leading].get("title", spoken(leading))
+            yield section, title, s.number(f"sizing.{section}.{leading}", none="none")
+
+
+def _relay(s: b.Source) -> Iterator[Line]:
+    """The setting of the relay, where another number stands for the protection."""
+    protection = s.result["sizing"].get("protection", {})
+    if "relay_current" in protection and _leading(protection) != "relay_current":
+        yield s.line("relay at {sizing.protection.relay_current}")
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
@@ -20,8 +69,8 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     if "sizing" not in s.result:
         return
     section = s.result["sizing"]
-    choice, nearest, candidates = (section.get(name) for name in ("chosen", "nearest", "candidates"))
-    best = nearest if choice is None else choice
+    choice, candidates = section.get("chosen"), section.get("candidates")
+    best = _best_path(s)
     if choice is None and candidates:
         reasons = (
             line(
@@ -34,9 +83,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         words = Strong("No candidate fits, because")
         yield b.Judgement("alarm", words, items=tuple(reasons), form="long")
     if best is not None:
-        yield from _best(
-            s, f"sizing.candidates.{best}", "Motor" if choice is not None else "Insufficient motor"
-        )
+        yield from _best(s, best, "Motor" if choice is not None else "Insufficient motor")
     if "coupling" in section.get("protection", {}):
         yield b.Text(s.words("sizing.protection.coupling"))
     yield from (b.Text(each, form="long") for each in s.lines("sizing.notes"))
@@ -67,23 +114,12 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
 
 
 def _best(s: b.Source, path: str, word: str) -> Iterator[b.Block]:
-    """The motor that all runs are with, large and in a sentence."""
-    motor, ratio = s.words(f"{path}.motor"), s.number(f"{path}.ratio", digits=4, given=True)
-    cards = [
-        b.Card("Motor", ((motor, str(b.at(s.result, f"{path}.verdict"))),)),
-        b.Card("Gear ratio", ((ratio, "motor turns per crank turn"),)),
-    ]
-    sentence = line(f"{word}: ", motor, ", ratio ", ratio)
-    for section in ("flywheel", "protection"):
-        leading = _leading(s.result["sizing"].get(section))
-        if leading:
-            title = s.result["sizing"][section][leading].get("title", spoken(leading))
-            size = s.number(f"sizing.{section}.{leading}", none="none")
-            cards.append(b.Card(section, ((size, title),)))
-            sentence += line("; no safety coupling" if size.value is None else line(f"; {title} ", size))
-    if leading != "relay_current" and "relay_current" in s.result["sizing"].get("protection", {}):
-        sentence += s.line("; relay at {sizing.protection.relay_current}")
-    yield b.Cards(tuple(cards))
+    """The motor that all runs are with, in a sentence."""
+    ratio = s.number(f"{path}.ratio", digits=4, given=True)
+    sentence = line(f"{word}: ", s.words(f"{path}.motor"), ", ratio ", ratio)
+    for _, title, size in _sizes(s):
+        sentence += line("; no safety coupling" if size.value is None else line(f"; {title} ", size))
+    sentence = line(sentence, *(line("; ", relay) for relay in _relay(s)))
     model = s.result["verdict"]["model"]
     doubt = s.line(" ({verdict.model.caveat})") if model is not None and model["caveat"] else ()
     why = "Chosen: " if word == "Motor" else "Insufficient: "
