@@ -21,7 +21,7 @@ LAYERS = (
 )
 """From above to below; a package imports from its own row and from the rows below. `fmu` stands beside them on
 `core`, and serves `system` and all above."""
-HOMES = {"__main__": "cli", "cli": "cli", "models": "system"}
+HOMES = {"__main__": "cli", "cli": "cli", "studies": "cli", "models": "system"}
 """Layer of a module or folder whose name is not that of its layer; any other module beside the folders is `core`."""
 
 

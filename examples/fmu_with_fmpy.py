@@ -16,14 +16,19 @@ from chainunit.fmu.export import export
 folder = tempfile.TemporaryDirectory()
 file = export(ChamberForces, Path(folder.name) / "ChamberForces.fmu", {"ratio": 50.0})
 
+# %% [markdown]
+# fmpy warns of an input that it is not given: each has a column, at its start value where nothing else is said.
+
 # %%
 speed = 150.0  # rad/s of the motor
 turn = 2.0 * np.pi * 50.0 / speed
 time = np.linspace(0.0, turn, 201)
-motion = np.array(
-    list(zip(time, speed * time, np.full_like(time, speed), strict=True)),
-    dtype=[("time", float), ("phi", float), ("w", float)],
-)
+variables = fmpy.read_model_description(str(file)).modelVariables
+inputs = {"time": time} | {v.name: float(v.start) for v in variables if v.causality == "input"}
+inputs |= {"phi": speed * time, "w": speed}
+motion = np.zeros(len(time), [(name, float) for name in inputs])
+for name, values in inputs.items():
+    motion[name] = values
 result = fmpy.simulate_fmu(
     str(file),
     stop_time=turn,

@@ -1,8 +1,11 @@
-"""The study files of `examples/` say what their titles promise; run by the command line, as a user does."""
+"""The study files of `examples/` say what their titles promise; run by the command line, as a user does. The scripts
+run without a warning, of Python or of an importer."""
 
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -88,3 +91,13 @@ def test_chains_run_near_their_resonance():
     resonance = float(loaded.machine.chain_modes(loaded.feed.left, loaded.feed.right).frequency[0])
     assert 0.7 * resonance < loaded.run.crank_speed < 0.9 * resonance
     assert loaded.chain.sweep_lowest < 0.5 * resonance and loaded.chain.sweep_highest > 2.0 * resonance
+
+
+@pytest.mark.parametrize("script", sorted(EXAMPLES.glob("*.py")), ids=lambda script: script.stem)
+def test_the_scripts_run_without_a_warning(script, tmp_path):
+    command = [sys.executable, "-W", "error", script]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    # fmpy prints its warnings
+    said = done.stdout + done.stderr
+    assert done.stdout and "warning" not in said.lower() and not list(tmp_path.iterdir())

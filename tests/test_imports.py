@@ -36,7 +36,7 @@ def test_imports_no_more_than_is_needed(code, needed):
 
 
 def test_public_names():
-    assert {"ChainUnitMachine", "ChamberForces", "SideLoads", "InputError"} <= set(chainunit.__all__)
+    assert {"Study", "ChainUnitMachine", "ChamberForces", "SideLoads", "InputError"} <= set(chainunit.__all__)
     for name in chainunit.__all__:
         assert getattr(chainunit, name) is getattr(chainunit, name) and name in dir(chainunit)
     assert chainunit.__version__ == metadata.version("chainunit")

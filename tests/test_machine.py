@@ -15,6 +15,7 @@ from chainunit.machines import api, machine
 from chainunit.machines.api import machine_of
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.machines.flexible import flexible
+from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.machines.machine import Machine
 from chainunit.models import MACHINES
 from chainunit.quantities import Layout
@@ -132,3 +133,17 @@ def test_a_machine_derived_from_the_chain_unit_is_one(monkeypatch):
     assert isinstance(machine, ChainUnitMachine) and machine.model is OtherUnit and machine.ratio == 20.0
     assert machine.loaded_sides(OtherUnit.Feed()) == OtherUnit.sides == ("left", "right")
     assert machine.slack_speed() == ChainUnitMachine(ratio=20.0).slack_speed()
+
+
+def test_a_machine_shows_the_call_that_makes_it():
+    assert repr(ChainUnitMachine()) == "ChainUnitMachine()"
+    machine = ChainUnitMachine({"crank.m": 35.0}, r=0.16)
+    assert repr(machine) == 'ChainUnitMachine({"r": 0.16, "crank.m": 35})'
+    assert eval(repr(machine)).p == machine.p
+    knife = Machine(KnifeDrive, {"knife.m": 90.0}, ratio=10.0)
+    assert repr(knife) == 'Machine(KnifeDrive, {"knife.m": 90, "ratio": 10})'
+    assert eval(repr(knife)).p == knife.p
+    other = type("OtherUnit", (ChamberForces,), {})
+    assert repr(ChainUnitMachine(model=other)) == "ChainUnitMachine(model=OtherUnit)"
+    # a length that is off by rounding is no change
+    assert repr(ChainUnitMachine(r=0.15000000000000002)) == "ChainUnitMachine()"

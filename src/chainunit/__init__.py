@@ -1,7 +1,7 @@
 """Forces in a chain unit, as Python and as FMUs.
 
-``ChainUnitMachine`` is the machine for scripts and sweeps; ``ChamberForces`` and ``DcMotor`` are the models
-that become FMUs; the command ``chainunit study`` runs the main job.
+``Study`` runs a machine with its motor, as the command ``chainunit study`` does; ``ChainUnitMachine`` is the machine
+alone, for scripts and sweeps; ``ChamberForces`` is its model, which becomes an FMU.
 """
 
 from importlib import import_module
@@ -17,12 +17,15 @@ __all__ = [
     "InputError",
     "RunError",
     "SideLoads",
+    "Study",
+    "StudyResult",
     "__version__",
 ]
 
 if TYPE_CHECKING:
     from .machines.api import EMPTY, ChainUnitMachine
     from .machines.chain_unit import ChamberForces, SideLoads
+    from .studies import Study, StudyResult
 
     __version__: str
 else:
@@ -32,6 +35,8 @@ else:
         "ChainUnitMachine": ".machines.api",
         "ChamberForces": ".machines.chain_unit",
         "SideLoads": ".machines.chain_unit",
+        "Study": ".studies",
+        "StudyResult": ".studies",
     }
 
     def __getattr__(name):

@@ -19,7 +19,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from .errors import InputError, InterruptedRunError, RunError, WriteError, printable
-from .files import claimed, full, leftovers
+from .files import claimed, clear, full
 
 if TYPE_CHECKING:
     from .report.blocks import Report
@@ -148,37 +148,22 @@ def study(
         print(commented(text) if example is Example.full else f"#:schema {FILE}\n{text}", end="")
         return
     loaded = _study_file(config)
-    from .reading import in_file
-    from .study.choice import check_files
+    from .report import results
+    from .report import study as contents
 
-    # before anything of an earlier run is taken away
-    with in_file(loaded.source, lambda: loaded.lines):
-        check_files(loaded)
     with claimed(output):
-        from .report import files, series
-        from .report import study as contents
-        from .study.record import LOAD_CYCLE
-        from .study.run import run_study
-
-        _clear(output, *files.names("result", contents.PICTURES), series.SERIES, LOAD_CYCLE)
         errors = _console(stderr=True)
-        with (
-            in_file(loaded.source, lambda: loaded.lines),
-            _progress("the machine at constant speed", errors) as progress,
-        ):
-            result = run_study(
+        with _progress("the machine at constant speed", errors) as progress:
+            record = results.compute(
                 loaded, output, progress, check=check, backend=backend.value if backend else None
             )
-        report = contents.report(result)
-        numbers, *others = files.writers(report, output, "result")
-        unwritten = _leave(
-            report, (numbers, lambda: series.write(result, output), *others), remarks=not errors.is_terminal
-        )
-    if result.failure is not None:
-        _stopped_early(result.failure, output, errors)
+        report = contents.report(record)
+        unwritten = _leave(report, results.writers(record, report, output), remarks=not errors.is_terminal)
+    if record.failure is not None:
+        _stopped_early(record.failure, output, errors)
     if unwritten is not None:
         raise unwritten
-    if result.insufficient:
+    if record.insufficient:
         errors.print("No motor of the catalogue fits; all is run with the nearest, which is insufficient.")
         raise typer.Exit(1)
 
@@ -189,15 +174,9 @@ def _leave(
     """Write all files of a report and show it; returns the error of the first file that there was no room for. It
     costs neither the others nor what is shown. On a terminal that has the remarks already they are not repeated.
     """
-    from .report import terminal
+    from .report import files, terminal
 
-    written: list[Path] = []
-    unwritten = None
-    for write in writers:
-        try:
-            written += write()
-        except WriteError as error:
-            unwritten = unwritten or error
+    written, unwritten = files.write_all(writers)
     console = _console()
     terminal.show(report, console, remarks=remarks or not console.is_terminal)
     console.print("Written: " + ", ".join(printable(str(path), 500) for path in written), soft_wrap=True)
@@ -229,16 +208,6 @@ def _progress(begin: str, console: Console) -> Iterator[Callable[[str, float, fl
             bar.update(task, description=what, completed=done, total=todo)
 
         yield report
-
-
-def _clear(folder: Path, *names: str) -> None:
-    """Remove the files of an earlier run."""
-    for stale in (folder / name for name in names):
-        if stale.exists() and not stale.is_file():
-            raise InputError(f"{stale}: is not a regular file; name another folder")
-        stale.unlink(missing_ok=True)
-        for part in leftovers(stale):
-            part.unlink(missing_ok=True)
 
 
 def _stopped_early(failure: RunError, output: Path, errors: Console) -> None:
@@ -292,7 +261,7 @@ def reproduce(
 
         with _console(stderr=True).status("computing"):
             contents = report(compute())
-        _clear(output, *files.names("reproduction", tuple(figure.file for figure in contents.figures)))
+        clear(output, *files.names("reproduction", tuple(figure.file for figure in contents.figures)))
         _finish(contents, output, "reproduction")
 
 
@@ -309,7 +278,7 @@ def two_bar_error(
     with claimed(output):
         from .report import files
 
-        _clear(output, *files.names(two_bar.NAME, (two_bar.PICTURE,)))
+        clear(output, *files.names(two_bar.NAME, (two_bar.PICTURE,)))
         with _progress("bars and catenaries", _console(stderr=True)) as progress:
             comparison = two_bar.two_bar_error(lambda done: progress("bars and catenaries", done, 1.0))
         contents = two_bar.report(comparison)

@@ -78,6 +78,22 @@ def leftovers(file: Path) -> list[Path]:
     return [path for path in file.parent.iterdir() if name.fullmatch(path.name)]
 
 
+def clear(folder: Path, *names: str) -> None:
+    """Remove the files of an earlier run.
+
+    Raises
+    ------
+    InputError
+        where one of the names is no file.
+    """
+    for stale in (folder / name for name in names):
+        if stale.exists() and not stale.is_file():
+            raise InputError(f"{stale}: is not a regular file; name another folder")
+        stale.unlink(missing_ok=True)
+        for part in leftovers(stale):
+            part.unlink(missing_ok=True)
+
+
 def folder(path: Path) -> Path:
     """The folder `path`, made where it is missing, and writable.
 

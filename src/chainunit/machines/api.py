@@ -60,6 +60,10 @@ class ChainUnitMachine(Machine):
     ) -> None:
         super().__init__(model, parameters, **values)
 
+    @property
+    def _kind(self) -> list[str]:
+        return [] if self.model is ChamberForces else [f"model={self.model.__name__}"]
+
     @classmethod
     def from_ratios(
         cls,

@@ -60,6 +60,19 @@ class Machine:
         changed.p = self.model.check(layout.from_names({**(parameters or {}), **values}, self.p))
         return changed
 
+    def __repr__(self) -> str:
+        """The call that makes the machine, by the parameters that are not at their start values, to nine digits."""
+        start = self.model.parameter_layout.named(self.model.Parameters())
+        shown = {name: f"{value:.9g}" for name, value in self.named.items()}
+        changed = [f'"{name}": {x}' for name, x in shown.items() if x != f"{start[name]:.9g}"]
+        arguments = [*self._kind, *([f"{{{', '.join(changed)}}}"] if changed else [])]
+        return f"{type(self).__name__}({', '.join(arguments)})"
+
+    @property
+    def _kind(self) -> list[str]:
+        """What tells the machine beside its parameters."""
+        return [self.model.name]
+
     @property
     def ratio(self) -> float:
         """Motor turns per crank turn."""

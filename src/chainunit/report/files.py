@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
+from ..errors import WriteError
 from ..files import whole
 from . import html, print_figures
 from .blocks import Report
@@ -20,7 +21,7 @@ def writers(report: Report, folder: Path, name: str) -> list[Callable[[], list[P
     def numbers() -> list[Path]:
         file = folder / f"{name}.json"
         with whole(file) as part:
-            part.write_text(json.dumps(report.result, indent=1, allow_nan=False) + "\n", "utf-8")
+            part.write_text(numbers_text(report), "utf-8")
         return [file]
 
     def draw() -> list[Path]:
@@ -38,6 +39,24 @@ def writers(report: Report, folder: Path, name: str) -> list[Callable[[], list[P
         return [file]
 
     return [numbers, draw, text, lambda: [html.write(report, folder)]]
+
+
+def numbers_text(report: Report) -> str:
+    """The numbers of a report as JSON."""
+    return json.dumps(report.result, indent=1, allow_nan=False) + "\n"
+
+
+def write_all(writers: Iterable[Callable[[], list[Path]]]) -> tuple[list[Path], WriteError | None]:
+    """Call the writers; returns the files, and the error of the first that there was no room for: it costs none of
+    the others."""
+    written: list[Path] = []
+    unwritten = None
+    for write in writers:
+        try:
+            written += write()
+        except WriteError as error:
+            unwritten = unwritten or error
+    return written, unwritten
 
 
 def names(name: str, pictures: tuple[str, ...]) -> tuple[str, ...]:

@@ -116,6 +116,13 @@ def _packed_plotly() -> str:
     return base64.b64encode(gzip.compress(get_plotlyjs().encode(), 9, mtime=0)).decode()
 
 
+def fragment(report: b.Report) -> str:
+    """Title and blocks as a piece of a page of somebody else's, such as a notebook: without figures and style."""
+    page = _Page(report.units)
+    failure = f"<p>The run stopped early: {page.line(report.failure)}.</p>" if report.failure else ""
+    return f"<h3>{escape(report.title or report.kind)}</h3>\n{failure}{page.blocks(report.blocks('long'))}"
+
+
 def _resource(name: str) -> str:
     return (resources.files(__package__) / name).read_text("utf-8")
 

@@ -19,7 +19,7 @@ from .terminal import plain_line
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """Every answer of every run, what the pins carry, and where the model ends."""
     if s.result["answers"]:
-        yield _table_of_runs(s, study)
+        yield table_of_runs(s, study)
     for run, phase in (("start_up", Phase.START_UP), ("settling", Phase.SETTLING)):
         if s.result.get(run):
             yield from _begin(s, study, run, phase)
@@ -72,7 +72,8 @@ def over_runs(
     return b.Table(tuple(rows), (b.Column("", first), *columns), title=title, groups=tuple(groups))
 
 
-def _table_of_runs(s: b.Source, study: StudyRecord) -> b.Table:
+def table_of_runs(s: b.Source, study: StudyRecord) -> b.Table:
+    """Every answer, with a column for each run."""
     answers, unknown = s.result["answers"], study.not_known
     runs = ordered(study, answers)
     rows = (

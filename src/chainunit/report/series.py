@@ -1,4 +1,12 @@
-"""The series of a study on a chain unit: result.nc and the load cycle; each file appears whole or not at all."""
+"""The series of a study: result.nc and the load cycle; each file appears whole or not at all.
+
+The line that opens result.nc::
+
+    runs = xarray.open_datatree("results/result.nc")
+
+``runs["jam_left"]["machine.tau"]`` is then the torque in that run over ``time``, with its unit and description in
+``attrs``. A tool that knows no trees opens a run as a group: ``xarray.open_dataset(file, group="jam_left")``.
+"""
 
 from __future__ import annotations
 
@@ -29,22 +37,25 @@ def _load_cycle(study: StudyRecord, turns: xr.Dataset, file: Path) -> Path:
     return file
 
 
+def tree(study: StudyRecord) -> xr.DataTree:
+    """The time series of all runs, a node for each; each variable has its unit and description."""
+    runs = {f"/{name}": run.assign_attrs(title=title(study, name)) for name, run in study.runs.items()}
+    whole_study = xr.DataTree.from_dict(runs)
+    whole_study.attrs.update(title=study.config.title, source=f"chainunit {__version__}")
+    return whole_study
+
+
 def write(study: StudyRecord, folder: Path) -> list[Path]:
     """Write the load cycle and the time series of a study; returns the files.
 
-    ``result.nc`` is netCDF-4 with a group per run (open it with `xarray.open_datatree`); each variable has its
-    unit and description.
+    ``result.nc`` is netCDF-4 with a group per run, the `tree`.
     """
     written = []
     if "steady" in study.answers and study.drive.whole_turns(study.steady) is not None:
         written.append(_load_cycle(study, study.steady, folder / LOAD_CYCLE))
     if study.runs:
         file = folder / SERIES
-        tree = xr.DataTree.from_dict(
-            {f"/{name}": run.assign_attrs(title=title(study, name)) for name, run in study.runs.items()}
-        )
-        tree.attrs.update(title=study.config.title, source=f"chainunit {__version__}")
         with whole(file) as part, netcdf():
-            tree.to_netcdf(part, engine="netcdf4")
+            tree(study).to_netcdf(part, engine="netcdf4")
         written.append(file)
     return written

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from importlib import metadata
 from typing import Any
 
@@ -44,6 +45,28 @@ def report(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Rep
             wording.of_machine(tuple(_opening(s, study)), study.turning),
             wording.of_machine(tuple(sections), study.turning),
             source=_head(s),
+            failure=s.words("failure") if study.failure is not None else (),
+            units=study.config.units,
+        )
+
+
+def summary(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Report:
+    """The verdicts and the main answers of every run alone; arguments as of `report`."""
+    s = b.Source(as_dict(study) if result is None else result)
+    blocks: list[b.Block] = []
+    with written_in(study.config.units):
+        for block in answer.blocks(s, study):
+            if isinstance(block, b.Judgement) and block.severity in ("good", "partly", "bad", "alarm"):
+                blocks.append(replace(block, form="both"))
+        if s.result["answers"]:
+            table = runs.table_of_runs(s, study)
+            blocks.append(replace(table, rows=tuple(row for row in table.rows if row.form != "long")))
+        return b.Report(
+            study.config.title,
+            study.kind,
+            s.result,
+            (),
+            wording.of_machine((b.Section("summary", "Summary", tuple(blocks)),), study.turning),
             failure=s.words("failure") if study.failure is not None else (),
             units=study.config.units,
         )

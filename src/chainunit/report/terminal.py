@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 
 from rich.console import Console
@@ -66,6 +67,18 @@ def show(report: Report, console: Console, *, remarks: bool = True) -> None:
                 console.print(prefix + words, soft_wrap=True)
     for words in last:
         console.print(words, soft_wrap=True)
+
+
+def plain(report: Report, width: int = 120) -> str:
+    """The short form in plain letters, in lines of that width."""
+    out = io.StringIO()
+    console = Console(
+        file=out, width=width, markup=False, highlight=False, force_jupyter=False, no_color=True
+    )
+    if report.failure:
+        console.print(f"The run stopped early: {plain_line(report.failure)}.", soft_wrap=True)
+    show(report, console)
+    return "\n".join(line.rstrip() for line in out.getvalue().splitlines())
 
 
 def _role(block: Block) -> str:

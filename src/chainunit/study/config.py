@@ -111,6 +111,8 @@ class Config:
     """that the report shows numbers in"""
     labels: Mapping[str, str] = dataclasses.field(default_factory=dict)
     """project, author, date and revision, as far as the file gives them"""
+    tables: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    """the tables and keys of the file, as it gives them"""
     lines: Mapping[str, int] = dataclasses.field(default_factory=dict)
     """the line of each key in the file"""
 
@@ -174,15 +176,26 @@ def load(file: Path | None = None) -> Config:
 
 
 def parse(text: str, source: str = "config") -> Config:
-    """A study from TOML text. What it leaves out is the example's: the packaged file's, and where that does not name
-    it, as declared.
+    """A study from TOML text, see `of_tables`.
 
     Raises
     ------
     InputError
         see `load`.
     """
-    data, faults = toml(text), Faults()
+    return dataclasses.replace(of_tables(toml(text), source), lines=lines_of(text))
+
+
+def of_tables(data: Mapping[str, Any], source: str) -> Config:
+    """A study from the tables and keys of its file. What they leave out is the example's: the packaged file's, and
+    where that does not name it, as declared. Files that they name are beside the file `source`.
+
+    Raises
+    ------
+    InputError
+        with a line for each fault.
+    """
+    faults = Faults()
     if isinstance(data.get("motor"), list):
         raise InputError(
             "motor: tables [[motor]] make a catalogue; name this file in a study file by catalogue", "motor"
@@ -200,20 +213,18 @@ def parse(text: str, source: str = "config") -> Config:
     faults.add(check_company(data, parts))
     faults.refuse()
     whole = over_example(data, parts)
-    checked = read_table(parts.form, whole)
+    form = read_table(parts.form, whole)
     declared = {name: section.declared for name, section in parts.sections.items()}
     unusual = tuple(slips(declared, data, {"run.crank_speed": parts.machine.usual_speed}))
     try:
-        events = read_events(checked.event)
+        events = read_events(form.event)
         if "event" in data:
             kinds = {f"event.{name}": event.Parameters for name, event in events.items()}
             tables = dict(zip(events, data["event"], strict=True))
             unusual += tuple(slips(kinds, {"event": tables}))
-        config = _config(data, checked, parts, events, source, unusual)
+        config = _config(data, form, parts, events, source, unusual)
         given, names = frozenset(_names(data, events)), frozenset(_names(whole, events))
-        return dataclasses.replace(
-            config, given=given, of_example=names - given - {"title"}, lines=lines_of(text)
-        )
+        return dataclasses.replace(config, given=given, of_example=names - given - {"title"}, tables=data)
     except InputError as error:
         # values that do not fit together may be a slip of the unit
         hints = [f'was {slip.variable.name} = "{slip.meant}" meant?' for slip in unusual if slip.meant]

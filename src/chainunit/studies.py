@@ -1,0 +1,343 @@
+"""`Study`: a study from Python, as ``chainunit study`` runs one from its file."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import shutil
+import tempfile
+import warnings
+import weakref
+from collections.abc import Mapping
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from .errors import InputError, WriteError, near_name, shown
+from .files import claimed, clear
+from .fmu.backends import Backend
+from .machines.machine import Machine
+from .places import lines_of
+from .progress import Report as Progress
+from .quantities import Layout
+from .reading import in_file
+from .report import files, html, results, series, terminal
+from .report import study as contents
+from .report.blocks import Report
+from .report.drawing import drawing
+from .study import config as study_files
+from .study.config import Config
+from .study.foreign_machine import ForeignMachine
+from .study.measures import Answers, measures_of
+from .study.parts import over_example, parts_of
+from .study.record import StudyRecord
+from .study.result import as_dict
+from .study.window import Phase
+from .text import number, written_in
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+_TABLES, _TEXT = "tables in Python", "text in Python"
+
+
+class Study:
+    """A machine with its motor, and what is to be run.
+
+    Parameters
+    ----------
+    **tables : the keys and tables of a study file (``chainunit keys`` shows them), by the same names and with the
+        same checks: tables are mappings, events a list of them. A number is in the SI unit that is declared; a text
+        may carry a unit. A key that is left out is the example's. Files that are named are relative to the working
+        folder.
+
+    Raises
+    ------
+    InputError
+        with a line for each value that is not allowed, each with its key.
+
+    Warns
+    -----
+    UserWarning
+        for a value that looks like a slip of its unit.
+
+    Examples
+    --------
+    >>> jam = {"type": "jam", "side": "left", "force": "2 kN"}
+    >>> study = Study(machine={"r": "160 mm"}, run={"crank_speed": "30 rev/min"}, event=[jam])
+    >>> study.machine.p.r, list(study.config.events)
+    (0.16, ['jam_left'])
+    """
+
+    config: Config
+    """the study, checked"""
+
+    def __init__(self, **tables: Any) -> None:
+        self._take(study_files.of_tables(_plain(tables), _TABLES), _TABLES)
+
+    @classmethod
+    def from_file(cls, path: str | Path | None = None) -> Self:
+        """The study of a TOML file; without one, the packaged example.
+
+        Raises
+        ------
+        InputError
+            with a line for each fault, which begins with file and line.
+        """
+        config = study_files.load(None if path is None else Path(path))
+        return cls.__new__(cls)._take(config, config.source)
+
+    @classmethod
+    def from_text(cls, text: str) -> Self:
+        """The study of a TOML text; files that it names are relative to the working folder.
+
+        Raises
+        ------
+        InputError
+            as `from_file`.
+        """
+        with in_file(_TEXT, lambda: lines_of(text)):
+            config = study_files.parse(text, _TEXT)
+        return cls.__new__(cls)._take(config, _TEXT)
+
+    def _take(self, config: Config, source: str, changes: Mapping[str, Any] | None = None) -> Self:
+        """Be the study `config`, `changes` against its `source` included; files that it names are beside that."""
+        self._source, self._changes = source, dict(changes or {})
+        if self._changes:
+            config = dataclasses.replace(config, source=f"{source} with {self._changed}")
+        self.config = config
+        for slip in config.slips:
+            warnings.warn(slip.sentence, stacklevel=3)
+        return self
+
+    def with_values(self, values: Mapping[str, Any]) -> Self:
+        """The same study with other values, by their full names.
+
+        Parameters
+        ----------
+        values : such as ``{"machine.r": "170 mm", "event.jam_left.force": "3 kN", "start": "direct"}``; an event is
+            named by its run. A name without a value in it stands for the whole table: ``{"event": []}``.
+
+        Raises
+        ------
+        InputError
+            as of the class.
+        """
+        tables = copy.deepcopy(dict(self.config.tables))
+        for name, value in values.items():
+            path = name.split(".")
+            if path[0] == "event" and len(path) > 1:
+                path[1] = self._place(name, path[1], tables)
+            _put(tables, path, _plain(value))
+        config = study_files.of_tables(tables, self._source)
+        changes = {name: _plain(value) for name, value in values.items()}
+        return type(self).__new__(type(self))._take(config, self._source, self._changes | changes)
+
+    @property
+    def _changed(self) -> str:
+        return ", ".join(f"{name} = {shown(value)}" for name, value in self._changes.items())
+
+    def _place(self, name: str, run: str, tables: dict[str, Any]) -> str:
+        """The number in the list of events of the one that is run as `run`; events of the example are written into
+        the `tables` first."""
+        runs = list(self.config.events)
+        if run not in runs:
+            hint = near_name(run, runs) or f"; there are {', '.join(runs) or 'none'}"
+            raise InputError(f"{name}: no such event{hint}", key=name)
+        if "event" not in tables:
+            tables["event"] = over_example(tables, parts_of(tables, self._source))["event"]
+        return str(runs.index(run))
+
+    @property
+    def machine(self) -> Machine:
+        """The machine, with its parameters."""
+        return self.config.machine
+
+    def run(
+        self,
+        folder: str | Path | None = None,
+        check: bool = False,
+        backend: Backend | None = None,
+        progress: Progress | None = None,
+    ) -> StudyResult:
+        """Run it: start-up, steady running, every event; half a minute for the packaged example.
+
+        Parameters
+        ----------
+        folder : where the files of ``chainunit study -o`` are written; without one nothing is left on the disk but
+            what `StudyResult.save` writes
+        check : compare every run with the monolithic solution, too
+        backend : of the FMUs, "native" or "python"; by default native where there is a C compiler
+        progress : called with what is running, how much is done, and all that there is to do
+
+        Raises
+        ------
+        InputError
+            for what only a run shows, such as a motor of somebody else that does not fit.
+        RunError
+            for a run that stopped early; its `partial` is the `StudyResult` up to there.
+        WriteError
+            for a file that could not be written; the others are.
+        """
+        if folder is None:
+            kept = Path(tempfile.mkdtemp(prefix="chainunit_"))
+            try:
+                record = results.compute(self.config, kept, progress, check=check, backend=backend)
+            except BaseException:
+                shutil.rmtree(kept, ignore_errors=True)
+                raise
+            result = StudyResult(record, kept)
+            weakref.finalize(result, shutil.rmtree, kept, ignore_errors=True)
+        else:
+            with claimed(Path(folder)) as place:
+                record = results.compute(self.config, place, progress, check=check, backend=backend)
+                result = StudyResult(record, place)
+                result._write(place)
+        if record.failure is not None:
+            record.failure.partial = result
+            raise record.failure
+        return result
+
+    def __repr__(self) -> str:
+        config = self.config
+        with written_in(config.units):
+            speed = number(config.run.crank_speed, "rad/s", "speed")
+        motor = "a motor that sizing chooses" if config.sizing else config.choices["system.motor"]
+        changes = f" with {self._changed}" if self._changes else ""
+        return (
+            f"<Study {config.title or self._source!r}{changes}: {config.choices['system.machine']} with {motor}, "
+            f"crank at {speed}; events: {', '.join(config.events) or 'none'}>"
+        )
+
+    def _repr_html_(self) -> str:
+        """The same with a drawing of the machine, for notebooks."""
+        words = f"<p>{escape(repr(self)[1:-1])}</p>"
+        return words + ("" if isinstance(self.machine, ForeignMachine) else drawing(self.machine))
+
+
+class StudyResult:
+    """What a study found. Shown by itself, it is its title, the verdicts and the main answers of every run."""
+
+    def __init__(self, record: StudyRecord, folder: Path) -> None:
+        self.record = record
+        """all that was computed, as the report reads it"""
+        self._folder = folder
+
+    @cached_property
+    def _numbers(self) -> dict[str, Any]:
+        return as_dict(self.record)
+
+    @cached_property
+    def _summary(self) -> Report:
+        return contents.summary(self.record, self._numbers)
+
+    @cached_property
+    def answers(self) -> pd.DataFrame:
+        """A row for each answer by its name in result.json, in SI units as the column "unit" says, and a column of
+        numbers for each run; NaN where an answer means nothing in a run."""
+        import pandas as pd
+
+        record = self.record
+        runs: dict[str, tuple[Any, set[str]]] = {
+            name: (answers, set(Layout(Answers).names)) for name, answers in record.answers.items()
+        }
+        for name, phase, begin in (
+            ("settling", Phase.SETTLING, record.settling),
+            ("start_up", Phase.START_UP, record.start),
+        ):
+            if begin is not None:
+                runs = {name: (begin, {v.name for v in measures_of(phase)}), **runs}
+        declared = Layout(Answers).variables
+        table = pd.DataFrame({"unit": [v.unit for v in declared]}, [v.name for v in declared])
+        for name, (answers, known) in runs.items():
+            values = (getattr(answers, v.name) if v.name in known else None for v in declared)
+            table[name] = [np.nan if x is None else float(x) for x in values]
+        return table.dropna(how="all", subset=list(runs))
+
+    @cached_property
+    def runs(self) -> xr.DataTree:
+        """The time series of every run: ``runs["jam_left"]["machine.tau"]``; units in ``attrs``. result.nc is the
+        same in a file."""
+        return series.tree(self.record)
+
+    @property
+    def verdict(self) -> str:
+        """Whether the model holds, whether the motor suffices, and whether any did: a line each."""
+        verdicts = self._numbers["verdict"].values()
+        lines = [verdict["text"] for verdict in verdicts if verdict is not None]
+        if self.record.insufficient:
+            lines.append(
+                "No motor of the catalogue fits; all is run with the nearest, which is insufficient."
+            )
+        return "\n".join(lines)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What gives cause for a warning, a text each."""
+        return [warning["text"] for warning in self._numbers["warnings"]]
+
+    @property
+    def notes(self) -> list[str]:
+        """The assumptions behind the numbers, a text each."""
+        return [note["text"] for note in self._numbers["notes"]]
+
+    def to_json(self) -> str:
+        """All numbers with their units: what result.json holds."""
+        return files.numbers_text(self._summary)
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Write the files of ``chainunit study -o``: page, numbers, series, plots, and the FMUs; returns the files.
+
+        Raises
+        ------
+        InputError, WriteError
+            as `Study.run`.
+        """
+        with claimed(Path(folder)) as place:
+            if place.resolve() != self._folder.resolve():
+                clear(place, *results.FILES)
+                shutil.copytree(self._folder / "fmu", place / "fmu", dirs_exist_ok=True)
+                if self.record.monte_carlo is not None:
+                    shutil.copy(self._folder / self.record.monte_carlo.file.name, place)
+            return self._write(place)
+
+    def _write(self, folder: Path) -> list[Path]:
+        report = contents.report(self.record, self._numbers)
+        written, unwritten = files.write_all(results.writers(self.record, report, folder))
+        if unwritten is not None:
+            raise WriteError(str(unwritten)) from unwritten
+        return written
+
+    def __repr__(self) -> str:
+        return terminal.plain(self._summary)
+
+    def _repr_html_(self) -> str:
+        """For notebooks."""
+        return html.fragment(self._summary)
+
+
+def _plain(value: Any) -> Any:
+    """A value from Python as a TOML file would give it."""
+    if isinstance(value, Mapping):
+        return {str(name): _plain(each) for name, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    return str(value) if isinstance(value, Path) else value
+
+
+def _put(tree: Any, path: list[str], value: Any) -> None:
+    """Set the value at a path in tables; what stands in the way and is no table gives way to one."""
+    name, *inner = path
+    key: Any = int(name) if isinstance(tree, list) else name
+    if not inner:
+        tree[key] = value
+        return
+    if not isinstance(tree, list) and not isinstance(tree.get(key), dict | list):
+        tree[key] = {}
+    _put(tree[key], inner, value)

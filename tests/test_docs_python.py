@@ -1,0 +1,44 @@
+"""docs/python.md: its lines run in order, and print what it shows."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+from pathlib import Path
+
+PAGE = Path(__file__).parents[1] / "docs" / "python.md"
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+def sessions(text):
+    """Pairs of a block of Python and what is shown below it, empty where nothing is."""
+    blocks = BLOCK.findall(text)
+    for k, (language, code) in enumerate(blocks):
+        shown = blocks[k + 1] if k + 1 < len(blocks) else ("", "")
+        if language == "python":
+            yield code, shown[1] if shown[0] == "text" else ""
+
+
+def outputs(text):
+    """What each block of Python prints."""
+    names: dict[str, object] = {}
+    for code, _ in sessions(text):
+        out = io.StringIO()
+        with contextlib.redirect_stdout(out):
+            exec(compile(code, PAGE.name, "exec"), names)
+        yield out.getvalue()
+
+
+def test_the_page_shows_what_its_lines_print(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = PAGE.read_text("utf-8")
+    shown = [said for _, said in sessions(text)]
+    assert len(shown) >= 8 and sum(map(bool, shown)) >= 8
+    assert list(outputs(text)) == shown
+
+
+def test_every_way_of_showing_is_seen():
+    text = "```python\nx = 1\n```\n\n```python\nprint(x)\n```\n\n```text\n1\n```\n"
+    assert list(sessions(text)) == [("x = 1\n", ""), ("print(x)\n", "1\n")]
+    assert list(outputs(text)) == ["", "1\n"]

@@ -1,0 +1,254 @@
+"""`Study`: what Python gives is what the command gives."""
+
+from __future__ import annotations
+
+import doctest
+import gc
+import json
+import re
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+import xarray as xr
+from command import chainunit
+
+from chainunit import ChainUnitMachine, InputError, RunError, Study, StudyResult, studies
+from chainunit.files import claimed
+from chainunit.study.record import StudyRecord
+
+FILE = """
+title = "<b>Short</b> & quick"
+[machine]
+r = "160 mm"
+ratio = 25
+[run]
+ramp = 0.3
+settle_turns = 1
+turns = 1
+step = "4 ms"
+crank_speed = "60 rev/min"
+[[event]]
+type = "jam"
+side = "left"
+force = "1 kN"
+"""
+TABLES = {
+    "title": "<b>Short</b> & quick",
+    "machine": {"r": "160 mm", "ratio": np.int64(25)},
+    "run": {"ramp": 0.3, "settle_turns": 1, "turns": np.float64(1.0), "step": "4 ms", "crank_speed": "60 rev/min"},
+    "event": ({"type": "jam", "side": "left", "force": "1 kN"},),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def result():
+    return Study(**TABLES).run()
+
+
+@pytest.fixture(scope="module")
+def command(tmp_path_factory):
+    """The folder of the same study by the command."""
+    folder = tmp_path_factory.mktemp("command")
+    (folder / "short.toml").write_text(FILE)
+    done = chainunit("study", "short.toml", "-o", "out", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    return folder / "out"
+
+
+def test_python_and_the_command_find_the_same(result, command, tmp_path):
+    written = result.save(tmp_path / "out")
+    assert {file.name for file in written} == {p.name for p in command.iterdir()} - {"fmu"}
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {p.name for p in command.iterdir()}
+    for name in ("ChamberForces.fmu", "DcMotor.fmu"):
+        assert (tmp_path / "out" / "fmu" / name).stat().st_size > 1000
+    python, by_command = (json.loads((f / "result.json").read_text()) for f in (tmp_path / "out", command))
+    assert python.pop("source") == "tables in Python" and by_command.pop("source") == "short.toml"
+    assert python == by_command
+    assert json.loads(result.to_json())["answers"] == python["answers"]
+
+
+def test_answers_are_a_table_with_units(result):
+    numbers, table = json.loads(result.to_json()), result.answers
+    assert list(table.columns) == ["unit", "start_up", "steady", "jam_left"]
+    for run in ("steady", "jam_left"):
+        for name, entry in numbers["answers"][run].items():
+            if entry["value"] is not None:
+                assert table.loc[name, run] == entry["value"] and table.loc[name, "unit"] == entry["unit"]
+            else:
+                assert name not in table.index or np.isnan(table.loc[name, run])
+    assert table.loc["start_time", "start_up"] == numbers["start_up"]["start_time"]["value"]
+    # of a start, a ripple says nothing; no row has nothing to say
+    assert np.isnan(table.loc["speed_ripple", "start_up"]) and "coupling_trip_time" not in table.index
+    assert all(kind is np.dtype(float) for kind in table.dtypes.iloc[1:])
+
+
+def test_runs_are_the_tree_in_the_file(result, command):
+    with xr.open_datatree(command / "result.nc") as tree:
+        assert list(result.runs.children) == list(tree.children) == ["start_up", "jam_left"]
+        for name in tree.children:
+            assert result.runs[name].to_dataset().drop_attrs().equals(tree[name].to_dataset().drop_attrs())
+    force = result.runs["jam_left"]["machine.left.processing_force"]
+    assert force.units == "N" and float(force.max()) == pytest.approx(1010.0)
+    # as the documentation says for a tool that knows no trees
+    with xr.open_dataset(command / "result.nc", group="jam_left") as run:
+        assert run["motor.w"].units == "rad/s"
+
+
+def test_verdict_warnings_and_notes_are_texts(result, monkeypatch):
+    numbers = json.loads(result.to_json())
+    assert result.verdict.split("\n") == [numbers["verdict"][of]["text"] for of in ("model", "motor")]
+    assert "The model of the organs does not hold" in result.verdict
+    assert result.warnings == [each["text"] for each in numbers["warnings"]] and len(result.warnings) >= 2
+    assert any("Friction is smoothed" in note for note in result.notes)
+    monkeypatch.setattr(StudyRecord, "insufficient", True)
+    assert result.verdict.endswith("which is insufficient.")
+
+
+def test_a_result_shows_itself(result):
+    shown, html = repr(result), result._repr_html_()
+    assert (
+        "<b>Short</b> & quick" in shown
+        and "\x1b" not in shown
+        and max(map(len, shown.split("\n")[3:])) <= 120
+    )
+    assert re.search(r"crank torque, peak +│ +[\d.]+ N m │ +[\d.]+ N m", shown)
+    for text in result.verdict.split("\n"):
+        assert text in shown
+    # escaped, and closed: a piece of a page
+    tree = ElementTree.fromstring(f"<div>{html.replace(chr(0xA0), ' ')}</div>")
+    assert tree.find("h3").text == "<b>Short</b> & quick"
+    words = " ".join("".join(tree.itertext()).split())
+    assert "crank torque, peak" in words and "a lump jams the left side" in words and "RMS" in words
+    assert "mean" not in shown and "crank torque, mean" not in words
+
+
+def test_files_of_a_result_without_a_folder_vanish_with_it(command):
+    study = Study(**TABLES)
+    result = study.run(backend="python")
+    kept = result._folder
+    assert (kept / "fmu" / "ChamberForces.fmu").exists()
+    del result
+    gc.collect()
+    assert not kept.exists()
+
+
+def test_a_run_in_a_folder_leaves_the_files_there(tmp_path, command):
+    reports = []
+    result = Study.from_text(FILE).run(tmp_path / "out", progress=lambda *report: reports.append(report))
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {p.name for p in command.iterdir()}
+    assert len({what for what, _, _ in reports}) >= 3 and all(done <= todo for _, done, todo in reports)
+    # saved again where it lies already
+    assert (tmp_path / "out" / "result.json") in result.save(tmp_path / "out")
+    with (
+        claimed(tmp_path / "out"),
+        pytest.raises(InputError, match="another chainunit writes to this folder"),
+    ):
+        Study(**TABLES).run(tmp_path / "out")
+
+
+def test_a_run_that_is_stopped_keeps_what_it_has(tmp_path):
+    def stop(what, done, todo):
+        if done > 0.5 * todo:
+            raise KeyboardInterrupt
+
+    with pytest.raises(RunError, match="interrupted") as caught:
+        Study(**TABLES).run(tmp_path / "out", progress=stop)
+    partial = caught.value.partial
+    assert isinstance(partial, StudyResult) and "The run stopped early: " in repr(partial)
+    assert "The run stopped early: " in partial._repr_html_()
+    assert json.loads((tmp_path / "out" / "result.json").read_text())["status"].startswith("failed")
+    assert set(partial.answers.columns) <= {"unit", "start_up", "steady"}
+
+
+def test_the_same_keys_and_checks_as_in_a_file():
+    study = Study(**TABLES)
+    assert study.machine.p.r == 0.16 and study.config.run.crank_speed == pytest.approx(2.0 * np.pi)
+    assert study.config.given == Study.from_text(FILE).config.given
+    with pytest.raises(InputError) as caught:
+        Study(machin={}, run={"crank_speed": "30 kg"})
+    assert {fault.key for fault in caught.value.faults} == {"run.crank_speed", "machin"}
+    assert 'was "machine" meant?' in str(caught.value) and 'crank_speed = "30 kg"' in str(caught.value)
+    with pytest.raises(InputError, match=r"^machine: r = 0.9 m: the crank cannot turn"):
+        Study(machine={"r": 0.9})
+    with pytest.raises(InputError, match=r"^machine = 3: must be a table"):
+        Study(machine=3)
+
+
+def test_a_text_and_a_file_tell_the_line(tmp_path):
+    text = FILE.replace('"160 mm"', '"160 kg"')
+    (tmp_path / "mine.toml").write_text(text)
+    with pytest.raises(InputError, match=r'^text in Python:4: machine.r = "160 kg"'):
+        Study.from_text(text)
+    with pytest.raises(InputError, match=r'mine.toml:4: machine.r = "160 kg"'):
+        Study.from_file(tmp_path / "mine.toml")
+    with pytest.raises(InputError, match=r"other.toml: cannot be read"):
+        Study.from_file(str(tmp_path / "other.toml"))
+    assert Study.from_file().config.packaged and not Study().config.packaged
+
+
+def test_what_a_run_refuses_names_file_and_line(tmp_path):
+    (tmp_path / "mine.toml").write_text('catalogue = "own.toml"\n[sizing]\n')
+    study = Study.from_file(tmp_path / "mine.toml")
+    # beside the study file, as for the command
+    assert study.config.catalogue == tmp_path / "own.toml"
+    with pytest.raises(InputError, match=r"mine.toml:1: catalogue = .*own.toml: cannot be read"):
+        study.run()
+    changed = study.with_values({"sizing.temperature": 400.0})
+    assert changed.config.catalogue == tmp_path / "own.toml"
+    with pytest.raises(InputError, match=r"^catalogue = .*own.toml: cannot be read"):
+        changed.run(tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_other_values_make_another_study():
+    study = Study(**TABLES)
+    other = study.with_values({"machine.r": "170 mm", "event.jam_left.force": "3 kN"})
+    assert (study.machine.p.r, other.machine.p.r) == (0.16, 0.17)
+    assert study.config.events["jam_left"].p.force == 1000.0
+    assert other.config.events["jam_left"].p.force == 3000.0
+    assert other.config.source == 'tables in Python with machine.r = "170 mm", event.jam_left.force = "3 kN"'
+    again = other.with_values({"machine.r": np.float64(0.165), "motor.rotor.J": 0.01})
+    assert again.machine.p.r == 0.165 and again.config.events["jam_left"].p.force == 3000.0
+    assert again.config.source.count("machine.r") == 1 and "motor.rotor.J = 0.01" in repr(again)
+    assert list(study.with_values({"event": []}).config.events) == []
+    assert study.with_values({}).config.source == "tables in Python"
+    with pytest.raises(InputError, match=r'^event.jam_lef.force: no such event; was "jam_left" meant'):
+        study.with_values({"event.jam_lef.force": 1.0})
+    with pytest.raises(InputError, match=r"^start = .*: must be "):
+        study.with_values({"start.now": 1.0})
+    with pytest.raises(InputError, match=r"^machine.rr: unknown key"):
+        study.with_values({"machine.rr": 1.0})
+
+
+def test_events_of_the_example_can_be_changed():
+    study = Study.from_file().with_values({"event.jam_right.force": "3 kN"})
+    assert list(study.config.events) == list(Study.from_file().config.events)
+    assert study.config.events["jam_right"].p.force == 3000.0
+    assert study.config.events["jam_left"].p == Study.from_file().config.events["jam_left"].p
+
+
+def test_a_slip_of_a_unit_is_a_warning():
+    with pytest.warns(UserWarning, match=r"run.crank_speed = 30 rad/s: is unusual") as caught:
+        Study(run={"crank_speed": 30.0, "turns": 1})
+    assert caught[0].filename == __file__
+
+
+def test_a_study_says_what_it_is():
+    assert repr(Study.from_text(FILE)) == (
+        "<Study '<b>Short</b> & quick': ChamberForces with DcMotor, crank at 6.28 rad/s (60.0 rev/min); "
+        "events: jam_left>"
+    )
+    html = Study.from_text(FILE)._repr_html_()
+    assert "&lt;b&gt;Short" in html and "<svg" in html
+    assert "InductionMotor" not in repr(Study(sizing={})) and "a motor that sizing chooses" in repr(
+        Study(sizing={})
+    )
+    assert repr(Study(event=[])).endswith("events: none>") and "'tables in Python'" in repr(Study())
+    assert repr(Study(report={"units": {"speed": "rev/min"}})).count("rad/s") == 0
+    assert isinstance(Study().machine, ChainUnitMachine)
+
+
+def test_the_lines_in_the_docstring_are_right():
+    tried = doctest.testmod(studies)
+    assert tried.attempted >= 3 and not tried.failed
