@@ -25,12 +25,14 @@ from chainunit.machines.chain_unit import Feed
 from chainunit.report import html, page_figures, study_motion
 from chainunit.report import study as study_report
 from chainunit.report.blocks import at
+from chainunit.report.figure import Label, Mark, Shade
 from chainunit.study import config, judgement
 from chainunit.study.chain import rest_forces
 from chainunit.study.cycle import cycle
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
 from chainunit.study.sections import Starter
+from chainunit.study.verdict import CRANK_GOOD, ROCKER_GOOD_EMPTY
 from chainunit.text import DEFAULT_UNITS, digits_text, forms, scales, unit_text
 from chainunit.text import number as told_as
 
@@ -872,3 +874,32 @@ def test_the_page_in_a_browser(study, written, tmp_path):
     played = int(re.search(r'data-frame="(\d+)"', stage)[1])
     assert 0 < played and 'data-run="jam_left"' in stage
     assert stage.count('class="link') == 7 and stage.count('class="arrow') == 11
+
+
+def test_plots_mark_running_margin_and_where_two_bars_end(study):
+    """Each mark against the numbers of the study, computed otherwise."""
+    figures = {figure.name: figure for figure in study_report.report(study).figures}
+    running = study.config.run.crank_speed
+
+    def items(figure, kind, name=""):
+        panels = [panel for *_, panel in figures[figure].all_panels()]
+        return [[x for x in panel.items if isinstance(x, kind) and name in x.name] for panel in panels]
+
+    for marks in items("torque-speed", Mark, "normal running"):
+        assert [mark.at for mark in marks] == [pytest.approx(running * study.drive.ratio)]
+    for marks in items("sides", Mark, "normal running"):
+        assert [mark.at for mark in marks] == [running]
+    mode = at(as_dict(study), "organs.limits.chain_resonance")["value"]
+    crank, rocker = items("sides", Shade)
+    assert crank[0].low == pytest.approx(CRANK_GOOD * mode) and rocker[0].low == pytest.approx(
+        ROCKER_GOOD_EMPTY * mode
+    )
+    gain, phase, _ = items("speed-loop", Mark, "crossover")
+    narrowest = min(study.statics.loops.values(), key=lambda loop: loop.phase_margin)
+    crossing = np.interp(0.0, -np.log(narrowest.gain), np.log(narrowest.frequency))
+    assert gain[0].at == phase[0].at == pytest.approx(math.exp(crossing), rel=2e-3)
+    (label,) = (
+        x for *_, panel in figures["speed-loop"].all_panels() for x in panel.items if isinstance(x, Label)
+    )
+    margin = 180.0 + np.interp(crossing, np.log(narrowest.frequency), narrowest.phase)
+    assert label.words == f"margin {margin:.1f} deg"

@@ -13,7 +13,7 @@ from ..engines import numpy_
 from ..study.cycle import Cycle
 from ..study.drive import Drive
 from ..study.record import StudyRecord
-from ..text import forms
+from ..text import forms, number
 from . import blocks as b
 from . import figure as fig
 from . import run_names as read
@@ -53,9 +53,8 @@ def _torque_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
         most = np.where(most < min(float(np.min(curve.y)) for curve in curves), np.nan, most)
         x = fig.Axis("motor speed", "rad/s", "speed", low=low, high=fastest + room)
         limit = fig.Curve("most that the drive gives, steady", w, most, "limit")
-        panels.append(
-            fig.Panel(x, fig.Axis("air-gap torque", "N.m"), (*curves, limit), _group_title(study, group))
-        )
+        items = (*curves, limit, *_duty(s, study))
+        panels.append(fig.Panel(x, fig.Axis("air-gap torque", "N.m"), items, _group_title(study, group)))
     return fig.Figure(
         "torque-speed",
         "Torque-speed plane: the start, and the overloads from their event on",
@@ -65,6 +64,16 @@ def _torque_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
         "Steady running is a closed loop. Grey: the most that the drive gives in steady running.",
         heights=(1.6,),
     )
+
+
+def _duty(s: b.Source, study: StudyRecord) -> Iterator[fig.Item]:
+    """The speed of normal running; of a motor with a nameplate its rated torque, which it may give without end (S1),
+    and the rated point."""
+    yield fig.Mark(study.config.run.crank_speed * study.drive.ratio, "normal running", look="mark")
+    if "rated_torque" in s.result["motor"]:
+        speed, torque = (s.value(f"motor.rated_{name}") for name in ("speed", "torque"))
+        yield fig.Mark(float(torque or 0.0), "rated torque (S1)", axis="y", look="reference")
+        yield fig.Curve("rated point", [speed], [torque], marker="o", joined=False)
 
 
 def _group_title(study: StudyRecord, runs: list[str]) -> str:
@@ -102,6 +111,7 @@ def _turn(s: b.Source, study: StudyRecord) -> fig.Figure:
 def _speed_loop(s: b.Source, study: StudyRecord) -> fig.Figure:
     loops = list(enumerate(study.statics.loops.items()))
     frequency = fig.Axis("frequency", "rad/s", log=True)
+    narrowest = min(study.statics.loops.values(), key=lambda loop: loop.phase_margin)
     longest = 1.5 * max(loop.settling for loop in study.statics.loops.values())
     time = fig.Axis("time after a step of the load torque", "s", low=0.0, high=longest)
     panels = (
@@ -122,6 +132,13 @@ def _speed_loop(s: b.Source, study: StudyRecord) -> fig.Figure:
         )
         if of == "gain":
             yield fig.Mark(1.0, axis="y", look="thin")
+        if of == "phase":
+            yield fig.Mark(-180.0, axis="y", look="thin")
+        if of in ("gain", "phase"):
+            yield fig.Mark(narrowest.crossover, "crossover", look="mark")
+        if of == "phase":
+            margin = narrowest.phase_margin
+            yield fig.Label(narrowest.crossover, -180.0 + margin, f"margin {number(margin, 'deg')}", "left")
 
     return fig.Figure(
         "speed-loop",

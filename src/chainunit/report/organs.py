@@ -8,6 +8,7 @@ from ..machines.chain_unit import SIDES
 from ..quantities import Layout
 from ..study.organs import Limits, OverloadFactors
 from ..study.record import StudyRecord
+from ..study.verdict import CRANK_GOOD, ROCKER_GOOD_EMPTY
 from . import blocks as b
 from . import figure as fig
 from .lines import capital
@@ -64,6 +65,10 @@ def _limits(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     yield b.Table(s.rows(Limits, "organs.limits", none="none"), title="Where the model ends", form="long")
 
 
+_GOOD = {"crank": CRANK_GOOD, "rocker": ROCKER_GOOD_EMPTY}
+"""Up to which part of the lowest natural frequency of a chain two bars give a torque to 10 %."""
+
+
 @PICTURES.declare(lambda study: True, "sides_over_speed.png")
 def _sides(s: b.Source, study: StudyRecord) -> fig.Figure:
     sides = study.findings["organs"].sides
@@ -74,7 +79,10 @@ def _sides(s: b.Source, study: StudyRecord) -> fig.Figure:
             yield fig.Curve(name, sides.speed, sides.peaks[f"{of}_{which}"], look)
         yield from (fig.Mark(at, look="thin") for speeds in sides.crossings()[of].values() for at in speeds)
         yield fig.Mark(study.config.run.crank_speed, "normal running")
+        if mode is not None and _GOOD[of] * mode < sides.speed[-1]:
+            yield fig.Shade(_GOOD[of] * mode, float(sides.speed[-1]), "two bars may be off by more than 10 %")
 
+    mode = s.value("organs.limits.chain_resonance")
     x = fig.Axis("crank speed", "rad/s", "speed", low=0.0, high=float(sides.speed[-1]))
     axes = {of: fig.Axis(f"{of} torque, peak", "N.m", low=0.0) for of in ("crank", "rocker")}
     caption = (
