@@ -1,0 +1,171 @@
+"""The pages of docs/: their commands run and print what stands there, their drawings are current, and the site builds
+without a broken link and without anything from elsewhere.
+
+A page is a walk: its blocks run in their order in one folder. A block that is fenced as ``sh`` runs in a shell,
+``python`` in one process for the whole page; one with a ``title`` is written to the file of that name. A ``text``
+block behind a command is an excerpt of what it prints: each of its lines occurs there, in this order, whatever the
+width of the terminal; a line of three dots stands for what is left out.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import io
+import os
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+FENCE = re.compile(r"^( *)```(\w*)(?: title=\"([^\"]+)\")?\n(.*?)^\1```$", re.DOTALL | re.MULTILINE)
+INSTALLS = ("pip install", "python3 -m venv")
+"""Commands that `.ci/run` runs."""
+QUICK = ("how-to/python.md",)
+"""Pages that take a second or two; the others run in `.ci/full`."""
+
+
+class Block(NamedTuple):
+    kind: str
+    file: str
+    text: str
+
+
+def blocks(page: Path) -> list[Block]:
+    """The fenced blocks of a page, in order."""
+    text = page.read_text("utf-8")
+    found = []
+    for indent, kind, file, body in FENCE.findall(text):
+        body = re.sub(rf"^{indent}", "", body, flags=re.MULTILINE) if indent else body
+        found.append(Block(kind, file, body))
+    return found
+
+
+def _walks() -> list:
+    """Pages that have something to run, the slow ones marked."""
+    pages = [
+        page for page in sorted(DOCS.rglob("*.md")) if any(b.kind in ("sh", "python") for b in blocks(page))
+    ]
+    names = [page.relative_to(DOCS).as_posix() for page in pages]
+    assert set(QUICK) <= set(names)
+    return [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in names]
+
+
+def _collapsed(text: str) -> str:
+    return " ".join(text.split())
+
+
+def missing(excerpt: str, printed: str) -> str | None:
+    """The first line of the excerpt that was not printed after the ones before it."""
+    whole, at = _collapsed(printed), 0
+    for line in map(_collapsed, excerpt.splitlines()):
+        if line in ("", "..."):
+            continue
+        found = whole.find(line, at)
+        if found < 0:
+            return line
+        at = found + len(line)
+    return None
+
+
+class Walk:
+    """A reader who follows a page in a folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.names = folder, {"__name__": "__main__"}
+        tools = folder / ".tools"
+        tools.mkdir()
+        for name, call in (("chainunit", "-m chainunit"), ("python", "")):
+            (tools / name).write_text(f'#!/bin/sh\nexec "{sys.executable}" {call} "$@"\n')
+            (tools / name).chmod(0o755)
+        paths = [str(tools), str(Path(sys.executable).parent), os.environ["PATH"]]
+        self.environment = os.environ | {"PATH": os.pathsep.join(paths), "COLUMNS": "80"}
+        (folder / "examples").symlink_to(ROOT / "examples")
+
+    def shell(self, text: str) -> str:
+        """What the commands print, both on their output and as errors."""
+        done = subprocess.run(
+            ["bash", "-c", text], cwd=self.folder, env=self.environment, capture_output=True, text=True
+        )
+        assert done.returncode in (0, 2), done.stdout[-2000:] + done.stderr[-2000:]
+        assert done.returncode == 0 or done.stderr, text
+        return done.stdout + done.stderr
+
+    def python(self, text: str) -> str:
+        """What the code prints; its names stay for the next block."""
+        printed = io.StringIO()
+        with contextlib.redirect_stdout(printed), contextlib.chdir(self.folder):
+            exec(compile(text, "page", "exec"), self.names)
+        return printed.getvalue()
+
+
+@pytest.mark.parametrize("page", _walks())
+def test_a_page_prints_what_stands_there(page, tmp_path):
+    walk, printed = Walk(tmp_path), None
+    for block in blocks(DOCS / page):
+        if block.file:
+            (tmp_path / block.file).write_text(block.text, "utf-8")
+        elif block.kind == "sh" and not any(word in block.text for word in INSTALLS):
+            printed = walk.shell(block.text)
+        elif block.kind == "python":
+            printed = walk.python(block.text)
+        elif block.kind == "text" and printed is not None:
+            assert block.text.strip(), f"{page}: an empty excerpt"
+            assert missing(block.text, printed) is None, printed[-4000:]
+        else:
+            printed = None
+
+
+def test_an_excerpt_is_compared_line_by_line():
+    printed = "a b\n c   d\ne"
+    assert missing("a b\nc d", printed) is None
+    assert missing("a\n...\ne\n", printed) is None
+    assert missing("c d\na b", printed) == "a b"
+    assert missing("a b\nx", printed) == "x"
+
+
+def test_the_drawings_are_those_of_the_machines():
+    """Else run docs/draw_machines.py."""
+    spec = importlib.util.spec_from_file_location("draw_machines", DOCS / "draw_machines.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    for file, text in module.pictures().items():
+        assert file.read_text("utf-8") == text, file.name
+
+
+class _Fetched(HTMLParser):
+    """What a browser fetches to show a page."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.places: list[str] = []
+
+    def handle_starttag(self, tag, attributes):
+        own = dict(attributes)
+        if tag == "link" and own.get("rel") not in ("canonical", "prev", "next"):
+            self.places.append(own.get("href") or "")
+        elif tag in ("img", "script", "iframe", "source"):
+            self.places.append(own.get("src") or "")
+
+
+def test_the_site_builds_without_a_broken_link_and_fetches_nothing(tmp_path):
+    pytest.importorskip("mkdocs")
+    pytest.importorskip("material")
+    pytest.importorskip("mkdocstrings")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-d", str(tmp_path / "site")]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    pages = list((tmp_path / "site").rglob("*.html"))
+    assert len(pages) > 20
+    for page in pages:
+        fetched = _Fetched()
+        fetched.feed(page.read_text("utf-8"))
+        assert fetched.places and not [place for place in fetched.places if "//" in place], page
+    for style in (tmp_path / "site").rglob("*.css"):
+        assert not re.search(r"(?:@import|url\()\s*[\"']?(?:https?:)?//", style.read_text("utf-8")), style
