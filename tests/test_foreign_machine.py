@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import tomllib
 import zipfile
 from dataclasses import replace
 from pathlib import Path
@@ -21,7 +22,7 @@ from test_foreign_system import OTHER_NAMES, build
 from test_ssp import TOOLS, connections
 from test_ssp import run as run_in
 
-from chainunit import InputError
+from chainunit import InputError, Study
 from chainunit.quantities import Value, declaration, quantity
 from chainunit.study import config
 from chainunit.study.choice import choose
@@ -352,3 +353,20 @@ def test_a_package_holds_their_files_as_they_are(tool, folder, tmp_path):
     with CoSimulation(replace(drive.system(files), start=study_system(study, drive).start)) as simulation:
         wanted = simulation.run(0.3, 1e-3)["motor.w"].values[1:]
     assert np.max(np.abs(got[:, 0] - wanted)) < 2e-4 * np.max(wanted)
+
+
+def test_python_runs_and_shows_it_too(folder):
+    file = folder / "ForeignMachine.fmu"
+    study = Study(system={"machine": file}, **tomllib.loads(STUDY))
+    assert str(file) in repr(study) and "<svg" not in study._repr_html_()
+    assert repr(study.machine).startswith("ForeignMachine(") and f'"piston.mass": {MASS:g}' in repr(
+        study.machine
+    )
+    result = study.run()
+    turn = cycle(study.machine, SPEED, study.config.feed)
+    # the speed ripples on the way round
+    assert result.answers.loc["crank_torque_peak", "steady"] == pytest.approx(
+        float(np.max(np.abs(turn.crank_torque))), rel=0.05
+    )
+    assert result.runs["start_up"]["machine.tau_bias"].units == "N.m"
+    assert "its energy balance holds" in repr(result)

@@ -173,6 +173,10 @@ def test_the_same_keys_and_checks_as_in_a_file():
         Study(machine={"r": 0.9})
     with pytest.raises(InputError, match=r"^machine = 3: must be a table"):
         Study(machine=3)
+    with pytest.raises(InputError, match=r"^coupling = None: must be a table"):
+        Study(coupling=None)
+    with pytest.raises(InputError, match=r"^run.step = \[1.0, 2.0\]: must be a number in s"):
+        Study(run={"step": np.array([1.0, 2.0])})
 
 
 def test_a_text_and_a_file_tell_the_line(tmp_path):
@@ -212,6 +216,8 @@ def test_other_values_make_another_study():
     assert again.machine.p.r == 0.165 and again.config.events["jam_left"].p.force == 3000.0
     assert again.config.source.count("machine.r") == 1 and "motor.rotor.J = 0.01" in repr(again)
     assert list(study.with_values({"event": []}).config.events) == []
+    right = study.with_values({"event.jam_left": {"type": "jam", "side": "right"}})
+    assert list(right.config.events) == ["jam_right"] and list(study.config.events) == ["jam_left"]
     assert study.with_values({}).config.source == "tables in Python"
     with pytest.raises(InputError, match=r'^event.jam_lef.force: no such event; was "jam_left" meant'):
         study.with_values({"event.jam_lef.force": 1.0})
@@ -231,6 +237,9 @@ def test_events_of_the_example_can_be_changed():
 def test_a_slip_of_a_unit_is_a_warning():
     with pytest.warns(UserWarning, match=r"run.crank_speed = 30 rad/s: is unusual") as caught:
         Study(run={"crank_speed": 30.0, "turns": 1})
+    assert caught[0].filename == __file__
+    with pytest.warns(UserWarning, match=r"run.crank_speed = 30 rad/s") as caught:
+        Study(run={"turns": 1}).with_values({"run.crank_speed": 30.0})
     assert caught[0].filename == __file__
 
 

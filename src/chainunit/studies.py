@@ -216,7 +216,10 @@ class Study:
     def _repr_html_(self) -> str:
         """The same with a drawing of the machine, for notebooks."""
         words = f"<p>{escape(repr(self)[1:-1])}</p>"
-        return words + ("" if isinstance(self.machine, ForeignMachine) else drawing(self.machine))
+        if isinstance(self.machine, ForeignMachine):
+            return words
+        # its lines are dark, the page of a notebook may be
+        return f'{words}<div style="background: white; max-width: 60em">{drawing(self.machine)}</div>'
 
 
 class StudyResult:
