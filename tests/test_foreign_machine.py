@@ -137,8 +137,14 @@ def test_what_a_file_sets_is_declared_by_the_fmu(folder):
     assert study.machine.component.start == {"piston.mass": MASS, "throw": 0.15}
     assert study.feed.back_pressure == PRESSURE
     for change, said in (
-        (("piston =", "pistn ="), r"machine\.pistn: unknown key; known here: ratio, piston, throw"),
-        (("back_pressure", "pressure"), r"feed\.pressure: unknown key; known here: back_pressure"),
+        (
+            ("piston =", "pistn ="),
+            r'machine\.pistn: unknown key; was "piston" meant\? known here: ratio, piston, throw',
+        ),
+        (
+            ("back_pressure", "pressure"),
+            r'feed\.pressure: unknown key; was "back_pressure" meant\? known here',
+        ),
         (("ForeignMachine", "none"), r"system\.machine: .*none\.fmu: no such FMU"),
         (("ForeignMachine", "ForeignMotor"), r"system\.machine: .*ForeignMotor\.fmu: has no variable phi; a"),
         (("[run]", "feed_forward = true\n[run]"), r"feed_forward: needs a model of the machine"),

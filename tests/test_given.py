@@ -171,7 +171,7 @@ NOT_OF_A_FILE = (
 )
 
 
-_OF_THE_FILE = ("source", "given", "of_example", "slips", "lines")
+_OF_THE_FILE = ("source", "given", "of_example", "slips", "lines", "tables")
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from .errors import InputError, InterruptedRunError, RunError, WriteError, printable
-from .files import claimed, clear, full
+from .files import claimed, clear, full, write_all
 
 if TYPE_CHECKING:
     from .report.blocks import Report
@@ -174,9 +174,9 @@ def _leave(
     """Write all files of a report and show it; returns the error of the first file that there was no room for. It
     costs neither the others nor what is shown. On a terminal that has the remarks already they are not repeated.
     """
-    from .report import files, terminal
+    from .report import terminal
 
-    written, unwritten = files.write_all(writers)
+    written, unwritten = write_all(writers)
     console = _console()
     terminal.show(report, console, remarks=remarks or not console.is_terminal)
     console.print("Written: " + ", ".join(printable(str(path), 500) for path in written), soft_wrap=True)

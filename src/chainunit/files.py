@@ -8,7 +8,7 @@ import os
 import re
 import secrets
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -65,6 +65,19 @@ def netcdf() -> Iterator[None]:
         yield
     except RuntimeError as error:
         raise OSError(errno.EIO, f"{error}; is the disk full?") from error
+
+
+def write_all(writers: Iterable[Callable[[], list[Path]]]) -> tuple[list[Path], WriteError | None]:
+    """Call the writers; returns the files, and the error of the first that there was no room for: it costs none of
+    the others."""
+    written: list[Path] = []
+    unwritten = None
+    for write in writers:
+        try:
+            written += write()
+        except WriteError as error:
+            unwritten = unwritten or error
+    return written, unwritten
 
 
 def full(error: OSError) -> bool:

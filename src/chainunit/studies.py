@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from .errors import InputError, WriteError, near_name, shown
-from .files import claimed, clear
+from .files import claimed, clear, write_all
 from .fmu.backends import Backend
 from .machines.machine import Machine
 from .places import lines_of
@@ -310,7 +310,7 @@ class StudyResult:
 
     def _write(self, folder: Path) -> list[Path]:
         report = contents.report(self.record, self._numbers)
-        written, unwritten = files.write_all(results.writers(self.record, report, folder))
+        written, unwritten = write_all(results.writers(self.record, report, folder))
         if unwritten is not None:
             raise WriteError(str(unwritten)) from unwritten
         return written

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 
-from ..errors import WriteError
 from ..files import whole
 from . import html, print_figures
 from .blocks import Report
@@ -44,19 +43,6 @@ def writers(report: Report, folder: Path, name: str) -> list[Callable[[], list[P
 def numbers_text(report: Report) -> str:
     """The numbers of a report as JSON."""
     return json.dumps(report.result, indent=1, allow_nan=False) + "\n"
-
-
-def write_all(writers: Iterable[Callable[[], list[Path]]]) -> tuple[list[Path], WriteError | None]:
-    """Call the writers; returns the files, and the error of the first that there was no room for: it costs none of
-    the others."""
-    written: list[Path] = []
-    unwritten = None
-    for write in writers:
-        try:
-            written += write()
-        except WriteError as error:
-            unwritten = unwritten or error
-    return written, unwritten
 
 
 def names(name: str, pictures: tuple[str, ...]) -> tuple[str, ...]:
