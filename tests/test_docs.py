@@ -126,6 +126,10 @@ def test_a_page_prints_what_stands_there(page, tmp_path):
             assert missing(block.text, printed) is None, printed[-4000:]
         else:
             printed = None
+    # a drawing that the page makes is the one that it shows
+    for shown in re.findall(r"\]\(([^)]*[.]svg)\)", (DOCS / page).read_text("utf-8")):
+        made = tmp_path / Path(shown).name
+        assert not made.exists() or made.read_text() == ((DOCS / page).parent / shown).read_text(), shown
 
 
 def test_an_excerpt_is_compared_line_by_line():
