@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 from event_tables import event_line
 
 from chainunit import InputError
 from chainunit.study.config import parse
 from chainunit.study.judgement import motor_limits, motor_verdict
+from chainunit.study.limits import heating
 from chainunit.study.run import run_study
 
 KNIFE = f"""{event_line("dip", turns=1)}
@@ -79,3 +82,10 @@ def test_sizing_has_the_permitted_temperature():
     assert parse("[sizing]\ntemperature = 400").permitted_temperature == ("sizing.temperature", 400.0)
     with pytest.raises(InputError, match=r"run.winding_temperature: is sizing.temperature"):
         parse("[sizing]\n[run]\nwinding_temperature = 400")
+
+
+def test_surroundings_as_hot_as_the_winding_may_be_pass_the_limit():
+    """Nothing is left to rise by: no division by zero, and no tick."""
+    for ambient in (330.0, 340.0):
+        check = heating(350.0, ambient, 330.0)
+        assert check.utilisation == math.inf and "over 1000 times" in check.passed

@@ -145,3 +145,38 @@ def test_what_the_program_prints_is_read_again(value, unit, kind):
 
 def test_a_number_alone_has_no_unit():
     assert split("12.5") == (12.5, "") and split("long") is None
+
+
+@pytest.mark.parametrize(
+    ("unit", "kind", "text", "value"),
+    [
+        ("N.m.s/rad", "", "3 Nm/(rad/s)", 3.0),
+        ("N.m.s/rad", "", "3 N/(m/s) m2/rad", None),
+        ("N", "", "2 × 10³ N", 2000.0),
+        ("N", "", "2 x 10^3 N", 2000.0),
+        ("N", "", "2*1000 N", None),
+        ("m", "", "3*100 mm", None),
+        ("N.m/rad", "", "5 N m deg", None),
+        ("N.m/rad", "", "5 N m/deg2", None),
+        ("J/K", "", "1200 k", None),
+        ("kg", "", "30 u", None),
+        ("kg", "", "30 ton", None),
+        ("K", "difference", "9 degF", 5.0),
+        ("K", "difference", "9 degC", 9.0),
+        ("K", "", "68 degF", 293.15),
+        ("N", "", "3 daN", 30.0),
+        ("N/m2", "", "81 GPa", 81e9),
+        ("m/s2", "", "5 m/s/s", 5.0),
+        ("m/s2", "", "0.5 g", None),
+        ("rad/s2", "", "60 rpm/s", 2 * math.pi),
+        ("m", "", "3 )m(", None),
+    ],
+)
+def test_odd_texts(unit, kind, text, value):
+    """As an engineer means them, or refused: never as another number."""
+    variable = _variable(unit, kind)
+    if value is None:
+        with pytest.raises(ValueError, match="must be"):
+            to_number(variable, text)
+    else:
+        assert to_number(variable, text) == pytest.approx(value, rel=1e-12)

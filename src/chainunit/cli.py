@@ -151,6 +151,8 @@ def study(
     from .report import results
     from .report import study as contents
 
+    # a fault is told before any progress
+    results.check_named(loaded)
     with claimed(output):
         errors = _console(stderr=True)
         with _progress("the machine at constant speed", errors) as progress:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,11 +27,11 @@ def statements(text: str) -> Iterator[Statement]:
 
     A statement ends with the first line up to which it is valid TOML by itself.
     """
-    lines = text.splitlines()
+    lines = text.replace("\r\n", "\n").split("\n")
     table, numbers, first = "", dict[str, int](), 0
     while first < len(lines):
         last = first + 1
-        while (data := _loaded("\n".join(lines[first:last]))) is None and last < len(lines):
+        while (data := _loaded(lines, first, last)) is None and last < len(lines):
             last += 1
         opens = lines[first].lstrip().startswith("[")
         if opens:
@@ -55,9 +55,19 @@ def lines_of(text: str) -> dict[str, int]:
     return found
 
 
-def _loaded(text: str) -> dict[str, Any] | None:
+def _loaded(lines: Sequence[str], first: int, last: int) -> dict[str, Any] | None:
+    """The data in these lines; None where they are no whole statement."""
+    end = lines[last - 1].strip()
+    # a list of many lines is tried where it may end, not at each of its lines
+    if (
+        last - first > 1
+        and last < len(lines)
+        and not end.endswith(("]", "}", '"""', "'''"))
+        and "#" not in end
+    ):
+        return None
     try:
-        return tomllib.loads(text)
+        return tomllib.loads("\n".join(lines[first:last]))
     except tomllib.TOMLDecodeError:
         return None
 

@@ -14,7 +14,7 @@ from typing import Any
 from .quantities import base_units
 
 _NUMBER = re.compile(
-    r"([+-]?(?:\d{1,3}(?: \d{3})+(?:\.\d*)?|\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3}| ?[x*] ?10\^?[+-]?\d{1,3}(?!\d))?)"
+    r"([+-]?(?:\d{1,3}(?: \d{3})+(?:\.\d*)?|\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3}| ?[x*] ?10\^[+-]?\d{1,3})?)"
     r" ?(\D.*|)"
 )
 _COMMA = re.compile(r"([+-]?\d+),(\d+)(?![\d,.])(.*)")
@@ -40,11 +40,28 @@ _PINT = {
     "r": "revolution",
     "PS": "metric_horsepower",
     "kp": "kilogram_force",
+    "kgf": "kilogram_force",
+    "lbf": "pound_force",
     "sec": "second",
     "%": "percent",
     "‰": "permille",
+    "degF": "delta_degF",
 }
-"""Names that pint does not know, or takes for something else."""
+"""Names of units that pint calls otherwise, or takes for something else."""
+_NAMES = (
+    frozenset(
+        """
+    m metre metres meter meters in inch inches ft g gram grams kilogram kilograms t tonne tonnes lb
+    s second seconds min minute minutes h hour hours d day days N newton J joule W watt hp bar Pa Wh kWh VA kVA
+    V volt A amp ampere Hz hertz K kelvin C degC H henry Wb ohm T F percent permille rpm
+    rad mrad radian radians deg degree degrees arcmin arcsec revolution revolutions turn turns
+    """.split()
+    )
+    | _PINT.keys()
+)
+"""Names of units; pint knows more, which nobody means (k is its constant of Boltzmann, ton the American one)."""
+_PREFIXED = re.compile(r"(?:[kMGTmµunpdc]|da)(?:m|g|s|N|J|W|V|A|K|Hz|Pa|ohm|H|Wb|T|F)")
+
 _ANGLES = frozenset(
     "rad mrad radian radians deg degree degrees arcmin arcsec revolution revolutions turn turns rpm".split()
 )
@@ -92,7 +109,7 @@ def split(text: str) -> tuple[float, str] | None:
     match = _NUMBER.fullmatch(_ascii(text))
     if match is None:
         return None
-    number = re.sub(r" ?[x*] ?10\^?", "e", match[1]).replace(" ", "")
+    number = re.sub(r" ?[x*] ?10\^", "e", match[1]).replace(" ", "")
     return float(number), match[2]
 
 
@@ -104,7 +121,7 @@ def with_point(text: str) -> str:
 
 def _ascii(text: str) -> str:
     """The text in one spelling: raised digits, signs and blanks of all kinds in plain letters."""
-    plain = text
+    plain = re.sub("([⁺⁻]?[⁰¹²³⁴-⁹]+)", r"^\1", text)
     for sign, letters in _SIGNS.items():
         plain = plain.replace(sign, letters)
     plain = unicodedata.normalize("NFKC", plain.replace("µ", "\0")).replace("\0", "µ").replace("μ", "µ")
@@ -166,10 +183,11 @@ def _of_angle(factors: list[tuple[str, int]], wanted: dict[str, int]) -> list[tu
     ValueError
         where one names an angle and the other does not.
     """
-    named = any(name in _ANGLES for name, _ in factors)
-    if named and not wanted.get("rad"):
-        raise ValueError("an angle is named, and the quantity has none")
-    if named or wanted.get("rad", 0) <= 0:
+    named = [power for name, power in factors if name in _ANGLES]
+    power = wanted.get("rad", 0)
+    if named and sum(named) != power:
+        raise ValueError("an angle is named that the quantity does not have")
+    if named or power <= 0:
         return factors
     if ("Hz", 1) in factors or factors[:1] == [("min", -1)]:
         return [*factors, ("revolution", 1)]
@@ -186,26 +204,39 @@ def _of_temperature(
     if kind != "difference" and factors == [("C", 1)]:
         return [("degC", 1)]
     if kind != "difference" and len(factors) == 1:
-        return factors
+        return [(name.removeprefix("delta_"), power) for name, power in factors]
     return [("kelvin" if name in ("degC", "C") else name, power) for name, power in factors]
 
 
 def _factors(written: str) -> list[tuple[str, int]]:
-    """Names of pint and their powers in a unit without special signs."""
+    """Names of pint and their powers in a unit without special signs.
+
+    Raises
+    ------
+    ValueError
+        for a name that is no unit, and for brackets that do not pair.
+    """
     factors: list[tuple[str, int]] = []
-    sign, depth, at = 1, 0, 0
+    outside: list[int] = []
+    # below a stroke all is divided by; in brackets a stroke turns what it finds
+    begin, sign, at = 1, 1, 0
     while at < len(written):
         match = _TOKEN.match(written, at)
         if match is None:
             raise ValueError(f"{written}: cannot be read")
         token, at = match[1], match.end()
         if token == "/":
-            sign = -1
-        elif token in "()":
-            depth += 1 if token == "(" else -1
+            sign = -begin
+        elif token == "(":
+            outside.append(begin)
+            begin = sign
+        elif token == ")":
+            if not outside:
+                raise ValueError(f"{written}: brackets do not open")
+            sign, begin = begin, outside.pop()
         elif token not in ("*", ".", "1"):
             factors += _of_name(token, sign)
-    if depth:
+    if outside:
         raise ValueError(f"{written}: brackets do not close")
     return factors
 
@@ -215,8 +246,10 @@ def _of_name(token: str, sign: int) -> list[tuple[str, int]]:
     assert match is not None  # a token of a name is a factor
     name, power = match[1], sign * int(match[2] or 1)
     glued = _GLUED.fullmatch(name)
-    if glued is None or (glued[2] is None and glued[3] is None) or name == "gs":
+    if name in _NAMES or _PREFIXED.fullmatch(name):
         return [(_PINT.get(name, name), power)]
+    if glued is None or (glued[2] is None and glued[3] is None) or name == "gs":
+        raise ValueError(f"{name}: is no unit")
     parts = [part for part in glued.groups() if part]
     return [*((part, sign) for part in parts[:-1]), (parts[-1], power)]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,8 +23,11 @@ class Check:
 
     @property
     def utilisation(self) -> float | None:
-        """value/limit; None where there is no value: the candidate does not get that far."""
-        return None if self.value is None else self.value / self.limit
+        """value/limit; None where there is no value: the candidate does not get that far. Where nothing is permitted,
+        any value passes it without end."""
+        if self.value is None:
+            return None
+        return self.value / self.limit if self.limit > 0.0 else math.inf
 
     @property
     def passed(self) -> str:
