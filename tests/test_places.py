@@ -2,7 +2,7 @@
 
 import tomllib
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chainunit.places import lines_of, statements
@@ -48,6 +48,7 @@ def test_a_list_of_many_lines_is_one_statement():
     ]
 
 
+@settings(deadline=None)
 @given(
     st.lists(st.sampled_from(["", "# [x]", "a{} = 1", "[t{}]", "b{} = '''\n[no]\n'''", "c{} = [\n1,\n2]"]))
 )

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chainunit.errors import InputError
@@ -129,6 +129,7 @@ def test_each_unit_that_a_refusal_names_is_read(unit):
         assert math.isfinite(to_number(_variable(unit), f"2 {name}"))
 
 
+@settings(deadline=None)
 @given(st.floats(1e-9, 1e9), st.sampled_from(sorted(FITTING)), st.sampled_from(["", "speed", "percent"]))
 def test_what_the_program_prints_is_read_again(value, unit, kind):
     """Within the three digits that are printed; a share of more than 1000 % is printed as words."""
