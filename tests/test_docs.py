@@ -27,9 +27,11 @@ DOCS = ROOT / "docs"
 FENCE = re.compile(r"^( *)```(\w*)(?: title=\"([^\"]+)\")?\n(.*?)^\1```$", re.DOTALL | re.MULTILINE)
 INSTALLS = ("pip install", "python3 -m venv")
 """Commands that `.ci/run` runs."""
-QUICK = ("how-to/python.md",)
-"""Pages that take a second or two; the others run in `.ci/full`."""
-OWN_TEST = ("python.md",)
+PAGES = (*sorted(DOCS.rglob("*.md")),)
+"""Whose commands run."""
+QUICK = ("docs/how-to/python.md", "docs/system.md")
+"""Pages that take some seconds; the others run in `.ci/full`."""
+OWN_TEST = ("docs/python.md",)
 """Of these `test_docs_python` compares every line."""
 
 
@@ -51,10 +53,8 @@ def blocks(page: Path) -> list[Block]:
 
 def _walks() -> list:
     """Pages that have something to run, the slow ones marked."""
-    pages = [
-        page for page in sorted(DOCS.rglob("*.md")) if any(b.kind in ("sh", "python") for b in blocks(page))
-    ]
-    names = [page.relative_to(DOCS).as_posix() for page in pages]
+    pages = [page for page in PAGES if any(b.kind in ("sh", "python") for b in blocks(page))]
+    names = [page.relative_to(ROOT).as_posix() for page in pages]
     assert set(QUICK) <= set(names)
     return [
         pytest.param(name, marks=() if name in QUICK else pytest.mark.slow)
@@ -114,7 +114,7 @@ class Walk:
 @pytest.mark.parametrize("page", _walks())
 def test_a_page_prints_what_stands_there(page, tmp_path):
     walk, printed = Walk(tmp_path), None
-    for block in blocks(DOCS / page):
+    for block in blocks(ROOT / page):
         if block.file:
             (tmp_path / block.file).write_text(block.text, "utf-8")
         elif block.kind == "sh" and not any(word in block.text for word in INSTALLS):
@@ -127,9 +127,9 @@ def test_a_page_prints_what_stands_there(page, tmp_path):
         else:
             printed = None
     # a drawing that the page makes is the one that it shows
-    for shown in re.findall(r"\]\(([^)]*[.]svg)\)", (DOCS / page).read_text("utf-8")):
+    for shown in re.findall(r"\]\(([^)]*[.]svg)\)", (ROOT / page).read_text("utf-8")):
         made = tmp_path / Path(shown).name
-        assert not made.exists() or made.read_text() == ((DOCS / page).parent / shown).read_text(), shown
+        assert not made.exists() or made.read_text() == ((ROOT / page).parent / shown).read_text(), shown
 
 
 def test_an_excerpt_is_compared_line_by_line():
