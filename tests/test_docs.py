@@ -132,6 +132,17 @@ def test_a_page_prints_what_stands_there(page, tmp_path):
         assert not made.exists() or made.read_text() == ((ROOT / page).parent / shown).read_text(), shown
 
 
+def test_the_tables_of_keys_that_pages_name_are_there():
+    texts = [page.read_text("utf-8") for page in PAGES]
+    named = sorted({name for text in texts for name in re.findall(r"chainunit keys ([a-z_]+)`", text)})
+    assert len(named) > 5
+    for name in named:
+        done = subprocess.run(
+            [sys.executable, "-m", "chainunit", "keys", name], capture_output=True, text=True
+        )
+        assert done.returncode == 0, done.stderr
+
+
 def test_an_excerpt_is_compared_line_by_line():
     printed = "a b\n c   d\ne"
     assert missing("a b\nc d", printed) is None
