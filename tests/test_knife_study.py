@@ -27,6 +27,7 @@ from chainunit.study.choice import choose
 from chainunit.study.config import load, parse
 from chainunit.study.drive import Drive
 from chainunit.study.flywheels import FlywheelFindings, least_flywheel
+from chainunit.study.limits import given_motor
 from chainunit.study.measures import read_answers
 from chainunit.study.parts import example
 from chainunit.study.record import StudyRecord
@@ -344,7 +345,7 @@ def drive_of(law, starts=math.inf, bare=0.01):
         known = {"flywheel": flywheel, "inertia": bare + flywheel, "residual": 0.0}
         if flywheel <= starts:
             known |= {"start_time": 1.0, "speed_ripple": law(bare + flywheel), "cycle_gap": 0.0}
-        return Wheel(FlywheelAnswers(**nothing | known), None)
+        return Wheel(FlywheelAnswers(**nothing | known), None, {})
 
     return run, tried
 
@@ -383,52 +384,86 @@ def test_no_flywheel_is_needed_where_the_motor_alone_keeps_the_fluctuation():
     assert said.startswith("For a fluctuation of 5.00 % no flywheel is needed; nor is it by hand. Without ")
 
 
+def judged(study, answers):
+    """A flywheel with these answers, and the limits of the study's motor."""
+    a = FlywheelAnswers(**answers)
+    checks = given_motor(study.config, study.drive, a.winding_temperature, a.current_rms, a.start_time)
+    return Wheel(a, None, checks)
+
+
 @pytest.mark.parametrize(
-    ("current", "start", "mean", "heavier", "ending"),
+    ("current", "start", "mean", "heavier", "hot", "ending"),
     [
-        (0.98, 5.0, 8.0, 0.9, "the start takes 5.00 s."),
-        (1.05, 5.0, 8.0, 1.02, "still over the limit: RMS current. No flywheel that was run keeps all."),
-        (1.05, 5.0, 8.0, 0.95, "still over the limit: RMS current. 2.00 kg m² keeps all."),
+        (0.98, 5.0, 8.0, 0.9, 350.0, "the start takes 5.00 s."),
+        (0.98, 12.9, 8.0, 0.9, 350.0, "the start takes 12.9 s."),
+        (0.98, 13.1, 8.0, 0.9, 350.0, "still over the limit: time to start. 2.00 kg m² keeps all."),
+        (0.98, 5.0, 8.0, 0.9, 400.0, "the limit: rise of temperature. 2.00 kg m² keeps all."),
+        (
+            1.05,
+            5.0,
+            8.0,
+            1.02,
+            350.0,
+            "still over the limit: RMS current. No flywheel that was run keeps all.",
+        ),
+        (1.05, 5.0, 8.0, 0.95, 350.0, "still over the limit: RMS current. 2.00 kg m² keeps all."),
         (
             2.61,
             27.9,
             20.0,
             2.0,
-            "RMS current, time of the start, mean torque. No flywheel that was run keeps all.",
+            350.0,
+            "RMS current, time to start, mean torque. No flywheel that was run keeps all.",
         ),
     ],
 )
-def test_a_flywheel_is_recommended_where_it_keeps_every_limit(current, start, mean, heavier, ending):
+def test_a_flywheel_is_recommended_where_it_keeps_every_limit(current, start, mean, heavier, hot, ending):
+    """The limits of its motor: rated current, permitted temperature, and the time its rotor may be locked."""
     study = bare()
+    plate = study.config.plate.nameplate
+    assert plate.locked_time == 13.0 and study.config.run.winding_temperature == 393.15
     assert 8.0 < study.config.plate.nameplate.torque < 20.0
     sound = {v.name: 0.004 for v in Layout(FlywheelAnswers).variables}
-    sizes = (1.0, 0.049, current, start), (2.0, 0.03, heavier, 6.0)
+    sizes = (1.0, 0.049, current, start, hot), (2.0, 0.03, heavier, 6.0, 350.0)
     least, heavy = (
-        Wheel(
-            FlywheelAnswers(
-                **sound | {"flywheel": J, "speed_ripple": ripple, "current_share": share, "start_time": time}
-            ),
-            None,
+        judged(
+            study,
+            sound
+            | {"flywheel": J, "speed_ripple": ripple, "current_share": share, "start_time": time}
+            | {"current_rms": share * plate.rated_current, "winding_temperature": T},
         )
-        for J, ripple, share, time in sizes
+        for J, ripple, share, time, T in sizes
     )
     FlywheelFindings(2.0, 0.05, 1e3, 150.0, 0.1, mean, [heavy], least, searched=True).remark(study)
     said = next(remark.text for remark in study.remarks if remark.kind == "least flywheel")
     assert said.endswith(ending)
-    assert ("It is not recommended" in said) == (current > 1.0)
+    assert ("It is not recommended" in said) == ("the limit" in said)
 
 
 def test_words_for_a_slow_start_and_a_poor_run():
     study = bare()
     sound = {v.name: 0.004 for v in Layout(FlywheelAnswers).variables}
-    given = sound | {"flywheel": 5.0, "start_time": 12.0, "residual": 0.03, "cycle_gap": 0.4}
-    FlywheelFindings(5.0, 0.05, 1.0, 150.0, 0.1, 1.0, [Wheel(FlywheelAnswers(**given), None)]).remark(study)
+    given = sound | {"flywheel": 5.0, "start_time": 14.0, "residual": 0.03, "cycle_gap": 0.4}
+    given |= {"winding_temperature": 400.0}
+    FlywheelFindings(1.0, 0.05, 1.0, 150.0, 0.1, 1.0, [judged(study, given)]).remark(study)
     assert [str(remark) for remark in study.warnings] == [
-        "The start takes more than 10 s with a flywheel of 5.00 kg m² (12.0 s).",
+        "The winding becomes hotter than the permitted 120 degC with a flywheel of 5.00 kg m² (127 degC).",
+        "The start takes longer than the 13 s for which the rotor may be locked with a flywheel of 5.00 kg m² "
+        "(14.0 s).",
         "Energy is missing with a flywheel of 5.00 kg m² (3.00 %): a shorter run.step is needed.",
         "The turns do not close with a flywheel of 5.00 kg m² (40.0 %): raise run.settle_turns.",
     ]
-    assert study.warnings[0].quantities["5.start_time"] == (12.0, "s", "")
+    assert study.warnings[1].quantities["5.start_time"] == (14.0, "s", "")
+    # of the limits that the study's own flywheel passes the study warns, with its remedies
+    own = bare()
+    FlywheelFindings(5.0, 0.05, 1.0, 150.0, 0.1, 1.0, [judged(own, given)]).remark(own)
+    assert [remark.kind for remark in own.warnings] == ["energy with flywheel", "flywheel not settled"]
+
+
+def test_a_motor_without_a_nameplate_has_the_limit_of_its_winding_alone():
+    config = parse('event = []\n[system]\nmachine = "KnifeDrive"\nmotor = "DcMotor"\n')
+    drive = choose(config, Path(), lambda *_: None).drive
+    assert set(given_motor(config, drive, 400.0, 50.0, 30.0)) == {"temperature"}
 
 
 @pytest.mark.parametrize(

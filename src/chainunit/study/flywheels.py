@@ -19,13 +19,14 @@ from .choice import tune
 from .config import Config
 from .cycle import needed_inertia
 from .drive import Drive
+from .limits import given_motor
 from .measures import Answers, read_answers
 from .record import Amount, StudyRecord
 from .rig import Rig, worst_residual
 from .shaft import remedies
 from .turn import Turn, TurnAnalysis
 from .verdict import RESIDUAL, STEADY
-from .wheel import START_LONG, FlywheelAnswers, Wheel, over
+from .wheel import FlywheelAnswers, Wheel
 from .window import Phase, Window, whole_turns
 
 CLOSE = 0.03
@@ -205,7 +206,11 @@ def _wheel(
     }
     names = Layout(FlywheelAnswers).names
     values = {name: own.get(name, getattr(steady, name, None) if turning else None) for name in names}
-    return Wheel(FlywheelAnswers(**values), turns)
+    answers = FlywheelAnswers(**values)
+    checks = given_motor(
+        study.config, drive, answers.winding_temperature, answers.current_rms, answers.start_time
+    )
+    return Wheel(answers, turns, checks)
 
 
 def least_flywheel(
@@ -260,12 +265,14 @@ def least_flywheel(
 
 @dataclass(frozen=True)
 class Trouble:
-    """What may go wrong with flywheels: which have it, at that rated current [A], and the answer that shows it."""
+    """What may go wrong with flywheels: which have it, the answer that shows it, and the limit of the motor that is
+    passed where it is one, of which the study warns with its own flywheel."""
 
     kind: str
-    has: Callable[[Wheel, float], bool]
+    has: Callable[[Wheel], bool]
     text: str
     number: str = ""
+    limit: str = ""
 
     def amount(self, wheel: Wheel) -> Amount:
         """The answer with its unit and kind."""
@@ -275,41 +282,54 @@ class Trouble:
     def words(self, wheel: Wheel) -> str:
         """The flywheel, and the answer where there is one."""
         size = number(wheel.flywheel, "kg.m2")
-        return f"{size} ({number(*self.amount(wheel))})" if self.number else size
+        if not self.number:
+            return size
+        value, *unit = self.amount(wheel)
+        # a winding whose loss grows faster than its cooling comes to no temperature
+        return f"{size} ({'without end' if value == math.inf else number(value, *unit)})"
 
 
 _TROUBLES = (
     Trouble(
         "flywheel stalls",
-        lambda wheel, rated: wheel.stalls,
+        lambda wheel: wheel.stalls,
         "the motor stalls under the load with a flywheel of {where}: {remedy}, or less load.",
     ),
     Trouble(
         "flywheel does not start",
-        lambda wheel, rated: wheel.answers.start_time is None,
+        lambda wheel: wheel.answers.start_time is None,
         "the motor does not come up to speed with a flywheel of {where}.",
     ),
     Trouble(
         "rated current",
-        lambda wheel, rated: over(wheel.answers.current_rms, rated),
-        "the RMS current passes the rated {rated}, so that the motor becomes too hot, with a flywheel of {where}.",
+        lambda wheel: wheel.passes("current"),
+        "the RMS current passes the rated {limit}, so that the motor becomes too hot, with a flywheel of {where}.",
         "current_rms",
+        "current",
+    ),
+    Trouble(
+        "hot winding",
+        lambda wheel: wheel.passes("temperature"),
+        "the winding becomes hotter than the permitted {limit} with a flywheel of {where}.",
+        "winding_temperature",
+        "temperature",
     ),
     Trouble(
         "long start",
-        lambda wheel, rated: over(wheel.answers.start_time, START_LONG),
-        "the start takes more than {long} with a flywheel of {where}.",
+        lambda wheel: wheel.passes("start"),
+        "the start takes longer than the {limit} for which the rotor may be locked with a flywheel of {where}.",
         "start_time",
+        "start",
     ),
     Trouble(
         "energy with flywheel",
-        lambda wheel, rated: not wheel.answers.residual < RESIDUAL,
+        lambda wheel: not wheel.answers.residual < RESIDUAL,
         "energy is missing with a flywheel of {where}: a shorter run.step is needed.",
         "residual",
     ),
     Trouble(
         "flywheel not settled",
-        lambda wheel, rated: not wheel.settled,
+        lambda wheel: not wheel.settled,
         "the turns do not close with a flywheel of {where}: raise run.settle_turns.",
         "cycle_gap",
     ),
@@ -319,7 +339,6 @@ _TROUBLES = (
 def _on_wheels(found: FlywheelFindings, study: StudyRecord) -> None:
     """A warning for each kind of trouble, with all flywheels that have it; the study warns of its own."""
     plate = study.config.plate
-    rated = math.inf if plate is None else plate.nameplate.rated_current
     too_small = plate is not None and found.mean_torque > plate.nameplate.torque
     remedy = "a larger motor" if too_small else "a larger motor or flywheel"
     if plate is not None and too_small:
@@ -330,9 +349,10 @@ def _on_wheels(found: FlywheelFindings, study: StudyRecord) -> None:
             mean=(found.mean_torque, "N.m"),
             rated=(plate.nameplate.torque, "N.m"),
         )
-    parts: dict[str, Amount] = {"rated": (rated, "A"), "long": (START_LONG, "s")}
     for trouble in _TROUBLES:
-        wheels = [wheel for wheel in found.wheels if trouble.has(wheel, rated)]
+        wheels = [wheel for wheel in found.wheels if trouble.has(wheel)]
+        if trouble.limit and all(wheel.flywheel == found.own for wheel in wheels):
+            continue
         if wheels:
             amounts = {
                 f"{wheel.flywheel:g}.{trouble.number}": trouble.amount(wheel)
@@ -340,8 +360,16 @@ def _on_wheels(found: FlywheelFindings, study: StudyRecord) -> None:
                 if trouble.number
             }
             where = ", ".join(map(trouble.words, wheels))
-            words = {name: number(*part, full=False) for name, part in parts.items()}
-            study.warn(trouble.kind, trouble.text, where=where, remedy=remedy, **words, **amounts)
+            limit = _limit(wheels[0], trouble.limit, study)
+            study.warn(trouble.kind, trouble.text, where=where, remedy=remedy, limit=limit, **amounts)
+
+
+def _limit(wheel: Wheel, name: str, study: StudyRecord) -> str:
+    """A limit of the motor, in words; that of its winding as a temperature, not as a rise."""
+    if name == "temperature":
+        return number(study.config.permitted_temperature[1], "K", full=False)
+    check = wheel.checks.get(name)
+    return "" if check is None else number(check.limit, check.unit, check.kind, full=False)
 
 
 def _on_fluctuation(found: FlywheelFindings, study: StudyRecord) -> None:

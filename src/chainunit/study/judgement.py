@@ -8,7 +8,7 @@ from typing import Any
 from ..text import entry, number, turning
 from . import verdict
 from .chain import HIGH
-from .limits import Check, heating, lasting_current, starting
+from .limits import Check, given_motor
 from .measures import Answers
 from .organs import OrganAnalysis
 from .quantiles import runs_needed
@@ -68,16 +68,12 @@ def _residuals(study: StudyRecord) -> dict[str, float]:
 def motor_limits(study: StudyRecord) -> dict[str, Check]:
     """What the motor does in its start and in steady running beside its limits, by name; of a motor that sizing chose
     the temperature alone, as its starts and its duty are among the checks of sizing."""
-    steady, config, drive = study.answers.get(STEADY), study.config, study.drive
-    if steady is None or drive.foreign is not None:
+    steady, start = study.answers.get(STEADY), study.start
+    if steady is None or start is None:
         return {}
-    ambient, (_, permitted) = drive.fmu_parameters.ambient.T, config.permitted_temperature
-    checks = {"temperature": heating(steady.winding_temperature, ambient, permitted)}
-    if config.plate is not None:
-        checks["current"] = lasting_current(steady.current_rms, config.plate.nameplate)
-        if study.start is not None and not drive.follows:
-            checks["start"] = starting(study.start.start_time, config.plate.nameplate)
-    return checks
+    return given_motor(
+        study.config, study.drive, steady.winding_temperature, steady.current_rms, start.start_time
+    )
 
 
 _PASSED = {

@@ -8,6 +8,8 @@ from typing import Any
 
 from ..drives.nameplate import Nameplate
 from ..text import entry, number
+from .config import Config
+from .drive import Drive
 from .window import BURNT
 
 
@@ -28,6 +30,11 @@ class Check:
         if self.value is None:
             return None
         return self.value / self.limit if self.limit > 0.0 else math.inf
+
+    @property
+    def over(self) -> bool:
+        """Whether a value is known, and passes the limit."""
+        return self.utilisation is not None and self.utilisation > 1.0
 
     @property
     def passed(self) -> str:
@@ -61,3 +68,30 @@ def starting(time: float | None, plate: Nameplate) -> Check:
 def lasting_current(rms: float, plate: Nameplate) -> Check:
     """The RMS current of a duty beside the rated one [A]."""
     return Check("RMS current", rms, plate.rated_current, "A")
+
+
+def given_motor(
+    config: Config, drive: Drive, temperature: float | None, current: float | None, start: float | None
+) -> dict[str, Check]:
+    """The limits of the motor that a study gives, by name; none of a motor of somebody else, and of one without a
+    nameplate that of the winding alone.
+
+    Parameters
+    ----------
+    temperature : at which the winding comes to rest if steady running goes on for ever [K]
+    current : RMS of steady running [A]
+    start : time of the start [s]; one by an inverter has no limit
+    """
+    if drive.foreign is not None:
+        return {}
+    checks = {}
+    if temperature is not None:
+        _, permitted = config.permitted_temperature
+        checks["temperature"] = heating(temperature, drive.fmu_parameters.ambient.T, permitted)
+    if config.plate is not None:
+        plate = config.plate.nameplate
+        if current is not None:
+            checks["current"] = lasting_current(current, plate)
+        if not drive.follows:
+            checks["start"] = starting(start, plate)
+    return checks

@@ -137,7 +137,7 @@ def _on_limits(study: StudyRecord) -> None:
     steady, warn = study.answers[STEADY], study.warn
     key, permitted = study.config.permitted_temperature
     for name, check in motor_limits(study).items():
-        if check.utilisation is None or not check.utilisation > 1.0:
+        if not check.over:
             continue
         value, limit = check.value, check.limit
         if name == "temperature":

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import xarray as xr
 
 from ..quantities import Value, declaration, quantity
+from .limits import Check
 from .measures import same_measure
 from .window import closes
-
-START_LONG = 10.0
-"""Time of a start from which on it is worth a word [s]."""
-
-
-def over(answer: float | None, limit: float) -> bool:
-    """Whether an answer is known and above a limit."""
-    return answer is not None and answer > limit
 
 
 @declaration
@@ -36,6 +30,7 @@ class FlywheelAnswers:
     current_peak: Value = same_measure("current_peak")
     current_rms: Value = same_measure("current_rms")
     current_share: Value = same_measure("current_share")
+    winding_temperature: Value = same_measure("winding_temperature")
     supply_power_mean: Value = same_measure("supply_power_mean")
     stored_share: Value = same_measure("stored_share")
     stored_share_most: Value = same_measure("stored_share_most")
@@ -46,10 +41,12 @@ class FlywheelAnswers:
 
 @dataclass(frozen=True)
 class Wheel:
-    """A flywheel with its run; `turns` are the steady ones, or where it makes none all of the run."""
+    """A flywheel with its run; `turns` are the steady ones, or where it makes none all of the run; `checks` are the
+    limits of the motor, by name."""
 
     answers: FlywheelAnswers
     turns: xr.Dataset
+    checks: Mapping[str, Check]
 
     @property
     def flywheel(self) -> float:
@@ -69,9 +66,11 @@ class Wheel:
     @property
     def passed(self) -> list[str]:
         """Limits of motor and start that its run passes, in words."""
-        a = self.answers
-        sizes = ("RMS current", a.current_share, 1.0), ("time of the start", a.start_time, START_LONG)
-        return [words for words, size, limit in sizes if over(size, limit)]
+        return [check.title for check in self.checks.values() if check.over]
+
+    def passes(self, limit: str) -> bool:
+        """Whether its run passes a limit of the motor, if there is one of that name."""
+        return limit in self.checks and self.checks[limit].over
 
     def keeps(self, permitted: float) -> bool:
         """Whether it runs steadily, not on the way to a stall, and keeps the `permitted` fluctuation."""
