@@ -294,3 +294,56 @@ sweep_points = 0
     for side in SIDES:
         assert float(np.max(coasting[f"machine.{side}.drift"])) < 1e-6
         assert {f"A2 {side} web at rocker", f"B {side} hinge"} <= set(study.pins["jam_left"])
+
+
+HELD = '[coupling]\ntrip_torque = "{trip} N m"\nheld_in_start = true\n[run]\nturns = 1\nsettle_turns = 1\n'
+
+
+def held_shut(text, folder):
+    """The study of a coupling that is held shut in the start, and what is said of it."""
+    study = run_study(config.parse(text), folder)
+    assert study.failure is None
+    (said,) = [remark for remark in study.remarks if remark.kind == "coupling held shut"]
+    return study, said
+
+
+def largest(study, run, begin=0.0, end=None):
+    """Largest torque of the motor in a run from `begin` to `end`, at the crank [N m]."""
+    return float(abs(study.runs[run]["motor.tau"].sel(time=slice(begin, end))).max()) * study.drive.ratio
+
+
+def test_a_coupling_is_needless_to_hold_only_where_no_start_would_open_it(tmp_path):
+    """Also the starts under load run with it held shut."""
+    starts = event_line("start_loaded_left", "start_loaded_right")
+    study, said = held_shut(starts + HELD.format(trip=46), tmp_path)
+    hardest = largest(study, "start_loaded_right")
+    assert max(largest(study, "start_up"), largest(study, "start_loaded_left")) < 46.0 < hardest
+    assert said.severity == "warning" and said.runs == ("start_loaded_right",)
+    assert said.quantities["start"][0] == pytest.approx(hardest)
+    assert f"start with all feed on the right ({hardest:.1f} N m)" in said.text
+    assert "not needed" not in said.text and "all feed on the left" not in said.text
+    study, said = held_shut(starts + HELD.format(trip=60), tmp_path / "needless")
+    assert said.severity == "note" and "which is not needed" in said.text
+    assert said.runs == ("start_loaded_right",) and "start with all feed on the right" in said.text
+
+
+def test_the_coming_of_the_feed_belongs_to_the_start_of_a_coupling(tmp_path, monkeypatch):
+    """It puts more on the coupling than a recommended setting, and than one that is given."""
+    empty = "empty_start = true\n" + event_line("jam_left", force=2000.0, turns=1)
+    motor = '[system]\nmotor = "IE3 4-pole 0.55 kW, 80M"\n'
+    study, said = held_shut(empty + motor + HELD.format(trip=60), tmp_path)
+    first = largest(study, "start_up", end=study.fed_from)
+    fed = largest(study, "start_up", study.fed_from, study.settled)
+    assert first > fed > 60.0
+    assert study.start_torques == pytest.approx({"start_up": first, "settling": fed})
+    assert said.severity == "warning" and said.runs == ("start_up", "settling")
+    assert f"settling under the feed ({fed:.0f} N m)" in said.text
+    one = [m for m in sizing.catalogue(None) if (m.nameplate.power, m.nameplate.poles) == (550.0, 4.0)]
+    monkeypatch.setattr(sizing, "catalogue", lambda extra: one)
+    sized = run_study(
+        config.parse(empty + "[sizing]\ncandidates = 1\n[run]\nturns = 2\n"), tmp_path / "sized"
+    )
+    assert sized.failure is None and sized.setting.torque < min(sized.start_torques.values())
+    assert set(sized.start_torques) == {"start_up", "settling"}
+    said = coupling_sentence(sized)
+    assert "settling under the feed" in said and "start-up" in said

@@ -61,6 +61,16 @@ def _torque(value: float) -> str:
     return number(value, "N.m")
 
 
+def _listed(study: StudyRecord, peaks: Mapping[str, float]) -> str:
+    """Runs with their peaks on the coupling [N m]."""
+    return ", ".join(f"{study.called(name)} ({_torque(peak)})" for name, peak in peaks.items())
+
+
+def _starts_above(study: StudyRecord, torque: float) -> dict[str, float]:
+    """The parts of starting that put more than this `torque` [N m] on the coupling, with their peaks [N m]."""
+    return {name: peak for name, peak in study.start_torques.items() if peak > torque}
+
+
 def coupling_sentence(study: StudyRecord) -> str:
     """Which safety coupling the sized drive should have and what it does in the overloads, or why none protects
     it."""
@@ -68,9 +78,6 @@ def coupling_sentence(study: StudyRecord) -> str:
     assert setting is not None
     caveat = f" ({study.verdict.caveat})" if study.verdict and study.verdict.caveat else ""
     above = f"{_torque(setting.least)}, {MARGIN:g} times the {_torque(setting.normal)} of normal duty"
-
-    def listed(names: Mapping[str, float]) -> str:
-        return ", ".join(f"{study.called(name)} ({_torque(peak)})" for name, peak in names.items())
 
     if setting.obstacle is Obstacle.MOTOR:
         return (
@@ -92,19 +99,19 @@ def coupling_sentence(study: StudyRecord) -> str:
     shut = {name: peak for name, peak in setting.overloads.items() if name not in setting.opens}
     text = (
         f"Recommended safety coupling{caveat}: {above}, {'above' if setting.stalls else 'below'} the "
-        f"{_torque(setting.motor)} that the motor gives at the crank. It opens where {listed(setting.opens)}"
+        f"{_torque(setting.motor)} that the motor gives at the crank. It opens where {_listed(study, setting.opens)}"
     )
-    text += f"; it stays shut where {listed(shut)}." if shut else "."
+    text += f"; it stays shut where {_listed(study, shut)}." if shut else "."
     if setting.stalls:
         text += (
             " A load that rises slowly stalls the motor and does not open it: the relay has to trip there."
         )
     if setting.nuisances:
-        text += f" A nuisance trip, which protects nothing: it opens, too, where {listed(setting.nuisances)}."
-    if study.start_torque is not None and study.start_torque > setting.least:
+        text += f" A nuisance trip, which protects nothing: it opens, too, where {_listed(study, setting.nuisances)}."
+    if starts := _starts_above(study, setting.least):
         text += (
-            f" A start direct on line puts {_torque(study.start_torque)} on it: it has to be held shut in the start "
-            "(coupling.held_in_start = true)."
+            f" Starting direct on line puts more on it: {_listed(study, starts)}; it has to be held shut in the "
+            "start (coupling.held_in_start = true)."
         )
     return text
 
@@ -116,14 +123,22 @@ def remark_on_coupling(study: StudyRecord, trip: float) -> None:
     peaks, shocks = peaks_on_coupling(study), peaks_on_coupling(study, Role.SHOCK)
     amounts = {"trip": (trip, "N.m")} | ({} if most is None else {"motor": (most, "N.m")})
     warn = study.warn
-    if study.start_torque is not None:
-        over = study.start_torque > trip
-        (warn if over else study.note)(
+    if starts := study.start_torques:
+        above = _starts_above(study, trip)
+        hardest = max(starts, key=starts.__getitem__)
+        text = (
+            "The safety coupling opens at {trip}, and starting puts more on it: {where}. It is held shut in the "
+            "start (coupling.held_in_start)."
+            if above
+            else "Starting puts {start} on the safety coupling at most ({where}), which opens at {trip}: it is held "
+            "shut in the start (coupling.held_in_start), which is not needed."
+        )
+        (warn if above else study.note)(
             "coupling held shut",
-            "The start puts {start} on the safety coupling, which opens at {trip}: it is held shut in the start "
-            "(coupling.held_in_start)" + ("." if over else ", which is not needed."),
-            "start_up",
-            start=(study.start_torque, "N.m"),
+            text,
+            *(above or [hardest]),
+            where=_listed(study, above) if above else study.called(hardest),
+            start=(starts[hardest], "N.m"),
             **amounts,
         )
     opened = [name for name in peaks if study.answers[name].coupling_trip_time is not None]

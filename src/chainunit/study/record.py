@@ -118,8 +118,9 @@ class StudyRecord:
     """rainflow cycles of the torque in shaft 2"""
     spreads: dict[str, Spread] = field(default_factory=dict)
     """of the events that rest on an assumption"""
-    start_torque: float | None = None
-    """peak on the coupling in a start direct on line, at the crank [N m]: judged apart"""
+    start_torques: dict[str, float] = field(default_factory=dict)
+    """peak on the coupling in each part of starting that is judged apart, at the crank [N m]: in the start-up, in the
+    settling under the feed, and in each start under load"""
     setting: Setting | None = None
     """the safety coupling that a sized drive should have, where none is given: one that is given cuts off the peaks
     which would set it"""
@@ -254,6 +255,11 @@ class StudyRecord:
         if config.coupling is not None:
             return config.held_in_start
         return config.sizing is not None and config.start == "direct"
+
+    @property
+    def start_torque(self) -> float | None:
+        """Largest of `start_torques` [N m]; None where no start is judged apart."""
+        return max(self.start_torques.values(), default=None)
 
     @property
     def not_known(self) -> frozenset[str]:

@@ -197,7 +197,7 @@ def _protection(study: StudyRecord) -> dict[str, Any]:
             setting.normal, "largest torque of normal duty on the coupling, at the crank"
         ),
         "breakdown_torque": torque(setting.motor, "most that the motor gives at the crank"),
-        "start_torque": torque(study.start_torque, "torque of a start direct on line on the coupling"),
+        "start_torque": torque(study.start_torque, "largest torque of a start on the coupling"),
         "overloads": {
             name: torque(
                 peak, f"{study.called(name)}: {'opens it' if name in setting.opens else 'leaves it shut'}"

@@ -232,13 +232,12 @@ class Runner:
         study.start = replace(read_answers(study.window(Phase.START_UP, start)), start_time=started)
         study.fed_from = rig.fed_from
         self._bearings(verdict.START, start)
+        self._held_shut(verdict.START, start)
         if rig.fed_from is not None:
             settling = run.sel(time=slice(end, begin))
             study.settling = read_answers(study.window(Phase.SETTLING, settling))
             self._bearings(verdict.SETTLING, settling)
-        if study.start_apart:
-            end = study.settled if rig.fed_from is None else rig.fed_from
-            study.start_torque = on_coupling(rig.drive, run.sel(time=slice(None, end)))
+            self._held_shut(verdict.SETTLING, settling)
         asked = on_coupling(rig.drive, steady)
         if config.coupling and asked > config.coupling.trip_torque:
             raise RunError(
@@ -259,6 +258,7 @@ class Runner:
             run = simulation.run(self.stop, self.rig.step, progress, guards=self.start_guards)
             transient = Transient(event, 0.0, run, self.rig.event_signals(event, 0.0, {}), {})
             self._close(simulation, transient, self.stop, Phase.LOADED_START)
+            self._held_shut(event.name, run)
         if check:
             self.report(f"monolithic reference: {event.title}", self.total, self.total)
             self._compare(event.name, transient)
@@ -281,6 +281,11 @@ class Runner:
         after = run.sel(time=slice(transient.begin, None))
         study.answers[name] = read_answers(study.window(phase, after, transient.begin, trip))
         self._bearings(name, after)
+
+    def _held_shut(self, name: str, run: xr.Dataset) -> None:
+        """What a coupling has to carry that is held shut in starting."""
+        if self.study.start_apart:
+            self.study.start_torques[name] = on_coupling(self.rig.drive, run)
 
     def _bearings(self, name: str, run: xr.Dataset) -> None:
         if loads := pin_loads(self.rig.drive, run):
