@@ -10,7 +10,7 @@ from event_tables import event_line
 from chainunit import InputError
 from chainunit.study.config import parse
 from chainunit.study.judgement import motor_limits, motor_verdict
-from chainunit.study.limits import heating
+from chainunit.study.limits import SPEED_DEVIATION, heating
 from chainunit.study.run import run_study
 
 KNIFE = f"""{event_line("dip", turns=1)}
@@ -82,6 +82,20 @@ def test_sizing_has_the_permitted_temperature():
     assert parse("[sizing]\ntemperature = 400").permitted_temperature == ("sizing.temperature", 400.0)
     with pytest.raises(InputError, match=r"run.winding_temperature: is sizing.temperature"):
         parse("[sizing]\n[run]\nwinding_temperature = 400")
+
+
+def test_a_motor_that_fits_by_its_speed_keeps_it(tmp_path):
+    """One limit for the choice and the verdict: behind the given gear the crank is 2.5 % too fast."""
+    text = "event = []\n[sizing]\npoles_least = 4\npoles_most = 4\ncandidates = 1\n[gear]\nratio = 51.0\n"
+    study, verdict, warnings = studied(text + "[run]\nturns = 1\n", tmp_path)
+    check = study.sizing.chosen.checks["crank_speed"]
+    assert 0.5 < check.utilisation < 1.0 and check.limit == SPEED_DEVIATION
+    mean = study.answers["steady"].speed_mean
+    assert mean == pytest.approx(3.0 * (1.0 + check.value), rel=2e-3)
+    assert verdict["holds"] == "true" and verdict["text"].startswith(
+        "The motor keeps the crank at 3.08 rad/s"
+    )
+    assert "speed missed" not in warnings
 
 
 def test_surroundings_as_hot_as_the_winding_may_be_pass_the_limit():

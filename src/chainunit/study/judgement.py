@@ -8,14 +8,13 @@ from typing import Any
 from ..text import entry, number, turning
 from . import verdict
 from .chain import HIGH
-from .limits import Check, given_motor
+from .limits import Check, given_motor, reaches
 from .measures import Answers
 from .organs import OrganAnalysis
 from .quantiles import runs_needed
 from .record import StudyRecord
 from .rig import worst_residual
 from .verdict import RESIDUAL, STEADY, Holds, Verdict
-from .window import reaches
 
 
 def model_verdict(study: StudyRecord) -> Verdict:

@@ -12,6 +12,9 @@ from .config import Config
 from .drive import Drive
 from .window import BURNT
 
+SPEED_DEVIATION = 0.03
+"""Of the crank's mean speed from the one that is asked for, in parts of it, up to which a drive keeps that."""
+
 
 @dataclass(frozen=True)
 class Check:
@@ -68,6 +71,17 @@ def starting(time: float | None, plate: Nameplate) -> Check:
 def lasting_current(rms: float, plate: Nameplate) -> Check:
     """The RMS current of a duty beside the rated one [A]."""
     return Check("RMS current", rms, plate.rated_current, "A")
+
+
+def keeping_speed(speed: float, asked: float) -> Check:
+    """How far the mean speed of the crank, or of the motor at its ratio, is from the one `asked` [rad/s]."""
+    return Check("deviation of the crank speed", abs(speed / asked - 1.0), SPEED_DEVIATION, "1", "percent")
+
+
+def reaches(speed: float, asked: float) -> bool:
+    """Whether the crank runs at the speed that is asked of it."""
+    check = keeping_speed(speed, asked)
+    return check.utilisation is not None and check.utilisation <= 1.0
 
 
 def given_motor(

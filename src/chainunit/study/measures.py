@@ -14,8 +14,9 @@ from ..quantities import Layout, Value, Variable, declaration, quantity
 from . import protection
 from .arrays import peak
 from .drive import AbsentError
+from .limits import reaches
 from .stored import stored_shares
-from .window import Phase, Window, drift, end_gap, reaches
+from .window import Phase, Window, drift, end_gap
 
 STARTED = 0.95
 """Share of the speed that is asked for at which a start is over."""

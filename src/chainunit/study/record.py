@@ -16,6 +16,7 @@ from . import verdict
 from .chain import ChainResult
 from .config import Config
 from .drive import Drive
+from .limits import reaches
 from .measures import Answers, not_known
 from .monte_carlo import MonteCarloResult
 from .parts import LENGTHS
@@ -24,7 +25,7 @@ from .shaft import Cycles, ShaftAnswers
 from .sizing import SizingResult
 from .statics import DriveStatics
 from .verdict import STEADY, Verdict
-from .window import Phase, Trip, Window, reaches, whole_turns
+from .window import Phase, Trip, Window, whole_turns
 
 LOAD_CYCLE = "load_cycle.csv"
 """File with the steady turns as the motor's shaft sees them."""

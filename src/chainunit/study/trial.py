@@ -23,11 +23,10 @@ from .arrays import peak
 from .config import Config
 from .drive import Drive
 from .duty import Duty, rms
-from .limits import Check, heating, starting
+from .limits import Check, heating, keeping_speed, starting
 from .rig import PATIENCE, Rig
 from .window import BURNT, settled
 
-_SPEED_DEVIATION = 0.03  # of the crank speed that is asked for
 _GAP = "motor.air_gap_tau"
 
 
@@ -189,13 +188,7 @@ class Trial:
             ),
             "temperature": reached(heating(self.temperature, p.ambient.T, asked.temperature)),
             "starts": Check("starts per hour", asked.starts_per_hour, self.permitted_starts, "1"),
-            "crank_speed": check(
-                "deviation of the crank speed",
-                abs(self.speed / asked_speed - 1.0),
-                _SPEED_DEVIATION,
-                "1",
-                "percent",
-            ),
+            "crank_speed": reached(keeping_speed(self.speed, asked_speed)),
             "speed": check("speed fluctuation", self.fluctuation, asked.fluctuation, "1", "percent"),
         }
         if math.isfinite(asked.inertia_ratio):

@@ -186,8 +186,3 @@ def closes(gap: float, drifts: float) -> bool:
 def settled(drive: Drive, turns: xr.Dataset) -> bool:
     """Whether `turns` close."""
     return closes(end_gap(drive, turns), drift(drive, turns))
-
-
-def reaches(speed: float, asked: float) -> bool:
-    """Whether the crank runs at the speed that is asked of it, within 1 %."""
-    return bool(abs(speed - asked) <= 0.01 * asked)
