@@ -59,6 +59,10 @@ def test_a_motor_that_burns_in_steady_running_is_no_good(tmp_path):
     assert current.quantities["limit"][0] == plate.rated_current
     assert current.quantities["value"][0] == pytest.approx(steady.current_share * plate.rated_current)
     assert warnings["no reserve"].quantities["over"][0] == -steady.torque_reserve > 0.1
+    # steady running comes in each turn, a dip for a moment: one sentence, of the verdict as of the warning
+    for when, where in (("in each turn", warnings["no reserve"].text), ("for a moment", verdict["text"])):
+        said = f"no reserve of torque: {when} it passes the largest torque of a steady state by "
+        assert said in where and "a moment the motor gives" not in where
 
 
 def test_the_permitted_temperature_of_a_dc_motor(tmp_path):

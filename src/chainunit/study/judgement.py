@@ -86,6 +86,13 @@ AMPLE = 0.02
 """Reserve of torque from which on the motor counts as strong enough: with less it stands at its limit."""
 
 
+def no_reserve(run: str, reserve: float) -> str:
+    """How far the motor's torque in a run passes what it gives for long, of a `reserve` below 0."""
+    over = number(-reserve, "1", "percent") + (" or more" if reserve <= -1.0 else "")
+    when = "in each turn" if run == STEADY else "for a moment"
+    return f"no reserve of torque: {when} it passes the largest torque of a steady state by {over}"
+
+
 def motor_verdict(study: StudyRecord) -> dict[str, Any] | None:
     """Whether the motor reaches the speed and stays cool ("false" where not), and its least reserve of torque with
     the run of it ("in part" where none is left or known, another limit is passed, or sizing found it insufficient),
@@ -123,12 +130,7 @@ def motor_verdict(study: StudyRecord) -> dict[str, Any] | None:
     elif reserve is not None and reserve >= 0.0:
         text += f"; least reserve of torque {number(reserve, '1', 'percent')} ({study.called(run)})"
     else:
-        over = number(-reserves[run], "1", "percent") + (" or more" if reserves[run] <= -1.0 else "")
-        when = "in each turn" if run == STEADY else "for a moment"
-        text += (
-            f"; no reserve of torque: {when} it passes the largest torque of a steady state by {over} "
-            f"({study.called(run)})"
-        )
+        text += f"; {no_reserve(run, reserves[run])} ({study.called(run)})"
     if left_out:
         names = ", ".join(study.called(name) for name in left_out)
         text += f"; runs whose energy balance is not kept are left out ({names})"

@@ -11,7 +11,7 @@ from ..drives.cardan import two_joints
 from ..engines import numpy_
 from ..text import number
 from .coupling import peaks_on_coupling, remark_on_coupling
-from .judgement import model_verdict, motor_limits
+from .judgement import model_verdict, motor_limits, no_reserve
 from .measures import STARTED, Answers
 from .record import LOAD_CYCLE, Amount, StudyRecord
 from .sections import ChainOrgans
@@ -159,9 +159,10 @@ def _on_limits(study: StudyRecord) -> None:
     if steady.torque_reserve is not None and steady.torque_reserve < 0.0:
         warn(
             "no reserve",
-            "steady running: for a moment the motor gives {over} more than the largest torque of a steady state: a "
-            "heavier load or a dip of the voltage stalls it; a larger motor or a heavier flywheel.",
+            "steady running: the motor has {passes}: a heavier load or a dip of the voltage stalls it; a larger "
+            "motor or a heavier flywheel.",
             STEADY,
+            passes=no_reserve(STEADY, steady.torque_reserve),
             over=(-steady.torque_reserve, "1", "percent"),
         )
 
