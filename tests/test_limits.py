@@ -102,6 +102,17 @@ def test_a_motor_that_fits_by_its_speed_keeps_it(tmp_path):
     assert "speed missed" not in warnings
 
 
+def test_a_motor_whose_gear_misses_the_speed_starts_all_the_same(tmp_path):
+    """Behind a gear for three quarters of the speed: the verdict speaks of the speed alone."""
+    text = KNIFE.replace("1.5 kW, 90L", "3 kW, 100L").replace("efficiency = 1", "ratio = 49")
+    study, verdict, warnings = studied(text, tmp_path)
+    assert not study.reaches and "speed missed" in warnings
+    assert 0.7 < study.answers["steady"].speed_mean / study.config.run.crank_speed < 0.8
+    check = motor_limits(study)["start"]
+    assert 0.0 < check.utilisation < 1.0 and check.value == study.start.start_time
+    assert "does NOT reach the speed" in verdict["text"] and "start takes too long" not in verdict["text"]
+
+
 def test_surroundings_as_hot_as_the_winding_may_be_pass_the_limit():
     """Nothing is left to rise by: no division by zero, and no tick."""
     for ambient in (330.0, 340.0):

@@ -29,9 +29,10 @@ from chainunit.study.cycle import cycle, energy_swing, needed_inertia
 from chainunit.study.drive import Drive
 from chainunit.study.duty import rms
 from chainunit.study.limits import Check
+from chainunit.study.measures import time_to_start
 from chainunit.study.rig import Rig
 from chainunit.study.sizing import Standing
-from chainunit.study.trial import Trial, permitted_starts, start_time
+from chainunit.study.trial import Trial, permitted_starts
 from chainunit.system import CoSimulation, Profile, System
 
 ANGLE = np.linspace(0.0, 2.0 * math.pi, 7200, endpoint=False)
@@ -101,8 +102,16 @@ def test_start_up_time_by_hand(dc):
     reached = float(np.interp(0.5 * w, run["motor.w"].values[:800], run["time"].values[:800]))
     assert reached == pytest.approx(inertia * 0.5 * w / (k * limit - load), rel=0.01)
     time = np.linspace(0.0, 4.0, 401)
-    assert start_time(time, np.minimum(100.0 * time, 200.0)) == pytest.approx(1.9, abs=0.011)
-    assert start_time(time, np.zeros(401)) is None
+    rise = np.minimum(100.0 * time, 200.0)
+    # at 95 % of the speed that is asked for, though it settles a little above, or below
+    for settled in (197.0, 200.0, 204.0):
+        assert time_to_start(time, rise, settled, 200.0) == pytest.approx(1.9, abs=0.011)
+    # where it settles at another, of that one
+    assert time_to_start(time, 0.7 * rise, 140.0, 200.0) == pytest.approx(1.9, abs=0.011)
+    # one that stalls later has started all the same; one that creeps from the beginning has not
+    assert time_to_start(time, np.where(time < 3.0, rise, 10.0), 10.0, 200.0) == pytest.approx(1.9, abs=0.011)
+    assert time_to_start(time, 0.4 * rise, 80.0, 200.0) is None
+    assert time_to_start(time, np.zeros(401), 0.0, 200.0) is None
 
 
 def test_permitted_starts_by_hand():

@@ -20,7 +20,7 @@ from .config import Config
 from .cycle import needed_inertia
 from .drive import Drive
 from .limits import given_motor
-from .measures import Answers, read_answers
+from .measures import CREEPS, Answers, read_answers
 from .record import Amount, StudyRecord
 from .rig import Rig, worst_residual
 from .shaft import remedies
@@ -31,8 +31,6 @@ from .window import Phase, Window, whole_turns
 
 CLOSE = 0.03
 """Relative width below the permitted fluctuation in which that of the least flywheel lies."""
-CREEPS = 0.5
-"""Share of the speed that is asked for below which a machine is said to stand."""
 _TRIALS = 8
 _WORSE = 1.1
 """Times the fluctuation with a lighter flywheel from which on a heavier one is said to be worse."""
@@ -171,14 +169,10 @@ def _run(study: StudyRecord, rig: Rig, found: FlywheelFindings, flywheel: float)
     run = start_up.run
     residual = worst_residual(rig.residuals(run))
     turns = whole_turns(drive, run.sel(time=slice(start_up.steady_from, None)), config.run.turns)
-    start, steady = (
-        read_answers(Window(phase, rows, drive, sides, config.run.crank_speed))
-        for phase, rows in (
-            (Phase.START_UP, run.sel(time=slice(None, turns["time"].values[0]))),
-            (Phase.STEADY, turns),
-        )
-    )
-    return _wheel(study, found, flywheel, steady, start, turns, residual)
+    steady = Window(Phase.STEADY, turns, drive, sides, config.run.crank_speed)
+    rows = run.sel(time=slice(None, turns["time"].values[0]))
+    start = Window(Phase.START_UP, rows, drive, sides, config.run.crank_speed, steady=steady)
+    return _wheel(study, found, flywheel, read_answers(steady), read_answers(start), turns, residual)
 
 
 def _wheel(

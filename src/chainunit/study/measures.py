@@ -18,8 +18,10 @@ from .limits import reaches
 from .stored import stored_shares
 from .window import Phase, Window, drift, end_gap
 
+CREEPS = 0.5
+"""Share of the speed that is asked for below which a machine is said to stand."""
 STARTED = 0.95
-"""Share of the speed that is asked for at which a start is over."""
+"""Share of the speed at which a start is over, see `time_to_start`."""
 
 _ALL = frozenset(Phase)
 _RUNNING = _ALL - {Phase.START_UP, Phase.SETTLING}
@@ -96,10 +98,24 @@ def _fold(w: Window) -> float | None:
     return max((float(np.max(w.value(f"machine.{side}.fold_largest"))) for side in w.sides), default=0.0)
 
 
+def time_to_start(time: Any, speed: Any, settled: float, asked: float) -> float | None:
+    """When a shaft first turns at `STARTED` of the speed `asked` of it or, where it settles at another, of that one;
+    None where it does not. One that stands or creeps in the end may have started before: it stalled under its load.
+
+    Parameters
+    ----------
+    time, speed : of the run [s], [rad/s], shape (time,)
+    settled : mean speed of steady running [rad/s]
+    asked : [rad/s]
+    """
+    misses = CREEPS * asked < settled and not reaches(settled, asked)
+    at_speed = np.flatnonzero(np.asarray(speed) >= STARTED * (settled if misses else asked))
+    return float(time[at_speed[0]]) if at_speed.size else None
+
+
 def _start_time(w: Window) -> float | None:
-    """When the crank first turns at `STARTED` of its speed."""
-    at_speed = np.flatnonzero(w.speed >= STARTED * w.asked)
-    return float(w.since[at_speed[0]]) if at_speed.size else None
+    settled = w.asked if w.steady is None else w.steady.speed_mean
+    return time_to_start(w.since, w.speed, settled, w.asked)
 
 
 def _lent(w: Window) -> tuple[float | None, float | None]:
@@ -159,7 +175,7 @@ class Answers:
     `power_peak` is the most that the motor gives, 0 where it only brakes.
 
     The ripple is (largest - least)/mean of the speed; `shaft_share` the peak torque on the machine's shaft over
-    that of the motor (the rest is the rotor's inertia); `start_time` ends at 95 % of the speed; `shaking_*` the
+    that of the motor (the rest is the rotor's inertia); `start_time` is `time_to_start`; `shaking_*` the
     largest deviation of the frame's load from its mean, the moment about C; `torque_reserve` the least part that is
     left of the driving torque that the warm motor can give at an instant, at its speed, voltage and frequency: 0 at
     the limit, less where a transient passes

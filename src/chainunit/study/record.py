@@ -288,7 +288,7 @@ class StudyRecord:
         sides = self.drive.machine.loaded_sides(self.config.feed)
         asked = self.config.run.crank_speed
         steady = None
-        if phase in (Phase.EVENT, Phase.LOADED_START):
+        if phase in (Phase.START_UP, Phase.EVENT, Phase.LOADED_START):
             steady = Window(Phase.STEADY, self.steady, self.drive, sides, asked)
         return Window(phase, run, self.drive, sides, asked, begin, steady, trip)
 

@@ -24,20 +24,11 @@ from .config import Config
 from .drive import Drive
 from .duty import Duty, rms
 from .limits import Check, heating, keeping_speed, starting
+from .measures import CREEPS, time_to_start
 from .rig import PATIENCE, Rig
 from .window import BURNT, settled
 
 _GAP = "motor.air_gap_tau"
-
-
-def start_time(time: Any, speed: Any, share: float = 0.95) -> float | None:
-    """Time at which the speed first reaches `share` of its mean over the last fifth of the run; None where the shaft
-    does not turn by then."""
-    speed = np.asarray(speed)
-    final = float(np.mean(speed[-max(1, len(speed) // 5) :]))
-    if not final > 0.0:
-        return None
-    return float(time[int(np.argmax(speed >= share * final))])
 
 
 @dataclass(frozen=True)
@@ -59,8 +50,8 @@ class Trial:
         """Time to start [s]; None where the motor does not bring the machine up to speed."""
         runs = (self.start, self.steady)
         speed, time = (np.concatenate([run[name].values for run in runs]) for name in ("motor.w", "time"))
-        expected = self.config.run.crank_speed * self.drive.ratio
-        return start_time(time, speed) if self.speed > 0.5 * expected else None
+        asked = self.config.run.crank_speed * self.drive.ratio
+        return time_to_start(time, speed, self.speed, asked) if self.speed > CREEPS * asked else None
 
     @cached_property
     def speed(self) -> float:
