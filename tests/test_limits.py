@@ -8,6 +8,8 @@ import pytest
 from event_tables import event_line
 
 from chainunit import InputError
+from chainunit.drives import induction_motor as induction
+from chainunit.engines import MATH
 from chainunit.study.config import parse
 from chainunit.study.judgement import motor_limits, motor_verdict
 from chainunit.study.limits import SPEED_DEVIATION, heating
@@ -63,6 +65,43 @@ def test_a_motor_that_burns_in_steady_running_is_no_good(tmp_path):
     for when, where in (("in each turn", warnings["no reserve"].text), ("for a moment", verdict["text"])):
         said = f"no reserve of torque: {when} it passes the largest torque of a steady state by "
         assert said in where and "a moment the motor gives" not in where
+
+
+STALLED = """event = {events}
+empty_start = true
+[system]
+machine = "KnifeDrive"
+motor = "IE3 4-pole 1.5 kW, 90L"
+[run]
+turns = 2
+"""
+
+
+def test_a_motor_below_its_breakdown_speed_stalls_under_the_load(tmp_path):
+    """That is said in place of ratio and slip, and no state of overloads where there are none."""
+    study, verdict, warnings = studied(STALLED.format(events="[]"), tmp_path)
+    steady, motor = study.answers["steady"], study.drive.parameters
+    missed = warnings["speed missed"].text
+    below = study.drive.breakdown_speed(study.steady)
+    assert steady.speed_mean < 0.5 * below and "the motor stalls under the load" in missed
+    assert f"below the {below:.2f} rad/s of its breakdown torque" in missed
+    assert "slip" not in missed and "verload" not in missed
+    # there the torque is the largest of all speeds
+    T, w = float(study.steady["motor.stator.T"].mean()), below * study.drive.ratio
+    slower, there, faster = (induction.steady(MATH, motor, w * x, T=T).tau for x in (0.9, 1.0, 1.1))
+    assert there > max(slower, faster)
+    said = (
+        "no reserve of torque: in each turn it passes the largest torque of a steady state by 100 % or more"
+    )
+    assert said in verdict["text"] and said in warnings["no reserve"].text
+
+
+def test_a_motor_above_its_breakdown_speed_has_the_speed_of_ratio_and_slip(tmp_path):
+    """Overloads start from there."""
+    text = JAM + '[system]\nmotor = "IE3 4-pole 0.55 kW, 80M"\n[gear]\nratio = 55\n[run]\nturns = 1\n'
+    missed = studied(text, tmp_path)[2]["speed missed"].text
+    assert "the speed that gear ratio and slip give. Overloads are those of this state." in missed
+    assert "stalls" not in missed
 
 
 def test_the_permitted_temperature_of_a_dc_motor(tmp_path):

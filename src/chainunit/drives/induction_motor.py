@@ -473,6 +473,13 @@ class InductionMotor(Motor):
         return float(breakdown(p, V / p.supply.V, f, T).tau) if min(V, f) > 0.0 else 0.0
 
     @staticmethod
+    def breakdown_speed(p: Any, T: float, *at: float) -> float:
+        """Of the breakdown torque behind friction and windage."""
+        V, f = at
+        slip = float(breakdown(p, V / p.supply.V, f, T).slip) if min(V, f) > 0.0 else 1.0
+        return (1.0 - slip) * _TURN * f / p.pole_pairs
+
+    @staticmethod
     def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
         """The fluxes are not faster than 1 MHz."""
         yield p.cage.L, 1e-6 * _resistance(p) / (1.0 - p.cage.skin_L), math.inf

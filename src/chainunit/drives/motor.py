@@ -193,6 +193,12 @@ class Motor(Model):
         arguments as in `largest_torque`."""
         raise NotImplementedError
 
+    @staticmethod
+    def breakdown_speed(p: Any, T: float, *at: float) -> float:
+        """Speed of the shaft [rad/s] below which the motor gives the less, the slower it turns: a load that brings it
+        there stalls it. 0 where it has no such speed; arguments as in `largest_torque`."""
+        return 0.0
+
 
 def friction_time(xp: Any, rotor: Any) -> Any:
     """The time constant of the rotor that its own friction `d` brakes, without any load [s]; at most a second."""

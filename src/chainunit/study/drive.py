@@ -368,8 +368,18 @@ class Drive:
         """Largest torque at the crank [N m] that a load meets which slows the motor down from the mean of a run until
         it stalls, with the winding at `T` [K]; see `Motor.pull_out`."""
         self.needs_own("the pull-out torque")
-        at = (float(np.mean(run[f"motor.{name}"].values)) for name in self.motor.limited_by)
-        return self.motor.pull_out(self.fmu_parameters, T, *at) * self.ratio
+        return self.motor.pull_out(self.fmu_parameters, T, *self._mean_supply(run)) * self.ratio
+
+    def breakdown_speed(self, run: xr.Dataset) -> float:
+        """Speed of the crank [rad/s] below which a load stalls the motor, at the mean supply and temperature of a
+        run; 0 where there is none. See `Motor.breakdown_speed`."""
+        self.needs_own("the breakdown speed")
+        T = float(np.mean(run[f"motor.{self.motor.temperature}"].values))
+        return self.motor.breakdown_speed(self.fmu_parameters, T, *self._mean_supply(run)) / self.ratio
+
+    def _mean_supply(self, run: xr.Dataset) -> list[float]:
+        """The means of `Motor.limited_by` over a run."""
+        return [float(np.mean(run[f"motor.{name}"].values)) for name in self.motor.limited_by]
 
     @property
     def coasting_model(self) -> type[DirectMachine]:

@@ -167,20 +167,38 @@ def _on_limits(study: StudyRecord) -> None:
         )
 
 
+def _why_missed(study: StudyRecord, steady: Answers) -> str:
+    """Why the crank does not turn at the speed asked for."""
+    drive = study.drive
+    if drive.foreign is None:
+        # of the winding as it is in the run: it may be the load that will burn it
+        breakdown = drive.breakdown_speed(study.steady)
+        if steady.speed_mean < breakdown:
+            below = number(breakdown, "rad/s", "speed", beside=False)
+            return (
+                f"the motor stalls under the load: below the {below} of its breakdown torque it gives the less, the "
+                "slower it turns; a larger motor, less load, or for a load that comes and goes a heavier flywheel"
+            )
+    if drive.follows:
+        return "the motor's voltage or current is at its limit, or the run is too short to settle"
+    return "a motor on the line takes the speed that gear ratio and slip give"
+
+
 def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
     asked, warn = study.config.run.crank_speed, study.warn
     if not study.reaches:
-        limit = "the motor's voltage or current is at its limit, or the run is too short to settle."
-        slip = "a motor on the line takes the speed that gear ratio and slip give."
+        why, branched = _why_missed(study, steady), ""
+        if any(not study.config.events[name].from_rest for name in study.overloads):
+            branched = " Overloads are those of this state."
         warn(
             "speed missed",
-            "steady running: the crank turns at {speed_mean} in place of {wanted}; {why} Overloads are those of this "
-            "state.",
+            "steady running: the crank turns at {speed_mean} in place of {wanted}; {why}.{branched}",
             STEADY,
             speed_mean=(steady.speed_mean, "rad/s", "speed"),
             asked=(asked, "rad/s", "speed"),
             wanted=number(asked, "rad/s", "speed", full=False),
-            why=limit if study.drive.follows else slip,
+            why=why,
+            branched=branched,
         )
     if study.drive.whole_turns(study.steady) is None:
         warn(
