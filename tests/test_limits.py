@@ -65,6 +65,7 @@ def test_a_motor_that_burns_in_steady_running_is_no_good(tmp_path):
     for when, where in (("in each turn", warnings["no reserve"].text), ("for a moment", verdict["text"])):
         said = f"no reserve of torque: {when} it passes the largest torque of a steady state by "
         assert said in where and "a moment the motor gives" not in where
+    assert ": a heavier load or a dip of the voltage stalls it; " in warnings["no reserve"].text
 
 
 STALLED = """event = {events}
@@ -93,7 +94,9 @@ def test_a_motor_below_its_breakdown_speed_stalls_under_the_load(tmp_path):
     said = (
         "no reserve of torque: in each turn it passes the largest torque of a steady state by 100 % or more"
     )
-    assert said in verdict["text"] and said in warnings["no reserve"].text
+    assert said in verdict["text"]
+    # it is stalled already
+    assert warnings["no reserve"].text.endswith(f"{said}; a larger motor or a heavier flywheel.")
 
 
 def test_a_motor_above_its_breakdown_speed_has_the_speed_of_ratio_and_slip(tmp_path):

@@ -157,29 +157,36 @@ def _on_limits(study: StudyRecord) -> None:
             key=key,
         )
     if steady.torque_reserve is not None and steady.torque_reserve < 0.0:
+        turns = _stalled(study, steady) is None
+        stalls = ": a heavier load or a dip of the voltage stalls it" if turns else ""
         warn(
             "no reserve",
-            "steady running: the motor has {passes}: a heavier load or a dip of the voltage stalls it; a larger "
-            "motor or a heavier flywheel.",
+            "steady running: the motor has {passes}{stalls}; a larger motor or a heavier flywheel.",
             STEADY,
+            stalls=stalls,
             passes=no_reserve(STEADY, steady.torque_reserve),
             over=(-steady.torque_reserve, "1", "percent"),
         )
 
 
+def _stalled(study: StudyRecord, steady: Answers) -> float | None:
+    """The crank speed [rad/s] below which a load stalls the motor, where this one does; of a motor of somebody else
+    that is not known."""
+    if study.reaches or study.drive.foreign is not None:
+        return None
+    breakdown = study.drive.breakdown_speed(study.steady)
+    return breakdown if steady.speed_mean < breakdown else None
+
+
 def _why_missed(study: StudyRecord, steady: Answers) -> str:
     """Why the crank does not turn at the speed asked for."""
-    drive = study.drive
-    if drive.foreign is None:
-        # of the winding as it is in the run: it may be the load that will burn it
-        breakdown = drive.breakdown_speed(study.steady)
-        if steady.speed_mean < breakdown:
-            below = number(breakdown, "rad/s", "speed", beside=False)
-            return (
-                f"the motor stalls under the load: below the {below} of its breakdown torque it gives the less, the "
-                "slower it turns; a larger motor, less load, or for a load that comes and goes a heavier flywheel"
-            )
-    if drive.follows:
+    if (breakdown := _stalled(study, steady)) is not None:
+        below = number(breakdown, "rad/s", "speed", beside=False)
+        return (
+            f"the motor stalls under the load: below the {below} of its breakdown torque it gives the less, the "
+            "slower it turns; a larger motor, less load, or for a load that comes and goes a heavier flywheel"
+        )
+    if study.drive.follows:
         return "the motor's voltage or current is at its limit, or the run is too short to settle"
     return "a motor on the line takes the speed that gear ratio and slip give"
 
