@@ -381,7 +381,25 @@ def test_no_flywheel_is_needed_where_the_motor_alone_keeps_the_fluctuation():
     found = FlywheelFindings(0.1, 0.05, 1.0, 1e3, 0.01, 1.0, [least], least)
     found.remark(study)
     said = next(remark.text for remark in study.remarks if remark.kind == "least flywheel")
-    assert said.startswith("For a fluctuation of 5.00 % no flywheel is needed; nor is it by hand. Without ")
+    assert said.startswith(
+        "For a fluctuation of 5.00 % no flywheel is needed; nor is it by hand. Without one, "
+    )
+    sound = {v.name: 0.03 for v in Layout(FlywheelAnswers).variables}
+    for size, words in (
+        (
+            0.0,
+            "Without one, the moving masses lend 3.00 % of a cut's work, the RMS current is 3.00 % of the rated, ",
+        ),
+        (
+            2.0,
+            "(the search ends within 3 % of that fluctuation); by the hand formula none is needed, as it leaves out "
+            "the shaft line. With it flywheel and moving masses lend 3.00 %",
+        ),
+    ):
+        study = bare()
+        least = judged(study, sound | {"flywheel": size})
+        FlywheelFindings(0.1, 0.05, 1.0, 1e3, 0.01, 1.0, [least], least).remark(study)
+        assert words in next(remark.text for remark in study.remarks if remark.kind == "least flywheel")
 
 
 def judged(study, answers):

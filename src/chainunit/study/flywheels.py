@@ -431,27 +431,31 @@ def _on_heavier(found: FlywheelFindings, study: StudyRecord) -> None:
 
 def _on_least(found: FlywheelFindings, least: Wheel, study: StudyRecord) -> None:
     """The least flywheel that keeps the fluctuation; it is no recommendation where another limit stays passed."""
-    a, by_hand, close = least.answers, found.flywheel_by_hand, number(CLOSE, "1", "percent")
+    a, by_hand, close = least.answers, found.flywheel_by_hand, number(CLOSE, "1", "percent", full=False)
     text = (
-        f"A fluctuation of {{permitted}} takes a flywheel of {{flywheel}} at least, found to {close} of it; "
+        "A fluctuation of {permitted} takes a flywheel of {flywheel} at least (the search ends within "
+        f"{close} of that fluctuation); "
         if least.flywheel
         else "For a fluctuation of {permitted} no flywheel is needed; "
     )
-    text += "the hand formula asks for {by_hand}" if by_hand else "nor is it by hand"
+    none = "by the hand formula none is needed" if least.flywheel else "nor is it by hand"
+    text += "the hand formula asks for {by_hand}" if by_hand else none
     if by_hand > least.flywheel:
         text += ", as it leaves out that the motor's torque rises where the speed falls"
     elif a.motor_ripple is not None and by_hand < least.flywheel:
         text += ", as it leaves out the shaft line"
+    beside, masses = (
+        ("With it", "flywheel and moving masses") if least.flywheel else ("Without one,", "the moving masses")
+    )
     parts: Mapping[str, tuple[str, Amount]] = {
         "stored": (
-            "flywheel and moving masses lend {stored} of a cut's work",
+            f"{masses} lend {{stored}} of a cut's work",
             (a.stored_share_most, "1", "percent"),
         ),
         "current": ("the RMS current is {current} of the rated", (a.current_share, "1", "percent")),
         "start": ("the start takes {start}", (a.start_time, "s")),
     }
     known = {name: part for name, part in parts.items() if part[1][0] is not None}
-    beside = "With it" if least.flywheel else "Without"
     text += f". {beside} {', '.join(words for words, _ in known.values())}."
     plate = study.config.plate
     too_small = plate is not None and found.mean_torque > plate.nameplate.torque
