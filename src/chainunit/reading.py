@@ -56,11 +56,19 @@ def to_number(variable: Variable, given: Any) -> float:
     return variable.quantity.bounded(value)
 
 
+def _may_be_share(variable: Variable) -> bool:
+    """Whether a quantity may be given in percent: no count, and no ratio of gears."""
+    low, high = variable.quantity.low, variable.quantity.high
+    return variable.unit != "1" or variable.kind == "percent" or (low < 1.0 and high <= 100.0)
+
+
 def _converted(variable: Variable, text: str) -> float:
     parts = units.split(text)
     try:
         if parts is not None:
             number, written = parts
+            if set(written) & set("%‰") and not _may_be_share(variable):
+                raise ValueError(written)
             return units.convert(number, written, variable.unit, variable.kind) if written else number
     except ValueError:
         pass

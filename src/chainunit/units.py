@@ -17,6 +17,7 @@ _NUMBER = re.compile(
     r"([+-]?(?:\d{1,3}(?: \d{3})+(?:\.\d*)?|\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3}| ?[x*] ?10\^[+-]?\d{1,3})?)"
     r" ?(\D.*|)"
 )
+_THOUSANDS = re.compile(r"^\s*[+-]?\d{1,3},\d{3}(?!\d)")
 _COMMA = re.compile(r"([+-]?\d+),(\d+)(?![\d,.])(.*)")
 _TOKEN = re.compile(r" ?([A-Za-zµ%‰]+(?:\^|\*\*)?(?:[+-]?\d)?|[*./()]|1(?!\d)) ?")
 _FACTOR = re.compile(r"([A-Za-zµ%‰]+)(?:\^|\*\*)?([+-]?\d)?")
@@ -158,7 +159,8 @@ def convert(number: float, written: str, unit: str, kind: str = "") -> float:
 def meant(text: str, unit: str, kind: str = "") -> str:
     """A text that fits a quantity of that `unit` and `kind`, where the given one likely means it: a point in place of
     a comma, the right case of letters; else empty."""
-    text = with_point(text) or text
+    # three digits behind a comma may be thousands
+    text = text if _THOUSANDS.search(text) else with_point(text) or text
     parts = split(text)
     if parts is None:
         return ""
@@ -258,7 +260,8 @@ def written(value: float, unit: str, kind: str = "") -> str:
     """The value of a quantity as a file may state it, as TOML, in the unit in which it is shortest and exact:
     0.06 m -> ``"60 mm"``; a pure number stands alone, a share in percent."""
     if value == 0.0 and unit != "1":
-        return f'"0 {fitting(unit, kind)[0]}"'
+        # a temperature is not zero in every unit
+        return f'"0 {fitting(unit, kind)[-1 if unit == "K" else 0]}"'
     texts = []
     for name in fitting(unit, kind):
         if name in _RARE:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from itertools import groupby
 
@@ -61,7 +62,7 @@ def _comment(lines: list[str], statement: Statement, keys: dict[str, Key]) -> No
     """Put the meaning of each key that a statement sets behind it, where its line has no comment."""
     meanings = [keys[name].description for name in statement.keys if name in keys]
     line = lines[statement.line - 1]
-    if meanings and "#" not in line:
+    if meanings and "#" not in re.sub(r"\"[^\"]*\"|'[^']*'", "", line):
         lines[statement.line - 1] = f"{line:<{_COLUMN}} # {'; '.join(meanings)}"
 
 

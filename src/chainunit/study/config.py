@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -226,13 +226,19 @@ def of_tables(data: Mapping[str, Any], source: str) -> Config:
         given, names = frozenset(_names(data, events)), frozenset(_names(whole, events))
         return dataclasses.replace(config, given=given, of_example=names - given - {"title"}, tables=data)
     except InputError as error:
-        # values that do not fit together may be a slip of the unit
-        hints = [f'was {slip.variable.name} = "{slip.meant}" meant?' for slip in unusual if slip.meant]
-        if not hints:
-            raise
-        *others, last = error.faults
-        hinted = InputError("; ".join([str(last), *hints]), key=last.key)
-        raise InputError.of([*others, hinted]) from error
+        raise InputError.of([_with_hints(fault, unusual) for fault in error.faults]) from error
+
+
+def _with_hints(fault: InputError, unusual: Iterable[Slip]) -> InputError:
+    """A refusal, and behind it the unusual values of its table: where values do not fit together, one may be a slip
+    of the unit."""
+    table = fault.key.partition(".")[0]
+    hints = [
+        f'was {slip.variable.name} = "{slip.meant}" meant?'
+        for slip in unusual
+        if slip.meant and slip.variable.name.startswith(f"{table}.")
+    ]
+    return InputError("; ".join([str(fault), *hints]), fault.key) if hints else fault
 
 
 def _config(
@@ -254,7 +260,9 @@ def _config(
     if "sizing" in data and checked.start != "inverter" and "inertia_ratio" not in tables["sizing"]:
         # of motors on the line only where it is given
         of_study["sizing"] = dataclasses.replace(of_study["sizing"], inertia_ratio=math.inf)
-    own_motors = beside(checked.catalogue, source) if checked.catalogue else None
+    own_motors = None
+    with faults.collected(), refusal_prefix("catalogue = ", "catalogue"):
+        own_motors = beside(checked.catalogue, source) if checked.catalogue else None
     machine: Any = None
     plate = None
     with faults.collected():

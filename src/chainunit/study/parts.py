@@ -118,6 +118,8 @@ def parts_of(data: Mapping[str, Any], source: str) -> Parts:
     if not motor:
         return parts
     if _is_fmu(motor):
+        with refusal_prefix("system.motor = ", "system.motor"):
+            beside(motor, source)
         return Parts(machine, Motor, file=motor)
     if motor in MOTORS:
         return Parts(machine, MOTORS[motor])
@@ -164,8 +166,20 @@ def _examples_of_machines() -> dict[str, str]:
     return {read_table(SystemTable, table, "system.").machine: name for name, table in tables.items()}
 
 
+_LONGEST = 1000
+"""letters of a file's name"""
+
+
 def beside(name: str, source: str) -> Path:
-    """A file that a study file names, relative to the study file."""
+    """A file that a study file names, relative to the study file.
+
+    Raises
+    ------
+    InputError
+        for a text that names no file on any system.
+    """
+    if not name.isprintable() or len(name) > _LONGEST:
+        raise InputError(f"{shown(name)}: must be the name of a file, of at most {_LONGEST} letters")
     return Path(source).parent / name
 
 
