@@ -20,14 +20,19 @@ from html.parser import HTMLParser
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import pytest
+
+from chainunit.study.config import load
+from chainunit.study.run import run_study
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 FENCE = re.compile(r"^( *)```(\w*)(?: title=\"([^\"]+)\")?\n(.*?)^\1```$", re.DOTALL | re.MULTILINE)
 INSTALLS = ("pip install", "python3 -m venv")
 """Commands that `.ci/run` runs."""
-PAGES = (*sorted(DOCS.rglob("*.md")),)
+README = ROOT / "README.md"
+PAGES = (README, *sorted(DOCS.rglob("*.md")))
 """Whose commands run."""
 QUICK = ("docs/how-to/python.md", "docs/system.md")
 """Pages that take some seconds; the others run in `.ci/full`."""
@@ -119,6 +124,9 @@ def test_a_page_prints_what_stands_there(page, tmp_path):
             (tmp_path / block.file).write_text(block.text, "utf-8")
         elif block.kind == "sh" and not any(word in block.text for word in INSTALLS):
             printed = walk.shell(block.text)
+        elif block.kind == "sh" and "/chainunit study" in block.text:
+            # the command behind the installation
+            printed = walk.shell(block.text.rpartition("/bin/")[2])
         elif block.kind == "python":
             printed = walk.python(block.text)
         elif block.kind == "text" and printed is not None:
@@ -190,3 +198,22 @@ def test_the_site_builds_without_a_broken_link_and_fetches_nothing(tmp_path):
         assert fetched.places and not [place for place in fetched.places if "//" in place], page
     for style in (tmp_path / "site").rglob("*.css"):
         assert not re.search(r"(?:@import|url\()\s*[\"']?(?:https?:)?//", style.read_text("utf-8")), style
+
+
+def test_the_readme_is_short_and_what_it_claims_is_computed(tmp_path):
+    """Its numbers on an overload that an ammeter hides, from the series of the packaged study over its last turn."""
+    text = README.read_text("utf-8")
+    assert len(text.splitlines()) <= 150
+    study = run_study(load(), tmp_path)
+    turn = 2.0 * np.pi / study.config.run.crank_speed
+    found = {}
+    for run in ("start_up", "feed_left"):
+        last = study.runs[run].isel(time=study.runs[run]["time"] > study.runs[run]["time"][-1] - turn)
+        time = last["time"].values
+        rocker = np.trapezoid(last["machine.rocker.tau"].values, time) / np.ptp(time)
+        current = np.trapezoid(last["motor.armature.i"].values ** 2, time) / np.ptp(time)
+        found[run] = rocker, np.sqrt(current)
+    (rocker, current), (of_one_side, more) = found.values()
+    share, times = re.search(r"rises by (\d+) %.*?grows to (\d+) times", text, re.DOTALL).groups()
+    assert round(100.0 * (more / current - 1.0)) == int(share)
+    assert of_one_side / rocker == pytest.approx(int(times), rel=0.03)

@@ -263,7 +263,7 @@ def test_a_machine_made_of_another_has_its_own_outputs():
 
 def test_a_crank_without_a_body_needs_an_inertia_on_its_shaft():
     direct = LightSixBar.direct()
-    with pytest.raises(GeometryError, match=r"inertia of the crank and on its shaft = 0 kg\.m2"):
+    with pytest.raises(GeometryError, match=r"inertia of the crank and on its shaft = 0 kg m2"):
         direct.check(direct.Parameters())
     p = direct.check(direct.Parameters(J_added=0.1))
     assert math.isfinite(direct.derivatives(MATH, p, direct.Inputs(), direct.initial_states(MATH, p))[1])

@@ -387,7 +387,7 @@ def test_a_geometry_that_cannot_turn_fails_the_initialisation_in_the_same_words(
         with running(native, "ChamberForces", {"z": 0.1}):
             pass
     assert str(refused.value) in str(failed.value)
-    with pytest.raises(RunError, match=r"rotor\.J = -1 kg\.m2: must be > 0 kg\.m2"):
+    with pytest.raises(RunError, match=r"rotor\.J = -1 kg m2: must be > 0 kg m2"):
         with running(native, "DcMotor", {"rotor.J": -1.0}):
             pass
 

@@ -416,7 +416,7 @@ def test_default_name_and_what_the_command_refuses(tmp_path, monkeypatch, capsys
         ({"a.b": "DcMotor"}, [], {}, r'"a\.b": a component.s name must be of letters'),
         ({"m": "DcMotor"}, [], {"m.w": 1.0}, r"m\.w: no such parameter or input"),
         ({"m": "DcMotor"}, [], {"n.w_ref": 1.0}, r'n\.w_ref: there is no component "n"; there are m'),
-        ({"m": "DcMotor"}, [], {"m.rotor.J": -1.0}, r"m: rotor\.J = -1 kg\.m2: must be > 0"),
+        ({"m": "DcMotor"}, [], {"m.rotor.J": -1.0}, r"m: rotor\.J = -1 kg m2: must be > 0"),
         ({"c": "ChamberForces"}, [], {"c.r": 0.9}, r"c: r = 0\.9 m: the crank cannot turn"),
         ({"m": "DcMotor"}, [], {"m.w_ref": float("nan")}, r"m: w_ref = nan rad/s: must be a finite number"),
         ({"m": "DcMotor"}, [("m.w", "m.speed")], {}, r"m\.speed: no such input"),
