@@ -346,7 +346,7 @@ class InductionMotorPoint(MotorPoint):
     """Everything at one state: supply, circuit, shaft."""
 
     __slots__ = (
-        "R_r", "R_s", "cooling", "df", "heat", "i_d", "i_q", "ir_d", "ir_q", "leak", "main", "slip_speed", "u", "w_s"
+        "R_r", "R_s", "cooling", "df", "heat", "i_d", "i_q", "ir_d", "ir_q", "leak", "main", "slip_speed", "u", "w_s",
     )  # fmt: skip
 
     def __init__(self, xp: Any, p: Any, u: Any, x: Any) -> None:
@@ -427,11 +427,13 @@ class InductionMotor(Motor):
     Point = InductionMotorPoint
     current, temperature, winding = "i", "stator.T", "stator"
     limited_by: ClassVar[Mapping[str, float]] = {"v": 1e-3, "supply.frequency": 1e-3}
-    required = Requirement(
-        "cage.L",
-        "H",
-        "the fluxes change faster than the internal integrator can follow",
-        ("stator.R", "cage.R", "cage.skin_R", "cage.skin_L"),
+    required = (
+        Requirement(
+            "cage.L",
+            "H",
+            "the fluxes change faster than the internal integrator can follow",
+            ("stator.R", "cage.R", "cage.skin_R", "cage.skin_L"),
+        ),
     )
 
     control = "an inverter, which follows the speed asked for by its frequency"
