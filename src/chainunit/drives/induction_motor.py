@@ -102,12 +102,8 @@ class InverterControl:
         "1", "share of the voltage at frequency zero", default=0.05, min=0.0, max=0.5, tunable=True
     )
     slip: Value = quantity(
-        "Hz/(N.m)",
-        "slip compensation: frequency added per air-gap torque",
-        default=0.0,
-        min=0.0,
-        tunable=True,
-    )
+        "Hz/(N.m)", "slip compensation: frequency added per air-gap torque", default=0.0, min=0.0, tunable=True,
+    )  # fmt: skip
 
 
 @declaration
