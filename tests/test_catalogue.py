@@ -212,7 +212,7 @@ def test_what_small_motors_lose_in_iron_shows_as_a_residual():
         ({"locked_torque_ratio": 9.9}, r"locked_torque_ratio = 9.9: .*must be < 9\."),
         ({"breakdown_ratio": 1.0}, "breakdown_ratio = 1: must be > 1"),
         ({"current": 6.0}, r"current = 6 A: .*make it 4\.578 A; must be > 4\.12 and < 5\.036 A"),
-        ({"J": 0.0}, "J = 0 kg.m2: must be > 0 kg.m2"),
+        ({"J": 0.0}, "J = 0 kg m2: must be > 0 kg m2"),
         ({"power": math.nan}, "power = nan W: must be finite, > 0 W"),
         (
             {"locked_current_ratio": 3.2, "locked_torque_ratio": 1.2},

@@ -444,7 +444,7 @@ def test_an_interrupt_after_the_last_step_keeps_the_rows(fmus):
 @pytest.mark.parametrize("name", ["DcMotor", "InductionMotor", "CardanDriveline"])
 def test_a_load_of_negative_inertia_is_refused(name, fmus):
     """No machine has one: the reflected inertia is a sum of squares."""
-    with pytest.raises(RunError, match=r"load\.J = -0\.01 kg m2: must be >= 0 kg\.m2"):
+    with pytest.raises(RunError, match=r"load\.J = -0\.01 kg m2: must be >= 0 kg m2"):
         with CoSimulation(
             System({"unit": component(name, fmus[name])}), {"unit.load.J": -0.01}
         ) as simulation:

@@ -490,7 +490,7 @@ def test_messages_do_not_follow_the_hosts_locale(native_fmus, german, fmi):
         capture_output=True, text=True, env=os.environ | {"LOCPATH": str(german)},
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    assert done.stdout.strip() == "[ERROR] rotor.J = -1.5 kg.m2: " + allowed("DcMotor", "rotor.J")
+    assert done.stdout.strip() == "[ERROR] rotor.J = -1.5 kg m2: " + allowed("DcMotor", "rotor.J")
 
 
 @pytest.mark.skipif(sys.platform != "linux" or shutil.which("objdump") is None, reason="no objdump")

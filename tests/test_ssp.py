@@ -400,7 +400,7 @@ def test_default_name_and_what_the_command_refuses(tmp_path, monkeypatch, capsys
     for arguments, said in (
         (["-o", "x.fmu"], "-o x.fmu: must be a file name that ends in .ssp"),
         (["none.toml"], "none.toml: cannot be read"),
-        (["wrong.toml"], "wrong.toml: machine: r = 0.9 m: the crank cannot turn"),
+        (["wrong.toml"], "wrong.toml:2: machine: r = 0.9 m: the crank cannot turn"),
         (["--backend", "fortran"], "'fortran' is not one of"),
         (["--backend", "python", "-o", "wrong.toml/x.ssp"], "wrong.toml: cannot be written to"),
     ):
