@@ -115,6 +115,8 @@ def motor_verdict(study: StudyRecord) -> dict[str, Any] | None:
     wanted = number(asked, "rad/s", "speed", full=False, beside=False)
     if kept:
         text = f"The motor keeps the crank at {speed}"
+        if speed != number(asked, "rad/s", "speed", beside=False):
+            text += f", near enough to the {wanted} asked for"
     elif steady.speed_mean > asked:
         text = f"The motor does NOT keep the speed: the crank turns at {speed}, faster than the {wanted} asked for"
     else:
