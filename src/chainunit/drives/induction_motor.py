@@ -10,11 +10,10 @@ rotor seen from it, `m` magnetising, `l` leakage; `p` is the number of pole pair
     (J_rotor + J_load) a = tau_air - d w - tau_load
     C dT/dt = losses - cooling(w) (T - T_ambient)/R_th
 
-All leakage stands on the rotor side (what the Gamma circuit means); saturation of the main path is then a function
-of |psi_s| alone: 1/L_m grows by (beta |psi_s|)^6. The skin effect of a deep bar raises R_r and lowers L_l with the
-slip frequency, quasi-steady, by the factor 2 s^2/(1 + s^2), s = 1 at standstill on the line. Sources: H. R. Slemon,
-"Modelling of induction machines for electric drives", 1989, for the circuit; the saturation curve is that of the
-open-source package motulator, which the tests compare with.
+All leakage stands on the rotor side, so that saturation of the main path follows from |psi_s| alone: 1/L_m grows by
+(beta |psi_s|)^6. The skin effect of a deep bar raises R_r and lowers L_l with the slip frequency, quasi-steady, by
+2 s^2/(1 + s^2), s = 1 at standstill on the line. Sources: H. R. Slemon, "Modelling of induction machines for electric
+drives", 1989; the saturation curve of the package motulator, which the tests compare with.
 """
 
 from __future__ import annotations
@@ -111,12 +110,8 @@ class InverterSwitch:
     """Whether an inverter feeds the motor."""
 
     on: Value = quantity(
-        "1",
-        "1: an inverter feeds the motor and follows w_ref; 0: the line does",
-        default=0.0,
-        min=0.0,
-        max=1.0,
-    )
+        "1", "1: an inverter feeds the motor and follows w_ref; 0: the line does", default=0.0, min=0.0, max=1.0,
+    )  # fmt: skip
 
 
 @declaration
@@ -459,14 +454,12 @@ class InductionMotor(Motor):
     @staticmethod
     def largest_torque(p: Any, T: float, *at: float) -> float:
         """The breakdown torque at the voltage [V] and the frequency [Hz] that the motor has."""
-        V, f = at
-        return float(breakdown(p, V / p.supply.V, f, T).air_gap_tau) if min(V, f) > 0.0 else 0.0
+        return float(breakdown(p, at[0] / p.supply.V, at[1], T).air_gap_tau) if min(at) > 0.0 else 0.0
 
     @staticmethod
     def pull_out(p: Any, T: float, *at: float) -> float:
         """The breakdown torque behind friction and windage."""
-        V, f = at
-        return float(breakdown(p, V / p.supply.V, f, T).tau) if min(V, f) > 0.0 else 0.0
+        return float(breakdown(p, at[0] / p.supply.V, at[1], T).tau) if min(at) > 0.0 else 0.0
 
     @staticmethod
     def breakdown_speed(p: Any, T: float, *at: float) -> float:
@@ -482,8 +475,8 @@ class InductionMotor(Motor):
 
     @staticmethod
     def internal_step(xp: Any, p: Any) -> Any:
-        """A quarter of the shortest time constant of the fluxes, a twelfth of a radian of the supply, the time
-        constant of the rotor alone that friction brakes, and at most 0.25 ms."""
+        """The least of a quarter of the fluxes' time constant, a twelfth of a radian of the supply, the time constant
+        of the rotor alone that friction brakes, and 0.25 ms."""
         by_flux = 0.25 * p.cage.L * (1.0 - p.cage.skin_L) / _resistance(p)
         longest = xp.minimum(xp.minimum(2.5e-4, 1.0 / (12.0 * _TURN * p.supply.f)), by_flux)
         return xp.minimum(longest, friction_time(xp, p.rotor))
