@@ -184,6 +184,7 @@ def test_the_commands(tmp_path):
     said = chainunit("keys", "jam", cwd=tmp_path).stdout
     assert "processing force of the lump" in said and '"2 kN"' in said
     assert "[[event]] of jam" in chainunit("keys", cwd=tmp_path).stdout
+    assert "rated power at the shaft" in chainunit("keys", "catalogue", cwd=tmp_path).stdout
     refused = chainunit("keys", "jams", cwd=tmp_path)
     assert refused.returncode == 2 and "there are system, machine" in refused.stderr
     assert chainunit("schema", cwd=tmp_path).returncode == 0

@@ -261,3 +261,18 @@ def test_a_study_says_what_it_is():
 def test_the_lines_in_the_docstring_are_right():
     tried = doctest.testmod(studies)
     assert tried.attempted >= 3 and not tried.failed
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"flywheel.compare.5": 0.1}, "5: must be the place of an entry, from 0 to 0"),
+        ({"event": [], "event.jam_left.force": 3.0}, "0: must be the place of an entry"),
+        ({3: 3}, "3: must be the name of a key"),
+    ],
+)
+def test_values_at_no_place_are_refused(values, said):
+    study = Study(flywheel={"compare": [0.1]}, event=[{"type": "jam", "side": "left"}])
+    with pytest.raises(InputError) as refused:
+        study.with_values(values)
+    assert str(refused.value).startswith(said)

@@ -129,6 +129,8 @@ class Study:
         """
         tables = copy.deepcopy(dict(self.config.tables))
         for name, value in values.items():
+            if not isinstance(name, str):
+                raise InputError(f'{shown(name)}: must be the name of a key, such as "machine.r"')
             path = name.split(".")
             if path[0] == "event" and len(path) > 1:
                 path[1] = self._place(name, path[1], tables)
@@ -337,6 +339,8 @@ def _plain(value: Any) -> Any:
 def _put(tree: Any, path: list[str], value: Any) -> None:
     """Set the value at a path in tables; what stands in the way and is no table gives way to one."""
     name, *inner = path
+    if isinstance(tree, list) and not (name.isdecimal() and int(name) < len(tree)):
+        raise InputError(f"{name}: must be the place of an entry, from 0 to {len(tree) - 1}")
     key: Any = int(name) if isinstance(tree, list) else name
     if not inner:
         tree[key] = value

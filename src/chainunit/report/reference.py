@@ -36,7 +36,11 @@ def keys_of(name: str) -> Report:
     InputError
         where no table has it.
     """
-    tables = [table for table in (*key_tables(), catalogue_columns()) if name in (table.name, table.of)]
+    tables = [
+        table
+        for table in (*key_tables(), catalogue_columns())
+        if name in (table.name, table.of, table.of.removeprefix("a "))
+    ]
     if not tables:
         known = dict.fromkeys(table.name for table in key_tables() if table.name)
         raise InputError(f"{name}: no such table; there are {', '.join(known)}")
