@@ -6,6 +6,7 @@ Standard library only: FMUs carry this file.
 from __future__ import annotations
 
 import copy
+import copyreg
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -82,7 +83,20 @@ class Part:
         self.by_differences = by_differences
 
 
-class Model:
+class ModelType(type):
+    """The type of all models."""
+
+
+def _reduced(model: Any) -> str | tuple[Callable[..., Any], tuple[Any, ...]]:
+    """A model as pickle keeps it: by its name, or by the call that makes it, for a class that no module names."""
+    maker = vars(model).get("maker")
+    return model.__qualname__ if maker is None else maker
+
+
+copyreg.pickle(ModelType, _reduced)
+
+
+class Model(metaclass=ModelType):
     """A model: four declarations and the equations between them.
 
     A subclass sets the class attributes; it is never instantiated. Inputs and outputs are those of
@@ -113,6 +127,8 @@ class Model:
     `closed` after each of its steps; else in equal steps."""
     built_by: ClassVar[str] = ""
     """The call that gives this class, for one that a function of its module makes."""
+    maker: ClassVar[tuple[Callable[..., Any], tuple[Any, ...]] | None] = None
+    """The same as function and arguments: by it another process finds the class."""
 
     parameter_layout: ClassVar[Layout]
     input_layout: ClassVar[Layout]

@@ -18,7 +18,11 @@ class Transmission:
 
     ratio: Value = quantity("1", "motor turns per turn of the output", default=1.0, above=0.0, max=1e4)
     efficiency: Value = quantity(
-        "1", "efficiency where the motor drives, without the drag", default=1.0, min=0.05, max=1.0
+        "1",
+        "efficiency while the motor drives; the loss by the drag d comes on top",
+        default=1.0,
+        min=0.05,
+        max=1.0,
     )
     d: Value = quantity("N.m.s/rad", "drag that grows with speed, at the motor's shaft", default=0.0, min=0.0)
     J: Value = quantity("kg.m2", "inertia at the motor's shaft", default=0.0, min=0.0)

@@ -196,6 +196,7 @@ def _flexible(walls: int, webs: int) -> type[InverseMachine]:
 
         name = "ChainUnitFlexible"
         built_by = f"flexible({walls}, {webs})"
+        maker = (flexible, (walls, webs))
         description = (
             f"Forces in a chain unit whose organs are chains of {chains.number} rods, {walls} in the wall and {webs} "
             "in the web: from motor angle and speed to torque, load port and every support reaction"

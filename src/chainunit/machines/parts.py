@@ -28,7 +28,7 @@ class Pin:
 
     friction: Value = quantity("1", "coefficient of friction", default=0.12, min=0.0, max=100.0, tunable=True)
     diameter: Value = quantity(
-        "m", "diameter", default=0.06, min=0.0, max=100.0, tunable=True, usual=(1e-3, 1.0)
+        "m", "diameter", default=0.06, min=0.0, max=100.0, tunable=True, usual=(1e-3, 0.5)
     )
     w_smooth: Value = quantity(
         "rad/s", "relative speed below which friction is smoothed", default=0.02, min=1e-9, tunable=True

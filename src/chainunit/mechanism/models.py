@@ -200,6 +200,7 @@ class InverseMachine(LinkageModel, MachineModel):
             "description": cls.direct_description
             or f"{cls.name} that turns by itself: from motor torque to angle, speed, acceleration and every reaction",
             "built_by": f"{cls.built_by or cls.__qualname__}.direct()",
+            "maker": (direct_model, (cls,)),
             "inverse": cls,
             "Parameters": declared_class(
                 "DirectParameters", (Start, AddedInertia, cls.Parameters), [*own, *parameters]
@@ -354,3 +355,8 @@ class DirectMachine(LinkageModel):
 def acceleration(p: Any, u: Any, s: MachineState) -> Any:
     """Motor acceleration [rad/s2]: (J_added + J) a = tau - tau_bias, all at the motor shaft."""
     return (u.tau - s.bias / p.ratio) / (p.J_added + s.J / (p.ratio * p.ratio))
+
+
+def direct_model(machine: type[InverseMachine]) -> type[DirectMachine]:
+    """The direct model of a machine."""
+    return machine.direct()

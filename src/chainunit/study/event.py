@@ -49,7 +49,8 @@ class Timing:
 
     crank_angle: Value = quantity(
         "rad",
-        "crank angle at which the event begins; at 0 the rocker is at its fastest",
+        "crank angle at which the event begins; the rocker of a chain unit is at its fastest at 0, to the right, "
+        "and near 180 deg, to the left",
         default=0.0,
         usual=(0.0, 6.3),
     )

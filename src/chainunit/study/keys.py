@@ -27,7 +27,7 @@ from .parts import ReportTable
 from .sections import CHOICES, SECTIONS, Ratios, SystemTable
 
 _FOLLOWS = {
-    "gear.ratio": "from the rated speed of the motor",
+    "gear.ratio": "the one with which the crank has its speed under the mean load",
     "sizing.inertia_ratio": '10 with start = "inverter", else none',
     "motor.speed_control.kp": "tuned",
     "motor.speed_control.ki": "tuned",

@@ -11,6 +11,7 @@ from ..drives.cardan import two_joints
 from ..engines import numpy_
 from ..text import number
 from .coupling import peaks_on_coupling, remark_on_coupling
+from .events import Jam
 from .judgement import model_verdict, motor_limits, no_reserve
 from .measures import STARTED, Answers
 from .record import LOAD_CYCLE, Amount, StudyRecord
@@ -400,6 +401,7 @@ def _on_chains(study: StudyRecord, chain: ChainOrgans) -> None:
             f"{walls + webs} rods have {walls + webs - 2} natural frequencies; 8 rods show what a chain does."
         )
         note("few rods", f"chains: {few}")
+    _on_folding(study)
     if result is None:
         return
     speed = result.own.speed
@@ -416,6 +418,28 @@ def _on_chains(study: StudyRecord, chain: ChainOrgans) -> None:
             "chains: the energy residual reaches {residual} of the energy moved; lessen chain.fold_stiffness."
         )
         warn("energy of chains", text, residual=(residual, "1"))
+
+
+FELT = 1.1
+"""A lump whose peak torque is below that many times the one of steady running is hardly felt by the drive."""
+
+
+def _on_folding(study: StudyRecord) -> None:
+    """Lumps on a stroke on which the web folds before them: the drive feels them on the other stroke alone."""
+    steady = study.answers.get(STEADY)
+    for run, event in study.config.events.items():
+        answers = study.answers.get(run)
+        if not isinstance(event, Jam) or steady is None or answers is None:
+            continue
+        if answers.crank_torque_peak < FELT * steady.crank_torque_peak:
+            study.warn(
+                "lump not felt",
+                "{run}: the drive hardly feels the lump, as the web folds before it on this stroke; on the other one "
+                "the web is pulled: try crank_angle = {angle}.",
+                run,
+                run=study.called(run),
+                angle=f'"{math.degrees((event.p.crank_angle + math.pi) % (2.0 * math.pi)):.4g} deg"',
+            )
 
 
 def _on_shaft(study: StudyRecord) -> None:
