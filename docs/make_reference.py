@@ -18,6 +18,8 @@ def commands() -> Iterator[tuple[str, str, list[tuple[str, str]]]]:
     """Name of each command, the first paragraph of its help, and its arguments and options with their help."""
     group = typer.main.get_command(app)
     for name, command in {"": group, **group.commands}.items():
+        # some arguments are described when the help is asked for
+        command.get_help(typer.Context(command))
         options = [
             (
                 ", ".join(option.opts) if option.param_type_name == "option" else option.name.upper(),

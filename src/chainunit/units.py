@@ -32,7 +32,7 @@ _SIGNS = {
     "·": "*",
     "⋅": "*",
     "×": "x",
-    "µ": "µ",
+    "μ": "µ",  # the Greek letter, which normal forms have
 }
 _PINT = {
     "rev": "revolution",
@@ -49,23 +49,17 @@ _PINT = {
     "degF": "delta_degF",
 }
 """Names of units that pint calls otherwise, or takes for something else."""
-_NAMES = (
-    frozenset(
-        """
-    m metre metres meter meters in inch inches ft g gram grams kilogram kilograms t tonne tonnes lb
-    s second seconds min minute minutes h hour hours d day days N newton J joule W watt hp bar Pa Wh kWh VA kVA
-    V volt A amp ampere Hz hertz K kelvin C degC H henry Wb ohm T F percent permille rpm
-    rad mrad radian radians deg degree degrees arcmin arcsec revolution revolutions turn turns
-    """.split()
-    )
-    | _PINT.keys()
-)
-"""Names of units; pint knows more, which nobody means (k is its constant of Boltzmann, ton the American one)."""
-_PREFIXED = re.compile(r"(?:[kMGTmµunpdc]|da)(?:m|g|s|N|J|W|V|A|K|Hz|Pa|ohm|H|Wb|T|F)")
-
 _ANGLES = frozenset(
     "rad mrad radian radians deg degree degrees arcmin arcsec revolution revolutions turn turns rpm".split()
 )
+_OTHERS = """
+    m metre metres meter meters in inch inches ft g gram grams kilogram kilograms t tonne tonnes lb
+    s second seconds min minute minutes h hour hours d day days N newton J joule W watt hp bar Pa Wh kWh VA kVA
+    V volt A amp ampere Hz hertz K kelvin C degC H henry Wb ohm T F percent permille
+"""
+_NAMES = _ANGLES | frozenset(_OTHERS.split()) | _PINT.keys()
+"""Names of units; pint knows more, which nobody means (k is its constant of Boltzmann, ton the American one)."""
+_PREFIXED = re.compile(r"(?:[kMGTmµunpdc]|da)(?:m|g|s|N|J|W|V|A|K|Hz|Pa|ohm|H|Wb|T|F)")
 
 FITTING: dict[str, tuple[str, ...]] = {
     "m": ("mm", "cm", "m"),
@@ -122,11 +116,11 @@ def with_point(text: str) -> str:
 
 def _ascii(text: str) -> str:
     """The text in one spelling: raised digits, signs and blanks of all kinds in plain letters."""
-    plain = re.sub("([⁺⁻]?[⁰¹²³⁴-⁹]+)", r"^\1", text)
+    marked = re.sub("([⁺⁻]?[⁰¹²³⁴-⁹]+)", r"^\1", text)
+    plain = unicodedata.normalize("NFKC", marked)
     for sign, letters in _SIGNS.items():
         plain = plain.replace(sign, letters)
-    plain = unicodedata.normalize("NFKC", plain.replace("µ", "\0")).replace("\0", "µ").replace("μ", "µ")
-    return " ".join(plain.replace("−", "-").replace("Ω", "ohm").split())
+    return " ".join(plain.split())
 
 
 @cache
@@ -264,7 +258,7 @@ def written(value: float, unit: str, kind: str = "") -> str:
         return f'"0 {fitting(unit, kind)[-1 if unit == "K" else 0]}"'
     texts = []
     for name in fitting(unit, kind):
-        if name in _RARE:
+        if name in _RARE and name != unit:
             continue
         factor = convert(1.0, name, unit, kind) - (zero := convert(0.0, name, unit, kind))
         number = f"{(value - zero) / factor:.12g}"
