@@ -6,7 +6,7 @@ import difflib
 import json
 import reprlib
 import unicodedata
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -50,15 +50,20 @@ class WriteError(RunError):
 
 
 @contextmanager
-def refusal_prefix(prefix: str, key: str = "") -> Iterator[None]:
-    """Put `prefix`, which says where a value stands, before each line of an InputError; `key` names the value where
-    the error does not."""
+def each_refusal(change: Callable[[InputError], InputError]) -> Iterator[None]:
+    """Put `change` of it in the place of each refusal of an InputError."""
     try:
         yield
     except InputError as error:
-        raise InputError.of(
-            [InputError(f"{prefix}{fault}", key=fault.key or key) for fault in error.faults]
-        ) from error
+        raise InputError.of([change(fault) for fault in error.faults]) from error
+
+
+@contextmanager
+def refusal_prefix(prefix: str, key: str = "") -> Iterator[None]:
+    """Put `prefix`, which says where a value stands, before each line of an InputError; `key` names the value where
+    the error does not."""
+    with each_refusal(lambda fault: InputError(f"{prefix}{fault}", fault.key or key)):
+        yield
 
 
 class Faults:

@@ -13,7 +13,7 @@ from ..drives.catalogue import CatalogueMotor, catalogue, motor_of_catalogue
 from ..drives.gearing import Transmission
 from ..drives.motor import Motor
 from ..drives.motors import MOTORS
-from ..errors import Faults, GeometryError, InputError, refusal_prefix
+from ..errors import Faults, GeometryError, InputError, each_refusal, refusal_prefix
 from ..machines.api import machine_of, ratios
 from ..machines.chain_unit import SideLoads, SideName
 from ..machines.machine import Machine
@@ -216,7 +216,7 @@ def of_tables(data: Mapping[str, Any], source: str) -> Config:
     form = read_table(parts.form, whole)
     declared = {name: section.declared for name, section in parts.sections.items()}
     unusual = tuple(slips(declared, data, {"run.crank_speed": parts.machine.usual_speed}))
-    try:
+    with each_refusal(lambda fault: _with_hints(fault, unusual)):
         events = read_events(form.event)
         if "event" in data:
             kinds = {f"event.{name}": event.Parameters for name, event in events.items()}
@@ -225,8 +225,6 @@ def of_tables(data: Mapping[str, Any], source: str) -> Config:
         config = _config(data, form, parts, events, source, unusual)
         given, names = frozenset(_names(data, events)), frozenset(_names(whole, events))
         return dataclasses.replace(config, given=given, of_example=names - given - {"title"}, tables=data)
-    except InputError as error:
-        raise InputError.of([_with_hints(fault, unusual) for fault in error.faults]) from error
 
 
 def _with_hints(fault: InputError, unusual: Iterable[Slip]) -> InputError:

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import Faults, InputError, near_name, refusal_prefix, shown
+from ..errors import Faults, InputError, each_refusal, near_name, refusal_prefix, shown
 from ..machines.chain_unit import SIDES
 from ..quantities import Layout, variables
 from ..reading import given_values, instance, read_table, schema, to_number
@@ -171,13 +171,10 @@ def _parameters(of: type[Event], table: Mapping[str, Any], prefix: str, place: s
     too."""
     texts: dict[str, Any] = dict.fromkeys(("type", "side", "name"), (str, ""))
     form = schema(of.Parameters, "event", prefix, **texts)
-    try:
+    with each_refusal(
+        lambda fault: InputError(str(fault), (place or prefix) + fault.key.removeprefix(prefix))
+    ):
         given = given_values(read_table(form, table, prefix))
-    except InputError as error:
-        keys = [(place or prefix) + fault.key.removeprefix(prefix) for fault in error.faults]
-        raise InputError.of(
-            [InputError(str(fault), key) for fault, key in zip(error.faults, keys, strict=True)]
-        ) from error
     values = {name: x for name, x in given.items() if name not in texts}
     p = instance(of.Parameters, values)
     for name in of.counts:
