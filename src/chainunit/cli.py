@@ -150,12 +150,11 @@ def study(
     loaded = _study_file(config)
     from .report import results
     from .report import study as contents
+    from .study.record import INSUFFICIENT
 
-    # a fault is told before any progress
-    results.check_named(loaded)
     with claimed(output):
         errors = _console(stderr=True)
-        with _progress("the machine at constant speed", errors) as progress:
+        with _progress(errors) as progress:
             record = results.compute(
                 loaded, output, progress, check=check, backend=backend.value if backend else None
             )
@@ -166,7 +165,7 @@ def study(
     if unwritten is not None:
         raise unwritten
     if record.insufficient:
-        errors.print("No motor of the catalogue fits; all is run with the nearest, which is insufficient.")
+        errors.print(INSUFFICIENT)
         raise typer.Exit(1)
 
 
@@ -194,8 +193,9 @@ def _finish(report: Report, output: Path, name: str) -> None:
 
 
 @contextmanager
-def _progress(begin: str, console: Console) -> Iterator[Callable[[str, float, float], None]]:
-    """A progress bar; yields its report: the present task, how much of all is done, and all."""
+def _progress(console: Console) -> Iterator[Callable[[str, float, float], None]]:
+    """A progress bar, from its first report on: a fault of the input is told without one. Yields the report: the
+    present task, how much of all is done, and all."""
     bar = Progress(
         TextColumn("{task.description}"),
         BarColumn(),
@@ -203,13 +203,17 @@ def _progress(begin: str, console: Console) -> Iterator[Callable[[str, float, fl
         TimeRemainingColumn(),
         console=console,
     )
-    with bar:
-        task = bar.add_task(begin, total=1.0)
+    task = bar.add_task("", total=1.0)
 
-        def report(what: str, done: float, todo: float) -> None:
-            bar.update(task, description=what, completed=done, total=todo)
+    def report(what: str, done: float, todo: float) -> None:
+        bar.start()
+        bar.update(task, description=what, completed=done, total=todo)
 
+    try:
         yield report
+    finally:
+        if bar.live.is_started:
+            bar.stop()
 
 
 def _stopped_early(failure: RunError, output: Path, errors: Console) -> None:
@@ -281,7 +285,8 @@ def two_bar_error(
         from .report import files
 
         clear(output, *files.names(two_bar.NAME, (two_bar.PICTURE,)))
-        with _progress("bars and catenaries", _console(stderr=True)) as progress:
+        with _progress(_console(stderr=True)) as progress:
+            progress("bars and catenaries", 0.0, 1.0)
             comparison = two_bar.two_bar_error(lambda done: progress("bars and catenaries", done, 1.0))
         contents = two_bar.report(comparison)
         _finish(contents, output, two_bar.NAME)

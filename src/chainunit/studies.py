@@ -33,7 +33,7 @@ from .study.config import Config
 from .study.foreign_machine import ForeignMachine
 from .study.measures import Answers, measures_of
 from .study.parts import over_example, parts_of
-from .study.record import StudyRecord
+from .study.record import INSUFFICIENT, StudyRecord
 from .study.result import as_dict
 from .study.window import Phase
 from .text import number, written_in
@@ -275,9 +275,7 @@ class StudyResult:
         verdicts = self._numbers["verdict"].values()
         lines = [verdict["text"] for verdict in verdicts if verdict is not None]
         if self.record.insufficient:
-            lines.append(
-                "No motor of the catalogue fits; all is run with the nearest, which is insufficient."
-            )
+            lines.append(INSUFFICIENT)
         return "\n".join(lines)
 
     @property

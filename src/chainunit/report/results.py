@@ -34,27 +34,17 @@ def compute(
     """Run a study in a folder, which is this process's alone (see `files.claimed`); what an earlier run left there
     is removed. Arguments and errors as of `run_study`; a refusal begins with the file of the study, if it has one."""
 
-    # before anything of an earlier run is taken away
-    check_named(config)
-    clear(folder, *FILES)
-    with _in_its_file(config):
-        return run_study(config, folder, progress, check=check, backend=backend)
+    def named() -> AbstractContextManager[None]:
+        return in_file(config.source, lambda: config.lines) if config.lines else nullcontext()
 
-
-def check_named(config: Config) -> None:
-    """Refuse files that a study names and cannot use.
-
-    Raises
-    ------
-    InputError
-        with the file of the study, if it has one, and the line.
-    """
-    with _in_its_file(config):
+    with named():
+        # before anything of an earlier run is taken away, and before any progress
         check_files(config)
-
-
-def _in_its_file(config: Config) -> AbstractContextManager[None]:
-    return in_file(config.source, lambda: config.lines) if config.lines else nullcontext()
+    clear(folder, *FILES)
+    if progress is not None:
+        progress("the machine at constant speed", 0.0, 1.0)
+    with named():
+        return run_study(config, folder, progress, check=check, backend=backend)
 
 
 def writers(record: StudyRecord, report: Report, folder: Path) -> list[Callable[[], list[Path]]]:

@@ -31,6 +31,9 @@ LOAD_CYCLE = "load_cycle.csv"
 """File with the steady turns as the motor's shaft sees them."""
 
 
+INSUFFICIENT = "No motor of the catalogue fits; all is run with the nearest, which is insufficient."
+"""What is said of a study whose sizing found no motor."""
+
 Amount: TypeAlias = (
     tuple[float | None, str] | tuple[float | None, str, str] | tuple[float | None, str, str, int]
 )
