@@ -67,6 +67,7 @@ def _limits(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
 
 _GOOD = {"crank": CRANK_GOOD, "rocker": ROCKER_GOOD_EMPTY}
 """Up to which part of the lowest natural frequency of a chain two bars give a torque to 10 %."""
+_SHADED = "Shaded: two bars may be off by more than a tenth, of the rocker where a side is empty."
 
 
 @PICTURES.declare(lambda study: True, "sides_over_speed.png")
@@ -95,7 +96,7 @@ def _sides(s: b.Source, study: StudyRecord) -> fig.Figure:
         "Largest crank torque and rocker torque in a turn over the crank speed, with both sides and with each side "
         "alone; the speed of normal running is marked.",
         fig.stacked(x, ((axis, items(of)) for of, axis in axes.items())),
-        s.line(f"{caption}{_crossings(s)}."),
+        s.line(f"{caption}{_crossings(s)}. {_SHADED}"),
     )
 
 
