@@ -58,7 +58,7 @@ def test_closed_forms(seed):
     ) * w
     assert out.tau * p.ratio == pytest.approx(J * a + held + lost, rel=1e-11)
     assert out.dissipated_power == pytest.approx(lost * w) and out.power == pytest.approx(out.tau * u.w)
-    by_work = s.torque(a) - s.effects["pins"].lost
+    by_work = s.torque(a) - s.effects["pins"].dissipative
     assert s.torque_by_reactions(a) == pytest.approx(by_work, rel=1e-11)
     for got, by in ((slopes.tau_bias_dphi, "phi"), (slopes.tau_bias_dw, "w")):
         moved = MODEL.input_layout.from_names({by: getattr(u, by) + 1e-30j}, u)

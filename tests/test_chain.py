@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 from chainunit import ChainUnitMachine, GeometryError, SideLoads
 from chainunit.engines import MATH
-from chainunit.groups.chain import Chain, Rods, closed, end_motion
+from chainunit.groups.chain import Chain, Rods, close, end_motion
 from chainunit.groups.driver import crank
 from chainunit.groups.dyad import SolvedDyad
 from chainunit.machines import hanging
@@ -143,7 +143,7 @@ def test_modes_are_those_of_the_recursion():
     modes = hanging.modes(lengths, masses * G, rest, G)
     rods = Rods(lengths, masses, np.zeros(9))
     end = end_motion(rods, list(rest.theta), [0.0] * 8, MATH)
-    theta, omega = closed(MATH, rods, list(rest.theta + 1e-4 * modes.shape[0]), [0.0] * 8, end)
+    theta, omega = close(MATH, rods, list(rest.theta + 1e-4 * modes.shape[0]), [0.0] * 8, end)
 
     def rates(_, y):
         return [*y[8:], *Chain(MATH, rods, list(y[:8]), list(y[8:]), G, 0.0, ZERO).rates]
@@ -192,11 +192,11 @@ def test_projection_closes_and_is_nearest():
     omega = list(rng.uniform(-1.0, 1.0, 8))
     to = Motion(Vec2(*reach(0.1)), Vec2(0.3, -0.2))
     off = [a + 1e-3 * x for a, x in zip(theta, rng.uniform(-1.0, 1.0, 8), strict=True)]
-    found, speeds = closed(MATH, rods, off, omega, to)
+    found, speeds = close(MATH, rods, off, omega, to)
     end = end_motion(rods, found, speeds, MATH)
     assert math.hypot(end.p.x - to.p.x, end.p.y - to.p.y) < 1e-12
     assert math.hypot(end.p1.x - to.p1.x, end.p1.y - to.p1.y) < 1e-12
-    again, _ = closed(MATH, rods, found, speeds, to)
+    again, _ = close(MATH, rods, found, speeds, to)
     np.testing.assert_allclose(again, found, atol=1e-13)
 
 

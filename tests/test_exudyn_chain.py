@@ -54,7 +54,7 @@ from scipy.integrate import solve_ivp
 from test_chain import G, M, acceleration, organ, reach, rocker
 
 from chainunit.engines import MATH
-from chainunit.groups.chain import Chain, Rods, closed, end_motion
+from chainunit.groups.chain import Chain, Rods, close, end_motion
 from chainunit.machines import hanging
 from chainunit.planar import Motion, Vec2
 
@@ -85,7 +85,7 @@ class Case:
         state = list(solution(self, np.array([0.0, case.begin]))[:, -1])
         psi, speed, _ = self.rocker(case.begin)
         end = Motion(Vec2(*reach(psi)), Vec2(math.cos(psi), math.sin(psi)) * (M["e"] * speed))
-        case.theta, case.omega = closed(MATH, self.rods, state[:N], state[N:], end)
+        case.theta, case.omega = close(MATH, self.rods, state[:N], state[N:], end)
         return case
 
     def times(self, steps):

@@ -177,11 +177,11 @@ def test_power_and_two_torques_of_random_machines():
         assert abs(out.power - sum(grows) - out.dissipated_power) < 1e-9 * size
         s = KnifeDrive.shared(MATH, p, u, None)
         by_forces = s.torque_by_reactions(a / p.ratio)
-        by_work = s.torque(a / p.ratio) - s.effects["pins"].lost
+        by_work = s.torque(a / p.ratio) - s.effects["pins"].dissipative
         terms = (
             abs(by_forces)
             + abs(s.J * a / p.ratio)
-            + sum(abs(s.effects[load].lost) for load in ("cut", "push", "pins"))
+            + sum(abs(s.effects[load].dissipative) for load in ("cut", "push", "pins"))
         )
         assert abs(by_forces - by_work) < 1e-9 * max(terms, 1.0)
 
@@ -205,7 +205,7 @@ def test_pins_on_one_line():
         u = KnifeDrive.input_layout.from_names({"phi": float(phi), "w": 4.0, "a": 2.0, "cut_force": 5e3})
         s = KnifeDrive.shared(MATH, p, u, None)
         by_forces = s.torque_by_reactions(2.0)
-        assert by_forces == pytest.approx(s.torque(2.0) - s.effects["pins"].lost, rel=1e-9)
+        assert by_forces == pytest.approx(s.torque(2.0) - s.effects["pins"].dissipative, rel=1e-9)
 
 
 def test_the_outputs_depend_on_the_angle_alone():

@@ -176,7 +176,7 @@ def test_power_and_two_torques(seed):
     size = abs(out.power) + sum(map(abs, grows)) + abs(out.dissipated_power)
     assert abs(out.power - sum(grows) - out.dissipated_power) < 1e-11 * size
     a = u.a / p.ratio
-    by_work = s.torque(a) - s.effects["pins"].lost
+    by_work = s.torque(a) - s.effects["pins"].dissipative
     assert s.torque_by_reactions(a) == pytest.approx(
         by_work, abs=1e-11 * (abs(s.J * a) + abs(s.bias) + 100.0)
     )
@@ -318,10 +318,10 @@ def test_a_chain_hangs_on_any_linkage():
     state = [0.5, 0.9, 1.4, 2.0], [0.0, 1.0, -1.0, 0.5]
     for _ in range(30):
         m = Mechanism(MATH, linkage(state), q)
-        state = m.linkage.loads["chain"].closed(MATH, m, w)[:2]
+        state = m.linkage.loads["chain"].close(MATH, m, w)[:2]
     s = ChainedState(MATH, Mechanism(MATH, linkage(state), q), w)
     held = s.chains["chain"]
-    assert held.missing.length(MATH) < 1e-12
+    assert held.gap.length(MATH) < 1e-12
     accelerations, _ = held.at(a)
     theta, omega = state
     moving = (
@@ -331,11 +331,11 @@ def test_a_chain_hangs_on_any_linkage():
     engine = dual(MATH)
     along = ChainedState(engine, Mechanism(engine, linkage(moving), Dual(q, w)), Dual(w, a))
     kinetic, potential, _ = along.chains["chain"].energies(engine, [0.0] * 4)
-    stored = slope(along.kinetic_energy + along.held_energy + kinetic + potential)
-    lost, power = s.lost * w + held.lost(), s.torque(a) * w
-    assert abs(held.torque(held.chain.forces)) > 0.5 and held.lost() > 0.0
+    stored = slope(along.kinetic_energy + along.potential_energy + kinetic + potential)
+    lost, power = s.lost_torque * w + held.lost_power(), s.torque(a) * w
+    assert abs(held.torque(held.chain.forces)) > 0.5 and held.lost_power() > 0.0
     assert power == pytest.approx(stored + lost, abs=1e-9 * (abs(stored) + abs(lost)))
-    assert s.torque_by_reactions(a) == pytest.approx(s.torque(a) - s.effects["pins"].lost, rel=1e-11)
+    assert s.torque_by_reactions(a) == pytest.approx(s.torque(a) - s.effects["pins"].dissipative, rel=1e-11)
 
 
 def test_names_follow_from_the_description():

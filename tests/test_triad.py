@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import brentq
 
 from chainunit.engines import MATH, Dual, dual, slope
-from chainunit.groups.triad import LEGS, Pose, SolvedTriad, assembly_modes, corrected
+from chainunit.groups.triad import LEGS, Pose, SolvedTriad, assembly_modes, correct_pose
 from chainunit.planar import Motion, Vec2
 
 
@@ -103,7 +103,7 @@ def searched(pins, lengths, arms, tries=600):
     for _ in range(tries):
         try:
             start = Pose(*rng.uniform(-2.0, 3.0, 2), rng.uniform(-math.pi, math.pi))
-            pose = corrected(MATH, pins, lengths, arms, start, 40)
+            pose = correct_pose(MATH, pins, lengths, arms, start, 40)
             triad = SolvedTriad.at(MATH, tuple(Motion(p) for p in pins), lengths, arms, pose)
         except (ArithmeticError, ValueError):
             continue
@@ -163,12 +163,12 @@ def test_motion_is_that_of_the_followed_pose(collinear):
         h = 1e-5
 
         def rates(t, outer=outer, at=at, lengths=lengths, arms=arms, pose=pose):
-            here = corrected(MATH, at(t), lengths, arms, pose, 12)
+            here = correct_pose(MATH, at(t), lengths, arms, pose, 12)
             pins = tuple(
                 Vec2(Dual(p.x, m.p1.x + m.p2.x * t), Dual(p.y, m.p1.y + m.p2.y * t))
                 for p, m in zip(at(t), outer, strict=True)
             )
-            return np.array([slope(v) for v in corrected(dual(MATH), pins, lengths, arms, here, 2)])
+            return np.array([slope(v) for v in correct_pose(dual(MATH), pins, lengths, arms, here, 2)])
 
         *legs, link = triad.links
         np.testing.assert_allclose([link.pin.p1.x, link.pin.p1.y, link.t1], rates(0.0), rtol=1e-9, atol=1e-9)

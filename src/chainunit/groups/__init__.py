@@ -1,4 +1,4 @@
-"""Assur groups: a driver and dyads, each written once.
+"""The Assur groups of a linkage (crank, dyad, triad, hanging chain), their bodies and loads.
 
 Kinematics run forward through the groups, forces run backward, last group first.
 """

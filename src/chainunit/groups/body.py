@@ -1,7 +1,7 @@
-"""A link as data, the rigid body on it, and the wrench that it exerts.
+"""A link as data, the rigid body on it, and the inertia forces of this body.
 
-`m` mass [kg], `I` moment of inertia about the centroid [kg m2], `c` motion of the centroid,
-`t1`, `t2` derivatives of the body's angle by the coordinate q.
+`m` is the mass [kg], `I` the moment of inertia about the centroid [kg m2], `c` the motion of the centroid; `t1`, `t2`
+are derivatives of the body's angle by the coordinate q.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ class Mass(NamedTuple):
 
 
 class Bar(NamedTuple):
-    """A binary link as data: its name, the pin that it starts from, its length [m], the body on it - anything with
-    `m`, `s`, `I` as `Mass` has them - and further points on it by name, each as distances along it and to its left
-    [m]."""
+    """A binary link as data: its name, the pin that it starts from, its length [m], the body on it (an object with
+    `m`, `s`, `I` as in `Mass`), and further points by name, each by its distances along the link and to the left of
+    it [m]."""
 
     name: str
     pin: str
@@ -40,7 +40,7 @@ class Bar(NamedTuple):
 Load = tuple[Vec2, Any]
 """The action on a link: force [N], and moment about the link's pin [N m]."""
 
-UNLOADED: Load = (ZERO, 0.0)
+NO_LOAD: Load = (ZERO, 0.0)
 
 
 class Body:
@@ -62,15 +62,15 @@ class Body:
             2.0 * (self.m * (p1.x * p2.x + p1.y * p2.y) + self.I * (k.t1 * k.t2)),
         )
 
-    # in components: this runs for each body in each force pass, and a vector costs `math` ten times a number
+    # in components: this runs for each body in each force pass, and with `math` a vector costs ten times a number
     def _resists(self, ax: Any, ay: Any, spin: Any) -> Load:
         c, pin = self.c.p, self.link.pin.p
         fx, fy = -(self.m * ax), -(self.m * ay)
         return Vec2(fx, fy), (c.x - pin.x) * fy - (c.y - pin.y) * fx - self.I * spin
 
     def centrifugal(self, w2: Any, field: Any = 0.0) -> Load:
-        """The inertia force (d'Alembert) at constant speed of the coordinate, `w2` its square, in a frame that is
-        accelerated by `field` along y [m/s2]: the weight where that is g."""
+        """The inertia force (d'Alembert) at constant speed of the coordinate, in a frame with the acceleration
+        `field` along y [m/s2]; `w2` is the squared speed. With the field g this includes the weight."""
         c2 = self.c.p2
         return self._resists(c2.x * w2, c2.y * w2 + field, self.link.t2 * w2)
 
@@ -80,12 +80,12 @@ class Body:
         pin, c = self.link.pin, self.c
         arm, turning = c.p - pin.p, c.p1 - pin.p1
         force = self.link.third(arm, start, t3) * (-(self.m * w2))
-        # the present force on an arm that turns
-        turned = turning.x * (c.p2.y * w2 + field) - turning.y * (c.p2.x * w2)
-        return force, arm.cross(force) - turned * self.m - self.I * (t3 * w2)
+        # the present force acts on an arm that turns
+        by_arm = turning.x * (c.p2.y * w2 + field) - turning.y * (c.p2.x * w2)
+        return force, arm.cross(force) - by_arm * self.m - self.I * (t3 * w2)
 
     def inertial(self) -> Load:
-        """The inertia force by the acceleration of the coordinate."""
+        """The inertia force per acceleration of the coordinate."""
         return self._resists(self.c.p1.x, self.c.p1.y, self.link.t1)
 
 
@@ -96,7 +96,7 @@ def body_on(link: Link, mass: Any) -> Body:
     return Body(link, mass.m, c, mass.I)
 
 
-def reflected(bodies: Iterable[Body]) -> tuple[Any, Any]:
+def reflected_inertia(bodies: Iterable[Body]) -> tuple[Any, Any]:
     """Reflected inertia of several bodies J [kg m2] and its derivative dJ/dq."""
     J, dJ = 0.0, 0.0
     for body in bodies:

@@ -2,12 +2,12 @@
 
 Rods are numbered from A1 to A2; rod k has the length l, the mass m, uniform along it, and the absolute angle theta
 from the downward vertical, positive towards +x (as the rocker's psi): u = (sin theta, -cos theta) points from its A1
-end to its A2 end. Pin k is the end of rod k, pin 0 is A1, pin N is A2; f_k is the force on rod k at pin k, from what
-follows.
+end to its A2 end. Pin k is the end of rod k, pin 0 is A1, pin N is A2. At pin k the next rod, or the rocker, acts on
+rod k with the force f_k.
 
-Damping moments act in the pins: on the outer of two rods -c_k (w_outer - w_inner), pin 0 against the frame, pin N
-against the rocker. Two rods that fold up against each other meet a stop: beyond the angle `fold_limit` between them
-it turns them back with fold_stiffness (angle - fold_limit)^2.
+Damping moments act in the pins. In pin k the outer rod gets the moment -c_k (w_outer - w_inner); pin 0 damps against
+the frame, pin N against the rocker. Two rods that fold up against each other meet a stop: beyond the angle
+`fold_limit` between them, the stop turns them back with the moment fold_stiffness (angle - fold_limit)^2.
 """
 
 from __future__ import annotations
@@ -19,8 +19,9 @@ from ..planar import ZERO, Motion, Vec2
 
 
 class Rods:
-    """Lengths [m] and masses [kg] of the rods, and damping c_0 .. c_N of the pins [N m s/rad]; `inertia` is a factor
-    on m l^2/12, 1 for uniform rods. Stops of the inner pins: angle [rad] and stiffness [N m/rad2]."""
+    """The rods of a chain: `lengths` [m], `masses` [kg], and `damping` c_0 .. c_N of the pins [N m s/rad]. `inertia`
+    is a factor on m l^2/12, 1 for uniform rods. The inner pins have stops: `fold_limit` is their angle [rad],
+    `fold_stiffness` their stiffness [N m/rad2]."""
 
     __slots__ = ("damping", "fold_limit", "fold_stiffness", "inertia", "lengths", "masses")
 
@@ -59,16 +60,16 @@ class _Matrix:
         return Vec2((self.yy * v.x - self.xy * v.y) / det, (self.xx * v.y - self.xy * v.x) / det)
 
 
-class Sweep:
-    """One pass over a chain at given angles: accelerations and pin forces from the acceleration of A2.
+class Recursion:
+    """A recursion over a chain at given angles: accelerations and pin forces from the acceleration of A2.
 
-    Carried from A1 rod by rod is the acceleration of each pin as a_k = Phi_k f_k + beta_k, with Phi symmetric and
-    positive: the articulated compliance of the part before the pin. At A2, where the acceleration is known, f_N
-    follows, and a pass back gives all forces and angular accelerations. The cost grows with N, not with its cube,
-    and the chain stays closed at the level of accelerations, to rounding.
+    From A1 to A2, rod by rod, it computes the acceleration of each pin as a_k = Phi_k f_k + beta_k. Phi_k is
+    symmetric and positive: the articulated compliance of the part before the pin. At A2 the acceleration is known, so
+    that f_N follows. A pass back from A2 to A1 gives all forces and angular accelerations. The cost grows with N, not
+    with its cube, and the chain stays closed at the level of accelerations, to rounding.
 
-    With speeds and loads zero it maps a wanted displacement of A2 to the smallest change of the angles in the metric
-    of the masses: the projection that closes a chain which has drifted (`closed`).
+    With speeds and loads zero the recursion maps a displacement of A2 to the smallest change of the angles in the
+    metric of the masses: the projection that closes a chain after a drift (`close`).
     """
 
     __slots__ = ("_beta", "_n", "_phi", "_rods", "_steps", "_u")
@@ -104,7 +105,7 @@ class Sweep:
             u, n = Vec2(s, -c), Vec2(c, s)
             # about the pin before: kappa m l^2 alpha + (m l/2) n . a = l n . f + (l/2) n . free + moment
             j = kappa * m * l * l
-            # what acts on the rod beside f and the acceleration of the pin before; `turn` is alpha's part of it
+            # the action on the rod besides f and the acceleration of the pin before: `turn` is its part of alpha
             turn = (free[k].dot(n) * (0.5 * l) + moments[k]) / j
             pull = free[k] + u * (0.5 * m * l * spin[k]) - n * (0.5 * m * l * turn)
             if at_start is not None:
@@ -123,10 +124,10 @@ class Sweep:
             sxx = (k22 * phi.xx - k12 * phi.xy) / det
             sxy = (k22 * phi.xy - k12 * phi.yy) / det
             syy = (k11 * phi.yy - k21 * phi.xy) / det
-            held = _Matrix(sxx, sxy, syy)
+            S = _Matrix(sxx, sxy, syy)
             rest = Vec2((k22 * beta.x - k12 * beta.y) / det, (k11 * beta.y - k21 * beta.x) / det)
-            rest = rest + held.times(pull)
-            self._steps.append((pull, b, held, rest, turn, j))
+            rest = rest + S.times(pull)
+            self._steps.append((pull, b, S, rest, turn, j))
             self._u.append(u)
             self._n.append(n)
             # a = a_before + l n alpha - l u spin, alpha = turn + (l/j) n . f - (m l/(2 j)) n . a_before
@@ -156,28 +157,37 @@ class Sweep:
         return self._phi[-1].solve(end - self._beta[-1])
 
     def back(self, force: Vec2) -> tuple[list[Any], list[Vec2]]:
-        """Angular accelerations of the rods and the forces f_0 .. f_N at the pins, from the force at A2; f_0 is on
+        """Angular accelerations of the rods and the forces f_0 .. f_N at the pins, from the force at A2; f_0 acts on
         the support."""
         half = 0.5 / (0.25 + self._rods.inertia * (1.0 / 12.0))
         accelerations: list[Any] = []
         forces = [force]
         for k in reversed(range(len(self._rods))):
-            pull, b, held, rest, turn, j = self._steps[k]
+            pull, b, S, rest, turn, j = self._steps[k]
             l, m = self._rods.lengths[k], self._rods.masses[k]
             n, f = self._n[k], forces[-1]
             across = n.dot(f)
-            moved = f - n * (half * across)
-            before = held.times(moved) + rest
+            Ef = f - n * (half * across)
+            before = S.times(Ef) + rest
             accelerations.append(turn + l / j * across - 0.5 * m * l / j * n.dot(before))
-            forces.append(pull + moved - b.times(before))
+            forces.append(pull + Ef - b.times(before))
         return accelerations[::-1], forces[::-1]
 
 
 class Chain:
-    """A chain at one state, its A2 end moved. `moment_at_start` and `moment_at_end` act on it in the pins A1 and A2
-    [N m]; `folding` is the energy in the stops [J], `damped` what damping takes [W]."""
+    """A chain at one state, with the acceleration of its end at A2. `moment_at_start` and `moment_at_end` act on the
+    chain in the pins A1 and A2 [N m]; `folding` is the energy in the stops [J], `damping_power` the power that
+    damping takes [W]."""
 
-    __slots__ = ("_end", "_solution", "damped", "folding", "moment_at_end", "moment_at_start", "sweep")
+    __slots__ = (
+        "_end",
+        "_solution",
+        "damping_power",
+        "folding",
+        "moment_at_end",
+        "moment_at_start",
+        "recursion",
+    )
 
     def __init__(
         self,
@@ -202,17 +212,17 @@ class Chain:
         speeds = [0.0, *omega, end_spin]
         slips = [speeds[k + 1] - speeds[k] for k in range(N + 1)]
         moments = [c * slip for c, slip in zip(rods.damping, slips, strict=True)]
-        self.damped = sum(moment * slip for moment, slip in zip(moments, slips, strict=True))
+        self.damping_power = sum(moment * slip for moment, slip in zip(moments, slips, strict=True))
         self.folding = 0.0
         # without a stop nothing is computed for it
         if not (isinstance(rods.fold_stiffness, float) and rods.fold_stiffness == 0.0):
             for k in range(1, N):
-                # what turns the inner rod towards the outer one, as damping does
+                # like damping, the stop turns the inner rod towards the outer one
                 moment, energy = self._stop(xp, rods, theta[k] - theta[k - 1])
                 moments[k] = moments[k] + moment
                 self.folding = self.folding + energy
         self.moment_at_start, self.moment_at_end = -moments[0], moments[-1]
-        self.sweep = Sweep(
+        self.recursion = Recursion(
             xp,
             rods,
             theta,
@@ -224,24 +234,24 @@ class Chain:
         self._end = end
         self._solution: tuple[list[Any], list[Vec2]] | None = None
 
-    def _solved(self) -> tuple[list[Any], list[Vec2]]:
+    def _solve(self) -> tuple[list[Any], list[Vec2]]:
         if self._solution is None:
-            self._solution = self.sweep.back(self.sweep.force(self._end))
+            self._solution = self.recursion.back(self.recursion.force(self._end))
         return self._solution
 
     @property
     def rates(self) -> list[Any]:
         """Angular accelerations of the rods [rad/s2]."""
-        return self._solved()[0]
+        return self._solve()[0]
 
     @property
     def forces(self) -> list[Vec2]:
         """Forces f_0 .. f_N at the pins [N]."""
-        return self._solved()[1]
+        return self._solve()[1]
 
     @staticmethod
     def _stop(xp: Any, rods: Rods, fold: Any) -> tuple[Any, Any]:
-        """Moment of a stop at the angle `fold` between two rods, along it, and its energy."""
+        """Moment of a stop in the direction of the angle `fold` between two rods, and its energy."""
         above = xp.maximum(fold - rods.fold_limit, 0.0)
         below = xp.maximum(-fold - rods.fold_limit, 0.0)
         k = rods.fold_stiffness
@@ -252,41 +262,41 @@ class Chain:
 
 
 def pins(lengths: Sequence[Any], theta: Sequence[Any], omega: Sequence[Any], xp: Any) -> list[Motion]:
-    """Place and velocity of each pin from A1, of pin 0 too."""
-    found = [Motion(ZERO, ZERO)]
+    """Place and velocity of each pin relative to A1, pin 0 included."""
+    joints = [Motion(ZERO, ZERO)]
     for l, angle, w in zip(lengths, theta, omega, strict=True):
         s, c = xp.sin(angle), xp.cos(angle)
-        found.append(Motion(found[-1].p + Vec2(s, -c) * l, found[-1].p1 + Vec2(c, s) * (l * w)))
-    return found
+        joints.append(Motion(joints[-1].p + Vec2(s, -c) * l, joints[-1].p1 + Vec2(c, s) * (l * w)))
+    return joints
 
 
 def end_motion(rods: Rods, theta: Sequence[Any], omega: Sequence[Any], xp: Any) -> Motion:
-    """Place and velocity of the last pin from A1."""
+    """Place and velocity of the last pin relative to A1."""
     return pins(rods.lengths, theta, omega, xp)[-1]
 
 
-def closed(
+def close(
     xp: Any, rods: Rods, theta: Sequence[Any], omega: Sequence[Any], end: Motion, rounds: int = 3
 ) -> tuple[list[Any], list[Any]]:
-    """Angles and speeds nearest to the given ones, in the metric of the masses, with which the chain ends at `end`
-    and moves with it."""
-    found, speeds, _ = jolted(xp, rods, theta, omega, end, rounds)
-    return found, speeds
+    """Angles and speeds with which the chain ends at `end` and moves with it: the nearest ones to the given ones, in
+    the metric of the masses."""
+    angles, speeds, _ = close_with_jolt(xp, rods, theta, omega, end, rounds)
+    return angles, speeds
 
 
-def jolted(
+def close_with_jolt(
     xp: Any, rods: Rods, theta: Sequence[Any], omega: Sequence[Any], end: Motion, rounds: int
 ) -> tuple[list[Any], list[Any], Any]:
-    """As `closed`, and the work [J] of the jolts at A2 that change the speeds."""
+    """The result of `close`, and the work [J] of the jolts at A2 that change the speeds."""
     N, work = len(rods), 0.0
     nothing = [Vec2(0.0, 0.0)] * N, [0.0] * N, [0.0] * N
     for _ in range(rounds):
         at = end_motion(rods, theta, omega, xp)
-        sweep = Sweep(xp, rods, theta, *nothing)
-        # the end's speed at the angles before they change, which is as near as they are
-        turns, _ = sweep.back(sweep.force(end.p - at.p))
-        jolt = sweep.force(end.p1 - at.p1)
-        faster, _ = sweep.back(jolt)
+        recursion = Recursion(xp, rods, theta, *nothing)
+        # the speed of the end is taken at the angles before the change: it is as near as they are
+        turns, _ = recursion.back(recursion.force(end.p - at.p))
+        jolt = recursion.force(end.p1 - at.p1)
+        faster, _ = recursion.back(jolt)
         work = work + 0.5 * jolt.dot(end.p1 + at.p1)
         theta = [a + d for a, d in zip(theta, turns, strict=True)]
         omega = [w + d for w, d in zip(omega, faster, strict=True)]

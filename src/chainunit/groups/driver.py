@@ -1,7 +1,7 @@
 """The driver: a crank on a fixed bearing.
 
-The crank angle is counted from the upward vertical, positive clockwise, and it is the
-coordinate q itself: the counter-clockwise angle of the crank falls at the rate -1.
+The crank angle counts from the upward vertical, positive clockwise. It is the coordinate q itself, so that the
+derivative of the crank's counter-clockwise angle by q is -1.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from .group import Group, SolvedGroup, Third
 
 @dataclass
 class Crank(Group):
-    """A crank as data: a bar on a ground pin, and the name of the pin at its end."""
+    """A crank as data: its bar, which starts from a ground pin, and the name of the pin at the bar's end."""
 
     bar: Bar
     end: str

@@ -1,6 +1,6 @@
 """The dyad (class II Assur group, three revolute joints): two links P-B and Q-B.
 
-P and Q move in a known way, B is where the circles about them meet. A circle intersection
+The motion of P and Q is known; B is an intersection of the circles about them. This intersection
 gives the position, one 2x2 system (solved twice) the motion, one 2x2 system the forces.
 
 r1 = B - P, r2 = B - Q, and ``det = r1 x r2``; ``det/(a b)`` is the sine of the transmission
@@ -20,9 +20,9 @@ from .group import Group, SolvedGroup, Third
 
 @dataclass
 class Dyad(Group):
-    """A dyad as data: two bars whose pins move in a known way, and the inner pin at the ends of both. `side` is +1
-    where the inner pin lies to the left of the ray from the first bar's pin to the second one's, -1 where to the
-    right. Of two links in the inner pin the second one carries all else that hangs on it."""
+    """A dyad as data: two bars, which start from pins of known motion, and the inner pin at the ends of both. `side`
+    is +1 where the inner pin lies to the left of the ray from the first bar's pin to the second bar's pin, -1 where
+    it lies to the right. Further groups on the inner pin hang on the second link."""
 
     inner: str
     first: Bar
@@ -36,17 +36,17 @@ class Dyad(Group):
 
     @property
     def pins(self) -> dict[str, str]:
-        """Pins that it adds, each with the link that carries it."""
+        """The pins that the dyad adds, each with the link that carries it."""
         return {self.inner: self.second.name}
 
     @property
     def joints(self) -> tuple[tuple[str, str], ...]:
-        """Pin and link of each reaction, as `SolvedDyad.reactions` gives them."""
+        """Pin and link of each reaction, in the order of `SolvedDyad.reactions`."""
         first, second = self.first, self.second
         return (first.pin, first.name), (self.inner, first.name), (second.pin, second.name)
 
     def solve(self, xp: Any, q: Any, pins: Mapping[str, Motion], derived: Sequence[Any]) -> SolvedDyad:
-        """The dyad where its outer `pins` are."""
+        """The dyad at the position of its outer `pins`."""
         first, second = self.first, self.second
         return SolvedDyad.between(
             xp, pins[first.pin], pins[second.pin], first.length, second.length, self.side
@@ -54,8 +54,8 @@ class Dyad(Group):
 
 
 class SolvedDyad(SolvedGroup):
-    """A solved dyad: its links from P and from Q, the inner pin B, the arms `r1`, `r2`; its margin is the sine of the
-    angle between them."""
+    """A solved dyad: its links from P and from Q, the inner pin B, and the arms `r1`, `r2`. Its margin is the sine of
+    the angle between the arms."""
 
     __slots__ = ("_minus_per_det", "r1", "r2")
 
@@ -81,7 +81,7 @@ class SolvedDyad(SolvedGroup):
         a, b : lengths P-B and Q-B [m]
         side : +1 where B lies to the left of the ray from P to Q, -1 where to the right
         """
-        # in components, as in `Body`; casadi would make a division by x of each use of 1/x, but not of -1/x
+        # in components, as in `Body`; casadi turns each use of 1/x into a division by x, but keeps -1/x
         dx, dy = q.p.x - p.p.x, q.p.y - p.p.y
         minus_per_d2 = -1.0 / (dx * dx + dy * dy)
         along = 0.5 * (1.0 + (b * b - a * a) * minus_per_d2)

@@ -1,4 +1,4 @@
-"""An Assur group as data, and the group solved at one position: the protocol of all of them."""
+"""The common interface of all groups: an Assur group as data, and the same group solved at one position."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ..planar import Link, Motion, Vec2
 from .body import Bar, Load
 
 Third = tuple[Vec2, Any]
-"""Third derivatives by q of a link: of its pin and of its angle."""
+"""Third derivatives of a link by q: of its pin and of its angle."""
 
 
 class SolvedGroup:
@@ -22,8 +22,8 @@ class SolvedGroup:
         self.links, self.pins, self.margin = links, pins, margin
 
     def third(self, outer: Sequence[Vec2]) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of each link and of each pin that the group adds, from those of the pins that its
-        bars start from."""
+        """Third derivatives by q of each link and of each pin that the group adds, from the third derivatives of the
+        pins that its bars start from."""
         raise NotImplementedError
 
     def reactions(self, loads: Sequence[Load]) -> Sequence[Vec2]:
@@ -35,27 +35,27 @@ class Group:
     """A group as data."""
 
     derived: ClassVar[int] = 0
-    """How many numbers follow from its lengths once, before a run (`derive`)."""
+    """The number of values that `derive` computes from the lengths, once before a run."""
 
     @property
     def bars(self) -> tuple[Bar, ...]:
-        """Its links; each with a pin that is there before hangs on it."""
+        """Its links. A bar with a `pin` starts from this pin of the linkage before the group."""
         raise NotImplementedError
 
     @property
     def pins(self) -> dict[str, str]:
-        """Pins that it adds, each with the link that carries all else that hangs on it."""
+        """The pins that the group adds, each with the link on which further groups at this pin hang."""
         raise NotImplementedError
 
     @property
     def joints(self) -> tuple[tuple[str, str], ...]:
-        """Pin and link of each reaction, as `SolvedGroup.reactions` gives them."""
+        """Pin and link of each reaction, in the order of `SolvedGroup.reactions`."""
         raise NotImplementedError
 
     def derive(self, xp: Any, pins: Callable[[float], Mapping[str, Motion]]) -> list[Any]:
-        """Numbers that follow from its lengths; `pins` gives the pins before it at a crank angle [rad]."""
+        """Numbers that follow from its lengths; `pins` gives the pins before the group at a crank angle [rad]."""
         return []
 
     def solve(self, xp: Any, q: Any, pins: Mapping[str, Motion], derived: Sequence[Any]) -> SolvedGroup:
-        """The group at the crank angle `q` [rad], where the `pins` are."""
+        """The group at the crank angle `q` [rad] and the position of the `pins`."""
         raise NotImplementedError

@@ -1,14 +1,15 @@
-"""A chain of rods that hangs between a pin of the frame and a pin of a linkage, as a load of the linkage with states.
+"""A chain of rods that hangs between a pin of the frame and a pin of a linkage: a load of the linkage with states.
 
-The outer pin A2 moves with the acceleration p1 a + p2 w^2 (derivatives by the coordinate), so that the chain adds
+The outer pin A2 moves with the acceleration p1 a + p2 w^2 (p1, p2: derivatives by the coordinate), so that the chain
+adds
 
     J = p1 . Phi^-1 p1,     torque = p1 . Phi^-1 (p2 w^2 - beta) + t1 m_A2
 
 at the coordinate, with the compliance Phi and the bias beta of the recursion at A2 (`chainunit.groups.chain`), and
 the moment m_A2 of the pin there.
 
-A chain that does not quite end at A2, through errors of integration, is drawn there: the wanted acceleration of its
-end has the addition 2 c (speed that is missing) + c^2 (way that is missing) with a rate c of closing.
+Errors of integration open a gap between the end of the chain and A2. To close it, the acceleration that the end has
+to have is increased by 2 c (gap in speed) + c^2 (gap in place), with the rate c of closing.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from ..planar import ZERO, Link, Motion, Vec2
-from .chain import Chain, Rods, jolted, pins
+from .chain import Chain, Rods, close_with_jolt, pins
 from .loads import Effect, Moving, Resistance, wrench_at
 
 State = tuple[Sequence[Any], Sequence[Any]]
@@ -37,45 +38,46 @@ class HangingChain(NamedTuple):
     at: int
     by_reactions: bool = False
 
-    def held(self, xp: Any, m: Moving, w: Any) -> HeldChain:
-        """The chain where the linkage holds it, at the speed `w` of the coordinate [rad/s]."""
+    def hold(self, xp: Any, m: Moving, w: Any) -> HeldChain:
+        """The chain between its pins on the linkage, at the speed `w` of the coordinate [rad/s]."""
         return HeldChain(xp, self, m.pins[self.start].p, m.pins[self.end], m.links[m.carrier(self.end)].t1, w)
 
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Any) -> Effect:
         """See `chainunit.groups.loads.Acting`; the source is the `HeldChain`."""
-        held = self.held(xp, m, w)
-        at_end = wrench_at(m, self.end, -held.chain.forces[-1])
+        chain = self.hold(xp, m, w)
+        at_end = wrench_at(m, self.end, -chain.chain.forces[-1])
         return Effect(
-            (at_end._replace(moment=at_end.moment - held.chain.moment_at_end),),
-            held=held.torque(held.chain.forces),
-            inertia=held.inertia(),
-            inertial=(wrench_at(m, self.end, -held.per_acceleration()),),
-            source=held,
+            (at_end._replace(moment=at_end.moment - chain.chain.moment_at_end),),
+            conservative=chain.torque(chain.chain.forces),
+            inertia=chain.inertia(),
+            inertial=(wrench_at(m, self.end, -chain.per_acceleration()),),
+            source=chain,
         )
 
-    def closed(self, xp: Any, m: Moving, w: Any) -> tuple[list[Any], list[Any], Any]:
-        """Angles and speeds with which it ends at its outer pin and moves with it, by the smallest change in the
-        metric of the masses, and the work of the jolt [J]."""
+    def close(self, xp: Any, m: Moving, w: Any) -> tuple[list[Any], list[Any], Any]:
+        """Angles and speeds with which the chain ends at its outer pin and moves with it, by the smallest change in
+        the metric of the masses, and the work of the jolt [J]."""
         a1, a2 = m.pins[self.start].p, m.pins[self.end]
-        return jolted(xp, self.rods, *self.state, Motion(a2.p - a1, a2.p1 * w), 1)
+        return close_with_jolt(xp, self.rods, *self.state, Motion(a2.p - a1, a2.p1 * w), 1)
 
 
 class HeldChain:
-    """A chain at one state, held at its outer pin, which moves in a known way: the `chain`, the way `missing` from
-    its end to that pin, and the force at the start of each rod."""
+    """A chain at one state, held at its outer pin, whose motion is known: the `chain`, the `gap` from its end to that
+    pin, the `end_acceleration` of that pin at constant speed of the coordinate, and the force at the start of each
+    rod."""
 
     __slots__ = (
-        "_late",
+        "_speed_gap",
         "a1",
         "a2",
         "at_start",
         "chain",
         "data",
-        "missing",
-        "resisted",
+        "end_acceleration",
+        "gap",
+        "resistance_power",
         "turn",
         "w",
-        "wanted",
     )
 
     def __init__(self, xp: Any, data: HangingChain, a1: Vec2, a2: Motion, turn: Any, w: Any) -> None:
@@ -91,46 +93,48 @@ class HeldChain:
         joints = pins(data.rods.lengths, theta, omega, xp)
         v, end = joints[data.at].p1, joints[-1]
         per_speed = data.resistance.per_speed(xp, v.squared())
-        self.resisted = v.squared() * per_speed
-        self.missing, self._late = a2.p - a1 - end.p, a2.p1 * w - end.p1
-        self.wanted = a2.p2 * (w * w)
+        self.resistance_power = v.squared() * per_speed
+        self.gap, self._speed_gap = a2.p - a1 - end.p, a2.p1 * w - end.p1
+        self.end_acceleration = a2.p2 * (w * w)
         self.at_start = [ZERO] * len(data.rods)
         self.at_start[data.at] = v * (-per_speed)
-        self.chain = Chain(xp, data.rods, theta, omega, data.g, turn * w, self.wanted, self.at_start)
+        self.chain = Chain(
+            xp, data.rods, theta, omega, data.g, turn * w, self.end_acceleration, self.at_start
+        )
 
     def per_acceleration(self) -> Vec2:
-        """Force at the outer pin by the acceleration of the coordinate [N s2]."""
-        return self.chain.sweep.compliance.solve(self.a2.p1)
+        """Force at the outer pin per acceleration of the coordinate [N s2]."""
+        return self.chain.recursion.compliance.solve(self.a2.p1)
 
     def inertia(self) -> Any:
-        """Inertia that it adds at the coordinate [kg m2]."""
+        """Inertia that the chain adds at the coordinate [kg m2]."""
         return self.a2.p1.dot(self.per_acceleration())
 
     def torque(self, forces: Sequence[Vec2]) -> Any:
-        """Torque that it adds at the coordinate [N m], with these forces at its pins."""
+        """Torque that the chain adds at the coordinate [N m], with these forces at its pins."""
         return self.a2.p1.dot(forces[-1]) + self.turn * self.chain.moment_at_end
 
-    def lost(self) -> Any:
+    def lost_power(self) -> Any:
         """Power that damping and resistance take [W]."""
-        return self.chain.damped + self.resisted
+        return self.chain.damping_power + self.resistance_power
 
     def at(self, a: Any, closing: float = 0.0) -> tuple[list[Any], list[Vec2]]:
-        """Accelerations of the rods and forces at the pins, see `chain.Sweep.back`, at the acceleration `a` of the
-        coordinate, drawn to the outer pin at the rate `closing` [1/s]."""
-        end = self.wanted + self.a2.p1 * a
+        """Accelerations of the rods and forces at the pins at the acceleration `a` of the coordinate, see
+        `chain.Recursion.back`; the end is drawn to the outer pin at the rate `closing` [1/s]."""
+        end = self.end_acceleration + self.a2.p1 * a
         if closing:
-            end = end + self._late * (2.0 * closing) + self.missing * (closing * closing)
-        sweep = self.chain.sweep
-        return sweep.back(sweep.force(end))
+            end = end + self._speed_gap * (2.0 * closing) + self.gap * (closing * closing)
+        recursion = self.chain.recursion
+        return recursion.back(recursion.force(end))
 
     def rates(self, a: Any, closing: float) -> list[Any]:
-        """Rates of angles and speeds, and of the energy that comes through the outer pin less what is lost [W]."""
+        """Rates of the angles and the speeds, and the power through the outer pin less the lost power [W]."""
         accelerations, forces = self.at(a, closing)
-        return [*self.data.state[1], *accelerations, self.torque(forces) * self.w - self.lost()]
+        return [*self.data.state[1], *accelerations, self.torque(forces) * self.w - self.lost_power()]
 
     def energies(self, xp: Any, shares: Sequence[Any]) -> tuple[Any, Any, Any]:
-        """Kinetic and potential energy [J], and the energy of a kilogram that lies on the rods in these shares
-        [J/kg]."""
+        """Kinetic and potential energy [J], and the energy of one kilogram of material that lies on the rods in these
+        shares [J/kg]."""
         rods, (theta, omega), g = self.data.rods, self.data.state, self.data.g
         kinetic, potential, per_kg = 0.0, self.chain.folding, 0.0
         p0, v0 = self.a1, ZERO
@@ -150,7 +154,7 @@ class HeldChain:
 
 
 def two_rods(xp: Any, first: Link, second: Link) -> list[Any]:
-    """Angles of two rods that stand where the links of a dyad do."""
+    """Angles of two rods in the position of the links of a dyad."""
     wall, web = first.u, -second.u
     angle = xp.atan2(wall.x, -wall.y)
     return [angle, angle + xp.atan2(wall.cross(web), wall.dot(web))]
@@ -158,40 +162,41 @@ def two_rods(xp: Any, first: Link, second: Link) -> list[Any]:
 
 def guess(xp: Any, reach: tuple[Any, Any]) -> list[Any]:
     """First guess of the unknowns of a chain at rest, for `hang`: the pull of a shallow parabola, v = 1/2, and the
-    number that holds Newton's method back. `reach` is the way between its pins in parts of its length."""
+    damping of Newton's method. `reach` is the vector from A1 to A2 in parts of the length of the chain."""
     x, y = reach
     spare = xp.maximum(1e-9, 1.0 - xp.sqrt(x * x + y * y))
     return [xp.maximum(x, 0.05) / xp.sqrt(24.0 * spare), 0.5, 1.0]
 
 
 def resting(xp: Any, rods: Rods, hand: float, z: Sequence[Any]) -> list[Any]:
-    """Angles of the rods at rest from the unknowns; `hand` is -1 for a chain that is mirrored."""
+    """Angles of the rods at rest from the unknowns; `hand` is -1 for a mirrored chain."""
     H, v, _ = z
     return [xp.atan2(hand * H, v - b) for b in _shape(rods)[1]]
 
 
 def hang(xp: Any, rods: Rods, reach: tuple[Any, Any], z: Sequence[Any]) -> list[Any]:
-    """One round towards the hanging position of z = H, v and a number that holds back: Newton's method on log H and
-    v, held back as long as it does not descend (Levenberg and Marquardt); H cannot cross zero."""
-    H, v, held = z
+    """One round towards the hanging position, of the unknowns z = (H, v, damping): Newton's method on log H and v,
+    with more damping as long as it does not descend (Levenberg and Marquardt). H cannot cross zero."""
+    H, v, damping = z
     l, b = _shape(rods)
     value, by_h, by_v, hh, hv, vv = _gradient(b, l, H, v, reach, xp)
     gs = H * by_h
-    ss, sv, vv = H * H * hh + xp.maximum(gs, 0.0) + held * H, H * hv, vv + held
+    ss, sv, vv = H * H * hh + xp.maximum(gs, 0.0) + damping * H, H * hv, vv + damping
     det = ss * vv - sv * sv
     farther = H * (1.0 + xp.maximum(-0.7, xp.minimum(1.0, (sv * by_v - vv * gs) / det)))
     higher = v + (sv * gs - ss * by_v) / det
     after = _gradient(b, l, farther, higher, reach, xp)[0]
-    # 1 where it descends or stands, 0 where not
-    taken = xp.minimum(1.0, xp.maximum(0.0, (value - after + 2e-15) * 1e18))
+    # 1 where the step descends or stands, otherwise 0
+    accept = xp.minimum(1.0, xp.maximum(0.0, (value - after + 2e-15) * 1e18))
     return [
-        H + taken * (farther - H), v + taken * (higher - v), xp.minimum(1e6, held * (4.0 - 3.9 * taken))
+        H + accept * (farther - H), v + accept * (higher - v), xp.minimum(1e6, damping * (4.0 - 3.9 * accept))
     ]  # fmt: skip
 
 
 def _gradient(b: Sequence[Any], l: Sequence[Any], H: Any, v: Any, reach: tuple[Any, Any], xp: Any) -> Any:
-    """The function whose minimum is the hanging position, see `machines.hanging`, with its derivatives by the
-    horizontal force H > 0 and the height v at which the pull of the chain is level, both in parts of the weight."""
+    """The function whose minimum is the hanging position, see `machines.hanging`, with its derivatives by H and v:
+    the horizontal force H > 0, and the weight v between A1 and the point of horizontal pull, both in parts
+    of the whole weight."""
     value, by_h, by_v = v * reach[1] - H * reach[0], -reach[0], reach[1]
     hh, hv, vv = 0.0, 0.0, 0.0
     for middle, length in zip(b, l, strict=True):
@@ -204,7 +209,8 @@ def _gradient(b: Sequence[Any], l: Sequence[Any], H: Any, v: Any, reach: tuple[A
 
 
 def _shape(rods: Rods) -> tuple[list[Any], list[Any]]:
-    """Lengths in parts of the whole length, and weight before the middle of each rod in parts of the whole."""
+    """Lengths of the rods in parts of the whole length, and the weight between A1 and the middle of each rod in parts
+    of the whole weight."""
     whole, weight = sum(rods.lengths), sum(rods.masses)
     middles, before = [], 0.0
     for m in rods.masses:

@@ -1,9 +1,9 @@
 """Loads of a linkage: weight, resistance to the motion of a point, a stop, the losses of the pins.
 
-Each takes parameters and inputs as machines declare them (`chainunit.machines.parts`), and answers one question by
-`effect`: the forces on links, the torque at the coordinate that overcomes them by virtual work, and the energy that
-is held. A force that does not only depend on the place takes power; its torque is that power over w, written so that
-w = 0 is regular.
+Each load takes parameters and inputs as machines declare them (`chainunit.machines.parts`). Its method `effect` gives
+the forces on the links, the torque at the coordinate that overcomes them (by virtual work), and the potential energy.
+A force that depends on more than the place takes power; its torque is this power over w, in a form that is regular at
+w = 0.
 """
 
 from __future__ import annotations
@@ -54,14 +54,14 @@ class Wrench(NamedTuple):
 
 class Effect(NamedTuple):
     """The effect of a load at one place and speed: wrenches on links, and the torques at the coordinate that overcome
-    it [N m]: `held` against the part that has the `energy` [J], `lost` against the part that takes power. A weight is
-    a `field`: it acts as if the frame were accelerated along y [m/s2]. A load that resists acceleration adds the
-    `inertia` [kg m2] and the wrenches `inertial`, each by the acceleration of the coordinate; `source` is the object
-    that they were computed from."""
+    the load [N m]. The `conservative` torque overcomes the part with the potential `energy` [J], the `dissipative`
+    one the part that takes power. A weight is a `field`: it acts like an acceleration of the frame along y [m/s2]. A
+    load that resists acceleration adds the `inertia` [kg m2] and the wrenches `inertial`, each per acceleration of
+    the coordinate. `source` is the object from which the effect was computed."""
 
     wrenches: tuple[Wrench, ...] = ()
-    held: Any = 0.0
-    lost: Any = 0.0
+    conservative: Any = 0.0
+    dissipative: Any = 0.0
     energy: Any = 0.0
     field: Any = 0.0
     inertia: Any = 0.0
@@ -74,11 +74,12 @@ class Acting(Protocol):
 
     @property
     def by_reactions(self) -> bool:
-        """Whether it follows from the reactions of the pins: then it is asked after them, has no wrench, and gives
-        its own slope, see `PinLosses.slope`."""
+        """Whether the load depends on the reactions of the pins. Then it is computed after them, has no wrench, and
+        gives its own slope, see `PinLosses.slope`."""
 
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Mapping[Joint, Vec2]) -> Effect:
-        """Its effect at the speed `w` of the coordinate [rad/s]; `reactions` are those at constant speed, [N]."""
+        """The effect of the load at the speed `w` of the coordinate [rad/s]; `reactions` are the reactions at
+        constant speed [N]."""
 
 
 def wrench_at(m: Moving, pin: str, force: Vec2) -> Wrench:
@@ -95,10 +96,10 @@ class Weight(NamedTuple):
 
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Any) -> Effect:
         """See `Acting`."""
-        held, energy = 0.0, 0.0
+        moment, energy = 0.0, 0.0
         for body in m.bodies.values():
-            held, energy = held + body.m * body.c.p1.y, energy + body.m * body.c.p.y
-        return Effect(held=held * self.g, energy=energy * self.g, field=self.g)
+            moment, energy = moment + body.m * body.c.p1.y, energy + body.m * body.c.p.y
+        return Effect(conservative=moment * self.g, energy=energy * self.g, field=self.g)
 
 
 class Push(NamedTuple):
@@ -110,7 +111,9 @@ class Push(NamedTuple):
 
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Any) -> Effect:
         """See `Acting`."""
-        return Effect((wrench_at(m, self.point, self.force),), lost=-self.force.dot(m.pins[self.point].p1))
+        return Effect(
+            (wrench_at(m, self.point, self.force),), dissipative=-self.force.dot(m.pins[self.point].p1)
+        )
 
 
 class Resistance(NamedTuple):
@@ -122,7 +125,7 @@ class Resistance(NamedTuple):
     by_reactions: bool = False
 
     def per_speed(self, xp: Any, v2: Any) -> Any:
-        """The force by the speed of the point, where that is `v2` squared [N s/m]."""
+        """The force over the speed of the point [N s/m]; `v2` is the squared speed."""
         return self.force / xp.sqrt(v2 + self.law.v_smooth * self.law.v_smooth)
 
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Any) -> Effect:
@@ -130,11 +133,12 @@ class Resistance(NamedTuple):
         p1 = m.pins[self.point].p1
         v2 = p1.squared()
         per = self.per_speed(xp, v2 * (w * w)) * w
-        return Effect((wrench_at(m, self.point, p1 * (-per)),), lost=v2 * per)
+        return Effect((wrench_at(m, self.point, p1 * (-per)),), dissipative=v2 * per)
 
 
 class Brake(NamedTuple):
-    """A torque on a link against its rotation in the frame [N m], smoothed below the speed `w_smooth` of its law."""
+    """A torque on a link against its rotation relative to the frame [N m], smoothed below the speed `w_smooth` of its
+    law."""
 
     link: str
     torque: Any
@@ -146,16 +150,16 @@ class Brake(NamedTuple):
         k, small = m.links[self.link].t1, self.law.w_smooth
         turning = k * w
         moment = self.torque * turning / xp.sqrt(turning * turning + small * small)
-        return Effect((Wrench(self.link, ZERO, -moment),), lost=k * moment)
+        return Effect((Wrench(self.link, ZERO, -moment),), dissipative=k * moment)
 
 
-def _engaged(xp: Any, x: Any) -> Any:
+def _smooth_step(xp: Any, x: Any) -> Any:
     """A step from 0 to 1 about x = 0, over about two units."""
     return 0.5 * (1.0 + x / xp.sqrt(1.0 + x * x))
 
 
 class Cut(NamedTuple):
-    """The resistance of a stack to a point on its way down in it [N], against the motion."""
+    """The resistance of a stack to a point that moves down in it [N]; it acts against the motion."""
 
     point: str
     force: Any
@@ -166,19 +170,19 @@ class Cut(NamedTuple):
         """See `Acting`."""
         k, stack = m.pins[self.point], self.stack
         small2 = stack.v_smooth * stack.v_smooth
-        inside = _engaged(xp, (stack.top - k.p.y) / stack.edge) * _engaged(
+        inside = _smooth_step(xp, (stack.top - k.p.y) / stack.edge) * _smooth_step(
             xp, (k.p.y - stack.table) / stack.edge
         )
         down = k.p1.y * w
         falling = 0.5 * (1.0 - down / xp.sqrt(down * down + small2))
         v2 = k.p1.squared()
         per = self.force * inside * falling / xp.sqrt(v2 * (w * w) + small2) * w
-        return Effect((wrench_at(m, self.point, k.p1 * (-per)),), lost=v2 * per)
+        return Effect((wrench_at(m, self.point, k.p1 * (-per)),), dissipative=v2 * per)
 
 
 class Block(NamedTuple):
-    """The obstacle of a link, a spring and a damper; the link's angle counts from the downward vertical and never
-    reaches the horizontal."""
+    """A stop against the rotation of a link: a spring and a damper. The angle of the link counts from the downward
+    vertical and never reaches the horizontal."""
 
     link: str
     stop: Any
@@ -187,23 +191,23 @@ class Block(NamedTuple):
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Any) -> Effect:
         """See `Acting`."""
         link, stop = m.links[self.link], self.stop
-        k, turned = link.t1, xp.asin(link.u.x) - stop.psi
-        held, damped = stop.stiffness * turned, stop.damping * k * w
+        k, twist = link.t1, xp.asin(link.u.x) - stop.psi
+        spring, damper = stop.stiffness * twist, stop.damping * k * w
         return Effect(
-            (Wrench(self.link, ZERO, -(held + damped)),),
-            held=held * k,
-            lost=damped * k,
-            energy=0.5 * held * turned,
+            (Wrench(self.link, ZERO, -(spring + damper)),),
+            conservative=spring * k,
+            dissipative=damper * k,
+            energy=0.5 * spring * twist,
         )
 
 
 class PinLosses(NamedTuple):
-    """Losses in all pins: Coulomb friction that the reaction sets, smoothed near rest, and viscous damping
-    [N m s/rad] of each.
+    """Losses in all pins: Coulomb friction in proportion to the reaction, smoothed near rest, and viscous damping
+    [N m s/rad] of each pin.
 
     A pin with the relative speed Dw and the reaction R dissipates friction * diameter/2 * |R| * Dw^2/sqrt(Dw^2 +
-    w_smooth^2) + damping * Dw^2. Friction is left out of the reactions: it is small, and with it the torque would no
-    longer be linear in the acceleration.
+    w_smooth^2) + damping * Dw^2. The reactions do not include the friction: it is small, and with it the torque would
+    no longer be linear in the acceleration.
     """
 
     pin: Any
@@ -212,12 +216,12 @@ class PinLosses(NamedTuple):
 
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Mapping[Joint, Vec2]) -> Effect:
         """See `Acting`."""
-        per_newton, smooth2, w2, lost = *self._law(), w * w, 0.0
+        per_newton, smooth2, w2, loss = *self._law(), w * w, 0.0
         turns, damping = m.turns, self.damping
         for joint, force in reactions.items():
-            k2, _, rubbed = _rubbed(xp, force, turns[joint], w2, smooth2)
-            lost = lost + k2 * (per_newton * rubbed + damping)
-        return Effect(lost=lost * w)
+            k2, _, ratio = _friction_terms(xp, force, turns[joint], w2, smooth2)
+            loss = loss + k2 * (per_newton * ratio + damping)
+        return Effect(dissipative=loss * w)
 
     def slope(
         self,
@@ -228,29 +232,29 @@ class PinLosses(NamedTuple):
         growing: Mapping[Joint, Vec2],
         turning: Mapping[Joint, Any] | None,
     ) -> Any:
-        """The slope of the lost torque in the direction in which the reactions grow and the relative rotations
-        change; without these by the speed."""
+        """The slope of the dissipative torque in the direction in which the reactions change by `growing` and the
+        relative rotations by `turning`; where `turning` is None, the slope by the speed."""
         per_newton, smooth2, w2, rest, slope = *self._law(), w * w, 0.0, 0.0
         for joint, force in reactions.items():
             k = m.turns[joint]
-            k2, minus_per, rubbed = _rubbed(xp, force, k, w2, smooth2)
-            # of rubbed^2 = |R|^2/(k^2 w^2 + smooth^2)
+            k2, minus_per, ratio = _friction_terms(xp, force, k, w2, smooth2)
+            # from ratio^2 = |R|^2/(k^2 w^2 + smooth^2)
             wider = k2 * w if turning is None else k * turning[joint] * w2
-            grows = (rubbed * rubbed * wider - force.dot(growing[joint])) * (minus_per / rubbed)
+            grows = (ratio * ratio * wider - force.dot(growing[joint])) * (minus_per / ratio)
             slope = slope + k2 * (per_newton * grows)
-            taken = per_newton * rubbed + self.damping
-            rest = rest + (k2 * taken if turning is None else 2.0 * (k * turning[joint]) * taken)
+            per_speed = per_newton * ratio + self.damping
+            rest = rest + (k2 * per_speed if turning is None else 2.0 * (k * turning[joint]) * per_speed)
         return slope * w + (rest if turning is None else rest * w)
 
     def _law(self) -> tuple[Any, Any]:
-        """Moment by force, and the square of the speed that smooths."""
+        """The friction moment per reaction [m], and the square of the smoothing speed [rad2/s2]."""
         pin = self.pin
         return 0.5 * pin.friction * pin.diameter, pin.w_smooth * pin.w_smooth
 
 
-def _rubbed(xp: Any, force: Vec2, turn: Any, w2: Any, smooth2: Any) -> tuple[Any, Any, Any]:
-    """The square of the relative rotation, -1/(k^2 w^2 + smooth^2), and |R| by the root of that, which has a slope at
-    zero, too; one root of the ratio of squares is cheaper than two."""
+def _friction_terms(xp: Any, force: Vec2, turn: Any, w2: Any, smooth2: Any) -> tuple[Any, Any, Any]:
+    """The square of the relative rotation k, -1/(k^2 w^2 + smooth^2), and the ratio |R|/sqrt(k^2 w^2 + smooth^2),
+    which has a slope at zero, too. One root of the ratio of the squares is cheaper than two roots."""
     k2 = turn * turn
     minus_per = -1.0 / (k2 * w2 + smooth2)
     return k2, minus_per, xp.sqrt(_TINY - (force.x * force.x + force.y * force.y) * minus_per)

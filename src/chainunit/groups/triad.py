@@ -1,24 +1,25 @@
 """The triad (class III Assur group, order 3): a ternary link C-D-E on three binary links, the legs.
 
-The outer pins P move in a known way; each leg keeps the distance `l` between its P and its pin on the ternary link.
-The pose of the ternary link is (x, y, theta): its origin and the direction of its own x axis; a pin that lies at
-`arm` in its own frame stands at (x, y) + R(theta) arm. With r = pin - P and A = R(theta) arm, each leg gives a row
+The motion of the outer pins P is known; each leg keeps the distance `l` between its P and its pin on the ternary
+link. The pose of the ternary link is (x, y, theta): its origin and the direction of its own x axis. A pin at `arm` in
+the frame of the ternary link stands at (x, y) + R(theta) arm. With r = pin - P and A = R(theta) arm, each leg gives a
+row
 
-    (r.x, r.y, A x r)
+    (r.x, r.y, A x r).
 
-and all that is solved here - Newton's correction, first and second derivative of the pose, the pull of the legs - has
-the matrix of these three rows, whose determinant vanishes where the lines of the legs meet in one point or are
-parallel: the dead positions of a triad, and nothing else. Nothing is lost where C, D and E lie on one line; the
-three moment equations about them that paper 003 solves are singular there.
+The matrix of these three rows is that of every linear system here: Newton's correction, the first and second
+derivative of the pose, the pull of the legs. Its determinant vanishes where the lines of the legs meet in one point
+or are parallel: these are the dead positions of a triad, and there are no others. Where C, D and E lie on one line,
+this matrix is regular; the three moment equations about C, D and E, which paper 003 solves, are singular there.
 
-There is no closed form for the pose: up to six assembly modes are the real roots of a polynomial (`assembly_modes`),
-and a mode is followed from one position to the next by `corrected`.
+There is no closed form for the pose. Up to six assembly modes are the real roots of a polynomial (`assembly_modes`),
+and `correct_pose` follows a mode from one position to the next.
 
-In a linkage with one crank the pose is a smooth periodic function of the crank angle: it is followed once around,
-from the mode that `Triad.assembly` leads to at q = 0, and kept as a Fourier series (`Triad.derive`). At any angle the
+In a linkage with one crank the pose is a smooth periodic function of the crank angle. `Triad.derive` follows it once
+around, from the mode to which `Triad.assembly` leads at q = 0, and keeps it as a Fourier series. At any angle the
 series gives a pose that is nearly right, and Newton's method makes it exact. So the pose depends on the crank angle
-alone, independent of the step and the history; the branch cannot jump, and parameters with which it ends within the
-turn are refused (`requirements`).
+alone, independent of the step and the history. The branch cannot jump; `requirements` refuses parameters with which
+the branch ends within the turn.
 """
 
 from __future__ import annotations
@@ -35,15 +36,15 @@ from .group import Group, SolvedGroup, Third
 
 LEGS = 3
 SAMPLES = 20
-"""Angles of the crank at which a triad is followed once around."""
+"""Number of crank angles at which a triad is followed once around."""
 HARMONICS = 8
-"""Of the series of its pose."""
+"""Number of harmonics in the series of the pose."""
 _STEPS = 3
-"""Of Newton's method from the series: an error of 1e-3, as of a pose that moves sharply, is gone after three."""
+"""Steps of Newton's method from the series: three remove an error of 1e-3, as of a pose that moves sharply."""
 
 
 class Pose(NamedTuple):
-    """Where the ternary link is: its origin [m] and the angle of its x axis, counter-clockwise [rad]."""
+    """The pose of the ternary link: its origin [m] and the angle of its x axis, counter-clockwise [rad]."""
 
     x: Any
     y: Any
@@ -51,7 +52,7 @@ class Pose(NamedTuple):
 
 
 class _Rows:
-    """The three rows (r.x, r.y, A x r) at a pose, and what solves with them."""
+    """The three rows (r.x, r.y, A x r) at a pose, and the solution of linear systems with them."""
 
     __slots__ = ("arms", "cofactors", "det", "minus_per_det", "r")
 
@@ -65,7 +66,7 @@ class _Rows:
 
     @classmethod
     def at(cls, xp: Any, pins: Sequence[Vec2], arms: Sequence[Vec2], pose: Pose) -> _Rows:
-        """The rows of the arms as they lie in the ternary link, at its pose."""
+        """The rows at a pose; `arms` are given in the frame of the ternary link [m]."""
         c, s = xp.cos(pose.theta), xp.sin(pose.theta)
         origin = Vec2(pose.x, pose.y)
         arms_now = tuple(Vec2(c * a.x - s * a.y, s * a.x + c * a.y) for a in arms)
@@ -94,11 +95,11 @@ def _dot(a: tuple[Any, Any, Any], b: tuple[Any, Any, Any]) -> Any:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def corrected(
+def correct_pose(
     xp: Any, pins: Sequence[Vec2], lengths: Sequence[Any], arms: Sequence[Vec2], near: Pose, steps: int
 ) -> Pose:
     """The pose after `steps` of Newton's method from `near`. From a pose that is nearly right each step doubles the
-    number of right digits, and the order to which derivatives by what the pins depend on are right."""
+    number of right digits. It also doubles the order up to which the derivatives of the pose are right."""
     pose = near
     for _ in range(steps):
         rows = _Rows.at(xp, pins, arms, pose)
@@ -110,9 +111,9 @@ def corrected(
 
 @dataclass
 class Triad(Group):
-    """A triad as data: the ternary link with its body, three legs whose pins move in a known way, the pins of the
-    ternary link in its own frame [m], each with its leg, further points on it, and the pose from which Newton's
-    method leads to the mode of assembly at crank angle 0."""
+    """A triad as data: the ternary link with its `mass`, three legs, which start from pins of known motion, the pins
+    of the ternary link in its own frame (`arms` [m], in the order of the legs), further points on it, and the pose
+    `assembly`, from which Newton's method leads to the assembly mode at crank angle 0."""
 
     name: str
     mass: Mass
@@ -122,7 +123,7 @@ class Triad(Group):
     assembly: Pose
 
     derived: ClassVar[int] = 3 * (2 * HARMONICS + 1) + 2
-    """Numbers that follow from the lengths: the series of the pose, the largest misfit, the least margin."""
+    """The number of values that `derive` gives: the series of the pose, the largest misfit, the least margin."""
 
     @property
     def bars(self) -> tuple[Bar, ...]:
@@ -131,12 +132,12 @@ class Triad(Group):
 
     @property
     def pins(self) -> dict[str, str]:
-        """Pins that it adds, each with the link that carries it."""
+        """The pins that the triad adds, each with the link that carries it."""
         return dict.fromkeys(self.arms, self.name)
 
     @property
     def joints(self) -> tuple[tuple[str, str], ...]:
-        """Pin and link of each reaction, as `SolvedTriad.reactions` gives them."""
+        """Pin and link of each reaction, in the order of `SolvedTriad.reactions`."""
         outer = ((leg.pin, leg.name) for leg in self.legs)
         return *outer, *((pin, leg.name) for pin, leg in zip(self.arms, self.legs, strict=True))
 
@@ -148,14 +149,14 @@ class Triad(Group):
         return tuple(pins[leg.pin] for leg in self.legs)
 
     def solve(self, xp: Any, q: Any, pins: Mapping[str, Motion], derived: Sequence[Any]) -> SolvedTriad:
-        """The triad where its outer `pins` are, on the branch that the series `derived` gives."""
+        """The triad at the position of its outer `pins`, on the branch of the series `derived`."""
         outer, arms = self.outer(pins), tuple(self.arms.values())
         near = pose_of_series(derived, xp.cos(q), xp.sin(q))
-        pose = corrected(xp, [pin.p for pin in outer], self._lengths(), arms, near, _STEPS)
+        pose = correct_pose(xp, [pin.p for pin in outer], self._lengths(), arms, near, _STEPS)
         return SolvedTriad.at(xp, outer, self._lengths(), arms, pose)
 
     def modes(self, pins: Mapping[str, Motion]) -> list[Pose]:
-        """All poses in which it can be assembled where its outer `pins` are."""
+        """All poses in which the triad can be assembled at the position of its outer `pins`."""
         return assembly_modes(
             tuple(pin.p for pin in self.outer(pins)), self._lengths(), tuple(self.arms.values())
         )
@@ -167,7 +168,7 @@ class Triad(Group):
         lengths, arms = self._lengths(), tuple(self.arms.values())
 
         def pose(q: float, near: Pose, steps: int = _STEPS) -> Pose:
-            return corrected(xp, [pin.p for pin in self.outer(pins(q))], lengths, arms, near, steps)
+            return correct_pose(xp, [pin.p for pin in self.outer(pins(q))], lengths, arms, near, steps)
 
         poses = [pose(0.0, self.assembly, 8)]
         for q in angles[1:]:
@@ -183,7 +184,7 @@ class Triad(Group):
                     series.append(
                         sum(v * (2.0 / SAMPLES * wave(n * q)) for v, q in zip(values, angles, strict=True))
                     )
-        # as in a run, halfway between the angles
+        # the misfit as in a run, at angles halfway between the samples
         misfit, first, least = 0.0, None, None
         for q in angles:
             middle = q + math.pi / SAMPLES
@@ -192,7 +193,7 @@ class Triad(Group):
             for pin, o, l in zip(triad.pins, self.outer(at), lengths, strict=True):
                 off = xp.abs(xp.sqrt((pin.p - o.p).squared()) / l - 1.0)
                 misfit = xp.maximum(misfit, xp.minimum(off, 1.0))
-            # the sign of the first: a margin that changes sign has passed a dead position
+            # relative to the sign of the first margin: a margin that changes sign has passed a dead position
             first = triad.margin if first is None else first
             margin = triad.margin * first / xp.abs(first)
             least = margin if least is None else xp.minimum(least, margin)
@@ -212,8 +213,8 @@ def pose_of_series(series: Sequence[Any], cos: Any, sin: Any) -> Pose:
 
 
 def requirements(legs: tuple[str, ...], assembly: tuple[str, ...]) -> tuple[Requirement, Requirement]:
-    """That a triad closes all the way round, clear of its dead positions: with the names of the parameters that are
-    the lengths of its legs and its pose of assembly."""
+    """The requirements that a triad closes over the whole turn, clear of its dead positions; `legs` and `assembly`
+    are the names of the parameters for the lengths of the legs and the pose of assembly."""
     return (
         Requirement(
             "largest misfit of a leg over the turn of the crank, in parts of its length",
@@ -239,8 +240,8 @@ def limits(derived: Sequence[Any]) -> Iterator[tuple[Any, Any, Any]]:
 
 
 class SolvedTriad(SolvedGroup):
-    """A solved triad: its `links`, the legs from their outer pins and then the ternary link (origin and x axis of
-    its frame), its `pins` in the order of the legs, and its `margin`, the determinant over the lengths of the legs
+    """A solved triad. Its `links` are the legs from their outer pins and then the ternary link (origin and x axis of
+    its frame); its `pins` are in the order of the legs; its `margin` is the determinant over the lengths of the legs
     and the size of the ternary link: 0 is a dead position."""
 
     __slots__ = ("_per_square", "_rows")
@@ -267,7 +268,7 @@ class SolvedTriad(SolvedGroup):
         outer : motion of the outer pins of the three legs
         lengths : of the legs [m]
         arms : pins on the ternary link, in its own frame [m]
-        pose : where it is, see `corrected`
+        pose : pose of the ternary link, see `correct_pose`
         """
         rows = _Rows.at(xp, [p.p for p in outer], arms, pose)
         x1, y1, t1 = rows.solve(tuple(r.dot(p.p1) for r, p in zip(rows.r, outer, strict=True)))
@@ -297,11 +298,11 @@ class SolvedTriad(SolvedGroup):
         """See `SolvedGroup`."""
         (*legs, ternary), rows = self.links, self._rows
         t1, t2 = ternary.t1, ternary.t2
-        spin, mixed = t1 * t1 * t1, 3.0 * (t1 * t2)
+        spin, mixed_term = t1 * t1 * t1, 3.0 * (t1 * t2)
         b = []
         for r, a, k, leg, p in zip(rows.r, rows.arms, self.pins, legs, outer, strict=True):
             centripetal = 3.0 * (k.p1 - leg.pin.p1).dot(k.p2 - leg.pin.p2)
-            b.append(r.dot(p + a.turned() * spin + a * mixed) - centripetal)
+            b.append(r.dot(p + a.turned() * spin + a * mixed_term) - centripetal)
         x, y, t3 = rows.solve(tuple(b))
         origin = Vec2(x, y)
         pins = [ternary.third(a, origin, t3) for a in rows.arms]
@@ -311,11 +312,11 @@ class SolvedTriad(SolvedGroup):
         return [*thirds, (origin, t3)], pins
 
     def reactions(self, loads: Sequence[Load]) -> tuple[Vec2, ...]:
-        """Forces on the legs at their outer pins, then at the ternary link [N], from the loads on each leg, as force
-        and moment about its outer pin, and on the ternary link, about its origin.
+        """Forces on the legs at their outer pins, then at the ternary link [N].
 
-        The moment about its outer pin gives the part of the force across each leg; the pulls along the legs follow
-        from two forces and one moment on the ternary link.
+        The loads are force and moment: of each leg about its outer pin, of the ternary link about its origin. The
+        moment about the outer pin of a leg gives the part of the force across this leg; the pulls along the legs
+        follow from the balance of two forces and one moment on the ternary link.
         """
         *legs, (force, moment) = loads
         across = []
@@ -331,12 +332,13 @@ class SolvedTriad(SolvedGroup):
 def assembly_modes(pins: tuple[Vec2, ...], lengths: tuple[float, ...], arms: tuple[Vec2, ...]) -> list[Pose]:
     """All poses in which the triad closes, by rising angle in (-pi, pi]; at most six.
 
-    Two pins of the ternary link in one place make two dyads of it, which are not looked for here.
+    A triad with two pins of the ternary link in one place is a pair of dyads; this function does not search for their
+    poses.
 
     With D the second pin, d = D - P2, u = (E - P3) - d and v = (C - P1) - d, the differences of the three equations
-    of length are linear in d; put into the second, they leave a trigonometric polynomial of third order in theta. Its
-    coefficients come from seven samples, its roots z = exp(i theta) are eigenvalues of a companion matrix, and each
-    real one is polished by Newton's method on the three lengths.
+    of length are linear in d. Their solution, put into the second equation, leaves a trigonometric polynomial of
+    third order in theta. Its coefficients come from seven samples, and its roots z = exp(i theta) are eigenvalues of
+    a companion matrix. Newton's method on the three lengths polishes each real root.
     """
     import numpy as np
 
@@ -367,8 +369,8 @@ def assembly_modes(pins: tuple[Vec2, ...], lengths: tuple[float, ...], arms: tup
             continue
         theta = float(np.angle(z))
         u, v, a, b = parts(theta)
-        # D lies on the circle about P2 and on the line d . u = a, and on d . v = b, which is the same line where u
-        # and v are parallel, as of parallel hangers: both ends of the chord are tried
+        # D lies on the circle about P2 and on the lines d . u = a and d . v = b; these two are one line where u and v
+        # are parallel, as with parallel hangers, so that both ends of the chord are tried
         across, at = (u, a) if u.squared() > v.squared() else (v, b)
         if not across.squared() > 0.0:
             continue
@@ -380,7 +382,7 @@ def assembly_modes(pins: tuple[Vec2, ...], lengths: tuple[float, ...], arms: tup
             start = p2 + d - arm
             try:
                 near = Pose(float(start.x), float(start.y), theta)
-                pose = corrected(MATH, pins, lengths, arms, near, 20)
+                pose = correct_pose(MATH, pins, lengths, arms, near, 20)
                 rows = _Rows.at(MATH, pins, arms, pose)
             except (ArithmeticError, ValueError):
                 continue

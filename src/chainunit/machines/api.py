@@ -137,7 +137,7 @@ class ChainUnitMachine(Machine):
     ) -> Any:
         """The part of `tau` that pin friction and joint damping take [N m]."""
         state = self.state(self._inputs(phi, w, 0.0, left, right, stop))
-        return state.effects["pins"].lost / self.p.ratio
+        return state.effects["pins"].dissipative / self.p.ratio
 
     def energy_per_kg(self, side: str, phi: Any, w: Any) -> Any:
         """Kinetic and potential energy of a kilogram of material on the `side` ("left" or "right") [J/kg]:

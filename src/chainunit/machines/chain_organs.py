@@ -212,10 +212,10 @@ class Organs:
         """The drive at the crank angle `q` with the chains in these states."""
         return Mechanism(xp, self.linkage(p, u, states), q)
 
-    def held(self, xp: Any, m: Mechanism, w: Any) -> Iterator[HeldChain]:
+    def hold(self, xp: Any, m: Mechanism, w: Any) -> Iterator[HeldChain]:
         """Both chains of the drive."""
         for side in SIDES:
-            yield m.linkage.loads[side].held(xp, m, w)
+            yield m.linkage.loads[side].hold(xp, m, w)
 
     def _shares(self, p: Any) -> list[Any]:
         """How a kilogram of material lies on the rods."""
@@ -241,7 +241,7 @@ class Organs:
             wall_pull=functools.reduce(xp.minimum, least[:walls]),
             slack_share=sum(slack) * (1.0 / self.number),
             fold_largest=_largest_fold(xp, theta),
-            drift=h.missing.length(xp),
+            drift=h.gap.length(xp),
             kinetic_energy=kinetic,
             potential_energy=potential,
             energy_residual=kinetic + potential - due,
@@ -266,7 +266,7 @@ class Organs:
         fields = running(s, a)
         fields["kinetic_energy"] += left.kinetic_energy + right.kinetic_energy
         fields["potential_energy"] += left.potential_energy + right.potential_energy
-        fields["dissipated_power"] += sum(h.lost() for h in chains)
+        fields["dissipated_power"] += sum(h.lost_power() for h in chains)
         if self.number == LEAST:
             for h in chains:
                 (wall, web), _ = h.data.state
@@ -284,7 +284,7 @@ class Organs:
         m = self.mechanism(xp, p, u, self.split(x), q)
         values: list[Any] = []
         for side in SIDES:
-            theta, omega, work = m.linkage.loads[side].closed(xp, m, w)
+            theta, omega, work = m.linkage.loads[side].close(xp, m, w)
             values += [*theta, *omega, getattr(x, side).energy_due + work]
         return values
 
@@ -330,10 +330,10 @@ class Organs:
             states = [self._given(rods_start, *each) for each in zip(SIDES, states, strict=True)]
         m = self.mechanism(xp, p, u, states, q)
         # once: of a chain that was not found to hang it leaves a gap, see `start_limits`
-        states = [m.linkage.loads[side].closed(xp, m, w)[:2] for side in SIDES]
+        states = [m.linkage.loads[side].close(xp, m, w)[:2] for side in SIDES]
         m = self.mechanism(xp, p, u, states, q)
         sides: dict[str, Any] = {}
-        for side, (theta, omega), h in zip(SIDES, states, self.held(xp, m, w), strict=True):
+        for side, (theta, omega), h in zip(SIDES, states, self.hold(xp, m, w), strict=True):
             kinetic, potential, _ = h.energies(xp, self._shares(p))
             sides[side] = self._layout.instance([*theta, *omega, kinetic + potential])
         return sides
@@ -351,8 +351,8 @@ class Organs:
     def start_limits(self, xp: Any, p: Any, u: Any, x: Any, q: Any) -> Iterator[tuple[Any, Any, Any]]:
         """Of each side: the chain ends at A2, and where it is to hang at rest no stop between rods is met."""
         moving = p.rods_start.given if hasattr(p, "rods_start") else 0.0
-        for h in self.held(xp, self.mechanism(xp, p, u, self.split(x), q), 0.0):
-            yield h.missing.length(xp), -math.inf, _CLOSED
+        for h in self.hold(xp, self.mechanism(xp, p, u, self.split(x), q), 0.0):
+            yield h.gap.length(xp), -math.inf, _CLOSED
             yield _largest_fold(xp, h.data.state[0]), -math.inf, p.organ.fold_limit + _ANY_FOLD * moving
 
 

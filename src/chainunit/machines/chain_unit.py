@@ -364,7 +364,7 @@ def on_drive(
             at_frame = at_frame + f
             moment = moment + s.m.pins[pin].p.cross(f)
     (stop,) = s.effects["stop"].wrenches
-    friction = s.effects["pins"].lost
+    friction = s.effects["pins"].dissipative
     a_to_c = s.m.pins["A"].p
     return {
         **{name: force(reactions[joint]) for name, joint in ON_DRIVE.items()},

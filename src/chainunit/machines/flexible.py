@@ -243,7 +243,7 @@ def _flexible(walls: int, webs: int) -> type[InverseMachine]:
             """Time derivatives of the states, in declared order."""
             q, w = cls.at_crank(p, u, x)
             m = chains.mechanism(xp, p, u, chains.split(x), q)
-            return [v for h in chains.held(xp, m, w) for v in h.rates(u.a / p.ratio, CLOSING)]
+            return [v for h in chains.hold(xp, m, w) for v in h.rates(u.a / p.ratio, CLOSING)]
 
     return ChainUnitFlexible
 

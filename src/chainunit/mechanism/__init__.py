@@ -1,1 +1,2 @@
-"""A mechanism as data, and the two models of it: motion in and torque out, torque in and motion out."""
+"""A mechanism as data, and its two models: the inverse one (motion in, torque out) and the direct one (torque in,
+motion out)."""

@@ -1,14 +1,12 @@
-"""A linkage with chains, which have states of their own: slopes of its load port are taken along the motion.
+"""A linkage with chains, which have states of their own: the slopes of its load port are taken along the motion.
 
-With a rate of change D at the present speed and a = 0,
+Let D be the rate of change in time at the present speed and a = 0. Then, at the crank,
 
-    tau_bias_dphi = D tau_bias w^3/(w^4 + W_SMALL^4),   dJ_dphi likewise (at the crank),
+    tau_bias_dphi = D tau_bias w^3/(w^4 + W_SMALL^4),   dJ_dphi likewise,
 
-which is the plain derivative by the angle for two rods, and
+which is the plain derivative by the angle for two rods. As the rods follow a change of the speed,
 
-    tau_bias_dw = d tau_bias/d w + (d tau_bias/d omega) . (d alpha/d a),
-
-as the rods follow a change of the speed.
+    tau_bias_dw = d tau_bias/d w + (d tau_bias/d omega) . (d alpha/d a).
 """
 
 from __future__ import annotations
@@ -43,12 +41,12 @@ class ChainedState(MachineState):
 
     @property
     def kinetic_energy(self) -> Any:
-        """Of the bodies, without the chains [J]."""
+        """Kinetic energy of the bodies, without the chains [J]."""
         bodies = self.J - sum(chain.inertia() for chain in self.chains.values())
         return 0.5 * bodies * (self.w * self.w)
 
     def _moving(self, rates: Mapping[str, tuple[Sequence[Any] | None, Sequence[Any]]]) -> dict[str, Any]:
-        """The loads with chains whose angles (None: they stand) and speeds change at these rates."""
+        """The loads, with chains whose angles and speeds change at these rates; None for the angles: they stay."""
         loads = dict(self._loads)
         for name, (turning, faster) in rates.items():
             theta, omega = loads[name].state
@@ -75,8 +73,8 @@ class ChainedState(MachineState):
             along = MachineState(engine, Mechanism(engine, self.m.linkage, Dual(self.m.q, w)), w, moving)
             by_a = {}
             for name, chain in self.chains.items():
-                pushed, _ = chain.at(1.0)
-                by_a[name] = None, [one - rate for one, rate in zip(pushed, rates[name], strict=True)]
+                at_one, _ = chain.at(1.0)
+                by_a[name] = None, [one - rate for one, rate in zip(at_one, rates[name], strict=True)]
             quicker = MachineState(engine, self.m, Dual(w, 1.0), self._moving(by_a))
             w2 = w * w
             share = w * w2 / (w2 * w2 + W_SMALL * W_SMALL * W_SMALL * W_SMALL)

@@ -1,8 +1,8 @@
 """A linkage as data: ground pins, a crank, Assur groups in order, bodies and points on links, loads by name.
 
-Pins and links have names; each group hangs on pins that are there before it. A joint is named by its pin and the link
-on which its reaction acts, as several links may meet in one pin. Reactions, points to draw and the ways of forces
-follow from the description.
+Pins and links have names; each group hangs on pins of the ground and of earlier groups. Several links may meet in one
+pin, so that a joint has two names: its pin, and the link on which its reaction acts. The reactions, the points to
+draw and the paths of the forces follow from these data.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from ..planar import Vec2
 
 
 class Connections(NamedTuple):
-    """How a group hangs in its linkage: names of its links, of the pins that it adds, of the pins that its bars start
-    from, and its joints: each with the link on which the opposite reaction acts, None for the ground, and again that
-    link where it stands before the group."""
+    """How a group hangs in its linkage: the names of its links, of the pins that it adds, and of the `outer` pins,
+    from which its bars start. Each of its `joints` has two further entries: the link on which the opposite reaction
+    acts (None for the ground), and the same link if it belongs to an earlier group (else None)."""
 
     links: tuple[str, ...]
     pins: tuple[str, ...]
@@ -43,7 +43,7 @@ class Topology(NamedTuple):
 
     @property
     def links(self) -> dict[str, tuple[str, ...]]:
-        """The pins and points on each link, as it is drawn; those that it starts from first."""
+        """The pins and points on each link, to draw it; the pin that the link starts from stands first."""
         pins: dict[str, dict[str, None]] = {link: {} for group in self.groups for link in group.links}
         for pin, link in (*self.joints, *self.carries.items()):
             pins[link][pin] = None
@@ -52,8 +52,8 @@ class Topology(NamedTuple):
 
 @dataclass
 class Linkage:
-    """A mechanism with one crank. Places in the frame [m], others in the frame of their link; loads as
-    `chainunit.groups.loads.Acting` describes them."""
+    """A mechanism with one crank. The `ground` pins have places in the frame [m], other pins and points have places
+    in the frame of their link. The loads, by name, follow the protocol `chainunit.groups.loads.Acting`."""
 
     ground: Mapping[str, Vec2]
     crank: Crank
@@ -62,7 +62,7 @@ class Linkage:
 
     @property
     def topology(self) -> Topology:
-        """Its names; they depend on no value."""
+        """The names of the linkage; they depend on no value."""
         carries: dict[str, str] = {}
         groups, points = [], {}
         for group in (self.crank, *self.groups):
@@ -81,9 +81,9 @@ class Linkage:
 
     @property
     def derived(self) -> int:
-        """How many numbers follow from the lengths once, before a run."""
+        """The number of values that the groups derive from the lengths, once before a run."""
         return sum(group.derived for group in self.groups)
 
     def before(self, group: int) -> Linkage:
-        """The linkage without that group and those behind it."""
+        """The linkage without the group of this index and all later ones, and without loads."""
         return replace(self, groups=self.groups[:group], loads={})

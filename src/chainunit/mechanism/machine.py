@@ -5,9 +5,9 @@ point load on the link that carries its pin. All reactions are
 
     R = R0(q) + R1(q) a + R2(q) w^2 + loads,
 
-so that one pass gives them at constant speed, one by the acceleration, and one, with the slopes of the loads, by the
-speed. By the angle the passes run in dual numbers whose parts are known from the motion; the third derivatives alone
-are new.
+so that one pass gives them at constant speed and one pass their derivatives by the acceleration. A third pass, with
+the slopes of the loads, gives the derivatives by the speed. The derivatives by the angle need dual numbers; their
+parts are known from the motion, except for the third derivatives.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from ..engines import Dual, dual, slope
-from ..groups.body import UNLOADED, Body, Load, body_on, reflected
+from ..groups.body import NO_LOAD, Body, Load, body_on, reflected_inertia
 from ..groups.group import SolvedGroup, Third
 from ..groups.loads import Effect, Joint, Moving, Wrench
 from ..planar import ZERO, Link, Motion, Vec2, growth
@@ -25,8 +25,8 @@ from .linkage import Connections, Linkage, Topology
 
 
 class Mechanism:
-    """The links of a linkage at crank angle `q` [rad]: `links`, `pins` with points, and `bodies` by name; `turns` the
-    relative rotation in each joint per rotation of the crank."""
+    """A linkage at crank angle `q` [rad]: its `links`, its `pins` and points, and its `bodies` by name; `turns` is
+    the relative rotation in each joint per rotation of the crank."""
 
     __slots__ = ("_groups", "bodies", "linkage", "links", "pins", "q", "topology", "turns")
 
@@ -38,7 +38,7 @@ class Mechanism:
         ----------
         xp : engine (see `chainunit.engines`)
         derived : numbers that the groups derive from the lengths, see `derived_numbers`
-        topology : that of the linkage, if it is known
+        topology : the topology of the linkage, if it is known
         """
         self.linkage, self.q = linkage, q
         self.topology = linkage.topology if topology is None else topology
@@ -80,7 +80,8 @@ class Mechanism:
         return thirds, pins
 
     def turning(self, reactions: Mapping[Joint, Vec2]) -> Iterator[Wrench]:
-        """The part of the reactions in the moments on the links as their arms turn with q."""
+        """The moments by which the present reactions enter the derivatives by q, as their arms turn with the
+        links."""
         for _, connections in self._groups:
             for joint, carrier, _ in connections.joints:
                 (pin, name), force = joint, reactions[joint]
@@ -104,39 +105,39 @@ class Mechanism:
         return slopes
 
     def margins(self) -> list[Any]:
-        """Of each group; 0 is a dead position."""
+        """The margin of each group; 0 is a dead position."""
         return [solved.margin for solved, _ in self._groups[1:]]
 
     def reactions(self, acting: Mapping[str, Load]) -> tuple[Any, dict[Joint, Vec2]]:
-        """The torque along the crank angle [N m] and the force in each joint on its link [N], from what acts on the
-        links, without friction: the force pass, independent of virtual work."""
+        """The torque along the crank angle [N m] and the force in each joint on its link [N], from the action on each
+        link, without friction: the force pass, independent of virtual work."""
         loads = dict(acting)
         reactions: dict[Joint, Vec2] = {}
         for solved, connections in reversed(self._groups):
-            forces = solved.reactions([loads.get(name, UNLOADED) for name in connections.links])
+            forces = solved.reactions([loads.get(name, NO_LOAD) for name in connections.links])
             for (joint, _, before), force in zip(connections.joints, forces, strict=True):
                 reactions[joint] = force
                 if before is not None:
-                    total, moment = loads.get(before, UNLOADED)
+                    total, moment = loads.get(before, NO_LOAD)
                     at, pin = self.pins[joint[0]].p, self.links[before].pin.p
                     loads[before] = (
                         total - force,
                         moment - (at.x - pin.x) * force.y + (at.y - pin.y) * force.x,
                     )
-        _, torque = loads.get(self.linkage.crank.bar.name, UNLOADED)
+        _, torque = loads.get(self.linkage.crank.bar.name, NO_LOAD)
         return torque, reactions
 
 
-def loaded(loads: dict[str, Load], wrenches: Iterable[Wrench]) -> dict[str, Load]:
-    """The action on each link by its name, with the wrenches of loads."""
+def add_wrenches(loads: dict[str, Load], wrenches: Iterable[Wrench]) -> dict[str, Load]:
+    """Add the wrenches to the action on each link, in place; the same dictionary is returned."""
     for link, force, moment in wrenches:
-        before, moment0 = loads.get(link, UNLOADED)
+        before, moment0 = loads.get(link, NO_LOAD)
         loads[link] = before + force, moment0 + moment
     return loads
 
 
 class _OnDemand(dict[str, Any]):
-    """Values that are made when they are first asked for: loads ask for few."""
+    """Values that are computed at their first use: loads use few of them."""
 
     def __init__(self, make: Callable[[str], Any]) -> None:
         super().__init__()
@@ -148,7 +149,7 @@ class _OnDemand(dict[str, Any]):
 
 
 class LiftedMechanism:
-    """A mechanism as loads see it, with its derivatives by q as dual parts."""
+    """A mechanism in the form that loads take (`Moving`), with its derivatives by q as dual parts."""
 
     __slots__ = ("_of", "bodies", "links", "pins", "turns")
 
@@ -156,7 +157,7 @@ class LiftedMechanism:
         """
         Parameters
         ----------
-        links, pins : their third derivatives, see `Mechanism.third`
+        links, pins : third derivatives of the links and pins, see `Mechanism.third`
         """
         self._of = m
         self.links: Mapping[str, Link] = _OnDemand(lambda name: m.links[name].lifted(*links[name]))
@@ -183,7 +184,8 @@ def derived_numbers(xp: Any, linkage: Linkage) -> list[Any]:
 
 class Steadiness:
     """A mechanism at constant crank speed `w`: the `effects` of the loads on links by name, the `reactions` in the
-    joints [N], the `torque` at the crank from these forces [N m], and the `losses` that the reactions set."""
+    joints [N], the `torque` at the crank from these forces [N m], and the `losses`: the effects of the loads that
+    depend on the reactions."""
 
     __slots__ = ("effects", "field", "losses", "reactions", "torque")
 
@@ -192,14 +194,14 @@ class Steadiness:
         self.effects = _effects(xp, m, w, loads)
         field = self.field = sum(effect.field for effect in self.effects.values())
         acting = {name: body.centrifugal(w2, field) for name, body in m.bodies.items()}
-        self.torque, self.reactions = m.reactions(loaded(acting, _wrenches(self.effects)))
+        self.torque, self.reactions = m.reactions(add_wrenches(acting, _wrenches(self.effects)))
         self.losses = _effects(xp, m, w, loads, self.reactions)
 
 
 def _effects(
     xp: Any, m: Moving, w: Any, loads: Mapping[str, Any], reactions: dict[Joint, Vec2] | None = None
 ) -> dict[str, Effect]:
-    """Effects of the loads that act on links; or, with the reactions, of those that follow from them."""
+    """Effects of the loads that act on links or, if the reactions are given, of the loads that depend on them."""
     late = reactions is not None
     return {
         name: load.effect(xp, m, w, reactions or {})
@@ -214,9 +216,9 @@ def _wrenches(effects: Mapping[str, Effect]) -> Iterator[Wrench]:
 
 
 class MachineState:
-    """A linkage at one crank angle and speed: the mechanism `m`, its inertia `J` [kg m2], `dJ` the derivative of the
-    bodies' part by the angle, the effect of each load by name, and the torque at constant speed `bias` [N m], by
-    virtual work."""
+    """A linkage at one crank angle and speed: the mechanism `m`, its inertia `J` [kg m2], the derivative `dJ` of the
+    bodies' part of it by the angle, the effect of each load by name, and the torque at constant speed `bias` [N m],
+    by virtual work."""
 
     __slots__ = ("J", "_by_acceleration", "_loads", "_xp", "bias", "dJ", "effects", "m", "steady", "w")
 
@@ -226,16 +228,16 @@ class MachineState:
         ----------
         xp : engine (see `chainunit.engines`)
         w : speed of the crank [rad/s]
-        loads : others than those of the linkage
+        loads : loads in place of those of the linkage
         """
         self._xp, self.m, self.w = xp, m, w
         self._loads = m.linkage.loads if loads is None else loads
-        self.J, self.dJ = reflected(m.bodies.values())
+        self.J, self.dJ = reflected_inertia(m.bodies.values())
         self.steady = Steadiness(xp, m, w, self._loads)
         self.effects = self.steady.effects | self.steady.losses
         bias = 0.5 * self.dJ * (w * w)
         for effect in self.effects.values():
-            bias = bias + (effect.held + effect.lost)
+            bias = bias + (effect.conservative + effect.dissipative)
             self.J = self.J + effect.inertia
         self.bias = bias
         self._by_acceleration: tuple[Any, dict[Joint, Vec2]] | None = None
@@ -248,7 +250,7 @@ class MachineState:
         if self._by_acceleration is None:
             wrenches = (k for effect in self.effects.values() for k in effect.inertial)
             acting = {name: body.inertial() for name, body in self.m.bodies.items()}
-            self._by_acceleration = self.m.reactions(loaded(acting, wrenches))
+            self._by_acceleration = self.m.reactions(add_wrenches(acting, wrenches))
         return self._by_acceleration
 
     def reactions(self, a: Any) -> dict[Joint, Vec2]:
@@ -261,7 +263,7 @@ class MachineState:
         return reactions
 
     def torque_by_reactions(self, a: Any) -> Any:
-        """The crank torque from the forces, group by group, without friction [N m]: the second route."""
+        """The crank torque from the force passes, without friction [N m]: the second route."""
         return self.steady.torque + self._inertial()[0] * a
 
     @property
@@ -271,32 +273,33 @@ class MachineState:
 
     @property
     def kinetic_energy(self) -> Any:
-        """[J]"""
+        """Kinetic energy [J]."""
         return 0.5 * self.J * (self.w * self.w)
 
     @property
-    def held_energy(self) -> Any:
+    def potential_energy(self) -> Any:
         """Potential energy of all loads [J]."""
         return sum(effect.energy for effect in self.effects.values())
 
     @property
-    def lost(self) -> Any:
-        """Torque at the crank that loads take away [N m]; times `w` it is the power that is lost."""
-        return sum(effect.lost for effect in self.effects.values())
+    def lost_torque(self) -> Any:
+        """Torque at the crank against all dissipative loads [N m]; times `w` it is the lost power."""
+        return sum(effect.dissipative for effect in self.effects.values())
 
     def margin(self) -> Any:
-        """The least margin of all groups in size; 1 of a crank alone, which has no dead position."""
+        """The least absolute margin of all groups; 1 for a crank alone, which has no dead position."""
         xp = self._xp
         sizes = [xp.abs(margin) for margin in self.m.margins()]
         return functools.reduce(xp.minimum, sizes) if sizes else 1.0
 
     def slopes(self) -> tuple[Any, Any]:
-        """Derivatives of `bias` by the crank angle [N m/rad] and the crank speed [N m s/rad], with chains where their
-        states stand.
+        """Derivatives of `bias` by the crank angle [N m/rad] and the crank speed [N m s/rad], at fixed states of
+        chains.
 
-        By the second route: the losses need the slopes of all reactions, and the torque comes with them. The sums of
-        forces and moments on each link are zero, and so are their derivatives: a force pass with the slopes of the
-        loads gives those of the reactions. By the angle the present reactions add moments, as their arms turn.
+        They come by the second route, since the losses need the slopes of all reactions anyway. The sums of forces
+        and moments on each link are zero, and so are their derivatives: a force pass with the slopes of the loads
+        gives the slopes of the reactions and of the torque. For the derivative by the angle the present reactions add
+        moments, as their arms turn.
         """
         return self._by_angle(), self._by_speed()
 
@@ -304,7 +307,7 @@ class MachineState:
         m, w2, field = self.m, self.w * self.w, self.steady.field
         links, pins = m.third()
         acting = {name: body.centrifugal_slope(w2, field, links[name]) for name, body in m.bodies.items()}
-        loaded(acting, m.turning(self.steady.reactions))
+        add_wrenches(acting, m.turning(self.steady.reactions))
         return self._slope(LiftedMechanism(m, links, pins), self.w, acting, m.turns2())
 
     def _by_speed(self) -> Any:
@@ -319,7 +322,7 @@ class MachineState:
         m, reactions = self.m, self.steady.reactions
         effects = _effects(dual(self._xp), moving, w, self._loads)
         growing = (Wrench(k.link, growth(k.force), slope(k.moment)) for k in _wrenches(effects))
-        torque, more = m.reactions(loaded(acting, growing))
+        torque, more = m.reactions(add_wrenches(acting, growing))
         for load in self._loads.values():
             if load.by_reactions:
                 torque = torque + load.slope(self._xp, m, self.w, reactions, more, turning)

@@ -1,8 +1,8 @@
 """The two models of a linkage: the inverse one takes the motion of the motor shaft and gives torque and load port,
 the direct one takes the torque and gives the motion.
 
-q is the crank angle, `w`, `a` its derivatives; at the shaft `phi w a tau J` are the motor's, ``p.ratio`` turns for
-one of the crank.
+q is the crank angle, `w` and `a` are its derivatives. The shaft quantities `phi w a tau J` belong to the motor shaft,
+which makes ``p.ratio`` turns for one turn of the crank.
 """
 
 from __future__ import annotations
@@ -21,28 +21,28 @@ from .linkage import Linkage, Topology
 from .machine import MachineState, Mechanism, derived_numbers
 
 MACHINES: dict[str, type[InverseMachine]] = {}
-"""The machines by name: a class of that kind anywhere is a machine that study files may name."""
+"""The machines by name: every subclass of `InverseMachine` with a name is a machine that study files may name."""
 Fields = Sequence[tuple[str, Any, Any]]
-"""Name, type and field of each quantity or group of a declaration that is built from others."""
+"""Name, type and field of each quantity or group, to build a declaration from."""
 
 
 def declared_class(name: str, bases: tuple[type, ...], fields: Fields = ()) -> Any:
-    """A declaration that is built from its fields."""
+    """A declaration with these fields and those of `bases`."""
     return dataclasses.make_dataclass(name, fields, bases=bases, frozen=True, kw_only=True)
 
 
-def fields_of(declared: type, *, without: Sequence[str] = ()) -> Fields:
-    """The fields of a declaration, those `without` left out, for another one."""
+def fields_of(of: type, *, without: Sequence[str] = ()) -> Fields:
+    """The fields of a declaration except those in `without`, to build another one from."""
     return [
         (f.name, f.type, dataclasses.field(default=f.default, metadata=f.metadata))
-        for f in dataclasses.fields(declared)
+        for f in dataclasses.fields(of)
         if f.name not in without
     ]
 
 
-def names_of(declared: type) -> tuple[str, ...]:
+def names_of(of: type) -> tuple[str, ...]:
     """The names of the fields of a declaration."""
-    return tuple(f.name for f in dataclasses.fields(declared))
+    return tuple(f.name for f in dataclasses.fields(of))
 
 
 @declaration
@@ -55,7 +55,7 @@ class CrankMotion(ShaftMotion):
 
 
 class LinkageModel(Model):
-    """A model whose mechanics are those of a linkage."""
+    """A model with the mechanics of a linkage."""
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -86,47 +86,47 @@ class LinkageModel(Model):
 
 
 class MachineModel(Model):
-    """The model of a machine, as far as a study asks for it: of a linkage, or of an FMU of somebody else.
+    """The model of a machine as a study uses it: of a linkage, or of a foreign FMU.
 
-    What a study does with a machine follows from what is declared here, not from which machine it is.
+    The work of a study on a machine depends only on the declarations here, never on the name of the machine.
     """
 
     Feed: ClassVar[type]
-    """Its loads in normal running: inputs beside the motion of its shaft."""
+    """Its loads in normal running: the inputs besides the motion of its shaft."""
     feed_layout: ClassVar[Layout]
     pins: ClassVar[Mapping[str, str]] = {}
     """Output of each bearing by its title."""
     noun: ClassVar[str] = "machine"
-    """What people call it."""
+    """The machine's name in texts for people."""
     turning: ClassVar[str] = "crank"
-    """What people call the link that the motor turns."""
+    """The name, in texts for people, of the link that the motor turns."""
     usual_speed: ClassVar[tuple[float, float]] = (0.05, 25.0)
-    """Of the crank [rad/s]; beyond, a slip of the unit is likely."""
+    """Usual range of the crank speed [rad/s]; beyond it, a wrong unit is likely."""
     sides: ClassVar[tuple[str, ...]] = ()
-    """Its sides, each with a working organ that may be a chain: so are called the groups of its loads, and of its
-    outputs, on them."""
+    """The names of its sides, each with a working organ that may be a chain. The groups of its loads and outputs on a
+    side have the same name."""
     cuts: ClassVar[bool] = False
-    """Whether it has a `blade` among its outputs, and a `stack` that the blade cuts among its parameters."""
+    """Whether its outputs have a `blade`, and its parameters a `stack` that the blade cuts."""
 
 
 class InverseMachine(LinkageModel, MachineModel):
     """Motion of the motor shaft in, torque, load port and every reaction out.
 
     A machine states its `Parameters`, `Inputs` (with those of `CrankMotion`), `Outputs` (with `tau`, `PortValues` and
-    those of `running`), its `linkage` and its `probes`; all else follows. Where it states none, its `Feed` are all
-    inputs beside `ShaftMotion`, and its `pins` have the names of pin and link.
+    those of `running`), its `linkage` and its `probes`; all else follows. Without a statement of its own, its `Feed`
+    has all inputs besides `ShaftMotion`, and its `pins` have the names of pin and link.
     """
 
     Outputs: ClassVar[type]
     joints: ClassVar[Mapping[str, Joint]] = {}
-    """Joint of each reaction by the name of the output."""
+    """The joint of each reaction by the name of the output."""
     angles: ClassVar[Mapping[str, str]] = {}
-    """Links by the symbols of their angles from the downward vertical, positive towards +x."""
+    """Links by the symbols of their angles; an angle counts from the downward vertical, positive towards +x."""
     direct_name: ClassVar[str]
-    """Name of the direct model, ``<name>Direct`` where a machine states none."""
+    """Name of the direct model; by default ``<name>Direct``."""
     direct_description: ClassVar[str] = ""
     by_differences: ClassVar[frozenset[str]] = frozenset()
-    """Outputs whose own derivatives are taken by differences, see `chainunit.model.Part`."""
+    """Outputs whose derivatives are taken by differences, see `chainunit.model.Part`."""
 
     terminals = (*flanges("inflow"), load_terminal())
 
@@ -134,7 +134,7 @@ class InverseMachine(LinkageModel, MachineModel):
         own = vars(cls)
         if "Inputs" in own and "Feed" not in own:
             cls.Feed = declared_class("Feed", (), fields_of(cls.Inputs, without=names_of(ShaftMotion)))
-            # where pickle finds it
+            # pickle finds the class by this name
             cls.Feed.__module__, cls.Feed.__qualname__ = cls.__module__, f"{cls.__qualname__}.Feed"
         if hasattr(cls, "Feed"):
             cls.feed_layout = Layout(cls.Feed)
@@ -142,7 +142,7 @@ class InverseMachine(LinkageModel, MachineModel):
             cls.pins = {f"{pin} {link}": output for output, (pin, link) in cls.joints.items()}
         if "name" in own and "direct_name" not in own:
             cls.direct_name = f"{cls.name}Direct"
-        # a class that a function makes has others of its name
+        # a function that makes classes may make several of one name
         if "name" in own and not cls.built_by:
             MACHINES[cls.name] = cls
         if hasattr(cls, "Outputs") and "parts" not in own:
@@ -155,13 +155,13 @@ class InverseMachine(LinkageModel, MachineModel):
 
     @staticmethod
     def probes(xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
-        """The machine's own outputs, of a state at crank acceleration `a`; those that `running` gives, too, where it
-        gives them otherwise."""
+        """The machine's own outputs at the state `s` and the crank acceleration `a`. A key of `running` in this
+        result replaces the value of `running`."""
         raise NotImplementedError
 
     @classmethod
     def shared(cls, xp: Any, p: Any, u: Any, x: Any) -> MachineState:
-        """The machine at the crank angle and speed that belong to the motor's."""
+        """The machine at the crank angle and speed that follow from those of the motor."""
         return cls.state(xp, p, u, u.phi / p.ratio, u.w / p.ratio)
 
     @classmethod
@@ -182,16 +182,16 @@ class InverseMachine(LinkageModel, MachineModel):
     def direct(cls) -> type[DirectMachine]:
         """The direct model of the same machine: torque in, motion out.
 
-        Its parameters are those of the machine, the inertia on its shaft and the start; its inputs the torque and the
-        loads; its outputs those of the machine without `tau` and load port, and `Turning`.
+        Its parameters are those of the machine, the inertia on its shaft and the start. Its inputs are the torque and
+        the loads. Its outputs are those of the machine without `tau` and load port, and those of `Turning`.
         """
         return cls._turning(DirectMachine)
 
     @classmethod
     def _turning(cls, base: type[DirectMachine], parameters: Fields = (), **more: Any) -> type[DirectMachine]:
         """The direct model as a subclass of `base`, with more `parameters` and attributes."""
-        carried = fields_of(cls.Outputs, without=("tau", *names_of(PortValues)))
-        # the machine's own where the start declares it, too
+        outputs = fields_of(cls.Outputs, without=("tau", *names_of(PortValues)))
+        # where the start declares the same name, the machine's own declaration counts
         own = [field for field in fields_of(cls.Parameters) if field[0] in names_of(Start)]
         members = {
             "__module__": cls.__module__,
@@ -213,19 +213,19 @@ class InverseMachine(LinkageModel, MachineModel):
             "Inputs": declared_class(
                 "DirectInputs", (DrivingTorque,), fields_of(cls.Inputs, without=names_of(ShaftMotion))
             ),
-            "Outputs": declared_class("DirectOutputs", (), [*carried, *fields_of(Turning)]),
+            "Outputs": declared_class("DirectOutputs", (), [*outputs, *fields_of(Turning)]),
             **more,
         }
         return type(f"Direct{cls.__name__}", (base,), members)
 
 
 def running(s: MachineState, a: Any) -> dict[str, Any]:
-    """Power and energies at crank acceleration `a` and the margin, which every machine has as outputs."""
+    """Outputs of every machine: power and energies at crank acceleration `a`, and the margin."""
     return {
         "power": s.torque(a) * s.w,
         "kinetic_energy": s.kinetic_energy,
-        "potential_energy": s.held_energy,
-        "dissipated_power": s.lost * s.w,
+        "potential_energy": s.potential_energy,
+        "dissipated_power": s.lost_torque * s.w,
         "margin": s.margin(),
     }
 
@@ -248,7 +248,7 @@ class AddedInertia:
 
 @declaration
 class TurningStates:
-    """States of the machine; each is an output, too."""
+    """States of the direct machine; each is an output, too."""
 
     phi: Value = quantity("rad", "motor angle; crank angle is phi/ratio, from the upward vertical, clockwise")
     w: Value = quantity("rad/s", "motor speed")
@@ -271,14 +271,14 @@ class Turning:
 
 
 class DirectMachine(LinkageModel):
-    """Torque of the motor in, motion and every reaction out, see `InverseMachine.direct`. `inverse` is the model of
-    the same machine with the motion given."""
+    """Torque of the motor in, motion and every reaction out, see `InverseMachine.direct`. `inverse` is the inverse
+    model of the same machine."""
 
     inverse: ClassVar[type[InverseMachine]]
     Outputs: ClassVar[type]
     States = TurningStates
     terminals = flanges("inflow")
-    _carried = Requirement(
+    _some_inertia = Requirement(
         "inertia of the crank and on its shaft",
         "kg.m2",
         "at the dead points of the rocker nothing else carries the torque; give crank.I, crank.m or J_added",
@@ -287,25 +287,25 @@ class DirectMachine(LinkageModel):
     def __init_subclass__(cls) -> None:
         if not hasattr(cls, "inverse"):  # a common base of several models
             return
-        cls.required = (*cls.inverse.required, cls._carried)
+        cls.required = (*cls.inverse.required, cls._some_inertia)
         cls.parts = (Part(cls.Outputs, cls._outputs),)
         super().__init_subclass__()
 
     @classmethod
     def linkage(cls, p: Any, u: Any) -> Linkage:
-        """That of the inverse model."""
+        """The linkage of the inverse model."""
         return cls.inverse.linkage(p, u)
 
     @classmethod
     def requirements(cls, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """Those of the inverse model, and an inertia that never vanishes."""
+        """The limits of the inverse model, and those of an inertia that never vanishes."""
         yield from cls.inverse.requirements(xp, p)
         yield p.J_added * p.ratio * p.ratio + cls.linkage(p, cls.Inputs()).crank.inertia, 0.0, math.inf
 
     @classmethod
     def start_from(cls, outputs: Mapping[str, float]) -> dict[str, float]:
-        """Start parameters with which it goes on from a motion of the inverse model, whose outputs and states at that
-        instant are given by name."""
+        """Start parameters with which the direct model continues a motion of the inverse model; `outputs` gives the
+        outputs and states of the inverse model at that instant by name."""
         return {"phi_start": outputs["phi0"], "w_start": outputs["w0"]}
 
     @staticmethod
@@ -317,13 +317,14 @@ class DirectMachine(LinkageModel):
 
     @staticmethod
     def internal_step(xp: Any, p: Any) -> Any:
-        """5 ms: a cut or a stop that comes is not passed over."""
+        """Longest internal step: 5 ms, so that no step skips the start of a cut or the contact with a stop."""
         return 5e-3
 
     @staticmethod
     def tolerance(xp: Any, p: Any) -> Any:
-        """The motion is slow, but smoothed friction near rest, and a blade that a stack stops, take microseconds. A
-        motion that runs freely keeps no error small: the local one is tight."""
+        """Tight relative tolerance. The motion is slow, but smoothed friction near rest and a blade that a stack
+        stops act within microseconds; and a free motion does not reduce its errors, so that local errors must be
+        small."""
         return 1e-9
 
     @staticmethod
@@ -333,7 +334,7 @@ class DirectMachine(LinkageModel):
 
     @classmethod
     def shared(cls, xp: Any, p: Any, u: Any, x: Any) -> MachineState:
-        """The machine at the crank angle and speed that belong to the motor's."""
+        """The machine at the crank angle and speed that follow from those of the motor."""
         return cls.state(xp, p, u, x.phi / p.ratio, x.w / p.ratio)
 
     @classmethod
@@ -346,7 +347,7 @@ class DirectMachine(LinkageModel):
         a = acceleration(p, u, s)
         at_crank = a / p.ratio
         fields = running(s, at_crank) | cls.inverse.probes(xp, p, u, s, at_crank)
-        # the motor drives what is on its shaft, too
+        # the motor also drives the inertia on its own shaft
         fields["kinetic_energy"] += 0.5 * p.J_added * (x.w * x.w)
         fields["power"] = u.tau * x.w
         return cls.Outputs(a=a, tau_bias=s.bias / p.ratio, J=s.J / (p.ratio * p.ratio), **fields)

@@ -15,7 +15,7 @@ import numpy as np
 from ..engines import MATH
 from ..groups.triad import LEGS
 from ..machines.knife_drive import KnifeDrive
-from ..mechanism.machine import MachineState, loaded
+from ..mechanism.machine import MachineState, add_wrenches
 from .table import PICK
 
 W = 4.0
@@ -41,7 +41,7 @@ def _acting(s: MachineState, *names: str) -> dict[str, Any]:
     """What acts on each link at constant speed, of inertia and of the loads with these names."""
     w2, field = s.w * s.w, sum(s.effects[name].field for name in names)
     wrenches = (wrench for name in names for wrench in s.effects[name].wrenches)
-    return loaded({name: body.centrifugal(w2, field) for name, body in s.m.bodies.items()}, wrenches)
+    return add_wrenches({name: body.centrifugal(w2, field) for name, body in s.m.bodies.items()}, wrenches)
 
 
 def as_the_paper(s: MachineState, line: float, *, cut: bool = True) -> Any:
