@@ -10,7 +10,7 @@ import pytest
 from chainunit.errors import InputError
 from chainunit.fmu.description import Interface, model_description
 from chainunit.models import MODELS
-from chainunit.quantities import Layout, Quantity, base_units, bounded, variables
+from chainunit.quantities import Layout, Quantity, base_units, variables, within_bounds
 from chainunit.reading import to_number
 
 NAMES = Path(__file__).parent / "data" / "variables.json"
@@ -97,12 +97,12 @@ def test_what_is_off_its_bound_by_rounding_counts_as_the_bound():
     share = Quantity("1", "", low=0.0, high=1.0)
     heavy = Quantity("kg", "", low=0.0, open_low=True, nominal=1e3)
     for x in (-1e-9, 0.0, 1.0, 1.0 + 1e-9):
-        assert share.admits(x) and share.bounded(x) == round(x)
+        assert share.admits(x) and share.within_bounds(x) == round(x)
     assert not share.admits(-1.1e-9) and not share.admits(1.0 + 1.1e-9)
     assert not heavy.admits(-1e-9) and not heavy.admits(0.0), "a bound that is itself forbidden"
     model = MODELS["ChamberForces"]
     p = model.parameter_layout.from_names({"web_share": 1.0 + 1e-12, "crank.m": -1e-12})
     assert (model.check(p).web_share, model.check(p).crank.m) == (1.0, 0.0)
-    assert bounded(model.parameter_layout, model.Parameters()) == model.Parameters()
+    assert within_bounds(model.parameter_layout, model.Parameters()) == model.Parameters()
     with pytest.raises(InputError, match=r"web_share = 1\.1: must be >= 0 and <= 1"):
         model.check(model.parameter_layout.from_names({"web_share": 1.1}))

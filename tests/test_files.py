@@ -12,7 +12,7 @@ import time
 import pytest
 
 from chainunit.errors import InputError, WriteError
-from chainunit.files import LOCK, claimed, folder, whole
+from chainunit.files import LOCK, claim, folder, whole
 
 SHORT = """
 event = []
@@ -58,7 +58,7 @@ def test_a_user_s_files_in_the_folder_are_left_alone(tmp_path):
     for name in (".chainunit", LOCK, "result.json.part"):
         (tmp_path / name).write_text("mine")
     folder(tmp_path)
-    with claimed(tmp_path):
+    with claim(tmp_path):
         pass
     assert {p.name: p.read_text() for p in tmp_path.iterdir()} == {
         ".chainunit": "mine",
@@ -72,8 +72,8 @@ def test_one_process_at_a_time_and_the_lock_goes_with_it(tmp_path):
         """
         import time
         from pathlib import Path
-        from chainunit.files import claimed
-        with claimed(Path("out")):
+        from chainunit.files import claim
+        with claim(Path("out")):
             print("has it", flush=True)
             time.sleep(600)
         """,
@@ -81,18 +81,18 @@ def test_one_process_at_a_time_and_the_lock_goes_with_it(tmp_path):
     )
     assert holder.stdout.readline() == "has it\n"
     with pytest.raises(InputError, match="another chainunit writes to this folder"):
-        with claimed(tmp_path / "out"):
+        with claim(tmp_path / "out"):
             pass
     holder.kill()
     holder.communicate()
-    with claimed(tmp_path / "out"):
+    with claim(tmp_path / "out"):
         assert (tmp_path / "out" / LOCK).exists()
     assert list((tmp_path / "out").iterdir()) == []
 
 
 def test_a_second_study_in_a_folder_is_refused_and_takes_nothing_away(tmp_path):
     out = tmp_path / "out"
-    with claimed(out):
+    with claim(out):
         (out / "result.json").write_text("of the first")
         second = subprocess.run(
             [sys.executable, "-m", "chainunit.cli", "study", "-o", "out"],
@@ -252,7 +252,7 @@ def test_a_folder_that_was_there_or_holds_a_file_stays(tmp_path):
     for name, there in (("old", True), ("full", False), ("new", False)):
         if there:
             (tmp_path / name).mkdir()
-        with pytest.raises(KeyboardInterrupt), claimed(tmp_path / name) as path:
+        with pytest.raises(KeyboardInterrupt), claim(tmp_path / name) as path:
             (path / "fmu").mkdir()
             if name == "full":
                 (path / "result").touch()

@@ -108,7 +108,7 @@ def chains(model, p, **over):
 def named(model, p, u, x=None):
     found = {}
     for part, values in zip(model.parts, model.evaluate(MATH, p, u, x), strict=True):
-        found |= part.layout.named(values)
+        found |= part.layout.by_name(values)
     return found
 
 
@@ -206,7 +206,7 @@ def direct_case(rng):
     walls, webs = model.organs.walls, model.organs.webs
     direct = flexible(walls, webs).direct()
     q = direct.parameter_layout.from_names(
-        model.parameter_layout.named(p)
+        model.parameter_layout.by_name(p)
         | {"J_added": rng.uniform(0.1, 1.0), "phi_start": u.phi, "w_start": u.w}
     )
     tau = direct.Inputs(tau=rng.uniform(-50.0, 50.0), left=u.left, right=u.right, stop=u.stop)
@@ -270,16 +270,16 @@ def test_the_direct_model_goes_on_from_where_the_inverse_one_is():
         state = model.state_layout.instance(x)
         outputs = named(model, p, u, state)
         direct = model.direct()
-        start = direct.start_from({**outputs, **model.state_layout.named(state)})
+        start = direct.start_from({**outputs, **model.state_layout.by_name(state)})
         p = dataclasses.replace(p, organ=dataclasses.replace(p.organ, fold_limit=0.01))
-        q = direct.check(direct.parameter_layout.from_names(model.parameter_layout.named(p) | start))
+        q = direct.check(direct.parameter_layout.from_names(model.parameter_layout.by_name(p) | start))
         begun = direct.begin(q, direct.Inputs(left=u.left, right=u.right))
         wanted = dict(zip(model.state_layout.names, x, strict=True))
         for side in SIDES:
             bent = named(direct, q, direct.Inputs(left=u.left, right=u.right), begun)
             kinetic, potential = (bent[f"{side}.{kind}_energy"] for kind in ("kinetic", "potential"))
             wanted[f"{side}.energy_due"] = kinetic + potential
-        got = direct.state_layout.named(begun)
+        got = direct.state_layout.by_name(begun)
         assert (got.pop("phi"), got.pop("w")) == (u.phi, u.w)
         for name, value in wanted.items():
             assert got[name] == pytest.approx(value, rel=1e-9, abs=1e-9), name
@@ -350,7 +350,7 @@ def test_starts_where_it_hangs():
         )
         x = model.start(MATH, p, u)
         state = MachineState(MATH, crank_rocker(p, u.phi / p.ratio), 0.0)
-        psi, states = rocker_motion(MATH, state, 0.0)["psi"], model.state_layout.named(x)
+        psi, states = rocker_motion(MATH, state, 0.0)["psi"], model.state_layout.by_name(x)
         for side, hand in zip(SIDES, (1.0, -1.0), strict=True):
             theta = [hand * states[f"{side}.theta_{k + 1}"] for k in range(number)]
             np.testing.assert_allclose(
@@ -359,7 +359,7 @@ def test_starts_where_it_hangs():
             assert all(states[f"{side}.omega_{k + 1}"] == 0.0 for k in range(number))
         outputs = model.parts[0].equations(MATH, p, u, x, model.shared(MATH, p, u, x))
         assert max(outputs.left.drift, outputs.right.drift) < 1e-9 * max(1.0, p.l1)
-        weightless = model.state_layout.named(model.start(MATH, dataclasses.replace(p, g=0.0), u))
+        weightless = model.state_layout.by_name(model.start(MATH, dataclasses.replace(p, g=0.0), u))
         for name in states:
             assert "theta" not in name or weightless[name] == pytest.approx(states[name], abs=1e-9)
 
@@ -466,7 +466,7 @@ def test_power_is_what_the_machine_stores_and_loses():
 def dense(model, p, u, x, side, a2):
     """A chain by mass matrix and multipliers: force at A2 and moment of the pin there, for the acceleration `a2`."""
     states, hand = (
-        model.state_layout.named(model.state_layout.instance(x)),
+        model.state_layout.by_name(model.state_layout.instance(x)),
         {"left": -1.0, "right": 1.0}[side],
     )
     N = len([n for n in states if n.startswith("left.theta")])
@@ -692,7 +692,7 @@ def sampled(rng):
             break
         except InputError:
             continue
-    start, w = ChamberForces.parameter_layout.named(p), between("w")
+    start, w = ChamberForces.parameter_layout.by_name(p), between("w")
     start |= {name: between(name) for name in ("organ.eta", "organ.end_damping")}
     start |= {"phi": p.ratio * rng.uniform(0.0, 6.28), "w": p.ratio * w}
     for side in SIDES:
@@ -986,7 +986,9 @@ def test_two_rods_stand_where_a_hanging_chain_would_not():
     # an unknown that was not found leaves a gap, which is told
     p = model.check(model.Parameters())
     u = model.Inputs()
-    limits = list(model.start_limits(MATH, p, u, model.started(MATH, p, u, [0.02, 0.9, 1.0, 0.5, 0.5, 1.0])))
+    limits = list(
+        model.start_limits(MATH, p, u, model.start_states(MATH, p, u, [0.02, 0.9, 1.0, 0.5, 0.5, 1.0]))
+    )
     assert limits[0][0] > limits[0][2]
 
 

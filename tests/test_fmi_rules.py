@@ -30,7 +30,7 @@ both = pytest.mark.parametrize("fmi", [2, 3])
 def allowed(model, name):
     """The end of a line that refuses a value."""
     declared = (*MODELS[model].parameter_layout.variables, *MODELS[model].input_layout.variables)
-    return next("must be " + v.quantity.allowed for v in declared if v.name == name)
+    return next("must be " + v.quantity.allowed_range for v in declared if v.name == name)
 
 
 class Unit:

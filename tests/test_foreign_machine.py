@@ -133,7 +133,7 @@ def together(t_end, w_ref, pressure):
 
 def test_what_a_file_sets_is_declared_by_the_fmu(folder):
     study = parse(folder, STUDY + MACHINE)
-    assert study.machine.named == {"ratio": RATIO, "piston.mass": MASS, "throw": 0.15}
+    assert study.machine.by_name == {"ratio": RATIO, "piston.mass": MASS, "throw": 0.15}
     assert study.machine.component.start == {"piston.mass": MASS, "throw": 0.15}
     assert study.feed.back_pressure == PRESSURE
     for change, said in (

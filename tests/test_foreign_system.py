@@ -366,7 +366,7 @@ side = "left"
 """
 OWN_MOTOR = "[motor]\n" + "".join(
     f"{name} = {value!r}\n"
-    for name, value in DcMotor.parameter_layout.named(DcMotor.Parameters()).items()
+    for name, value in DcMotor.parameter_layout.by_name(DcMotor.Parameters()).items()
     if "." in name
 )
 OTHER_NAMES = 'motor_names = { w = "rotor_speed", phi = "rotor_angle", load.J = "inertia_behind" }\n'

@@ -184,7 +184,7 @@ def test_a_study_can_be_repeated_from_its_result(text, tmp_path):
         if each.name in (*_OF_THE_FILE, "choices", "machine", "events", "random"):
             continue
         assert getattr(again, each.name) == getattr(study.config, each.name), each.name
-    assert again.machine.named == pytest.approx(study.config.machine.named, rel=1e-12)
+    assert again.machine.by_name == pytest.approx(study.config.machine.by_name, rel=1e-12)
     assert again.random.as_dict() == study.config.random.as_dict()
     for name, event in study.config.events.items():
         assert (again.events[name].p, again.events[name].side) == (event.p, event.side)

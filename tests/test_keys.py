@@ -120,7 +120,7 @@ def test_a_key_at_its_value_changes_nothing(table, key):
 def _values(part):
     """The numbers of a part of a study, by name."""
     declared = getattr(part, "p", part)
-    return Layout(type(declared)).named(declared) if declared is not None else {}
+    return Layout(type(declared)).by_name(declared) if declared is not None else {}
 
 
 def test_the_full_example_names_every_key_once():

@@ -34,7 +34,7 @@ def test_a_machine_follows_from_its_model(model):
     phi = np.linspace(0.0, 2.0 * np.pi * 3.0, 5)
     out = machine.outputs(phi, 9.0, 4.0, model.Feed())
     assert isinstance(out, model.Outputs) and out.tau.shape == phi.shape
-    named = machine.evaluate({"phi": phi, "w": 9.0, "a": 4.0, **feed.named(model.Feed())})
+    named = machine.evaluate({"phi": phi, "w": 9.0, "a": 4.0, **feed.by_name(model.Feed())})
     np.testing.assert_array_equal(named["tau"], out.tau)
     with pytest.raises(InputError, match="w = nan"):
         machine.outputs(0.0, float("nan"))
@@ -61,7 +61,7 @@ def test_the_direct_model_follows_from_the_inverse_one(model):
     p = direct.check(direct.parameter_layout.from_names({"w_start": 4.0, "J_added": 0.3, "ratio": 2.0}))
     x, u = direct.initial_states(MATH, p), direct.Inputs(tau=5.0)
     a = direct.derivatives(MATH, p, u, x)[1]
-    feed = {name: value for name, value in direct.input_layout.named(u).items() if name != "tau"}
+    feed = {name: value for name, value in direct.input_layout.by_name(u).items() if name != "tau"}
     need = machine_of(model, ratio=2.0).evaluate({"phi": 0.0, "w": 4.0, "a": a, **feed})
     assert float(need["tau"]) + 0.3 * a == pytest.approx(5.0, rel=1e-9)
 

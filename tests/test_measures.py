@@ -78,7 +78,7 @@ def test_each_measure_has_its_reader_and_its_runs():
     steady = window()
     for phase in Phase:
         answers = read_answers(window(phase, steady=steady, begin=1.0 if phase is Phase.EVENT else 0.0))
-        told = {n for n, x in Layout(Answers).named(answers).items() if x is not None}
+        told = {n for n, x in Layout(Answers).by_name(answers).items() if x is not None}
         assert told <= {v.name for v in measures_of(phase)}
         if phase is Phase.START_UP:
             # two bars have no slack rod and no fold

@@ -112,7 +112,7 @@ def test_a_row_is_what_its_number_says(killed):
         simulation.run(1.0, config.run.step)
         simulation.save()
         for number in (7, 3, 20):
-            got = monte_carlo.Layout(monte_carlo.Sample).named(monte_carlo.one(task, number, simulation))
+            got = monte_carlo.Layout(monte_carlo.Sample).by_name(monte_carlo.one(task, number, simulation))
             drawn = monte_carlo.draw(config, number)
             row = {"run": number, "side": drawn.event.side, "drawn": drawn.values, "failed": None}
             assert {**row, **got} == before[number]

@@ -98,7 +98,7 @@ def test_the_example_and_random_machines_give_no_remark():
     assert config.load().slips == ()
     rng = np.random.default_rng(5)
     for _ in range(20):
-        named = ChamberForces.parameter_layout.named(random_machine(rng).p)
+        named = ChamberForces.parameter_layout.by_name(random_machine(rng).p)
         table: dict = {}
         for name, x in named.items():
             *groups, last = name.split(".")

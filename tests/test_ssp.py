@@ -145,7 +145,7 @@ def test_parameter_sets_and_fmus_hold_the_studys_values(package, tmp_path):
     assert motor.limit.i == 3.9 and motor.speed_control.kp != loaded.motor.speed_control.kp
     start = {
         "machine": start_of(loaded, MODELS["ChamberForces"]),
-        "motor": MODELS["DcMotor"].parameter_layout.named(motor) | {"w_ref": 2.4 * 50.0},
+        "motor": MODELS["DcMotor"].parameter_layout.by_name(motor) | {"w_ref": 2.4 * 50.0},
     }
     with zipfile.ZipFile(package) as archive:
         archive.extractall(tmp_path)

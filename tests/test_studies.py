@@ -14,7 +14,7 @@ import xarray as xr
 from command import chainunit
 
 from chainunit import ChainUnitMachine, InputError, RunError, Study, StudyResult, studies
-from chainunit.files import claimed
+from chainunit.files import claim
 from chainunit.study.record import StudyRecord
 
 FILE = """
@@ -141,7 +141,7 @@ def test_a_run_in_a_folder_leaves_the_files_there(tmp_path, command):
     # saved again where it lies already
     assert (tmp_path / "out" / "result.json") in result.save(tmp_path / "out")
     with (
-        claimed(tmp_path / "out"),
+        claim(tmp_path / "out"),
         pytest.raises(InputError, match="another chainunit writes to this folder"),
     ):
         Study(**TABLES).run(tmp_path / "out")

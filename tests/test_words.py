@@ -14,7 +14,7 @@ from chainunit.report.study import report
 from chainunit.study.config import parse
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
-from chainunit.text import chosen_units, number, turning, written_in
+from chainunit.text import chosen_units, number, shown_in, turning
 
 UNITS = 'units = { speed = "rev/min", torque = "kN.m", force = "kN", power = "W" }\n'
 SHORT = """
@@ -73,7 +73,7 @@ def test_a_word_in_place_of_crank():
 
 def test_the_units_of_words_end_where_they_are_written():
     assert number(10.0, "N.m") == "10.0 N m"
-    with pytest.raises(ZeroDivisionError), written_in(chosen_units({"torque": "kN.m"})):
+    with pytest.raises(ZeroDivisionError), shown_in(chosen_units({"torque": "kN.m"})):
         assert number(10.0, "N.m") == "0.0100 kN m"
         raise ZeroDivisionError
     assert number(10.0, "N.m") == "10.0 N m"

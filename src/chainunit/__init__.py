@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     __version__: str
 else:
-    # numpy and scipy take longer to import than the command line to answer: not before they are needed
+    # numpy and scipy take longer to import than a command takes to answer: import them when they are needed
     _HOMES = {
         "EMPTY": ".machines.api",
         "ChainUnitMachine": ".machines.api",

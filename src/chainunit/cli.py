@@ -19,7 +19,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from .errors import InputError, InterruptedRunError, RunError, WriteError, printable
-from .files import claimed, clear, full, write_all
+from .files import claim, clear, full, write_all
 
 if TYPE_CHECKING:
     from .report.blocks import Report
@@ -152,7 +152,7 @@ def study(
     from .report import study as contents
     from .study.record import INSUFFICIENT
 
-    with claimed(output):
+    with claim(output):
         errors = _console(stderr=True)
         with _progress(errors) as progress:
             record = results.compute(
@@ -260,7 +260,7 @@ def reproduce(
 
     Writes report.html, reproduction.json, reproduction.md and the figures into the output folder.
     """
-    with claimed(output):
+    with claim(output):
         from .papers import reproduce as compute
         from .papers.output import report
         from .report import files
@@ -281,7 +281,7 @@ def two_bar_error(
     """
     from .papers import two_bar
 
-    with claimed(output):
+    with claim(output):
         from .report import files
 
         clear(output, *files.names(two_bar.NAME, (two_bar.PICTURE,)))

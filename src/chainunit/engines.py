@@ -4,8 +4,8 @@ A kernel uses operators and exactly the names of `NAMES`; each engine here offer
 name that one engine lacks cannot slip into a kernel.
 
 ========  ==============================================================================
-`MATH`    one point, floats, standard library only: inside an FMU; where numpy gives NaN it raises, and
-          `minimum`, `maximum` may pass a NaN by
+`MATH`    floats at one point, standard library only, for use inside an FMU; where numpy returns NaN it
+          raises an error, and `minimum` and `maximum` may ignore a NaN
 `numpy_`  arrays of any broadcastable shape
 `casadi_` symbols, from which C code, exact derivatives and sparsity come
 `jax_`    arrays under ``jit``/``grad`` (needs the extra ``jax``)
@@ -52,15 +52,15 @@ def casadi_() -> SimpleNamespace:
     """The engine on CasADi symbols (SX)."""
     import casadi
 
-    renamed = {"abs": "fabs", "minimum": "fmin", "maximum": "fmax"}
-    return SimpleNamespace(**{name: getattr(casadi, renamed.get(name, name)) for name in NAMES})
+    casadi_names = {"abs": "fabs", "minimum": "fmin", "maximum": "fmax"}
+    return SimpleNamespace(**{name: getattr(casadi, casadi_names.get(name, name)) for name in NAMES})
 
 
 class Dual:
     """``v + d*epsilon``: a value with its derivative in one direction.
 
     `v` and `d` are the numbers of the engine below (floats, arrays, symbols). Values are computed in the same
-    order as without duals, so that equal symbols are found to be equal.
+    order as without duals, so that equal symbols stay equal.
     """
 
     __slots__ = ("d", "v")
@@ -126,7 +126,7 @@ class _DualEngine(SimpleNamespace):
 
 
 def dual(xp: Any) -> SimpleNamespace:
-    """The engine on dual numbers over `xp`; plain numbers pass through it unharmed.
+    """The engine on dual numbers over `xp`; plain numbers pass through it unchanged.
 
     At a kink (`abs`, `minimum`, `maximum`) the derivative is that of either side, as
     in every automatic differentiation.
@@ -134,7 +134,7 @@ def dual(xp: Any) -> SimpleNamespace:
     Raises
     ------
     TypeError
-        over an engine that is dual itself: parts of both would be mixed up.
+        if `xp` is dual itself: the derivatives of both would be mixed up.
     """
     if isinstance(xp, _DualEngine):
         raise TypeError(

@@ -21,9 +21,10 @@ _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
 
 @contextmanager
 def whole(file: Path) -> Iterator[Path]:
-    """A path to write to in place of `file`; it becomes `file` at the end, and vanishes on an error.
+    """A temporary path to write to in place of `file`. It is renamed to `file` at the end, and removed after
+    an error.
 
-    Its name is a new one each time: several processes may write the same file, and that of the last one stays.
+    Each call has a new temporary name, so that several processes may write the same file. The last one wins.
 
     Raises
     ------
@@ -60,7 +61,8 @@ def writing(file: Path) -> Iterator[None]:
 
 @contextmanager
 def netcdf() -> Iterator[None]:
-    """An OSError in place of the error of the NetCDF library, which does not name a full disk."""
+    """Raise an OSError in place of the error of the NetCDF library, which does not say that the disk is
+    full."""
     try:
         yield
     except RuntimeError as error:
@@ -68,25 +70,25 @@ def netcdf() -> Iterator[None]:
 
 
 def write_all(writers: Iterable[Callable[[], list[Path]]]) -> tuple[list[Path], WriteError | None]:
-    """Call the writers; returns the files, and the error of the first that there was no room for: it costs none of
-    the others."""
-    written: list[Path] = []
-    unwritten = None
+    """Call every writer, also after one that failed. Returns the files that were written, and the first
+    `WriteError`, or None."""
+    paths: list[Path] = []
+    failure = None
     for write in writers:
         try:
-            written += write()
+            paths += write()
         except WriteError as error:
-            unwritten = unwritten or error
-    return written, unwritten
+            failure = failure or error
+    return paths, failure
 
 
 def full(error: OSError) -> bool:
-    """Whether the disk is at fault, and not the name of the file."""
+    """Whether the disk, and not the name of the file, is the cause of the error."""
     return error.errno in _FULL
 
 
 def leftovers(file: Path) -> list[Path]:
-    """Parts of `file` beside it, from processes that were killed while they wrote it."""
+    """Temporary files beside `file`, from processes that were killed while they wrote it."""
     name = re.compile(re.escape(file.name) + r"\.[0-9a-f]{16}\.part")
     return [path for path in file.parent.iterdir() if name.fullmatch(path.name)]
 
@@ -108,7 +110,7 @@ def clear(folder: Path, *names: str) -> None:
 
 
 def folder(path: Path) -> Path:
-    """The folder `path`, made where it is missing, and writable.
+    """The folder `path`, which is made if it is missing, and can be written to.
 
     Raises
     ------
@@ -127,17 +129,17 @@ def folder(path: Path) -> Path:
 
 
 @contextmanager
-def claimed(path: Path) -> Iterator[Path]:
+def claim(path: Path) -> Iterator[Path]:
     """The `folder` at `path`, for this process alone as long as the context lasts.
 
-    A lock of the operating system guards it, on a file that vanishes at the end; the lock ends with the process,
-    however that ends. Where the file system has no locks, there is none. A folder that was made here is removed where
-    an error leaves it empty.
+    A lock of the operating system on a file guards the folder. The file is removed at the end. The lock ends
+    with the process, even if the process is killed. A file system without locks gives no protection. A folder
+    that was made here is removed if an error leaves it empty.
 
     Raises
     ------
     InputError
-        where another process writes there; see `folder`, too.
+        where another process writes there; see also `folder`.
     """
     ours, left_empty = not path.exists(), False
     lock = folder(path) / LOCK
@@ -149,7 +151,7 @@ def claimed(path: Path) -> Iterator[Path]:
                     f"{path}: another chainunit writes to this folder; wait until it ends, or name another folder "
                     "with -o"
                 )
-            # the process before may have removed its file between the opening and the locking
+            # the owner of the lock may have removed its file after it was opened here, before it was locked
             with contextlib.suppress(FileNotFoundError):
                 if os.path.samestat(os.fstat(handle), lock.stat()):
                     break
@@ -165,7 +167,7 @@ def claimed(path: Path) -> Iterator[Path]:
     finally:
         if sys.platform == "win32":  # an open file cannot be removed there
             os.close(handle)
-        # a file with content is not a lock of ours
+        # a file with content is no lock file of this package
         with contextlib.suppress(OSError):
             if not lock.stat().st_size:
                 lock.unlink()
@@ -176,7 +178,7 @@ def claimed(path: Path) -> Iterator[Path]:
 
 
 def _remove_empty(path: Path) -> None:
-    """Remove the folder with those in it, as far as they hold no file."""
+    """Remove the folder and the folders in it; those that hold a file stay."""
     for inner in (inner for inner in path.iterdir() if inner.is_dir() and not inner.is_symlink()):
         _remove_empty(inner)
     with contextlib.suppress(OSError):

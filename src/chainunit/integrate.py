@@ -31,17 +31,18 @@ class Solver:
 
 
 MAX_STEPS = "solver.max_steps"
-"""the full name of that parameter"""
+"""Full name of the parameter `Solver.max_steps`."""
 
 
 SAME_TIME, ROUNDED, ADDED_UP = 1e-9, 4.0 * 2.0**-52, 1e6 * 2.0**-53
-"""The tolerance of a time: in parts of the step or the experiment, and by rounding in parts of the time itself.
-Rounding is some units of its last place at a communication point, which the FMU takes over from the host, and half a
-unit for each of a million steps where a host adds up its steps to the stop time."""
+"""Tolerances of a time. The first is relative to the step or the experiment; the others allow for rounding
+and are relative to the time itself. A communication point, which the FMU takes over from the host, is rounded
+by some units in the last place. A stop time that the host adds up from its steps is rounded by half a unit
+for each of a million steps."""
 
 
 class BudgetError(ArithmeticError):
-    """A communication step takes more steps of the integrator than it may, `most`."""
+    """A communication step takes more than `most` steps of the integrator."""
 
     def __init__(self, most: float) -> None:
         super().__init__(f"takes more than {most:g} steps")
@@ -59,13 +60,13 @@ def rk4(
     longest: float,
     most: float = math.inf,
 ) -> list[float]:
-    """The states `step` later, in equal substeps of at most `longest`; `rates` gives their derivatives at a time
-    since the start of the step, and the states there.
+    """The states after `step` [s], by equal substeps of at most `longest` [s]. `rates` gives the derivatives
+    of the states; its arguments are the time since the start of the step, and the states at that time.
 
     Raises
     ------
     BudgetError
-        where it takes more than `most` of them, before it begins.
+        where the step takes more than `most` substeps; it is raised before the first one.
     """
     count = step / longest - 1e-9
     if count > most:
@@ -95,17 +96,18 @@ STAGES: tuple[tuple[float, ...], ...] = (
 )
 """Coefficients of Dormand and Prince, J. Comp. Appl. Math. 6 (1980) 19; the last stage is the solution of order 5."""
 ERRORS = (71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40)
-"""of its error, the weights of the stages"""
+"""Weights of the stages in the error of that solution."""
 SHORTEST = 1e-6
-"""of the longest step: one as short is steps as it is, as a snatch must not stop a run"""
+"""Shortest substep over the longest: such a step is accepted whatever its error, as a snatch must not stop a
+run."""
 FIRST = 0.01
-"""of the longest step, where nothing is known of the states yet"""
+"""First substep over the longest, where no earlier substep is known."""
 SAFETY, ERROR_POWER = 0.9, -0.2
-"""the next step is that for which the error would be this share of the permitted one"""
+"""The next substep is chosen so that its error should be the share `SAFETY` of the permitted one."""
 LEAST_GROWTH, MOST_GROWTH = 0.2, 5.0
-"""of a step against the one before"""
+"""Limits of the ratio of a substep to the one before."""
 NO_ERROR = 1e-4
-"""in parts of the permitted error; below it the step grows as much as it may"""
+"""Error over the permitted error below which the next substep grows by `MOST_GROWTH`."""
 
 
 def controlled(
@@ -119,21 +121,21 @@ def controlled(
     nominal: Sequence[float],
     most: float = math.inf,
 ) -> tuple[list[float], float]:
-    """The states `step` later, and the next substep that the error allows.
+    """The states after `step` [s], and the next substep [s] that the error allows.
 
     Parameters
     ----------
-    rates : derivatives of the states at a time since the start of the step, and the states there
-    close : the states, put where the model's constraints are met at that time; after each substep
-    pace : substep to begin with, 0 where none is known, and `longest` the longest [s]
-    tolerance, nominal : permitted error of a substep in parts of each state, or of its nominal size
+    rates : gives the derivatives of the states, from the time since the start of the step and the states at
+        that time close : gives states near its argument that meet the model's constraints at that time;
+        called after each substep pace, longest : first substep, 0 where none is known, and longest substep
+        [s] tolerance, nominal : permitted error of a substep, relative to each state or to its nominal size
 
     Raises
     ------
     ArithmeticError
-        where the states leave all bounds.
+        where the states are not finite even after the shortest substep.
     BudgetError
-        where it takes more than `most` steps.
+        where the step takes more than `most` substeps.
     """
     now, since, steps, pace = list(x), 0.0, 0, pace or FIRST * longest
     while since < step:

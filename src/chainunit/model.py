@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 from . import refusals
 from .engines import MATH
 from .errors import GeometryError, InputError
-from .quantities import Layout, bounded, violations
+from .quantities import Layout, violations, within_bounds
 
 
 @dataclass(frozen=True)
@@ -23,23 +23,26 @@ class Requirement:
     """A condition on the parameters beyond their own bounds: `subject` in `unit` lies strictly between two
     limits that depend on the others.
 
-    `why` tells the consequence otherwise, with the parameters `given` named beside it; `depends` are further ones
-    that the limits come from; `remedy` what to do where no value fits. The words are declared once; the limits come
-    from the model's `requirements`.
+    `why` says what happens if the condition is not met; the refusal names the parameters of `context` with
+    their values. `depends` are further parameters that set the limits. `remedy` says what to do where no
+    value
+    fits. The words are declared once; the limits come from the model's `requirements`.
     """
 
     subject: str
     unit: str
     why: str
-    given: tuple[str, ...] = ()
+    context: tuple[str, ...] = ()
     remedy: str = ""
     depends: tuple[str, ...] = ()
 
     def refusal(self, value: float, low: float, high: float, values: Mapping[str, float]) -> str:
         """The line that refuses `value`."""
         unit = refusals.unit_behind(self.unit)
-        formats = (refusals.FIRST_PARAMETER, *[refusals.NEXT_PARAMETER] * len(self.given))
-        those = "".join(f.format(name=n, value=values[n]) for f, n in zip(formats, self.given, strict=False))
+        formats = (refusals.FIRST_PARAMETER, *[refusals.NEXT_PARAMETER] * len(self.context))
+        those = "".join(
+            f.format(name=n, value=values[n]) for f, n in zip(formats, self.context, strict=False)
+        )
         bounded = math.isfinite(low), math.isfinite(high)
         limits = {(True, False): refusals.ABOVE, (False, True): refusals.BELOW}.get(bounded, refusals.BETWEEN)
         return refusals.REQUIREMENT.format(
@@ -56,8 +59,9 @@ class Requirement:
 
 @dataclass(frozen=True)
 class Terminal:
-    """Variables that connect as one. `members` maps the name that both sides know to the model's own; `flows` says
-    which of them flow, and whereto ("inflow", "outflow"); `kind` tells its possible partners."""
+    """Variables that are connected together. `members` maps each name that both sides know to the model's own
+    name; `flows` gives the flow variables with their direction ("inflow", "outflow"); only terminals of one
+    `kind` are joined."""
 
     name: str
     kind: str
@@ -67,7 +71,7 @@ class Terminal:
 
 
 class Part:
-    """Outputs that are evaluated together, when one of them is asked for.
+    """Outputs that are evaluated together, as soon as one of them is requested.
 
     `equations` is called as ``equations(xp, p, u, x, shared)``, where `shared` is what the
     model's `shared` returned, and gives an instance of the declaration `declared`.
@@ -76,8 +80,8 @@ class Part:
     def __init__(
         self, declared: type, equations: Callable[..., Any], *, by_differences: frozenset[str] = frozenset()
     ) -> None:
-        """`by_differences` names outputs that are derivatives themselves and whose own derivatives it takes by
-        central differences: exact ones would be the largest part of its code."""
+        """`by_differences` names outputs that are derivatives themselves. Their own derivatives are central
+        differences, as exact ones would be the largest part of the code."""
         self.layout = Layout(declared)
         self.equations = equations
         self.by_differences = by_differences
@@ -88,7 +92,8 @@ class ModelType(type):
 
 
 def _reduced(model: Any) -> str | tuple[Callable[..., Any], tuple[Any, ...]]:
-    """A model as pickle keeps it: by its name, or by the call that makes it, for a class that no module names."""
+    """A model as pickle stores it: by its name, or, for a class that has no name in a module, by the call
+    that makes it."""
     maker = vars(model).get("maker")
     return model.__qualname__ if maker is None else maker
 
@@ -112,23 +117,25 @@ class Model(metaclass=ModelType):
     required: ClassVar[tuple[Requirement, ...]] = ()
     terminals: ClassVar[tuple[Terminal, ...]] = ()
     derived: ClassVar[int] = 0
-    """How many values follow from the fixed parameters alone and are computed once, before a run: see `derive`."""
+    """Number of values that follow from the fixed parameters alone and are computed once before a run; see
+    `derive`."""
     input_rates: ClassVar[Mapping[str, str]] = {}
-    """Inputs of a co-simulation FMU that run along another one, their time derivative, inside a step (``phi`` along
-    ``w`` along ``a``): else what turns would stand still in each step."""
+    """Inputs of a co-simulation FMU whose time derivative is another input (``phi`` has ``w``, ``w`` has
+    ``a``). They are extrapolated inside a step; without that a turning shaft would stand still in each
+    step."""
     start_unknowns: ClassVar[int] = 0
-    """How many numbers the states at the start are found from by iteration; see `start`."""
+    """Number of unknowns that an iteration finds to give the states at the start; see `start`."""
     start_rounds: ClassVar[int] = 0
-    """Rounds of that iteration."""
+    """Number of rounds of that iteration."""
     start_required: ClassVar[tuple[Requirement, ...]] = ()
-    """A condition on the states at the start; see `start_limits`."""
+    """Conditions on the states at the start; see `start_limits`."""
     controlled: ClassVar[bool] = False
-    """Whether a co-simulation FMU integrates with control of the error, to `tolerance`, and closes the states by
-    `closed` after each of its steps; else in equal steps."""
+    """Whether a co-simulation FMU integrates with error control to `tolerance` and corrects the states by
+    `closed` after each substep; otherwise it integrates in equal steps."""
     built_by: ClassVar[str] = ""
-    """The call that gives this class, for one that a function of its module makes."""
+    """The call that makes this class, if a function of its module makes it; else empty."""
     maker: ClassVar[tuple[Callable[..., Any], tuple[Any, ...]] | None] = None
-    """The same as function and arguments: by it another process finds the class."""
+    """The same call as function and arguments, by which another process gets the class."""
 
     parameter_layout: ClassVar[Layout]
     input_layout: ClassVar[Layout]
@@ -143,18 +150,18 @@ class Model(metaclass=ModelType):
 
     @staticmethod
     def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """Value, lower and upper limit of each of `required`, in order; a later one may be undefined where an
-        earlier one is not met."""
+        """Value, lower limit and upper limit of each requirement of `required`, in order. A later one may be
+        undefined where an earlier one is not met."""
         return iter(())
 
     @staticmethod
     def derive(xp: Any, p: Any) -> list[Any]:
-        """Values computed once from the fixed parameters; the equations find them as ``p.derived``."""
+        """Values computed once from the fixed parameters; the equations read them as ``p.derived``."""
         return []
 
     @classmethod
     def prepared(cls, xp: Any, p: Any, derived: list[Any] | None = None) -> Any:
-        """Parameters with the values of `derive`, or with these values in their place."""
+        """The parameters with the values of `derive`, or with the values `derived` in their place."""
         if not cls.derived:
             return p
         ready = copy.copy(p)
@@ -163,8 +170,8 @@ class Model(metaclass=ModelType):
 
     @classmethod
     def check(cls, p: Any, derived: list[Any] | None = None) -> Any:
-        """The parameters `prepared`, with those `derived` values if they are known; refuse what is out of bounds, or
-        makes no machine.
+        """The parameters `prepared`, with the values `derived` if they are given. Parameters that are out of
+        bounds, or with which the machine does not work, are refused.
 
         Raises
         ------
@@ -175,7 +182,7 @@ class Model(metaclass=ModelType):
         """
         for line in violations(cls.parameter_layout, p):
             raise InputError(line)
-        p = bounded(cls.parameter_layout, p)
+        p = within_bounds(cls.parameter_layout, p)
         try:
             p = cls.prepared(MATH, p, derived)
         except (ArithmeticError, ValueError):
@@ -186,18 +193,18 @@ class Model(metaclass=ModelType):
 
     @classmethod
     def _meets(
-        cls, p: Any, required: tuple[Requirement, ...], limits: Iterator[tuple[Any, Any, Any]]
+        cls, p: Any, requirements: tuple[Requirement, ...], limits: Iterator[tuple[Any, Any, Any]]
     ) -> None:
-        for each, (value, low, high) in zip(required, limits, strict=True):
+        for each, (value, low, high) in zip(requirements, limits, strict=True):
             if not low < value < high:
-                error = GeometryError(each.refusal(value, low, high, cls.parameter_layout.named(p)))
-                error.names = (each.subject, *each.given, *each.depends)
+                error = GeometryError(each.refusal(value, low, high, cls.parameter_layout.by_name(p)))
+                error.names = (each.subject, *each.context, *each.depends)
                 raise error
 
     @classmethod
     def course(cls, values: Sequence[Any]) -> list[tuple[int, Any, Any]]:
-        """Place, rate and half of the rate's rate of each input that runs along another one, from the values of all:
-        `since` later it has gone on by since (rate + since half)."""
+        """Index, rate and half of the second derivative of each input of `input_rates`, from the `values` of
+        all inputs: after the time `since` the input has changed by since * (rate + since * half)."""
 
         def rate(name: str | None) -> Any:
             other = cls.input_rates.get(name or "")
@@ -224,13 +231,14 @@ class Model(metaclass=ModelType):
         raise NotImplementedError
 
     @classmethod
-    def started(cls, xp: Any, p: Any, u: Any, z: list[Any]) -> Any:
+    def start_states(cls, xp: Any, p: Any, u: Any, z: list[Any]) -> Any:
         """States at the start with the inputs `u`, from the unknowns."""
         return cls.initial_states(xp, p)
 
     @staticmethod
     def start_limits(xp: Any, p: Any, u: Any, x: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """Value, lower and upper limit of each of `start_required`, in order, of the states `x` at the start."""
+        """Value, lower limit and upper limit of each requirement of `start_required`, in order, for the
+        states `x`."""
         return iter(())
 
     @classmethod
@@ -240,7 +248,7 @@ class Model(metaclass=ModelType):
         Raises
         ------
         GeometryError
-            where they do not meet a condition, in one line.
+            where the states do not meet a condition, in one line.
         """
         x = cls.start(MATH, p, u)
         cls._meets(p, cls.start_required, cls.start_limits(MATH, p, u, x))
@@ -248,11 +256,12 @@ class Model(metaclass=ModelType):
 
     @classmethod
     def start(cls, xp: Any, p: Any, u: Any, rounds: int | None = None) -> Any:
-        """States at the start with the inputs `u`; a few `rounds` show their dependencies."""
+        """States at the start with the inputs `u`, by `start_rounds` or so many `rounds`: a few show the
+        dependencies."""
         z = cls.start_guess(xp, p, u)
         for _ in range(cls.start_rounds if rounds is None else rounds):
             z = cls.start_improved(xp, p, u, z)
-        return cls.started(xp, p, u, z)
+        return cls.start_states(xp, p, u, z)
 
     @staticmethod
     def derivatives(xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
@@ -281,8 +290,8 @@ class Model(metaclass=ModelType):
 
     @classmethod
     def evaluate(cls, xp: Any, p: Any, u: Any, x: Any = None) -> tuple[Any, ...]:
-        """Every part's outputs at one point (or array of points); parameters that are not `prepared` are, each
-        time."""
+        """The outputs of every part at one point (or array of points). Parameters that are not yet `prepared`
+        are prepared in each call."""
         if cls.derived and not hasattr(p, "derived"):
             p = cls.prepared(MATH, p)
         shared = cls.shared(xp, p, u, x)

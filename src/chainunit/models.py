@@ -1,4 +1,4 @@
-"""The models that become FMUs, by name. A module of `machines` adds its machine by itself."""
+"""The models that become FMUs, by name. A module of `machines` adds its own machine."""
 
 from importlib import import_module
 from pkgutil import iter_modules

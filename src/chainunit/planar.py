@@ -56,7 +56,7 @@ class Vec2:
         return self.x * self.x + self.y * self.y
 
     def length(self, xp: Any) -> Any:
-        """Length, of no less than 1e-30, with which it has a slope at zero, too: none in any direction."""
+        """Length, at least 1e-30. With this bound the zero vector, too, has a derivative, which is zero."""
         return xp.sqrt(self.squared() + _NO_LENGTH * _NO_LENGTH)
 
 
@@ -64,7 +64,7 @@ _NO_LENGTH = 1e-30
 
 
 def lifted(v: Vec2, d: Vec2) -> Vec2:
-    """The vector `v` as a dual one, with the derivative `d`."""
+    """The vector `v` as a dual vector with the derivative `d`."""
     return Vec2(Dual(v.x, d.x), Dual(v.y, d.y))
 
 
@@ -87,7 +87,7 @@ class Motion:
         self.p2 = p2
 
     def lifted(self, p3: Vec2) -> Motion:
-        """The motion with the derivatives by q as dual parts, from the third one."""
+        """The motion with its derivatives by q as dual parts; `p3` is the third one."""
         return Motion(lifted(self.p, self.p1), lifted(self.p1, self.p2), lifted(self.p2, p3))
 
 
@@ -114,7 +114,7 @@ class Link:
 
     def carried(self, r: Vec2) -> Motion:
         """Motion of the point `r` away from the pin."""
-        # in components: a vector costs `math` ten times a number
+        # in components: with the engine `math` a vector takes ten times as long as a number
         p, p1, p2, x, y = self.pin.p, self.pin.p1, self.pin.p2, r.x, r.y
         t1, t2 = self.t1, self.t2
         spin = t1 * t1
@@ -125,13 +125,15 @@ class Link:
         )
 
     def third(self, r: Vec2, start: Vec2, t3: Any) -> Vec2:
-        """Third derivative by q of the point `r` away from the pin, from `start` of the pin and `t3` of the angle."""
+        """Third derivative by q of the point `r` away from the pin; `start` is that of the pin, `t3` that of
+        the angle."""
         t1 = self.t1
         across, along = t3 - t1 * t1 * t1, 3.0 * (t1 * self.t2)
         return Vec2(start.x - r.y * across - r.x * along, start.y + r.x * across - r.y * along)
 
     def lifted(self, start: Vec2, t3: Any) -> Link:
-        """The link with the derivatives by q as dual parts, from the third ones of its pin and its angle."""
+        """The link with its derivatives by q as dual parts; `start` is the third one of the pin, `t3` that of
+        the angle."""
         return Link(
             self.pin.lifted(start),
             lifted(self.u, self.u.turned() * self.t1),

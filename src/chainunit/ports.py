@@ -1,8 +1,9 @@
 """The load port: how a machine shows its load to the shaft that drives it.
 
-The machine gives torque at constant speed and reflected inertia at one point, with their slopes; the driver
-solves for its own acceleration with the linearised load inside its step, so that there is no algebraic
-loop, and the coupling is second order in the communication step. Seven plain signals, which chain.
+The machine gives its torque at constant speed and its reflected inertia at one point, with their slopes. The
+driver solves for its own acceleration with the linearised load inside its step. So there is no algebraic
+loop, and the coupling is second order in the communication step. The port is seven plain signals, and ports
+can be chained.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ class PortSlopes:
 
 @declaration
 class LoadPort(PortSlopes, PortValues):
-    """The seven signals, as a driver takes them."""
+    """The seven signals of the load port, as inputs of a driver."""
 
 
 NO_LOAD = LoadPort(tau_bias=0.0, J=0.0, dJ_dphi=0.0, phi0=0.0, w0=0.0, tau_bias_dphi=0.0, tau_bias_dw=0.0)
@@ -61,7 +62,7 @@ class LoadInput:
 
 @declaration
 class ShaftMotion:
-    """Motion of the motor's shaft, as a model takes it that does not own the shaft."""
+    """Motion of the motor's shaft, as the input of a model that does not compute it."""
 
     phi: Value = quantity("rad", "motor angle", default=0.0)
     w: Value = quantity("rad/s", "motor speed", default=0.0)
@@ -70,7 +71,8 @@ class ShaftMotion:
 
 @declaration
 class ShaftInput(ShaftMotion, LoadInput):
-    """The motor's shaft, and the load of the machine: the inputs of a part between the two."""
+    """Motion of the motor's shaft, and the load of the machine: the inputs of a part between motor and
+    machine."""
 
 
 @declaration
@@ -91,17 +93,17 @@ def load_inertia(load: LoadPort, phi: Any) -> Any:
 
 
 def shaft_motion(load: LoadPort, phi: Any, w: Any, J: Any, tau: Any) -> tuple[Any, Any]:
-    """Acceleration [rad/s2] of a shaft of the inertia `J` [kg m2] that the torque `tau` [N m] speeds up and the load
-    holds back, and the torque [N m] that it gives to the load."""
+    """Acceleration [rad/s2] of a shaft with the inertia `J` [kg m2], which the torque `tau` [N m] drives
+    against the load, and the torque [N m] that the shaft gives to the load."""
     torque, inertia = load_torque(load, phi, w), load_inertia(load, phi)
     a = (tau - torque) / (J + inertia)
     return a, inertia * a + torque
 
 
 OWN = "org.chainunit"
-"""Before the names of kinds of terminals that are ours."""
+"""Prefix of the names of this package's own kinds of terminals."""
 FLANGE, LOAD = f"{OWN}.flange", f"{OWN}.load"
-"""Kinds of the terminals of a shaft and of a load port."""
+"""Kinds of terminals: of a shaft, and of a load port."""
 
 
 def flange(flow: str, prefix: str = "", name: str = "flange") -> Terminal:
@@ -112,7 +114,7 @@ def flange(flow: str, prefix: str = "", name: str = "flange") -> Terminal:
 
 
 def flanges(flow: str) -> tuple[Terminal, Terminal]:
-    """The terminals of the shaft: our own, and the one that tools with Modelica's library know."""
+    """The terminals of the shaft: the package's own, and the one that tools with Modelica's library know."""
     own = flange(flow)
     modelica = "Modelica.Mechanics.Rotational.Interfaces.Flange_a"
     members = {name: name for name in ("phi", "tau")}

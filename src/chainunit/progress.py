@@ -1,10 +1,10 @@
-"""How a long task says how far it is."""
+"""The functions by which a long task reports its progress."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 Progress = Callable[[float], None]
-"""Called with how much is done."""
+"""A function that a task calls with the amount of work that is complete."""
 Report = Callable[[str, float, float], None]
-"""Called with what is running, how much is done, and all that there is to do."""
+"""A function that a task calls with its name, the amount of work that is complete, and the total amount."""

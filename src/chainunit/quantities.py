@@ -1,12 +1,13 @@
 """Declares a parameter, input, state or output once: unit, description, bounds, start.
 
 A model states its quantities as frozen dataclasses whose fields come from `quantity` (one
-scalar) or `group` (a nested dataclass, whose fields appear under a prefix: ``crank.m``).
+scalar) or `group` (a nested dataclass, whose fields have a prefix: ``crank.m``).
 Everything else - modelDescription.xml, config validation, tables, netCDF attributes - is
 generated from these declarations. Standard library only: FMUs carry this file.
 
 Units are written as in FMI: ``.`` multiplies, ``/`` divides, an integer behind a name is its power:
-``kg.m2``, ``N.m.s/rad``, ``1`` for a pure number. Several factors below stand in brackets: ``Hz/(N.m)``.
+``kg.m2``, ``N.m.s/rad``, ``1`` for a pure number. Several factors in the denominator stand in brackets:
+``Hz/(N.m)``.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ DISPLAY_UNITS: dict[str, tuple[str, float, float]] = {
     "rad/s": ("rev/min", 30.0 / math.pi, 0.0),
     "K": ("degC", 1.0, -273.15),
 }
-"""unit -> (display unit, factor, offset), shown = factor * value + offset."""
+"""unit -> (display unit, factor, offset); the displayed value is factor * value + offset."""
 
 TYPES: dict[str, str] = {
     "1": "Ratio",
@@ -85,7 +86,7 @@ TYPES: dict[str, str] = {
     "Hz/s": "FrequencyRate",
     "Hz/(N.m)": "SlipCompensation",
 }
-"""Name of the kind of quantity of a unit, as the declared type of an FMU's variables."""
+"""By unit, the name of the kind of quantity: the declared type of an FMU's variables."""
 
 
 def base_units(unit: str) -> dict[str, int]:
@@ -94,7 +95,7 @@ def base_units(unit: str) -> dict[str, int]:
     Raises
     ------
     ValueError
-        for a unit name that is not known here, or more than one stroke.
+        for an unknown unit name, or more than one stroke.
     """
     exponents: dict[str, int] = {}
     parts = unit.split("/")
@@ -141,22 +142,23 @@ MOST: dict[str, float] = {
     "A/rad": 1e15,
     "Ohm/s": 1e12,
 }
-"""Upper bound of a quantity that declares a lower bound alone, by unit: no machine reaches it, and the equations
-stay within the range of numbers."""
+"""By unit, the upper bound of a quantity that declares only a lower bound. No machine reaches it, and up to
+it the equations do not overflow."""
 
 USUAL: dict[str, tuple[float, float]] = {"m": (1e-4, 30.0), "kg": (1e-3, 2e4), "N": (1e-3, 1e6)}
-"""Sizes that machines of this kind have, by unit, where a declaration names none of its own; 0 is always one."""
+"""By unit, the range of usual sizes of a quantity whose declaration gives none; 0 is always usual."""
 
 ROUNDING = 1e-9
-"""in parts of a quantity's nominal size: a value beyond a bound by no more counts as the bound"""
+"""Tolerance of a bound, relative to the nominal size of the quantity: a value beyond the bound by less is the
+bound."""
 
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """One scalar: unit, description, bounds (`low` may itself be forbidden: `open_low`),
-    start value (None for outputs), size that is typical of it, whether it may change in a run, the sizes that are
-    usual (beyond them a slip of the unit is likely, nothing is refused), and how people show it beside its unit
-    (`kind`, see `chainunit.text`)."""
+    """One scalar: its unit, its description, its bounds (with `open_low` the bound `low` itself is not
+    allowed), its start value (None for outputs), its `nominal` size, whether it may change in a run
+    (`tunable`), the range of its `usual` sizes (a value outside it is probably a slip of the unit, and is not
+    refused), and its `kind`, which says how it is shown (see `chainunit.text`)."""
 
     unit: str
     description: str
@@ -170,12 +172,12 @@ class Quantity:
     kind: str = ""
 
     def is_usual(self, x: float) -> bool:
-        """Whether a machine of this kind may well have the value `x`."""
+        """Whether the value `x` is usual for a machine of this kind."""
         low, high = self.usual or (0.0, math.inf)
         return x == 0.0 or low <= abs(x) <= high
 
     @property
-    def allowed(self) -> str:
+    def allowed_range(self) -> str:
         """The allowed range in words, e.g. ``> 0 m``."""
         unit = refusals.unit_behind(self.unit)
         low = f"{'>' if self.open_low else '>='} {self.low:g}{unit}" if math.isfinite(self.low) else ""
@@ -184,7 +186,8 @@ class Quantity:
 
     @property
     def slack(self) -> float:
-        """How far beyond a bound a value counts as the bound: the rounding of its typical size."""
+        """The distance beyond a bound up to which a value counts as the bound: the rounding of its nominal
+        size."""
         return ROUNDING * (self.nominal or 1.0)
 
     def admits(self, x: float) -> bool:
@@ -192,8 +195,8 @@ class Quantity:
         above = x > self.low if self.open_low else x >= self.low - self.slack
         return math.isfinite(x) and above and x <= self.high + self.slack
 
-    def bounded(self, x: float) -> float:
-        """An admitted number `x`, on its bound where it is beyond it by rounding."""
+    def within_bounds(self, x: float) -> float:
+        """The admitted number `x`, set to the bound where it is beyond it by rounding."""
         return self.low if x < self.low else self.high if x > self.high else x
 
 
@@ -214,9 +217,10 @@ def quantity(
     usual: tuple[float, float] | None = None,
     kind: str = "",
 ) -> Any:
-    """A field that declares one scalar; `default` is its start value (outputs have none), `above` a
-    lower bound that is itself forbidden. Without `max`, a quantity with a lower bound has the upper one of `MOST`;
-    without `usual`, its sizes are those of `USUAL`. `kind` says how people show it (see `chainunit.text`)."""
+    """A field that declares one scalar. `default` is its start value (outputs have none); `above` is a lower
+    bound that is not allowed itself. Without `max`, a quantity with a lower bound has the upper bound of
+    `MOST`; without `usual`, its usual sizes are those of `USUAL`. `kind` says how it is shown (see
+    `chainunit.text`)."""
     base_units(unit)
     low = min if above is None else above
     high = MOST.get(unit, math.inf) if math.isinf(max) and math.isfinite(low) else max
@@ -271,7 +275,7 @@ class Variable:
 
     @property
     def kind(self) -> str:
-        """How people show it, as in the declaration."""
+        """The kind by which it is shown, as in the declaration."""
         return self.quantity.kind
 
 
@@ -295,7 +299,7 @@ def variables(cls: type, prefix: str = "", context: str = "", default: Any = Non
 
 
 def finite(value: Any) -> float | None:
-    """A number as JSON can have it: None where it is not finite, or none."""
+    """A number as JSON can hold it: None in place of None or a number that is not finite."""
     return None if value is None or not math.isfinite(value) else float(value)
 
 
@@ -315,7 +319,7 @@ class Layout:
             return [self._getter(instance)]
         return list(self._getter(instance))
 
-    def named(self, instance: Any) -> dict[str, Any]:
+    def by_name(self, instance: Any) -> dict[str, Any]:
         """The values of `instance` by name."""
         return dict(zip(self.names, self.values(instance), strict=True))
 
@@ -324,7 +328,8 @@ class Layout:
         return _build(self._plan, values)
 
     def from_names(self, values: dict[str, Any], default: Any = None) -> Any:
-        """The instance with these `values` by name; others from `default`, else at start.
+        """The instance with these `values` by name; the other values are those of `default`, or else the
+        start values.
 
         Raises
         ------
@@ -367,10 +372,10 @@ def violations(layout: Layout, instance: Any) -> Iterator[str]:
             yield complaint(variable, x)
 
 
-def bounded(layout: Layout, instance: Any) -> Any:
-    """An admitted `instance` with each value that is beyond a bound by rounding on that bound."""
+def within_bounds(layout: Layout, instance: Any) -> Any:
+    """The admitted `instance`, with each value that is beyond a bound by rounding set to that bound."""
     values = layout.values(instance)
-    inside = [v.quantity.bounded(x) for v, x in zip(layout.variables, values, strict=True)]
+    inside = [v.quantity.within_bounds(x) for v, x in zip(layout.variables, values, strict=True)]
     return instance if inside == values else layout.instance(inside)
 
 
@@ -378,8 +383,8 @@ def complaint(variable: Variable, x: Any) -> str:
     """The line that says what is wrong with the value `x` of `variable`."""
     q = variable.quantity
     free = math.isinf(q.low) and math.isinf(q.high)
-    finite = refusals.NUMBER if free else refusals.FINITE.format(allowed=q.allowed)
-    allowed = q.allowed if math.isfinite(x) else finite
+    finite = refusals.NUMBER if free else refusals.FINITE.format(allowed=q.allowed_range)
+    allowed = q.allowed_range if math.isfinite(x) else finite
     line = refusals.VALUE.format(
         name=variable.name, value=x, unit=refusals.unit_behind(q.unit), allowed=allowed
     )

@@ -53,7 +53,7 @@ def to_number(variable: Variable, given: Any) -> float:
     if not variable.quantity.admits(value):
         meant = _meant(variable, given)
         raise ValueError(complaint(variable, value) + (f'; was "{meant}" meant?' if meant else ""))
-    return variable.quantity.bounded(value)
+    return variable.quantity.within_bounds(value)
 
 
 def _may_be_share(variable: Variable) -> bool:
@@ -72,7 +72,7 @@ def _converted(variable: Variable, text: str) -> float:
             return units.convert(number, written, variable.unit, variable.kind) if written else number
     except ValueError:
         pass
-    meant = units.meant(text, variable.unit, variable.kind)
+    meant = units.probable_text(text, variable.unit, variable.kind)
     hint = f'; was "{meant}" meant?' if meant else ""
     raise ValueError(f"{variable.name} = {shown(text)}: must be {_kind(variable)}{hint}")
 

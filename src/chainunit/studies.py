@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from .errors import InputError, WriteError, near_name, shown
-from .files import claimed, clear, write_all
+from .files import claim, clear, write_all
 from .fmu.backends import Backend
 from .machines.machine import Machine
 from .places import lines_of
@@ -36,7 +36,7 @@ from .study.parts import over_example, parts_of
 from .study.record import INSUFFICIENT, StudyRecord
 from .study.result import as_dict
 from .study.window import Phase
-from .text import number, written_in
+from .text import number, shown_in
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,14 +46,14 @@ _TABLES, _TEXT = "tables in Python", "text in Python"
 
 
 class Study:
-    """A machine with its motor, and what is to be run.
+    """A machine with its motor, and the runs that are to be made.
 
     Parameters
     ----------
     **tables : the keys and tables of a study file (``chainunit keys`` shows them), by the same names and with the
-        same checks: tables are mappings, events a list of them. A number is in the SI unit that is declared; a text
-        may carry a unit. A key that is left out is the example's. Files that are named are relative to the working
-        folder.
+        same checks: tables are mappings, events a list of them. A number is in the declared SI unit; a text
+        may carry a unit. A key that is left out has the value of the example. Paths of files are relative to
+        the working folder.
 
     Raises
     ------
@@ -74,7 +74,7 @@ class Study:
     """
 
     config: Config
-    """the study, checked"""
+    """The configuration of the study, checked."""
 
     def __init__(self, **tables: Any) -> None:
         self._take(study_files.of_tables(_plain(tables), _TABLES), _TABLES)
@@ -86,14 +86,14 @@ class Study:
         Raises
         ------
         InputError
-            with a line for each fault, which begins with file and line.
+            with a line of text for each fault, which begins with the file and its line number.
         """
         config = study_files.load(None if path is None else Path(path))
         return cls.__new__(cls)._take(config, config.source)
 
     @classmethod
     def from_text(cls, text: str) -> Self:
-        """The study of a TOML text; files that it names are relative to the working folder.
+        """The study of a TOML text; paths in it are relative to the working folder.
 
         Raises
         ------
@@ -105,7 +105,8 @@ class Study:
         return cls.__new__(cls)._take(config, _TEXT)
 
     def _take(self, config: Config, source: str, changes: Mapping[str, Any] | None = None) -> Self:
-        """Be the study `config`, `changes` against its `source` included; files that it names are beside that."""
+        """Become the study `config`, which has `changes` against its `source`; paths in it are relative to
+        the source."""
         self._source, self._changes = source, dict(changes or {})
         if self._changes:
             config = dataclasses.replace(config, source=f"{source} with {self._changed}")
@@ -119,13 +120,14 @@ class Study:
 
         Parameters
         ----------
-        values : such as ``{"machine.r": "170 mm", "event.jam_left.force": "3 kN", "start": "direct"}``; an event is
-            named by its run. A name without a value in it stands for the whole table: ``{"event": []}``.
+        values : such as ``{"machine.r": "170 mm", "event.jam_left.force": "3 kN", "start": "direct"}``; an
+            event is called by the name of its run. The name of a table stands for the whole table:
+            ``{"event": []}``.
 
         Raises
         ------
         InputError
-            as of the class.
+            as the class.
         """
         tables = copy.deepcopy(dict(self.config.tables))
         for name, value in values.items():
@@ -144,8 +146,8 @@ class Study:
         return ", ".join(f"{name} = {shown(value)}" for name, value in self._changes.items())
 
     def _place(self, name: str, run: str, tables: dict[str, Any]) -> str:
-        """The number in the list of events of the one that is run as `run`; events of the example are written into
-        the `tables` first."""
+        """The index of the event with the name `run` in the list of events. Events of the example are written
+        into the `tables` first."""
         runs = list(self.config.events)
         if run not in runs:
             hint = near_name(run, runs) or f"; there are {', '.join(runs) or 'none'}"
@@ -166,36 +168,36 @@ class Study:
         backend: Backend | None = None,
         progress: Progress | None = None,
     ) -> StudyResult:
-        """Run it: start-up, steady running, every event; half a minute for the packaged example.
+        """Run the study: start-up, steady running, every event. The packaged example takes half a minute.
 
         Parameters
         ----------
-        folder : where the files of ``chainunit study -o`` are written; without one nothing is left on the disk but
-            what `StudyResult.save` writes
-        check : compare every run with the monolithic solution, too
-        backend : of the FMUs, "native" or "python"; by default native where there is a C compiler
-        progress : called with what is running, how much is done, and all that there is to do
+        folder : the folder to which the files of ``chainunit study -o`` are written; without it only
+            `StudyResult.save` leaves files on the disk check : whether every run is also compared with the
+            monolithic solution backend : backend of the FMUs, "native" or "python"; by default native where
+            there is a C compiler progress : a function that is called with the task, the amount of work that
+            is complete, and the total amount
 
         Raises
         ------
         InputError
-            for what only a run shows, such as a motor of somebody else that does not fit.
+            for a fault that only a run shows, such as a foreign motor that does not fit.
         RunError
             for a run that stopped early; its `partial` is the `StudyResult` up to there.
         WriteError
-            for a file that could not be written; the others are.
+            for a file that cannot be written; the others are written.
         """
         if folder is None:
-            kept = Path(tempfile.mkdtemp(prefix="chainunit_"))
+            temporary = Path(tempfile.mkdtemp(prefix="chainunit_"))
             try:
-                record = results.compute(self.config, kept, progress, check=check, backend=backend)
+                record = results.compute(self.config, temporary, progress, check=check, backend=backend)
             except BaseException:
-                shutil.rmtree(kept, ignore_errors=True)
+                shutil.rmtree(temporary, ignore_errors=True)
                 raise
-            result = StudyResult(record, kept)
-            weakref.finalize(result, shutil.rmtree, kept, ignore_errors=True)
+            result = StudyResult(record, temporary)
+            weakref.finalize(result, shutil.rmtree, temporary, ignore_errors=True)
         else:
-            with claimed(Path(folder)) as place:
+            with claim(Path(folder)) as place:
                 record = results.compute(self.config, place, progress, check=check, backend=backend)
                 result = StudyResult(record, place)
                 result._write(place)
@@ -206,7 +208,7 @@ class Study:
 
     def __repr__(self) -> str:
         config = self.config
-        with written_in(config.units):
+        with shown_in(config.units):
             speed = number(config.run.crank_speed, "rad/s", "speed")
         motor = "a motor that sizing chooses" if config.sizing else config.choices["system.motor"]
         changes = f" with {self._changed}" if self._changes else ""
@@ -216,20 +218,20 @@ class Study:
         )
 
     def _repr_html_(self) -> str:
-        """The same with a drawing of the machine, for notebooks."""
+        """The text of `repr` with a drawing of the machine, for notebooks."""
         words = f"<p>{escape(repr(self)[1:-1])}</p>"
         if isinstance(self.machine, ForeignMachine):
             return words
-        # its lines are dark, the page of a notebook may be
+        # the lines of the drawing are dark, and the page of a notebook may be dark, too
         return f'{words}<div style="background: white; max-width: 60em">{drawing(self.machine)}</div>'
 
 
 class StudyResult:
-    """What a study found. Shown by itself, it is its title, the verdicts and the main answers of every run."""
+    """The result of a study. Its `repr` shows the title, the verdicts and the main answers of every run."""
 
     def __init__(self, record: StudyRecord, folder: Path) -> None:
         self.record = record
-        """all that was computed, as the report reads it"""
+        """All computed values, as the report reads them."""
         self._folder = folder
 
     @cached_property
@@ -242,8 +244,9 @@ class StudyResult:
 
     @cached_property
     def answers(self) -> pd.DataFrame:
-        """A row for each answer by its name in result.json, in SI units as the column "unit" says, and a column of
-        numbers for each run; NaN where an answer means nothing in a run."""
+        """A table with a row for each answer, by its name in result.json, and a column of numbers for each
+        run. The column "unit" gives the SI unit. A number is NaN where the answer has no meaning in the
+        run."""
         import pandas as pd
 
         record = self.record
@@ -256,22 +259,23 @@ class StudyResult:
         ):
             if begin is not None:
                 runs = {name: (begin, {v.name for v in measures_of(phase)}), **runs}
-        declared = Layout(Answers).variables
-        table = pd.DataFrame({"unit": [v.unit for v in declared]}, [v.name for v in declared])
-        for name, (answers, known) in runs.items():
-            values = (getattr(answers, v.name) if v.name in known else None for v in declared)
+        variables = Layout(Answers).variables
+        table = pd.DataFrame({"unit": [v.unit for v in variables]}, [v.name for v in variables])
+        for name, (answers, names) in runs.items():
+            values = (getattr(answers, v.name) if v.name in names else None for v in variables)
             table[name] = [np.nan if x is None else float(x) for x in values]
         return table.dropna(how="all", subset=list(runs))
 
     @cached_property
     def runs(self) -> xr.DataTree:
-        """The time series of every run: ``runs["jam_left"]["machine.tau"]``; units in ``attrs``. result.nc is the
-        same in a file."""
+        """The time series of every run: ``runs["jam_left"]["machine.tau"]``, with units in ``attrs``. The
+        file result.nc holds the same."""
         return series.tree(self.record)
 
     @property
     def verdict(self) -> str:
-        """Whether the model holds, whether the motor suffices, and whether any did: a line each."""
+        """The verdicts, a line each: on the model, on the motor, and, where it found no motor that fits, on
+        the sizing."""
         verdicts = self._numbers["verdict"].values()
         lines = [verdict["text"] for verdict in verdicts if verdict is not None]
         if self.record.insufficient:
@@ -280,7 +284,7 @@ class StudyResult:
 
     @property
     def warnings(self) -> list[str]:
-        """What gives cause for a warning, a text each."""
+        """The warnings, a text each."""
         return [warning["text"] for warning in self._numbers["warnings"]]
 
     @property
@@ -289,7 +293,7 @@ class StudyResult:
         return [note["text"] for note in self._numbers["notes"]]
 
     def to_json(self) -> str:
-        """All numbers with their units: what result.json holds."""
+        """All numbers with their units, as the text of result.json."""
         return files.numbers_text(self._summary)
 
     def save(self, folder: str | Path) -> list[Path]:
@@ -300,7 +304,7 @@ class StudyResult:
         InputError, WriteError
             as `Study.run`.
         """
-        with claimed(Path(folder)) as place:
+        with claim(Path(folder)) as place:
             if place.resolve() != self._folder.resolve():
                 clear(place, *results.FILES)
                 shutil.copytree(self._folder / "fmu", place / "fmu", dirs_exist_ok=True)
@@ -310,21 +314,21 @@ class StudyResult:
 
     def _write(self, folder: Path) -> list[Path]:
         report = contents.report(self.record, self._numbers)
-        written, unwritten = write_all(results.writers(self.record, report, folder))
-        if unwritten is not None:
-            raise WriteError(str(unwritten)) from unwritten
-        return written
+        paths, failure = write_all(results.writers(self.record, report, folder))
+        if failure is not None:
+            raise WriteError(str(failure)) from failure
+        return paths
 
     def __repr__(self) -> str:
         return terminal.plain(self._summary)
 
     def _repr_html_(self) -> str:
-        """For notebooks."""
+        """The summary as HTML, for notebooks."""
         return html.fragment(self._summary)
 
 
 def _plain(value: Any) -> Any:
-    """A value from Python as a TOML file would give it."""
+    """A value from Python in the form that a TOML file would give."""
     if isinstance(value, Mapping):
         return {str(name): _plain(each) for name, each in value.items()}
     if isinstance(value, list | tuple):
@@ -335,7 +339,8 @@ def _plain(value: Any) -> Any:
 
 
 def _put(tree: Any, path: list[str], value: Any) -> None:
-    """Set the value at a path in tables; what stands in the way and is no table gives way to one."""
+    """Set the value at a path in nested tables; a value on the path that is no table is replaced by a
+    table."""
     name, *inner = path
     if isinstance(tree, list) and not (name.isdecimal() and int(name) < len(tree)):
         raise InputError(f"{name}: must be the place of an entry, from 0 to {len(tree) - 1}")

@@ -3,12 +3,12 @@
 Kinds, beside the unit (see `quantities.quantity`):
 
 ``percent``      a share, shown in %
-``dip``          the share of a speed that is lost: where all or more is lost, the shaft stands or turns back
-``used``         the share of a limit that is used, in % up to ten times of it
-``difference``   of temperatures: it stays in K
-``speed``        of a shaft, in rad/s and rev/min
-``frequency``    an angular one, in rad/s and Hz
-``assumed``      known to one digit
+``dip``          the lost share of a speed; at 100 % or more, "stands" or "turns back"
+``used``         the used share of a limit: in % up to ten times the limit, beyond that as a multiple
+``difference``   a difference of temperatures, which stays in K
+``speed``        the speed of a shaft, in rad/s and rev/min
+``frequency``    an angular frequency, in rad/s and Hz
+``assumed``      a value that is known to one digit
 ``millimetres``  a length in mm
 """
 
@@ -29,22 +29,23 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _THIN = "\u202f"  # between thousands
 _SPACE = "\u00a0"  # before a unit
 _PERCENT = 10.0
-"""Up to there a share is shown in %, beyond as "over 1000 %", or a used share as so many times of it."""
+"""Largest share that is shown in %. A larger one is "over 1000 %"; a larger used share is a multiple."""
 _NOTHING = 5e-5
-"""A share below that is none."""
+"""A share below this value is shown as 0."""
 _TIMES = 1000.0
-"""Beyond, a used share is "over 1000 times" the limit: its size says nothing any more."""
+"""Largest multiple of a limit that is shown. A larger one is "over 1000 times", as its size has no meaning
+any more."""
 _SHARES = ("percent", "dip", "used")
 
 Units: TypeAlias = Mapping[str, tuple[str, ...]]
-"""By kind, the units in which its numbers are shown: one, or one and another beside it."""
+"""By kind, the units in which its numbers are shown: one unit, or one and a second beside it."""
 
 DEFAULT_UNITS: Units = MappingProxyType(
     {"speed": ("rad/s", "rev/min"), "frequency": ("rad/s", "Hz"), "power": ("kW",), "millimetres": ("mm",)}
 )
-_WRITTEN_IN: ContextVar[Units] = ContextVar("units of words", default=DEFAULT_UNITS)
+_SHOWN_IN: ContextVar[Units] = ContextVar("units of words", default=DEFAULT_UNITS)
 _KIND_OF = {"W": "power", "N.m": "torque", "N": "force"}
-"""Kind of a quantity that declares none, by its unit."""
+"""By unit, the kind of a quantity that declares none."""
 _SCALES: dict[str, dict[str, tuple[float, float]]] = {
     "speed": {"rad/s": (1.0, 0.0), "rev/min": (30.0 / math.pi, 0.0)},
     "frequency": {"rad/s": (1.0, 0.0), "Hz": (0.5 / math.pi, 0.0)},
@@ -53,20 +54,21 @@ _SCALES: dict[str, dict[str, tuple[float, float]]] = {
     "force": {"N": (1.0, 0.0), "kN": (1e-3, 0.0)},
     "millimetres": {"mm": (1e3, 0.0)},
 }
-"""By kind, the units it may be shown in: shown = factor * value + offset."""
+"""By kind, the units in which it may be shown, with factor and offset: shown = factor * value + offset."""
 CHOICES = {kind: tuple(scales) for kind, scales in _SCALES.items() if len(scales) > 1 and kind != "frequency"}
 """Units that an engineer may choose, by kind."""
 
 
-def chosen_units(given: Mapping[str, str]) -> Units:
-    """The units to show numbers in, where those of some kinds are chosen: ``{"speed": "rev/min"}``.
+def chosen_units(choices: Mapping[str, str]) -> Units:
+    """The units in which numbers are shown, where the user chooses those of some kinds: ``{"speed":
+    "rev/min"}``.
 
     Raises
     ------
     InputError
-        for a kind or a unit that there is not.
+        for an unknown kind or unit.
     """
-    for kind, unit in given.items():
+    for kind, unit in choices.items():
         if kind not in CHOICES:
             key = f"report.units.{kind}"
             raise InputError(
@@ -75,21 +77,22 @@ def chosen_units(given: Mapping[str, str]) -> Units:
         if unit not in CHOICES[kind]:
             allowed = " or ".join(f'"{name}"' for name in CHOICES[kind])
             raise InputError(f'report.units.{kind} = "{unit}": must be {allowed}', f"report.units.{kind}")
-    return {**DEFAULT_UNITS, **{kind: (unit,) for kind, unit in given.items()}}
+    return {**DEFAULT_UNITS, **{kind: (unit,) for kind, unit in choices.items()}}
 
 
 @contextmanager
-def written_in(units: Units) -> Iterator[None]:
-    """Within it the numbers in sentences are in these units, as those of a study are in the units of its reader."""
-    token = _WRITTEN_IN.set(units)
+def shown_in(units: Units) -> Iterator[None]:
+    """A context in which the numbers in sentences are in these units, as a study uses the units that its
+    reader chose."""
+    token = _SHOWN_IN.set(units)
     try:
         yield
     finally:
-        _WRITTEN_IN.reset(token)
+        _SHOWN_IN.reset(token)
 
 
 def scales(unit: str, kind: str = "", units: Units = DEFAULT_UNITS) -> list[tuple[str, float, float]]:
-    """The units in which a quantity is shown, the first before the one beside it, each with factor and offset:
+    """The units in which a quantity is shown, first unit first, each with factor and offset:
     shown = factor * value + offset."""
     if kind in _SHARES:
         return [("%", 100.0, 0.0)]
@@ -112,8 +115,8 @@ def unit_text(unit: str) -> str:
 
 
 def digits_text(value: float, digits: int = 3, *, full: bool = True) -> str:
-    """A number with that many digits that count, up to a million with all before the point; with `full`, zeros
-    at the end are kept: they say how exact the number is."""
+    """A number with so many significant `digits`; up to a million all digits before the point are written.
+    With `full`, zeros at the end are kept: they show how exact the number is."""
     size = abs(value)
     if value == 0.0:
         return "0"
@@ -154,8 +157,8 @@ def forms(
     full: bool = True,
     units: Units = DEFAULT_UNITS,
 ) -> list[tuple[str, str]]:
-    """The number, or words in its place, and the unit that follows it, of a `value` in its declared `unit`: in each
-    unit in which it is shown."""
+    """A `value` in its declared `unit` as text: for each unit in which it is shown, the number (or words in
+    its place) and the unit that follows it."""
     if kind in _SHARES:
         return [_share(value, kind, digits, full)]
     if kind == "assumed":
@@ -169,26 +172,27 @@ def forms(
 
 
 def entry(value: float | None, unit: str, kind: str = "") -> dict[str, Any]:
-    """A number as it stands in a result: with its unit, and its kind if it has one; null where it is not finite."""
+    """A number as a result holds it: with its unit, and its kind if it has one; None where it is not
+    finite."""
     return {"value": finite(value), "unit": unit} | ({"kind": kind} if kind else {})
 
 
 def array_entry(x: Any, unit: str, kind: str = "") -> dict[str, Any]:
-    """An array as `entry` gives a number; null where it is not finite."""
+    """An array as a result holds it, see `entry`; None for each number that is not finite."""
 
-    def listed(x: Any) -> Any:
-        return [listed(each) for each in x] if isinstance(x, list | tuple) else finite(float(x))
+    def plain_list(x: Any) -> Any:
+        return [plain_list(each) for each in x] if isinstance(x, list | tuple) else finite(float(x))
 
-    value = listed(x.tolist() if hasattr(x, "tolist") else x)
+    value = plain_list(x.tolist() if hasattr(x, "tolist") else x)
     return {"value": value, "unit": unit} | ({"kind": kind} if kind else {})
 
 
-def entries(declared: Any, *, titled: bool = False) -> dict[str, Any]:
-    """The declared values of an instance as ``{name: entry}``; with their descriptions where `titled`."""
-    layout = Layout(type(declared))
+def entries(instance: Any, *, titled: bool = False) -> dict[str, Any]:
+    """The declared values of an instance as ``{name: entry}``; with `titled`, each with its description."""
+    layout = Layout(type(instance))
     return {
         v.name: entry(value, v.unit, v.kind) | ({"title": v.description} if titled else {})
-        for v, value in zip(layout.variables, layout.values(declared), strict=True)
+        for v, value in zip(layout.variables, layout.values(instance), strict=True)
     }
 
 
@@ -203,29 +207,30 @@ def number(
     units: Units | None = None,
     beside: bool = True,
 ) -> str:
-    """The same in one piece and in plain letters, for a terminal or a message, the second unit in brackets where that
-    is wanted `beside`; `none` stands for a number that is not there. The units are those of `written_in`, unless
-    others are given."""
+    """The text of `forms` in one piece and in plain letters, for a terminal or a message. With `beside`, the
+    second unit follows in brackets. `none` is the text for a missing number. The units are those of
+    `shown_in`, unless `units` gives others."""
     if value is None or math.isnan(value):
         return none
-    shown = [
+    texts = [
         plain(f"{text} {follows}" if follows else text)
-        for text, follows in forms(value, unit, kind, digits, full=full, units=units or _WRITTEN_IN.get())
+        for text, follows in forms(value, unit, kind, digits, full=full, units=units or _SHOWN_IN.get())
     ]
-    return shown[0] + "".join(f" ({other})" for other in shown[1:] if beside)
+    return texts[0] + "".join(f" ({other})" for other in texts[1:] if beside)
 
 
 _PLAIN = {"−": "-", _THIN: "", "°C": "degC", "°": "deg", "Ω": "Ohm", "∞": "inf"}
 
 
 def turning(text: str, word: str) -> str:
-    """The text, written for a machine with a crank, for one whose motor turns something else, the `word` for it."""
+    """The `text`, which is written for a machine with a crank, with another `word` for the part that the
+    motor turns."""
 
-    def named(found: re.Match[str]) -> str:
-        article = f"{found[1]}{'n' if word[0] in 'aeiou' else ''} " if found[1] else ""
-        return article + (word.capitalize() if found[2] == "C" else word)
+    def replacement(match: re.Match[str]) -> str:
+        article = f"{match[1]}{'n' if word[0] in 'aeiou' else ''} " if match[1] else ""
+        return article + (word.capitalize() if match[2] == "C" else word)
 
-    return text if word == "crank" else re.sub(r"\b(?:([Aa]) )?([Cc])rank\b", named, text)
+    return text if word == "crank" else re.sub(r"\b(?:([Aa]) )?([Cc])rank\b", replacement, text)
 
 
 def plain(text: str) -> str:

@@ -1,7 +1,8 @@
 """Numbers with units as engineers write them: ``4 kNm``, ``30 rev/min``, ``0.5 kg m²``, ``8 %``, ``40 °C``.
 
-A product is a point, a star or a blank, or nothing where the names are those of a torque or an inertia (``Nm``,
-``kgm2``). What follows a stroke is below it, as in FMI. Numbers and units that the program prints are read again.
+A product is written with a point, a star or a blank, or, in a torque or an inertia, with nothing (``Nm``,
+``kgm2``). All factors behind a stroke are in the denominator, as in FMI. Every number and unit that the
+program prints can be read back.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ _PINT = {
     "‰": "permille",
     "degF": "delta_degF",
 }
-"""Names of units that pint calls otherwise, or takes for something else."""
+"""Names of units for which pint has another name, or another meaning."""
 _ANGLES = frozenset(
     "rad mrad radian radians deg degree degrees arcmin arcsec revolution revolutions turn turns rpm".split()
 )
@@ -58,7 +59,8 @@ _OTHERS = """
     V volt A amp ampere Hz hertz K kelvin C degC H henry Wb ohm T F percent permille
 """
 _NAMES = _ANGLES | frozenset(_OTHERS.split()) | _PINT.keys()
-"""Names of units; pint knows more, which nobody means (k is its constant of Boltzmann, ton the American one)."""
+"""Names of units that are read. Pint knows more, which nobody means (its k is Boltzmann's constant, its ton
+the American one)."""
 _PREFIXED = re.compile(r"(?:[kMGTmµunpdc]|da)(?:m|g|s|N|J|W|V|A|K|Hz|Pa|ohm|H|Wb|T|F)")
 
 FITTING: dict[str, tuple[str, ...]] = {
@@ -82,22 +84,24 @@ FITTING: dict[str, tuple[str, ...]] = {
     "J/K": ("J/K", "kJ/K"),
     "1/K": ("%/K", "1/K"),
 }
-"""Units in which people give a quantity, the usual one first, by its declared unit."""
+"""By declared unit, the units in which people write a quantity, the usual one first."""
 
 
 _RARE = ("cm", "g", "t", "h", "kg cm2", "mOhm", "rpm", "Hz")
-"""Units that are read, and not written."""
+"""Units that are read but never written."""
 
 
 def fitting(unit: str, kind: str = "") -> tuple[str, ...]:
-    """Units that fit a quantity of the declared `unit` and `kind`, as a file takes them, the usual one first."""
+    """Units for a quantity of the declared `unit` and `kind`, as a file may write them, the usual one
+    first."""
     if unit == "1":
         return ("%",) if kind == "percent" else ()
     return FITTING.get(unit, (unit.replace(".", " "),))
 
 
 def split(text: str) -> tuple[float, str] | None:
-    """The number with which a text begins, and the unit behind it; None where it begins with none.
+    """The number with which a text begins, and the unit behind it; None where the text does not begin with a
+    number.
 
     Blanks between thousands are read (``10 500 N``), as is a power of ten (``2.3 × 10⁻⁷``).
     """
@@ -109,15 +113,15 @@ def split(text: str) -> tuple[float, str] | None:
 
 
 def with_point(text: str) -> str:
-    """The text with a point in place of a decimal comma; empty where it has none."""
+    """The text with a point in place of a decimal comma; empty where it has no comma."""
     match = _COMMA.fullmatch(_ascii(text))
     return f"{match[1]}.{match[2]}{match[3]}" if match else ""
 
 
 def _ascii(text: str) -> str:
-    """The text in one spelling: raised digits, signs and blanks of all kinds in plain letters."""
-    marked = re.sub("([⁺⁻]?[⁰¹²³⁴-⁹]+)", r"^\1", text)
-    plain = unicodedata.normalize("NFKC", marked)
+    """The text in one spelling: superscripts, signs and blanks of all kinds become plain characters."""
+    with_carets = re.sub("([⁺⁻]?[⁰¹²³⁴-⁹]+)", r"^\1", text)
+    plain = unicodedata.normalize("NFKC", with_carets)
     for sign, letters in _SIGNS.items():
         plain = plain.replace(sign, letters)
     return " ".join(plain.split())
@@ -130,72 +134,70 @@ def _registry() -> Any:
     return pint.UnitRegistry()
 
 
-def convert(number: float, written: str, unit: str, kind: str = "") -> float:
-    """The `number` in the unit that is `written` behind it, in the declared `unit`.
+def convert(number: float, unit_text: str, unit: str, kind: str = "") -> float:
+    """The `number` in the unit that is `unit_text` behind it, in the declared `unit`.
 
     Raises
     ------
     ValueError
-        for a unit of another kind, or one that is not known.
+        for a unit of another kind, or an unknown unit.
     """
     import pint
 
-    wanted = base_units(unit)
-    factors = _of_temperature(_of_angle(_factors(_ascii(written)), wanted), wanted, kind)
+    base = base_units(unit)
+    factors = _of_temperature(_of_angle(_factors(_ascii(unit_text)), base), base, kind)
     try:
         return float(
             _registry().Quantity(number, _joined(factors)).to(_joined(_factors(_ascii(unit)))).magnitude
         )
     except (pint.PintError, TypeError, AttributeError, AssertionError) as error:
-        raise ValueError(f"{written}: is no unit of {unit}") from error
+        raise ValueError(f"{unit_text}: is no unit of {unit}") from error
 
 
-def meant(text: str, unit: str, kind: str = "") -> str:
-    """A text that fits a quantity of that `unit` and `kind`, where the given one likely means it: a point in place of
-    a comma, the right case of letters; else empty."""
+def probable_text(text: str, unit: str, kind: str = "") -> str:
+    """The text that the user probably meant, for a quantity of this `unit` and `kind`: with a point in place
+    of a comma, or with the right case of letters. Empty where there is none."""
     # three digits behind a comma may be thousands
     text = text if _THOUSANDS.search(text) else with_point(text) or text
     parts = split(text)
     if parts is None:
         return ""
-    number, written = parts
+    number, unit_text = parts
     for usual in ("", *fitting(unit, kind)):
-        if usual.lower().replace(" ", "") == written.lower().replace(" ", ""):
+        if usual.lower().replace(" ", "") == unit_text.lower().replace(" ", ""):
             return f"{number:.15g} {usual}".strip()
     return ""
 
 
 def _joined(factors: list[tuple[str, int]]) -> str:
-    """Factors as pint reads them."""
+    """The factors as a text that pint reads."""
     return "*".join(f"{name}**({power})" for name, power in factors) or "dimensionless"
 
 
-def _of_angle(factors: list[tuple[str, int]], wanted: dict[str, int]) -> list[tuple[str, int]]:
-    """Factors with the angle that the quantity has: a machine's 15 1/min or 0.25 Hz are turns. Pint takes an angle
-    for a pure number, so that "1/s" would pass for an angular speed.
+def _of_angle(factors: list[tuple[str, int]], base: dict[str, int]) -> list[tuple[str, int]]:
+    """The factors with the angle of the quantity added: 15 1/min or 0.25 Hz of a machine are turns. Pint
+    takes an angle for a pure number, so that it would accept "1/s" as an angular speed.
 
     Raises
     ------
     ValueError
-        where one names an angle and the other does not.
+        where the unit names an angle and the quantity has none, or the reverse.
     """
-    named = [power for name, power in factors if name in _ANGLES]
-    power = wanted.get("rad", 0)
-    if named and sum(named) != power:
+    angles = [power for name, power in factors if name in _ANGLES]
+    power = base.get("rad", 0)
+    if angles and sum(angles) != power:
         raise ValueError("an angle is named that the quantity does not have")
-    if named or power <= 0:
+    if angles or power <= 0:
         return factors
     if ("Hz", 1) in factors or factors[:1] == [("min", -1)]:
         return [*factors, ("revolution", 1)]
     raise ValueError("no angle is named, and the quantity has one")
 
 
-def _of_temperature(
-    factors: list[tuple[str, int]], wanted: dict[str, int], kind: str
-) -> list[tuple[str, int]]:
-    """Factors in which a temperature alone is one from zero Celsius, and one in a product or of a difference a
-    number of kelvins."""
-    if "K" not in wanted:
+def _of_temperature(factors: list[tuple[str, int]], base: dict[str, int], kind: str) -> list[tuple[str, int]]:
+    """The factors, in which a temperature alone counts from 0 degC, and a temperature in a product, or a
+    difference, is a number of kelvins."""
+    if "K" not in base:
         return factors
     if kind != "difference" and factors == [("C", 1)]:
         return [("degC", 1)]
@@ -204,22 +206,22 @@ def _of_temperature(
     return [("kelvin" if name in ("degC", "C") else name, power) for name, power in factors]
 
 
-def _factors(written: str) -> list[tuple[str, int]]:
-    """Names of pint and their powers in a unit without special signs.
+def _factors(unit_text: str) -> list[tuple[str, int]]:
+    """Pint's names and their powers in a unit without special signs.
 
     Raises
     ------
     ValueError
-        for a name that is no unit, and for brackets that do not pair.
+        for a name that is no unit, and for unpaired brackets.
     """
     factors: list[tuple[str, int]] = []
     outside: list[int] = []
-    # below a stroke all is divided by; in brackets a stroke turns what it finds
+    # a stroke inverts all factors behind it, up to the end of its brackets
     begin, sign, at = 1, 1, 0
-    while at < len(written):
-        match = _TOKEN.match(written, at)
+    while at < len(unit_text):
+        match = _TOKEN.match(unit_text, at)
         if match is None:
-            raise ValueError(f"{written}: cannot be read")
+            raise ValueError(f"{unit_text}: cannot be read")
         token, at = match[1], match.end()
         if token == "/":
             sign = -begin
@@ -228,12 +230,12 @@ def _factors(written: str) -> list[tuple[str, int]]:
             begin = sign
         elif token == ")":
             if not outside:
-                raise ValueError(f"{written}: brackets do not open")
+                raise ValueError(f"{unit_text}: brackets do not open")
             sign, begin = begin, outside.pop()
         elif token not in ("*", ".", "1"):
             factors += _of_name(token, sign)
     if outside:
-        raise ValueError(f"{written}: brackets do not close")
+        raise ValueError(f"{unit_text}: brackets do not close")
     return factors
 
 
@@ -241,18 +243,18 @@ def _of_name(token: str, sign: int) -> list[tuple[str, int]]:
     match = _FACTOR.fullmatch(token)
     assert match is not None  # a token of a name is a factor
     name, power = match[1], sign * int(match[2] or 1)
-    glued = _GLUED.fullmatch(name)
+    product = _GLUED.fullmatch(name)
     if name in _NAMES or _PREFIXED.fullmatch(name):
         return [(_PINT.get(name, name), power)]
-    if glued is None or (glued[2] is None and glued[3] is None) or name == "gs":
+    if product is None or (product[2] is None and product[3] is None) or name == "gs":
         raise ValueError(f"{name}: is no unit")
-    parts = [part for part in glued.groups() if part]
+    parts = [part for part in product.groups() if part]
     return [*((part, sign) for part in parts[:-1]), (parts[-1], power)]
 
 
-def written(value: float, unit: str, kind: str = "") -> str:
-    """The value of a quantity as a file may state it, as TOML, in the unit in which it is shortest and exact:
-    0.06 m -> ``"60 mm"``; a pure number stands alone, a share in percent."""
+def shortest_text(value: float, unit: str, kind: str = "") -> str:
+    """The value of a quantity as TOML, in the unit in which its text is shortest and exact: 0.06 m -> ``"60
+    mm"``. A pure number has no unit; a share is in percent."""
     if value == 0.0 and unit != "1":
         # a temperature is not zero in every unit
         return f'"0 {fitting(unit, kind)[-1 if unit == "K" else 0]}"'

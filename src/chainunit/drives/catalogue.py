@@ -175,7 +175,7 @@ def _motor(origin: str, row: Mapping[str, Any], others: set[str]) -> CatalogueMo
             values[name] = to_number(variable, row[name])
         elif variable.quantity.start is None:
             raise InputError(
-                f"{name}: is missing; must be {variable.quantity.allowed} ({variable.description})"
+                f"{name}: is missing; must be {variable.quantity.allowed_range} ({variable.description})"
             )
     nameplate = LAYOUT.from_names(values)
     check(nameplate)

@@ -264,7 +264,7 @@ class _Fit:
         n = nameplate
         self.base = n.voltage * n.voltage / n.apparent_power
         layout, w_s = InductionMotor.parameter_layout, _TURN * n.frequency
-        self.fixed = layout.named(Parameters()) | {
+        self.fixed = layout.by_name(Parameters()) | {
             "pole_pairs": 0.5 * n.poles,
             "supply.V": n.voltage,
             "supply.f": n.frequency,

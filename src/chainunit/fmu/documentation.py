@@ -48,7 +48,7 @@ def _table(signals: list[Signal], causality: str) -> str:
         v, q = signal.variable, signal.variable.quantity
         cells = [f"<td><code>{escape(v.name)}</code></td>", f"<td>{escape(v.unit)}</td>"]
         if settable:
-            allowed = escape(q.allowed) + (
+            allowed = escape(q.allowed_range) + (
                 "" if causality == "input" else ", tunable" if q.tunable else ", fixed"
             )
             cells += [f'<td class="number">{signal.start:.6g}</td>', f"<td>{allowed}</td>"]

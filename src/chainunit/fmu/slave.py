@@ -220,7 +220,7 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
                 continue
             quantity = self._variables[vr].quantity
             if quantity.admits(value):
-                value = quantity.bounded(value)
+                value = quantity.within_bounds(value)
             if self._set[vr] == value:
                 continue
             if vr >= self._n_p:

@@ -89,7 +89,7 @@ class ChainUnitMachine(Machine):
         self, phi: Any, w: Any, a: Any, left: SideLoads, right: SideLoads, stop: Stop = FREE
     ) -> Inputs:
         given = Inputs(phi=phi, w=w, a=a, left=left, right=right, stop=stop)
-        inputs: Inputs = self.inputs(ChamberForces.input_layout.named(given))
+        inputs: Inputs = self.inputs(ChamberForces.input_layout.by_name(given))
         return inputs
 
     def forces(

@@ -313,7 +313,7 @@ class Organs:
         sides = zip(self.rods(p, u), self._reaches(xp, p, u, q), (z[:3], z[3:]), strict=True)
         return [value for rods, reach, own in sides for value in hanging_chain.hang(xp, rods, reach, own)]
 
-    def started(
+    def start_states(
         self, xp: Any, p: Any, u: Any, q: Any, w: Any, z: Sequence[Any], rods_start: Any = None
     ) -> dict[str, Any]:
         """States of both sides: hanging at rest, or as `rods_start` gives them, and taken along by A2 where the crank

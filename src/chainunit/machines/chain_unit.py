@@ -430,7 +430,7 @@ class ChamberForces(InverseMachine):
 
     required = (
         Requirement("c", "m", "the crank circle must stay left of the pivot C", depends=("r",)),
-        dataclasses.replace(TURNS, given=("l", "h", "c", "hy")),
+        dataclasses.replace(TURNS, context=("l", "h", "c", "hy")),
         Requirement(
             "largest rocker angle",
             "rad",

@@ -110,10 +110,10 @@ class ChainedModel(LinkageModel):
         return cls.organs.improved(xp, p, u, cls.at_crank(p, u)[0], z)
 
     @classmethod
-    def started(cls, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> Any:
-        """See `Organs.started`."""
+    def start_states(cls, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> Any:
+        """See `Organs.start_states`."""
         assert cls.States is not None
-        return cls.States(**cls.organs.started(xp, p, u, *cls.at_crank(p, u), z))
+        return cls.States(**cls.organs.start_states(xp, p, u, *cls.at_crank(p, u), z))
 
     @classmethod
     def closed(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
@@ -147,9 +147,9 @@ class TurningChains(ChainedModel, DirectMachine):
         return {**super().start_from(outputs), "rods_start.given": 1.0, **rods}
 
     @classmethod
-    def started(cls, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> Any:
-        """See `Organs.started`."""
-        chains = cls.organs.started(xp, p, u, *cls.at_crank(p, u), z, p.rods_start)
+    def start_states(cls, xp: Any, p: Any, u: Any, z: Sequence[Any]) -> Any:
+        """See `Organs.start_states`."""
+        chains = cls.organs.start_states(xp, p, u, *cls.at_crank(p, u), z, p.rods_start)
         return cls.States(**vars(cls.initial_states(xp, p)), **chains)
 
     @classmethod

@@ -240,7 +240,7 @@ class KnifeDrive(InverseMachine):
     required = (
         dataclasses.replace(
             TURNS,
-            given=("ab", "bo2", "o1.x", "o1.y", "o2.x", "o2.y"),
+            context=("ab", "bo2", "o1.x", "o1.y", "o2.x", "o2.y"),
             remedy="|O1 O2| must be > |ab - bo2| and < ab + bo2 for any crank",
         ),
         *triad.requirements(("bc", "o3d", "o4e"), ("assembly.x", "assembly.y", "assembly.theta")),

@@ -62,8 +62,8 @@ class Machine:
 
     def __repr__(self) -> str:
         """The call that makes the machine, by the parameters that are not at their start values, to nine digits."""
-        start = self.model.parameter_layout.named(self.model.Parameters())
-        shown = {name: f"{value:.9g}" for name, value in self.named.items()}
+        start = self.model.parameter_layout.by_name(self.model.Parameters())
+        shown = {name: f"{value:.9g}" for name, value in self.by_name.items()}
         changed = [f'"{name}": {x}' for name, x in shown.items() if x != f"{start[name]:.9g}"]
         arguments = [*self._kind, *([f"{{{', '.join(changed)}}}"] if changed else [])]
         return f"{type(self).__name__}({', '.join(arguments)})"
@@ -79,9 +79,9 @@ class Machine:
         return float(self.p.ratio)
 
     @property
-    def named(self) -> dict[str, float]:
+    def by_name(self) -> dict[str, float]:
         """Parameters by name."""
-        return self.model.parameter_layout.named(self.p)
+        return self.model.parameter_layout.by_name(self.p)
 
     def inputs(self, named: Mapping[str, Any]) -> Any:
         """Inputs from values by name, each as its declaration admits it; one that is not named is at its start.
@@ -122,7 +122,7 @@ class Machine:
         return self._outputs(self.inputs({"phi": phi, "w": w, "a": a, **self._named(feed)}))
 
     def _named(self, feed: Any) -> dict[str, Any]:
-        return self.model.feed_layout.named(self.model.Feed() if feed is None else feed)
+        return self.model.feed_layout.by_name(self.model.Feed() if feed is None else feed)
 
     def _outputs(self, u: Any) -> Any:
         part = self.model.parts[0]
@@ -143,7 +143,7 @@ class Machine:
         named: dict[str, Any] = {}
         state = self.state(u)
         for part in self.model.parts:
-            named |= part.layout.named(part.equations(_XP, self.p, u, None, state))
+            named |= part.layout.by_name(part.equations(_XP, self.p, u, None, state))
         return dict(zip(named, np.broadcast_arrays(*named.values()), strict=True))
 
     def pin_turns(self, run: Mapping[str, Any]) -> dict[str, Any]:
@@ -191,7 +191,7 @@ def admitted(variable: Variable, given: Any) -> Any:
     for extreme in (np.min(x), np.max(x)) if np.size(x) else ():
         if not q.admits(float(extreme)):
             raise InputError(complaint(variable, float(extreme)))
-    return q.bounded(x) if isinstance(x, float) else np.clip(x, q.low, q.high)
+    return q.within_bounds(x) if isinstance(x, float) else np.clip(x, q.low, q.high)
 
 
 def array(x: Any) -> Any:

@@ -102,7 +102,7 @@ def dimensions(machine: Machine) -> dict[tuple[str, ...], Dimension]:
     of = {value: name for name, value in marks.items()}
     declared = {v.name: v for v in layout.variables}
     marked = model.linkage(layout.from_names(dict(marks)), Layout(model.Inputs).from_names({}))
-    values = layout.named(machine.p)
+    values = layout.by_name(machine.p)
 
     def known(x: Any) -> Dimension | None:
         name = of.get(abs(float(x)))

@@ -86,7 +86,7 @@ def _variables(model: type[Model]) -> Iterator[Block]:
         for signal in interface.of(causality):
             v = signal.variable
             start = "-" if causality == "output" else f"{v.quantity.start:g}{unit_behind(v.unit)}"
-            allowed = v.quantity.allowed if causality != "output" else "-"
+            allowed = v.quantity.allowed_range if causality != "output" else "-"
             unit = unit_behind(v.unit).strip() or "1"
             rows.append(TableRow((v.name, causality, unit, start, allowed, v.description)))
     yield Table(

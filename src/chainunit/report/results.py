@@ -31,7 +31,7 @@ def compute(
     check: bool = False,
     backend: Backend | None = None,
 ) -> StudyRecord:
-    """Run a study in a folder, which is this process's alone (see `files.claimed`); what an earlier run left there
+    """Run a study in a folder, which is this process's alone (see `files.claim`); what an earlier run left there
     is removed. Arguments and errors as of `run_study`; a refusal begins with the file of the study, if it has one."""
 
     def named() -> AbstractContextManager[None]:

@@ -12,7 +12,7 @@ from ..study.given import GivenSection, description, given
 from ..study.record import StudyRecord
 from ..study.result import as_dict
 from ..study.rig import DIFFERENCE
-from ..text import written_in
+from ..text import shown_in
 from . import answer, chains, figures, runs, shaft, sizing, wording
 from . import blocks as b
 from . import run_names as read
@@ -32,7 +32,7 @@ _VERSIONS = ("numpy", "casadi", "fmpy", "plotly")
 def report(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Report:
     """The report; `result` are its numbers, by default those of `as_dict`."""
     s = b.Source(as_dict(study) if result is None else result)
-    with written_in(study.config.units):
+    with shown_in(study.config.units):
         sections = [
             b.Section(name, each.heading, tuple(each.blocks(s, study)))
             for name, each in _SECTIONS.items()
@@ -54,7 +54,7 @@ def summary(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Re
     """The verdicts and the main answers of every run alone; arguments as of `report`."""
     s = b.Source(as_dict(study) if result is None else result)
     blocks: list[b.Block] = []
-    with written_in(study.config.units):
+    with shown_in(study.config.units):
         for block in answer.blocks(s, study):
             if isinstance(block, b.Judgement) and block.severity in ("good", "partly", "bad", "alarm"):
                 blocks.append(replace(block, form="both"))

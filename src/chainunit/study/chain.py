@@ -225,7 +225,7 @@ def run_turns(
     names = [*outputs, *rods]
     ratio = drive.driven.p.ratio
     step = 2.0 * math.pi / crank_speed / points
-    parameters = model.parameter_layout.named(p) | Layout(Feed).named(feed)
+    parameters = model.parameter_layout.by_name(p) | Layout(Feed).by_name(feed)
     done = [0]
 
     def one(start: int, stop: Callable[[], bool]) -> Any:
@@ -278,7 +278,7 @@ def two_bar_pulls(machine: ChainUnitMachine, angle: Any, crank_speed: float, fee
     """Mean axial pull [N] in wall and web of both sides of two bars at crank angles `angle` [rad], shape (4, n): as
     two rods without damping, so that slack means the same of both."""
     model, xp = flexible(1, 1), numpy_()
-    named = ChamberForces.parameter_layout.named(machine.p) | {
+    named = ChamberForces.parameter_layout.by_name(machine.p) | {
         f"organ.{name}": 0.0 for name in ("eta", "end_damping", "fold_stiffness")
     }
     p = model.parameter_layout.from_names(named)

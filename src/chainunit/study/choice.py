@@ -124,7 +124,7 @@ def with_line(config: Config, drive: Drive) -> Drive:
     """The drive with the driveline of the study, if it has one: on the crank's shaft behind the gear, or before."""
     if config.driveline is None:
         return drive
-    given = Layout(type(config.driveline)).named(config.driveline)
+    given = Layout(type(config.driveline)).by_name(config.driveline)
     values = {name: x for name, x in given.items() if name in CardanDriveline.parameter_layout.names}
     values["ratio"] = drive.ratio if config.place == "crank" else 1.0
     drive = replace(drive, line=CardanDriveline.parameter_layout.from_names(values))

@@ -390,7 +390,7 @@ def _machine(parts: Parts, given: dict[str, float], of_papers: Mapping[str, floa
 def _taken_over(error: InputError, machine: type[MachineModel], given: Mapping[str, float]) -> str:
     """The lengths behind a refusal that neither file nor example give, as words to follow it."""
     names = error.names if isinstance(error, GeometryError) else ()
-    declared = Layout(machine.Parameters).named(machine.Parameters())
+    declared = Layout(machine.Parameters).by_name(machine.Parameters())
     taken = [f"{name} = {declared[name]:g}" for name in names if name in declared and name not in given]
     return f"; not in the file, so at the declared start value: {', '.join(taken)}" if taken else ""
 
@@ -408,7 +408,7 @@ def _loads_beyond(config: Config) -> Iterator[InputError]:
                 key="feed",
             )
     inputs = {v.name: v for v in model.input_layout.variables}
-    normal = {name: v.quantity.start or 0.0 for name, v in inputs.items()} | Layout(model.Feed).named(feed)
+    normal = {name: v.quantity.start or 0.0 for name, v in inputs.items()} | Layout(model.Feed).by_name(feed)
     hardest = [
         (f"event.{name}", f"event.{k}", event) for k, (name, event) in enumerate(config.events.items(), 1)
     ]
@@ -434,7 +434,7 @@ def _loads_beyond(config: Config) -> Iterator[InputError]:
             if not v.quantity.admits(most):
                 yield InputError(
                     f"{where}: {name} comes to {most:.9g}{unit_behind(v.unit)} with the feed: must be "
-                    f"{v.quantity.allowed}",
+                    f"{v.quantity.allowed_range}",
                     key=key,
                 )
 

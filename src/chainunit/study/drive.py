@@ -186,7 +186,7 @@ class Drive:
         if self.chain is None:
             return machine.model, machine.p
         model = flexible(*self.rods)
-        return model, model.parameter_layout.from_names(machine.named | self.organ())
+        return model, model.parameter_layout.from_names(machine.by_name | self.organ())
 
     @cached_property
     def simulated(self) -> Machine:
@@ -205,7 +205,7 @@ class Drive:
         """What the model with chains has beside the parameters of the one with two bars."""
         if self.chain is None:
             return {}
-        law = Layout(type(self.chain)).named(self.chain)
+        law = Layout(type(self.chain)).by_name(self.chain)
         return {f"organ.{name}": law[name] for name in Layout(OrganLaw).names}
 
     @cached_property
@@ -320,7 +320,7 @@ class Drive:
         """Write the machine's FMU alone; the same as `export` writes."""
         model, p = self.load_model()
         file = folder / f"{model.name}.fmu"
-        export_fmu(model, file, model.parameter_layout.named(p), backend=backend)
+        export_fmu(model, file, model.parameter_layout.by_name(p), backend=backend)
         return file
 
     def system(self, files: Mapping[str, Path]) -> System:
@@ -344,7 +344,7 @@ class Drive:
 
     def loads(self, feed: Any) -> dict[str, Any]:
         """Signals of the loads in normal running: of the machine, and of the one that the control asks."""
-        named = Layout(type(feed)).named(feed)
+        named = Layout(type(feed)).by_name(feed)
         model = {f"model.{name}": value for name, value in named.items()} if self.feed_forward else {}
         return {f"machine.{name}": value for name, value in named.items()} | model
 
@@ -398,4 +398,4 @@ class Drive:
     def coasting_parameters(self) -> dict[str, float]:
         """Its parameters by name."""
         added = {} if self.line is None else {"J_added": self.line.J4}
-        return self.simulated.named | added
+        return self.simulated.by_name | added

@@ -86,7 +86,7 @@ class RandomEvent:
 
     def as_dict(self) -> dict[str, Any]:
         """All that a drawn event depends on, ready for JSON."""
-        fixed = Layout(type(self.p)).named(self.p)
+        fixed = Layout(type(self.p)).by_name(self.p)
         return {"type": self.of.kind, "side": self.side, "p": fixed, "ranges": dict(self.ranges)}
 
 

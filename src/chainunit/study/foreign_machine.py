@@ -110,7 +110,7 @@ class ForeignMachine(Machine):
         """The FMU with these parameters."""
         known = self.model.component.connectors
         own: FmuComponent = self.model.component
-        return replace(own, start={name: x for name, x in self.named.items() if name in known})
+        return replace(own, start={name: x for name, x in self.by_name.items() if name in known})
 
     def outputs(self, phi: Any, w: Any = 0.0, a: Any = 0.0, feed: Any = None) -> Any:
         """See `Machine`: torque `tau` and inertia `J` at the motor, by the FMU alone, which turns at the constant

@@ -20,7 +20,7 @@ from ..drives.shafts import Shaft
 from ..models import MACHINES
 from ..quantities import Layout, Variable, variables
 from ..text import CHOICES as UNITS
-from ..units import written
+from ..units import shortest_text
 from .config import Config, parse
 from .event import TYPES, Event
 from .parts import ReportTable
@@ -64,7 +64,7 @@ class Key:
     def allowed(self) -> str:
         """The range, or the values to choose from, in words."""
         if self.variable is not None:
-            return self.variable.quantity.allowed
+            return self.variable.quantity.allowed_range
         if self.words:
             return ", ".join(self.words)
         return {"text": "a text", "list": "a list", "table": "a table"}.get(self.sort, "")
@@ -126,10 +126,10 @@ def _study(machine: str = "ChamberForces", motor: str = "") -> Config:
 
 def _numbers(declared: type, values: Any = None, prefix: str = "", table: str = "") -> Iterator[Key]:
     """Keys of declared quantities; `values` are those of a file that leaves them out."""
-    known = Layout(declared).named(values) if values is not None else {}
+    known = Layout(declared).by_name(values) if values is not None else {}
     for v in variables(declared):
         value = known.get(v.name, v.quantity.start)
-        left_out = "" if value is None else written(value, v.unit, v.kind)
+        left_out = "" if value is None else shortest_text(value, v.unit, v.kind)
         follows = _FOLLOWS.get(f"{table}.{v.name}", "")
         yield Key(prefix + v.name, v.description, v, left_out="" if follows else left_out, follows=follows)
 

@@ -213,7 +213,7 @@ def row_of(task: Task, digest: str, number: int) -> dict[str, Any]:
     chance = draw(task.config, number)
     named = {"run": number, "side": chance.event.side or None, "drawn": chance.values}
     try:
-        return {**named, "failed": None, **layout.named(one(task, number, simulation))}
+        return {**named, "failed": None, **layout.by_name(one(task, number, simulation))}
     except InterruptedRunError:
         raise
     except RunError as error:

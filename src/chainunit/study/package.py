@@ -62,7 +62,7 @@ def start_of(
     if model is CardanDriveline:
         if drive.line is None:
             raise InputError("the study has no [driveline]; add the table, or export without --config")
-        return model.parameter_layout.named(drive.line)
+        return model.parameter_layout.by_name(drive.line)
     if not issubclass(model, Motor):
         if not _is_of(model, drive):
             raise InputError(f"the study's machine is {drive.driven.model.name}, not {model.name}")
@@ -71,7 +71,7 @@ def start_of(
     if drive.motor is not model:
         title = drive.graph.components["motor"].title
         raise InputError(f"the study's motor is {title}, not {model.name}")
-    return model.parameter_layout.named(drive.fmu_parameters)
+    return model.parameter_layout.by_name(drive.fmu_parameters)
 
 
 def with_rods(number: int, start: Mapping[str, float]) -> type[Model]:
@@ -103,7 +103,7 @@ def _machine(config: Config, model: type[Model], machine: Machine) -> dict[str, 
     speed = config.run.crank_speed * machine.ratio
     direct = issubclass(model, DirectMachine)
     turning = {"w_start": speed} if direct else {"phi": 0.0, "w": speed, "a": 0.0}
-    return machine.named | Layout(type(config.feed)).named(config.feed) | turning
+    return machine.by_name | Layout(type(config.feed)).by_name(config.feed) | turning
 
 
 def _drive(config: Config, backend: Backend | None, report: Callable[[str], None]) -> Drive:

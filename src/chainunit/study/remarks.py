@@ -39,7 +39,7 @@ def conclude(study: StudyRecord) -> None:
             "machine behind an open coupling, are not known of it."
         )
     note("assumed", own)
-    if any(value for name, value in study.drive.machine.named.items() if name.endswith("friction")):
+    if any(value for name, value in study.drive.machine.by_name.items() if name.endswith("friction")):
         note(
             "smoothed friction",
             "Friction is smoothed: at rest nothing sticks, so that the torque to break away from a loaded stop is "
@@ -93,7 +93,7 @@ def _left_out(study: StudyRecord) -> Iterator[str]:
     if config.plate is not None and "system.motor" in config.of_example:
         yield f"the motor ({config.plate.designation})"
     elif config.sizing is None and config.foreign is None:
-        values = study.drive.motor.parameter_layout.named(study.drive.parameters)
+        values = study.drive.motor.parameter_layout.by_name(study.drive.parameters)
         units = {v.name: v.unit for v in study.drive.motor.parameter_layout.variables}
         names = [name for name in _RATING if f"motor.{name}" in config.of_example]
         if names:

@@ -7,7 +7,7 @@ from typing import Any
 from .. import __version__
 from ..drives.catalogue import CatalogueMotor
 from ..quantities import variables
-from ..text import entries, entry, turning, written_in
+from ..text import entries, entry, shown_in, turning
 from .coupling import coupling_sentence
 from .given import given
 from .judgement import motor_verdict
@@ -39,7 +39,7 @@ def _rating(motor: CatalogueMotor | None) -> dict[str, Any]:
 
 def as_dict(study: StudyRecord) -> dict[str, Any]:
     """Everything but the time series, ready for JSON: each number with its unit."""
-    with written_in(study.config.units):
+    with shown_in(study.config.units):
         return _as_dict(study)
 
 

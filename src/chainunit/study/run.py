@@ -16,7 +16,7 @@ from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
 from ..progress import Progress, Report
 from ..system import Simulation
-from ..text import number, written_in
+from ..text import number, shown_in
 from . import verdict
 from .analyses import ANALYSES
 from .bearings import pin_loads
@@ -59,7 +59,7 @@ def run_study(
         overloads that the drive has no inputs for, and a motor of somebody else that does not fit or cannot save its
         state.
     """
-    with written_in(config.units):
+    with shown_in(config.units):
         return _run_study(config, folder, report or (lambda what, done, todo: None), check, backend)
 
 

@@ -75,7 +75,7 @@ class ModelComponent:
     @property
     def start(self) -> dict[str, float]:
         """Its parameters by name."""
-        return self.model.parameter_layout.named(self.parameters)
+        return self.model.parameter_layout.by_name(self.parameters)
 
     @property
     def title(self) -> str:

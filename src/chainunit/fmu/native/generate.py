@@ -79,7 +79,9 @@ def _programs(interface: Interface) -> Iterator[Program]:
         if z:
             yield one("guess", [ps, us], model.start_guess(casadi_(), p, u))
             yield one("improved", [ps, us, unknowns], model.start_improved(casadi_(), p, u, z))
-        yield one("initial", [ps, us, unknowns], model.state_layout.values(model.started(casadi_(), p, u, z)))
+        yield one(
+            "initial", [ps, us, unknowns], model.state_layout.values(model.start_states(casadi_(), p, u, z))
+        )
         if model.start_required:
             yield one(
                 "start_limits", point, [v for row in model.start_limits(casadi_(), p, u, x) for v in row]
@@ -173,7 +175,7 @@ def tables(interface: Interface, guid: str, room: int) -> str:
     def quantity(v: Variable) -> str:
         q = v.quantity
         return (
-            f"{{{_text(v.name)}, {_unit(v.unit)}, {_text(q.allowed)}, {number(q.low)}, {number(q.high)}, "
+            f"{{{_text(v.name)}, {_unit(v.unit)}, {_text(q.allowed_range)}, {number(q.low)}, {number(q.high)}, "
             f"{number(q.slack)}, {int(q.open_low)}, {int(q.tunable)}}}"
         )
 
@@ -208,9 +210,9 @@ def tables(interface: Interface, guid: str, room: int) -> str:
     ]
     requirements = (*model.required, *model.start_required)
     for i, r in enumerate(requirements):
-        lines.append(_array("int", f"given_{i}", [str(parameter_names.index(n)) for n in r.given]))
+        lines.append(_array("int", f"given_{i}", [str(parameter_names.index(n)) for n in r.context]))
     rows = [
-        f"{{{_text(r.subject)}, {_unit(r.unit)}, {_text(r.why)}, {_text(r.remedy)}, {len(r.given)}, given_{i}}}"
+        f"{{{_text(r.subject)}, {_unit(r.unit)}, {_text(r.why)}, {_text(r.remedy)}, {len(r.context)}, given_{i}}}"
         for i, r in enumerate(requirements)
     ]
     if rows:
