@@ -54,7 +54,7 @@ def test_table_is_whole():
     for m in MOTORS:
         assert f"{m.nameplate.poles:g}-pole {m.nameplate.power / 1000:g} kW, " in m.designation
         assert (m.nameplate.voltage, m.nameplate.frequency) == (400.0, 50.0)
-        assert "typical" in m.source and m.origin.startswith("motors.csv: line ")
+        assert "typical" in m.source and m.origin.startswith("motors.csv:")
 
 
 def test_headings_are_the_declarations():
@@ -265,9 +265,9 @@ def test_own_motors_stand_behind_the_packaged(tmp_path):
     toml = tmp_path / "own.toml"
     toml.write_text(TOML)
     csv_ = csv_file(tmp_path, ROW, ROW | {"designation": "fan", "power [kW]": "2200 W"})
-    for file, where in ((csv_, "line 2"), (toml, "motor 1")):
+    for file, where in ((csv_, 2), (toml, 1)):
         own = catalogue(file)[54:]
-        assert (own[0].designation, own[0].origin) == ("pump, old", f"{file}: {where}")
+        assert (own[0].designation, own[0].origin) == ("pump, old", f"{file}:{where}")
         assert own[0].source == own[0].origin
         for name, value in PLATE.items():
             assert getattr(own[0].nameplate, name) == pytest.approx(value, rel=1e-12)
@@ -293,24 +293,84 @@ def test_columns_may_have_any_unit_of_their_kind(tmp_path):
 @pytest.mark.parametrize(
     ("column", "cell", "said"),
     [
-        ("power [kW]", "-1", r"line 3: power = -1000 W: must be > 0 W and <= 1e\+10 W \(rated power"),
-        ("power [kW]", "much", 'line 3: power = "much": must be a number in W'),
-        ("power [kW]", "nan", 'line 3: power = "nan kW": must be a number in W'),
-        ("power [kW]", "", "line 3: power: is missing; must be > 0 W"),
-        ("poles", "5", "line 3: poles = 5: must be an even number"),
-        ("speed [rev/min]", "1555", r"line 3: speed = .* \(1555 rev/min\)"),
-        ("efficiency", "86.7", "line 3: efficiency = 86.7: must be > 0 and <= 1"),
-        ("designation", "", 'line 3: designation = "": must be a text of one line'),
-        ("designation", "a\nb", r"line 4: designation = \"a\\nb\": must be a text of one line"),
-        ("designation", "pump, old", 'line 3: designation = "pump, old": stands in the catalogue already'),
-        ("designation", MOTORS[0].designation, "line 3: designation = .* stands in the catalogue already"),
+        ("power [kW]", "-1", r":3: column power = -1000 W: must be > 0 W and <= 1e\+10 W \(rated power"),
+        ("power [kW]", "much", ':3: column power = "much": must be a number in W'),
+        ("power [kW]", "nan", ':3: column power = "nan": must be a number in W'),
+        ("power [kW]", "", ":3: column power: is missing; must be > 0 W"),
+        ("poles", "5", ":3: column poles = 5: must be an even number"),
+        ("speed [rev/min]", "1555", r":3: column speed = .* \(1555 rev/min\)"),
+        ("efficiency", "86.7", ":3: column efficiency = 86.7: must be > 0 and <= 1"),
+        ("designation", "", ':3: column designation = "": must be a text of one line'),
+        ("designation", "a\nb", r":3: column designation = \"a\\nb\": must be a text of one line"),
+        ("designation", "pump, old", ':3: column designation = "pump, old": stands in the catalogue already'),
+        ("designation", MOTORS[0].designation, ":3: column designation = .* stands in the catalogue already"),
     ],
 )
 def test_bad_rows_are_refused(tmp_path, column, cell, said):
     file = csv_file(tmp_path, ROW, ROW | {"designation": "fan"} | {column: cell})
     with pytest.raises(InputError, match=said) as refused:
         catalogue(file)
-    assert str(refused.value).startswith(f"{file}: ") and "\n" not in str(refused.value)
+    assert str(refused.value).startswith(f"{file}:") and "\n" not in str(refused.value)
+
+
+def test_all_wrong_cells_are_told_at_once(tmp_path):
+    rows = [
+        ROW | {"power [kW]": "-1", "poles": "four", "current [A]": "4,9"},
+        ROW | {"designation": "fan", "poles": "5", "current [A]": "9"},
+        ROW | {"designation": "fan"},
+    ]
+    file = csv_file(tmp_path, *rows)
+    with file.open("a", encoding="utf-8") as stream:
+        stream.write("a,b\n")
+    with pytest.raises(InputError) as refused:
+        catalogue(file)
+    said = [line.removeprefix(f"{file}:") for line in str(refused.value).splitlines()]
+    begins = [
+        "2: column power = -1000 W: must be > 0 W",
+        '2: column poles = "four": must be a pure number',
+        '2: column current = "4,9": must be a number in A, or a text such as "2 A" (rated current',
+        "3: column current = 9 A: power, voltage, efficiency and power factor make it",
+        "3: column poles = 5: must be an even number",
+        '4: column designation = "fan": stands in the catalogue already',
+        "5: has 2 cells; must have",
+    ]
+    assert len(said) == len(begins)
+    for line, begin in zip(said, begins, strict=True):
+        assert line.startswith(begin), line
+    assert 'was "4.9" meant?' in said[2]
+
+
+def test_all_wrong_headings_are_told_at_once(tmp_path):
+    file = tmp_path / "own.csv"
+    file.write_text("designation,pwer [kW],speed [kg],source [m],poles,poles\n")
+    with pytest.raises(InputError) as refused:
+        catalogue(file)
+    said = [line.removeprefix(f"{file}:1: ") for line in str(refused.value).splitlines()]
+    assert said[0].startswith('heading "pwer [kW]": unknown; was "power" meant?')
+    assert said[1:] == [
+        'heading "speed [kg]": must have a unit such as speed [rev/min]',
+        'heading "source [m]": has no unit',
+        "column poles: stands twice",
+    ]
+
+
+def test_thousands_with_blanks_have_the_unit_of_their_column(tmp_path):
+    rows = ROW | {"speed [rev/min]": "1\u202f455"}, ROW | {"designation": "2", "speed [rev/min]": "1.455e3"}
+    for motor in catalogue(csv_file(tmp_path, *rows))[54:]:
+        assert motor.nameplate.speed == pytest.approx(PLATE["speed"], rel=1e-12)
+
+
+def test_wrong_values_of_a_toml_catalogue_have_their_own_lines(tmp_path):
+    file = tmp_path / "own.toml"
+    file.write_text(
+        f"# own\n\n{TOML}\n{TOML}".replace("2200.0", '"2 m"', 1).replace("poles = 4.0", "poles = []", 1)
+    )
+    with pytest.raises(InputError) as refused:
+        catalogue(file)
+    said = [line.removeprefix(f"{file}:") for line in str(refused.value).splitlines()]
+    assert [line.partition(" = ")[0] for line in said] == [
+        "5: motor 1: power", "6: motor 1: poles", "16: motor 2: designation",
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -323,17 +383,21 @@ def test_bad_rows_are_refused(tmp_path, column, cell, said):
             'heading "designation;power": unknown; known here: designation, source, pow',
         ),
         ("a.csv", "designation,colour\n", 'heading "colour": unknown'),
-        ("a.csv", "power [W],power [kW]\n", "power: has two columns"),
-        ("a.csv", "designation,power [V]\nx,1\n", 'power = "1 V": must be a number in W'),
-        ("a.csv", "designation,poles\nx\n", "line 2: has 1 cells; must have 2"),
-        ("a.csv", 'designation\n"x\n', "no valid CSV"),
-        ("a.toml", "x = ", "no valid TOML"),
+        ("a.csv", "power [W],power [kW]\n", "a.csv:1: column power: stands twice"),
+        (
+            "a.csv",
+            "designation,power [V]\nx,1\n",
+            'a.csv:1: heading "power [V]": must have a unit such as power [W]',
+        ),
+        ("a.csv", "designation,poles\nx\n", "a.csv:2: has 1 cells; must have 2"),
+        ("a.csv", 'designation\n"x\n', "a.csv:2: no valid CSV"),
+        ("a.toml", "x = ", "a.toml:1: no valid TOML"),
         ("a.toml", "x = 1", '"x": unknown; each motor is a table'),
         ("a.toml", "", "has no motor; each motor must be a table"),
         ("a.toml", "motor = 1", "motor = 1: each motor must be a table"),
-        ("a.toml", "[[motor]]\ncolour = 1", 'motor 1: "colour": unknown; known here: designation'),
+        ("a.toml", f"{TOML}\ncolour = 1", 'a.toml:13: motor 1: "colour": unknown; known here: designation'),
         ("a.toml", TOML.replace("'pump, old'", "1"), "motor 1: designation = 1: must be a text of one line"),
-        ("a.toml", TOML.replace("2200.0", "true"), "motor 1: power = True: must be a number in W"),
+        ("a.toml", TOML.replace("2200.0", "true"), "motor 1: power = true: must be a number in W"),
         ("a.toml", f"{TOML}\nmass = -1", "motor 1: mass = -1 kg: must be >= 0 kg"),
     ],
 )
@@ -342,7 +406,7 @@ def test_bad_files_are_refused(tmp_path, name, text, said):
     file.write_text(text)
     with pytest.raises(InputError) as refused:
         catalogue(file)
-    assert str(refused.value).startswith(f"{file}: ") and said in str(refused.value)
+    assert str(refused.value).startswith(f"{file}:") and said in str(refused.value)
     assert "\n" not in str(refused.value)
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import difflib
+import itertools
 import json
-import reprlib
+import re
 import unicodedata
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from datetime import date, time
 from typing import Any
 
 
@@ -15,12 +17,23 @@ class InputError(ValueError):
     """A value of the user is outside its allowed range; the message is one line.
 
     `key` is the full name of the refused value, as its file has it; `faults` are the refusals of which it consists,
-    where it stands for several: its message has a line for each.
+    where it stands for several: its message has a line for each. The message of one that is `placed` begins with
+    the file that is at fault, and the line in it. `line` is the fault's own, where no key has it, else 0.
     """
 
-    def __init__(self, message: str = "", key: str = "", faults: Sequence[InputError] = ()) -> None:
+    def __init__(
+        self,
+        message: str = "",
+        key: str = "",
+        faults: Sequence[InputError] = (),
+        *,
+        line: int = 0,
+        placed: bool = False,
+    ) -> None:
         super().__init__(message)
         self.key = key
+        self.line = line
+        self.placed = placed
         self.faults: tuple[InputError, ...] = tuple(faults) or (self,)
 
     @classmethod
@@ -51,18 +64,19 @@ class WriteError(RunError):
 
 @contextmanager
 def each_refusal(change: Callable[[InputError], InputError]) -> Iterator[None]:
-    """Put `change` of it in the place of each refusal of an InputError."""
+    """Put `change` of it in the place of each refusal of an InputError that is not `placed` yet."""
     try:
         yield
     except InputError as error:
-        raise InputError.of([change(fault) for fault in error.faults]) from error
+        changed = [fault if fault.placed else change(fault) for fault in error.faults]
+        raise InputError.of(changed) from error
 
 
 @contextmanager
 def refusal_prefix(prefix: str, key: str = "") -> Iterator[None]:
     """Put `prefix`, which says where a value stands, before each line of an InputError; `key` names the value where
     the error does not."""
-    with each_refusal(lambda fault: InputError(f"{prefix}{fault}", fault.key or key)):
+    with each_refusal(lambda fault: InputError(f"{prefix}{fault}", fault.key or key, line=fault.line)):
         yield
 
 
@@ -120,20 +134,49 @@ def _escape(character: str) -> str:
     return character.encode("unicode_escape").decode()
 
 
-class _Brief(reprlib.Repr):
-    """Values of a file as Python writes them, cut in depth and length."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.maxlevel, self.maxstring, self.maxlong, self.maxother = 2, 60, 40, 60
+_LETTERS, _ENTRIES, _DEPTH = 60, 4, 2
+"""Most letters of a text, entries of a list or a table, and tables in one another that `shown` writes out."""
 
 
-def shown(given: Any) -> str:
-    """A value from outside, as a refusal cites it: in one short line, a text in quotation marks."""
-    if isinstance(given, list) and len(given) <= 4 and all(isinstance(x, str | int | float) for x in given):
-        return f"[{', '.join(map(shown, given))}]"
-    if not isinstance(given, str):
-        return printable(_Brief().repr(given), 100)
-    most = 60
-    quoted = printable(json.dumps(given[:most], ensure_ascii=False), 8 * most)
-    return quoted if len(given) <= most else f"{quoted}... ({len(given) - most} more characters)"
+def shown(given: Any, depth: int = 0) -> str:
+    """A value from outside, as a refusal cites it: in one short line, as TOML writes it."""
+    if isinstance(given, str):
+        quoted = printable(json.dumps(given[:_LETTERS], ensure_ascii=False), 8 * _LETTERS)
+        rest = len(given) - _LETTERS
+        return quoted if rest <= 0 else f"{quoted}... ({rest} more characters)"
+    if isinstance(given, bool):
+        return "true" if given else "false"
+    if isinstance(given, Mapping):
+        entries = [f"{_bare(str(name))} = {shown(x, depth + 1)}" for name, x in _first(given.items())]
+        return _bracketed("{ ", entries, len(given), " }", depth)
+    if isinstance(given, list | tuple):
+        return _bracketed("[", [shown(x, depth + 1) for x in _first(given)], len(given), "]", depth)
+    if isinstance(given, date | time):
+        return given.isoformat()
+    return printable(_brief(given), 100)
+
+
+def _first(entries: Iterable[Any]) -> Iterator[Any]:
+    return itertools.islice(entries, _ENTRIES)
+
+
+def _bracketed(begin: str, entries: Sequence[str], number: int, end: str, depth: int) -> str:
+    """A list or a table of `number` entries, the first of which are written out."""
+    if not number:
+        return begin.strip() + end.strip()
+    more = ["..."] if number > len(entries) else []
+    return begin + ("..." if depth > _DEPTH else ", ".join([*entries, *more])) + end
+
+
+def _bare(name: str) -> str:
+    """A key as TOML writes it."""
+    return name if re.fullmatch(r"[A-Za-z0-9_-]{1,60}", name) else shown(name)
+
+
+def _brief(given: Any) -> str:
+    """A number, or a value that no file can have, cut in length."""
+    try:
+        text = repr(given)
+    except ValueError:  # Python writes no integer of more than 4300 digits
+        return f"a number of about {round(0.30103 * int(given).bit_length())} digits"
+    return text if len(text) <= _LETTERS else f"{text[:20]}...{text[-10:]}"

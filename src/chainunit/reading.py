@@ -32,6 +32,7 @@ from . import places, units
 from .errors import InputError, near_name, printable, shown
 from .quantities import Layout, Variable, complaint, variables
 from .refusals import unit_behind
+from .syntax import syntax_faults
 
 T = TypeVar("T")
 
@@ -227,7 +228,8 @@ def _line(error: ErrorDetails, file: type[BaseModel], prefix: str) -> str:
         hint = near_name(str(path[-1]), table.model_fields) or _elsewhere(str(path[-1]), file)
         return f"{where}: unknown key{hint}{' ' if hint.endswith('?') else '; '}{known}"
     if error["type"] == "model_type":
-        return f"{where} = {shown(error['input'])}: must be a table"
+        array = f", below [{where}]" if isinstance(error["input"], list) else ""
+        return f"{where} = {shown(error['input'])}: must be a table{array}"
     if error["type"] == "value_error":
         return str(error["ctx"]["error"])
     return f"{where} = {shown(error['input'])}: {_allowed(error, where.removeprefix(prefix))}"
@@ -244,7 +246,13 @@ def _elsewhere(key: str, file: type[BaseModel]) -> str:
     )
 
 
-_KINDS = {"string_type": "a text", "bool_type": "true or false", "dict_type": "a table"}
+_KINDS = {
+    "string_type": "a text",
+    "string_too_short": "a text that is not empty",
+    "bool_type": "true or false",
+    "dict_type": "a table",
+    "tuple_type": "a list of 2",
+}
 """What a value must be, by the kind of pydantic's error."""
 
 
@@ -256,6 +264,12 @@ def _allowed(error: ErrorDetails, key: str) -> str:
         return f"must be {expected}{near_name(str(value), expected.split(chr(34))[1::2])}"
     if kind == "list_type":
         return "must be a list" + (f" of tables, each below [[{key}]]" if isinstance(value, Mapping) else "")
+    if kind == "too_long":
+        length = error["ctx"]
+        most = "exactly 2" if isinstance(value, tuple) else f"at most {length['max_length']}"
+        return f"must be a list of {most}, and has {length['actual_length']}"
+    if kind == "missing":
+        return "must be a list of 2"
     return f"must be {_KINDS[kind]}" if kind in _KINDS else error["msg"].lower()
 
 
@@ -289,16 +303,12 @@ def toml(text: str) -> dict[str, Any]:
     Raises
     ------
     InputError
-        in one line, where it is none.
+        where it is none; each fault knows its line.
     """
     try:
         return tomllib.loads(text)
     except ValueError as error:  # TOMLDecodeError, and numbers that are too long
-        first = text.lstrip().partition("\n")[0]
-        kind = (
-            "; it is JSON" if first.startswith("{") else "; it is a CSV table" if first.count(",") > 2 else ""
-        )
-        raise InputError(f"no valid TOML: {printable(str(error))}{kind}") from error
+        raise InputError.of(syntax_faults(text, error)) from error
     except RecursionError as error:
         raise InputError("no valid TOML: tables or lists are nested too deeply") from error
 
@@ -325,10 +335,20 @@ def in_file(source: str, lines_of: Callable[[], Mapping[str, int]]) -> Iterator[
         yield
     except InputError as error:
         lines = lines_of() if any(fault.key for fault in error.faults) else {}
+
+        def line_of(fault: InputError) -> int:
+            return fault.line or _line_of(fault.key, lines)
+
+        # faults of another file that this one names stand at the end
+        ordered = sorted(error.faults, key=lambda fault: (fault.placed, line_of(fault)))
         raise InputError.of(
             [
-                InputError(f"{source}:{f'{line}:' if (line := _line_of(fault.key, lines)) else ''} {fault}")
-                for fault in sorted(error.faults, key=lambda fault: _line_of(fault.key, lines))
+                fault
+                if fault.placed
+                else InputError(
+                    f"{source}:{f'{line}:' if (line := line_of(fault)) else ''} {fault}", placed=True
+                )
+                for fault in ordered
             ]
         ) from error
 

@@ -22,7 +22,7 @@ from contextvars import ContextVar
 from types import MappingProxyType
 from typing import Any, TypeAlias
 
-from .errors import InputError, near_name
+from .errors import Faults, InputError, near_name, printable, shown
 from .quantities import DISPLAY_UNITS, Layout, finite
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -59,24 +59,25 @@ CHOICES = {kind: tuple(scales) for kind, scales in _SCALES.items() if len(scales
 """Units that an engineer may choose, by kind."""
 
 
-def chosen_units(choices: Mapping[str, str]) -> Units:
+def chosen_units(choices: Mapping[str, Any]) -> Units:
     """The units in which numbers are shown, where the user chooses those of some kinds: ``{"speed":
     "rev/min"}``.
 
     Raises
     ------
     InputError
-        for an unknown kind or unit.
+        with a line for each unknown kind and unit.
     """
+    faults = Faults()
     for kind, unit in choices.items():
+        key = f"report.units.{printable(kind, 80)}"
         if kind not in CHOICES:
-            key = f"report.units.{kind}"
-            raise InputError(
-                f"{key}: unknown kind; must be one of {', '.join(CHOICES)}{near_name(kind, CHOICES)}", key
-            )
-        if unit not in CHOICES[kind]:
+            known = f"unknown kind; must be one of {', '.join(CHOICES)}{near_name(kind, CHOICES)}"
+            faults.add([InputError(f"{key}: {known}", key)])
+        elif unit not in CHOICES[kind]:
             allowed = " or ".join(f'"{name}"' for name in CHOICES[kind])
-            raise InputError(f'report.units.{kind} = "{unit}": must be {allowed}', f"report.units.{kind}")
+            faults.add([InputError(f"{key} = {shown(unit)}: must be {allowed}", key)])
+    faults.refuse()
     return {**DEFAULT_UNITS, **{kind: (unit,) for kind, unit in choices.items()}}
 
 

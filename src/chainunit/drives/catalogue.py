@@ -15,15 +15,16 @@ import csv
 import difflib
 import io
 import re
-from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError, near_name, refusal_prefix, shown
+from .. import places, units
+from ..errors import Faults, InputError, each_refusal, near_name, shown
 from ..quantities import DISPLAY_UNITS, Layout, Value, Variable, declaration, quantity
-from ..reading import file_text, packaged, to_number, toml
+from ..reading import file_text, in_file, packaged, to_number, toml
 from .induction_motor import InductionMotor
 from .motor import Motor
 from .nameplate import Identification, Nameplate, check, identify
@@ -68,7 +69,9 @@ class CatalogueMotor:
         InputError
             in one line, where no circuit meets its nameplate.
         """
-        with refusal_prefix(f"{self.origin}: {self.designation}: "):
+        with each_refusal(
+            lambda fault: InputError(f"{self.origin}: {self.designation}: {fault}", placed=True)
+        ):
             return identify(self.nameplate)
 
     def model(self) -> tuple[type[Motor], Any]:
@@ -94,12 +97,12 @@ def catalogue(extra: Path | None = None) -> list[CatalogueMotor]:
     Raises
     ------
     InputError
-        in one line: the file, the row, the field, its value and the allowed range.
+        with a line for each wrong value: the file, the line, the column, the value and the allowed range.
     """
     motors = list(_packaged())
     if extra is not None:
         rows = _toml_rows if extra.suffix.lower() == ".toml" else _csv_rows
-        motors += _motors(rows(file_text(extra), str(extra)), {m.designation for m in motors})
+        motors += _motors(rows, file_text(extra), str(extra), {m.designation for m in motors})
     return motors
 
 
@@ -134,106 +137,173 @@ def check_own(extra: Path | None) -> None:
     InputError
         see `catalogue` and `CatalogueMotor.identify`.
     """
+    faults = Faults()
     for motor in catalogue(extra)[len(_packaged()) :]:
-        motor.identify()
+        with faults.collected():
+            motor.identify()
+    faults.refuse()
 
 
 @cache
 def _packaged() -> tuple[CatalogueMotor, ...]:
     name = "motors.csv"
-    return tuple(_motors(_csv_rows(packaged(name), name), set()))
+    return tuple(_motors(_csv_rows, packaged(name), name, set()))
 
 
-def _motors(rows: Iterator[tuple[str, Mapping[str, Any]]], others: set[str]) -> list[CatalogueMotor]:
-    motors = []
-    for origin, row in rows:
-        try:
-            motors.append(_motor(origin, row, others))
-        except ValueError as error:
-            raise InputError(f"{origin}: {error}") from error
-        others.add(motors[-1].designation)
+@dataclass(frozen=True)
+class _Row:
+    """A motor as a file gives it."""
+
+    file: str
+    line: int
+    values: Mapping[str, Any]
+    """by the names of their columns"""
+    prefix: str
+    """what stands before the name of a column in a refusal"""
+    lines: Mapping[str, int] = field(default_factory=dict)
+    """of the values, where they stand in lines of their own"""
+
+    @property
+    def origin(self) -> str:
+        """The file and the line."""
+        return f"{self.file}:{self.line}"
+
+    def refusal(self, fault: InputError) -> InputError:
+        """A fault in this row, with its place."""
+        line = self.lines.get(fault.key, self.line)
+        return InputError(f"{self.file}:{line}: {self.prefix}{fault}", placed=True)
+
+
+def _motors(
+    rows: Callable[[str, str, Faults], Iterator[_Row]], text: str, file: str, others: set[str]
+) -> list[CatalogueMotor]:
+    """The motors of a file whose `rows` these are, behind those of the designations `others`."""
+    motors, others, faults = [], set(others), Faults()
+    for row in rows(text, file, faults):
+        with faults.collected(), each_refusal(row.refusal):
+            motors.append(_motor(row, others))
+        others.add(str(row.values.get("designation", "")).strip())
+    faults.refuse()
     return motors
 
 
-def _motor(origin: str, row: Mapping[str, Any], others: set[str]) -> CatalogueMotor:
-    for name in row:
+def _motor(row: _Row, others: set[str]) -> CatalogueMotor:
+    faults, values = Faults(), dict[str, float]()
+    for name in row.values:
         if name not in _VARIABLES and name not in TEXTS:
-            raise InputError(f"{shown(name)}: unknown; known here: {', '.join((*TEXTS, *_VARIABLES))}")
-    texts = {}
-    for name in TEXTS:
-        text = row.get(name, origin if name == "source" else "")
+            hint = near_name(name, (*TEXTS, *_VARIABLES))
+            known = f"unknown{hint}; known here: {', '.join((*TEXTS, *_VARIABLES))}"
+            faults.add([InputError(f"{shown(name)}: {known}", name)])
+    texts = {name: row.values.get(name, row.origin if name == "source" else "") for name in TEXTS}
+    for name, text in texts.items():
         if not isinstance(text, str) or not text.strip() or not text.isprintable() or len(text) > _LONGEST:
-            raise InputError(
-                f"{name} = {shown(text)}: must be a text of one line, of at most {_LONGEST} characters"
-            )
-        texts[name] = text.strip()
-    if texts["designation"] in others:
-        raise InputError(f"designation = {shown(texts['designation'])}: stands in the catalogue already")
-    values = {}
+            words = f"must be a text of one line, of at most {_LONGEST} characters"
+            faults.add([InputError(f"{name} = {shown(text)}: {words}", name)])
+        elif name == "designation" and text.strip() in others:
+            words = "stands in the catalogue already"
+            faults.add([InputError(f"{name} = {shown(text.strip())}: {words}", name)])
     for name, variable in _VARIABLES.items():
-        if name in row:
-            values[name] = to_number(variable, row[name])
+        if name in row.values:
+            try:
+                values[name] = to_number(variable, row.values[name])
+            except ValueError as error:
+                faults.add([InputError(str(error), name)])
         elif variable.quantity.start is None:
-            raise InputError(
-                f"{name}: is missing; must be {variable.quantity.allowed_range} ({variable.description})"
-            )
+            allowed = f"{variable.quantity.allowed_range} ({variable.description})"
+            faults.add([InputError(f"{name}: is missing; must be {allowed}", name)])
+    faults.refuse()
     nameplate = LAYOUT.from_names(values)
     check(nameplate)
-    return CatalogueMotor(nameplate=nameplate, origin=origin, **texts)
+    own = {name: text.strip() for name, text in texts.items()}
+    return CatalogueMotor(nameplate=nameplate, origin=row.origin, **own)
 
 
-def _csv_rows(text: str, file: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-    try:
-        rows = [(reader.line_num, row) for row in reader if any(cell.strip() for cell in row)]
-    except csv.Error as error:
-        raise InputError(f"{file}: line {reader.line_num}: no valid CSV: {error}") from error
+def _csv_rows(text: str, file: str, faults: Faults) -> Iterator[_Row]:
+    rows = list(_lines_of_cells(text, file))
     if not rows:
         raise InputError(f"{file}: is empty; must begin with a row of headings, parted by commas")
-    columns = [_column(cell, file) for cell in rows[0][1]]
-    names = [name for name, _ in columns]
-    for name in names:
-        if names.count(name) > 1:
-            raise InputError(f"{file}: {name}: has two columns")
-    for line, row in rows[1:]:
-        origin = f"{file}: line {line}"
-        if len(row) != len(columns):
-            raise InputError(f"{origin}: has {len(row)} cells; must have {len(columns)}, as the headings")
-        yield (
-            origin,
-            {
-                name: _with_unit(cell.strip(), unit)
-                for (name, unit), cell in zip(columns, row, strict=True)
-                if cell.strip()
-            },
-        )
+    (first, headings), *others = rows
+    columns = _columns(headings, file, first)
+    for line, row in others:
+        if len(row) == len(columns):
+            cells = zip(columns, map(str.strip, row), strict=True)
+            values = {name: _with_unit(cell, unit) for (name, unit), cell in cells if cell}
+            yield _Row(file, line, values, "column ")
+        else:
+            quotes = "; a comma in a cell needs quotation marks around it" if len(row) > len(columns) else ""
+            words = f"has {len(row)} cells; must have {len(columns)}, as the headings{quotes}"
+            faults.add([InputError(f"{file}:{line}: {words}", placed=True)])
 
 
-def _column(cell: str, file: str) -> tuple[str, str]:
-    match = _HEADING.fullmatch(cell)
-    if match is None or (match[1] not in _VARIABLES and match[1] not in TEXTS):
-        names = ", ".join((*TEXTS, *(heading(v) for v in _VARIABLES.values())))
-        raise InputError(f"{file}: heading {shown(cell)}: unknown; known here: {names}")
-    return match[1], match[2] or ""
+def _lines_of_cells(text: str, file: str) -> Iterator[tuple[int, list[str]]]:
+    """The rows that are not empty, each with its first line."""
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    line = 1
+    try:
+        for row in reader:
+            if any(cell.strip() for cell in row):
+                yield line, row
+            line = reader.line_num + 1
+    except csv.Error as error:
+        raise InputError(f"{file}:{line}: no valid CSV: {error}", placed=True) from error
+
+
+def _columns(headings: Sequence[str], file: str, line: int) -> list[tuple[str, str]]:
+    """Names and units of the columns."""
+    faults, columns = Faults(), list[tuple[str, str]]()
+    names = (*TEXTS, *_VARIABLES)
+    for cell in headings:
+        match = _HEADING.fullmatch(cell)
+        name, unit = (match[1], match[2] or "") if match else ("", "")
+        if name not in names:
+            parted = "; cells must be parted by commas" if cell.count(";") > 2 or "\t" in cell else ""
+            known = ", ".join((*TEXTS, *(heading(v) for v in _VARIABLES.values())))
+            words = f"unknown{parted}{near_name(name, names)}; known here: {known}"
+            faults.add([InputError(f"{file}:{line}: heading {shown(cell)}: {words}", placed=True)])
+        elif any(name == other for other, _ in columns):
+            faults.add([InputError(f"{file}:{line}: column {name}: stands twice", placed=True)])
+        elif unit and (name in TEXTS or not _fits(unit, _VARIABLES[name])):
+            has = (
+                f"must have a unit such as {heading(_VARIABLES[name])}"
+                if name not in TEXTS
+                else "has no unit"
+            )
+            faults.add([InputError(f"{file}:{line}: heading {shown(cell)}: {has}", placed=True)])
+        columns.append((name, unit))
+    faults.refuse()
+    return columns
+
+
+def _fits(unit: str, variable: Variable) -> bool:
+    """Whether a value in that unit is one of the quantity."""
+    try:
+        units.convert(1.0, unit, variable.unit, variable.kind)
+    except ValueError:
+        return False
+    return True
 
 
 def _with_unit(cell: str, unit: str) -> str:
-    try:
-        float(cell)
-    except ValueError:
-        return cell
-    return f"{cell} {unit}" if unit else cell
+    """A cell with the unit of its column, where it is a number that has none of its own."""
+    parts = units.split(cell)
+    return f"{cell} {unit}" if unit and parts is not None and not parts[1] else cell
 
 
-def _toml_rows(text: str, file: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    with refusal_prefix(f"{file}: "):
+def _toml_rows(text: str, file: str, faults: Faults) -> Iterator[_Row]:
+    with in_file(file, lambda: places.lines_of(text)):
         data = toml(text)
-    tables = data.pop("motor", None)
-    for name in data:
-        raise InputError(f"{file}: {shown(name)}: unknown; each motor is a table [[motor]]")
-    if tables is None:
-        raise InputError(f"{file}: has no motor; each motor must be a table [[motor]]")
-    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
-        raise InputError(f"{file}: motor = {shown(tables)}: each motor must be a table [[motor]]")
+        tables = data.pop("motor", None)
+        wrong = Faults()
+        for name in data:
+            wrong.add([InputError(f"{shown(name)}: unknown; each motor is a table [[motor]]", name)])
+        if tables is None and not data:
+            wrong.add([InputError("has no motor; each motor must be a table [[motor]]")])
+        elif tables is not None and not (
+            isinstance(tables, list) and all(isinstance(table, dict) for table in tables)
+        ):
+            wrong.add([InputError(f"motor = {shown(tables)}: each motor must be a table [[motor]]", "motor")])
+        wrong.refuse()
+    lines = places.lines_of(text)
     for number, table in enumerate(tables, 1):
-        yield f"{file}: motor {number}", table
+        own = {name: lines.get(f"motor.{number}.{name}", 0) for name in table}
+        yield _Row(file, lines.get(f"motor.{number}", 0), table, f"motor {number}: ", own)

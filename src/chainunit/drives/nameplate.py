@@ -18,7 +18,8 @@ locked rotor for the cold one. A motor in rated running therefore comes to rest 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
@@ -27,7 +28,7 @@ from typing import Any
 import numpy as np
 
 from ..engines import MATH, Dual, dual, slope, value
-from ..errors import InputError
+from ..errors import Faults, InputError
 from ..quantities import Layout, Value, declaration, quantity, violations
 from .induction_motor import InductionMotor, Parameters, Steady, breakdown, steady
 from .motor import T_RATED
@@ -174,37 +175,51 @@ def check(nameplate: Nameplate, assumptions: Assumptions = TYPICAL) -> None:
     Raises
     ------
     InputError
-        in one line: the quantity, its value, the allowed range.
+        with a line for each: the quantity, its value, the allowed range.
     """
-    for line in (*violations(LAYOUT, nameplate), *violations(Layout(Assumptions), assumptions)):
-        raise InputError(line)
-    n = nameplate
-    if n.poles % 2.0:
-        raise InputError(f"poles = {n.poles:g}: must be an even number (number of poles)")
-    low, high = (1.0 - LARGEST_SLIP) * n.synchronous, n.synchronous
-    if not low < n.speed < high:
-        rev = [x * 60.0 / _TURN for x in (n.speed, low, high)]
-        raise InputError(
-            f"speed = {n.speed:g} rad/s ({rev[0]:g} rev/min): with poles = {n.poles:g} at {n.frequency:g} Hz it "
-            f"must be > {low:g} and < {high:g} rad/s, the synchronous speed ({rev[1]:g} and {rev[2]:g} rev/min)"
-        )
+    faults = Faults()
+    faults.add(map(_of_column, violations(LAYOUT, nameplate)))
+    faults.add(map(InputError, violations(Layout(Assumptions), assumptions)))
+    faults.refuse()
+    faults.add(map(_of_column, _contradictions(nameplate, assumptions)))
+    faults.refuse()
+
+
+def _of_column(line: str) -> InputError:
+    """The refusal of a value, with the name of which its line begins as its key."""
+    return InputError(line, re.split("[ :]", line)[0])
+
+
+def _contradictions(n: Nameplate, assumptions: Assumptions) -> Iterator[str]:
+    """Values that contradict others, each in a line that begins with its name."""
     low, high = ((1.0 + sign * LARGEST_RESIDUAL) * n.implied_current for sign in (-1.0, 1.0))
     if n.current and not low < n.current < high:
-        raise InputError(
+        yield (
             f"current = {n.current:g} A: power, voltage, efficiency and power factor make it {n.implied_current:.4g} "
             f"A; must be > {low:.4g} and < {high:.4g} A, or be left out"
         )
+    if n.poles % 2.0:
+        yield f"poles = {n.poles:g}: must be an even number (number of poles)"
+        return
+    low, high = (1.0 - LARGEST_SLIP) * n.synchronous, n.synchronous
+    if not low < n.speed < high:
+        rev = [x * 60.0 / _TURN for x in (n.speed, low, high)]
+        yield (
+            f"speed = {n.speed:g} rad/s ({rev[0]:g} rev/min): with poles = {n.poles:g} at {n.frequency:g} Hz it "
+            f"must be > {low:g} and < {high:g} rad/s, the synchronous speed ({rev[1]:g} and {rev[2]:g} rev/min)"
+        )
+        return
     # slip and friction alone would leave that much
     most = (1.0 - n.slip) / (1.0 + assumptions.friction)
     real = n.power / (n.apparent_power * n.power_factor)
     if not max(real, n.efficiency) < most:
-        raise InputError(
+        yield (
             f"efficiency = {max(real, n.efficiency):.4g}: a slip of {n.slip:.3g} and friction of "
             f"{assumptions.friction:g} of the power leave at most {most:.4g}; must be < {most:.4g}"
         )
     most = n.locked_current_ratio * n.apparent_power / (n.torque * n.synchronous)
     if not n.locked_torque_ratio < most:
-        raise InputError(
+        yield (
             f"locked_torque_ratio = {n.locked_torque_ratio:g}: takes more than the whole power of the locked-rotor "
             f"current; must be < {most:.3g}"
         )

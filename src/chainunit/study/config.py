@@ -207,6 +207,12 @@ def of_tables(data: Mapping[str, Any], source: str) -> Config:
         if isinstance(data.get("event", []), list):
             read_events(data.get("event", []))
     with faults.collected():
+        random = named_table(data, "monte_carlo").get("event")
+        if isinstance(random, Mapping):
+            read_random_event(random, "monte_carlo.event")
+    with faults.collected():
+        _read_catalogue(data, source)
+    with faults.collected():
         units = named_table(data, "report").get("units", {})
         if isinstance(units, Mapping):
             chosen_units(units)
@@ -343,12 +349,18 @@ def _choices(checked: Any, parts: Parts) -> dict[str, Any]:
     return known
 
 
+def _read_catalogue(data: Mapping[str, Any], source: str) -> None:
+    """Refuse a catalogue that cannot be read, and the wrong values in one."""
+    name = data.get("catalogue")
+    if isinstance(name, str) and name:
+        with refusal_prefix("catalogue = ", "catalogue"):
+            catalogue(beside(name, source))
+
+
 def _plate(designation: str, file: Path | None) -> CatalogueMotor | None:
     """The motor of the catalogue that [system] names."""
     if not designation:
         return None
-    with refusal_prefix("catalogue = ", "catalogue"):
-        catalogue(file)
     with refusal_prefix("system.motor = ", "system.motor"):
         return motor_of_catalogue(designation, file, MOTORS)
 

@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import Faults, InputError, each_refusal, near_name, refusal_prefix, shown
+from ..errors import Faults, InputError, each_refusal, near_name, shown
 from ..machines.chain_unit import SIDES
-from ..quantities import Layout, variables
+from ..quantities import Layout, Variable, variables
 from ..reading import given_values, instance, read_table, schema, to_number
 from .event import TYPES, AnySide, Event, on_side
 from .events import Jam
@@ -42,14 +42,15 @@ def read_events(tables: Sequence[Any]) -> dict[str, Event]:
     events: dict[str, Event] = {}
     faults = Faults()
     for k, table in enumerate(tables, 1):
-        with faults.collected(), refusal_prefix("", f"event.{k}"):
-            of = _type(table, f"event {k}")
-            where = f"event {k} ({of.kind})"
-            side = _side(of, table, where)
-            if not side and of.sided:
-                raise InputError(f'{where}: side: must be given, "left" or "right"')
-            name = _name(table, of.on(side).name, events, where)
-            events[name] = of.on(side, _parameters(of, table, f"event.{name}.", f"event.{k}."), name)
+        with faults.collected():
+            of = _type(table, f"event {k}", f"event.{k}")
+            where, place = f"event {k} ({of.kind})", f"event.{k}"
+            side = _side(of, table, where, place, faults)
+            if "side" not in table and of.sided:
+                faults.add([InputError(f'{where}: side: must be given, "left" or "right"', place)])
+            usual = of.on(side).name if side or not of.sided else of.kind
+            name = _name(table, usual, events, where, place, faults)
+            events[name] = of.on(side, _parameters(of, table, f"event.{name}.", f"{place}."), name)
     faults.refuse()
     return events
 
@@ -102,68 +103,85 @@ def read_random_event(table: Mapping[str, Any], where: str) -> RandomEvent:
     InputError
         see `read_events`.
     """
-    of = _type({"type": Jam.kind, **table}, where)
+    faults = Faults()
+    of = _type({"type": Jam.kind, **table}, where, where)
     if of.from_rest:
-        raise InputError(f'{where}.type = "{of.kind}": must be an event in steady running')
+        key = f"{where}.type"
+        raise InputError(f'{key} = "{of.kind}": must be an event in steady running', key)
     for name in (*_PLACED, "name"):
         if name in table:
             key = f"{where}.{name}"
-            raise InputError(f"{key}: is not of random overloads, which come at any crank angle", key)
+            faults.add([InputError(f"{key}: is not of random overloads, which come at any crank angle", key)])
     ranges = {name: ends for name, ends in of.draws.items() if name not in table}
-    for v in variables(of.Parameters):
-        ends = table.get(v.name)
-        if isinstance(ends, list):
-            named = replace(v, name=f"{where}.{v.name}")
-            if len(ends) != 2:
-                raise InputError(
-                    f"{named.name} = {shown(ends)}: must be a number, or two: from where to where", named.name
-                )
-            try:
-                low, high = (to_number(named, end) for end in ends)
-            except ValueError as error:
-                raise InputError(str(error), named.name) from error
-            if high < low:
-                raise InputError(f"{named.name} = {shown(ends)}: the second must be >= the first", named.name)
-            ranges[v.name] = (low, high)
-    fixed = {name: value for name, value in table.items() if name not in ranges}
+    given = [v for v in variables(of.Parameters) if isinstance(table.get(v.name), list)]
+    for v in given:
+        with faults.collected():
+            ranges[v.name] = _range(replace(v, name=f"{where}.{v.name}"), table[v.name])
+    drawn = {*ranges, *(v.name for v in given), *_PLACED, "name"}
     ordered = {name: ranges[name] for name in Layout(of.Parameters).names if name in ranges}
-    return RandomEvent(of, _side(of, table, where), _parameters(of, fixed, f"{where}."), ordered)
+    side = _side(of, table, where, where, faults)
+    with faults.collected():
+        fixed = {name: value for name, value in table.items() if name not in drawn}
+        p = _parameters(of, fixed, f"{where}.")
+    faults.refuse()
+    return RandomEvent(of, side, p, ordered)
 
 
-def _type(table: Any, where: str) -> type[Event]:
+def _range(variable: Variable, ends: Any) -> tuple[float, float]:
+    """The range from which a quantity is drawn."""
+    name = variable.name
+    if len(ends) != 2:
+        raise InputError(f"{name} = {shown(ends)}: must be a number, or two: from where to where", name)
+    try:
+        low, high = (to_number(variable, end) for end in ends)
+    except ValueError as error:
+        raise InputError(str(error), name) from error
+    if high < low:
+        raise InputError(f"{name} = {shown(ends)}: the second must be >= the first", name)
+    return low, high
+
+
+def _type(table: Any, where: str, place: str) -> type[Event]:
+    """The type that the table names; a refusal begins with `where`, and its key with `place`."""
     if not isinstance(table, Mapping):
-        raise InputError(f"{where} = {shown(table)}: must be a table")
+        raise InputError(f"{where} = {shown(table)}: must be a table", place)
     name = table.get("type")
     of = TYPES.get(name) if isinstance(name, str) else None
     if of is None:
         refused = ": must be given," if name is None else f" = {shown(name)}: must be"
-        raise InputError(f"{where}: type{refused} one of {', '.join(TYPES)}{near_name(str(name), TYPES)}")
+        line = f"{where}: type{refused} one of {', '.join(TYPES)}{near_name(str(name), TYPES)}"
+        raise InputError(line, f"{place}.type")
     return of
 
 
-def _side(of: type[Event], table: Mapping[str, Any], where: str) -> AnySide:
+def _side(of: type[Event], table: Mapping[str, Any], where: str, place: str, faults: Faults) -> AnySide:
+    """The side that the table names, none where it names a wrong one: that goes to the `faults`."""
     if "side" not in table:
         return ""
-    if not of.sided:
-        raise InputError(f"{where}: side: this event has none; leave it out")
-    for side in SIDES:
+    for side in SIDES if of.sided else ():
         if table["side"] == side:
             return side
-    raise InputError(f'{where}: side = {shown(table["side"])}: must be "left" or "right"')
+    wrong = f' = {shown(table["side"])}: must be "left" or "right"{near_name(str(table["side"]), SIDES)}'
+    words = wrong if of.sided else ": this event has none; leave it out"
+    faults.add([InputError(f"{where}: side{words}", f"{place}.side")])
+    return ""
 
 
-def _name(table: Mapping[str, Any], usual: str, others: Mapping[str, Event], where: str) -> str:
-    if "name" not in table:
-        numbers = (usual if k == 1 else f"{usual}_{k}" for k in range(1, len(others) + 2))
-        return next(name for name in numbers if name not in others)
-    name = table["name"]
-    if not isinstance(name, str) or not _NAME.fullmatch(name) or name.endswith("_coasting"):
-        raise InputError(
-            f"{where}: name = {shown(name)}: must be small letters, digits and _, at most 40, with a letter first"
-        )
-    if name in others or name in RESERVED:
-        raise InputError(f"{where}: name = {shown(name)}: is that of another run")
-    return name
+def _name(
+    table: Mapping[str, Any], usual: str, others: Mapping[str, Event], where: str, place: str, faults: Faults
+) -> str:
+    """The name of the run; the usual one in place of a wrong name, which goes to the `faults`."""
+    if "name" in table:
+        name = table["name"]
+        if not isinstance(name, str) or not _NAME.fullmatch(name) or name.endswith("_coasting"):
+            words = "must be small letters, digits and _, at most 40, with a letter first"
+        elif name in others or name in RESERVED:
+            words = "is that of another run"
+        else:
+            return name
+        faults.add([InputError(f"{where}: name = {shown(name)}: {words}", f"{place}.name")])
+    numbers = (usual if k == 1 else f"{usual}_{k}" for k in range(1, len(others) + 2))
+    return next(name for name in numbers if name not in others)
 
 
 def _parameters(of: type[Event], table: Mapping[str, Any], prefix: str, place: str = "") -> Any:

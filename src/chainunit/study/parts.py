@@ -32,7 +32,7 @@ class ReportTable(BaseModel):
     """How the report on a study shows it."""
 
     model_config = ConfigDict(extra="forbid")
-    units: dict[str, str] = {}
+    units: dict[str, Any] = {}
     project: Title = Field("", description="project that the study is for")
     author: Title = Field("", description="author of the study")
     date: Annotated[Title, BeforeValidator(_as_text)] = Field("", description="date of the study")

@@ -1,0 +1,117 @@
+"""Faults of a text that is no TOML, each with its line and a remedy: tomllib tells the first, in words of its own."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+
+from .errors import InputError, printable, shown
+
+_PLACE = re.compile(r" \(at (?:line (\d+), column \d+|end of document)\)$")
+_NAMED = r"\s*([\w.\"' -]*?)\s*=\s*"
+_COMMA = re.compile(r"([+-−]?\d+),(\d+)(?!\d*,)(.*)")
+_NUMBER = re.compile(r"([+-]?)0*(\d*)\.?(\d*)")
+_QUOTES = "“”„«»‘’′″`"
+_BARE = re.compile(_NAMED + r"([^\s\"'\[{#=][^\"#=]*?)\s*(?:#.*)?")
+_HEADING = re.compile(r"\s*(\[\[?)\s*([^]\[]+?)\s*\]")
+_DIGITS = re.compile(r"\d{4301,}")
+_SWITCHES = {"true": "true", "yes": "true", "on": "true", "false": "false", "no": "false", "off": "false"}
+_MOST = 50
+"""Faults that are told at once."""
+_LONGEST = 500
+"""Letters of a line whose value is looked at."""
+
+
+def syntax_faults(text: str, error: Exception) -> list[InputError]:
+    """The faults of a text that tomllib refuses with `error`: the first, and those in other lines as far as each
+    concerns its own line alone."""
+    faults: list[InputError] = []
+    lines = text.replace("\r\n", "\n").split("\n")
+    while len(faults) < _MOST:
+        line = _line(lines, error)
+        own = _value_fault(lines[line - 1]) if line else ""
+        if faults and not own:
+            break
+        faults.append(InputError(f"no valid TOML: {own or _words(lines, line, error)}", line=line))
+        if not own:
+            break
+        lines[line - 1] = ""
+        try:
+            tomllib.loads("\n".join(lines))
+        except (ValueError, RecursionError) as next_error:
+            error = next_error
+        else:
+            break
+    return faults
+
+
+def _line(lines: list[str], error: Exception) -> int:
+    """The line of the fault, from 1; 0 where it is not known."""
+    place = _PLACE.search(str(error))
+    if place is not None:
+        return int(place[1]) if place[1] else len(lines)
+    return next((k for k, line in enumerate(lines, 1) if _DIGITS.search(line)), 0)
+
+
+def _value_fault(line: str) -> str:
+    """What is wrong with the value in a line, and how it is written; empty where that is not clear."""
+    match = _BARE.fullmatch(line) if len(line) <= _LONGEST else None
+    if match is None or _is_value(match[2]):
+        return ""
+    key, value = match[1], match[2]
+    cited = printable(match[0].partition("#")[0].strip(), 80)
+    comma = _COMMA.fullmatch(value)
+    value = f"{comma[1]}.{comma[2]}{comma[3]}" if comma else value
+    if comma and not comma[3]:
+        return f"{cited}: a number has a point: {key} = {value}"
+    if switch := _SWITCHES.get(value.lower()):
+        return f"{cited}: must be true or false: {key} = {switch}"
+    number = _NUMBER.fullmatch(value)
+    if number is not None and (number[2] or number[3]):
+        decimals = f".{number[3]}" if number[3] else ""
+        return f"{cited}: a number is written {key} = {number[1]}{number[2] or 0}{decimals}"
+    kind = "a value with a unit" if value[0] in "+-−.0123456789" else "a text"
+    return f"{cited}: {kind} stands in quotation marks: {key} = {shown(value.strip(_QUOTES))}"
+
+
+def _is_value(text: str) -> bool:
+    try:
+        tomllib.loads(f"x = {text}")
+    except ValueError:
+        return False
+    return True
+
+
+def _words(lines: list[str], line: int, error: Exception) -> str:
+    """What is wrong, where it is not a value."""
+    said = _PLACE.sub("", str(error))
+    own = lines[line - 1] if line else ""
+    twice = any(word in said for word in ("Cannot", "Duplicate"))
+    if twice and (heading := _HEADING.match(own)):
+        return _twice(lines, line, heading)
+    if twice:
+        key = printable(own.partition("=")[0].strip(), 80)
+        return f"{key} stands twice in its table; leave one of the two out"
+    if _DIGITS.search(own):
+        return "a number has more than 4300 digits"
+    if own.count('"') == 1 or own.count("'") == 1:
+        return f"{printable(own.strip(), 80)}: a quotation mark is missing"
+    if own.rstrip().endswith("="):
+        return f"{printable(own.strip(), 80)}: its value is missing"
+    first = next(filter(None, (each.strip() for each in lines)), "")
+    kind = "; it is JSON" if first.startswith("{") else "; it is a CSV table" if first.count(",") > 2 else ""
+    cited = f"{printable(own.strip(), 80)}: " if own.strip() and not kind else ""
+    return f"{cited}{printable(said[:1].lower() + said[1:])}{kind}"
+
+
+def _twice(lines: list[str], line: int, heading: re.Match[str]) -> str:
+    """The refusal of a second table of the same name."""
+    begin, name = heading[1], heading[2]
+    end = "]" * len(begin)
+    for k, other in enumerate(lines[: line - 1], 1):
+        first = _HEADING.match(other)
+        if first is not None and first[2] == name:
+            if first[1] != begin:
+                return f"{begin}{name}{end} stands beside {first[0].strip()}{']' * (len(first[1]) - 1)} in line {k}"
+            return f"[{name}] stands twice, first in line {k}; put the keys of both into one table"
+    return f"{begin}{name}{end}: what is in it stands before already; put the keys of both into one table"
