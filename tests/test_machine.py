@@ -90,7 +90,7 @@ def test_a_machine_with_chains_is_simulated():
     machine = machine_of(flexible(2, 1), {"left.wall_mass": 50.0})
     assert machine.p.left.wall_mass == 50.0
     for ask in (lambda: machine.outputs(0.3), lambda: machine.evaluate({"phi": 0.3})):
-        with pytest.raises(TypeError, match="ChainUnitFlexible: its outputs follow from its states"):
+        with pytest.raises(TypeError, match="ChainUnitFlexible: its outputs depend on its states"):
             ask()
     rods = {f"{side}.theta_{k}": np.full(5, 0.1 * k) for side in ("left", "right") for k in (1, 2, 3)}
     run = {"phi0": np.linspace(0.0, 1.0, 5), "rocker.psi": np.linspace(0.0, 0.1, 5), **rods}

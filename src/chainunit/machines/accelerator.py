@@ -1,7 +1,7 @@
-"""The accelerator of a crusher: a rotor that throws the material, a crank without groups.
+"""The accelerator of a crusher: a rotor that throws the material, as a crank without groups.
 
-x right, y up, origin in the axis O; the angle of the rotor is counted from the upward vertical, clockwise. A force is
-the one on the rotor from its bearing.
+x points right, y up, the origin is the axis O. The angle of the rotor counts from the upward vertical, clockwise. A
+force is the force on the rotor from its bearing.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ class BrakeLaw:
 
 @declaration
 class Parameters:
-    """Parameters of the accelerator. The start values are ours: paper 002 prints no dimensions and no inertias."""
+    """Parameters of the accelerator. The start values are assumptions of this package: paper 002 prints no dimensions
+    and no inertias."""
 
     radius: Value = quantity("m", "axis O to the rim", default=0.45, above=0.0, max=1e4)
     g: Value = quantity("m/s2", "gravity", default=9.81, min=0.0, tunable=True)

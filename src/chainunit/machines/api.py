@@ -1,4 +1,4 @@
-"""`ChainUnitMachine`: the machine for Python - arrays in, arrays out."""
+"""`ChainUnitMachine`: the chain unit in Python, with arrays as arguments and results."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from .chain_unit import SIDES, Chamber, ChamberForces, Feed, Inputs, Outputs, Pa
 from .crank_rocker import rocker_extremes
 from .flexible import ChainedModel
 from .hanging import Hanging, Modes, modes, rods, split
-from .machine import Machine, admitted
+from .machine import Machine, admit
 from .parts import Stop
 
 _XP = numpy_()
 CHAIN_RODS = 32
-"""Rods of an organ with which its lowest frequency is that of a chain to a thousandth."""
+"""Number of rods of an organ with which its lowest frequency agrees with that of a chain to a thousandth."""
 EMPTY = SideLoads(material_mass=0.0, processing_force=0.0)
 FREE = Stop()
 _ROCKER = {
@@ -39,7 +39,7 @@ _ROCKER = {
 
 
 class ChainUnitMachine(Machine):
-    """A chain unit with its parameters checked; arguments, arrays and errors as of `Machine`.
+    """A chain unit with checked parameters; arguments, arrays and errors are those of `Machine`.
 
     Examples
     --------
@@ -77,10 +77,10 @@ class ChainUnitMachine(Machine):
         l1: float = 1.35,
         **values: float,
     ) -> Self:
-        """The machine in the papers' ratios and frame.
+        """The machine with the ratios and the frame of the papers 000 and 001.
 
-        rho = r/l, lam = h/l, mu = e/l1, zeta = z/z_max with z_max = 2 l1 sqrt(1 - mu), l2 = l1 - e;
-        c = sqrt(l^2 - r^2) and hy = h, so that crank and rocker are parallel at phi = 0 (papers 000, 001).
+        The ratios are rho = r/l, lam = h/l, mu = e/l1 and zeta = z/z_max with z_max = 2 l1 sqrt(1 - mu); l2 = l1 - e.
+        The frame has c = sqrt(l^2 - r^2) and hy = h, so that crank and rocker are parallel at phi = 0.
         """
         lengths = ratios(rho, lam, mu, zeta, l, l1)
         return cls({**lengths, **(parameters or {}), **values})
@@ -88,8 +88,8 @@ class ChainUnitMachine(Machine):
     def _inputs(
         self, phi: Any, w: Any, a: Any, left: SideLoads, right: SideLoads, stop: Stop = FREE
     ) -> Inputs:
-        given = Inputs(phi=phi, w=w, a=a, left=left, right=right, stop=stop)
-        inputs: Inputs = self.inputs(ChamberForces.input_layout.by_name(given))
+        values = Inputs(phi=phi, w=w, a=a, left=left, right=right, stop=stop)
+        inputs: Inputs = self.inputs(ChamberForces.input_layout.by_name(values))
         return inputs
 
     def forces(
@@ -128,20 +128,20 @@ class ChainUnitMachine(Machine):
         right: SideLoads = EMPTY,
         stop: Stop = FREE,
     ) -> Any:
-        """The motor torque without friction [N m], from the reactions, group by group: the second route."""
+        """The motor torque without friction [N m], from the force passes group by group: the second route."""
         u = self._inputs(phi, w, a, left, right, stop)
         return self.state(u).torque_by_reactions(u.a / self.p.ratio) / self.p.ratio
 
     def friction_torque(
         self, phi: Any, w: Any, left: SideLoads = EMPTY, right: SideLoads = EMPTY, stop: Stop = FREE
     ) -> Any:
-        """The part of `tau` that pin friction and joint damping take [N m]."""
+        """The part of `tau` against pin friction and joint damping [N m]."""
         state = self.state(self._inputs(phi, w, 0.0, left, right, stop))
         return state.effects["pins"].dissipative / self.p.ratio
 
     def energy_per_kg(self, side: str, phi: Any, w: Any) -> Any:
-        """Kinetic and potential energy of a kilogram of material on the `side` ("left" or "right") [J/kg]:
-        dE/dm, with which the feed enters an energy balance (the energy is linear in the mass)."""
+        """Kinetic and potential energy of one kilogram of material on the `side` ("left" or "right") [J/kg]: dE/dm,
+        the factor of the feed in an energy balance (the energy is linear in the mass)."""
         kilogram = SideLoads(material_mass=1.0, processing_force=0.0)
 
         def energy(**loads: Any) -> Any:
@@ -161,11 +161,11 @@ class ChainUnitMachine(Machine):
     def chamber(
         self, psi: Any, w: Any = 0.0, a: Any = 0.0, left: SideLoads = EMPTY, right: SideLoads = EMPTY
     ) -> Chamber:
-        """Loads of the organs at a rocker angle `psi` [rad] (speed `w`, acceleration `a` of the
-        rocker), independent of the drive: the papers' statics at +-12 degrees, beyond this drive's swing.
+        """Loads of the organs at a rocker angle `psi` [rad], with speed `w` and acceleration `a` of the rocker,
+        independent of the drive: for the papers' statics at +-12 degrees, beyond this drive's swing.
 
-        Where a side cannot be assembled an array of angles has NaN in the loads of that side and in those of the
-        rocker: a sweep may pass the limit.
+        For an array of angles, the loads of a side and of the rocker are NaN where that side cannot be assembled: a
+        sweep may pass the limit.
 
         Raises
         ------
@@ -175,13 +175,13 @@ class ChainUnitMachine(Machine):
             see the class.
         """
         loads = self._inputs(0.0, 0.0, 0.0, left, right)
-        psi, w, a = (admitted(_ROCKER[n], x) for n, x in (("psi", psi), ("w", w), ("a", a)))
+        psi, w, a = (admit(_ROCKER[n], x) for n, x in (("psi", psi), ("w", w), ("a", a)))
         if np.ndim(psi) == 0:
-            self._assembled(float(psi))
+            self._check_assembly(float(psi))
         with np.errstate(invalid="ignore"):
             return chain_unit.chamber(_XP, self.p, loads, psi, w, a)
 
-    def _assembled(self, psi: float) -> None:
+    def _check_assembly(self, psi: float) -> None:
         p = self.p
         for side in ("left", "right"):
             span = float(np.hypot(*self._reach(side, psi)))
@@ -194,7 +194,7 @@ class ChainUnitMachine(Machine):
 
     def organ_rods(self, side: str, loads: SideLoads = EMPTY, number: int = CHAIN_RODS) -> tuple[Any, Any]:
         """Lengths [m] and masses [kg] of an organ as `number` rods, shape (number,), wall first, with the material on
-        it: as many in wall and web as brings them nearest to equal length."""
+        them. The numbers of rods in wall and web are those that bring the rods nearest to equal length."""
         p, own = self.p, getattr(self.p, side)
         loads = getattr(self._inputs(0.0, 0.0, 0.0, loads, loads), side)
         on_web = p.web_share * loads.material_mass
@@ -204,27 +204,27 @@ class ChainUnitMachine(Machine):
         return np.repeat(lengths, counts), np.repeat(shares, counts)
 
     def hanging(self, side: str, psi: float, loads: SideLoads = EMPTY, number: int = CHAIN_RODS) -> Hanging:
-        """An organ at rest as a chain of `number` rods, at the rocker angle `psi` [rad]; the right one is given
-        mirrored, as a left one at -psi.
+        """An organ at rest as a chain of `number` rods, at the rocker angle `psi` [rad]. The right organ is returned
+        mirrored, as a left organ at -psi.
 
         Raises
         ------
         GeometryError
-            where it does not hang.
+            where the organ does not hang.
         """
         lengths, masses = self.organ_rods(side, loads, number)
         return rods(lengths, masses * self.p.g, self._reach(side, psi))
 
     def _reach(self, side: str, psi: float) -> Any:
-        """From A1 to A2 of a left organ, or of the mirrored right one [m]."""
+        """The vector from A1 to A2 of a left organ, or of the mirrored right one [m]."""
         hand = 1.0 if side == "left" else -1.0
         return np.array([self.p.z + self.p.e * math.sin(hand * psi), -self.p.e * math.cos(psi)])
 
     def chain_modes(
         self, left: SideLoads = EMPTY, right: SideLoads = EMPTY, number: int = CHAIN_RODS
     ) -> Modes | None:
-        """Small vibration of the organs as chains of `number` rods, the rocker held in the middle: of the loaded side
-        with the lowest frequency. None where no side is loaded, weighs anything or hangs."""
+        """Small vibration of an organ as a chain of `number` rods, with the rocker held in the middle. Of the sides
+        that have mass and hang, it is the one with the lowest frequency; None if there is no such side."""
         candidates = []
         for side, loads in (("left", left), ("right", right)):
             lengths, masses = self.organ_rods(side, loads, number)
@@ -248,15 +248,15 @@ class ChainUnitMachine(Machine):
     def least_web_pull(
         self, w: Any, left: SideLoads = EMPTY, right: SideLoads = EMPTY, points: int = 720
     ) -> Any:
-        """The least pull in the webs [N] over `points` angles of a crank turn at constant motor speed `w`, for
-        each speed given; infinite where no side is loaded."""
+        """The least pull in the webs [N] over `points` angles of a crank turn at constant motor speed `w`, for each
+        speed in `w`; infinite where no side is loaded."""
         phi = np.linspace(0.0, 2.0 * math.pi * self.p.ratio, points, endpoint=False)
         out = self.forces(phi, np.asarray(w, float)[..., None], 0.0, left, right)
         pulls = [getattr(out, side).web_pull for side in self.loaded_sides(Feed(left=left, right=right))]
         return np.min(pulls, axis=(0, -1)) if pulls else np.full(np.shape(w), np.inf)
 
     def loaded_sides(self, feed: Feed) -> tuple[str, ...]:
-        """The sides whose organ has any mass or load: a web that is not there cannot go slack."""
+        """The sides whose organ has any mass or load: an organ without both is absent, and cannot go slack."""
         present = []
         for side in SIDES:
             masses, loads = getattr(self.p, side), getattr(feed, side)
@@ -269,8 +269,9 @@ class ChainUnitMachine(Machine):
     def slack_speed(
         self, left: SideLoads = EMPTY, right: SideLoads = EMPTY, highest: float = 1000.0
     ) -> float:
-        """Lowest crank speed [rad/s] at which a web loses its pull somewhere in the turn; 0 if it has none at
-        rest, infinity if it keeps it up to `highest`. Beyond, two rigid bars are no model of a chain."""
+        """Lowest crank speed [rad/s] at which a web loses its pull somewhere in the turn: 0 if a web has no pull at
+        rest, infinity if all webs keep their pull up to `highest`. Above this speed two rigid bars are no model of a
+        chain."""
         from scipy.optimize import brentq
 
         def pull(crank_speed: Any) -> Any:
@@ -280,7 +281,7 @@ class ChainUnitMachine(Machine):
         if pull(low) <= 0.0:
             return 0.0
         while low < highest:
-            # the pull may fall and rise again with the speed: look for the first loss, not for any
+            # the pull may fall and rise again with the speed: the first loss counts
             speeds = np.linspace(low, high, 33)
             losses = np.flatnonzero(pull(speeds) <= 0.0)
             if losses.size:
@@ -311,10 +312,10 @@ def ratios(rho: float, lam: float, mu: float, zeta: float, l: float, l1: float) 
 
 
 class ChainedUnit(Machine):
-    """A chain unit with chains, as a run of its model shows it: its outputs need its states."""
+    """A chain unit with chains. Its outputs depend on its states, so that its results come from runs of its model."""
 
     def pin_turns(self, run: Mapping[str, Any]) -> dict[str, Any]:
-        """See `Machine`: in A2, B and A1 of each side from the angles of the rods."""
+        """See `Machine`; the angles in A2, B and A1 of each side come from the angles of the rods."""
         assert issubclass(self.model, ChainedModel)
         angles, rods = super().pin_turns(run), self.model.organs.at_pins
         for side in SIDES:
@@ -326,12 +327,13 @@ class ChainedUnit(Machine):
 
     @property
     def stored_per_unit(self) -> Mapping[str, Callable[[Mapping[str, Any]], Any]]:
-        """See `Machine`: the material of both organs, as their chains carry it."""
+        """See `Machine`: the material of both organs, distributed over their chains."""
         return {f"{side}.material_mass": itemgetter(f"{side}.energy_per_kg") for side in SIDES}
 
 
 def machine_of(model: type[InverseMachine], parameters: Any = None, /, **values: float) -> Machine:
-    """The machine of a model with what its kind has beside others; arguments and errors as of `Machine`."""
+    """The machine of a model, of the class with the methods for its kind; arguments and errors are those of
+    `Machine`."""
     if issubclass(model, ChamberForces):
         return ChainUnitMachine(parameters, model=model, **values)
     if issubclass(model, ChainedModel):

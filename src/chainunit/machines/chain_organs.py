@@ -1,7 +1,7 @@
 """The organs of the chain unit as chains of rods: their declarations, and their mechanics on the drive.
 
-Rods are numbered from the wall hinge A1, the first `walls` of them are the wall, the others the web; theta is the
-angle of a rod from the downward vertical, positive towards +x.
+Rods are numbered from the wall hinge A1: the first `walls` rods are the wall, the others the web. theta is the angle
+of a rod from the downward vertical, positive towards +x.
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ _CLOSED = 1e-6
 """Gap at the start above which a chain does not hang [m]."""
 _ANY_FOLD = 1e6
 """Angle beyond any fold [rad]."""
-_NO_PULL = 1e-6  # N, over which a rod turns from pulled to slack
+_NO_PULL = 1e-6  # N, range of the pull in which a rod changes from taut to slack
 LEAST, MOST = 2, 24
-"""Rods of an organ."""
+"""Least and largest number of rods of an organ."""
 
 
 @declaration
 class OrganLaw:
-    """What damps and bounds the rods of a chain; alike on both sides."""
+    """Damping and stops of the rods of a chain; the same on both sides."""
 
     eta: Value = quantity(
         "N.m2.s/rad",
-        "damping of the inner pins times the mean length of the rods beside each; assumed",
+        "damping of an inner pin times the mean length of its two rods; assumed",
         default=0.24,
         min=0.0,
         max=1e4,
@@ -64,7 +64,7 @@ class OrganLaw:
     )
     fold_stiffness: Value = quantity(
         "N.m/rad2",
-        "stiffness of the stop behind it, whose moment grows with the square of the angle; assumed",
+        "stiffness of the stop beyond fold_limit; its moment grows with the square of the angle; assumed",
         default=5e4,
         min=0.0,
         max=1e7,
@@ -96,19 +96,19 @@ class ChainSide(chain_unit.Side):
     fold_largest: Value = quantity("rad", "largest angle between neighbouring rods")
     drift: Value = quantity(
         "m",
-        "distance between the end of the chain and A2, in Co-Simulation behind the projection of each step",
+        "distance between the end of the chain and A2; in Co-Simulation after the projection in each step",
     )
     kinetic_energy: Value = quantity("J", "kinetic energy")
     potential_energy: Value = quantity(
         "J", "potential energy, of weights zero at the level of C, and of folded rods", nominal=100.0
     )
     energy_residual: Value = quantity(
-        "J", "energy that is there beyond that at the start and what came and went since", nominal=1000.0
+        "J", "energy minus energy_due: the error of the energy balance since the start", nominal=1000.0
     )
-    energy_per_kg: Value = quantity("J/kg", "energy of a kilogram of material on its place")
+    energy_per_kg: Value = quantity("J/kg", "energy of a kilogram of material at its place on the rods")
 
 
-def _numbered(
+def _rod_fields(
     name: str, number: int, unit: str, words: str, nominal: float | None = None, default: float | None = None
 ) -> list[Any]:
     return [
@@ -123,12 +123,12 @@ def both(of: type, default: Any = None) -> list[Any]:
 
 
 @declaration
-class RodsGiven:
-    """The start of the rods of both organs."""
+class StartChoice:
+    """The choice of the start of the rods."""
 
     given: Value = quantity(
         "1",
-        "1: they start with these angles and speeds, closed by the smallest change; 0: where they hang at rest",
+        "1: the rods start with these angles and speeds, changed as little as closes the chain; 0: they hang at rest",
         default=0.0,
         min=0.0,
         max=1.0,
@@ -136,20 +136,20 @@ class RodsGiven:
 
 
 class Organs:
-    """Both organs as chains of `walls` + `webs` rods: their states and outputs as declared, and their mechanics from
-    the crank angle `q` and speed `w`, for the inverse and the direct model."""
+    """Both organs as chains of `walls` + `webs` rods: the declarations of their states and outputs, and their
+    mechanics at the crank angle `q` and speed `w`, for the inverse and the direct model."""
 
     def __init__(self, walls: int, webs: int) -> None:
         self.walls, self.webs = walls, webs
         self.number = N = walls + webs
         words = "angle of rod {}, counted from A1, from the downward vertical, positive towards +x"
-        due = "energy at the start, and what came and went since by rocker, damping and processing"
+        due = "energy at the start, plus the work of the rocker since, minus the losses to damping and processing"
         self.States = declared_class(
             "ChainStates",
             (),
             [
-                *_numbered("theta", N, "rad", words),
-                *_numbered("omega", N, "rad/s", "speed of rod {}", 10.0),
+                *_rod_fields("theta", N, "rad", words),
+                *_rod_fields("omega", N, "rad/s", "speed of rod {}", 10.0),
                 ("energy_due", Value, quantity("J", due, nominal=100.0)),
             ],
         )
@@ -157,8 +157,8 @@ class Organs:
             "ChainLoads",
             (ChainSide,),
             [
-                *_numbered("pull", N, "N", "mean axial pull in rod {}", 100.0),
-                *_numbered("fold", N - 1, "rad", "angle of rod {1} from rod {0}"),
+                *_rod_fields("pull", N, "N", "mean axial pull in rod {}", 100.0),
+                *_rod_fields("fold", N - 1, "rad", "angle of rod {1} from rod {0}"),
             ],
         )
         self._layout = Layout(self.States)
@@ -167,11 +167,11 @@ class Organs:
             "RodStart",
             (),
             [
-                *_numbered("theta", N, "rad", words, default=0.0),
-                *_numbered("omega", N, "rad/s", "speed of rod {}", default=0.0),
+                *_rod_fields("theta", N, "rad", words, default=0.0),
+                *_rod_fields("omega", N, "rad/s", "speed of rod {}", default=0.0),
             ],
         )
-        self.RodsStart = declared_class("RodsStart", (RodsGiven,), both(rod_start, rod_start()))
+        self.RodsStart = declared_class("RodsStart", (StartChoice,), both(rod_start, rod_start()))
         self._start_layout = Layout(rod_start)
 
     @property
@@ -185,7 +185,8 @@ class Organs:
         return [(side[:N], side[N : 2 * N]) for side in sides]
 
     def rods(self, p: Any, u: Any) -> list[Rods]:
-        """Wall and web of each side with the material on them, as uniform rods: paper 000's organ in more pieces."""
+        """Wall and web of each side with the material on them, as uniform rods: the organ of paper 000 in more
+        pieces."""
         walls, webs = self.walls, self.webs
         lengths = [p.l1 / walls] * walls + [p.l2 / webs] * webs
         inner = [2.0 * p.organ.eta / (one + other) for one, other in pairwise(lengths)]
@@ -218,7 +219,7 @@ class Organs:
             yield m.linkage.loads[side].hold(xp, m, w)
 
     def _shares(self, p: Any) -> list[Any]:
-        """How a kilogram of material lies on the rods."""
+        """The share of each rod in the material."""
         on_wall, on_web = (1.0 - p.web_share) / self.walls, p.web_share / self.webs
         return [on_wall] * self.walls + [on_web] * self.webs
 
@@ -279,8 +280,9 @@ class Organs:
         }
 
     def closed(self, xp: Any, p: Any, u: Any, x: Any, q: Any, w: Any) -> list[Any]:
-        """Both chains end at A2 and move with it, by the smallest change in the metric of the masses. Where the
-        drive has corrected its speed this is a jolt from the rocker, whose work counts."""
+        """States with which both chains end at A2 and move with it, by the smallest change in the metric of the
+        masses. Where the drive has corrected its speed, the change is a jolt from the rocker; its work enters
+        `energy_due`."""
         m = self.mechanism(xp, p, u, self.split(x), q)
         values: list[Any] = []
         for side in SIDES:
@@ -292,11 +294,11 @@ class Organs:
 
     @property
     def unknowns(self) -> int:
-        """Of the chains at rest; two rods stand where the dyad does."""
+        """Number of unknowns of the chains at rest; two rods have none, as they stand in the position of the dyad."""
         return 0 if self.number == LEAST else 6
 
     def _reaches(self, xp: Any, p: Any, u: Any, q: Any) -> Iterator[tuple[Any, Any]]:
-        """From A1 to A2 in parts of the length, the right organ mirrored."""
+        """The vector from A1 to A2 of each organ in parts of its length, of the right one mirrored."""
         pins, whole = Mechanism(xp, chain_unit.drive(p, u, (), {}), q).pins, p.l1 + p.l2
         for names in NAMES.values():
             way = pins["A2"].p - pins[names.a1].p
@@ -316,8 +318,8 @@ class Organs:
     def start_states(
         self, xp: Any, p: Any, u: Any, q: Any, w: Any, z: Sequence[Any], rods_start: Any = None
     ) -> dict[str, Any]:
-        """States of both sides: hanging at rest, or as `rods_start` gives them, and taken along by A2 where the crank
-        turns."""
+        """States of both sides: hanging at rest, or as in `rods_start`; then changed so that they end at A2 and move
+        with it."""
         states: list[Any] = []
         bars = None if self.unknowns else Mechanism(xp, ChamberForces.linkage(p, u), q).links
         for k, (rods, names) in enumerate(zip(self.rods(p, u), NAMES.values(), strict=True)):
@@ -327,9 +329,9 @@ class Organs:
                 theta = hanging_chain.resting(xp, rods, names.hand, z[3 * k : 3 * k + 3])
             states.append((theta, [0.0 * theta[0]] * self.number))
         if rods_start is not None:
-            states = [self._given(rods_start, *each) for each in zip(SIDES, states, strict=True)]
+            states = [self._start_state(rods_start, *each) for each in zip(SIDES, states, strict=True)]
         m = self.mechanism(xp, p, u, states, q)
-        # once: of a chain that was not found to hang it leaves a gap, see `start_limits`
+        # closed once only: a chain without a hanging position keeps a gap, which `start_limits` refuses
         states = [m.linkage.loads[side].close(xp, m, w)[:2] for side in SIDES]
         m = self.mechanism(xp, p, u, states, q)
         sides: dict[str, Any] = {}
@@ -338,18 +340,19 @@ class Organs:
             sides[side] = self._layout.instance([*theta, *omega, kinetic + potential])
         return sides
 
-    def _given(self, rods_start: Any, side: str, hanging: State) -> State:
-        """Angles and speeds of a side: those that are given, or those of the hanging chain."""
+    def _start_state(self, rods_start: Any, side: str, hanging: State) -> State:
+        """Angles and speeds of a side: those of `rods_start`, or those of the hanging chain."""
         N, share = self.number, rods_start.given
-        given = self._start_layout.values(getattr(rods_start, side))
+        start = self._start_layout.values(getattr(rods_start, side))
         values = [
             (1.0 - share) * rest + share * own
-            for rest, own in zip((*hanging[0], *hanging[1]), given, strict=True)
+            for rest, own in zip((*hanging[0], *hanging[1]), start, strict=True)
         ]
         return values[:N], values[N:]
 
     def start_limits(self, xp: Any, p: Any, u: Any, x: Any, q: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """Of each side: the chain ends at A2, and where it is to hang at rest no stop between rods is met."""
+        """Limits of each side: the chain ends at A2; and if it starts at rest, no rods touch the stops between
+        them."""
         moving = p.rods_start.given if hasattr(p, "rods_start") else 0.0
         for h in self.hold(xp, self.mechanism(xp, p, u, self.split(x), q), 0.0):
             yield h.gap.length(xp), -math.inf, _CLOSED

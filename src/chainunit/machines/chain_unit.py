@@ -4,9 +4,9 @@ Symbols are those of papers 000 and 001: ``r, l, h`` crank, coupler and rocker a
 bearing O1 = (-c, -hy) from the rocker pivot C, which is the origin; ``e`` rocker arm to the web hinge
 A2; ``l1`` wall A1-B, ``l2`` web B-A2; ``z`` half width, A1 = (-z, 0) and A1' = (+z, 0). ``phi`` is the
 crank angle from the upward vertical, clockwise; ``psi`` the rocker angle from the downward vertical,
-positive towards +x. x right, y up. A force is the one on the machine part from its support
-or neighbour. Paper 000's eqs. (24)-(34), (41)-(45), with the corrections of docs/physics.md, follow from
-the dyad of `chainunit.groups.dyad`.
+positive towards +x. x points right, y up. A force is the force on the machine part from its support
+or neighbour. The dyad of `chainunit.groups.dyad` gives eqs. (24)-(34), (41)-(45) of paper 000, with the
+corrections of docs/physics.md.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ SIDES: tuple[SideName, ...] = ("left", "right")
 
 
 def other(side: SideName) -> SideName:
-    """The side across."""
+    """The opposite side."""
     return "right" if side == "left" else "left"
 
 
@@ -49,8 +49,8 @@ class SideMasses:
 
 @declaration
 class Parameters:
-    """Parameters of the chain unit. The start values are the packaged machine: plausible, but ours; the
-    papers print no masses and no absolute lengths."""
+    """Parameters of the chain unit. The start values are those of the packaged machine: plausible assumptions of this
+    package, as the papers print no masses and no absolute lengths."""
 
     r: Value = quantity("m", "crank O1-A", default=0.15, above=0.0, max=1e4)
     l: Value = quantity("m", "coupler A-Bd", default=1.5, above=0.0, max=1e4)
@@ -86,7 +86,7 @@ class Parameters:
     right: SideMasses = group(SideMasses, "right organ", default=SideMasses())
     web_share: Value = quantity(
         "1",
-        "part of the material that lies on the web, the rest on the wall",
+        "part of the material that lies on the web; the rest lies on the wall",
         default=1.0,
         min=0.0,
         max=1.0,
@@ -136,17 +136,17 @@ class Side:
     """Loads of one organ."""
 
     tangential_load: Value = quantity(
-        "N", "R_t, load across the rocker arm at A2; both sides mirrored alike", nominal=100.0
+        "N", "R_t, load across the rocker arm at A2; sign mirrored on the right", nominal=100.0
     )
     normal_load: Value = quantity("N", "R_n, load along the rocker arm at A2", nominal=100.0)
     support: Force = group(Force, "on the wall at A1, from the support")
     hinge: Force = group(Force, "on the wall at B, from the web")
     rocker_joint: Force = group(Force, "on the web at A2, from the rocker")
     web_pull: Value = quantity(
-        "N", "least axial pull in the web; below zero the chain would have to push", nominal=100.0
+        "N", "least axial pull in the web; negative where a chain would have to push", nominal=100.0
     )
     wall_pull: Value = quantity(
-        "N", "least axial pull in the wall; below zero the wall would have to push", nominal=100.0
+        "N", "least axial pull in the wall; negative where the wall would have to push", nominal=100.0
     )
 
 
@@ -216,12 +216,12 @@ class Outputs(PortValues):
 
 
 def supports(p: Any) -> dict[str, Vec2]:
-    """A1 of the left and of the right organ."""
+    """The wall hinge A1 of the left and of the right organ."""
     return {"A1 left": Vec2(-p.z, 0.0), "A1 right": Vec2(p.z, 0.0)}
 
 
 class OrganNames(NamedTuple):
-    """Names of an organ's parts in the linkage: pins, links, load; its `hand` is +1 on the left, -1 on the right."""
+    """The names of an organ's parts in the linkage (pins, links, load), and its `hand`: +1 left, -1 right."""
 
     a1: str
     b: str
@@ -277,16 +277,17 @@ def _on_sides(xp: Any, p: Any, s: MachineState, reactions: Mapping[Any, Vec2], r
 
 
 def _pull(xp: Any, axis: Vec2, begin: Vec2, end: Vec2) -> Any:
-    """The least pull in a rod along `axis`, from the force on it at its begin and minus that at its end."""
+    """The least pull in a rod along `axis`, from the force on it at its begin and minus the force on it at its
+    end."""
     return xp.minimum(-axis.dot(begin), -axis.dot(end))
 
 
 def on_side(rocker: Link, hand: float, forces: tuple[Vec2, Vec2, Vec2]) -> dict[str, Any]:
-    """The fields of `Side` but the pulls, from the forces at A1 and B on the wall and at A2 on the web; `hand` is +1
-    on the left and -1 on the right."""
+    """The fields of `Side` except the pulls, from the forces at A1 and B on the wall and at A2 on the web; `hand` is
+    +1 on the left and -1 on the right."""
     at_a1, at_b, at_a2 = forces
     return {
-        # X cos s + Y sin s with s = +-psi: the force across the arm, along the arm
+        # the force across the arm (X cos s + Y sin s with s = +-psi) and along it
         "tangential_load": rocker.u.turned().dot(at_a2) * hand,
         "normal_load": -rocker.u.dot(at_a2),
         "support": force(at_a1),
@@ -296,7 +297,7 @@ def on_side(rocker: Link, hand: float, forces: tuple[Vec2, Vec2, Vec2]) -> dict[
 
 
 def rocker_load(p: Any, left: Side, right: Side, at_a2: Any = 0.0) -> dict[str, Any]:
-    """The fields of `RockerLoad`, with a moment on both organs in A2 from the rocker [N m]."""
+    """The fields of `RockerLoad`; `at_a2` is the moment of the rocker on both organs in A2 [N m]."""
     tangential = left.tangential_load - right.tangential_load
     return {
         "tau": p.e * tangential + at_a2,
@@ -306,8 +307,8 @@ def rocker_load(p: Any, left: Side, right: Side, at_a2: Any = 0.0) -> dict[str, 
 
 
 def chamber(xp: Any, p: Any, u: Any, psi: Any, psi_w: Any, psi_a: Any) -> Chamber:
-    """Both organs on a rocker at angle `psi` with speed `psi_w` and acceleration `psi_a`, independent of the drive:
-    the rocker is the crank of this linkage, whose angle from the upward vertical falls as psi rises."""
+    """Both organs on a rocker at angle `psi` with speed `psi_w` and acceleration `psi_a`, independent of the drive.
+    The rocker is the crank of this linkage; its crank angle, from the upward vertical, falls as psi rises."""
     linkage = Linkage(
         {"C": ZERO, **supports(p)},
         Crank(Bar("rocker", "C", p.e), "A2"),
@@ -334,7 +335,7 @@ ON_SIDE = {
     )
 }
 JOINTS = {**ON_DRIVE, **ON_SIDE}
-"""Joint of each reaction, by output."""
+"""The joint of each reaction, by output."""
 PINS = {
     "O1 crank bearing": "crank_bearing",
     "A crank pin": "crank_pin",
@@ -350,14 +351,14 @@ PINS = {
         )
     },
 }
-"""Output of each bearing, by title."""
+"""The output of each bearing, by title."""
 
 
 def on_drive(
     xp: Any, p: Any, s: Any, a: Any, reactions: Mapping[Any, Vec2], at_a1: Any = 0.0
 ) -> dict[str, Any]:
     """The fields of `Outputs` that do not depend on the kind of organ, at crank acceleration `a`; `at_a1` is the
-    moment on both organs at their walls, from the frame [N m]."""
+    moment of the frame on both organs in A1 [N m]."""
     at_frame, moment = ZERO, at_a1
     for (pin, _), f in reactions.items():
         if pin in s.m.linkage.ground:
@@ -374,7 +375,8 @@ def on_drive(
 
 
 def rocker_motion(xp: Any, s: Any, a: Any) -> dict[str, Any]:
-    """The motion of the rocker at crank acceleration `a`, as `Rocker` has it; it never reaches the horizontal."""
+    """The motion of the rocker at crank acceleration `a`: fields of `Rocker`. The rocker never reaches the
+    horizontal."""
     link = s.m.links["rocker"]
     return {"psi": xp.asin(link.u.x), "w": link.t1 * s.w, "a": link.t1 * a + link.t2 * (s.w * s.w)}
 
@@ -449,7 +451,7 @@ class ChamberForces(InverseMachine):
 
     @staticmethod
     def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """The crank turns, and both organs close at both extremes of the rocker."""
+        """Limits with which the crank turns, and both organs close over the whole swing of the rocker."""
         yield p.c, p.r, math.inf
         yield p.r, 0.0, longest_crank(xp, p.l, p.h, xp.sqrt(p.c * p.c + p.hy * p.hy))
         right, left = rocker_extremes(xp, p)

@@ -1,13 +1,13 @@
-"""The crank-rocker as a tool: does it turn, how far does it swing, how well does it push, how even is its return.
+"""Design of a crank-rocker: whether its crank turns, its swing, its pressure angle, its speed-change coefficient.
 
-`r` crank, `l` coupler, `h` rocker, `b` frame O1-C; ``rho = r/l``, ``lam = h/l`` (paper 001). Angles in radians.
-`b` is free: the papers' frame, with crank and rocker parallel at the start, has b^2 = l^2 - r^2 + h^2
-(`parallel_frame`). It is the frame in which both strokes take the same time, for any rho and lam: at the
-extremes the rocker's end lies at l + r and l - r from O1 on its circle about C, and b^2 - h^2 = (l + r)(l - r)
-says that these two points lie on one line through O1 (the power of the point O1). The crank then turns by half
+`r` is the crank, `l` the coupler, `h` the rocker, `b` the frame O1-C; ``rho = r/l``, ``lam = h/l`` (paper 001).
+Angles are in radians. Any `b` is allowed. The papers' frame, with crank and rocker parallel at the start, has
+b^2 = l^2 - r^2 + h^2 (`parallel_frame`). In this frame both strokes take the same time, for any rho and lam: at the
+extremes the rocker's end lies at l + r and l - r from O1 on its circle about C, and from b^2 - h^2 = (l + r)(l - r)
+follows that these two points lie on one line through O1 (the power of the point O1). The crank then turns by half
 a revolution between them, and K = 1.
 
-Functions take floats, and those with an `xp` any engine's values.
+Functions with an `xp` take values of any engine, the others take floats.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from ..model import Requirement
 
 
 def longest_crank(xp: Any, l: Any, h: Any, b: Any) -> Any:
-    """The crank turns where r is less than this [m].
+    """The upper limit of the crank length r below which the crank turns [m].
 
-    Eqs. (3), (4) of paper 001, and the third condition that it misses for h > l: b - r > h - l.
+    Eqs. (3), (4) of paper 001, and a third condition for h > l that the paper lacks: b - r > h - l.
     """
     return xp.minimum(l + h - b, b - xp.abs(l - h))
 
@@ -35,7 +35,8 @@ def parallel_frame(xp: Any, r: Any, l: Any, h: Any) -> Any:
 
 
 def angle_at_pivot(xp: Any, h: Any, b: Any, reach: Any) -> Any:
-    """Angle O1-C-Bd where Bd is `reach` away from O1; at the extremes reach = l + r and l - r (eqs. (14), (15))."""
+    """Angle O1-C-Bd where Bd is `reach` away from O1; at the extremes reach is l + r and l - r (eqs. (14), (15) of
+    paper 001)."""
     return xp.acos((h * h + b * b - reach * reach) / (2.0 * h * b))
 
 
@@ -45,27 +46,28 @@ def angle_at_bearing(xp: Any, h: Any, b: Any, reach: Any) -> Any:
 
 
 def swing(xp: Any, r: Any, l: Any, h: Any, b: Any) -> Any:
-    """The rocker's whole swing, eta = psi_1 + psi_2 of paper 001."""
+    """The whole swing of the rocker, eta = psi_1 + psi_2 of paper 001."""
     return angle_at_pivot(xp, h, b, l + r) - angle_at_pivot(xp, h, b, l - r)
 
 
 def pressure_angle(xp: Any, l: Any, h: Any, crank_pin_to_pivot_squared: Any) -> Any:
-    """The pressure angle at Bd, signed, where |AC|^2 is given (before eq. (11) of paper 001)."""
+    """The signed pressure angle at Bd, from |AC|^2 (before eq. (11) of paper 001)."""
     return xp.asin((h * h + l * l - crank_pin_to_pivot_squared) / (2.0 * h * l))
 
 
 def pressure_angle_extremes(xp: Any, r: Any, l: Any, h: Any, b: Any) -> tuple[Any, Any]:
-    """The largest and the least pressure angle over the turn, where A lies on the line O1-C.
+    """The largest and the least pressure angle over the turn; at both, A lies on the line O1-C.
 
-    Either may be the larger in size: the limit of eq. (10) of paper 001 holds for both.
+    Either may have the larger absolute value: the limit of eq. (10) of paper 001 holds for both.
     """
     near, far = b - r, b + r
     return pressure_angle(xp, l, h, near * near), pressure_angle(xp, l, h, far * far)
 
 
 def speed_change(xp: Any, r: Any, l: Any, h: Any, b: Any) -> Any:
-    """The speed-change coefficient K = (180 + theta)/(180 - theta): crank angle of the forward stroke
-    (towards the far extreme) to that of the return; theta is the angle between the extreme couplers."""
+    """The speed-change coefficient K = (180 + theta)/(180 - theta): the ratio of the crank angles of the forward
+    stroke (towards the far extreme) and the return stroke. theta is the angle between the couplers at the
+    extremes."""
     theta = angle_at_bearing(xp, h, b, l + r) - angle_at_bearing(xp, h, b, l - r)
     return (math.pi + theta) / (math.pi - theta)
 
@@ -80,16 +82,17 @@ def rocker_extremes(xp: Any, p: Any) -> tuple[Any, Any]:
     return right, left
 
 
-_FAR = 1e300  # more than any length; times a length of either sign it picks one of two limits
+_FAR = 1e300  # larger than any length; the sign of a length times this number selects one of two limits
 
 
 def half_width_range(xp: Any, e: Any, l1: Any, l2: Any, swing: Any, z: Any = math.inf) -> tuple[Any, Any]:
-    """Least and largest half width [m] at which both organs close wherever the rocker stands within +-`swing` [rad];
-    both ends are singular, but for 0. Empty where the least is not below the largest.
+    """Least and largest half width [m] at which both organs close for every rocker angle within +-`swing` [rad]. Both
+    ends are singular, except 0. The range is empty where the least half width is not below the largest.
 
     The distance of A2 from A1 must stay above |l1 - l2| and below l1 + l2; over the swing its square is within
-    (z -+ e sin(swing))^2 + (e cos(swing))^2. Above e cos(swing), |l1 - l2| leaves out half widths about e sin(swing):
-    then it is the range on the side of these on which `z` lies. With l2 = l1 - e the range begins at 2 e sin(swing).
+    (z -+ e sin(swing))^2 + (e cos(swing))^2. If |l1 - l2| > e cos(swing), half widths about e sin(swing) are
+    excluded: the range then is the part below or above them in which `z` lies. With l2 = l1 - e the range begins at
+    2 e sin(swing).
     """
     reach = e * xp.sin(swing)
     drop2 = e * e - reach * reach
@@ -109,12 +112,12 @@ TURNS = Requirement(
 
 @dataclass(frozen=True)
 class CrankRocker:
-    """A crank-rocker that turns.
+    """A crank-rocker whose crank turns.
 
     Raises
     ------
     GeometryError
-        where it does not, with the allowed range.
+        where the crank cannot turn, with the allowed range.
     """
 
     r: float
@@ -133,7 +136,7 @@ class CrankRocker:
 
     @property
     def swing(self) -> float:
-        """The rocker's whole swing [rad]."""
+        """The whole swing of the rocker [rad]."""
         return float(swing(MATH, self.r, self.l, self.h, self.b))
 
     @property
@@ -143,7 +146,7 @@ class CrankRocker:
 
     @property
     def worst_pressure_angle(self) -> float:
-        """The largest pressure angle in size [rad]; admissible is 45 to 60 degrees."""
+        """The largest absolute pressure angle [rad]; the admissible limit is 45 to 60 degrees."""
         return max(map(abs, self.pressure_angles))
 
     @property
@@ -152,33 +155,33 @@ class CrankRocker:
         return float(speed_change(MATH, self.r, self.l, self.h, self.b))
 
     @classmethod
-    def for_swing(cls, wanted: float, lam: float, l: float = 1.0) -> CrankRocker:
-        """The crank-rocker with K = 1 and the swing `wanted` [rad], for a chosen lam = h/l.
+    def for_swing(cls, eta: float, lam: float, l: float = 1.0) -> CrankRocker:
+        """The crank-rocker with K = 1 and the swing `eta` [rad], for a chosen lam = h/l.
 
-        With K = 1 the extremes of the rocker's end are 2 r apart on a line through O1, so that
-        r = h sin(eta/2); in its own frame b^2 = l^2 - r^2 + h^2 the pressure angle then reaches
-        arcsin(sin(eta/2) sqrt(1 + lam^2 cos^2(eta/2))), to both sides alike. It falls with lam, towards eta/2:
-        the least pressure angle belongs to the shortest rocker that can be built.
+        With K = 1 the extremes of the rocker's end are 2 r apart on a line through O1, so that r = h sin(eta/2). With
+        the frame b^2 = l^2 - r^2 + h^2 the pressure angle then reaches arcsin(sin(eta/2) sqrt(1 + lam^2
+        cos^2(eta/2))), equally to both sides. It falls with lam, towards eta/2: the least pressure angle belongs to
+        the shortest rocker that can be built.
 
         Raises
         ------
         GeometryError
             for a swing outside 0 to 180 degrees, or a rocker so long that the pressure angle reaches 90 degrees.
         """
-        if not 0.0 < wanted < math.pi:
-            raise GeometryError(f"swing = {math.degrees(wanted):g} deg: must be > 0 and < 180 deg")
+        if not 0.0 < eta < math.pi:
+            raise GeometryError(f"swing = {math.degrees(eta):g} deg: must be > 0 and < 180 deg")
         h = lam * l
-        r = h * math.sin(0.5 * wanted)
+        r = h * math.sin(0.5 * eta)
         if not r < l:
             raise GeometryError(
-                f"lam = {lam:g}: for a swing of {math.degrees(wanted):g} deg it must be "
-                f"< {1.0 / math.sin(0.5 * wanted):g}"
+                f"lam = {lam:g}: for a swing of {math.degrees(eta):g} deg it must be "
+                f"< {1.0 / math.sin(0.5 * eta):g}"
             )
         return cls(r, l, h, parallel_frame(MATH, r, l, h))
 
 
-def longest_rocker(wanted: float, admissible: float) -> float:
-    """The largest lam = h/l at which a crank-rocker with K = 1 and the swing `wanted` keeps its pressure angle
-    within `admissible` [rad]; 0 where none does (the pressure angle is never below half the swing)."""
-    s, c = math.sin(0.5 * wanted), math.cos(0.5 * wanted)
+def longest_rocker(eta: float, admissible: float) -> float:
+    """The largest lam = h/l at which a crank-rocker with K = 1 and the swing `eta` [rad] keeps its pressure angle
+    within `admissible` [rad]; 0 if there is none (the pressure angle is never below half the swing)."""
+    s, c = math.sin(0.5 * eta), math.cos(0.5 * eta)
     return math.sqrt(max((math.sin(admissible) / s) ** 2 - 1.0, 0.0)) / c

@@ -1,16 +1,16 @@
 """The chain unit with its organs as true chains: N rods a side between wall hinge A1 and web hinge A2, with states.
 
-Symbols as in `chainunit.machines.chain_unit`, of the chain as in `chainunit.groups.chain`: rods are numbered from A1,
-the first `walls` of them are the wall, the others the web; theta is the angle of a rod from the downward vertical,
-positive towards +x. The drive is that of the two-bar machine, the chains are loads of its rocker, and a slope of the
-load port is taken along the motion (`chainunit.mechanism.chains`). Outputs are without the acceleration that closes
-the chains: at a communication point the drive has just corrected its speed, and the chain follows in the next step
-only.
+Symbols are those of `chainunit.machines.chain_unit`, and for the chain those of `chainunit.groups.chain`. Rods are
+numbered from A1: the first `walls` rods are the wall, the others the web. theta is the angle of a rod from the
+downward vertical, positive towards +x. The drive is that of the two-bar machine, the chains are loads of its rocker,
+and a slope of the load port is taken along the motion (`chainunit.mechanism.chains`). The outputs do not include the
+acceleration that closes the chains: at a communication point the drive has just corrected its speed, and the chain
+follows only in the next step.
 
-Pin friction acts in the four pins of the drive alone; in those of the chains it is the viscous damping of `organ`.
+Pin friction acts only in the four pins of the drive; the pins of the chains have the viscous damping of `organ`.
 
-Two models have these organs: the inverse one, and the direct one, whose states are the shaft's, too. The direct one
-starts where its chains hang at rest, or from the angles and speeds of the rods in `rods_start`.
+Two models have these organs: the inverse one, and the direct one, which also has the states of the shaft. The direct
+one starts with chains that hang at rest, or with the angles and speeds of the rods in `rods_start`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from .chain_organs import MOST, Organs, Parameters, both
 from .chain_unit import SIDES, ChamberForces, Inputs, Outputs, drive
 
 CLOSING = 20.0
-"""Rate at which a chain that has drifted off A2 is drawn back [1/s]."""
+"""Rate at which the gap between a chain and A2 is closed [1/s]."""
 
 _HANGS = tuple(
     Requirement(subject.format(side), unit, why, ("z", "l1", "l2", "e"))
@@ -54,7 +54,7 @@ _MASSES = tuple(
     Requirement(
         f"{side}.{part}_mass",
         "kg",
-        "a chain without mass has no motion of its own; for an organ that is not there take ChamberForces",
+        "a chain without mass has no motion of its own; for a machine without this organ take ChamberForces",
     )
     for side in SIDES
     for part in ("wall", "web")
@@ -62,7 +62,7 @@ _MASSES = tuple(
 
 
 class ChainedModel(LinkageModel):
-    """A model of the chain unit with chains. Its own integrator controls its error to `tolerance`."""
+    """A model of the chain unit with chains. Its internal integrator controls the error to `tolerance`."""
 
     organs: ClassVar[Organs]
     controlled = True
@@ -76,22 +76,22 @@ class ChainedModel(LinkageModel):
 
     @staticmethod
     def linkage(p: Any, u: Any) -> Linkage:
-        """The drive; its chains hang where their states say."""
+        """The drive without the chains: their places follow from their states."""
         return drive(p, u, (), {})
 
     @staticmethod
     def internal_step(xp: Any, p: Any) -> Any:
-        """20 ms: a quarter of a radian of the crank at 12 rad/s."""
+        """Longest internal step: 20 ms, a quarter of a radian of the crank at 12 rad/s."""
         return 0.02
 
     @staticmethod
     def tolerance(xp: Any, p: Any) -> Any:
-        """As the parameter says."""
+        """The parameter `tolerance`."""
         return p.tolerance
 
     @classmethod
     def at_crank(cls, p: Any, u: Any, x: Any = None) -> tuple[Any, Any]:
-        """Angle [rad] and speed [rad/s] of the crank; without states those at the start."""
+        """Angle [rad] and speed [rad/s] of the crank; without states `x`, those at the start."""
         raise NotImplementedError
 
     @classmethod
@@ -132,13 +132,13 @@ class TurningChains(ChainedModel, DirectMachine):
 
     @classmethod
     def at_crank(cls, p: Any, u: Any, x: Any = None) -> tuple[Any, Any]:
-        """See `ChainedModel`: of its own states."""
+        """See `ChainedModel`; they are states of this model."""
         shaft = cls.initial_states(None, p) if x is None else x
         return shaft.phi / p.ratio, shaft.w / p.ratio
 
     @classmethod
     def start_from(cls, outputs: Mapping[str, float]) -> dict[str, float]:
-        """See `DirectMachine`: with the angles and speeds of the rods."""
+        """See `DirectMachine`; the start parameters include the angles and speeds of the rods."""
         rods = {
             f"rods_start.{side}.{name}": outputs[f"{side}.{name}"]
             for side in SIDES
@@ -171,7 +171,7 @@ def flexible(walls: int, webs: int) -> type[InverseMachine]:
     Raises
     ------
     InputError
-        for fewer than one rod in either, or more than MOST in all.
+        for fewer than one rod in wall or web, or more than MOST rods in all.
     """
     if walls < 1 or webs < 1 or walls + webs > MOST:
         raise InputError(
@@ -186,12 +186,12 @@ def _flexible(walls: int, webs: int) -> type[InverseMachine]:
     chains = Organs(walls, webs)
 
     class ChainUnitFlexible(ChainedModel, InverseMachine):
-        """The chain unit with its organs as chains of rods, as many as `flexible` was told.
+        """The chain unit with its organs as chains of rods; `flexible` sets their numbers.
 
-        Inputs, outputs and load port are those of ChamberForces, and connect alike. In a co-simulation the inputs phi
-        and w run along w and a inside a step, and its own integrator controls its error to `tolerance`. In Model
-        Exchange phi, w and a must be set whenever derivatives are evaluated. Rods are counted from A1; a rod is slack
-        where its mean axial pull is below zero.
+        Inputs, outputs and load port are those of ChamberForces and connect in the same way. In a co-simulation phi
+        follows w, and w follows a, inside a step; the internal integrator controls the error to `tolerance`. In Model
+        Exchange phi, w and a must be set before each evaluation of the derivatives. Rods are counted from A1; a rod
+        is slack where its mean axial pull is below zero.
         """
 
         name = "ChainUnitFlexible"
@@ -219,7 +219,7 @@ def _flexible(walls: int, webs: int) -> type[InverseMachine]:
 
         @staticmethod
         def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
-            """Those of two bars, and masses that move."""
+            """The limits of the machine with two bars, and masses above zero."""
             yield from ChamberForces.requirements(xp, p)
             for masses in (p.left, p.right):
                 yield masses.wall_mass, 0.0, math.inf
@@ -227,7 +227,7 @@ def _flexible(walls: int, webs: int) -> type[InverseMachine]:
 
         @classmethod
         def at_crank(cls, p: Any, u: Any, x: Any = None) -> tuple[Any, Any]:
-            """See `ChainedModel`: of the given motion."""
+            """See `ChainedModel`; they follow from the inputs."""
             return u.phi / p.ratio, u.w / p.ratio
 
         @classmethod
@@ -249,4 +249,4 @@ def _flexible(walls: int, webs: int) -> type[InverseMachine]:
 
 
 ChainUnitFlexible = flexible(6, 2)
-"""Eight rods, split as the start values' lengths want it."""
+"""Eight rods, of nearly equal length at the start values."""

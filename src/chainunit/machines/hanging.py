@@ -1,17 +1,18 @@
-"""Statics of a hanging chain between two pins: N rods, and the catenary that they tend to.
+"""Statics of a hanging chain between two pins: N rods, and the catenary as their limit.
 
-Frame x right, y up. `p` is the force on the chain at A1 from the support; going along the chain the force that a
-piece receives from the part before it is p less the weight of that part, and a rod lies along the mean of the
-forces at its ends: u = -m/|m|, m = p - (0, weight before its middle). So two unknowns are left. The length of the
-way from A1 to A2 is the gradient of a convex function of p,
+x points right, y up. `p` is the force on the chain at A1 from the support. Along the chain, the force of a part on
+the next piece is p less the weight of that part. A rod lies along the mean of the forces at its ends: u = -m/|m|,
+m = p - (0, weight before its middle). So the two components of p are the only unknowns. The vector from A1 to A2
+is minus the gradient of a convex function of p,
 
-    d/dp sum of l |m(p)| = -(A2 - A1),
+    d/dp sum of l |m(p)| = -(A2 - A1).
 
-whose minimum is unique where the chain is longer than the distance: the hanging, stable position. A uniform piece
-has the integral of |p - (0, w s)| along it in place of l |m|: the catenary, piece by piece, in closed form.
+With the term p . (A2 - A1) added, the function has a unique minimum where the chain is longer than the distance of
+the pins: the hanging, stable position. A uniform piece has the integral of |p - (0, w s)| along it in place of l |m|:
+the catenary, piece by piece, in closed form.
 
-A trust-region method finds it, as near a crossing of m = 0, where a rod would turn over, plain steps of Newton's
-method fail; those polish its result.
+A trust-region method finds the minimum, since plain steps of Newton's method fail near a crossing of m = 0, where a
+rod would turn over. Newton's method then polishes the result.
 """
 
 from __future__ import annotations
@@ -31,9 +32,9 @@ _POLISH = 30
 
 @dataclass(frozen=True)
 class Hanging:
-    """A chain at rest. Forces [N], shape (2,): `first` on it at A1 from the support, `last` at A2 from the part
-    that holds it there; `theta` the angles of the rods from the downward vertical, positive towards +x [rad], shape
-    (N,), empty for a catenary; `pull` the mean pull in each rod [N], the least one of a catenary."""
+    """A chain at rest. `first` and `last` are the forces on it at A1 and A2 [N], shape (2,). `theta` are the angles
+    of the rods from the downward vertical, positive towards +x [rad], shape (N,), empty for a catenary. `pull` is the
+    mean pull in each rod [N], for a catenary the least pull."""
 
     first: Any
     last: Any
@@ -42,12 +43,12 @@ class Hanging:
 
 
 def rods(lengths: Any, weights: Any, reach: Any) -> Hanging:
-    """Rods of the `lengths` [m] and `weights` [N] between A1 and A2 = A1 + `reach` [m].
+    """Rods of the `lengths` [m] and `weights` [N] at rest between A1 and A2 = A1 + `reach` [m].
 
     Raises
     ------
     GeometryError
-        where the chain is not longer than the distance, or is folded up between pins nearer than a rod.
+        where the chain is not longer than the distance of the pins, or the pins are so near that it folds up.
     """
     l, W = np.asarray(lengths, float), np.asarray(weights, float)
     before = np.concatenate([[0.0], np.cumsum(W)[:-1]]) + 0.5 * W
@@ -61,7 +62,7 @@ def rods(lengths: Any, weights: Any, reach: Any) -> Hanging:
 
     reach = np.asarray(reach, float)
     for k in range(len(l)):
-        # without horizontal force all others would hang straight, and this one, without any, would close the rest
+        # without horizontal force all other rods would hang straight, and rod k, free of force, would close the gap
         open_end = reach + np.array([0.0, float(l @ np.sign(before[k] - before))])
         if np.hypot(*open_end) <= l[k] * (1.0 + 1e-9):
             raise GeometryError(
@@ -76,7 +77,7 @@ def rods(lengths: Any, weights: Any, reach: Any) -> Hanging:
 
 
 def catenary(lengths: Any, weights: Any, reach: Any) -> Hanging:
-    """Uniform pieces of the `lengths` [m] and `weights` [N], one behind the other, as chains of infinitely many rods.
+    """Uniform pieces of the `lengths` [m] and `weights` [N] in series, each a chain of infinitely many rods.
 
     Raises
     ------
@@ -91,12 +92,12 @@ def catenary(lengths: Any, weights: Any, reach: Any) -> Hanging:
         H = abs(p[0])
         v = p[1] - ends
         size = np.hypot(H, v)
-        # of |m| over a piece: (v |m| + H^2 asinh(v/H))/2 between its ends, divided by -w
-        curved = np.arcsinh(v / H)
-        area = 0.5 * (v * size + H * H * curved)
-        along_x = np.sum(p[0] * (curved[:-1] - curved[1:]) / w)
+        # the integral of |m| over a piece: (v |m| + H^2 asinh(v/H))/2 between its ends, divided by -w
+        arc = np.arcsinh(v / H)
+        area = 0.5 * (v * size + H * H * arc)
+        along_x = np.sum(p[0] * (arc[:-1] - arc[1:]) / w)
         along_y = np.sum((size[:-1] - size[1:]) / w)
-        xx = np.sum(((curved - v / size)[:-1] - (curved - v / size)[1:]) / w)
+        xx = np.sum(((arc - v / size)[:-1] - (arc - v / size)[1:]) / w)
         xy = np.sum(((p[0] / size)[:-1] - (p[0] / size)[1:]) / w)
         yy = np.sum(((v / size)[:-1] - (v / size)[1:]) / w)
         return (
@@ -111,13 +112,14 @@ def catenary(lengths: Any, weights: Any, reach: Any) -> Hanging:
 
 
 def _least(parts: Any, reach: Any, length: float, weight: float) -> Any:
-    """The p that makes the function with value, gradient and second derivatives of `parts`, and p . reach, least."""
+    """The p at the minimum of the function f(p) + p . reach; `parts` gives value, gradient and second derivatives of
+    f."""
     distance = float(np.hypot(*reach))
     if not length > distance:
         raise GeometryError(
             f"length of the chain = {length:g} m: must be > {distance:g} m, the distance of its ends"
         )
-    # about the pull of a shallow parabola, which is of the right size also where the chain hangs deep
+    # start from the pull of a shallow parabola; it has the right size for a deep chain, too
     across = max(abs(reach[0]), 0.05 * length)
     pull = across / np.sqrt(24.0 * max(length - distance, 1e-9 * length) * length)
     start = np.array([-np.copysign(pull, reach[0] or 1.0), 0.5])
@@ -140,7 +142,7 @@ def _least(parts: Any, reach: Any, length: float, weight: float) -> Any:
             method="trust-exact",
             options={"gtol": 1e-7, "maxiter": 500},
         ).x
-        # near the minimum values differ by less than rounding; the gradient still tells
+        # near the minimum the values differ by less than rounding, but the gradient is still accurate
         wrong = gradient(x)
         for _ in range(_POLISH):
             trial = x - np.linalg.solve(curvature(x), wrong)
@@ -158,8 +160,9 @@ def _least(parts: Any, reach: Any, length: float, weight: float) -> Any:
 
 @dataclass(frozen=True)
 class Modes:
-    """Small vibration of a hanging chain of N rods about its rest, both pins held: natural frequencies [rad/s],
-    rising, shape (N - 2,), and the angles of the rods in each, largest 1, shape (N - 2, N)."""
+    """Small vibration of a hanging chain of N rods about its rest, with both pins held: the natural frequencies
+    [rad/s], rising, shape (N - 2,), and the angles of the rods in each mode, scaled to a largest angle of 1, shape
+    (N - 2, N)."""
 
     frequency: Any
     shape: Any
@@ -168,13 +171,14 @@ class Modes:
 def modes(lengths: Any, weights: Any, rest: Hanging, g: float) -> Modes:
     """Natural frequencies and shapes of the rods at `rest`, undamped; the rods are uniform.
 
-    A rod that turns out of its line stretches the way by l theta^2/2, so that the stiffness is diagonal: its length
-    times its pull. The inertia is that of the chain that hangs from A1; the pin A2 takes two directions away.
+    A rotation theta of a rod shortens its projection on its line by l theta^2/2, so that the stiffness is diagonal:
+    length times pull of each rod. The inertia is that of the chain that hangs from A1; the pin A2 removes two
+    degrees of freedom.
     """
     l, m = np.asarray(lengths, float), np.asarray(weights, float) / g
     N = len(l)
     after = np.concatenate([np.cumsum(m[::-1])[::-1][1:], [0.0]])  # mass behind each rod
-    outer = np.maximum.outer(np.arange(N), np.arange(N))  # of each two rods the one farther from A1
+    outer = np.maximum.outer(np.arange(N), np.arange(N))  # the rod farther from A1 of each two rods
     inertia = np.outer(l, l) * np.cos(np.subtract.outer(rest.theta, rest.theta)) * (0.5 * m + after)[outer]
     inertia[np.diag_indices(N)] = l * l * (m / 3.0 + after)
     along = np.stack([l * np.cos(rest.theta), l * np.sin(rest.theta)])
@@ -185,8 +189,8 @@ def modes(lengths: Any, weights: Any, rest: Hanging, g: float) -> Modes:
 
 
 def split(parts: Sequence[float], number: int) -> tuple[int, ...]:
-    """How many of `number` rods each of two parts of these lengths gets, so that the rods are nearest to equal
-    length."""
+    """Distribute `number` rods over two parts of these lengths, so that the rods are nearest to equal length: the
+    number in each part."""
     first, second = parts
     most = number - 1
     share = round(number * first / (first + second))

@@ -1,8 +1,9 @@
 """The knife drive of the paper cutter BR-125 (paper 003): crank + dyad + triad.
 
-Crank O1-A; dyad: coupler AB and rocker BO2; triad: the ternary link CDE, which carries the knife, on the legs BC,
-O3D and O4E. BC hangs on the pin B, where three links meet. x right, y up; a force is the one on the first-named
-part. The crank angle q is counted from the upward vertical, clockwise; B lies to the left of the ray from A to O2.
+The crank is O1-A. The dyad has the coupler AB and the rocker BO2. The triad has the ternary link CDE, which carries
+the knife, and the legs BC, O3D and O4E. BC hangs on the pin B, where three links meet. x points right, y up. A force
+is the force on the part that its description names first. The crank angle q counts from the upward vertical,
+clockwise; B lies to the left of the ray from A to O2.
 """
 
 from __future__ import annotations
@@ -63,8 +64,8 @@ class Knife:
 
 @declaration
 class Assembly:
-    """The pose of the knife from which Newton's method leads to the mode of assembly at crank angle 0; `modes` lists
-    them all."""
+    """The pose of the knife from which Newton's method leads to the assembly mode at crank angle 0; the function
+    `modes` lists all assembly modes."""
 
     x: Value = quantity("m", "origin of its frame, x", default=1.0460696, min=-1e4, max=1e4)
     y: Value = quantity("m", "origin of its frame, y", default=0.0172492, min=-1e4, max=1e4)
@@ -75,14 +76,14 @@ class Assembly:
 
 @declaration
 class Stack:
-    """The stack of paper, and how it resists."""
+    """The stack of paper and its resistance."""
 
     top: Value = quantity("m", "height y of its top", default=-0.185, min=-1e4, max=1e4, tunable=True)
     table: Value = quantity(
         "m", "height y of the table below it", default=-0.234, min=-1e4, max=1e4, tunable=True
     )
     edge: Value = quantity(
-        "m", "way over which the resistance rises and falls", default=0.002, min=1e-6, tunable=True
+        "m", "distance over which the resistance rises and falls", default=0.002, min=1e-6, tunable=True
     )
     v_smooth: Value = quantity(
         "m/s",
@@ -95,7 +96,8 @@ class Stack:
 
 @declaration
 class Parameters(Lengths):
-    """Parameters of the knife drive. The start values are ours: paper 003 prints no dimensions and no masses."""
+    """Parameters of the knife drive. The start values are assumptions of this package: paper 003 prints no dimensions
+    and no masses."""
 
     o1: Point = group(Point, "crank bearing O1", default=Point(y=-0.1))
     o2: Point = group(Point, "rocker bearing O2", default=Point(x=0.33, y=-0.4))
@@ -188,7 +190,7 @@ JOINTS = {
     "o3_bearing": ("O3", "leg_3"),
     "o4_bearing": ("O4", "leg_4"),
 }
-"""Joint of each reaction, by output."""
+"""The joint of each reaction, by output."""
 PINS = {
     "O1 crank bearing": "crank_bearing",
     "A crank pin": "crank_pin",
@@ -201,7 +203,7 @@ PINS = {
     "O3 bearing": "o3_bearing",
     "O4 bearing": "o4_bearing",
 }
-"""Output of each bearing, by title."""
+"""The output of each bearing, by title."""
 
 
 def _probes(xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
@@ -248,7 +250,7 @@ class KnifeDrive(InverseMachine):
 
     @staticmethod
     def linkage(p: Any, u: Any) -> Linkage:
-        """Crank, dyad and triad, the knife in the stack."""
+        """Crank, dyad and triad, with the weight, the cut, the further force on the blade and the pin losses."""
         knife = p.knife
         return Linkage(
             ground={"O1": _vector(p.o1), "O2": _vector(p.o2), "O3": _vector(p.o3), "O4": _vector(p.o4)},
@@ -278,7 +280,8 @@ class KnifeDrive(InverseMachine):
 
     @staticmethod
     def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """The crank turns, and the triad closes all the way round, clear of its dead positions."""
+        """Limits with which the crank turns, and the triad closes over the whole turn, clear of its dead
+        positions."""
         between = _vector(p.o1) - _vector(p.o2)
         yield p.r, 0.0, longest_crank(xp, p.ab, p.bo2, xp.sqrt(between.squared()))
         yield from triad.limits(p.derived)

@@ -1,4 +1,4 @@
-"""`Machine`: any linkage machine for Python - arrays in, arrays out."""
+"""`Machine`: any linkage machine in Python, with arrays as arguments and results."""
 
 from __future__ import annotations
 
@@ -18,19 +18,20 @@ _XP = numpy_()
 
 
 class Machine:
-    """A machine with its parameters checked: `model`, and the parameters `p`.
+    """A machine with checked parameters: its `model`, and its parameters `p`.
 
-    Angles and speeds are the motor's, as at the FMU; with ``ratio`` 1 they are the crank's.
-    Every argument may be a float or an array; shapes broadcast, and outputs have the common shape. A value that
-    is not finite, or a load outside its declared bounds, is an `InputError` that names it, in an array as well as
-    alone; a value beyond a bound by rounding only counts as the bound.
+    Angles and speeds are those of the motor, as in the FMU; with ``ratio`` 1 they are those of the crank. Every
+    argument may be a float or an array; shapes broadcast, and outputs have the common shape. A value that is not
+    finite, or a load outside its declared bounds, raises an `InputError` that names it; in an array this holds for
+    each value. A value that exceeds a bound only by rounding counts as the bound.
 
     Parameters
     ----------
     model : the inverse model of the machine
-    parameters : its `Parameters`, or names of parameters with their values (SI), e.g.
-        ``{"r": 0.2, "crank.m": 35.0}``; a value that is not named is the packaged machine's.
-    **values : the same for names without a dot.
+    parameters : its `Parameters`, or values (SI) by the names of parameters, e.g. ``{"r": 0.2, "crank.m": 35.0}``;
+    all
+        other parameters have the values of the packaged machine.
+    **values : values by names without a dot.
 
     Raises
     ------
@@ -49,28 +50,29 @@ class Machine:
 
     def __init__(self, model: type[InverseMachine], parameters: Any = None, /, **values: float) -> None:
         base = parameters if isinstance(parameters, model.Parameters) else model.Parameters()
-        given = {} if isinstance(parameters, model.Parameters) else dict(parameters or {})
+        by_name = {} if isinstance(parameters, model.Parameters) else dict(parameters or {})
         self.model = model
-        self.p: Any = model.check(model.parameter_layout.from_names({**given, **values}, base))
+        self.p: Any = model.check(model.parameter_layout.from_names({**by_name, **values}, base))
 
     def replace(self, parameters: Mapping[str, float] | None = None, /, **values: float) -> Self:
-        """The same machine with some parameters changed, given as to the constructor."""
-        changed = copy.copy(self)
+        """The same machine with new values of some parameters; the arguments are those of the constructor."""
+        machine = copy.copy(self)
         layout = self.model.parameter_layout
-        changed.p = self.model.check(layout.from_names({**(parameters or {}), **values}, self.p))
-        return changed
+        machine.p = self.model.check(layout.from_names({**(parameters or {}), **values}, self.p))
+        return machine
 
     def __repr__(self) -> str:
-        """The call that makes the machine, by the parameters that are not at their start values, to nine digits."""
+        """The call that makes the machine, with the parameters that differ from their start values, to nine
+        digits."""
         start = self.model.parameter_layout.by_name(self.model.Parameters())
-        shown = {name: f"{value:.9g}" for name, value in self.by_name.items()}
-        changed = [f'"{name}": {x}' for name, x in shown.items() if x != f"{start[name]:.9g}"]
-        arguments = [*self._kind, *([f"{{{', '.join(changed)}}}"] if changed else [])]
+        texts = {name: f"{value:.9g}" for name, value in self.by_name.items()}
+        changes = [f'"{name}": {x}' for name, x in texts.items() if x != f"{start[name]:.9g}"]
+        arguments = [*self._kind, *([f"{{{', '.join(changes)}}}"] if changes else [])]
         return f"{type(self).__name__}({', '.join(arguments)})"
 
     @property
     def _kind(self) -> list[str]:
-        """What tells the machine beside its parameters."""
+        """The arguments of the constructor besides the parameters, as texts."""
         return [self.model.name]
 
     @property
@@ -80,11 +82,11 @@ class Machine:
 
     @property
     def by_name(self) -> dict[str, float]:
-        """Parameters by name."""
+        """Values of the parameters by name."""
         return self.model.parameter_layout.by_name(self.p)
 
-    def inputs(self, named: Mapping[str, Any]) -> Any:
-        """Inputs from values by name, each as its declaration admits it; one that is not named is at its start.
+    def inputs(self, values: Mapping[str, Any]) -> Any:
+        """Inputs from values by name, each within the bounds of its declaration; all others have their start values.
 
         Raises
         ------
@@ -94,8 +96,8 @@ class Machine:
             see the class.
         """
         layout = self.model.input_layout
-        values = layout.values(layout.from_names(dict(named)))
-        return layout.instance([admitted(v, x) for v, x in zip(layout.variables, values, strict=True)])
+        numbers = layout.values(layout.from_names(dict(values)))
+        return layout.instance([admit(v, x) for v, x in zip(layout.variables, numbers, strict=True)])
 
     def state(self, u: Any) -> MachineState:
         """The linkage with the `inputs`.
@@ -103,10 +105,10 @@ class Machine:
         Raises
         ------
         TypeError
-            for a machine with states of its own.
+            for a machine whose outputs depend on states.
         """
         if self.model.States is not None:
-            raise TypeError(f"{self.model.name}: its outputs follow from its states, too; simulate it")
+            raise TypeError(f"{self.model.name}: its outputs depend on its states, too; simulate it")
         return self.model.shared(_XP, self.p, u, None)
 
     def outputs(self, phi: Any, w: Any = 0.0, a: Any = 0.0, feed: Any = None) -> Any:
@@ -119,9 +121,9 @@ class Machine:
         InputError
             see the class.
         """
-        return self._outputs(self.inputs({"phi": phi, "w": w, "a": a, **self._named(feed)}))
+        return self._outputs(self.inputs({"phi": phi, "w": w, "a": a, **self._feed(feed)}))
 
-    def _named(self, feed: Any) -> dict[str, Any]:
+    def _feed(self, feed: Any) -> dict[str, Any]:
         return self.model.feed_layout.by_name(self.model.Feed() if feed is None else feed)
 
     def _outputs(self, u: Any) -> Any:
@@ -130,7 +132,7 @@ class Machine:
         return part.layout.instance(np.broadcast_arrays(*part.layout.values(out)))
 
     def evaluate(self, inputs: Mapping[str, Any]) -> dict[str, Any]:
-        """All outputs of the FMU by name, from inputs by name; an input not named is 0.
+        """All outputs of the FMU by name, from inputs by name; all other inputs are 0.
 
         Raises
         ------
@@ -140,16 +142,16 @@ class Machine:
             see the class.
         """
         u = self.inputs({**dict.fromkeys(self.model.input_layout.names, 0.0), **inputs})
-        named: dict[str, Any] = {}
+        outputs: dict[str, Any] = {}
         state = self.state(u)
         for part in self.model.parts:
-            named |= part.layout.by_name(part.equations(_XP, self.p, u, None, state))
-        return dict(zip(named, np.broadcast_arrays(*named.values()), strict=True))
+            outputs |= part.layout.by_name(part.equations(_XP, self.p, u, None, state))
+        return dict(zip(outputs, np.broadcast_arrays(*outputs.values()), strict=True))
 
     def pin_turns(self, run: Mapping[str, Any]) -> dict[str, Any]:
-        """Relative angle in each of the model's joints, by output, up to a constant [rad], shape (n,), over a `run`:
-        outputs and states of the model by name, each of shape (n,). The sum of all turning to and fro is left to the
-        reader."""
+        """Relative angle in each of the model's joints over a `run`, by output, up to a constant [rad], shape (n,).
+        The `run` has outputs and states of the model by name, each of shape (n,). The caller sums the turning to and
+        fro."""
         phi = array(run["phi0"])
         turns = self.drive(phi).turns
         step = np.diff(phi / self.p.ratio)
@@ -161,33 +163,33 @@ class Machine:
         return angles
 
     def drive(self, phi: Any) -> Mechanism:
-        """The links at motor angles `phi` [rad]; of a machine with chains those of its drive."""
+        """The linkage at motor angles `phi` [rad]; for a machine with chains, its drive only."""
         u = self.inputs({"phi": phi})
         linkage = self.model.linkage(self.p, u)
         return Mechanism(_XP, linkage, u.phi / self.p.ratio, getattr(self.p, "derived", ()))
 
     @property
     def stored_per_unit(self) -> Mapping[str, Callable[[Mapping[str, Any]], Any]]:
-        """By the name of an input, the energy that a unit of it holds on its place [J per unit], a function of
-        outputs and states by name: dE/du, with which the input enters an energy balance as it changes."""
+        """By the name of an input, a function of outputs and states by name: the energy that one unit of the input
+        holds at its place [J per unit]. This is dE/du, with which a change of the input enters an energy balance."""
         return {}
 
     def loaded_sides(self, feed: Any) -> tuple[str, ...]:
-        """The sides of the machine on which there is any mass or load, where it has sides."""
+        """The sides of the machine with any mass or load; none for a machine without sides."""
         return ()
 
 
-def admitted(variable: Variable, given: Any) -> Any:
-    """A float or an array whose every value the declaration admits; a value beyond a bound by rounding is set on
-    it.
+def admit(variable: Variable, value: Any) -> Any:
+    """A float or an array of values that the declaration admits; a value that exceeds a bound by rounding is set to
+    the bound.
 
     Raises
     ------
     InputError
-        for any other value.
+        for a value that the declaration does not admit.
     """
-    q, x = variable.quantity, array(given)
-    # NaN is the extreme of any array that holds it
+    q, x = variable.quantity, array(value)
+    # the extremes of an array with a NaN are NaN
     for extreme in (np.min(x), np.max(x)) if np.size(x) else ():
         if not q.admits(float(extreme)):
             raise InputError(complaint(variable, float(extreme)))
@@ -195,5 +197,5 @@ def admitted(variable: Variable, given: Any) -> Any:
 
 
 def array(x: Any) -> Any:
-    """A float as it is, anything else as an array of floats."""
+    """A float unchanged, anything else as an array of floats."""
     return x if isinstance(x, float) else np.asarray(x, float)

@@ -24,7 +24,7 @@ class Rod:
 
 @declaration
 class Pin:
-    """The pins, all alike."""
+    """The pins; all have the same parameters."""
 
     friction: Value = quantity("1", "coefficient of friction", default=0.12, min=0.0, max=100.0, tunable=True)
     diameter: Value = quantity(
@@ -46,8 +46,8 @@ class Processing:
 
 @declaration
 class Stop:
-    """A spring and damper between rocker and frame, which hold a blocked rocker; off where both are zero. The
-    smoothed friction and processing force hold nothing at rest."""
+    """A spring and a damper between rocker and frame, which hold a blocked rocker; without effect where both are
+    zero. The smoothed friction and the smoothed processing force cannot hold the rocker at rest."""
 
     stiffness: Value = quantity("N.m/rad", "stiffness", default=0.0, min=0.0, nominal=1e6)
     damping: Value = quantity("N.m.s/rad", "damping", default=0.0, min=0.0, nominal=1e4)
@@ -56,12 +56,12 @@ class Stop:
 
 @declaration
 class Force:
-    """A force in the frame x right, y up."""
+    """A force by its components: x right, y up."""
 
     fx: Value = quantity("N", "force along x", nominal=1000.0)
     fy: Value = quantity("N", "force along y", nominal=1000.0)
 
 
 def force(f: Vec2) -> Force:
-    """The vector as declared."""
+    """The vector as an instance of `Force`."""
     return Force(fx=f.x, fy=f.y)

@@ -120,7 +120,7 @@ class ForeignMachine(Machine):
         times = (np.asarray(phi) - phi[0]) / (w * gear)
         terminals = self.model.component.terminals
         shaft, load = terminals["flange"].members, terminals["load"].members
-        signals = {f"machine.{name}": x for name, x in self._named(feed).items()}
+        signals = {f"machine.{name}": x for name, x in self._feed(feed).items()}
         signals |= {f"machine.{shaft['phi']}": lambda t: first + w * t, f"machine.{shaft['w']}": w}
         names = {"tau": f"machine.{load['tau_bias']}", "J": f"machine.{load['J']}"}
         step = float(times[1] - times[0])
