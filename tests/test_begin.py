@@ -84,7 +84,7 @@ def test_every_peak_of_the_run_is_in_a_table(done):
     assert told[0] == pytest.approx(np.max(torque[~fed]), rel=1e-9)
     words = said_of(study)
     assert "Settling under the feed: crank torque, peak" in words
-    assert "What the settling under the feed asks of the drive" in (folder / "result.md").read_text()
+    assert "Demands of the settling under the feed on the drive" in (folder / "result.md").read_text()
     # and so are those of the bearings
     assert set(result["pins"]) == {"start_up", "settling", "steady", "dip"}
 
@@ -96,7 +96,7 @@ def test_the_driveline_has_its_start(done):
     assert result["shaft"]["start_up"]["tau2_peak"]["value"] == np.max(tau2)
     assert study.shaft["start_up"].tau2_peak > study.shaft["steady"].tau2_peak
     assert study.shaft["start_up"].turns_of_steady > 0.0
-    table = (folder / "result.md").read_text().partition("What the driveline carries")[2]
+    table = (folder / "result.md").read_text().partition("Torque in the driveline")[2]
     assert "start-up" in table[:200]
 
 

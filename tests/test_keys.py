@@ -185,6 +185,10 @@ def test_the_commands(tmp_path):
     assert "processing force of the lump" in said and '"2 kN"' in said
     assert "[[event]] of jam" in chainunit("keys", cwd=tmp_path).stdout
     assert "rated power at the shaft" in chainunit("keys", "catalogue", cwd=tmp_path).stdout
+    # each machine has other keys: the command lists the machines, and how to ask for one
+    machines = chainunit("keys", "machine", cwd=tmp_path).stdout
+    assert re.findall(r"chainunit keys (\w+)", machines) == list(MACHINES) and "web_share" not in machines
+    assert "web_share" in chainunit("keys", "ChamberForces", cwd=tmp_path).stdout
     refused = chainunit("keys", "jams", cwd=tmp_path)
     assert refused.returncode == 2 and "there are system, machine" in refused.stderr
     assert chainunit("schema", cwd=tmp_path).returncode == 0

@@ -17,7 +17,7 @@ import chainunit.report
 from chainunit.report import blocks as b
 from chainunit.report import figure as fig
 from chainunit.report import html, page_figures, print_figures, terminal
-from chainunit.report.lines import Aside, Number, Strong, Words, joined, line
+from chainunit.report.lines import Aside, Number, Strong, Words, join, line
 from chainunit.report.markdown import markdown
 from chainunit.report.motion import Animation, Arrow, Clip, DrawnLink, Reading, pictures
 from chainunit.study.config import Run
@@ -71,7 +71,7 @@ def a_report(units=DEFAULT_UNITS):
         b.Text(S.estimate("band")),
         *S.conclusions(),
         b.Text("fine", "fine", "long"),
-        b.Given((("Run", tuple(S.given(Run, "run"))),)),
+        b.Given((("Run", tuple(S.given_values(Run, "run"))),)),
         a_figure(),
     )
     sections = (b.Section("answer", "The answer", blocks), b.Section("none", "Empty", ()))
@@ -121,7 +121,7 @@ def test_each_number_of_a_page_names_its_place():
 
 
 def test_what_the_file_does_not_give_is_marked():
-    given = list(S.given(Run, "run"))
+    given = list(S.given_values(Run, "run"))
     assert [(value.name, value.origin) for value in given] == [
         ("run.crank_speed", "file"),
         ("run.turns", "declared"),
@@ -153,7 +153,7 @@ def test_the_chosen_units_are_everywhere():
 
 ITEMS = (
     curve("a line", look=2),
-    curve("points", marker="o", joined=False),
+    curve("points", marker="o", has_line=False),
     fig.Between("between", [0.0, 1.0], [0.0, 0.0], [0.5, 1.0]),
     fig.Shade(0.2, 0.4, "shade"),
     fig.Shade(0.2, 0.4, "lying shade", "y"),
@@ -257,10 +257,10 @@ def test_what_moves_is_played_as_it_is():
 
 def test_lines():
     assert line("a", ("b", "c"), Aside("d")) == ("a", "b", "c", Aside("d"))
-    assert joined(["a", ("b", "c")], "; ") == ("a", "; ", "b", "c") and joined([]) == ()
+    assert join(["a", ("b", "c")], "; ") == ("a", "; ", "b", "c") and join([]) == ()
     assert S.line("at {=speed} {who}", who="!") == (
         "at ",
-        Number(314.159, "rad/s", "speed", "speed", given=True),
+        Number(314.159, "rad/s", "speed", "speed", as_given=True),
         " ",
         "!",
     )

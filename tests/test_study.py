@@ -71,7 +71,7 @@ def test_study_writes_numbers_series_plots_and_fmus(done):
     for word in (
         "crank torque, peak",
         "Overload factor",
-        "What the bearings carry",
+        "Forces in the bearings",
         "Energy residual",
         "Note:",
     ):

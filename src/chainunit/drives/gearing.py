@@ -19,7 +19,7 @@ class Transmission:
     ratio: Value = quantity("1", "motor turns per turn of the output", default=1.0, above=0.0, max=1e4)
     efficiency: Value = quantity(
         "1",
-        "efficiency while the motor drives; the loss by the drag d comes on top",
+        "efficiency while the motor drives, without the loss by the drag d",
         default=1.0,
         min=0.05,
         max=1.0,

@@ -40,7 +40,9 @@ class Parameters:
     ratio: Value = quantity(
         "1", "gear ratio, motor turns per turn of the rotor", default=1.0, above=0.0, max=1e6
     )
-    rotor: Rod = group(Rod, "rotor with the material in it", default=Rod(m=400.0, s=0.0, I=60.0))
+    rotor: Rod = group(
+        Rod, "rotor on the axis O, with the material in it", default=Rod(m=400.0, s=0.0, I=60.0)
+    )
     pin: Pin = group(Pin, "bearing", default=Pin(friction=0.0, diameter=0.12))
     joint_damping: Value = quantity(
         "N.m.s/rad", "viscous friction of the bearing", default=0.0, min=0.0, tunable=True

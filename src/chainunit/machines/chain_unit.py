@@ -79,14 +79,14 @@ class Parameters:
     ratio: Value = quantity(
         "1", "gear ratio, motor turns per crank turn", default=1.0, above=0.0, max=1e6, usual=(1.0, 500.0)
     )
-    crank: Rod = group(Rod, "crank", default=Rod(m=40.0, s=0.05, I=0.6))
-    coupler: Rod = group(Rod, "coupler", default=Rod(m=25.0, s=0.7, I=5.0))
-    rocker: Rod = group(Rod, "rocker", default=Rod(m=60.0, s=0.5, I=8.0))
+    crank: Rod = group(Rod, "crank O1-A", default=Rod(m=40.0, s=0.05, I=0.6))
+    coupler: Rod = group(Rod, "coupler A-Bd", default=Rod(m=25.0, s=0.7, I=5.0))
+    rocker: Rod = group(Rod, "rocker C-Bd", default=Rod(m=60.0, s=0.5, I=8.0))
     left: SideMasses = group(SideMasses, "left organ", default=SideMasses())
     right: SideMasses = group(SideMasses, "right organ", default=SideMasses())
     web_share: Value = quantity(
         "1",
-        "part of the material that lies on the web; the rest lies on the wall",
+        "share of the material that lies on the web; the rest lies on the wall",
         default=1.0,
         min=0.0,
         max=1.0,

@@ -13,7 +13,7 @@ class Rod:
     m: Value = quantity("kg", "mass", default=0.0, min=0.0, tunable=True)
     s: Value = quantity(
         "m",
-        "distance of the centroid from the first pin, along the link",
+        "distance of the centroid from the pin named first, along the link",
         default=0.0,
         min=-1e4,
         max=1e4,

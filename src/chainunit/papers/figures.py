@@ -28,7 +28,7 @@ _SIDES = (("left", 1.0, 0, "printed"), ("right", -1.0, "right", "printed right")
 
 
 def _points(x: Any, y: Any, name: str = "printed") -> Curve:
-    return Curve(name, x, y, "printed", "o", joined=False)
+    return Curve(name, x, y, "printed", "o", has_line=False)
 
 
 def _figure(name: str, title: str, alt: str, *rows: Iterable[Panel | None], level: bool = False) -> Figure:
@@ -262,7 +262,7 @@ def crank_rockers() -> Figure:
             field,
             *_contours(rho, lam, worst, "largest pressure angle", (10.0, 20.0, 30.0, 45.0, 60.0), 0, 0.45),
             *_contours(rho, lam, eta, "swing", (10.0, 17.25, 30.0, 60.0, 90.0, 120.0), 1, 0.25),
-            Curve("the papers' machine", np.array([0.1]), np.array([p1.LAM]), 2, "o", joined=False),
+            Curve("the papers' machine", np.array([0.1]), np.array([p1.LAM]), 2, "o", has_line=False),
         ],
     )
 

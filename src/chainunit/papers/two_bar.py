@@ -209,7 +209,7 @@ def _figure(comparison: TwoBarError) -> Figure:
     mu, zeta, percent = comparison.mu, comparison.zeta, 100.0 * comparison.largest
     errors: list[Item] = [Field(zeta, mu, percent, _LEVELS, _CLASSES)]
     errors += [Curve("20 %", line[:, 0], line[:, 1], 1) for line in contours(zeta, mu, percent, 20.0)]
-    errors.append(Curve("the papers' organ", np.array([0.5]), np.array([0.6]), 1, "o", joined=False))
+    errors.append(Curve("the papers' organ", np.array([0.5]), np.array([0.6]), 1, "o", has_line=False))
     i, j = int(np.argmin(np.abs(mu - 0.6))), int(np.argmin(np.abs(zeta - 0.5)))
     load, error_t, error_n = (x[i, j] for x in (comparison.load_t, comparison.error_t, comparison.error_n))
     loads = (

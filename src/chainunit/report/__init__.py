@@ -1,1 +1,1 @@
-"""The report on a study: a table on the terminal, result.json, result.nc, plots, a page that holds it all."""
+"""The report on a study: tables on the terminal, result.json, result.nc, plots, and a page with all of them."""

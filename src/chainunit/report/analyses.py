@@ -1,4 +1,4 @@
-"""The sections of a report that belong to analyses of a study, by the name of the analysis."""
+"""The sections of a report on the analyses of a study, by the name of the analysis."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .blocks import Block, Source
 
 @dataclass(frozen=True)
 class Contents:
-    """A section: its heading, its blocks (tables, words, figures), and the files of its figures."""
+    """The contents of a section: its heading, its blocks (tables, text, figures), and the files of its figures."""
 
     heading: str
     blocks: Callable[[Source, StudyRecord], Iterator[Block]]

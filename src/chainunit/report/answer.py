@@ -7,16 +7,16 @@ from collections.abc import Iterator
 from ..study.measures import MEASURES
 from ..study.record import StudyRecord
 from . import blocks as b
+from . import chains, sizing
 from . import run_names as read
-from . import sizing
-from .lines import Line, Strong, joined, line
+from .lines import Line, Strong, join, line
 from .runs import number
 
 _HOLDS: dict[str, b.Severity] = {"true": "good", "in part": "partly", "false": "bad"}
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
-    """The drive that was found, verdicts, cards and warnings."""
+    """The drive that sizing chose, the verdicts, the cards and the warnings."""
     yield from sizing.answer(s)
     for of in ("model", "motor"):
         verdict = s.result["verdict"][of]
@@ -33,17 +33,18 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     answers = s.result["answers"]
     if answers:
         reference = "steady" if "steady" in answers else next(iter(answers))
-        worst = " Below: the overload that asks most." if study.overloads else ""
+        worst = " Below them: the overload with the largest value." if study.overloads else ""
         speed = _speed(s, study, reference)
-        lead = line(f"Large: {read.title(study, reference)}, the crank at ", speed, f".{worst}")
+        lead = line(f"Large numbers: {read.title(study, reference)}, the crank at ", speed, f".{worst}")
         yield b.Text(lead, "lead", "long")
         yield b.Cards(tuple(_cards(s, study, reference)))
     else:
         yield b.Text("The study ended before any run could be evaluated.", "lead", "long")
     if study.monte_carlo is not None:
         yield b.Text(_random(s, study))
-    yield from (b.Judgement("warning", each) for each in s.lines("warnings"))
-    if answers and not s.result["warnings"]:
+    warnings = [*(b.Judgement("warning", each) for each in s.lines("warnings")), *chains.speeds_to_avoid(s)]
+    yield from warnings
+    if answers and not warnings:
         yield b.Text("No run gives cause for a warning.", "fine", "long")
 
 
@@ -51,11 +52,11 @@ _LARGEST, _ENDS = (
     "crank_torque_peak",
     {"trips": "the safety coupling opens", "stalls": "the crank stands at the end"},
 )
-"""Of overloads at random: the peak of the answer, and what may come of a run."""
+"""The quantity of random overloads that the answer states, and the ways in which a run may end badly."""
 
 
 def _random(s: b.Source, study: StudyRecord) -> Line:
-    """What overloads at random ask: the largest quantile of the crank's torque, and how often a run ends badly."""
+    """The sentence on random overloads: the largest quantile of the crank torque, and how often a run ends badly."""
     quantiles = s.result["monte_carlo"]["quantiles"]
     ends = dict(_ENDS) if study.config.coupling else {"stalls": _ENDS["stalls"]}
     parts: list[Line] = [
@@ -63,35 +64,35 @@ def _random(s: b.Source, study: StudyRecord) -> Line:
         for name, words in ends.items()
         if name in quantiles
     ]
-    if known := list(quantiles.get(_LARGEST, ())):
-        peak = s.estimate(f"monte_carlo.quantiles.{_LARGEST}.{known[-1]}", ".low", ".high")
-        parts.insert(0, line(f"{known[-1][1:]} % stay below a crank torque of ", peak))
-    return s.line("Of {=monte_carlo.runs} overloads at random: {parts}.", parts=joined(parts, "; "))
+    if quantile_names := list(quantiles.get(_LARGEST, ())):
+        peak = s.estimate(f"monte_carlo.quantiles.{_LARGEST}.{quantile_names[-1]}", ".low", ".high")
+        parts.insert(0, line(f"{quantile_names[-1][1:]} % stay below a crank torque of ", peak))
+    return s.line("Of {=monte_carlo.runs} overloads at random: {parts}.", parts=join(parts, "; "))
 
 
 def _speed(s: b.Source, study: StudyRecord, run: str) -> Line:
-    """The crank speed that a run has: the one asked for, or the one reached and marked where it is another."""
+    """The crank speed of a run: the speed asked for, or, marked, the mean speed where the motor misses it."""
     if run != "steady" or study.reaches:
         return s.line("{=run.crank_speed}")
-    reached = Strong(s.line(f"▲ {{answers.{run}.speed_mean}}"))
-    return line(reached, s.line(", not the {=run.crank_speed} asked for"))
+    mean_speed = Strong(s.line(f"▲ {{answers.{run}.speed_mean}}"))
+    return line(mean_speed, s.line(", not the {=run.crank_speed} asked for"))
 
 
 def _cards(s: b.Source, study: StudyRecord, run: str) -> Iterator[b.Card]:
-    """Families of answers, large: of each the first two numbers in the run `run`, and the worst overload."""
+    """A card for each family of answers: its first two numbers in the run `run`, and the worst overload."""
     families: dict[str, list[str]] = {}
     for name in s.result["answers"][run]:
         families.setdefault(MEASURES[name].of, []).append(name)
     for of, names in families.items():
         if MEASURES[names[0]].card:
             numbers = [(MEASURES[name].words, number(s, study, run, name)) for name in names]
-            lines = [joined(line(f"{words} ", size) for words, size in numbers[2:])] if numbers[2:] else []
+            lines = [join(line(f"{words} ", size) for words, size in numbers[2:])] if numbers[2:] else []
             cards = tuple((size, words) for words, size in numbers[:2])
             yield b.Card(of, cards, (*lines, *_worst(s, study, names[0])))
 
 
 def _worst(s: b.Source, study: StudyRecord, name: str) -> Iterator[Line]:
-    """An answer in the overload that asks most."""
+    """The answer `name` in the overload in which it is largest; nothing where there is no overload."""
     sizes = {run: s.value(f"answers.{run}.{name}") for run in study.overloads}
     magnitudes = {run: abs(size) for run, size in sizes.items() if size is not None}
     if magnitudes:

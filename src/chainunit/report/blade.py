@@ -25,13 +25,13 @@ _EDGE = DrawnLink("edge", ENDS, "heavy")
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
-    """Table and figure."""
+    """The table and the figure of the blade."""
     yield b.Table(s.rows(Cutting, "blade", digits=4), title="The blade over a turn at constant speed")
     yield _figure(study, study.findings["blade"])
 
 
-def _drawn(links: tuple[DrawnLink, ...], at: Mapping[str, tuple[Any, Any]]) -> tuple[Any, Any]:
-    """All links as one line with gaps, shape (points,)."""
+def _polyline(links: tuple[DrawnLink, ...], at: Mapping[str, tuple[Any, Any]]) -> tuple[Any, Any]:
+    """Places x, y of all links as one line with gaps, shape (points,) each [m]."""
     gap, points = (math.nan, math.nan), []
     for link in links:
         points += [at[pin] for pin in (*link.joints, *link.joints[: int(link.closed)])] + [gap]
@@ -39,29 +39,32 @@ def _drawn(links: tuple[DrawnLink, ...], at: Mapping[str, tuple[Any, Any]]) -> t
     return x, y
 
 
-def _spans(found: BladeFindings) -> list[fig.Shade]:
-    """Where the blade goes down in the stack."""
-    y, stack = found.blade.y, found.stack
+def _spans(findings: BladeFindings) -> list[fig.Shade]:
+    """The ranges of the crank angle in which the blade goes down inside the stack."""
+    y, stack = findings.blade.y, findings.stack
     inside = (np.roll(y, -1) < y) & (y < stack.top) & (y > stack.table)
-    angle = np.append(found.turn.angle, 2.0 * math.pi)
+    angle = np.append(findings.turn.angle, 2.0 * math.pi)
     return [fig.Shade(float(angle[a]), float(angle[b]), "in the stack") for a, b in stretches(inside)]
 
 
-def _figure(study: StudyRecord, found: BladeFindings) -> fig.Figure:
-    angle = found.turn.angle
-    fall = (float(angle[np.argmin(found.blade.y)]) - found.top) % (2.0 * math.pi)
+def _figure(study: StudyRecord, findings: BladeFindings) -> fig.Figure:
+    angle = findings.turn.angle
+    fall = (float(angle[np.argmin(findings.blade.y)]) - findings.top) % (2.0 * math.pi)
     metre, small = ((fig.Axis("x", "m", kind), fig.Axis("y", "m", kind)) for kind in ("", "millimetres"))
-    tilt: tuple[fig.Item, ...] = (fig.Curve("tilt", angle, found.blade.tilt, listed=False), *_spans(found))
+    tilt: tuple[fig.Item, ...] = (
+        fig.Curve("tilt", angle, findings.blade.tilt, in_legend=False),
+        *_spans(findings),
+    )
     panels = (
         fig.Panel(
             *metre,
-            tuple(_positions(study.drive.machine, found, fall)),
+            tuple(_positions(study.drive.machine, findings, fall)),
             "The linkage in three positions",
             equal=True,
         ),
         fig.Panel(
             *small,
-            tuple(_path(found, fall)),
+            tuple(_path(findings, fall)),
             "Path of the edge's middle; crank angles on its way down",
             equal=True,
         ),
@@ -78,34 +81,34 @@ def _figure(study: StudyRecord, found: BladeFindings) -> fig.Figure:
     )
 
 
-def _positions(machine: Machine, found: BladeFindings, fall: float) -> Iterator[fig.Item]:
+def _positions(machine: Machine, findings: BladeFindings, fall: float) -> Iterator[fig.Item]:
     """The linkage with its blade at the top, half-way and at the bottom, and the stack."""
     at: dict[str, tuple[Any, Any]] = {}
     for look, (name, q) in (
-        (2, ("blade at its top", found.top)),
-        (1, ("half-way", found.top + 0.5 * fall)),
-        (0, ("at its bottom", found.top + fall)),
+        (2, ("blade at its top", findings.top)),
+        (1, ("half-way", findings.top + 0.5 * fall)),
+        (0, ("at its bottom", findings.top + fall)),
     ):
         m = machine.drive(q * machine.ratio)
         at = linkage.places(m) | edge(machine.p, m.links)
         words = f"{name}, crank at {number(q % (2.0 * math.pi), 'rad')}"
-        yield fig.Curve(words, *_drawn((*linkage.links(m.linkage, {}), _EDGE), at), look, "o")
+        yield fig.Curve(words, *_polyline((*linkage.links(m.linkage, {}), _EDGE), at), look, "o")
     ends = sorted(float(at[name][0]) for name in ENDS)
-    low, high = ([each, each] for each in (found.stack.table, found.stack.top))
+    low, high = ([each, each] for each in (findings.stack.table, findings.stack.top))
     yield fig.Between("stack", ends, low, high, "hatched")
-    yield fig.Curve("path of the edge's middle", found.blade.x, found.blade.y, "path")
+    yield fig.Curve("path of the edge's middle", findings.blade.x, findings.blade.y, "path")
     yield from (fig.Label(float(x), float(y), name) for name, (x, y) in at.items() if len(name) < 3)
 
 
-def _path(found: BladeFindings, fall: float) -> Iterator[fig.Item]:
-    """The path of the edge's middle, with crank angles on the way down alone: the way up may run along the same
-    line."""
-    x, y = (np.append(each, each[0]) for each in (found.blade.x, found.blade.y))
-    yield fig.Shade(found.stack.table, found.stack.top, "stack", "y", "hatched")
-    yield fig.Curve("path of the edge's middle", x, y, listed=False)
-    angle = found.turn.angle
+def _path(findings: BladeFindings, fall: float) -> Iterator[fig.Item]:
+    """The path of the edge's middle. Crank angles are marked only on the way down, as the way up may run along the
+    same line."""
+    x, y = (np.append(each, each[0]) for each in (findings.blade.x, findings.blade.y))
+    yield fig.Shade(findings.stack.table, findings.stack.top, "stack", "y", "hatched")
+    yield fig.Curve("path of the edge's middle", x, y, in_legend=False)
+    angle = findings.turn.angle
     for k in range(7):
-        i = round((found.top + fall * k / 6.0) / (2.0 * math.pi) * len(angle)) % len(angle)
-        at = float(found.blade.x[i]), float(found.blade.y[i])
-        yield fig.Curve("", [at[0]], [at[1]], marker="o", joined=False, listed=False)
+        i = round((findings.top + fall * k / 6.0) / (2.0 * math.pi) * len(angle)) % len(angle)
+        at = float(findings.blade.x[i]), float(findings.blade.y[i])
+        yield fig.Curve("", [at[0]], [at[1]], marker="o", has_line=False, in_legend=False)
         yield fig.Label(at[0], at[1], number(float(angle[i]), "rad"), "left" if k == 6 else "right")

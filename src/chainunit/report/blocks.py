@@ -1,4 +1,4 @@
-"""The blocks of a report. A study is told in them; renderers know nothing but them.
+"""The blocks of a report. Every section consists of blocks, and a renderer knows blocks alone.
 
 A block, a row or a column is in the ``short`` form of a report (the terminal), the ``long`` one (page and Markdown),
 or in both.
@@ -19,14 +19,14 @@ from .motion import Animation
 
 Form = Literal["both", "short", "long"]
 Severity = Literal["good", "partly", "bad", "warning", "alarm", "remark"]
-Shown: TypeAlias = "Number | Words | str"
-"""A given value: a number, words of the result, or what a switch or a list says."""
+Content: TypeAlias = "Number | Words | str"
+"""The content of a given value: a number, words of the result, or the text of a switch or a list."""
 Origin = Literal["", "file", "example", "declared", "tuned", "catalogue", "sizing"]
 
 
 @dataclass(frozen=True)
 class Text:
-    """A paragraph; a lead comes before the block that it explains, a note after it."""
+    """A paragraph. A lead stands before the block that it explains, a note stands after it."""
 
     line: Line
     role: Literal["plain", "lead", "note", "fine"] = "plain"
@@ -35,7 +35,7 @@ class Text:
 
 @dataclass(frozen=True)
 class Judgement:
-    """A judgement, of the run `run` where it belongs to one."""
+    """A sentence that judges the study, or its run `run`; `items` are the entries of a list below it."""
 
     severity: Severity
     line: Line
@@ -46,7 +46,7 @@ class Judgement:
 
 @dataclass(frozen=True)
 class Card:
-    """Numbers that are shown large, each with what it is, and lines below them."""
+    """A card: large numbers, each with its name, and lines of text below them (`also`)."""
 
     title: str
     numbers: tuple[tuple[Line, str], ...]
@@ -55,7 +55,7 @@ class Card:
 
 @dataclass(frozen=True)
 class Cards:
-    """Cards beside each other."""
+    """Cards that stand beside each other."""
 
     cards: tuple[Card, ...]
     form: Form = "long"
@@ -63,7 +63,7 @@ class Cards:
 
 @dataclass(frozen=True)
 class Column:
-    """The head of a column; `short` is its head where there is little room."""
+    """A column of a table by its head; `short` is the head where there is little room."""
 
     title: Line
     short: str = ""
@@ -77,9 +77,9 @@ def heads(*titles: Line) -> tuple[Column, ...]:
 
 @dataclass(frozen=True)
 class Share:
-    """A cell: how much of a limit is used, and of which."""
+    """A cell with the share of a limit that is used; `of` states the value and its limit."""
 
-    used: Number
+    utilisation: Number
     of: Line = ()
 
 
@@ -88,7 +88,7 @@ Cell: TypeAlias = "Line | Share"
 
 @dataclass(frozen=True)
 class TableRow:
-    """Cells of a table, the first of which names the row; `note` is a line that belongs to the whole row."""
+    """A row of a table. The first cell names the row; `note` is a line that belongs to the whole row."""
 
     cells: tuple[Cell, ...]
     note: Line = ()
@@ -98,8 +98,8 @@ class TableRow:
 
 @dataclass(frozen=True)
 class Table:
-    """A table. `groups` are columns that belong together: where there is no room for all, each group has a table of
-    its own beside the columns that are in none. `note_title` heads the notes of rows where they are a column."""
+    """A table. `groups` are the places of columns that belong together: where the table is too wide, each group gets
+    a table of its own, with the columns that are in no group. `note_title` is the head of the column of notes."""
 
     rows: tuple[TableRow, ...]
     columns: tuple[Column, ...] = ()
@@ -112,7 +112,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Tables:
-    """Small tables beside each other."""
+    """Small tables that stand beside each other."""
 
     tables: tuple[Table, ...]
     form: Form = "long"
@@ -120,17 +120,17 @@ class Tables:
 
 @dataclass(frozen=True)
 class GivenValue:
-    """A value that the study rests on, and where it is from."""
+    """A value that the study uses, and its origin."""
 
     name: str
     description: str
-    value: Shown
+    value: Content
     origin: Origin = ""
 
 
 @dataclass(frozen=True)
 class Given:
-    """Values that were given, by section."""
+    """The given values of a study: for each section its title and its values."""
 
     sections: tuple[tuple[str, tuple[GivenValue, ...]], ...]
     form: Form = "long"
@@ -138,7 +138,7 @@ class Given:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A picture as SVG, with its file's name; `alt` tells it to a reader who does not see it."""
+    """A picture as SVG, and the name of its file; `alt` describes the picture to a reader who does not see it."""
 
     svg: str
     alt: str
@@ -151,13 +151,13 @@ Block: TypeAlias = "Text | Judgement | Cards | Table | Tables | Given | Drawing 
 
 
 def of_form(blocks: Iterable[Block], form: Form) -> list[Block]:
-    """The blocks that are in that form of a report."""
+    """The blocks of the form `form` of a report."""
     return [block for block in blocks if block.form in ("both", form)]
 
 
 @dataclass(frozen=True)
 class Section:
-    """Blocks under a heading; `name` is its address on the page."""
+    """Blocks under a heading; `name` is the address of the section on the page."""
 
     name: str
     heading: str
@@ -166,14 +166,14 @@ class Section:
 
 @dataclass(frozen=True)
 class Report:
-    """A report on a study whose numbers are `result`, ready for JSON."""
+    """A report on a study; `result` has the numbers of the study, ready for JSON."""
 
     title: str
     kind: str
-    """of study"""
+    """the kind of the study, in words"""
     result: Mapping[str, Any]
     opening: tuple[Block, ...]
-    """what was asked"""
+    """the blocks on the question that the study answers"""
     sections: tuple[Section, ...]
     source: Line = ()
     failure: Line = ()
@@ -198,13 +198,13 @@ class Report:
 
 
 def at(result: Any, path: str) -> Any:
-    """What stands at the dotted `path` in a result; a key may itself hold dots ("machine.crank.m"), and the items
-    of a list have their number.
+    """The entry of a result at the dotted `path`. A key may itself have dots ("machine.crank.m"); the key of an item
+    of a list is its number.
 
     Raises
     ------
     KeyError
-        where there is nothing.
+        where the result has no such entry.
     """
     for node in _matches(result, path):
         return node
@@ -226,13 +226,13 @@ def _matches(node: Any, path: str) -> Iterator[Any]:
 
 @dataclass(frozen=True)
 class Source:
-    """Makes numbers and words of the entries of a `result`."""
+    """Makes numbers, words and lines for a report from the entries of a `result`."""
 
     result: Mapping[str, Any]
 
     def number(self, path: str, *items: int, **more: Any) -> Number:
-        """The number at `path`, or of the numbers that stand there the one at the places `items`; `more` as of
-        `Number`."""
+        """The number at `path`; where an array stands there, the number at the places `items` in it. `more` are
+        further fields of `Number`."""
         node = at(self.result, path)
         value, place = node["value"], path
         for i, item in enumerate(items):
@@ -240,14 +240,14 @@ class Source:
         return Number(value, node["unit"], **{"kind": node.get("kind", ""), "path": place, **more})
 
     def value(self, path: str) -> float | None:
-        """The bare value of the number at `path`."""
+        """The value of the number at `path`, without its unit."""
         value: float | None = at(self.result, path)["value"]
         return value
 
     def line(self, template: str, **parts: Line) -> tuple[Piece, ...]:
-        """A line with what stands at the paths that the template has in brackets: ``{run.turns}`` is shown as a
-        result, ``{=run.turns}`` as it was given, ``{ratio:4}`` with that many digits; `parts` stand for their
-        names."""
+        """A line from a template. A path in braces stands for the entry of the result at that path: ``{run.turns}``
+        shows it as a result, ``{=run.turns}`` as a given value, ``{ratio:4}`` with 4 digits. A name of `parts` in
+        braces stands for that part."""
         text: tuple[Piece, ...] = ()
         for i, part in enumerate(re.split(r"\{([^}]*)\}", template)):
             if i % 2 == 0:
@@ -256,17 +256,19 @@ class Source:
                 text += pieces(parts[part])
             else:
                 path, _, digits = part.removeprefix("=").partition(":")
-                given = part.startswith("=")
+                as_given = part.startswith("=")
                 node = at(self.result, path)
-                words = isinstance(node, str)
+                is_text = isinstance(node, str)
                 text += (
-                    self.words(path) if words else self.number(path, given=given, digits=int(digits or 0)),
+                    self.words(path)
+                    if is_text
+                    else self.number(path, as_given=as_given, digits=int(digits or 0)),
                 )
         return text
 
     def estimate(self, path: str, low: str = "_from", high: str = "_to") -> Line:
-        """The number at `path`, with the interval whose ends stand at `path` and `low` or `high`, if there is one;
-        starts or runs that differ too much do not tell it."""
+        """The number at `path` and, where the result has one, its interval, whose ends stand at `path` + `low` and
+        `path` + `high`. Where the starts or runs differ too much for an interval, the line says so."""
         try:
             least = self.value(path + low)
         except KeyError:
@@ -281,43 +283,43 @@ class Source:
         return Words(str(at(self.result, path)), path)
 
     def lines(self, path: str) -> list[Words]:
-        """The sentences of the list at `path`; what has more than a text has it below that name."""
+        """The sentences of the list at `path`; an item that is a mapping has its sentence at the key ``text``."""
         items = enumerate(at(self.result, path))
         return [self.words(f"{path}.{i}.text" if isinstance(x, Mapping) else f"{path}.{i}") for i, x in items]
 
     def conclusions(self) -> Iterator[Text | Judgement]:
-        """The warnings and the notes."""
+        """The warnings of the result as judgements, then its notes."""
         yield from (Judgement("warning", each) for each in self.lines("warnings"))
         yield from (Text(each, "note") for each in self.lines("notes"))
 
-    def rows(self, declared: type, path: str, only: str = "", **more: Any) -> tuple[TableRow, ...]:
-        """A row for each declared quantity that stands at `path`, or for `only` that one: description and number."""
-        have = at(self.result, path)
+    def rows(self, declaration: type, path: str, only: str = "", **more: Any) -> tuple[TableRow, ...]:
+        """A row (description, number) for each declared quantity that the result has at `path`, or for `only` one."""
+        entries = at(self.result, path)
         return tuple(
             TableRow((v.description, self.number(f"{path}.{v.name}", **more)))
-            for v in Layout(declared).variables
-            if v.name in have and only in ("", v.name)
+            for v in Layout(declaration).variables
+            if v.name in entries and only in ("", v.name)
         )
 
-    def given(self, declared: Any, name: str, path: str = "") -> Iterator[GivenValue]:
-        """Given values: the declared quantities of an instance or class that stand at `path`, by default at `name`;
-        of a range both ends."""
+    def given_values(self, declaration: Any, name: str, path: str = "") -> Iterator[GivenValue]:
+        """Given values: the quantities that an instance or class declares and the result has at `path` (by default
+        at `name`). A range gives two values, its ends."""
         path = path or name
-        have = at(self.result, path)
-        cls = declared if isinstance(declared, type) else type(declared)
+        entries = at(self.result, path)
+        cls = declaration if isinstance(declaration, type) else type(declaration)
         for v in Layout(cls).variables:
-            if v.name in have:
+            if v.name in entries:
                 full, origin = f"{name}.{v.name}", self.origin(f"{name}.{v.name}")
-                if isinstance(have[v.name]["value"], list):
+                if isinstance(entries[v.name]["value"], list):
                     for i, end in enumerate(("least", "most")):
-                        value = self.number(f"{path}.{v.name}", i, given=True)
+                        value = self.number(f"{path}.{v.name}", i, as_given=True)
                         yield GivenValue(full, f"{v.description}, {end}", value, origin)
                 else:
-                    value = self.number(f"{path}.{v.name}", given=True, none="none")
+                    value = self.number(f"{path}.{v.name}", as_given=True, none="none")
                     yield GivenValue(full, v.description, value, origin)
 
     def origin(self, path: str) -> Origin:
-        """Where a given value is from, if the result says it."""
+        """The origin of the given value at `path`; empty where the result has no origins."""
         if "origins" not in self.result:
             return ""
         origin: Origin = self.result["origins"].get(path, "declared")

@@ -1,4 +1,7 @@
-"""The section on the organs as chains: beside two bars at the study's speed, and over the speeds of the sweep."""
+"""The section on chains as organs: chains and two bars at the speed of the study, and over the speeds of the sweep.
+
+`speeds_to_avoid` are warnings of the whole study; they stand with the others at the head of the report.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,7 @@ from ..study.chain import HIGH
 from ..study.record import StudyRecord
 from . import blocks as b
 from . import figure as fig
-from .lines import Line, joined, line
+from .lines import Line, join, line
 from .pictures import Pictures
 from .style import WIDE
 
@@ -20,32 +23,41 @@ _OWN = (
     ("crank torque, peak", ("crank_torque_median", "crank_torque_high", "two_bar_crank_torque")),
     ("crank torque, RMS", ("crank_torque_rms", "", "two_bar_crank_torque_rms")),
     ("rocker torque, peak", ("rocker_torque_median", "rocker_torque_high", "two_bar_rocker_torque")),
-    ("snatch: force at A2 over its own at rest", ("snatch_median", "snatch_high", "two_bar_snatch")),
-    ("turns that count as independent, at the quantile", ("independent_turns", "", "")),
-    ("snatch, largest over least median of a start", ("snatch_spread", "", "")),
-    ("time with a slack rod; two bars: with one that pushes", ("slack_time", "", "two_bar_slack_time")),
-    ("rods that are slack, mean over time", ("slack_rods", "", "")),
+    ("snatch: force at A2 over the force there at rest", ("snatch_median", "snatch_high", "two_bar_snatch")),
+    ("number of independent turns behind the quantile", ("independent_turns", "", "")),
+    ("snatch: largest over least median of the starts", ("snatch_spread", "", "")),
+    (
+        "share of the time with a slack rod (two bars: with a bar in compression)",
+        ("slack_time", "", "two_bar_slack_time"),
+    ),
+    ("share of the rods that are slack, mean over time", ("slack_rods", "", "")),
     ("largest angle between neighbouring rods", ("fold_largest", "", "")),
-    ("energy residual of an organ over the energy moved", ("energy_residual", "", "")),
+    ("energy residual of an organ, share of the energy moved", ("energy_residual", "", "")),
+)
+_ORDERS = (
+    "Modes are the natural modes of an organ, counted from the lowest frequency; at order n, n times the crank speed "
+    "is the natural frequency of the mode."
 )
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
-    """Words, tables and figure."""
+    """Text, tables and figure."""
     if study.chain is None:
         return
     chain = s.result["chain"]
     lead = (
-        "The organs are chains of {=chain.rods_of_wall} rods in the wall and {=chain.rods_of_web} in the web, the "
-        "crank is held at constant speed, {=chain.starts} starts at other crank angles are followed over "
-        "{=chain.turns} turns each. Where rods go slack the motion may be chaotic: no single peak is a prediction. "
-        "Median and quantile are of the peaks of single turns, all turns of all starts."
+        "The organs are chains of {=chain.rods_of_wall} rods in the wall and {=chain.rods_of_web} in the web. The "
+        "crank turns at constant speed. {=chain.starts} runs start at different crank angles and last "
+        "{=chain.turns} turns each. Where rods go slack, the motion may be chaotic, and no single peak is a "
+        "prediction. Each turn of each run has one peak; the tables show the median and a quantile of these peaks."
     )
     yield b.Text(s.line(lead), "lead", "long")
-    yield from _avoid(s, chain)
+    if not chain["avoid"] and len(chain["sweep"]) > 1:
+        ends = f"{{chain.sweep.0.speed}} to {{chain.sweep.{len(chain['sweep']) - 1}.speed}}"
+        yield b.Text(s.line(f"No speed to avoid from {ends}."), "fine")
     yield _own_speed(s, chain)
     slack = {
-        side: joined(
+        side: join(
             s.line(f"{{chain.slack_by_rod.{side}.{k}.rod}}: {{chain.slack_by_rod.{side}.{k}}}")
             for k, rod in enumerate(rods)
             if rod["value"] > 0.0
@@ -62,18 +74,16 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     yield from PICTURES.figures(s, study)
 
 
-def _avoid(s: b.Source, chain: Mapping[str, Any]) -> Iterator[b.Block]:
-    """The speeds that the crank should not have."""
-    sweep = chain["sweep"]
-    for i, band in enumerate(chain["avoid"]):
+def speeds_to_avoid(s: b.Source) -> Iterator[b.Judgement]:
+    """A warning for each range of speeds that the crank should avoid; none without chains."""
+    chain = s.result.get("chain", {})
+    sweep = chain.get("sweep", ())
+    for i, band in enumerate(chain.get("avoid", ())):
         path = f"chain.avoid.{i}"
         end = f" to {{{path}.to}}" if band["to"] != band["from"] else ""
         ends = ", where the sweep begins" if band["from"] == sweep[0]["speed"] else ""
         ends += ", where the sweep ends" if end and band["to"] == sweep[-1]["speed"] else ""
-        yield b.Judgement("partly", s.line(f"Avoid {{{path}.from}}{end}{ends}: {{{path}.why}}."))
-    if not chain["avoid"] and len(sweep) > 1:
-        ends = f"{{chain.sweep.0.speed}} to {{chain.sweep.{len(sweep) - 1}.speed}}"
-        yield b.Text(s.line(f"No speed to avoid from {ends}."), "fine")
+        yield b.Judgement("warning", s.line(f"Avoid {{{path}.from}}{end}{ends}: {{{path}.why}}."))
 
 
 def _own_speed(s: b.Source, chain: Mapping[str, Any]) -> b.Table:
@@ -85,15 +95,20 @@ def _own_speed(s: b.Source, chain: Mapping[str, Any]) -> b.Table:
         rows += [
             b.TableRow(("resonance of an organ, crank speed", s.number("chain.resonance"), "", "")),
             b.TableRow(
-                ("distance to it, relative; negative below", s.number("chain.distance_to_resonance"), "", "")
+                (
+                    "relative distance of the speed from it (negative: below)",
+                    s.number("chain.distance_to_resonance"),
+                    "",
+                    "",
+                )
             ),
         ]
     title = (
         "Chains and two bars at constant {=chain.own_speed.speed}, {=chain.starts} starts of {=chain.turns} turns; "
-        "in brackets: interval of {=chain.confidence} confidence"
+        "in brackets: the interval of {=chain.confidence} confidence"
     )
     quantile = s.line("chains, {=chain.quantile} of turns")
-    heads = b.heads("peaks are of single turns", "chains, median", quantile, "two bars")
+    heads = b.heads("peaks of single turns", "chains, median", quantile, "two bars")
     return b.Table(tuple(rows), heads, title=s.line(title))
 
 
@@ -107,25 +122,25 @@ def _sweep(s: b.Source, chain: Mapping[str, Any]) -> b.Table:
         "two_bar_rocker_torque": "rocker torque: two bars",
         "snatch_median": "snatch: median",
         "snatch_high": "snatch: {=chain.quantile} quantile",
-        "slack_time": "time with a slack rod",
+        "slack_time": "share of the time with a slack rod",
     }
 
     def cell(i: int, name: str) -> Line:
-        unknown = chain["sweep"][i].get(f"{name}_from", {"value": 0.0})["value"] is None
-        return "-" if unknown else s.number(f"chain.sweep.{i}.{name}")
+        is_unknown = chain["sweep"][i].get(f"{name}_from", {"value": 0.0})["value"] is None
+        return "-" if is_unknown else s.number(f"chain.sweep.{i}.{name}")
 
     rows = (
         b.TableRow((s.number(f"chain.sweep.{i}.speed"), *(cell(i, name) for name in columns)))
         for i in range(len(chain["sweep"]))
     )
-    title = "Over the crank speed; -: the starts differ by so much that they do not tell the quantile"
+    title = "Chains and two bars over the crank speed; -: the starts differ too much for a quantile"
     return b.Table(
         tuple(rows), b.heads("crank speed", *map(s.line, columns.values())), title=title, form="long"
     )
 
 
 def _critical(s: b.Source, chain: Mapping[str, Any], study: StudyRecord) -> Iterator[b.Block]:
-    """Critical crank speeds: all in a table, those within the sweep in a sentence."""
+    """Critical crank speeds: all of them in a table, those within the sweep in a sentence."""
     path = "chain.critical_speeds"
     places: dict[float, dict[float, int]] = {}
     for i, each in enumerate(chain["critical_speeds"]):
@@ -140,7 +155,7 @@ def _critical(s: b.Source, chain: Mapping[str, Any], study: StudyRecord) -> Iter
         for by_order in places.values()
     )
     orders = (s.line(f"order {{={path}.{i}.order}}") for i in next(iter(places.values())).values())
-    title = "Critical crank speeds, at which a multiple of the speed is a natural frequency of an organ"
+    title = f"Critical crank speeds. {_ORDERS}"
     yield b.Table(tuple(rows), b.heads("", *orders), title=title, form="long")
     assert study.chain is not None
     inside = [
@@ -148,18 +163,18 @@ def _critical(s: b.Source, chain: Mapping[str, Any], study: StudyRecord) -> Iter
         for mode, order, _ in sorted(study.chain.within_sweep(), key=lambda each: each[2])
     ]
     if inside:
-        yield b.Text(line("Critical speeds within the sweep: ", joined(inside), "."), form="short")
+        yield b.Text(line("Critical speeds within the sweep: ", join(inside), f". {_ORDERS}"), form="short")
 
 
 @PICTURES.declare(lambda study: study.chain is not None and len(study.chain.sweep) > 1, "chain_sweep.png")
 def _over_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
-    """Torques of chains and two bars, and the time slack."""
+    """Torques of chains and two bars, and the share of the time with a slack rod, over the crank speed."""
     result = study.chain
     assert result is not None
     rows = result.sweep
     speed = np.array([n.speed for n in rows])
     x = fig.Axis("crank speed", "rad/s", "speed", low=float(speed[0]), high=float(speed[-1]))
-    # on a narrow screen, too, no label covers another
+    # the least distance of 5 % keeps labels apart on a narrow screen, too
     words: list[fig.Item] = [
         fig.Mark(
             at, words=f"mode {mode}" + (f", order {order}" if order > 1 else ""), look="thin", upright=True
@@ -172,7 +187,7 @@ def _over_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
         fig.Mark(result.own.speed, "the study's speed", look=2),
     ]
 
-    def compared(median: Any, two: Any) -> list[fig.Item]:
+    def pair(median: Any, two: Any) -> list[fig.Item]:
         return [
             fig.Curve("chains, median", speed, median, 0, "o"),
             fig.Curve("two bars", speed, two, 1, "s"),
@@ -187,8 +202,8 @@ def _over_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
         wide = float(np.nanmax(sizes)) > WIDE * max(float(np.nanmin(sizes)), 1e-9)
         quantile = fig.Between(f"chains, up to the {100 * HIGH:g} % quantile", speed, median, high)
         y = fig.Axis(f"{of} torque, peak", "N.m", low=None if wide else 0.0, log=wide)
-        panels.append((y, [quantile, *compared(median, two), *([] if panels else words)]))
-    slack = compared([n.slack_time for n in rows], [n.two_bar_slack_time for n in rows])
+        panels.append((y, [quantile, *pair(median, two), *([] if panels else words)]))
+    slack = pair([n.slack_time for n in rows], [n.two_bar_slack_time for n in rows])
     panels.append((fig.Axis("time slack", "1", "percent", low=-0.04, high=1.04), slack))
     return fig.Figure(
         "chains",
@@ -197,9 +212,9 @@ def _over_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
         "share of the time in which a rod is slack; speeds to avoid are shaded, critical speeds are lines.",
         fig.stacked(x, panels),
         s.line(
-            "The crank held at constant speed, {=chain.starts} starts of {=chain.turns} turns each. Shaded: speeds "
-            "to avoid; dash-dotted: the speed of normal running; thin: critical speeds. Two bars do not go slack: of "
-            "them, the time in which one pushes."
+            "The crank turns at constant speed; {=chain.starts} starts of {=chain.turns} turns each. Shaded: speeds "
+            f"to avoid; dash-dotted: the speed of normal running; thin lines: critical speeds. {_ORDERS} Two bars do "
+            "not go slack: their curve shows the share of the time in which a bar is in compression."
         ),
         heights=(1.1, 1.1, 0.65),
     )

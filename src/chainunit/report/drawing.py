@@ -1,7 +1,7 @@
 """A labelled drawing of a linkage machine, as SVG: pins, links and dimensions by their names, the frame, the angles.
 
-All follows from the linkage. Which parameter is the length of a link or the place of a pin is found by giving each
-parameter a value of its own.
+The drawing follows from the linkage alone. To find the parameter that is the length of a link or the place of a pin,
+each parameter gets a value that no other one has.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from . import linkage
 from .motion import DrawnLink
 
 WIDTH, HEIGHT, MARGIN, COLUMN = 620.0, 450.0, 60.0, 345.0
-"""Room for the machine, its margin, and the column of dimensions beside it [px]."""
+"""Width and height of the room for the machine, its margin, and the width of the column of dimensions [px]."""
 _LETTER, _LINE = 7.2, 15.0
 """Width of a letter and height of a line of text [px]."""
 _LOOKS = {"crank": ("#c1440e", 7), "heavy": ("#3d3d3d", 7), "light": ("#0b6fa4", 5)}
@@ -34,7 +34,7 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class Dimension:
-    """A parameter that is a length in the drawing."""
+    """A parameter that is a length in the drawing: its name, its description, its value [m]."""
 
     name: str
     description: str
@@ -43,21 +43,26 @@ class Dimension:
 
 @dataclass
 class _Canvas:
-    """The pieces of the picture, and the room that its labels take."""
+    """The pieces of the picture, and the boxes that no further label may cover."""
 
     pieces: list[str] = field(default_factory=list)
-    taken: list[tuple[float, float, float, float]] = field(default_factory=list)
+    label_boxes: list[tuple[float, float, float, float]] = field(default_factory=list)
 
     def add(self, tag: str, text: str = "", **attributes: Any) -> None:
-        named = "".join(f' {name.replace("_", "-")}="{_shown(x)}"' for name, x in attributes.items())
-        self.pieces.append(f"<{tag}{named}>{escape(text)}</{tag}>" if text else f"<{tag}{named}/>")
+        attribute_text = "".join(
+            f' {name.replace("_", "-")}="{_svg_value(x)}"' for name, x in attributes.items()
+        )
+        self.pieces.append(
+            f"<{tag}{attribute_text}>{escape(text)}</{tag}>" if text else f"<{tag}{attribute_text}/>"
+        )
 
     def label(self, text: str, places: list[Point], lines: list[tuple[Point, Point]], **look: Any) -> None:
-        """A label at the one of the places (of its middle) that is clearest of others and of the `lines`."""
+        """Draw a label. `places` are the candidates for its middle; it gets the first one that is clear of other
+        labels and of the `lines`."""
         boxes = [_box(text, place) for place in places]
         clear = [
             min(
-                [_gap(box, other) for other in self.taken]
+                [_gap(box, other) for other in self.label_boxes]
                 + [_from_line(box, line) for line in lines]
                 + [box[0] - 4.0, WIDTH + COLUMN - box[2]]
             )
@@ -65,12 +70,12 @@ class _Canvas:
         ]
         # the first of the places that has room enough, else the one with most
         best = next((k for k, room in enumerate(clear) if room >= 3.0), int(np.argmax(clear)))
-        self.taken.append(boxes[best])
+        self.label_boxes.append(boxes[best])
         x, y = places[best]
         self.add("text", text, x=x, y=y + 4.5, text_anchor="middle", **look)
 
 
-def _shown(value: Any) -> str:
+def _svg_value(value: Any) -> str:
     return f"{value:.2f}" if isinstance(value, float) else str(value)
 
 
@@ -80,12 +85,12 @@ def _box(text: str, middle: Point) -> tuple[float, float, float, float]:
 
 
 def _gap(box: tuple[float, ...], other: tuple[float, ...]) -> float:
-    """The distance between two boxes; negative where they overlap."""
+    """The distance between two boxes [px]; negative where they overlap."""
     return max(box[0] - other[2], other[0] - box[2], box[1] - other[3], other[1] - box[3])
 
 
 def _from_line(box: tuple[float, ...], line: tuple[Point, Point]) -> float:
-    """The distance of a line from a box, by some points of it."""
+    """The distance of a line from a box, from 25 points of the line [px]."""
     (x0, y0), (x1, y1) = line
     gaps = []
     for t in np.linspace(0.0, 1.0, 25):
@@ -95,35 +100,36 @@ def _from_line(box: tuple[float, ...], line: tuple[Point, Point]) -> float:
 
 
 def dimensions(machine: Machine) -> dict[tuple[str, ...], Dimension]:
-    """The parameters that are lengths in the drawing: of links by ``("link", name)``, of points on links by
-    ``("point", link, name)``, of ground pins by ``("x", pin)`` and ``("y", pin)``."""
+    """The parameters that are lengths in the drawing. Keys are ``("link", name)`` for the length of a link,
+    ``("point", link, name)`` for the place of a point on a link, and ``("x", pin)`` and ``("y", pin)`` for the place
+    of a ground pin."""
     layout, model = machine.model.parameter_layout, machine.model
     marks = {v.name: 1.0 + k / 7919.0 for k, v in enumerate(layout.variables)}
     of = {value: name for name, value in marks.items()}
-    declared = {v.name: v for v in layout.variables}
-    marked = model.linkage(layout.from_names(dict(marks)), Layout(model.Inputs).from_names({}))
+    variables = {v.name: v for v in layout.variables}
+    marked_linkage = model.linkage(layout.from_names(dict(marks)), Layout(model.Inputs).from_names({}))
     values = layout.by_name(machine.p)
 
-    def known(x: Any) -> Dimension | None:
+    def dimension_of(x: Any) -> Dimension | None:
         name = of.get(abs(float(x)))
-        v = declared.get(name or "")
+        v = variables.get(name or "")
         return None if v is None or v.unit != "m" else Dimension(v.name, v.description, values[v.name])
 
-    found: dict[tuple[str, ...], Dimension | None] = {}
-    for group in (marked.crank, *marked.groups):
+    matches: dict[tuple[str, ...], Dimension | None] = {}
+    for group in (marked_linkage.crank, *marked_linkage.groups):
         for bar in group.bars:
-            found["link", bar.name] = known(getattr(bar, "length", 0.0) or 0.0)
+            matches["link", bar.name] = dimension_of(getattr(bar, "length", 0.0) or 0.0)
             for name, (s, _) in bar.points.items():
-                found["point", bar.name, name] = known(s)
-    for pin, place in marked.ground.items():
-        found["x", pin], found["y", pin] = known(place.x), known(place.y)
-    return {key: each for key, each in found.items() if each is not None}
+                matches["point", bar.name, name] = dimension_of(s)
+    for pin, place in marked_linkage.ground.items():
+        matches["x", pin], matches["y", pin] = dimension_of(place.x), dimension_of(place.y)
+    return {key: each for key, each in matches.items() if each is not None}
 
 
 def drawing(machine: Machine, phi: float = 1.0) -> str:
     """The machine at the crank angle `phi` [rad] as an SVG picture.
 
-    A name that two links of mirrored organs share, such as A1, stands at both.
+    Where two mirrored organs share a name, such as A1, it stands at both.
     """
     whole = machine.state(machine.inputs({"phi": phi * machine.ratio})).m
     turns = np.linspace(0.0, 2.0 * math.pi, 73)
@@ -135,7 +141,7 @@ def drawing(machine: Machine, phi: float = 1.0) -> str:
     links = [_straightened(link, at) for link in linkage.links(whole.linkage, {})]
     sizes = dimensions(machine)
     canvas.add("rect", width=WIDTH + COLUMN, height=HEIGHT, fill="#ffffff", rx=8)
-    # the way of the crank pin
+    # the circle of the crank pin
     radius = math.dist(at[crank.bar.pin], at[crank.end])
     x, y = at[crank.bar.pin]
     canvas.add("circle", cx=x, cy=y, r=radius, fill="none", stroke="#999999", stroke_dasharray="4 4")
@@ -154,11 +160,11 @@ def drawing(machine: Machine, phi: float = 1.0) -> str:
             canvas.add(
                 "circle", cx=place[0], cy=place[1], r=4.5, fill="#ffffff", stroke="#1b1b1b", stroke_width=2
             )
-            canvas.taken.append((place[0] - 6, place[1] - 6, place[0] + 6, place[1] + 6))
+            canvas.label_boxes.append((place[0] - 6, place[1] - 6, place[0] + 6, place[1] + 6))
     _angle(canvas, at[crank.bar.pin], phi, radius)
     of = {link.name: link for link in links}
-    for symbol, swinging in machine.model.angles.items():
-        _swing(canvas, at, of[swinging], symbol)
+    for symbol, link_name in machine.model.angles.items():
+        _swing(canvas, at, of[link_name], symbol)
     lines += _sizes(canvas, sizes, at, to_page((0.0, 0.0)), whole, hanging)
     for name, place in at.items():
         around = [
@@ -184,7 +190,7 @@ def _curve(place: tuple[Any, Any]) -> Iterator[Point]:
 
 
 def _scale(points: list[Point]) -> Any:
-    """From places in the machine [m] to the page [px], y down."""
+    """The function from places in the machine [m] to places in the picture [px], y down."""
     xs, ys = [x for x, _ in points], [y for _, y in points]
     room = (WIDTH - 2.0 * MARGIN, HEIGHT - 2.0 * MARGIN)
     factor = min(room[0] / (max(xs) - min(xs)), room[1] / (max(ys) - min(ys)))
@@ -199,7 +205,7 @@ def _sides(link: DrawnLink) -> Iterator[tuple[str, str]]:
 
 
 def _beside(link: DrawnLink, at: Mapping[str, Point]) -> list[Point]:
-    """Places for the name of a link: beside its middle, then elsewhere along it."""
+    """Candidate places for the name of a link: first beside its middle, then beside other points of it."""
     if link.closed:
         corners = [at[joint] for joint in link.joints]
         return [(sum(x for x, _ in corners) / len(corners), sum(y for _, y in corners) / len(corners))]
@@ -223,7 +229,7 @@ def _beside(link: DrawnLink, at: Mapping[str, Point]) -> list[Point]:
 
 
 def _support(canvas: _Canvas, at: Point, down: float) -> None:
-    """The bearing of a ground pin, below it, or above where its links hang from it."""
+    """Draw the bearing of a ground pin: below the pin, or above it where links hang from it."""
     x, y = at
     canvas.add("polygon", points=f"{x:.2f},{y:.2f} {x - 11:.1f},{y + 17 * down:.1f} {x + 11:.1f},{y + 17 * down:.1f}",
                fill="#ffffff", stroke="#777777", stroke_width=1.5)  # fmt: skip
@@ -232,24 +238,24 @@ def _support(canvas: _Canvas, at: Point, down: float) -> None:
     canvas.add(
         "line", x1=x - 15, y1=y + 17 * down, x2=x + 15, y2=y + 17 * down, stroke="#777777", stroke_width=1.5
     )
-    canvas.taken.append((x - 15, min(y, y + 23 * down), x + 15, max(y, y + 23 * down)))
+    canvas.label_boxes.append((x - 15, min(y, y + 23 * down), x + 15, max(y, y + 23 * down)))
 
 
 def _angle(canvas: _Canvas, at: Point, phi: float, radius: float) -> None:
-    """The crank angle: an arc from the upward vertical, clockwise, with an arrow."""
+    """Draw the crank angle: an arc with an arrow, clockwise from the upward vertical."""
     x, y = at
     r = min(radius + 14.0, 70.0)
     end = (x + r * math.sin(phi), y - r * math.cos(phi))
     canvas.add("line", x1=x, y1=y, x2=x, y2=y - r - 8, stroke="#999999", stroke_dasharray="2 3")
     canvas.add("path", d=f"M {x:.1f} {y - r:.1f} A {r:.1f} {r:.1f} 0 0 1 {end[0]:.1f} {end[1]:.1f}", fill="none",
                stroke="#c1440e", stroke_width=1.5, marker_end="url(#drawing-tip)")  # fmt: skip
-    canvas.taken.append((x - 3, y - r - 10, end[0] + 4, y - radius + 2))
+    canvas.label_boxes.append((x - 3, y - r - 10, end[0] + 4, y - radius + 2))
     middle = (x + (r + 12) * math.sin(0.5 * phi), y - (r + 12) * math.cos(0.5 * phi))
     canvas.label("φ", [middle], [], fill="#c1440e", font_style="italic")
 
 
 def _frame(canvas: _Canvas) -> None:
-    """The directions of the frame's axes, in a corner of the picture."""
+    """Draw the axes of the frame in a corner of the picture."""
     x, y = 26.0, HEIGHT - 26.0
     for dx, dy, name in ((34.0, 0.0, "x"), (0.0, -34.0, "y")):
         canvas.add(
@@ -259,19 +265,20 @@ def _frame(canvas: _Canvas) -> None:
 
 
 def _straightened(link: DrawnLink, at: Mapping[str, Point]) -> DrawnLink:
-    """A link as it is drawn: one whose pins lie on a line is a line from its first pin to the furthest."""
+    """The link as it is drawn. A closed link whose pins lie on one line becomes a line from its first pin to the
+    furthest one."""
     if not link.closed:
         return link
     (x0, y0), *others = (at[joint] for joint in link.joints)
     across = [(x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0) for x1, y1 in others for x2, y2 in others]
     if max(map(abs, across)) > 1.0:
         return link
-    ordered = sorted(link.joints, key=lambda joint: math.dist(at[link.joints[0]], at[joint]))
-    return replace(link, joints=tuple(ordered), closed=False)
+    joints = sorted(link.joints, key=lambda joint: math.dist(at[link.joints[0]], at[joint]))
+    return replace(link, joints=tuple(joints), closed=False)
 
 
 def _swing(canvas: _Canvas, at: Mapping[str, Point], link: DrawnLink, name: str) -> None:
-    """The angle of a link from the downward vertical, positive towards +x."""
+    """Draw the angle of a link from the downward vertical, positive towards +x."""
     x, y = at[link.joints[0]]
     end = at[link.joints[-1]]
     r = 0.45 * math.dist((x, y), end)
@@ -293,8 +300,8 @@ def _sizes(
     whole: Mechanism,
     hanging: Collection[str],
 ) -> list[tuple[Point, Point]]:
-    """Lines of the dimensions that are no length of a link: places of ground pins from the origin of the frame, and
-    places of points along a link."""
+    """Draw the dimensions that are not the length of a link: places of ground pins from the origin of the frame, and
+    places of points along a link. Returns their lines."""
     lines: list[tuple[Point, Point]] = []
     for (kind, *of), size in sizes.items():
         if "." in size.name or kind == "link":
@@ -318,7 +325,7 @@ def _sizes(
 
 
 def _line(canvas: _Canvas, a: Point, b: Point, name: str) -> None:
-    """A dimension: a thin line with an arrow at each end, and its symbol."""
+    """Draw a dimension: a thin line with an arrow at each end, and its symbol."""
     canvas.add("line", x1=a[0], y1=a[1], x2=b[0], y2=b[1], stroke="#777777", stroke_width=0.9,
                marker_start="url(#drawing-begin)", marker_end="url(#drawing-end)")  # fmt: skip
     length = math.dist(a, b) or 1.0
@@ -329,8 +336,8 @@ def _line(canvas: _Canvas, a: Point, b: Point, name: str) -> None:
 
 
 def _column(canvas: _Canvas, sizes: Mapping[tuple[str, ...], Dimension], ground: Mapping[str, Any]) -> None:
-    """The dimensions beside the picture, each once, in the order of the drawing; of a ground pin whose coordinates
-    are parameters, both in a row."""
+    """Write the dimensions beside the picture, each once, in the order of the drawing. The two coordinates of a
+    ground pin that are parameters stand in one row."""
     rows = [
         (size.name, number(size.value, "m", "millimetres", 4, full=False), size.description)
         for size in dict.fromkeys(sizes.values())

@@ -14,18 +14,18 @@ ENDS = ("first end of the edge", "last end of the edge")
 
 
 def edge(p: Any, links: Mapping[str, Link]) -> dict[str, tuple[Any, Any]]:
-    """Where the ends of the edge are [m]: it is drawn as long as the knife's pins lie apart."""
+    """The places of the two ends of the edge [m]. The edge is drawn as long as the distance of the knife's pins."""
     ends = min(p.knife.d.x, p.knife.e.x), max(p.knife.d.x, p.knife.e.x)
     points = (links["knife"].beside(x, p.knife.blade.y).p for x in ends)
     return {name: (point.x, point.y) for name, point in zip(ENDS, points, strict=True)}
 
 
 class EdgeMotion(Supplement):
-    """The picture of a knife drive has its edge."""
+    """Adds the cutting edge to the picture of a knife drive."""
 
     def __init__(self, study: StudyRecord) -> None:
         super().__init__(study, links={"edge": ENDS}, names=dict.fromkeys(ENDS, ""))
 
     def details(self, part: Any, state: MachineState) -> Details:
-        """Where the edge ends."""
+        """The places of the ends of the edge."""
         return Details(edge(self.study.drive.machine.p, state.m.links))

@@ -1,5 +1,5 @@
-"""A figure as data: panels of curves, shades, marks, bars and maps, with names and units. It is drawn by
-`page_figures` and by `print_figures`."""
+"""A figure as data: panels of curves, shades, marks, bars and maps, with names and units. `page_figures` and
+`print_figures` draw it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .lines import Line
 
 @dataclass(frozen=True)
 class Axis:
-    """What an axis shows; values are in the declared unit, a step between ticks in the unit that is shown."""
+    """An axis. Values on it are in the declared unit; `step` between ticks is in the unit that is shown."""
 
     label: str
     unit: str = "1"
@@ -25,23 +25,23 @@ class Axis:
     step: float | None = None
     log: bool = False
     names: tuple[str, ...] = ()
-    """of places 0, 1, .. from the top down"""
+    """names of the places 0, 1, .. from the top down, in place of numbers"""
     second: tuple[str, float] | None = None
     """label and factor of the unit beside the one that is shown"""
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A line, or the points of one. `look` is a number of the lines in `style`, or the name of another."""
+    """A curve as a line, as points, or as both. `look` is the number of a line in `style`, or the name of a look."""
 
     name: str
     x: Any
     y: Any
     look: int | str = 0
     marker: str = ""
-    joined: bool = True
-    listed: bool = True
-    """in the legend"""
+    has_line: bool = True
+    in_legend: bool = True
+    """whether its name stands in the legend"""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Between:
 
 @dataclass(frozen=True)
 class Shade:
-    """A range of one axis, shaded."""
+    """A shaded range of one axis."""
 
     low: float
     high: float
@@ -68,7 +68,7 @@ class Shade:
 
 @dataclass(frozen=True)
 class Mark:
-    """A line across the panel; `name` is in the legend, `words` stand beside it."""
+    """A line across the panel at one value of an axis; `name` stands in the legend, `words` beside the line."""
 
     at: float
     name: str = ""
@@ -81,7 +81,7 @@ class Mark:
 
 @dataclass(frozen=True)
 class Bars:
-    """Lying bars at places of the y axis."""
+    """Horizontal bars at places of the y axis."""
 
     name: str
     at: Any
@@ -89,7 +89,7 @@ class Bars:
     height: Any
     look: int = 0
     slim: bool = False
-    """the dark bar inside another"""
+    """whether they are the dark bars inside others"""
     words: tuple[str, ...] = ()
 
 
@@ -105,8 +105,8 @@ class Label:
 
 @dataclass(frozen=True)
 class Field:
-    """A map: `z`, shape (len(y), len(x)), in classes between `levels`, which have `names`; the line at the level
-    `bold` is drawn."""
+    """A map of `z`, shape (len(y), len(x)), in classes between neighbouring `levels`. `names` are those of the
+    classes; the line at the level `bold` is drawn."""
 
     x: Any
     y: Any
@@ -121,7 +121,7 @@ Item: TypeAlias = "Curve | Between | Shade | Mark | Bars | Label | Field"
 
 @dataclass(frozen=True)
 class Panel:
-    """Axes with what is drawn in them; `equal` gives a metre the same length on both."""
+    """Two axes and the items that are drawn in them; with `equal`, a metre has the same length on both axes."""
 
     x: Axis
     y: Axis
@@ -132,10 +132,10 @@ class Panel:
 
 @dataclass(frozen=True)
 class Figure:
-    """Panels in rows. Those of a column with the same x axis share it, and their cursor; with `level`, those of a row
-    share the scale of y.
+    """Panels in rows. Panels of a column that have the same x axis share this axis and the cursor; with `level`, the
+    panels of a row share the scale of y.
 
-    `file` names the picture in print. `alt` tells the figure to a reader who does not see it.
+    `file` is the name of the picture in print. `alt` describes the figure to a reader who does not see it.
     """
 
     name: str
@@ -148,12 +148,12 @@ class Figure:
     widths: tuple[float, ...] = ()
     level: bool = False
     half: bool = False
-    """whether two stand beside each other on a page"""
+    """whether two such figures stand beside each other on a page"""
     on_page: bool = True
     form: ClassVar[str] = "long"
 
     def sharing(self, row: int, column: int) -> list[int]:
-        """The rows around `row`, one upon the other, whose panels in this column have the x axis of the one in it."""
+        """The unbroken rows around `row` in which the panel of this column has the same x axis as that of `row`."""
         panels = [each[column] for each in self.panels]
         own = panels[row]
         if own is None:
@@ -164,18 +164,18 @@ class Figure:
         return list(range(first, last))
 
     def all_panels(self) -> Iterator[tuple[int, int, Panel]]:
-        """Row, column and panel of each."""
+        """Row, column and panel, for each panel."""
         for r, row in enumerate(self.panels):
             yield from ((r, c, panel) for c, panel in enumerate(row) if panel is not None)
 
 
 def stacked(x: Axis, panels: Iterable[tuple[Axis, Iterable[Item]]]) -> tuple[tuple[Panel], ...]:
-    """Panels below each other, over the same x."""
+    """Panels below each other over the same x axis: a row for each y axis with its items."""
     return tuple((Panel(x, y, tuple(items)),) for y, items in panels)
 
 
 def along(item: Item) -> dict[str, str]:
-    """By the name of each field of an item that holds places on an axis, that axis."""
+    """The fields of an item whose values lie along an axis, each with its axis, x or y."""
     match item:
         case Curve() | Label() | Field():
             return {"x": "x", "y": "y"}
@@ -190,17 +190,17 @@ def along(item: Item) -> dict[str, str]:
 
 
 def in_units(figure: Figure, units: Units) -> Figure:
-    """The same with all values in the units in which they are shown; its axes name them."""
+    """The figure with all values in the units in which they are shown; the labels of its axes name these units."""
     cache: dict[tuple[int, float, float], Any] = {}
 
     def values(axis: Axis, x: Any) -> Any:
-        """Values on an axis; the same object for the same object, so that curves over one x stay so."""
+        """Values on an axis. The same array gives the same array again, so that curves over one x still share it."""
         _, factor, offset = scales(axis.unit, axis.kind, units)[0]
         key = (id(x), factor, offset)
         if key not in cache:
-            scaled = factor * np.asarray(x, float) + offset
-            # x is kept, so that no other object gets its identity
-            cache[key] = float(scaled) if scaled.ndim == 0 else scaled, x
+            result = factor * np.asarray(x, float) + offset
+            # the cache keeps x alive, so that no other object gets its identity
+            cache[key] = float(result) if result.ndim == 0 else result, x
         return cache[key][0]
 
     def panel(original: Panel) -> Panel:
@@ -213,14 +213,14 @@ def in_units(figure: Figure, units: Units) -> Figure:
             replace(axis, low=axis.low and values(axis, axis.low), high=axis.high and values(axis, axis.high))
             for axis in axes.values()
         )
-        x, y = (_named(axis, units) for axis in ends)
+        x, y = (_with_unit(axis, units) for axis in ends)
         return replace(original, x=x, y=y, items=tuple(items))
 
     return replace(figure, panels=tuple(tuple(each and panel(each) for each in row) for row in figure.panels))
 
 
-def _named(axis: Axis, units: Units) -> Axis:
-    """An axis whose label has its unit."""
+def _with_unit(axis: Axis, units: Units) -> Axis:
+    """The axis with its unit in its label."""
     if axis.names:
         return axis
     (unit, factor, _), *others = scales(axis.unit, axis.kind, units)

@@ -1,4 +1,4 @@
-"""The section of plots: torque and speed of each run, a turn at constant speed, what the pins carry."""
+"""The section of plots: torque and speed of each run, a turn at constant speed, the forces in the pins."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ _SPEED = fig.Axis("crank speed", "rad/s")
 _CURRENT = fig.Axis("motor current", "A")
 
 
-@PICTURES.declare(lambda study: read.driven(study) and study.drive.foreign is None, "torque_speed.png")
+@PICTURES.declare(lambda study: read.motor_runs(study) and study.drive.foreign is None, "torque_speed.png")
 def _torque_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
-    """The start, and beside it the overloads of each side, at a scale of their own."""
-    names, panels = read.driven(study), []
+    """Torque over speed in a panel for the start and one for the overloads of each side, at scales of their own."""
+    names, panels = read.motor_runs(study), []
     for group in [[name for name in names if not read.is_event(study, name)], *read.groups(study, names)]:
-        # an overload from its event on; before it is the steady running of the first panel
+        # an overload is drawn from its event on: before, it is the steady running of the first panel
         runs = {name: study.runs[name].sel(time=slice(read.event_time(study, name), None)) for name in group}
         curves = [
             fig.Curve(
@@ -49,35 +49,35 @@ def _torque_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
         low = slowest - room if slowest < 0.0 else max(0.0, slowest - room)
         w = np.linspace(low, fastest + room, 301)
         most = np.broadcast_to(study.drive.motor.limit(numpy_(), study.drive.parameters, w), w.shape)
-        # beyond the synchronous speed it falls out of all that is run
+        # beyond the synchronous speed the limit falls far below the torques of all runs
         most = np.where(most < min(float(np.min(curve.y)) for curve in curves), np.nan, most)
         x = fig.Axis("motor speed", "rad/s", "speed", low=low, high=fastest + room)
-        limit = fig.Curve("most that the drive gives, steady", w, most, "limit")
+        limit = fig.Curve("largest steady torque of the drive", w, most, "limit")
         items = (*curves, limit, *_duty(s, study))
         panels.append(fig.Panel(x, fig.Axis("air-gap torque", "N.m"), items, _group_title(study, group)))
     return fig.Figure(
         "torque-speed",
         "Torque-speed plane: the start, and the overloads from their event on",
-        "Air-gap torque of the motor over its speed, a line for each run, with the most that the drive gives in "
-        "steady running.",
+        "Air-gap torque of the motor over its speed, a line for each run, with the largest torque that the drive "
+        "gives in steady running.",
         (tuple(panels),),
-        "Steady running is a closed loop. Grey: the most that the drive gives in steady running.",
+        "Steady running is a closed loop. Grey: the largest torque that the drive gives in steady running.",
         heights=(1.6,),
     )
 
 
 def _duty(s: b.Source, study: StudyRecord) -> Iterator[fig.Item]:
-    """The speed of normal running; of a motor with a nameplate its rated torque, which it may give without end (S1),
-    and the rated point."""
+    """The speed of normal running and, where the motor has a nameplate, its rated point and the rated torque, which
+    it may give without a limit of time (S1)."""
     yield fig.Mark(study.config.run.crank_speed * study.drive.ratio, "normal running", look="mark")
     if "rated_torque" in s.result["motor"]:
         speed, torque = (s.value(f"motor.rated_{name}") for name in ("speed", "torque"))
         yield fig.Mark(float(torque or 0.0), "rated torque (S1)", axis="y", look="reference")
-        yield fig.Curve("rated point", [speed], [torque], marker="o", joined=False)
+        yield fig.Curve("rated point", [speed], [torque], marker="o", has_line=False)
 
 
 def _group_title(study: StudyRecord, runs: list[str]) -> str:
-    """What the runs of a panel have in common."""
+    """The title of a panel with these runs."""
     sides = [study.config.events[run].loaded_side for run in runs if read.is_event(study, run)]
     if not sides:
         return "Start-up and steady running"
@@ -158,14 +158,14 @@ def _start_up(s: b.Source, study: StudyRecord) -> fig.Figure:
     return _transient(s, study, "start_up")
 
 
-@PICTURES.declare(read.driven)
+@PICTURES.declare(read.motor_runs)
 def _others(s: b.Source, study: StudyRecord) -> Iterator[fig.Figure]:
-    return (_transient(s, study, name) for name in read.driven(study) if name != "start_up")
+    return (_transient(s, study, name) for name in read.motor_runs(study) if name != "start_up")
 
 
 @PICTURES.declare(lambda study: read.groups(study, study.overloads), "overload_time.png")
 def _overloads(s: b.Source, study: StudyRecord) -> fig.Figure:
-    """The overloads beside each other in print: a band of rows for each side, the scales alike in all."""
+    """The overloads beside each other, for print: a band of rows for each side, and the same scales in all panels."""
     groups = [[_transient(s, study, name) for name in group] for group in read.groups(study, study.overloads)]
     rows: list[list[fig.Panel | None]] = []
     for group in groups:
@@ -188,9 +188,9 @@ def _transient(s: b.Source, study: StudyRecord, name: str) -> fig.Figure:
     run, drive, event = study.runs[name], study.drive, read.event_time(study, name)
     time = run["time"].values - (event or 0.0)
     low, high = float(time[0]), float(time[-1])
-    speed: list[fig.Item] = [fig.Curve(_SPEED.label, time, drive.crank_motion(run)[1], listed=False)]
+    speed: list[fig.Item] = [fig.Curve(_SPEED.label, time, drive.crank_motion(run)[1], in_legend=False)]
     items: dict[fig.Axis, list[fig.Item]] = {
-        _TORQUE: [fig.Curve(_TORQUE.label, time, drive.crank_torque(run), listed=False)],
+        _TORQUE: [fig.Curve(_TORQUE.label, time, drive.crank_torque(run), in_legend=False)],
         _SPEED: speed,
         **_current(drive, run, time),
     }
@@ -198,13 +198,13 @@ def _transient(s: b.Source, study: StudyRecord, name: str) -> fig.Figure:
         items[TORQUE] = shaft_torque(run, time)
     if event is None and drive.follows:
         speed.append(fig.Curve("speed asked for", time, run["motor.w_ref"].values / drive.ratio, 1))
-    behind = study.runs.get(name + read.COASTING)
-    if behind is not None:
-        after = behind["time"].values - (event or 0.0)
-        speed.append(fig.Curve("crank behind the open coupling", after, drive.crank_motion(behind)[1], 1))
+    coasting = study.runs.get(name + read.COASTING)
+    if coasting is not None:
+        after = coasting["time"].values - (event or 0.0)
+        speed.append(fig.Curve("crank behind the open coupling", after, drive.crank_motion(coasting)[1], 1))
         high = float(after[-1])
     if event is not None:
-        # the last quarter turn before the event says enough of steady running
+        # a quarter turn before the event shows enough of steady running
         low = max(low, -0.5 * math.pi / study.config.run.crank_speed)
     marks, words = _marks(study, name, event), read.title(study, name)
     return fig.Figure(
@@ -222,24 +222,24 @@ def _transient(s: b.Source, study: StudyRecord, name: str) -> fig.Figure:
 
 
 def _current(drive: Drive, run: Any, time: Any) -> dict[fig.Axis, list[fig.Item]]:
-    """The motor's current where it is known, with its limit where it comes near."""
+    """The motor current, where the motor is not a foreign FMU, with its limit where the current passes half of it."""
     if drive.foreign is not None:
         return {}
     current, limit = run[f"motor.{drive.motor.current}"].values, drive.motor.current_limit(drive.parameters)
-    items: list[fig.Item] = [fig.Curve(_CURRENT.label, time, current, listed=False)]
+    items: list[fig.Item] = [fig.Curve(_CURRENT.label, time, current, in_legend=False)]
     if limit is not None and np.max(np.abs(current)) > 0.5 * limit:
         items.append(fig.Mark(limit, "current limit", axis="y", look="limit"))
     return {_CURRENT: items}
 
 
 def _marks(study: StudyRecord, name: str, event: float | None) -> Callable[[bool], list[fig.Item]]:
-    """What is marked in each panel of a run; words only where they are asked for."""
+    """The function that gives the marks in a panel of a run; its argument says whether the marks have words."""
     run = study.runs[name]
 
     def marks(words: bool) -> list[fig.Item]:
         if event is not None:
             loads = (name for name in study.drive.machine.model.input_layout.names if name not in _MOTION)
-            changing = _changing(run, [*(f"machine.{load}" for load in loads), "motor.voltage"])
+            changing = _load_change(run, [*(f"machine.{load}" for load in loads), "motor.voltage"])
             shade = [] if changing is None else [fig.Shade(changing[0] - event, changing[1] - event)]
             return [*shade, fig.Mark(0.0, words="event" if words else "")]
         if name == "start_up" and study.answers:
@@ -249,8 +249,8 @@ def _marks(study: StudyRecord, name: str, event: float | None) -> Callable[[bool
     return marks
 
 
-def _changing(run: Any, loads: Iterable[str]) -> tuple[float, float] | None:
-    """From when to when the loads differ from one sample to the next [s]."""
+def _load_change(run: Any, loads: Iterable[str]) -> tuple[float, float] | None:
+    """The first and the last instant at which a load changes [s]; None where none does."""
     changes = np.zeros(len(run["time"]) - 1, bool)
     for name in loads:
         if name in run:
@@ -263,7 +263,7 @@ def _changing(run: Any, loads: Iterable[str]) -> tuple[float, float] | None:
 
 
 def _after(s: b.Source, study: StudyRecord, run: str) -> str:
-    """What the speed does after the event, as a template."""
+    """The sentence on the speed after the event, as a template."""
     caption = "Upright, dashed: the event. Shaded: the loads change."
     if run not in s.result["answers"]:
         return caption
@@ -272,7 +272,7 @@ def _after(s: b.Source, study: StudyRecord, run: str) -> str:
     if share is None or share <= 0.0:
         caption += f" The least speed is {{{least}}}"
     elif not forms(share, "1", "dip")[0][1]:
-        # words stand in the number's place
+        # a dip so large is shown as words in place of a number
         caption += f" The crank {{{dip}}}"
     else:
         caption += f" The speed dips by {{{dip}}}"
@@ -288,8 +288,10 @@ def _after(s: b.Source, study: StudyRecord, run: str) -> str:
         path, ends = f"block_peaks.{run}", s.result["block_peaks"][run]
         names = [name.removesuffix("_low") for name in ends if name.endswith("_low")]
         ranges = {name: f"{{{path}.{name}_low}} to {{{path}.{name}_high}}" for name in names}
-        assumed = (f"{name} {ranges[name]}" for name in names if ends[f"{name}_low"].get("kind") == "assumed")
-        caption += f" Assumed: {', '.join(assumed)}; the crank torque peaks at {ranges['crank_torque']}."
+        assumptions = (
+            f"{name} {ranges[name]}" for name in names if ends[f"{name}_low"].get("kind") == "assumed"
+        )
+        caption += f" Assumed: {', '.join(assumptions)}; the crank torque peaks at {ranges['crank_torque']}."
     return caption
 
 
@@ -306,9 +308,9 @@ def _reactions(s: b.Source, study: StudyRecord) -> fig.Figure:
             items.append(fig.Bars(words, places, sizes, wide * height, look, slim=size == "rms"))
     return fig.Figure(
         "reactions",
-        "What the pins carry",
-        "Bars of the reaction of every pin in every run: the wide bar is the peak, the dark one inside the RMS.",
+        "Forces in the pins",
+        "Bars of the reaction of every pin in every run: the wide bar is the peak, the dark bar inside it the RMS.",
         ((fig.Panel(fig.Axis("reaction", "N", low=0.0), fig.Axis("pin", names=tuple(pins)), tuple(items)),),),
-        "Peak and RMS of the force in each pin, frame x right, y up; means over whole crank turns.",
+        "Peak and RMS of the force in each pin; means are taken over whole crank turns.",
         heights=(max(0.6, max(11, 20 - len(runs)) * len(runs) * len(pins) / 250.0),),
     )

@@ -1,4 +1,4 @@
-"""The files of a report; each appears whole or not at all."""
+"""The files of a report. Each file appears whole or not at all."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from .markdown import markdown
 
 
 def writers(report: Report, folder: Path, name: str) -> list[Callable[[], list[Path]]]:
-    """What writes the numbers (``NAME.json``), the pictures, the text (``NAME.md``) and the page of a report, in this
-    order; each returns its files."""
+    """The functions that write the numbers (``NAME.json``), the pictures, the text (``NAME.md``) and the page of a
+    report, in this order; each function returns the files that it wrote."""
     pictures: list[Path] = []
 
     def numbers() -> list[Path]:
@@ -46,5 +46,5 @@ def numbers_text(report: Report) -> str:
 
 
 def names(name: str, pictures: tuple[str, ...]) -> tuple[str, ...]:
-    """The files that a report may leave."""
+    """The names of all files that a report may write."""
     return (f"{name}.json", f"{name}.md", html.NAME, *pictures)

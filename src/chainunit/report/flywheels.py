@@ -1,4 +1,4 @@
-"""The section on the flywheels of a study: a row for each, a turn with each, the fluctuation over the inertia."""
+"""The section on flywheels: a row for each flywheel, a turn with each, the fluctuation of speed over the inertia."""
 
 from __future__ import annotations
 
@@ -30,53 +30,53 @@ _HEADS = {
     "current_share": "of rated",
     "stored_share_most": "lent to a cut",
 }
-"""The columns, with their heads on a terminal; result.json has every number."""
+"""The columns with their heads on a terminal; result.json has further numbers."""
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
-    """Table and figure."""
-    found: FlywheelFindings = study.findings["flywheels"]
+    """The table and the figure of the flywheels."""
+    findings: FlywheelFindings = study.findings["flywheels"]
     if study.config.plate is not None:
-        rated = ", ".join(f"{{motor.rated_{name}}}" for name in ("power", "speed", "torque", "current"))
-        yield b.Text(s.line(f"Motor: {{motor.title}}, rated {rated}; ratio {{machine.ratio:4}}."))
-    if found.wheels:
-        yield _table(s, found)
-        if found.retuned:
+        nameplate = ", ".join(f"{{motor.rated_{name}}}" for name in ("power", "speed", "torque", "current"))
+        yield b.Text(s.line(f"Motor: {{motor.title}}, rated {nameplate}; ratio {{machine.ratio:4}}."))
+    if findings.wheels:
+        yield _table(s, findings)
+        if findings.retuned:
             yield b.Text(
-                "The gains of the speed control are tuned anew to the inertia with each flywheel, but for those "
-                "that the file gives: the runs compare drives as they would be commissioned.",
+                "The gains of the speed control are tuned to the inertia with each flywheel, except gains that the "
+                "file gives: the runs compare drives as they would be commissioned.",
                 "note",
             )
-    running = [wheel for _, wheel, _ in found.rows if wheel.answers.speed_ripple is not None]
+    running = [wheel for _, wheel, _ in findings.rows if wheel.answers.speed_ripple is not None]
     if running:
-        yield _figure(study, found, running)
+        yield _figure(study, findings, running)
 
 
-def _table(s: b.Source, found: FlywheelFindings) -> b.Table:
-    rows = found.rows
-    shown = [
+def _table(s: b.Source, findings: FlywheelFindings) -> b.Table:
+    rows = findings.rows
+    columns = [
         v
         for v in Layout(FlywheelAnswers).variables
         if v.name in _HEADS and any(getattr(wheel.answers, v.name) is not None for _, wheel, _ in rows)
     ]
-    columns = (b.Column(v.description, _HEADS[v.name]) for v in shown)
+    heads = (b.Column(v.description, _HEADS[v.name]) for v in columns)
 
     def head(words: str, path: str) -> Line:
         return line(s.number(f"{path}.flywheel"), f" ({words})" if words else "")
 
     return b.Table(
         tuple(
-            b.TableRow((head(words, path), *(s.number(f"{path}.{v.name}", none="-") for v in shown)))
+            b.TableRow((head(words, path), *(s.number(f"{path}.{v.name}", none="-") for v in columns)))
             for words, _, path in rows
         ),
-        (b.Column("flywheel"), *columns),
+        (b.Column("flywheel"), *heads),
         title=s.line("Flywheels on the motor's shaft; permitted ripple of the speed {=flywheels.permitted}"),
     )
 
 
-def _figure(study: StudyRecord, found: FlywheelFindings, running: list[Wheel]) -> fig.Figure:
+def _figure(study: StudyRecord, findings: FlywheelFindings, running: list[Wheel]) -> fig.Figure:
     drive, plate = study.drive, study.config.plate
-    # as many as there are lines to tell apart, from the least to the largest
+    # at most as many flywheels as there are distinct looks of a line, from the least to the largest
     some = [running[round(k)] for k in np.linspace(0, len(running) - 1, min(len(running), len(LINES)))]
     speed, torque, current = (
         fig.Axis("crank speed", "rad/s", "speed"),
@@ -102,7 +102,7 @@ def _figure(study: StudyRecord, found: FlywheelFindings, running: list[Wheel]) -
         "flywheel",
         "A turn with each flywheel, and the ripple of the speed over the inertia",
         "Crank speed, motor torque and current over a turn with each flywheel; ripple of the speed over inertia.",
-        ((panels[0], panels[1]), (panels[2], _ripple(found, running))),
+        ((panels[0], panels[1]), (panels[2], _ripple(findings, running))),
         file=PICTURE,
         heights=(1.3, 1.3),
     )
@@ -117,23 +117,23 @@ def _last_turn(angle: Any, y: Any) -> tuple[Any, Any]:
     return place[order], y[last][order]
 
 
-def _ripple(found: FlywheelFindings, running: list[Wheel]) -> fig.Panel:
+def _ripple(findings: FlywheelFindings, running: list[Wheel]) -> fig.Panel:
     """The ripple of the speed over the inertia on the motor's shaft."""
     inertia = np.array([wheel.answers.inertia for wheel in running])
     sizes = [wheel.answers.speed_ripple for wheel in running]
     ends = np.array(
-        [min(inertia[0], found.bare), 1.3 * max(inertia[-1], found.bare + found.flywheel_by_hand)]
+        [min(inertia[0], findings.bare), 1.3 * max(inertia[-1], findings.bare + findings.flywheel_by_hand)]
     )
-    by_hand = [found.by_hand(J - found.bare) for J in ends]
+    by_hand = [findings.by_hand(J - findings.bare) for J in ends]
     items: list[fig.Item] = [
         fig.Curve("by hand, dE/(J w2)", ends, by_hand, 1),
         fig.Curve("co-simulated", inertia, sizes, marker="o"),
-        fig.Mark(found.permitted, "permitted", axis="y", look=3),
+        fig.Mark(findings.permitted, "permitted", axis="y", look=3),
     ]
-    if found.least in running:
-        a = found.least.answers
-        items.append(fig.Curve("least flywheel", [a.inertia], [a.speed_ripple], marker="s", joined=False))
-    low, high = 0.7 * min(*sizes, found.permitted), min(2.0, 1.5 * max(by_hand))
+    if findings.least in running:
+        a = findings.least.answers
+        items.append(fig.Curve("least flywheel", [a.inertia], [a.speed_ripple], marker="s", has_line=False))
+    low, high = 0.7 * min(*sizes, findings.permitted), min(2.0, 1.5 * max(by_hand))
     y = fig.Axis("ripple of the speed", "1", "percent", low=low, high=high, log=True)
     x = fig.Axis("inertia on the motor's shaft", "kg.m2", log=True)
     return fig.Panel(x, y, tuple(items), "Ripple over inertia")

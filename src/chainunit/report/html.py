@@ -1,7 +1,7 @@
-"""A report as one page that needs nothing else, neither files nor a network.
+"""A report as one page that needs no other file and no network.
 
-Every number in its text is an element that names its place in the result, which the page carries whole
-(``<script id="result">``). Curves and the animation machine are of the series, thinned out.
+Every number in the text of the page is an element that names its place in the result. The page contains the whole
+result (``<script id="result">``). Its curves and its animation come from the time series, thinned out.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ _ORIGIN = {
     "file": "the study file's",
     "example": "the example's",
     "tuned": "tuned to the machine",
-    "catalogue": "of the motor of the catalogue",
-    "sizing": "found by sizing",
+    "catalogue": "from the row of the catalogue",
+    "sizing": "chosen by sizing",
     "declared": "the declared start value",
 }
 
@@ -54,7 +54,7 @@ def write(report: b.Report, folder: Path) -> Path:
 
 
 def render(report: b.Report) -> str:
-    """The page."""
+    """The page as a text of HTML."""
     page = _Page(report.units)
     sections = [
         (section, content)
@@ -97,7 +97,7 @@ def render(report: b.Report) -> str:
                 for section, content in sections
             ),
             "</main>",
-            # no text can end the element early
+            # without a "<" no text can end the element early
             *(
                 f'<script type="application/json" id="{name}">{text.replace("<", chr(92) + "u003c")}</script>'
                 for name, text in embedded.items()
@@ -112,12 +112,12 @@ def render(report: b.Report) -> str:
 
 @cache
 def _packed_plotly() -> str:
-    """The library of plots, by gzip, in letters; the page unpacks it."""
+    """plotly.js, compressed by gzip, in base64; the page unpacks it."""
     return base64.b64encode(gzip.compress(get_plotlyjs().encode(), 9, mtime=0)).decode()
 
 
 def fragment(report: b.Report) -> str:
-    """Title and blocks as a piece of a page of somebody else's, such as a notebook: without figures and style."""
+    """Title and blocks as a piece of another page, such as a notebook; without figures and style."""
     page = _Page(report.units)
     failure = f"<p>The run stopped early: {page.line(report.failure)}.</p>" if report.failure else ""
     return f"<h3>{escape(report.title or report.kind)}</h3>\n{failure}{page.blocks(report.blocks('long'))}"
@@ -128,21 +128,21 @@ def _resource(name: str) -> str:
 
 
 def _marks(block: b.Given) -> str:
-    """What the marks beside given values mean."""
+    """The legend of the marks that stand beside given values."""
     origins = {value.origin for _, values in block.sections for value in values} - {"", "file"}
     words = (f"{origin[0]}: {words}" for origin, words in _ORIGIN.items() if origin in origins)
     return f'<p class="hint">Not in the study file: {"; ".join(words)}.</p>' if origins else ""
 
 
 def _kind(block: b.Block) -> str:
-    """What makes blocks stand together."""
+    """The name of the group that a block forms with its neighbours; empty for a block that stands alone."""
     if isinstance(block, b.Judgement) and block.severity == "warning":
         return "warnings"
     return "figures" if isinstance(block, Figure) else ""
 
 
 class _Page:
-    """Renders blocks with numbers in these units."""
+    """Renders blocks as HTML, with numbers in the units `units`."""
 
     def __init__(self, units: Units) -> None:
         self.units = units
@@ -150,12 +150,12 @@ class _Page:
     # -- pieces
 
     def number(self, n: Number) -> str:
-        """A number as an element that carries its place in the result, and its value as it is there."""
+        """A number as an element that holds its place in the result and its value there."""
         if n.value is None:
             words = f'<span class="none">{escape(n.none)}</span>'
         else:
-            digits = n.digits or (6 if n.given else 3)
-            first, *others = forms(n.value, n.unit, n.kind, digits, full=not n.given, units=self.units)
+            digits = n.digits or (6 if n.as_given else 3)
+            first, *others = forms(n.value, n.unit, n.kind, digits, full=not n.as_given, units=self.units)
             words = ("▲ " if n.over else "") + self._form(*first)
             words += "".join(f' <span class="beside">{self._form(*other)}</span>' for other in others)
         exact = "no value" if n.value is None else f"{n.value:.9g}" + ("" if n.unit == "1" else f" {n.unit}")
@@ -189,7 +189,7 @@ class _Page:
     # -- blocks
 
     def blocks(self, blocks: Sequence[b.Block]) -> str:
-        """Blocks in order; warnings and figures that follow each other stand together."""
+        """Blocks in order; consecutive warnings form one list, consecutive figures one grid."""
         parts = []
         for kind, together in groupby(blocks, _kind):
             html = [self.block(block) for block in together]
@@ -277,17 +277,17 @@ class _Page:
     def _cell(self, cell: b.Cell) -> str:
         css = ""
         if isinstance(cell, b.Share):
-            css = ' class="check over"' if cell.used.over else ' class="check"'
+            css = ' class="check over"' if cell.utilisation.over else ' class="check"'
         return f"<td{css}>{self._inside(cell)}</td>"
 
     def _inside(self, cell: b.Cell) -> str:
         if not isinstance(cell, b.Share):
             return self.line(cell)
-        used = cell.used.value or 0.0
-        width = 100.0 * min(max(used, 0.0), 1.5) / 1.5
+        share = cell.utilisation.value or 0.0
+        width = 100.0 * min(max(share, 0.0), 1.5) / 1.5
         bar = f'<span class="bar" aria-hidden="true"><span style="width:{width:.1f}%"></span></span>'
         of = f'<span class="of">{self.line(cell.of)}</span>' if cell.of else ""
-        return self.number(cell.used) + bar + of
+        return self.number(cell.utilisation) + bar + of
 
     def _given(self, title: str, values: Iterable[b.GivenValue]) -> str:
         rows = "".join(
@@ -301,7 +301,7 @@ class _Page:
         )
 
     def _origin(self, value: b.GivenValue) -> str:
-        """A mark at what the file does not give."""
+        """A mark at a value that the study file does not give."""
         if value.origin in ("", "file"):
             return ""
         return f'<abbr class="from" title="{escape(_ORIGIN[value.origin])}">{value.origin[0]}</abbr>'
@@ -319,10 +319,10 @@ class _Page:
     # -- the head of the page
 
     def header(self, report: b.Report, title: str, names: Iterable[str]) -> str:
-        """Title, source, state, navigation and what was asked."""
+        """Title, source, status, navigation, and the question that the study answers."""
         status = (
             '<p class="alarm"><strong>The run stopped early:</strong> '
-            f"{self.line(report.failure)}. What was computed before is shown.</p>"
+            f"{self.line(report.failure)}. The page shows the results up to there.</p>"
             if report.failure
             else ""
         )
@@ -335,13 +335,13 @@ class _Page:
             f'<p class="from">{source}{" · " if source else ""}status: '
             f"{'stopped early' if status else 'complete'}</p>\n"
             f'{status}\n<nav aria-label="Sections">{links}</nav>\n'
-            + (f'<h2 id="asked">What was asked</h2>\n<div class="asked">{opening}</div>\n' if opening else "")
+            + (f'<h2 id="asked">The question</h2>\n<div class="asked">{opening}</div>\n' if opening else "")
             + "</header>"
         )
 
 
 _PLOTS = (
-    "<noscript><p>Plots and the animation machine need JavaScript; the numbers of this page do not.</p></noscript>"
+    "<noscript><p>The plots and the animation need JavaScript; the numbers of this page do not.</p></noscript>"
     '<div class="plots">{}</div>'
     '<p class="hint">Drag to zoom, double-click to zoom out, click a name in a legend to hide its line.</p>'
 )

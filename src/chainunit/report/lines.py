@@ -1,5 +1,5 @@
-"""Lines of text with numbers in them. A number carries its declared unit and kind and its place in the result; how it
-looks is decided in one place (`chainunit.text`)."""
+"""Lines of text with numbers in them. A number has its declared unit and kind and its place in the result;
+`chainunit.text` alone decides how a number looks."""
 
 from __future__ import annotations
 
@@ -10,22 +10,23 @@ from typing import TypeAlias
 
 @dataclass(frozen=True)
 class Number:
-    """A number, or `none` in its place; `given` shows it as it was given, not with the digits of a result."""
+    """A number, or the text `none` where `value` is None. With `as_given` it is shown with all digits of a given
+    value, not with the few of a result."""
 
     value: float | None
     unit: str
     kind: str = ""
     path: str = ""
-    given: bool = False
+    as_given: bool = False
     digits: int = 0
     none: str = "-"
     over: bool = False
-    """whether it passes its limit"""
+    """whether the number exceeds its limit"""
 
 
 @dataclass(frozen=True)
 class Words:
-    """Words that stand in the result at `path`."""
+    """A text of the result, at `path`."""
 
     text: str
     path: str
@@ -33,14 +34,14 @@ class Words:
 
 @dataclass(frozen=True)
 class Strong:
-    """A line that is to be seen first."""
+    """A line with emphasis."""
 
     line: Line
 
 
 @dataclass(frozen=True)
 class Aside:
-    """A line that says more about the one before it, such as an interval."""
+    """A line that adds something to the piece before it, such as an interval."""
 
     line: Line
 
@@ -55,17 +56,17 @@ def pieces(line: Line) -> tuple[Piece, ...]:
 
 
 def line(*parts: Line) -> tuple[Piece, ...]:
-    """One line from several."""
+    """One line from several parts."""
     return tuple(piece for part in parts for piece in pieces(part))
 
 
-def joined(lines: Iterable[Line], between: str = ", ") -> tuple[Piece, ...]:
-    """One line from several, with `between` them."""
+def join(lines: Iterable[Line], between: str = ", ") -> tuple[Piece, ...]:
+    """One line from several lines, with `between` between two of them."""
     return line(*(part for each in lines for part in (between, each)))[1:]
 
 
 def capital(text: str) -> str:
-    """The text with a capital at its begin."""
+    """The text with a capital as its first letter."""
     return text[:1].upper() + text[1:]
 
 

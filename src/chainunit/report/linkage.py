@@ -1,4 +1,4 @@
-"""What a linkage gives to its picture: links through pins, places, paths, supports, and reactions as arrows."""
+"""The parts of the picture of a linkage: links through pins, places, paths, supports, and reactions as arrows."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from .motion import Arrow, DrawnLink
 
 
 def links(linkage: Linkage, looks: Mapping[str, str]) -> Iterator[DrawnLink]:
-    """The links as they are drawn, the crank first; those with a pin in the ground are heavier than those between,
-    and a link with more than two pins is an area. `looks` are those of links that look otherwise."""
+    """The links as they are drawn, the crank first. Links with a pin in the ground are heavier than the others; a
+    link with more than two pins is an area. `looks` has the looks of links that differ from this rule."""
     for name, pins in linkage.topology.links.items():
         crank, grounded = name == linkage.crank.bar.name, any(pin in linkage.ground for pin in pins)
         usual = "crank" if crank else "heavy" if grounded else "light"
@@ -22,12 +22,12 @@ def links(linkage: Linkage, looks: Mapping[str, str]) -> Iterator[DrawnLink]:
 
 
 def places(mechanism: Mechanism) -> dict[str, tuple[Any, Any]]:
-    """Where its pins and points are [m]."""
+    """The places x, y of the pins and points of a mechanism [m]."""
     return {name: (pin.p.x, pin.p.y) for name, pin in mechanism.pins.items()}
 
 
 def paths(turn: Mechanism) -> dict[str, tuple[Any, Any]]:
-    """The curves of the points that are no pins, of a mechanism over a whole turn [m]."""
+    """The paths of all points that are not pins [m]; `turn` is the mechanism over a whole turn."""
     topology, at = turn.topology, places(turn)
     pins = {pin for pin, _ in topology.joints}
     return {
@@ -39,7 +39,8 @@ def paths(turn: Mechanism) -> dict[str, tuple[Any, Any]]:
 
 
 def hanging(turn: Mechanism) -> tuple[str, ...]:
-    """The ground pins whose links hang from them, of a mechanism over a whole turn: their supports are above."""
+    """The ground pins from which links hang, so that their supports are drawn above; `turn` is the mechanism over a
+    whole turn."""
     low: dict[str, list[float]] = {}
     at = places(turn)
     for pins in turn.topology.links.values():
@@ -56,8 +57,8 @@ def arrows(
     force: Callable[[str], tuple[Any, Any]],
     groups: Mapping[str, str] | None = None,
 ) -> Iterator[Arrow]:
-    """The reactions of outputs by their titles, each at its joint, if it has one, in its group; `force` gives their
-    components [N]."""
+    """An arrow for each output with a joint. `titles` gives the output of each title, `joints` its joint, `groups`
+    its group, `force` the components of its reaction [N]."""
     for title, output in titles.items():
         if output in joints:
             yield Arrow(title, joints[output], *force(output), group=(groups or {}).get(output, ""))

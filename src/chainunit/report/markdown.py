@@ -1,4 +1,4 @@
-"""A report as Markdown: its long form, with the pictures beside it."""
+"""A report as Markdown: its long form, with links to the pictures in the same folder."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ _SIGNS = {"good": "✓ ", "partly": "◐ ", "bad": "✗ ", "warning": "", "alarm
 
 
 def markdown_text(text: str) -> str:
-    """A text that is not ours, as Markdown shows it literally: no link, no table cell, no HTML."""
+    """A text of the user with its special characters escaped: Markdown makes no link, cell or HTML of it."""
     return re.sub(r"([\\`*_\[\]<>#!|~&$])", r"\\\1", text)
 
 
 def markdown(report: Report, pictures: Collection[str]) -> str:
-    """The long form; a figure is shown where its file is among the `pictures`."""
+    """The long form of a report; a figure appears where its file is among the `pictures`."""
     units = report.units
     lines = [f"# {markdown_text(report.title or report.kind)}", ""]
     if report.failure:

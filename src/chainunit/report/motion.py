@@ -1,4 +1,5 @@
-"""A linkage in motion as data, and as the page plays it: rounded numbers, one of them where nothing moves."""
+"""A linkage in motion as data, and as the JSON that the page plays. The numbers of the JSON are rounded; a constant
+series has one number."""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ from .lines import Line
 
 @dataclass(frozen=True)
 class DrawnLink:
-    """A body of a linkage: a polyline through joints, closed or not; `look` is a name of its style."""
+    """A body of a linkage: a polyline through joints, closed or open; `look` is the name of its style."""
 
     name: str
     joints: tuple[str, ...]
@@ -34,12 +35,12 @@ class Arrow:
     short: str = ""
     group: str = ""
     load: bool = False
-    """whether it is a load, not a reaction"""
+    """whether the force is a load, not a reaction"""
 
 
 @dataclass(frozen=True)
 class Reading:
-    """A value beside the picture over time."""
+    """A value over time that stands beside the picture."""
 
     title: str
     values: Any
@@ -60,16 +61,16 @@ class Clip:
     readings: tuple[Reading, ...] = ()
     arrows: tuple[Arrow, ...] = ()
     loads: Mapping[str, Any] = field(default_factory=dict)
-    """by link, how heavily it is loaded: the width of a band along it"""
+    """the load on each link, shown as the width of a band along the link"""
     event: bool = False
     still: float = 0.0
-    """time of the picture that stands still until it is played [s]"""
+    """time of the picture that the page shows before it plays [s]"""
 
 
 @dataclass(frozen=True)
 class Animation:
-    """A linkage in motion. `grounds` are the joints that stand, those `hanging` under their support apart; `groups`
-    are the colours of arrows and loads by name; `turn` is the time of a turn [s]."""
+    """A linkage in motion. `grounds` are the fixed joints; those in `hanging` have their support above. `groups` are
+    the names of groups of arrows and loads, each of a colour of its own; `turn` is the time of a turn [s]."""
 
     links: tuple[DrawnLink, ...]
     grounds: tuple[str, ...]
@@ -78,18 +79,18 @@ class Animation:
     caption: Line = ()
     hanging: tuple[str, ...] = ()
     orbit: tuple[str, str] | None = None
-    """centre and joint of a circle that is drawn"""
+    """the centre of a circle, and a joint on it"""
     groups: tuple[str, ...] = ()
     names: Mapping[str, str] = field(default_factory=dict)
-    """what joints are called, where that is not their name"""
+    """the labels of joints whose label differs from their name"""
     paths: Mapping[str, tuple[Any, Any]] = field(default_factory=dict)
-    """curves that points of it run along [m]"""
+    """the paths of points of the linkage [m]"""
     form: ClassVar[str] = "long"
 
 
 def pictures(animation: Animation, units: Units) -> dict[str, Any]:
-    """The animation, ready for JSON. Joints are exact to a hundred-thousandth of the size of the linkage, forces to a
-    ten-thousandth of the largest of their run."""
+    """The animation, ready for JSON. Joints are exact to 1e-5 of the size of the linkage, forces to 1e-4 of the
+    largest force of their run."""
     ends = [
         (float(np.min(v)), float(np.max(v)))
         for run in animation.runs
@@ -154,12 +155,12 @@ def _reading(reading: Reading, units: Units) -> dict[str, Any]:
 
 
 def _list(x: Any, size: float | None, digits: int) -> list[float]:
-    """Numbers rounded to `digits` digits of `size` (their own largest without one), one of them where all are
-    the same."""
+    """The numbers of `x`, rounded to `digits` digits of `size`, or of the largest of them where `size` is None; one
+    number where all are equal."""
     x = np.nan_to_num(np.atleast_1d(np.asarray(x, float)))
     scale = size if size is not None else float(np.max(np.abs(x)))
     places = digits - 1 - math.floor(math.log10(scale)) if scale > 0.0 else 0
     # adding 0 makes -0 a 0
-    rounded = np.round(x, places) + 0.0
-    numbers = rounded.tolist() if places > 0 else [int(n) for n in rounded]
-    return numbers[:1] if len(set(numbers)) == 1 else numbers
+    numbers = np.round(x, places) + 0.0
+    values = numbers.tolist() if places > 0 else [int(n) for n in numbers]
+    return values[:1] if len(set(values)) == 1 else values

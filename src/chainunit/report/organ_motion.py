@@ -23,7 +23,7 @@ _CAPTION = (
 
 
 def organ_motion(study: StudyRecord) -> Supplement:
-    """The organs of both sides, each in its colour."""
+    """The supplement with the organs of both sides, each side in its colour."""
     walls, _ = rods = (1, 1) if study.drive.chain is None else study.drive.rods
     joints = {side: _joints(names, rods) for side, names in NAMES.items()}
     links = {
@@ -44,7 +44,7 @@ def organ_motion(study: StudyRecord) -> Supplement:
             for output, (_, link) in ON_SIDE.items()
             if link in (names.wall, names.web)
         },
-        # they would hide those of the rocker
+        # their arrows would hide those of the rocker
         hidden=("crank_pin", "coupler_pin"),
     )
 
@@ -58,10 +58,10 @@ def _joints(names: OrganNames, rods: tuple[int, int]) -> list[str]:
 
 
 class OrganMotion(Supplement):
-    """The picture of a chain unit."""
+    """Adds the organs to the picture of a chain unit."""
 
     def details(self, part: Any, state: MachineState) -> Details:
-        """The rods of chains have joints of their own between the named ones."""
+        """The inner joints of chains, the processing forces, and the material on each link."""
         share = self.study.drive.machine.p.web_share
         joints: dict[str, tuple[Any, Any]] = {}
         loads: dict[str, Any] = {}
@@ -78,7 +78,7 @@ class OrganMotion(Supplement):
         return Details(joints, tuple(arrows), loads)
 
     def _chain(self, part: Any, state: MachineState, side: SideName) -> tuple[list[Vec2], Vec2]:
-        """Places of the inner joints of a chain, and its processing force."""
+        """The places of the inner joints of a chain [m], and its processing force [N]."""
         drive, names = self.study.drive, NAMES[side]
         p, (walls, webs) = drive.machine.p, drive.rods
         theta, omega = (

@@ -1,4 +1,4 @@
-"""The section on the organs of a chain unit: one side against both, and where two bars end as a model."""
+"""The section on the organs of a chain unit: one side against both, and the limits of two bars as a model."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
 
 def _factors(s: b.Source, study: StudyRecord) -> b.Table:
     sides = s.result["organs"]["overload_factors"]
-    described = {v.name: v.description for v in Layout(OverloadFactors).variables}
+    descriptions = {v.name: v.description for v in Layout(OverloadFactors).variables}
     first = next(iter(sides))
     rows = (
         b.TableRow(
             (
-                described[name],
+                descriptions[name],
                 *(s.number(f"organs.overload_factors.{side}.{name}") for side in sides),
                 s.words(f"organs.overload_factors.{first}.{name}.for"),
             )
@@ -41,7 +41,7 @@ def _factors(s: b.Source, study: StudyRecord) -> b.Table:
     # chains have no cycle at constant speed: the factors are those of two bars in every study
     by = "" if study.drive.chain is None else ", of two bars in place of the chains"
     title = s.line("Overload factor, one side against both, at {=run.crank_speed}" + by)
-    return b.Table(tuple(rows), b.heads("way", *sides, "is for"), title=title, numeric=False)
+    return b.Table(tuple(rows), b.heads("factor", *sides, "use"), title=title, numeric=False)
 
 
 def _limits(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
@@ -62,12 +62,15 @@ def _limits(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         cases.append("the lowest mode of a chain lies near {organs.limits.chain_resonance}")
     if cases:
         yield b.Text(s.line(capital("; ".join(cases)) + "."))
-    yield b.Table(s.rows(Limits, "organs.limits", none="none"), title="Where the model ends", form="long")
+    yield b.Table(s.rows(Limits, "organs.limits", none="none"), title="Limits of the model", form="long")
 
 
 _GOOD = {"crank": CRANK_GOOD, "rocker": ROCKER_GOOD_EMPTY}
-"""Up to which part of the lowest natural frequency of a chain two bars give a torque to 10 %."""
-_SHADED = "Shaded: two bars may be off by more than a tenth, of the rocker where a side is empty."
+"""The crank speed up to which two bars give a torque to 10 %, in parts of the lowest natural frequency of a chain."""
+_SHADED = (
+    "Shaded: two bars may be wrong by more than a tenth; for the rocker torque this limit is that of a machine with "
+    "an empty side."
+)
 
 
 @PICTURES.declare(lambda study: True, "sides_over_speed.png")
@@ -101,7 +104,7 @@ def _sides(s: b.Source, study: StudyRecord) -> fig.Figure:
 
 
 def _crossings(s: b.Source) -> str:
-    """Where one side alone asks as much as both, as a template; empty where nothing crosses."""
+    """The speeds at which one side alone asks as much as both, as a template; empty where no lines cross."""
     text = ""
     for torque, sides in s.result["organs"]["sides_over_speed"]["crossings"].items():
         path = f"organs.sides_over_speed.crossings.{torque}"

@@ -48,6 +48,19 @@
     for (const [box, height] of drawn) resize(box, null, height, 13);
   });
 
+  /* wide tables say that they scroll */
+  const tables = document.querySelectorAll(".wide");
+  const markWide = () => {
+    for (const table of tables) {
+      const room = table.scrollWidth - table.clientWidth;
+      table.classList.toggle("scrolls", getComputedStyle(table).overflowX === "auto" && room > 1);
+      table.classList.toggle("at-end", table.scrollLeft > room - 2);
+    }
+  };
+  for (const table of tables) table.addEventListener("scroll", markWide, { passive: true });
+  window.addEventListener("resize", markWide);
+  markWide();
+
   /* the machine in motion */
   const motion = read("pictures");
   const stage = byId("stage");

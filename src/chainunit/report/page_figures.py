@@ -1,4 +1,4 @@
-"""A figure on a page, by plotly: to zoom into, with one cursor for all panels of a column."""
+"""A figure on a page, by plotly: the reader can zoom, and all panels of a column share one cursor."""
 
 from __future__ import annotations
 
@@ -62,26 +62,26 @@ def height(figure: Figure) -> int:
 
 
 def figure(spec: Figure, units: Units) -> Any:
-    """The figure as plotly has it."""
+    """The figure as a figure of plotly."""
     drawing = _Drawing(in_units(spec, units))
     for place in drawing.spec.all_panels():
         drawing.panel(*place)
-    pointed = any(_pointed(panel) for _, _, panel in spec.all_panels())
+    by_point = any(_hovers_by_point(panel) for _, _, panel in spec.all_panels())
     drawing.figure.update_layout(
         drawing.axes,
         template=_TEMPLATE,
         height=height(spec),
         margin={"l": 64, "r": 16, "t": 34 + _above(spec), "b": 52 + _legend_rows(spec)},
         barmode="overlay",
-        hovermode="closest" if pointed else "x unified",
+        hovermode="closest" if by_point else "x unified",
         hoversubplots="axis",
     )
     return drawing.figure
 
 
-def _pointed(panel: Panel) -> bool:
-    """Whether its points are told one by one, as x is no running variable."""
-    curves = (item for item in panel.items if isinstance(item, Curve) and item.joined)
+def _hovers_by_point(panel: Panel) -> bool:
+    """Whether the cursor shows single points of a panel: its x is not a variable that runs from left to right."""
+    curves = (item for item in panel.items if isinstance(item, Curve) and item.has_line)
     bars = any(isinstance(item, Bars | Field) for item in panel.items)
     return panel.equal or bars or any(bool(np.any(np.diff(curve.x) < 0.0)) for curve in curves)
 
@@ -101,12 +101,12 @@ def _legend_rows(figure: Figure) -> int:
 
 
 def _small(x: Any) -> Any:
-    # plotly packs arrays as they are: single precision halves the page
+    # plotly keeps the precision of an array: single precision halves the page
     return np.asarray(x, np.float32)
 
 
 def _domains(sizes: Iterable[float], gap: float) -> list[tuple[float, float]]:
-    """Parts of the length 1 for sizes, with gaps between them."""
+    """The intervals of a length 1 that belong to `sizes`, with gaps between them."""
     shares = np.array(list(sizes), float)
     shares *= (1.0 - gap * (len(shares) - 1)) / shares.sum()
     begins = np.concatenate([[0.0], np.cumsum(shares + gap)])[:-1]
@@ -114,7 +114,7 @@ def _domains(sizes: Iterable[float], gap: float) -> list[tuple[float, float]]:
 
 
 class _Drawing:
-    """A plotly figure that panels are drawn into; the values of `spec` are in the units that are shown."""
+    """A plotly figure into which panels are drawn; the values of `spec` are in the units that are shown."""
 
     def __init__(self, spec: Figure) -> None:
         self.spec, self.figure = spec, go.Figure()
@@ -129,7 +129,7 @@ class _Drawing:
         self.x_axes: dict[tuple[int, int], str] = {}
         self.y_axes: dict[int, list[str]] = {}
         self.axes: dict[str, dict[str, Any]] = {}
-        self.listed: set[str] = set()
+        self.legend_names: set[str] = set()
 
     def panel(self, r: int, c: int, panel: Panel) -> None:
         """Draw a panel into its place."""
@@ -158,10 +158,10 @@ class _Drawing:
         at = {"x": x, "y": y, "xref": xref, "yref": yref}
         self.figure.add_annotation(**at, text=text, showarrow=False, font={"size": 12}, **more)
 
-    def _legend(self, name: str, listed: bool = True) -> dict[str, Any]:
-        """What tells a name in the legend, once."""
-        new = listed and bool(name) and name not in self.listed
-        self.listed |= {name} if new else set()
+    def _legend(self, name: str, in_legend: bool = True) -> dict[str, Any]:
+        """The arguments of a trace that put its name into the legend, once for each name."""
+        new = in_legend and bool(name) and name not in self.legend_names
+        self.legend_names |= {name} if new else set()
         return {"name": name or " ", "legendgroup": name, "showlegend": new}
 
     def _draw(self, item: Item, panel: Panel, x: str, y: str) -> None:
@@ -202,9 +202,11 @@ class _Drawing:
                 self._field(item, place)
 
     def _curve(self, curve: Curve, panel: Panel, place: dict[str, Any]) -> None:
-        samples = self.samples[id(curve.x)] if curve.joined and not curve.marker else slice(None)
+        samples = self.samples[id(curve.x)] if curve.has_line and not curve.marker else slice(None)
         look = look_of(curve.look)
-        mode = "+".join(name for name, there in (("lines", curve.joined), ("markers", curve.marker)) if there)
+        mode = "+".join(
+            name for name, there in (("lines", curve.has_line), ("markers", curve.marker)) if there
+        )
         symbol, edge = _MARKERS.get(curve.marker, "circle"), {"width": 1.4, "color": look["color"]}
         self.figure.add_scatter(
             x=_small(np.asarray(curve.x)[samples]),
@@ -212,13 +214,13 @@ class _Drawing:
             mode=mode,
             line={"color": look["color"], "width": look["linewidth"] + 0.2, "dash": _dash(look["linestyle"])},
             marker={"symbol": symbol, "size": 7, "line": edge},
-            hovertemplate=("%{x:.4g}, " if _pointed(panel) else "") + _hover(panel.y),
-            **self._legend(curve.name, curve.listed),
+            hovertemplate=("%{x:.4g}, " if _hovers_by_point(panel) else "") + _hover(panel.y),
+            **self._legend(curve.name, curve.in_legend),
             **place,
         )
 
     def _sample(self, name: str, place: dict[str, Any], **style: Any) -> None:
-        """A name in the legend for an item that is no trace."""
+        """Put the name of an item that is not a trace into the legend."""
         legend = self._legend(name)
         if legend["showlegend"]:
             self.figure.add_scatter(x=[None], y=[None], **style, **legend, **place)
@@ -229,8 +231,8 @@ class _Drawing:
         style = {"color": look["color"], "width": look["linewidth"], "dash": _dash(look["linestyle"])}
         self.figure.add_shape(type="line", line=style, **_across(mark.axis, mark.at, mark.at, x, y))
         if mark.words and mark.axis == "x":
-            turned = {"textangle": -90 if mark.upright else 0, "xanchor": "center", "yanchor": "bottom"}
-            self._words(x, f"{y} domain", mark.at, 1.0, mark.words, **turned)
+            orientation = {"textangle": -90 if mark.upright else 0, "xanchor": "center", "yanchor": "bottom"}
+            self._words(x, f"{y} domain", mark.at, 1.0, mark.words, **orientation)
         self._sample(mark.name, place, mode="lines", line=style)
 
     def _bars(self, bars: Bars, panel: Panel, place: dict[str, Any]) -> None:
@@ -275,7 +277,7 @@ def _axis(axis: Axis) -> dict[str, Any]:
 
 
 def _across(axis: str, low: float, high: float, x: str, y: str) -> dict[str, Any]:
-    """Where a shape lies that spans a panel across an axis."""
+    """The place of a shape that spans a panel across an axis."""
     if axis == "x":
         return {"x0": low, "x1": high, "y0": 0, "y1": 1, "xref": x, "yref": f"{y} domain"}
     return {"y0": low, "y1": high, "x0": 0, "x1": 1, "yref": y, "xref": f"{x} domain"}
@@ -307,17 +309,17 @@ def _dash(style: Any) -> str:
 
 
 def _thin_groups(figure: Figure) -> dict[int, Any]:
-    """By the identity of x, which samples to draw of the curves over it."""
+    """The samples to draw of the curves over one x; the key is the identity of x."""
     groups: dict[int, list[Curve]] = {}
     for _, _, panel in figure.all_panels():
         for item in panel.items:
-            if isinstance(item, Curve) and item.joined and not item.marker:
+            if isinstance(item, Curve) and item.has_line and not item.marker:
                 groups.setdefault(id(item.x), []).append(item)
     return {key: thin(curves[0].x, *(curve.y for curve in curves)) for key, curves in groups.items()}
 
 
 def thin(*signals: Any) -> Any:
-    """Which samples to draw: those from which straight lines run within a thousandth of the range of each signal."""
+    """The samples to draw: straight lines between them stay within a thousandth of the range of each signal."""
     values = np.array([np.nan_to_num(np.asarray(s, float)) for s in signals])
     values = values / np.array([[np.ptp(s) or 1.0] for s in values])
     tolerance = 1e-3

@@ -1,4 +1,4 @@
-"""The figures of a section: each is declared once, with the function that draws it."""
+"""The figures of a section. Each is declared once, at the function that draws it."""
 
 from __future__ import annotations
 
@@ -17,28 +17,29 @@ Draw: TypeAlias = "Callable[[Source, StudyRecord], Figure | Iterable[Figure]]"
 class Pictures:
     """Figures in the order of their declaration."""
 
-    _declared: list[tuple[Draw, Callable[[StudyRecord], Any], str]] = field(default_factory=list)
+    _declarations: list[tuple[Draw, Callable[[StudyRecord], Any], str]] = field(default_factory=list)
 
     def declare(self, needs: Callable[[StudyRecord], Any], file: str = "") -> Callable[[Draw], Draw]:
-        """Declare the function below as that of a figure, or of several, of all studies that have what it `needs`;
-        `file` is the name of the picture in print, empty where there is none."""
+        """A decorator that declares a function which draws one figure or several. It draws for studies of which
+        `needs` is true; `file` is the name of the picture in print, empty where there is none."""
 
-        def declared(draw: Draw) -> Draw:
-            self._declared.append((draw, needs, file))
+        def register(draw: Draw) -> Draw:
+            self._declarations.append((draw, needs, file))
             return draw
 
-        return declared
+        return register
 
     @property
     def files(self) -> tuple[str, ...]:
-        """The pictures that they may leave."""
-        return tuple(file for _, _, file in self._declared if file)
+        """The names of the pictures that these figures may write."""
+        return tuple(file for _, _, file in self._declarations if file)
 
     def figures(self, s: Source, study: StudyRecord) -> Iterator[Figure]:
-        """Those that the study has the data of."""
-        for draw, needs, file in self._declared:
+        """The figures of which the study has the data."""
+        for draw, needs, file in self._declarations:
             if needs(study):
-                drawn = draw(s, study)
+                figures = draw(s, study)
                 yield from (
-                    replace(each, file=file) for each in ([drawn] if isinstance(drawn, Figure) else drawn)
+                    replace(each, file=file)
+                    for each in ([figures] if isinstance(figures, Figure) else figures)
                 )

@@ -1,4 +1,4 @@
-"""A figure in print, by matplotlib: a PNG beside the page."""
+"""A figure in print, by matplotlib: a PNG in the folder of the page."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ def write(figures: Iterable[Figure], folder: Path, units: Units) -> list[Path]:
 
 
 def contours(x: Any, y: Any, z: Any, level: float) -> list[Any]:
-    """The lines along which `z`, shape (len(y), len(x)), has the `level`, each as its points, shape (n, 2); the
-    longest first. NaN has no line."""
+    """The lines along which `z`, shape (len(y), len(x)), equals `level`, each as its points, shape (n, 2). The
+    longest comes first. No line runs through NaN."""
     figure, axis = plt.subplots()
     lines = axis.contour(x, y, np.ma.masked_invalid(z), levels=[level]).allsegs[0]
     plt.close(figure)
@@ -45,9 +45,9 @@ def _figure(spec: Figure, units: Units) -> Any:
     figure = in_units(spec, units)
     rows, columns = len(figure.panels), len(figure.panels[0])
     heights, widths = figure.heights or (1.0,) * rows, figure.widths or (1.0,) * columns
-    titled = any(panel.title for _, _, panel in figure.all_panels())
+    has_titles = any(panel.title for _, _, panel in figure.all_panels())
     width = 8.2 if columns == 1 else 1.0 + _COLUMN * columns
-    tall = 1.2 + (_ROW if rows > 1 else 3.2) * sum(heights) + (0.3 * rows if titled else 0.0)
+    tall = 1.2 + (_ROW if rows > 1 else 3.2) * sum(heights) + (0.3 * rows if has_titles else 0.0)
     drawing, axes = plt.subplots(
         rows, columns, figsize=(width, tall), squeeze=False, height_ratios=heights, width_ratios=widths
     )
@@ -63,7 +63,7 @@ def _figure(spec: Figure, units: Units) -> Any:
             axes[r, c].sharey(axes[r, 0])
         for item in panel.items:
             _draw(axes[r, c], item)
-    # axes that share a scale have all that is drawn on it by now
+    # scales come last: axes that share one need the items of all their panels
     for r, c, panel in figure.all_panels():
         sharing = figure.sharing(r, c)
         _dress(axes[r, c], panel, last=r == sharing[-1], first=r == sharing[0])
@@ -86,7 +86,7 @@ def _legend(drawing: Any, axes: Any, columns: int) -> None:
 
 
 def _dress(axis: Any, panel: Panel, *, last: bool, first: bool) -> None:
-    """Scales and words of a panel."""
+    """Set scales, labels and title of a panel; `last` and `first` in the column that shares its x axis."""
     _scale(axis, panel.x, "x")
     _scale(axis, panel.y, "y")
     if last:
@@ -131,11 +131,11 @@ def _name(axis: Any, name: str) -> str | None:
 def _draw(axis: Any, item: Item) -> None:
     match item:
         case Curve():
-            look = look_of(item.look) | ({} if item.joined else {"linestyle": ""})
+            look = look_of(item.look) | ({} if item.has_line else {"linestyle": ""})
             hollow = (
                 {"marker": item.marker, "markersize": 5.0, "markerfacecolor": "white"} if item.marker else {}
             )
-            axis.plot(item.x, item.y, label=item.name if item.listed else None, **look, **hollow)
+            axis.plot(item.x, item.y, label=item.name if item.in_legend else None, **look, **hollow)
         case Between():
             hatch = "--" if item.look == "hatched" else None
             style = {"facecolor": FILLS[item.look], "edgecolor": INK, "linewidth": 0.5, "hatch": hatch}
@@ -145,8 +145,8 @@ def _draw(axis: Any, item: Item) -> None:
             style = {"facecolor": FILLS[item.look], "linewidth": 0.0, "zorder": 0}
             span(item.low, item.high, label=_name(axis, item.name), **style)
         case Mark():
-            ruled = axis.axvline if item.axis == "x" else axis.axhline
-            ruled(item.at, label=_name(axis, item.name), **look_of(item.look))
+            draw_line = axis.axvline if item.axis == "x" else axis.axhline
+            draw_line(item.at, label=_name(axis, item.name), **look_of(item.look))
             if item.words and item.axis == "x":
                 top = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "fontsize": 8}
                 if item.upright:  # inside: above there may be a second scale

@@ -1,5 +1,5 @@
-"""The reference of all keys of study files and catalogues, of the variables of all FMUs, and of the commands: tables
-that follow from the declarations."""
+"""The reference: all keys of study files and catalogues, the variables of all FMUs, and the commands, as tables that
+follow from the declarations."""
 
 from __future__ import annotations
 
@@ -14,36 +14,60 @@ from ..refusals import unit_behind
 from ..study.keys import Key, KeyTable, catalogue_columns, key_tables
 from .blocks import Block, Report, Section, Table, TableRow, Text, heads
 
-_KEY_COLUMNS = heads("key", "where it is left out", "allowed", "meaning")
+_KEY_COLUMNS = heads("key", "default", "allowed", "meaning")
 
 
 def overview() -> Report:
-    """The tables of a study file, with what they are."""
+    """The tables of a study file with their contents and their number of keys."""
+    hint = Text("chainunit keys TABLE shows the keys of a table, such as run, event or ChamberForces.")
+    tables = (*key_tables(), catalogue_columns())
+    return Report("Keys of a study file", "reference", {}, (_contents(tables), hint), ())
+
+
+def _contents(tables: Iterable[KeyTable], head: str = "table") -> Table:
+    """A row for each table: its heading, or with another `head` the command that shows it; its title; its number of
+    keys."""
     rows = tuple(
-        TableRow((table.heading, table.title, str(len(table.keys))))
-        for table in (*key_tables(), catalogue_columns())
+        TableRow(
+            (
+                table.heading if head == "table" else f"chainunit keys {_kind(table)}",
+                table.title,
+                str(len(table.keys)),
+            )
+        )
+        for table in tables
     )
-    table = Table(rows, heads("table", "contents", "keys"), numeric=False)
-    hint = Text("chainunit keys TABLE shows the keys of a table, such as machine, event or motor.")
-    return Report("Keys of a study file", "reference", {}, (table, hint), ())
+    return Table(rows, heads(head, "contents", "keys"), numeric=False)
+
+
+def _kind(table: KeyTable) -> str:
+    """The machine, motor or event whose table it is; empty where all share one."""
+    return table.of.removeprefix("a ")
 
 
 def keys_of(name: str) -> Report:
-    """The keys of the tables of that name.
+    """The keys of the table `name`, or of the tables of the machine, motor or event `name`. Where machines, motors or
+    events each have a table of this name, the report lists these tables and tells how to ask for one.
 
     Raises
     ------
     InputError
-        where no table has it.
+        where no table has this name.
     """
     tables = [
         table
         for table in (*key_tables(), catalogue_columns())
-        if name in (table.name, table.of, table.of.removeprefix("a "))
+        if name in (table.name, table.of, _kind(table))
     ]
     if not tables:
-        known = dict.fromkeys(table.name for table in key_tables() if table.name)
-        raise InputError(f"{name}: no such table; there are {', '.join(known)}")
+        table_names = dict.fromkeys(table.name for table in key_tables() if table.name)
+        kinds = dict.fromkeys(_kind(table) for table in key_tables() if table.of)
+        raise InputError(
+            f"{name}: no such table; there are {', '.join(table_names)}; and of single types: {', '.join(kinds)}"
+        )
+    if sum(name == table.name and bool(table.of) for table in tables) > 1:
+        lead = Text(f"[{name}] has a table of keys for each type; a command shows one of them:")
+        return Report("", "reference", {}, (lead, _contents(tables, head="command")), ())
     return Report("", "reference", {}, tuple(_block(table, table.heading) for table in tables), ())
 
 
@@ -56,7 +80,7 @@ def _row(key: Key) -> TableRow:
 
 
 def reference(commands: Iterable[tuple[str, str, Iterable[tuple[str, str]]]]) -> Report:
-    """The whole reference; `commands` have a name, what they do, and options with their help."""
+    """The whole reference; each of the `commands` has a name, a description, and options with their help."""
     sections = [
         Section(
             f"{table.name}-{table.of}",
@@ -79,7 +103,7 @@ def reference(commands: Iterable[tuple[str, str, Iterable[tuple[str, str]]]]) ->
 
 
 def _variables(model: type[Model]) -> Iterator[Block]:
-    """Of an FMU of that model."""
+    """The table of the variables of an FMU of that model."""
     interface: Any = Interface(model, {})
     rows = []
     for causality in ("parameter", "input", "output"):

@@ -1,4 +1,4 @@
-"""The results of a study in a folder: how the command and Python run it there, and what both write."""
+"""The results of a study in a folder. The command and Python run a study and write its files by these functions."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .blocks import Report
 
 NAME = "result"
 FILES = (*files.names(NAME, contents.PICTURES), series.SERIES, LOAD_CYCLE)
-"""All that a study may leave in its folder, apart from FMUs and random overloads."""
+"""The names of all files that a study may write into its folder, apart from FMUs and random overloads."""
 
 
 def compute(
@@ -31,24 +31,25 @@ def compute(
     check: bool = False,
     backend: Backend | None = None,
 ) -> StudyRecord:
-    """Run a study in a folder, which is this process's alone (see `files.claim`); what an earlier run left there
-    is removed. Arguments and errors as of `run_study`; a refusal begins with the file of the study, if it has one."""
+    """Run a study in a folder that belongs to this process alone (see `files.claim`). The files of an earlier run
+    in it are removed. Arguments and errors are those of `run_study`; a refusal begins with the name of the study
+    file, if there is one."""
 
-    def named() -> AbstractContextManager[None]:
+    def file_context() -> AbstractContextManager[None]:
         return in_file(config.source, lambda: config.lines) if config.lines else nullcontext()
 
-    with named():
-        # before anything of an earlier run is taken away, and before any progress
+    with file_context():
+        # before the files of an earlier run are removed, and before any progress is reported
         check_files(config)
     clear(folder, *FILES)
     if progress is not None:
         progress("the machine at constant speed", 0.0, 1.0)
-    with named():
+    with file_context():
         return run_study(config, folder, progress, check=check, backend=backend)
 
 
 def writers(record: StudyRecord, report: Report, folder: Path) -> list[Callable[[], list[Path]]]:
-    """What writes the numbers, the series, the pictures, the text and the page of a study, in this order; each
-    returns its files."""
+    """The functions that write the numbers, the series, the pictures, the text and the page of a study, in this
+    order; each function returns the files that it wrote."""
     numbers, *others = files.writers(report, folder, NAME)
     return [numbers, lambda: series.write(record, folder), *others]

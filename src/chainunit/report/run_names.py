@@ -1,4 +1,4 @@
-"""The runs of a study as a report names and orders them."""
+"""Names and order of the runs of a study in a report."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from ..study.event import in_groups
 from ..study.record import StudyRecord
 
 COASTING = "_coasting"
-"""Ends the name of a run of the machine alone, behind the safety coupling that opened in the run named before it."""
+"""The end of the name of a run of the machine alone, after the safety coupling has opened; the name begins with that
+of the run in which it opened."""
 _TITLES = {"start_up": "start-up and steady running", "unfinished": "the run that stopped early"}
 
 
@@ -18,32 +19,33 @@ def is_event(study: StudyRecord, run: str) -> bool:
 
 
 def groups(study: StudyRecord, runs: Collection[str]) -> list[list[str]]:
-    """The overloads among `runs` by the side that has to carry them."""
+    """The overloads among `runs`, in groups by the side that has to carry them."""
     return in_groups(study.config.events, list(runs))
 
 
 def short(study: StudyRecord, run: str) -> str:
-    """A run in two or three words."""
+    """The name of a run in two or three words."""
     return study.config.events[run].short if is_event(study, run) else run.replace("_", "-")
 
 
 def title(study: StudyRecord, run: str) -> str:
-    """What a run is called."""
+    """The title of a run."""
     if run.endswith(COASTING):
         return f"{title(study, run.removesuffix(COASTING))}: behind the open coupling"
     return _TITLES.get(run) or study.called(run)
 
 
-def driven(study: StudyRecord) -> list[str]:
+def motor_runs(study: StudyRecord) -> list[str]:
     """The runs in which the motor turns the machine."""
     return [name for name in study.runs if not name.endswith(COASTING)]
 
 
 def in_order(study: StudyRecord) -> list[str]:
-    """The runs, each followed by that of the machine behind the open coupling, where there is one."""
-    return [run for name in driven(study) for run in (name, name + COASTING) if run in study.runs]
+    """All runs; a run in which the coupling opens is followed by that of the machine behind the open coupling."""
+    return [run for name in motor_runs(study) for run in (name, name + COASTING) if run in study.runs]
 
 
 def event_time(study: StudyRecord, run: str) -> float | None:
-    """When the overload of a run begins [s]; None where it has none, or is one from the start."""
+    """The time at which the overload of a run begins [s]; None for a run without an overload, or with one from its
+    start."""
     return study.event.get(run.removesuffix(COASTING)) or None

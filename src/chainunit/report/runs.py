@@ -1,4 +1,4 @@
-"""The section on every run in numbers: all answers, what the pins carry, overloads at random, the speed loop."""
+"""The section on every run in numbers: all answers, forces in the pins, random overloads, the speed loop."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from ..study.record import StudyRecord
 from ..study.window import Phase
 from . import blocks as b
 from . import run_names as read
-from .lines import Line, Number, capital, joined, line, spoken
+from .lines import Line, Number, capital, join, line, spoken
 from .terminal import plain_line
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
-    """Every answer of every run, what the pins carry, and where the model ends."""
+    """Tables of the answers of every run, the forces in the bearings, random overloads and the speed loop."""
     if s.result["answers"]:
         yield table_of_runs(s, study)
     for run, phase in (("start_up", Phase.START_UP), ("settling", Phase.SETTLING)):
@@ -28,23 +28,24 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     if study.monte_carlo is not None:
         yield from _random(s)
     if loops := s.result.get("speed_loop"):
-        title = "The speed loop, linearised; deviation and settling: after a step of the load torque"
+        title = "The linearised speed loop; deviation and settling are those after a step of the load torque"
         rows = {loop: spoken(loop) if len(loops) > 1 else "constant inertia" for loop in loops}
         yield matrix(s, "speed_loop", rows, title, first="")
 
 
 def _begin(s: b.Source, study: StudyRecord, run: str, phase: Phase) -> Iterator[b.Block]:
-    """What a part of the run before the steady turns asks."""
+    """The demands of a phase before the steady turns: the start-up, or the settling."""
     title = study.called(run)
     numbers = [(v, s.number(f"{run}.{v.name}")) for v in measures_of(phase)]
     rows = [(v.description, size) for v, size in numbers if size.value is not None]
-    sizes = joined((line(f"{words} ", size) for words, size in rows), "; ")
+    sizes = join((line(f"{words} ", size) for words, size in rows), "; ")
     yield b.Text(line(f"{capital(title)}: ", sizes, "."), form="short")
-    yield b.Table(tuple(map(b.TableRow, rows)), title=f"What the {title} asks of the drive", form="long")
+    yield b.Table(tuple(map(b.TableRow, rows)), title=f"Demands of the {title} on the drive", form="long")
 
 
 def matrix(s: b.Source, path: str, rows: Mapping[str, str], title: str, first: str, **more: Any) -> b.Table:
-    """A table of all that stands below `path`: what has a title in `rows`, by what each has."""
+    """A table of the numbers below `path`: a row for each entry that has a title in `rows`, a column for each name of
+    a number in these entries."""
     sections = b.at(s.result, path)
     names = list(dict.fromkeys(name for section in rows for name in sections[section]))
     cells = (
@@ -56,41 +57,41 @@ def matrix(s: b.Source, path: str, rows: Mapping[str, str], title: str, first: s
     return b.Table(tuple(cells), b.heads(first, *map(spoken, names)), title=title, **more)
 
 
-def ordered(study: StudyRecord, runs: Iterable[str]) -> list[str]:
-    """Runs with the overloads of each side beside each other."""
+def by_side(study: StudyRecord, runs: Iterable[str]) -> list[str]:
+    """The runs in an order in which the overloads of each side are neighbours."""
     runs = list(runs)
-    by_side = [run for group in read.groups(study, runs) for run in group]
-    return [*(run for run in runs if run not in by_side), *by_side]
+    sided_runs = [run for group in read.groups(study, runs) for run in group]
+    return [*(run for run in runs if run not in sided_runs), *sided_runs]
 
 
 def over_runs(
     study: StudyRecord, runs: list[str], rows: Iterable[b.TableRow], title: str, first: str = ""
 ) -> b.Table:
-    """A table with a column for each run; those of the overloads of a side belong together."""
+    """A table with a column for each run; the columns of the overloads of a side form a group."""
     columns = (b.Column(study.called(run), read.short(study, run)) for run in runs)
     groups = (tuple(runs.index(run) + 1 for run in group) for group in read.groups(study, runs))
     return b.Table(tuple(rows), (b.Column("", first), *columns), title=title, groups=tuple(groups))
 
 
 def table_of_runs(s: b.Source, study: StudyRecord) -> b.Table:
-    """Every answer, with a column for each run."""
-    answers, unknown = s.result["answers"], study.not_known
-    runs = ordered(study, answers)
+    """The table of all answers, with a column for each run."""
+    answers, unknown_names = s.result["answers"], study.not_known
+    runs = by_side(study, answers)
     rows = (
         b.TableRow(
             (v.description, *(number(s, study, run, v.name) for run in runs)),
             form="long" if MEASURES[v.name].minor else "both",
         )
         for v in Layout(Answers).variables
-        # nothing to say of a coupling that is not there, or that did not open; a dash for what a motor does not tell
-        if v.name in unknown
+        # a coupling that is absent or stayed shut has no row; an answer that the motor does not give has dashes
+        if v.name in unknown_names
         or any(answers[run][v.name]["value"] is not None for run in runs)
         or (v.name == "recovery_time" and study.returns and study.overloads)
     )
     head = "crank at {=run.crank_speed}"
     if not study.reaches:
         head = "crank at {answers.steady.speed_mean}; {=run.crank_speed} NOT reached"
-    title = f"What each run asks of the drive{'; the motor is insufficient' if study.insufficient else ''}"
+    title = f"Demands of each run on the drive{'; the motor is insufficient' if study.insufficient else ''}"
     return over_runs(study, runs, rows, title, plain_line(s.line(head), study.config.units))
 
 
@@ -119,14 +120,14 @@ def _pins(s: b.Source, study: StudyRecord) -> b.Table:
             b.Column("in", form="long"),
             b.Column("in", form="short"),
         ),
-        title="What the bearings carry (equivalent: ISO 281)",
+        title="Forces in the bearings (equivalent load: ISO 281)",
     )
 
 
 def _random(s: b.Source) -> Iterator[b.Block]:
-    """The quantiles of overloads at random."""
+    """The table of the quantiles of random overloads."""
     quantiles = {name: sizes for name, sizes in s.result["monte_carlo"]["quantiles"].items() if sizes}
-    declared = {v.name: v.description.removeprefix("1 where ") for v in Layout(Sample).variables}
+    descriptions = {v.name: v.description.removeprefix("1 where ") for v in Layout(Sample).variables}
     columns = list(dict.fromkeys(k for sizes in quantiles.values() for k in sizes))
 
     def cell(name: str, k: str) -> Line:
@@ -134,14 +135,12 @@ def _random(s: b.Source) -> Iterator[b.Block]:
             s.estimate(f"monte_carlo.quantiles.{name}.{k}", ".low", ".high") if k in quantiles[name] else ""
         )
 
-    rows = tuple(b.TableRow((declared[name], *(cell(name, k) for k in columns))) for name in quantiles)
+    rows = tuple(b.TableRow((descriptions[name], *(cell(name, k) for k in columns))) for name in quantiles)
     heads = (f"{k[1:]} % of runs below" if k.startswith("q") else "share of runs" for k in columns)
-    sides = joined(
-        s.line(f"{{=monte_carlo.sides.{side}}} {side}") for side in s.result["monte_carlo"]["sides"]
-    )
+    sides = join(s.line(f"{{=monte_carlo.sides.{side}}} {side}") for side in s.result["monte_carlo"]["sides"])
     of_sides = line(" (", sides, ")") if sides else ()
     title = s.line(
-        "Overloads at random, {=monte_carlo.runs} runs{sides}; in brackets: interval of {=monte_carlo.confidence} "
+        "Random overloads, {=monte_carlo.runs} runs{sides}; in brackets: the interval of {=monte_carlo.confidence} "
         "confidence",
         sides=of_sides,
     )
@@ -150,6 +149,6 @@ def _random(s: b.Source) -> Iterator[b.Block]:
 
 
 def number(s: b.Source, study: StudyRecord, run: str, name: str) -> Number:
-    """An answer of a run."""
+    """The answer `name` of a run."""
     back = name == "recovery_time" and run != "steady" and study.returns
     return s.number(f"answers.{run}.{name}", none="not reached" if back else "-")

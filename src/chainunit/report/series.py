@@ -1,6 +1,6 @@
-"""The series of a study: result.nc and the load cycle; each file appears whole or not at all.
+"""The time series of a study: result.nc and the load cycle. Each file appears whole or not at all.
 
-The line that opens result.nc::
+This line opens result.nc::
 
     runs = xarray.open_datatree("results/result.nc")
 
@@ -24,9 +24,9 @@ SERIES = "result.nc"
 
 
 def _load_cycle(study: StudyRecord, turns: xr.Dataset, file: Path) -> Path:
-    """The load that the motor shaft sees in the steady turns, in the form that sizing tools import: a row per instant
-    with time, speed, torque of the load and inertia of the load, units in the head. The last row is the first of the
-    next turn."""
+    """Write the load at the motor shaft in the steady turns, in the form that sizing tools import: a row for each
+    instant with time, speed, load torque and load inertia; the head has the units. The last row is the first instant
+    of the next turn."""
     time, drive = turns["time"].values, study.drive
     torque, speed = drive.motor_shaft(turns)
     columns = time - time[0], speed, torque, drive.load_inertia(turns)
@@ -38,7 +38,7 @@ def _load_cycle(study: StudyRecord, turns: xr.Dataset, file: Path) -> Path:
 
 
 def tree(study: StudyRecord) -> xr.DataTree:
-    """The time series of all runs, a node for each; each variable has its unit and description."""
+    """The time series of all runs, a node for each run; each variable has its unit and description."""
     runs = {f"/{name}": run.assign_attrs(title=title(study, name)) for name, run in study.runs.items()}
     whole_study = xr.DataTree.from_dict(runs)
     whole_study.attrs.update(title=study.config.title, source=f"chainunit {__version__}")
@@ -50,12 +50,12 @@ def write(study: StudyRecord, folder: Path) -> list[Path]:
 
     ``result.nc`` is netCDF-4 with a group per run, the `tree`.
     """
-    written = []
+    files = []
     if "steady" in study.answers and study.drive.whole_turns(study.steady) is not None:
-        written.append(_load_cycle(study, study.steady, folder / LOAD_CYCLE))
+        files.append(_load_cycle(study, study.steady, folder / LOAD_CYCLE))
     if study.runs:
         file = folder / SERIES
         with whole(file) as part, netcdf():
             tree(study).to_netcdf(part, engine="netcdf4")
-        written.append(file)
-    return written
+        files.append(file)
+    return files

@@ -1,4 +1,4 @@
-"""The section on the driveline: the torque that its shafts carry in each run, and its cycles."""
+"""The section on the driveline: the torque in its shafts in each run, and the cycles of this torque."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from ..study.verdict import START, STEADY
 from . import blocks as b
 from . import figure as fig
 from .pictures import Pictures
-from .runs import ordered, over_runs
+from .runs import by_side, over_runs
 
 PICTURES = Pictures()
 TORQUE = fig.Axis("torque in shaft 2", "N.m")
 _BESIDE = 3
-"""Runs beside each other in the figure: with more no label is legible on the page."""
+"""Number of runs beside each other in the figure; with more of them the labels are illegible on the page."""
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
-    """Tables and figure."""
+    """The tables and the figure of the driveline."""
     if not study.shaft:
         return
     yield _shaft(s, study)
@@ -31,18 +31,18 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
 
 
 def _shaft(s: b.Source, study: StudyRecord) -> b.Table:
-    """What each run asks of the driveline."""
-    runs = ordered(study, s.result["shaft"])
+    """The table of the demands of each run on the driveline."""
+    runs = by_side(study, s.result["shaft"])
     rows = (
         b.TableRow((v.description, *(s.number(f"shaft.{run}.{v.name}") for run in runs)))
         for v in Layout(ShaftAnswers).variables
     )
-    return over_runs(study, runs, rows, "What the driveline carries")
+    return over_runs(study, runs, rows, "Torque in the driveline")
 
 
 @PICTURES.declare(lambda study: study.shaft, "driveline.png")
 def _driveline(s: b.Source, study: StudyRecord) -> fig.Figure:
-    """Torque in the driveline beside that of a rigid one, and its rainflow cycles."""
+    """The torque in the driveline beside that in a rigid one, and its rainflow cycles."""
     largest = max(answers.range_largest for answers in study.shaft.values())
     above, below = [], []
     for name in study.shaft:
@@ -76,6 +76,6 @@ def _driveline(s: b.Source, study: StudyRecord) -> fig.Figure:
 
 
 def shaft_torque(run: Any, time: Any) -> list[fig.Item]:
-    """Torque in the driveline, and what it were with a rigid shaft, where that is known."""
+    """The torque in the driveline and, where the run has it, the torque with a rigid shaft."""
     rigid = [fig.Curve("with a rigid shaft", time, run[RIGID].values, 1)] if RIGID in run else []
     return [fig.Curve("with this driveline", time, run["driveline.tau2"].values), *rigid]

@@ -1,4 +1,4 @@
-"""The section on sizing: what a drive was sized for, its candidates, and which was chosen."""
+"""The section on sizing: the demands on the drive, the candidates, and the choice."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from ..study.sizing import Standing
 from . import blocks as b
 from .lines import Aside, Line, Number, Strong, capital, line, spoken
 
-_NAMED = 5  # of the candidates that do not fit; the table has all
+_REASONS = 5  # of the candidates that do not fit; the table has all
 _SIGN = {Standing.CHOSEN: "✓", Standing.FITS: "○", Standing.INSUFFICIENT: "✗", Standing.REJECTED: "✗"}
 _SEVERITY: dict[str, b.Severity] = {Standing.CHOSEN: "good", Standing.FITS: "partly"}
 
 
 def answer(s: b.Source) -> Iterator[b.Block]:
-    """The motor that all runs are with, its gear, flywheel and protection, large; beside them the share of each limit
-    that it takes."""
+    """Cards with the motor of all runs, its gear, flywheel and protection, and a table of the share that this drive
+    takes of each limit."""
     path = _best_path(s)
     if path is None:
         return
-    motor, ratio = s.words(f"{path}.motor"), s.number(f"{path}.ratio", digits=4, given=True)
+    motor, ratio = s.words(f"{path}.motor"), s.number(f"{path}.ratio", digits=4, as_given=True)
     cards = [
         b.Card("Motor", ((motor, str(b.at(s.result, f"{path}.verdict"))),)),
         b.Card("Gear ratio", ((ratio, "motor turns per crank turn"),)),
@@ -37,19 +37,19 @@ def answer(s: b.Source) -> Iterator[b.Block]:
         for name, check in checks.items()
     )
     if rows:
-        title = "Share of each limit that the drive takes; a line in the bar is the limit"
+        title = "Share of each limit that the drive takes; the line in the bar is the limit"
         yield b.Table(rows, b.heads("check", "share"), title=title, numeric=False, form="long")
 
 
 def _best_path(s: b.Source) -> str | None:
-    """Where the motor stands that all runs are with."""
+    """The path of the candidate whose motor all runs use: the chosen one, else the nearest one; None without any."""
     section = s.result.get("sizing", {})
     best = section.get("nearest") if section.get("chosen") is None else section["chosen"]
     return None if best is None else f"sizing.candidates.{best}"
 
 
 def _sizes(s: b.Source) -> Iterator[tuple[str, str, Number]]:
-    """The number that stands for the flywheel, and for the protection: section, title, size."""
+    """The leading numbers of the flywheel and of the protection: section, title, number."""
     for section in ("flywheel", "protection"):
         leading = _leading(s.result["sizing"].get(section))
         if leading:
@@ -58,14 +58,14 @@ def _sizes(s: b.Source) -> Iterator[tuple[str, str, Number]]:
 
 
 def _relay(s: b.Source) -> Iterator[Line]:
-    """The setting of the relay, where another number stands for the protection."""
+    """The setting of the relay, where it is not the leading number of the protection."""
     protection = s.result["sizing"].get("protection", {})
     if "relay_current" in protection and _leading(protection) != "relay_current":
         yield s.line("relay at {sizing.protection.relay_current}")
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
-    """What a drive was sized for, its candidates with how much of each limit they take, and which was chosen."""
+    """The choice, the candidates with the share that each takes of the limits, and the demands on the drive."""
     if "sizing" not in s.result:
         return
     section = s.result["sizing"]
@@ -78,9 +78,9 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
                 ": ",
                 s.words(f"sizing.candidates.{i}.reason"),
             )
-            for i in range(min(_NAMED, len(candidates)))
+            for i in range(min(_REASONS, len(candidates)))
         )
-        words = Strong("No candidate fits, because")
+        words = Strong("No candidate fits. The reasons:")
         yield b.Judgement("alarm", words, items=tuple(reasons), form="long")
     if best is not None:
         yield from _best(s, best, "Motor" if choice is not None else "Insufficient motor")
@@ -90,21 +90,23 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     if candidates:
         if "tried" in section:
             weak = "; too weak by the nameplate: {=sizing.weak}" if s.value("sizing.weak") else ""
-            tried = "Tried: {=sizing.tried} of {=sizing.motors} motors of the catalogue"
-            yield b.Text(s.line(f"{tried}{weak}."))
-        listed = int(study.config.sizing.candidates) if study.config.sizing else len(candidates)
-        yield _candidates(s, listed)
-        if len(candidates) > listed:
-            yield b.Text(f"{len(candidates) - listed} more were tried; report.html lists them.", form="short")
+            trials = "Tried: {=sizing.tried} of {=sizing.motors} motors of the catalogue"
+            yield b.Text(s.line(f"{trials}{weak}."))
+        row_count = int(study.config.sizing.candidates) if study.config.sizing else len(candidates)
+        yield _candidates(s, row_count)
+        if len(candidates) > row_count:
+            yield b.Text(
+                f"{len(candidates) - row_count} more were tried; report.html lists them.", form="short"
+            )
     tables = []
-    # of a machine without sides no feed is on one of them
-    sided = () if study.config.machine.model.sides else ("one_sided_share", "torque_peak_one_sided")
+    # a machine without sides has no one-sided feed
+    side_keys = () if study.config.machine.model.sides else ("one_sided_share", "torque_peak_one_sided")
     for name in ("asked", "cycle", "flywheel", "protection"):
-        # the sentence on the coupling stands above, and is no cell of a narrow table
+        # the sentence on the coupling is too long for a cell of a narrow table, and stands above
         leaves = [
             leaf
             for key, below in (section.get(name) or {}).items()
-            if not isinstance(below, str) and key not in sided
+            if not isinstance(below, str) and key not in side_keys
             for leaf in _leaves(below, f"sizing.{name}.{key}", spoken(key))
         ]
         rows = tuple(b.TableRow((title, _leaf(s, path))) for title, path in leaves)
@@ -114,8 +116,8 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
 
 
 def _best(s: b.Source, path: str, word: str) -> Iterator[b.Block]:
-    """The motor that all runs are with, in a sentence."""
-    ratio = s.number(f"{path}.ratio", digits=4, given=True)
+    """The sentences on the motor of all runs and on the reason for it."""
+    ratio = s.number(f"{path}.ratio", digits=4, as_given=True)
     sentence = line(f"{word}: ", s.words(f"{path}.motor"), ", ratio ", ratio)
     for _, title, size in _sizes(s):
         sentence += line("; no safety coupling" if size.value is None else line(f"; {title} ", size))
@@ -128,13 +130,13 @@ def _best(s: b.Source, path: str, word: str) -> Iterator[b.Block]:
 
 
 def _leading(section: Mapping[str, Any] | None) -> str | None:
-    """The number that stands for a section: the torque at which it trips, else its first."""
+    """The name of the leading number of a section: the trip torque, else the first number."""
     names = [name for name, entry in (section or {}).items() if isinstance(entry, dict) and "value" in entry]
     return "trip_torque" if "trip_torque" in names else next(iter(names), None)
 
 
 def _leaves(node: Any, path: str, title: str = "") -> Iterator[tuple[str, str]]:
-    """Title and path of everything below a node that is a number with its unit, or words."""
+    """Title and path of each number and each text below a node."""
     if isinstance(node, Mapping) and "value" in node:
         yield node.get("title", title), path
     elif isinstance(node, Mapping | list):
@@ -151,11 +153,11 @@ def _leaf(s: b.Source, path: str) -> Line:
         return s.words(path)
     if isinstance(node["value"], str):
         return s.words(f"{path}.value")
-    return s.number(path, given=path.startswith("sizing.asked."), none="none")
+    return s.number(path, as_given=path.startswith("sizing.asked."), none="none")
 
 
-def _candidates(s: b.Source, listed: int) -> b.Table:
-    """The table of candidates, best first."""
+def _candidates(s: b.Source, row_count: int) -> b.Table:
+    """The table of candidates, best first; the terminal shows the first `row_count` rows."""
     candidates = s.result["sizing"]["candidates"]
     checks: dict[str, str] = {}
     for candidate in candidates:
@@ -172,10 +174,12 @@ def _candidates(s: b.Source, listed: int) -> b.Table:
                 (motor, s.words(f"{path}.verdict"), *cells),
                 line(f"{_SIGN.get(verdict, '')} ", s.words(f"{path}.reason")),
                 _SEVERITY.get(verdict, "bad"),
-                "both" if i < listed else "long",
+                "both" if i < row_count else "long",
             )
         )
-    title = "Candidates, best first. Cell: the share of its limit that a check takes; a line in the bar is the limit."
+    title = (
+        "Candidates, best first. Cell: the share of its limit that a check takes; line in the bar: the limit."
+    )
     columns = (*b.heads("motor", "verdict"), *(b.Column(title, form="long") for title in checks.values()))
     return b.Table(tuple(rows), columns, title=title, note_title="because", numeric=False)
 

@@ -1,4 +1,4 @@
-"""The report on a study: what was asked, its sections, what it rests on, what was given."""
+"""The report on a study: the question, the sections of results, the basis of the results, the given values."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from . import blocks as b
 from . import run_names as read
 from .analyses import ANALYSES, Contents
 from .drawing import drawing
-from .lines import Line, capital, joined, line, spoken
+from .lines import Line, capital, join, line, spoken
 from .study_motion import motion
 
 DRAWING = "machine.svg"
-_DRAWN = (
+_DRAWING_CAPTION = (
     "Pins and links, and dimensions by their names in a study file. φ is the crank angle, clockwise from the upward "
     "vertical."
 )
@@ -30,7 +30,7 @@ _VERSIONS = ("numpy", "casadi", "fmpy", "plotly")
 
 
 def report(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Report:
-    """The report; `result` are its numbers, by default those of `as_dict`."""
+    """The report on a study; `result` has its numbers, by default those of `as_dict`."""
     s = b.Source(as_dict(study) if result is None else result)
     with shown_in(study.config.units):
         sections = [
@@ -51,7 +51,7 @@ def report(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Rep
 
 
 def summary(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Report:
-    """The verdicts and the main answers of every run alone; arguments as of `report`."""
+    """A short report: the verdicts and the main answers of every run. Arguments as of `report`."""
     s = b.Source(as_dict(study) if result is None else result)
     blocks: list[b.Block] = []
     with shown_in(study.config.units):
@@ -73,17 +73,17 @@ def summary(study: StudyRecord, result: Mapping[str, Any] | None = None) -> b.Re
 
 
 def _head(s: b.Source) -> Line:
-    """Project, author, date and revision, where they are given; the study file, and the version."""
-    named = [s.line(f"{capital(name)}: {{report.{name}}} · ") for name in s.result.get("report", ())]
-    return line(*named, s.line("Study file: {source} · chainunit {chainunit}"))
+    """Project, author, date and revision, where the file gives them; the study file, and the version."""
+    entries = [s.line(f"{capital(name)}: {{report.{name}}} · ") for name in s.result.get("report", ())]
+    return line(*entries, s.line("Study file: {source} · chainunit {chainunit}"))
 
 
 def _motion(study: StudyRecord) -> list[b.Block]:
-    # of an FMU of somebody else no links are known
+    # the links of a foreign FMU are unknown
     return [motion(study)] if study.runs and not study.drive.outsider else []
 
 
-# -- what was asked
+# -- the question
 
 
 def _opening(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
@@ -109,58 +109,60 @@ def _opening(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
             event=study.config.random.title,
         )
     yield b.Text(question, form="long")
-    sized, feed = "sizing" in s.result, study.config.feed
+    has_sizing, feed = "sizing" in s.result, study.config.feed
     parts = {"machine": study.drive.machine.p, "run": study.config.run}
-    wanted = [("run", "crank_speed"), *([] if sized else [("machine", "ratio")])]
+    given_names = [("run", "crank_speed"), *([] if has_sizing else [("machine", "ratio")])]
     rows = [
-        *([] if sized else [b.TableRow(("motor", s.words("motor.title")))]),
-        *(row for of, name in wanted for row in s.rows(type(parts[of]), of, only=name, given=True)),
-        *s.rows(type(feed), "feed", given=True),
+        *([] if has_sizing else [b.TableRow(("motor", s.words("motor.title")))]),
+        *(row for of, name in given_names for row in s.rows(type(parts[of]), of, only=name, as_given=True)),
+        *s.rows(type(feed), "feed", as_given=True),
     ]
     yield b.Table(tuple(rows), title="In short", form="long")
     if not study.drive.outsider:
         alt = f"The {noun}: its pins, links and dimensions"
-        yield b.Drawing(drawing(study.drive.machine), alt, DRAWING, _DRAWN)
+        yield b.Drawing(drawing(study.drive.machine), alt, DRAWING, _DRAWING_CAPTION)
 
 
 def _given(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
-    """All values of the study, by section."""
-    # a motor on the line follows no reference, and a machine without sides has no feed on one
-    unused = [] if study.drive.follows else ["run.ramp"]
-    unused += [] if study.config.machine.model.sides else ["sizing.one_sided_share"]
-    yield b.Given(tuple((section.title, tuple(_values(s, section, unused))) for section in given(study)))
+    """All given values of the study, by section."""
+    # a motor on the line follows no reference; a machine without sides has no one-sided feed
+    unused_names = [] if study.drive.follows else ["run.ramp"]
+    unused_names += [] if study.config.machine.model.sides else ["sizing.one_sided_share"]
+    yield b.Given(
+        tuple((section.title, tuple(_values(s, section, unused_names))) for section in given(study))
+    )
 
 
-def _values(s: b.Source, section: GivenSection, unused: Iterable[str]) -> Iterator[b.GivenValue]:
-    """Quantities and choices of a section."""
+def _values(s: b.Source, section: GivenSection, unused_names: Iterable[str]) -> Iterator[b.GivenValue]:
+    """The quantities and choices of a section as given values, except those with a name in `unused_names`."""
     if section.values is not None:
-        for value in s.given(section.values, section.name, section.place):
-            if value.name not in unused:
+        for value in s.given_values(section.values, section.name, section.place):
+            if value.name not in unused_names:
                 yield value
     for key, choice in section.choices.items():
         name, place = (".".join(filter(None, (of, key))) for of in (section.name, section.place))
         if isinstance(choice, str):
-            shown: b.Shown = s.words(place)
+            content: b.Content = s.words(place)
         elif isinstance(choice, bool):
-            shown = "yes" if choice else "no"
+            content = "yes" if choice else "no"
         elif isinstance(choice, float):
-            shown = s.number(place, given=True)
+            content = s.number(place, as_given=True)
         else:
-            shown = ", ".join(f"{x:g}" for x in choice)
-        yield b.GivenValue(name, description(name), shown, s.origin(name))
+            content = ", ".join(f"{x:g}" for x in choice)
+        yield b.GivenValue(name, description(name), content, s.origin(name))
 
 
-# -- what it rests on
+# -- the basis of the results
 
 
 def _basis(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     yield from (b.Text(each, "note") for each in s.lines("notes"))
     if s.result["certificate"]:
         yield from _certificate(s, study, s.result["certificate"])
-    tuned = s.result["control"]
+    gains = s.result["control"]
     control: Line = (
-        joined(s.line(f"{spoken(name)} {{control.{name}}}") for name in tuned)
-        if isinstance(tuned, Mapping)
+        join(s.line(f"{spoken(name)} {{control.{name}}}") for name in gains)
+        if isinstance(gains, Mapping)
         else s.words("control")
     )
     versions = {"Python": platform.python_version()} | {name: _version(name) for name in _VERSIONS}
@@ -170,33 +172,34 @@ def _basis(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         b.TableRow(("speed control", control)),
         b.TableRow(("versions", s.line("chainunit {chainunit}{libraries}", libraries=libraries))),
     )
-    yield b.Table(rows, title="How it was made", numeric=False, form="long")
-    traced = (
-        "Every number in the text of this page is taken from result.json, which is embedded here whole; point at a "
-        "number to see where it stands there, and with more digits."
+    yield b.Table(rows, title="Models and software", numeric=False, form="long")
+    hint = (
+        "Every number in the text of this page comes from result.json, which the page contains whole. Point at a "
+        "number to see its place in result.json and more digits."
     )
-    yield b.Text(traced, "note", "long")
+    yield b.Text(hint, "note", "long")
 
 
 def _certificate(
     s: b.Source, study: StudyRecord, certificate: Mapping[str, Mapping[str, Any]]
 ) -> Iterator[b.Block]:
     words = (
-        "What the motor gave to the shaft, computed in the motor, against what the machine stored and dissipated, "
-        "computed in the machine: the share of the energy moved that is missing."
+        "The energy that the motor gave to the shaft, computed in the motor, is compared with the energy that the "
+        "machine stored and dissipated, computed in the machine. The table shows the missing share of the energy "
+        "moved."
     )
     yield b.Text(words, form="long")
     titles = {run: study.called(run) for run in certificate}
     yield runs.matrix(s, "certificate", titles, "Energy certificate", "run", form="long")
     for name in dict.fromkeys(name for shares in certificate.values() for name in shares):
-        have = [run for run, shares in certificate.items() if name in shares]
-        run = max(have, key=lambda run: s.value(f"certificate.{run}.{name}") or 0.0)
+        run_names = [run for run, shares in certificate.items() if name in shares]
+        run = max(run_names, key=lambda run: s.value(f"certificate.{run}.{name}") or 0.0)
         most = f"{{certificate.{run}.{name}}}"
         text = f"{spoken(name.removesuffix('_share')).capitalize()}: at most {most} of the energy moved."
         if name.endswith(DIFFERENCE):
             text = (
                 f"Difference of {name.removesuffix(DIFFERENCE)} to the monolithic solution, in parts of its "
-                f"peak: at most {most} ({titles[run]}), {len(have)} runs compared."
+                f"peak: at most {most} ({titles[run]}), {len(run_names)} runs compared."
             )
         yield b.Text(s.line(text), form="short")
 
@@ -217,8 +220,8 @@ _SECTIONS: Mapping[str, Contents] = {
     **ANALYSES,
     "plots": Contents("Plots", figures.PICTURES.figures, figures.PICTURES.files),
     "motion": Contents("The machine in motion", lambda s, study: iter(_motion(study))),
-    "basis": Contents("What this rests on", _basis),
-    "given": Contents("All that was given", _given),
+    "basis": Contents("Basis of the results", _basis),
+    "given": Contents("Given values", _given),
 }
 PICTURES = (DRAWING, *(picture for each in _SECTIONS.values() for picture in each.pictures))
-"""Files of all figures that a report may have."""
+"""The files of all figures that a report may have."""

@@ -1,4 +1,4 @@
-"""A linkage in motion: where every joint is in each run of a study, and what it carries."""
+"""The animation of a study: the place of every joint in each run, and the force in it."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from .supplement import Supplement
 _PER_SECOND = 60
 _PER_TURN = 90
 MOST = 7000
-"""Pictures of all runs together: a longer study is shown at a lower rate."""
+"""The largest number of pictures of all runs together; a longer study is shown at a lower rate."""
 _CAPTION = "An arrow is the force on a part of the machine from its support or neighbour{}."
 
 
 def motion(study: StudyRecord) -> Animation:
-    """Every run at about 60 pictures a second of machine time, more where the crank is fast."""
+    """The animation of every run, at about 60 pictures per second of machine time, more where the crank is fast."""
     machine = study.drive.machine
     turn = study.config.turn
     interval = min(1.0 / _PER_SECOND, turn / _PER_TURN)
@@ -83,11 +83,11 @@ def _run(study: StudyRecord, name: str, interval: float, supplement: Supplement)
         lambda output: (part[f"machine.{output}.fx"].values, part[f"machine.{output}.fy"].values),
         supplement.groups,
     )
-    driven = name in read.driven(study)
+    has_motor = name in read.motor_runs(study)
     readings = (
         Reading("Crank angle", angle % (2.0 * math.pi), "rad"),
         Reading("Crank speed", speed, "rad/s"),
-        *([Reading("Crank torque", drive.crank_torque(part), "N.m")] if driven else []),
+        *([Reading("Crank torque", drive.crank_torque(part), "N.m")] if has_motor else []),
         *(
             Reading(capital(v.description), loads[v.name], v.unit, v.kind)
             for v in model.feed_layout.variables

@@ -1,4 +1,4 @@
-"""The look of every plot (matplotlib): lines differ in dash and weight, too, to survive a grey print."""
+"""The look of every plot (matplotlib). Lines differ in dash and weight, too, so that they stay distinct in grey."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ LOOKS: dict[str, dict[str, Any]] = {
     "printed": {"color": "#c1440e", "linestyle": "-", "linewidth": 0.9},
     "printed right": {"color": "#c1440e", "linestyle": "--", "linewidth": 0.9},
 }
-"""Lines that mean the same in every plot."""
+"""Looks of lines that have one meaning in every plot."""
 INK = "#1b1b1b"
 FILLS = {"pale": "#ececec", "dark": "#a9a9a9", "band": "#c8c8c8", "hatched": "#e4e4e4"}
 CLASSES = ("#ffffff", "#d4d4d4", "#9a9a9a", "#4d4d4d")
@@ -60,7 +60,7 @@ BARS = (
     {"color": "#d9e4d0", "pattern": "+", "hatch": "++"},
 )
 WIDE = 30.0
-"""From that ratio of largest to least on an axis is logarithmic."""
+"""The ratio of the largest value to the least from which an axis is logarithmic."""
 
 
 def look_of(look: int | str) -> dict[str, Any]:
@@ -71,7 +71,7 @@ def look_of(look: int | str) -> dict[str, Any]:
 def draw(plots: Mapping[str, Callable[[], Any]], folder: Path) -> list[Path]:
     """Draw each figure into its file in `folder`, a PNG; returns the files."""
     folder.mkdir(parents=True, exist_ok=True)
-    written = []
+    files = []
     with plt.rc_context(STYLE):
         for name, make in plots.items():
             figure = make()
@@ -80,5 +80,5 @@ def draw(plots: Mapping[str, Callable[[], Any]], folder: Path) -> list[Path]:
                     figure.savefig(part, format="png")
             finally:
                 plt.close(figure)
-            written.append(folder / name)
-    return written
+            files.append(folder / name)
+    return files

@@ -1,4 +1,4 @@
-"""What the picture of one kind of machine has beside the links, pins and reactions of any linkage."""
+"""Additions of a kind of machine to the picture of a linkage, which has links, pins and reactions alone."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .motion import Arrow
 
 @dataclass(frozen=True)
 class Details:
-    """What a run has beside: places of joints [m], arrows, and by link how heavily it is loaded."""
+    """Additions to a run: places of further joints [m], arrows, and the load on each link."""
 
     joints: Mapping[str, tuple[Any, Any]] = field(default_factory=dict)
     arrows: tuple[Arrow, ...] = ()
@@ -23,20 +23,20 @@ class Details:
 
 @dataclass(frozen=True)
 class Supplement:
-    """What the pictures of all runs have beside; of most machines it is nothing."""
+    """Additions to the pictures of all runs; most machines have none."""
 
     study: StudyRecord
     caption: Line = ()
     links: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    """joints of the links that are drawn otherwise, or beside those of the linkage"""
+    """the joints of links that are drawn otherwise, or in addition to those of the linkage"""
     looks: Mapping[str, str] = field(default_factory=dict)
     names: Mapping[str, str] = field(default_factory=dict)
-    """names of joints, where they are not those of the linkage"""
+    """the labels of joints that differ from the names in the linkage"""
     groups: Mapping[str, str] = field(default_factory=dict)
-    """by output, the group of its reaction: each has a colour"""
+    """the group of the reaction of each output; each group has a colour"""
     hidden: tuple[str, ...] = ()
-    """outputs whose reactions would hide others"""
+    """outputs whose reactions are not drawn, as they would hide others"""
 
     def details(self, part: Any, state: MachineState) -> Details:
-        """Of some instants of a run, and the machine at these."""
+        """The additions to a run; `part` has the samples of the run that are drawn, `state` the machine at these."""
         return Details()

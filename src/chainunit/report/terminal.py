@@ -1,4 +1,4 @@
-"""A report on the terminal: its short form, what is wrong and what it rests on last, next to the prompt."""
+"""A report on the terminal: its short form. Warnings and notes come last, next to the prompt."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ _LAST = {"warning": "Warning: ", "note": "Note: "}
 
 
 def plain_line(line: Line, units: Units = DEFAULT_UNITS) -> str:
-    """A line in plain letters."""
+    """A line as plain text."""
     return "".join(_plain(piece, units) for piece in pieces(line))
 
 
 def _plain(piece: Piece, units: Units) -> str:
     match piece:
         case Number():
-            digits = piece.digits or (6 if piece.given else 3)
+            digits = piece.digits or (6 if piece.as_given else 3)
             return number(
                 piece.value,
                 piece.unit,
                 piece.kind,
                 digits,
-                full=not piece.given,
+                full=not piece.as_given,
                 none=piece.none,
                 units=units,
             )
@@ -45,12 +45,12 @@ def _plain(piece: Piece, units: Units) -> str:
 
 
 def plain_cell(cell: Cell, units: Units) -> str:
-    """A cell of a table in plain letters."""
-    return plain_line((cell.used,) if isinstance(cell, Share) else cell, units)
+    """A cell of a table as plain text."""
+    return plain_line((cell.utilisation,) if isinstance(cell, Share) else cell, units)
 
 
 def show(report: Report, console: Console, *, remarks: bool = True) -> None:
-    """Print the short form; without `remarks` where they were printed before the study ran."""
+    """Print the short form. `remarks` is false where the remarks were printed before the study ran."""
     title = report.title
     last: list[str] = []
     for block in report.blocks("short"):
@@ -70,7 +70,7 @@ def show(report: Report, console: Console, *, remarks: bool = True) -> None:
 
 
 def plain(report: Report, width: int = 120) -> str:
-    """The short form in plain letters, in lines of that width."""
+    """The short form as plain text, in lines of at most `width` letters."""
     out = io.StringIO()
     console = Console(
         file=out, width=width, markup=False, highlight=False, force_jupyter=False, no_color=True
@@ -92,7 +92,7 @@ def _sentences(block: Block, units: Units) -> list[str]:
 
 
 def _show_table(table: Table, console: Console, units: Units) -> None:
-    """One table; where that is too wide, one for each group of columns beside those that are in none."""
+    """Print a table. Where it is too wide, print a table for each group of columns, with the columns of no group."""
     widest = console.options.update(width=10_000)
     title = plain_line(table.title, units)
     count = len(table.columns) or len(table.rows[0].cells)
@@ -100,14 +100,14 @@ def _show_table(table: Table, console: Console, units: Units) -> None:
     if console.measure(whole, options=widest).maximum <= console.width:
         console.print(whole)
         return
-    grouped = {i for group in table.groups for i in group}
+    group_columns = {i for group in table.groups for i in group}
     for group in table.groups if len(table.groups) > 1 else [range(count)]:
-        places = [i for i in range(count) if i not in grouped or i in group or len(table.groups) < 2]
+        places = [i for i in range(count) if i not in group_columns or i in group or len(table.groups) < 2]
         console.print(_grid(table, places, units, title, console.width))
 
 
 def _grid(table: Table, places: Sequence[int], units: Units, title: str, room: int | None = None) -> Grid:
-    """The table with its columns at `places`; where a `room` in letters is given, narrowed to that."""
+    """The table with its columns at `places`, narrowed to the width `room` [letters] where this is given."""
     if table.columns:
         places = [i for i in places if table.columns[i].form != "long"]
     rows = [row for row in table.rows if row.form != "long"]
@@ -133,8 +133,9 @@ def _head(column: Column, units: Units) -> str:
 
 
 def _widths(columns: Sequence[Sequence[Cell]], units: Units, room: int) -> list[int]:
-    """Widths of columns, each with its head first, in a table of the width `room`. Heads wrap first, then words in
-    cells, and only where that is not enough are numbers parted from their units; the widest column gives first."""
+    """The widths of columns in a table of the width `room`; the first cell of a column is its head. Heads wrap first,
+    then words in cells. Only where that is not enough, numbers are parted from their units. The widest column is
+    narrowed first."""
     texts = [[plain_cell(cell, units) for cell in column] for column in columns]
     widths = [max(map(len, column)) for column in texts]
     whole = [max(len(part) for cell in column for part in _parts(cell, units)) for column in columns]
@@ -151,9 +152,9 @@ def _widths(columns: Sequence[Sequence[Cell]], units: Units, room: int) -> list[
 
 
 def _parts(cell: Cell, units: Units) -> list[str]:
-    """A cell in parts that stay on one line: words, and numbers with their units."""
+    """The parts of a cell that stay on one line: words, and numbers with their units."""
     parts = [""]
-    for piece in pieces((cell.used,) if isinstance(cell, Share) else cell):
+    for piece in pieces((cell.utilisation,) if isinstance(cell, Share) else cell):
         if isinstance(piece, Number):
             parts += _plain(piece, units).replace(" (", "\n(").split("\n")
         elif isinstance(piece, Strong | Aside):

@@ -16,7 +16,8 @@ from .lines import Line, line
 
 PICTURES = ("campbell.png", "stability.png", "resonance.png", "ratio.png")
 _OVER_BOTH = "over the turns of shaft and machine"
-"""For natural frequencies that an order may meet: i23 varies over a turn of the shaft, the inertia over the other."""
+"""The range of natural frequencies that an order may meet: i23 varies over a turn of the shaft, the inertia over a
+turn of the machine."""
 _JOINTS = {
     "alpha1": "bend of the joint on shaft 2",
     "alpha2": "bend of the joint on shaft 3",
@@ -25,13 +26,13 @@ _JOINTS = {
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
-    """What the line is, its numbers, and the figures."""
+    """A text on the line, the tables of its numbers, and the figures."""
     analysis: LineAnalysis = study.findings["torsion"].analysis
     lead = (
-        "The line by itself, between the rotor J1 and the machine J4: shaft 2 is the motor's, shaft 3 the machine's, "
-        "and a cardan shaft with two joints is between them. Shaft 3 turns i23 times as fast as shaft 2. Bent joints "
-        "vary this ratio twice a turn (order 2), large bends four times a turn, too (order 4). The motor gives a "
-        "constant torque."
+        "This section is on the line alone, between the rotor J1 and the machine J4. Shaft 2 belongs to the motor, "
+        "shaft 3 to the machine, and a cardan shaft with two joints connects them. Shaft 3 turns i23 times as fast "
+        "as shaft 2. Bent joints vary this ratio twice a turn (order 2); large bends vary it four times a turn, too "
+        "(order 4). The motor gives a constant torque."
     )
     yield b.Text(lead, "lead", "long")
     yield b.Table(tuple(b.TableRow(row) for row in _numbers(s, analysis)), title="Torsion of the driveline")
@@ -44,33 +45,34 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
 
 
 def _numbers(s: b.Source, analysis: LineAnalysis) -> Iterator[tuple[Line, Line]]:
-    """One number in each row."""
+    """Rows with a title and a number."""
 
-    def found(path: str, *item: int, digits: int = 4) -> Line:
+    def value(path: str, *item: int, digits: int = 4) -> Line:
         return s.number(f"torsion.{path}", *item, digits=digits)
 
-    yield "inertia J1 of the rotor, at the shaft", found("line.J1")
-    yield "inertia J4 on shaft 3, with the machine's mean", found("line.J4")
-    yield "speed of the shaft in normal running", found("running.speed")
-    yield "mean torque on J4", found("running.load")
-    yield "natural frequency at i23 = 1", found("natural_frequency.even", digits=5)
+    yield "inertia J1 of the rotor, at the shaft", value("line.J1")
+    yield "inertia J4 on shaft 3, with the machine's mean", value("line.J4")
+    yield "speed of the shaft in normal running", value("running.speed")
+    yield "mean torque on J4", value("running.load")
+    yield "natural frequency at i23 = 1", value("natural_frequency.even", digits=5)
     yield "damping ratio", s.number("torsion.damping_ratio")
     for n in analysis.excitation:
-        yield f"order {n} moves shaft 3 by, {n} times a turn", s.number(f"torsion.excitation.order {n}")
+        title = f"amplitude by which order {n} turns shaft 3, {n} times a turn"
+        yield title, s.number(f"torsion.excitation.order {n}")
     if analysis.operating.exists[0]:
         yield (
             "Floquet multiplier in normal running, per half turn (stable below 1)",
-            found("operating.largest_multiplier", 0),
+            value("operating.largest_multiplier", 0),
         )
     else:
         yield "steady motion in normal running", "not found"
     for i in range(len(analysis.resonances())):
-        at = found("resonance.peaks.speed", i)
-        yield line("resonance: largest torque in shaft 2 at ", at), found("resonance.peaks.torque2", i)
+        at = value("resonance.peaks.speed", i)
+        yield line("resonance: largest torque in shaft 2 at ", at), value("resonance.peaks.torque2", i)
 
 
 def _ranges(s: b.Source, analysis: LineAnalysis) -> Iterator[tuple[Line, Line, Line]]:
-    """Two ends in each row."""
+    """Rows with a title and the two ends of a range."""
 
     def ends(path: str, *item: int, digits: int = 4) -> tuple[Line, Line]:
         low, high = (s.number(f"torsion.{path}", *item, end, digits=digits) for end in (0, 1))
@@ -87,17 +89,18 @@ def _ranges(s: b.Source, analysis: LineAnalysis) -> Iterator[tuple[Line, Line, L
     yield f"natural frequency, {_OVER_BOTH}", *ends("natural_frequency.over_both_turns", digits=5)
     for n in ORDERS:
         if analysis.excitation[n]:
-            yield f"speed at which order {n} meets it, {_OVER_BOTH}", *ends(f"crossings.speed = k/{n}")
+            title = f"speed at which order {n} meets the natural frequency, {_OVER_BOTH}"
+            yield title, *ends(f"crossings.speed = k/{n}")
     if analysis.operating.exists[0]:
         for shaft in (2, 3):
             torques = extremes(f"operating.{{}}_torque{shaft}", 0)
             yield f"torque of shaft {shaft} in normal running", *torques
     for i in range(len(analysis.unstable_ranges())):
-        yield "speed at which it is unstable", *ends("resonance.unstable", i)
+        yield "speed at which the line is unstable", *ends("resonance.unstable", i)
     for i in range(len(analysis.missing_ranges())):
-        yield "speed at which it is not known whether it is stable", *ends("resonance.no_steady_motion", i)
+        yield "speed at which the stability is unknown", *ends("resonance.no_steady_motion", i)
     if not analysis.unstable_ranges():
-        yield "speed at which it is unstable", "nowhere", ""
+        yield "speed at which the line is unstable", "nowhere", ""
 
 
 # -- figures
@@ -115,17 +118,17 @@ def _campbell(analysis: LineAnalysis) -> fig.Figure:
     low, high = analysis.span
     ends = np.array([0.0, analysis.fastest])
     places = np.flatnonzero(analysis.steady.exists & ~analysis.steady.unstable)[::4]
-    damped, frequency = "damped frequency in rotation (Floquet)", analysis.steady.frequency
-    crossed = {n: 0.5 * (first + last) for n, (first, last) in analysis.crossings().items()}
+    damped_name, frequency = "damped frequency in rotation (Floquet)", analysis.steady.frequency
+    crossing_labels = {n: 0.5 * (first + last) for n, (first, last) in analysis.crossings().items()}
     items: tuple[fig.Item, ...] = (
         fig.Shade(low, high, f"natural frequency {_OVER_BOTH}", "y", "band"),
-        fig.Curve(damped, analysis.speed[places], frequency[places], 2, "+", joined=False),
+        fig.Curve(damped_name, analysis.speed[places], frequency[places], 2, "+", has_line=False),
         *(fig.Curve(f"order {n} of i23", ends, n * ends, look) for look, n in enumerate(ORDERS)),
         fig.Curve("order 1: parametric resonance at speed = k", ends, ends, 3),
         _running(analysis),
         *(
             fig.Label(at, 0.5 * (low + high), "k" if n == 1 else f"k/{n}", "above")
-            for n, at in crossed.items()
+            for n, at in crossing_labels.items()
             if analysis.slowest < at < analysis.fastest
         ),
     )
@@ -150,14 +153,14 @@ def _stability(analysis: LineAnalysis) -> fig.Figure:
     y = fig.Axis(_JOINTS[grid.joint], "rad", low=float(grid.bend[0]), high=float(grid.bend[-1]))
     panels = []
     for ratio, growth, unstable in zip(grid.ratio, grid.growth, grid.unstable, strict=True):
-        # what does not count as unstable is not drawn so, however near
+        # a point that does not count as unstable is not drawn as unstable, however near it is
         z = np.where(unstable, growth / k, np.minimum(growth / k, -1e-9))
         bold = 0.0 if np.any(unstable) else None
         items: list[fig.Item] = [fig.Field(grid.speed, grid.bend, z, levels, names, bold), _running(analysis)]
         rows, columns = np.nonzero(~np.isfinite(growth))
         if rows.size:
             gaps = grid.speed[columns], grid.bend[rows]
-            items.append(fig.Curve("no steady motion found", *gaps, 1, "x", joined=False))
+            items.append(fig.Curve("no steady motion found", *gaps, 1, "x", has_line=False))
         if grid.joint != "both":
             items.append(fig.Mark(getattr(analysis.line, grid.joint), "bend as given", axis="y", look=3))
         title = f"damping ratio {number(ratio, '1', full=False)}"
@@ -175,7 +178,7 @@ def _stability(analysis: LineAnalysis) -> fig.Figure:
 
 
 def _resonance(analysis: LineAnalysis) -> fig.Figure:
-    simulated, panels = analysis.simulated, []
+    simulation, panels = analysis.simulated, []
     for shaft, static in ((2, analysis.static2), (3, analysis.rotation.load)):
         steady, rigid = (np.asarray(getattr(of, f"peak{shaft}")) for of in (analysis.steady, analysis.rigid))
         items: list[fig.Item] = [
@@ -184,15 +187,18 @@ def _resonance(analysis: LineAnalysis) -> fig.Figure:
             *(fig.Shade(low, high, "unstable") for low, high in analysis.unstable_ranges()),
             _running(analysis),
         ]
-        if simulated is not None:
-            points = simulated.speed[analysis.on_speed], getattr(simulated, f"peak{shaft}")[analysis.on_speed]
-            items.append(fig.Curve("time simulation", *points, 1, "o", joined=False))
+        if simulation is not None:
+            points = (
+                simulation.speed[analysis.on_speed],
+                getattr(simulation, f"peak{shaft}")[analysis.on_speed],
+            )
+            items.append(fig.Curve("time simulation", *points, 1, "o", has_line=False))
         if static > 0.0:
             items.append(fig.Mark(static, "load alone", axis="y", look=3))
         if shaft == 2:
             peaks = analysis.resonances()
             items += [fig.Label(at, peak, number(peak, "N.m", digits=4), "above") for at, peak in peaks]
-        # where there is nothing to see, not even roundoff is shown
+        # torques that are all zero get an axis that hides their roundoff
         largest = max(static, *(float(np.nanmax(y, initial=0.0)) for y in (steady, rigid)))
         low, high = (1e-3, 1.0) if largest < 1e-3 else (None, None)
         y = fig.Axis("peak torque", "N.m", low=low, high=high, log=True)
@@ -215,7 +221,7 @@ def _ratio(analysis: LineAnalysis) -> fig.Figure:
     panels = (
         ("ratio i23 of shaft 3 to shaft 2", fig.Axis("ratio i23"), analysis.ratio),
         (
-            "natural frequency of the line if it stood at this angle",
+            "natural frequency of the line at rest at this angle",
             fig.Axis("natural frequency", "rad/s", "frequency"),
             analysis.frequency,
         ),
@@ -225,7 +231,7 @@ def _ratio(analysis: LineAnalysis) -> fig.Figure:
         f"The driveline over a turn of the shaft: bends {' and '.join(bends)}",
         "Ratio i23 and frozen-angle natural frequency over a turn of the shaft, with the machine's mean inertia.",
         tuple(
-            (fig.Panel(angle, y, (fig.Curve(y.label, analysis.angle, values, listed=False),), title),)
+            (fig.Panel(angle, y, (fig.Curve(y.label, analysis.angle, values, in_legend=False),), title),)
             for title, y, values in panels
         ),
         file="ratio.png",

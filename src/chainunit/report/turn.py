@@ -19,7 +19,7 @@ ANGLE = fig.Axis("crank angle from the upward vertical", "rad", low=0.0, high=2.
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
-    """Table, reactions and figure."""
+    """The tables and the figure of a turn at constant speed."""
     turn: TurnFindings = study.findings["constant_speed"]
     lead = s.line("Inverse dynamics at {=run.crank_speed} of the crank, without a motor.")
     yield b.Text(lead, "lead", "long")
@@ -32,13 +32,13 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         )
         heads = b.heads("pin", "peak, with feed", "at", "peak, without feed", "at")
         yield b.Table(
-            tuple(rows), heads, title="What the pins carry over a turn at constant speed", form="long"
+            tuple(rows), heads, title="Largest forces in the pins over a turn at constant speed", form="long"
         )
     yield _figure(turn)
 
 
 def _figure(turn: TurnFindings) -> fig.Figure:
-    inertia = fig.Curve("inertia", turn.fed.angle, turn.inertia, listed=False)
+    inertia = fig.Curve("inertia", turn.fed.angle, turn.inertia, in_legend=False)
     panels = [fig.Panel(ANGLE, fig.Axis("reflected inertia", "kg.m2", low=0.0), (inertia,))]
     if turn.pins:
         panels.append(_reactions(turn))
@@ -63,7 +63,7 @@ def _reactions(turn: TurnFindings) -> fig.Panel:
         places = tuple(f"{number(peak, 'N')} at {number(at, 'rad')}" for peak, at in peaks)
         at = np.arange(len(pins)) + shift
         items.append(fig.Bars(words, at, [peak for peak, _ in peaks], 0.38, look, words=places))
-    # room for the words beside the bars
+    # 30 % of room for the words beside the bars
     largest = max(max(r.peak, r.peak_free) for r in pins.values())
     x = fig.Axis("largest reaction", "N", low=0.0, high=1.3 * largest)
     return fig.Panel(x, fig.Axis("pin", names=tuple(pins)), tuple(items))

@@ -1,5 +1,5 @@
-"""The words of a report follow the machine: what the motor turns is a crank, or the machine itself where it has
-no other link. Texts are written for a crank; here they get the machine's word."""
+"""Adapts the words of a report to the machine. All texts are written for a machine with a crank; where the machine
+has none, its own word replaces "crank"."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from .figure import Figure
 from .lines import Number, Words
 
 _ADDRESSES = {GivenValue: ("name",), Section: ("name",), Figure: ("name", "file")}
-"""Fields that name a place, and are no words."""
+"""Fields that hold an address, not words."""
 
 
 def of_machine(node: Any, word: str) -> Any:
-    """Blocks, lines and figures with the `word` of the machine; what stands in the result is left as it is there."""
+    """Blocks, lines and figures with the `word` of the machine in place of "crank"; texts of the result stay."""
     if word == "crank":
         return node
     if isinstance(node, str):
@@ -25,9 +25,9 @@ def of_machine(node: Any, word: str) -> Any:
         return tuple(of_machine(each, word) for each in node)
     if isinstance(node, Number | Words) or not dataclasses.is_dataclass(node) or isinstance(node, type):
         return node
-    told = {
+    changes = {
         field.name: of_machine(getattr(node, field.name), word)
         for field in dataclasses.fields(node)
         if field.init and field.name not in _ADDRESSES.get(type(node), ())
     }
-    return dataclasses.replace(node, **told)
+    return dataclasses.replace(node, **changes)

@@ -98,7 +98,10 @@ def key_tables() -> tuple[KeyTable, ...]:
             "", "Study", (Key("title", "title of the study", sort="text"), *_of_fields(CHOICES, _study()))
         ),
         KeyTable("system", "Machine and motor", tuple(_of_system())),
-        *(KeyTable("machine", "Machine", tuple(_of_machine(name, "machine")), name) for name in MACHINES),
+        *(
+            KeyTable("machine", of.noun.capitalize(), tuple(_of_machine(name, "machine")), name)
+            for name, of in MACHINES.items()
+        ),
         KeyTable("ratios", "The papers' ratios", tuple(_numbers(Ratios, Ratios())), "ChamberForces"),
         *(
             KeyTable("feed", "Feed in normal running", tuple(_of_machine(name, "feed")), name)
