@@ -133,7 +133,7 @@ step = 0.002
 """
     study = run_study(parse(text), tmp_path)
     assert study.failure is None
-    words = "tuned anew to the inertia with each flywheel"
+    words = "tuned to the inertia with each flywheel"
     assert (words in said_of(study)) is told
     assert study.findings["flywheels"].as_dict()["retuned"] is told
 

@@ -620,7 +620,7 @@ def test_no_candidate_fits(study):
     sizing["chosen"] = None
     sizing["candidates"] = sizing["candidates"][2:]
     text = page_of(study, {**as_dict(study), "sizing": sizing})
-    assert "No candidate fits, because" in text and "too weak by 31 %" in text
+    assert "No candidate fits. The reasons:" in text and "too weak by 31 %" in text
 
 
 def test_a_run_that_stopped_early_has_a_page(study, tmp_path):
@@ -755,7 +755,8 @@ def test_chains_stand_beside_two_bars(chains, tmp_path):
         "chains, 95 %",
         "10 starts of 30 turns",
         "Rods that go slack",
-        "Avoid 3.54 rad/s (33.8 rev/min) to",
+        "Warning: Avoid 3.54 rad/s (33.8 rev/min) to",
+        "at order n, n times the crank speed is the natural frequency",
         "(mode 1, order 1)",
     ):
         assert words in told, words
