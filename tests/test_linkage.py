@@ -239,7 +239,7 @@ class LightSixBar(SixBar):
     def linkage(p, u):
         """The same but for the crank."""
         bars = SixBar.linkage(p, u)
-        return replace(bars, crank=Crank(bars.crank.bar._replace(mass=None), "A"))
+        return replace(bars, driver=Crank(bars.driver.bar._replace(mass=None), "A"))
 
 
 class OtherSixBar(SixBar):

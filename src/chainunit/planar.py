@@ -39,6 +39,10 @@ class Vec2:
     def __mul__(self, factor: Any) -> Vec2:
         return Vec2(self.x * factor, self.y * factor)
 
+    def plus(self, other: Vec2, factor: Any) -> Vec2:
+        """The sum with `other` times a factor."""
+        return Vec2(self.x + other.x * factor, self.y + other.y * factor)
+
     def dot(self, other: Vec2) -> Any:
         """Scalar product."""
         return self.x * other.x + self.y * other.y

@@ -1,26 +1,26 @@
-"""The driver: a crank on a fixed bearing.
+"""The drivers, which move in a given way: a crank on a fixed bearing, and a ram on a fixed rail.
 
-The crank angle counts from the upward vertical, positive clockwise. It is the coordinate q itself, so that the
-derivative of the crank's counter-clockwise angle by q is -1.
+Each gives the coordinate q of the linkage. That of the packaged machines is the crank angle, counted from the upward
+vertical and positive clockwise: the counter-clockwise angle of the crank falls at the rate -1.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from ..planar import ZERO, Link, Motion, Vec2
 from .body import Bar, Load, Mass
-from .group import Group, SolvedGroup, Third
+from .group import Group, GuideForce, Placed, Rail, Slide, SolvedGroup, Third
+
+UPWARD = Vec2(0.0, 1.0)
 
 
-@dataclass
-class Crank(Group):
-    """A crank as data: its bar, which starts from a ground pin, and the name of the pin at the bar's end."""
+class Driver(Group):
+    """The link that is driven, as data."""
 
     bar: Bar
-    end: str
 
     @property
     def bars(self) -> tuple[Bar, ...]:
@@ -28,9 +28,26 @@ class Crank(Group):
         return (self.bar,)
 
     @property
+    def inertia(self) -> Any:
+        """The least inertia that it reflects by itself: of a crank about its bearing [kg m2], of a ram its mass
+        [kg]."""
+        raise NotImplementedError
+
+
+@dataclass
+class Crank(Driver):
+    """A crank as data: a bar on a ground pin, the name of the pin at its end, if it has one there, the direction of
+    the bar at q = 0, a unit vector, and `sense`: +1 where q counts counter-clockwise, -1 where clockwise."""
+
+    bar: Bar
+    end: str = ""
+    start: Vec2 = UPWARD
+    sense: float = -1.0
+
+    @property
     def pins(self) -> dict[str, str]:
         """The pin at its end."""
-        return {self.end: self.bar.name}
+        return {self.end: self.bar.name} if self.end else {}
 
     @property
     def joints(self) -> tuple[tuple[str, str], ...]:
@@ -47,27 +64,98 @@ class Crank(Group):
         arm2 = mass.s * mass.s if beside is None else mass.s * mass.s + beside * beside
         return mass.I + mass.m * arm2
 
-    def solve(self, xp: Any, q: Any, pins: Mapping[str, Motion], derived: Sequence[Any]) -> TurnedCrank:
+    def solve(self, xp: Any, q: Any, at: Placed, derived: Sequence[Any]) -> SolvedDriver:
         """The crank at the angle `q` [rad]."""
-        link = crank(xp, pins[self.bar.pin].p, q)
-        return TurnedCrank((link,), (link.at(self.bar.length),))
+        link = crank(xp, at.pins[self.bar.pin].p, q, self.start, self.sense)
+        return TurnedCrank((link,), (link.at(self.bar.length),) if self.end else ())
 
 
-class TurnedCrank(SolvedGroup):
-    """The crank at one angle: its link, and the pin at its end."""
+@dataclass
+class Ram(Driver):
+    """A ram as data, such as the rod of a hydraulic cylinder: a bar without a pin, which moves along a `rail` of the
+    ground. Its frame starts at the point of the rail that q [m] counts from and has the direction of the rail.
+    `guide` is the pin at which the reaction of the rail acts on it."""
+
+    bar: Bar
+    rail: Rail
+    guide: str
+
+    @property
+    def pins(self) -> dict[str, str]:
+        """None: what hangs on it hangs on its points."""
+        return {}
+
+    @property
+    def joints(self) -> tuple[tuple[str, str], ...]:
+        """Its rail."""
+        return ((self.guide, self.bar.name),)
+
+    @property
+    def guides(self) -> dict[tuple[str, str], str | None]:
+        """Its rail."""
+        return {(self.guide, self.bar.name): None}
+
+    @property
+    def inertia(self) -> Any:
+        """Its mass [kg]."""
+        return 0.0 if self.bar.mass is None else self.bar.mass.m
+
+    def solve(self, xp: Any, q: Any, at: Placed, derived: Sequence[Any]) -> SolvedDriver:
+        """The ram at the way `q` [m]."""
+        rail = self.rail.placed(at.links)
+        start = Motion(rail.pin.p + rail.u * q, rail.u)
+        return PushedRam((Link(start, rail.u, 0.0, 0.0),), (), 1.0, (Slide(rail.u, q, 1.0, 0.0),))
+
+
+class SolvedDriver(SolvedGroup):
+    """A driver at one place: its link, and the pin at its end."""
 
     __slots__ = ()
 
-    def third(self, outer: Sequence[Vec2]) -> tuple[Sequence[Third], Sequence[Vec2]]:
+    def third(
+        self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
+    ) -> tuple[Sequence[Third], Sequence[Vec2]]:
         """See `SolvedGroup`."""
-        (link,), (end,) = self.links, self.pins
-        return [(ZERO, 0.0)], [link.third(end.p - link.pin.p, ZERO, 0.0)]
+        (link,) = self.links
+        return [(ZERO, 0.0)], [link.third(end.p - link.pin.p, ZERO, 0.0) for end in self.pins]
+
+    def effort(self, load: Load) -> Any:
+        """The torque, or of a ram the force, along the coordinate that holds against the load of the link [N m,
+        N]."""
+        raise NotImplementedError
+
+
+class TurnedCrank(SolvedDriver):
+    """The crank at one angle."""
+
+    __slots__ = ()
+
+    def effort(self, load: Load) -> Any:
+        """See `SolvedDriver`."""
+        return load[1] * -self.links[0].t1
 
     def reactions(self, loads: Sequence[Load]) -> tuple[Vec2, ...]:
         """The force on the crank at its bearing [N]."""
         return (-loads[0][0],)
 
 
-def crank(xp: Any, bearing: Vec2, angle: Any) -> Link:
-    """The crank as a link from its bearing at `angle` [rad]."""
-    return Link(Motion(bearing), Vec2(xp.sin(angle), xp.cos(angle)), -1.0, 0.0)
+class PushedRam(SolvedDriver):
+    """The ram at one place."""
+
+    __slots__ = ()
+
+    def effort(self, load: Load) -> Any:
+        """See `SolvedDriver`."""
+        return -load[0].dot(self.links[0].u)
+
+    def reactions(self, loads: Sequence[Load]) -> tuple[Vec2, ...]:
+        """The force and the moment of the rail on the ram."""
+        ((force, moment),) = loads
+        n = self.links[0].u.turned()
+        return (GuideForce.along(n, -force.dot(n), -moment),)
+
+
+def crank(xp: Any, bearing: Vec2, angle: Any, start: Vec2 = UPWARD, sense: float = -1.0) -> Link:
+    """The crank as a link from its bearing at `angle` [rad], see `Crank`."""
+    c, s = xp.cos(angle), xp.sin(angle) * sense
+    return Link(Motion(bearing), Vec2(start.x * c - start.y * s, start.y * c + start.x * s), sense, 0.0)

@@ -9,13 +9,13 @@ angle and vanishes in a dead position.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from ..planar import Link, Motion, Vec2
 from .body import Bar, Load
-from .group import Group, SolvedGroup, Third
+from .group import Group, Placed, SolvedGroup, Third
 
 
 @dataclass
@@ -45,9 +45,9 @@ class Dyad(Group):
         first, second = self.first, self.second
         return (first.pin, first.name), (self.inner, first.name), (second.pin, second.name)
 
-    def solve(self, xp: Any, q: Any, pins: Mapping[str, Motion], derived: Sequence[Any]) -> SolvedDyad:
-        """The dyad at the position of its outer `pins`."""
-        first, second = self.first, self.second
+    def solve(self, xp: Any, q: Any, at: Placed, derived: Sequence[Any]) -> SolvedDyad:
+        """The dyad where its outer pins are."""
+        first, second, pins = self.first, self.second, at.pins
         return SolvedDyad.between(
             xp, pins[first.pin], pins[second.pin], first.length, second.length, self.side
         )
@@ -102,7 +102,9 @@ class SolvedDyad(SolvedGroup):
         second = Link(q, u2, s2, (hx * x1 + hy * y1) * minus_per_det)
         return cls((r1, r2), minus_per_det, (first, second), first.carried(r1), det / (a * b))
 
-    def third(self, outer: Sequence[Vec2]) -> tuple[Sequence[Third], Sequence[Vec2]]:
+    def third(
+        self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
+    ) -> tuple[Sequence[Third], Sequence[Vec2]]:
         """See `SolvedGroup`."""
         (p, q), (first, second) = outer, self.links
         (r1, s1, x), (r2, s2, y) = (self.r1, first.t1, first.t2), (self.r2, second.t1, second.t2)

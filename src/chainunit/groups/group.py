@@ -3,31 +3,104 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
-from ..planar import Link, Motion, Vec2
+from ..planar import ZERO, Link, Motion, Vec2
 from .body import Bar, Load
 
 Third = tuple[Vec2, Any]
-"""Third derivatives of a link by q: of its pin and of its angle."""
+"""Third derivatives by q of a link: of its pin and of its angle."""
+Joint = tuple[str, str]
+"""A joint of a linkage by the names of its pin and of the link on which its reaction acts."""
+
+
+class Placed(Protocol):
+    """The part of a linkage that stands before a group, where it is: `pins` with points, and `links`, by name."""
+
+    @property
+    def pins(self) -> Mapping[str, Motion]:
+        """Motion of each pin and point."""
+
+    @property
+    def links(self) -> Mapping[str, Link]:
+        """Links by name."""
+
+
+class Rail(NamedTuple):
+    """A straight line in a link, as data: the name of the link, None for the ground; a point `at` of the line [m] and
+    its direction `along`, a unit vector, both in the frame of the link."""
+
+    of: str | None
+    at: Vec2
+    along: Vec2
+
+    def placed(self, links: Mapping[str, Link]) -> Link:
+        """The line where its link is: it starts from the point and has the direction of the line."""
+        if self.of is None:
+            return Link(Motion(self.at), self.along, 0.0, 0.0)
+        link, along = links[self.of], self.along
+        u = link.u * along.x + link.u.turned() * along.y
+        return Link(link.beside(self.at.x, self.at.y), u, link.t1, link.t2)
+
+
+class Slide(NamedTuple):
+    """The motion in a sliding joint: the direction `d` of its line, the way `s` of the link that its reaction acts on
+    along it, and the derivatives of that by q [m, m/rad, m/rad2]."""
+
+    d: Vec2
+    s: Any
+    s1: Any
+    s2: Any
+
+
+class GuideForce(Vec2):
+    """The reaction of a sliding joint on a link: force [N], and its whole `moment` about the start of the link's
+    frame [N m]."""
+
+    __slots__ = ("moment",)
+
+    def __init__(self, x: Any, y: Any, moment: Any) -> None:
+        super().__init__(x, y)
+        self.moment = moment
+
+    def plus(self, other: Vec2, factor: Any) -> GuideForce:
+        """The sum with `other`, a reaction of the same joint, times a factor."""
+        assert isinstance(other, GuideForce)
+        return GuideForce(
+            self.x + other.x * factor, self.y + other.y * factor, self.moment + other.moment * factor
+        )
+
+    @classmethod
+    def along(cls, n: Vec2, force: Any, moment: Any) -> Self:
+        """The reaction with a `force` in the direction `n`."""
+        return cls(n.x * force, n.y * force, moment)
 
 
 class SolvedGroup:
-    """A group at one position: its `links` in the order of the group's bars, the `pins` that it adds, and the
-    `margin`, which is 0 in a dead position."""
+    """A group at one position: its `links` in the order of the group's bars, the `pins` that it adds, the `margin`,
+    which is 0 in a dead position, and the `slides` in its sliding joints, in the order of the group's `guides`."""
 
-    __slots__ = ("links", "margin", "pins")
+    __slots__ = ("links", "margin", "pins", "slides")
 
-    def __init__(self, links: tuple[Link, ...], pins: tuple[Motion, ...], margin: Any = 1.0) -> None:
-        self.links, self.pins, self.margin = links, pins, margin
+    def __init__(
+        self,
+        links: tuple[Link, ...],
+        pins: tuple[Motion, ...],
+        margin: Any = 1.0,
+        slides: tuple[Slide, ...] = (),
+    ) -> None:
+        self.links, self.pins, self.margin, self.slides = links, pins, margin, slides
 
-    def third(self, outer: Sequence[Vec2]) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of each link and of each pin that the group adds, from the third derivatives of the
-        pins that its bars start from."""
+    def third(
+        self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
+    ) -> tuple[Sequence[Third], Sequence[Vec2]]:
+        """Third derivatives by q of each link and of each pin that the group adds, from those of the pins that its
+        bars start from, and of its rails: of the point that a rail starts from, and of its angle."""
         raise NotImplementedError
 
     def reactions(self, loads: Sequence[Load]) -> Sequence[Vec2]:
-        """Forces in the group's joints, in their order [N], from the load of each link."""
+        """Forces in the group's joints, in their order [N], from the load of each link; that of a sliding joint is a
+        `GuideForce`."""
         raise NotImplementedError
 
 
@@ -43,19 +116,37 @@ class Group:
         raise NotImplementedError
 
     @property
-    def pins(self) -> dict[str, str]:
-        """The pins that the group adds, each with the link on which further groups at this pin hang."""
+    def pins(self) -> Mapping[str, str]:
+        """Pins that it adds, each with the link that carries all else that hangs on it."""
         raise NotImplementedError
 
     @property
-    def joints(self) -> tuple[tuple[str, str], ...]:
-        """Pin and link of each reaction, in the order of `SolvedGroup.reactions`."""
+    def joints(self) -> tuple[Joint, ...]:
+        """Pin and link of each reaction, as `SolvedGroup.reactions` gives them."""
         raise NotImplementedError
 
-    def derive(self, xp: Any, pins: Callable[[float], Mapping[str, Motion]]) -> list[Any]:
-        """Numbers that follow from its lengths; `pins` gives the pins before the group at a crank angle [rad]."""
+    @property
+    def guides(self) -> Mapping[Joint, str | None]:
+        """Its sliding joints, each with the link on which the opposite reaction acts, None for the ground."""
+        return {}
+
+    @property
+    def rails(self) -> tuple[Rail, ...]:
+        """The lines of links before it on which its own links slide."""
+        return ()
+
+    def derive(self, xp: Any, before: Callable[[float], Placed]) -> list[Any]:
+        """Numbers that follow from its lengths; `before` gives what stands before it at a crank angle [rad]."""
         return []
 
-    def solve(self, xp: Any, q: Any, pins: Mapping[str, Motion], derived: Sequence[Any]) -> SolvedGroup:
-        """The group at the crank angle `q` [rad] and the position of the `pins`."""
+    def solve(self, xp: Any, q: Any, at: Placed, derived: Sequence[Any]) -> SolvedGroup:
+        """The group at the coordinate `q` [rad], with what stands before it as it is placed `at` it."""
         raise NotImplementedError
+
+
+def rail_third(rail: Rail, placed: Link, links: Mapping[str, Link], thirds: Mapping[str, Third]) -> Third:
+    """The third derivatives of a rail, where it is `placed`, from those of the links."""
+    if rail.of is None:
+        return ZERO, 0.0
+    link, third = links[rail.of], thirds[rail.of]
+    return link.third(placed.pin.p - link.pin.p, *third), third[1]

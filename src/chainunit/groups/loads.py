@@ -9,13 +9,12 @@ w = 0.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple, Protocol
 
 from ..planar import ZERO, Link, Motion, Vec2
 from .body import Body
-
-Joint = tuple[str, str]
-"""A joint of a linkage by the names of its pin and of the link on which its reaction acts."""
+from .group import GuideForce, Joint, Slide
 
 
 class Moving(Protocol):
@@ -35,7 +34,11 @@ class Moving(Protocol):
 
     @property
     def turns(self) -> Mapping[Joint, Any]:
-        """Relative rotation per rotation of the coordinate in each joint."""
+        """Relative rotation by the coordinate in each joint that turns."""
+
+    @property
+    def slides(self) -> Mapping[Joint, Slide]:
+        """The motion in each joint that slides."""
 
     def carrier(self, pin: str) -> str:
         """The link that carries a pin or a point."""
@@ -103,7 +106,7 @@ class Weight(NamedTuple):
 
 
 class Push(NamedTuple):
-    """A force on a point [N], independent of its motion; its power counts as lost."""
+    """A force on a point [N], independent of its motion; its power counts as loss."""
 
     point: str
     force: Vec2
@@ -217,9 +220,9 @@ class PinLosses(NamedTuple):
     def effect(self, xp: Any, m: Moving, w: Any, reactions: Mapping[Joint, Vec2]) -> Effect:
         """See `Acting`."""
         per_newton, smooth2, w2, loss = *self._law(), w * w, 0.0
-        turns, damping = m.turns, self.damping
-        for joint, force in reactions.items():
-            k2, _, ratio = _friction_terms(xp, force, turns[joint], w2, smooth2)
+        damping = self.damping
+        for joint, turn in m.turns.items():
+            k2, _, ratio = _friction_terms(xp, reactions[joint].squared(), turn, w2, smooth2)
             loss = loss + k2 * (per_newton * ratio + damping)
         return Effect(dissipative=loss * w)
 
@@ -235,10 +238,10 @@ class PinLosses(NamedTuple):
         """The slope of the dissipative torque in the direction in which the reactions change by `growing` and the
         relative rotations by `turning`; where `turning` is None, the slope by the speed."""
         per_newton, smooth2, w2, rest, slope = *self._law(), w * w, 0.0, 0.0
-        for joint, force in reactions.items():
-            k = m.turns[joint]
-            k2, minus_per, ratio = _friction_terms(xp, force, k, w2, smooth2)
-            # from ratio^2 = |R|^2/(k^2 w^2 + smooth^2)
+        for joint, k in m.turns.items():
+            force = reactions[joint]
+            k2, minus_per, ratio = _friction_terms(xp, force.squared(), k, w2, smooth2)
+            # of ratio^2 = |R|^2/(k^2 w^2 + smooth^2)
             wider = k2 * w if turning is None else k * turning[joint] * w2
             grows = (ratio * ratio * wider - force.dot(growing[joint])) * (minus_per / ratio)
             slope = slope + k2 * (per_newton * grows)
@@ -252,9 +255,96 @@ class PinLosses(NamedTuple):
         return 0.5 * pin.friction * pin.diameter, pin.w_smooth * pin.w_smooth
 
 
-def _friction_terms(xp: Any, force: Vec2, turn: Any, w2: Any, smooth2: Any) -> tuple[Any, Any, Any]:
-    """The square of the relative rotation k, -1/(k^2 w^2 + smooth^2), and the ratio |R|/sqrt(k^2 w^2 + smooth^2),
-    which has a slope at zero, too. One root of the ratio of the squares is cheaper than two roots."""
-    k2 = turn * turn
+class GuideLosses(NamedTuple):
+    """Losses in all guides: Coulomb friction that the reaction sets, smoothed near rest, and viscous damping [N s/m]
+    of each.
+
+    The block of a guide of the length L bears at its two ends: on these press N/2 + M/L and N/2 - M/L, M the moment
+    about its middle. Each dissipates friction |press| Dv^2/sqrt(Dv^2 + v_smooth^2) at the relative speed Dv.
+    `lengths` are those of the guides by joint [m]; one that is not named has a point for a block, and M does not
+    matter. As with pins, friction is left out of the reactions.
+    """
+
+    guide: Any
+    damping: Any
+    lengths: Mapping[Joint, Any] = MappingProxyType({})
+    by_reactions: bool = True
+
+    def effect(self, xp: Any, m: Moving, w: Any, reactions: Mapping[Joint, Vec2]) -> Effect:
+        """See `Acting`."""
+        smooth2, w2, loss = self.guide.v_smooth * self.guide.v_smooth, w * w, 0.0
+        for joint, slide in m.slides.items():
+            per = self.damping
+            for press in self._presses(m, joint, reactions[joint]):
+                _, _, ratio = _friction_terms(xp, press * press, slide.s1, w2, smooth2)
+                per = per + self.guide.friction * ratio
+            loss = loss + slide.s1 * slide.s1 * per
+        return Effect(dissipative=loss * w)
+
+    def slope(
+        self,
+        xp: Any,
+        m: Moving,
+        w: Any,
+        reactions: Mapping[Joint, Vec2],
+        growing: Mapping[Joint, Vec2],
+        turning: Mapping[Joint, Any] | None,
+    ) -> Any:
+        """See `PinLosses.slope`; where the direction is that of q, `turning` is given."""
+        smooth2, w2, rest, slope = self.guide.v_smooth * self.guide.v_smooth, w * w, 0.0, 0.0
+        friction, by_speed = self.guide.friction, turning is None
+        for joint, slide in m.slides.items():
+            k, own = slide.s1, self.damping
+            grown = self._growing(m, joint, reactions[joint], growing[joint], by_speed)
+            for press, more in zip(self._presses(m, joint, reactions[joint]), grown, strict=True):
+                k2, minus_per, ratio = _friction_terms(xp, press * press, k, w2, smooth2)
+                wider = k2 * w if by_speed else k * slide.s2 * w2
+                grows = (ratio * ratio * wider - press * more) * (minus_per / ratio)
+                slope = slope + k2 * (friction * grows)
+                own = own + friction * ratio
+            rest = rest + (k * k * own if by_speed else 2.0 * (k * slide.s2) * own)
+        return slope * w + (rest if by_speed else rest * w)
+
+    def _presses(self, m: Moving, joint: Joint, reaction: Vec2) -> tuple[Any, ...]:
+        """The forces with which a block bears."""
+        n = m.slides[joint].d.turned()
+        normal = reaction.dot(n)
+        if joint not in self.lengths:
+            return (normal,)
+        arm = m.pins[joint[0]].p - m.links[joint[1]].pin.p
+        return _ends(normal, _couple(reaction) - arm.cross(reaction), self.lengths[joint])
+
+    def _growing(
+        self, m: Moving, joint: Joint, reaction: Vec2, growing: Vec2, by_speed: bool
+    ) -> tuple[Any, ...]:
+        """The derivatives of these forces. By q the line of the guide turns, and the arm of the force with it."""
+        link, n = m.links[joint[1]], m.slides[joint].d.turned()
+        more = growing.dot(n)
+        if joint not in self.lengths:
+            return (more,)
+        pin = m.pins[joint[0]]
+        arm, moment = pin.p - link.pin.p, _couple(growing)
+        moment = moment - arm.cross(n * more)
+        if not by_speed:
+            turned = reaction.turned() * link.t1
+            moment = moment - (pin.p1 - link.pin.p1).cross(reaction) - arm.cross(turned)
+        return _ends(more, moment, self.lengths[joint])
+
+
+def _couple(reaction: Vec2) -> Any:
+    assert isinstance(reaction, GuideForce)
+    return reaction.moment
+
+
+def _ends(normal: Any, moment: Any, length: Any) -> tuple[Any, Any]:
+    """The forces at the ends of a block."""
+    half, more = 0.5 * normal, moment / length
+    return half + more, half - more
+
+
+def _friction_terms(xp: Any, square: Any, slip: Any, w2: Any, smooth2: Any) -> tuple[Any, Any, Any]:
+    """The square of the relative rotation or way by q, -1/(k^2 w^2 + smooth^2), and the force, given by its `square`,
+    by the root of that, which has a slope at zero, too; one root of the ratio of squares is cheaper than two."""
+    k2 = slip * slip
     minus_per = -1.0 / (k2 * w2 + smooth2)
-    return k2, minus_per, xp.sqrt(_TINY - (force.x * force.x + force.y * force.y) * minus_per)
+    return k2, minus_per, xp.sqrt(_TINY - square * minus_per)

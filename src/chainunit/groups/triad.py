@@ -32,7 +32,7 @@ from typing import Any, ClassVar, NamedTuple
 from ..model import Requirement
 from ..planar import Link, Motion, Vec2
 from .body import Bar, Load, Mass
-from .group import Group, SolvedGroup, Third
+from .group import Group, Placed, SolvedGroup, Third
 
 LEGS = 3
 SAMPLES = 20
@@ -148,9 +148,9 @@ class Triad(Group):
         """Motion of the outer pins of the legs."""
         return tuple(pins[leg.pin] for leg in self.legs)
 
-    def solve(self, xp: Any, q: Any, pins: Mapping[str, Motion], derived: Sequence[Any]) -> SolvedTriad:
-        """The triad at the position of its outer `pins`, on the branch of the series `derived`."""
-        outer, arms = self.outer(pins), tuple(self.arms.values())
+    def solve(self, xp: Any, q: Any, at: Placed, derived: Sequence[Any]) -> SolvedTriad:
+        """The triad where its outer pins are, on the branch that the series `derived` gives."""
+        outer, arms = self.outer(at.pins), tuple(self.arms.values())
         near = pose_of_series(derived, xp.cos(q), xp.sin(q))
         pose = correct_pose(xp, [pin.p for pin in outer], self._lengths(), arms, near, _STEPS)
         return SolvedTriad.at(xp, outer, self._lengths(), arms, pose)
@@ -161,14 +161,14 @@ class Triad(Group):
             tuple(pin.p for pin in self.outer(pins)), self._lengths(), tuple(self.arms.values())
         )
 
-    def derive(self, xp: Any, pins: Callable[[float], Mapping[str, Motion]]) -> list[Any]:
-        """The series of the pose over the crank angle, the largest misfit and the least margin around; `pins` gives
-        the outer pins at a crank angle [rad]."""
+    def derive(self, xp: Any, before: Callable[[float], Placed]) -> list[Any]:
+        """The series of the pose over the crank angle, the largest misfit and the least margin around; `before` gives
+        what stands before the triad at a crank angle [rad]."""
         angles = [2.0 * math.pi * k / SAMPLES for k in range(SAMPLES)]
         lengths, arms = self._lengths(), tuple(self.arms.values())
 
         def pose(q: float, near: Pose, steps: int = _STEPS) -> Pose:
-            return correct_pose(xp, [pin.p for pin in self.outer(pins(q))], lengths, arms, near, steps)
+            return correct_pose(xp, [pin.p for pin in self.outer(before(q).pins)], lengths, arms, near, steps)
 
         poses = [pose(0.0, self.assembly, 8)]
         for q in angles[1:]:
@@ -188,9 +188,9 @@ class Triad(Group):
         misfit, first, least = 0.0, None, None
         for q in angles:
             middle = q + math.pi / SAMPLES
-            at = pins(middle)
+            at = before(middle)
             triad = self.solve(xp, middle, at, series)
-            for pin, o, l in zip(triad.pins, self.outer(at), lengths, strict=True):
+            for pin, o, l in zip(triad.pins, self.outer(at.pins), lengths, strict=True):
                 off = xp.abs(xp.sqrt((pin.p - o.p).squared()) / l - 1.0)
                 misfit = xp.maximum(misfit, xp.minimum(off, 1.0))
             # relative to the sign of the first margin: a margin that changes sign has passed a dead position
@@ -294,7 +294,9 @@ class SolvedTriad(SolvedGroup):
         margin = rows.det / (lengths[0] * lengths[1] * lengths[2] * size)
         return cls(rows, per_square, (*legs, ternary), pins, margin)
 
-    def third(self, outer: Sequence[Vec2]) -> tuple[Sequence[Third], Sequence[Vec2]]:
+    def third(
+        self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
+    ) -> tuple[Sequence[Third], Sequence[Vec2]]:
         """See `SolvedGroup`."""
         (*legs, ternary), rows = self.links, self._rows
         t1, t2 = ternary.t1, ternary.t2

@@ -97,7 +97,7 @@ class Accelerator(InverseMachine):
         """A crank alone."""
         return Linkage(
             ground={"O": ZERO},
-            crank=Crank(Bar("rotor", "O", p.radius, p.rotor), "rim"),
+            driver=Crank(Bar("rotor", "O", p.radius, p.rotor), "rim"),
             groups=(),
             loads={
                 "weight": Weight(p.g),

@@ -254,7 +254,7 @@ class KnifeDrive(InverseMachine):
         knife = p.knife
         return Linkage(
             ground={"O1": _vector(p.o1), "O2": _vector(p.o2), "O3": _vector(p.o3), "O4": _vector(p.o4)},
-            crank=Crank(Bar("crank", "O1", p.r, p.crank), "A"),
+            driver=Crank(Bar("crank", "O1", p.r, p.crank), "A"),
             groups=(
                 Dyad("B", Bar("coupler", "A", p.ab, p.coupler), Bar("rocker", "O2", p.bo2, p.rocker), 1.0),
                 Triad(

@@ -1,4 +1,4 @@
-"""A linkage as data: ground pins, a crank, Assur groups in order, bodies and points on links, loads by name.
+"""A linkage as data: ground pins, a driver, Assur groups in order, bodies and points on links, loads by name.
 
 Pins and links have names; each group hangs on pins of the ground and of earlier groups. Several links may meet in one
 pin, so that a joint has two names: its pin, and the link on which its reaction acts. The reactions, the points to
@@ -11,25 +11,25 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from ..groups.driver import Crank
-from ..groups.group import Group
-from ..groups.loads import Joint
+from ..groups.driver import Driver
+from ..groups.group import Group, Joint
 from ..planar import Vec2
 
 
 class Connections(NamedTuple):
-    """How a group hangs in its linkage: the names of its links, of the pins that it adds, and of the `outer` pins,
-    from which its bars start. Each of its `joints` has two further entries: the link on which the opposite reaction
-    acts (None for the ground), and the same link if it belongs to an earlier group (else None)."""
+    """How a group hangs in its linkage: names of its links, of the pins that it adds, of the pins that its bars start
+    from, and its joints: each with the link on which the opposite reaction acts, None for the ground, and again that
+    link where it stands before the group. `guides` are those of its joints that slide."""
 
     links: tuple[str, ...]
     pins: tuple[str, ...]
     outer: tuple[str, ...]
     joints: tuple[tuple[Joint, str | None, str | None], ...]
+    guides: tuple[Joint, ...] = ()
 
 
 class Topology(NamedTuple):
-    """The names of a linkage: the link that `carries` each pin or point that is not in the ground, the crank and the
+    """The names of a linkage: the link that `carries` each pin or point that is not in the ground, the driver and the
     groups with their connections, and the `points` on each link."""
 
     carries: dict[str, str]
@@ -42,6 +42,11 @@ class Topology(NamedTuple):
         return tuple(joint for group in self.groups for joint, *_ in group.joints)
 
     @property
+    def guides(self) -> tuple[Joint, ...]:
+        """The joints that slide."""
+        return tuple(joint for group in self.groups for joint in group.guides)
+
+    @property
     def links(self) -> dict[str, tuple[str, ...]]:
         """The pins and points on each link, to draw it; the pin that the link starts from stands first."""
         pins: dict[str, dict[str, None]] = {link: {} for group in self.groups for link in group.links}
@@ -52,11 +57,11 @@ class Topology(NamedTuple):
 
 @dataclass
 class Linkage:
-    """A mechanism with one crank. The `ground` pins have places in the frame [m], other pins and points have places
-    in the frame of their link. The loads, by name, follow the protocol `chainunit.groups.loads.Acting`."""
+    """A mechanism with one driver. Places in the frame [m], others in the frame of their link; loads as
+    `chainunit.groups.loads.Acting` describes them."""
 
     ground: Mapping[str, Vec2]
-    crank: Crank
+    driver: Driver
     groups: tuple[Group, ...]
     loads: Mapping[str, Any]
 
@@ -65,18 +70,19 @@ class Linkage:
         """The names of the linkage; they depend on no value."""
         carries: dict[str, str] = {}
         groups, points = [], {}
-        for group in (self.crank, *self.groups):
-            inner, bars = group.pins, group.bars
+        for group in (self.driver, *self.groups):
+            inner, bars, guides = group.pins, group.bars, group.guides
+            own = tuple(bar.name for bar in bars)
             carries |= inner
             joints = []
-            for pin, link in group.joints:
-                carrier = carries.get(pin)
-                joints.append(((pin, link), carrier, None if pin in inner else carrier))
+            for joint in group.joints:
+                carrier = guides[joint] if joint in guides else carries.get(joint[0])
+                joints.append((joint, carrier, None if carrier in own else carrier))
             for bar in bars:
                 carries |= dict.fromkeys(bar.points, bar.name)
                 points[bar.name] = tuple(bar.points)
             outer = tuple(bar.pin for bar in bars if bar.pin)
-            groups.append(Connections(tuple(bar.name for bar in bars), tuple(inner), outer, tuple(joints)))
+            groups.append(Connections(own, tuple(inner), outer, tuple(joints), tuple(guides)))
         return Topology(carries, tuple(groups), points)
 
     @property

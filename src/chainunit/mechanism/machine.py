@@ -18,17 +18,19 @@ from typing import Any
 
 from ..engines import Dual, dual, slope
 from ..groups.body import NO_LOAD, Body, Load, body_on, reflected_inertia
-from ..groups.group import SolvedGroup, Third
-from ..groups.loads import Effect, Joint, Moving, Wrench
+from ..groups.driver import SolvedDriver
+from ..groups.group import GuideForce, Joint, Slide, SolvedGroup, Third, rail_third
+from ..groups.loads import Effect, Moving, Wrench
 from ..planar import ZERO, Link, Motion, Vec2, growth
 from .linkage import Connections, Linkage, Topology
 
 
 class Mechanism:
-    """A linkage at crank angle `q` [rad]: its `links`, its `pins` and points, and its `bodies` by name; `turns` is
-    the relative rotation in each joint per rotation of the crank."""
+    """The links of a linkage at the coordinate `q`, a crank angle [rad] or a way [m]: `links`, `pins` with points,
+    and `bodies` by name; `turns` the relative rotation in each revolute joint by q, `slides` the motion in each
+    sliding one."""
 
-    __slots__ = ("_groups", "bodies", "linkage", "links", "pins", "q", "topology", "turns")
+    __slots__ = ("_groups", "bodies", "linkage", "links", "pins", "q", "slides", "topology", "turns")
 
     def __init__(
         self, xp: Any, linkage: Linkage, q: Any, derived: Sequence[Any] = (), topology: Topology | None = None
@@ -46,11 +48,12 @@ class Mechanism:
         self.pins = {name: Motion(at) for name, at in linkage.ground.items()}
         self.bodies: dict[str, Body] = {}
         self.turns: dict[Joint, Any] = {}
+        self.slides: dict[Joint, Slide] = {}
         self._groups: list[tuple[SolvedGroup, Connections]] = []
         links, pins, first = self.links, self.pins, 0
-        for group, connections in zip((linkage.crank, *linkage.groups), self.topology.groups, strict=True):
+        for group, connections in zip((linkage.driver, *linkage.groups), self.topology.groups, strict=True):
             last = first + group.derived
-            solved = group.solve(xp, q, pins, derived[first:last])
+            solved = group.solve(xp, q, self, derived[first:last])
             first = last
             self._groups.append((solved, connections))
             pins.update(zip(connections.pins, solved.pins, strict=True))
@@ -61,16 +64,22 @@ class Mechanism:
                         pins[point] = link.beside(s, t)
                 if bar.mass is not None:
                     self.bodies[bar.name] = body_on(link, bar.mass)
+            self.slides.update(zip(connections.guides, solved.slides, strict=True))
             for joint, carrier, _ in connections.joints:
-                turn = links[joint[1]].t1
-                self.turns[joint] = turn if carrier is None else turn - links[carrier].t1
+                if joint not in self.slides:
+                    turn = links[joint[1]].t1
+                    self.turns[joint] = turn if carrier is None else turn - links[carrier].t1
 
     def third(self) -> tuple[dict[str, Third], dict[str, Vec2]]:
         """Third derivatives by q of each link and of each pin that is not in the ground."""
         pins: dict[str, Vec2] = {}
         thirds: dict[str, Third] = {}
-        for solved, connections in self._groups:
-            links, inner = solved.third([pins.get(pin, ZERO) for pin in connections.outer])
+        groups = (self.linkage.driver, *self.linkage.groups)
+        for group, (solved, connections) in zip(groups, self._groups, strict=True):
+            links, inner = solved.third(
+                [pins.get(pin, ZERO) for pin in connections.outer],
+                [rail_third(rail, rail.placed(self.links), self.links, thirds) for rail in group.rails],
+            )
             thirds.update(zip(connections.links, links, strict=True))
             pins.update(zip(connections.pins, inner, strict=True))
             for name in connections.links:
@@ -80,16 +89,29 @@ class Mechanism:
         return thirds, pins
 
     def turning(self, reactions: Mapping[Joint, Vec2]) -> Iterator[Wrench]:
-        """The moments by which the present reactions enter the derivatives by q, as their arms turn with the
-        links."""
+        """The part of the reactions in the moments on the links as their arms turn with q, and in the forces as the
+        guides turn."""
         for _, connections in self._groups:
             for joint, carrier, _ in connections.joints:
                 (pin, name), force = joint, reactions[joint]
+                if joint in self.slides:
+                    yield from self._turning_guide(name, carrier, force)
+                    continue
                 p1, start = self.pins[pin].p1, self.links[name].pin.p1
                 if p1 is not start:
                     yield Wrench(name, ZERO, (p1 - start).cross(force))
                 if carrier is not None:
                     yield Wrench(carrier, ZERO, (self.links[carrier].pin.p1 - p1).cross(force))
+
+    def _turning_guide(self, name: str, carrier: str | None, force: Vec2) -> Iterator[Wrench]:
+        """That part of the reaction of a guide: the force is normal to its line, which turns with the link."""
+        link = self.links[name]
+        more = force.turned() * link.t1
+        yield Wrench(name, more, 0.0)
+        if carrier is not None:
+            other = self.links[carrier]
+            arm, arm1 = link.pin.p - other.pin.p, link.pin.p1 - other.pin.p1
+            yield Wrench(carrier, -more, -(arm1.cross(force) + arm.cross(more)))
 
     def carrier(self, pin: str) -> str:
         """The link that carries a pin or a point."""
@@ -100,6 +122,8 @@ class Mechanism:
         slopes = {}
         for _, connections in self._groups:
             for joint, carrier, _ in connections.joints:
+                if joint in self.slides:
+                    continue
                 t2 = self.links[joint[1]].t2
                 slopes[joint] = t2 if carrier is None else t2 - self.links[carrier].t2
         return slopes
@@ -109,8 +133,8 @@ class Mechanism:
         return [solved.margin for solved, _ in self._groups[1:]]
 
     def reactions(self, acting: Mapping[str, Load]) -> tuple[Any, dict[Joint, Vec2]]:
-        """The torque along the crank angle [N m] and the force in each joint on its link [N], from the action on each
-        link, without friction: the force pass, independent of virtual work."""
+        """The torque (or force) along the coordinate [N m, N] and the force in each joint on its link [N], from what
+        acts on the links, without friction: the force pass, independent of virtual work."""
         loads = dict(acting)
         reactions: dict[Joint, Vec2] = {}
         for solved, connections in reversed(self._groups):
@@ -119,13 +143,18 @@ class Mechanism:
                 reactions[joint] = force
                 if before is not None:
                     total, moment = loads.get(before, NO_LOAD)
-                    at, pin = self.pins[joint[0]].p, self.links[before].pin.p
+                    pin = self.links[before].pin.p
+                    if isinstance(force, GuideForce):
+                        at, moment = self.links[joint[1]].pin.p, moment - force.moment
+                    else:
+                        at = self.pins[joint[0]].p
                     loads[before] = (
                         total - force,
                         moment - (at.x - pin.x) * force.y + (at.y - pin.y) * force.x,
                     )
-        _, torque = loads.get(self.linkage.crank.bar.name, NO_LOAD)
-        return torque, reactions
+        driver, _ = self._groups[0]
+        assert isinstance(driver, SolvedDriver)
+        return driver.effort(loads.get(self.linkage.driver.bar.name, NO_LOAD)), reactions
 
 
 def add_wrenches(loads: dict[str, Load], wrenches: Iterable[Wrench]) -> dict[str, Load]:
@@ -151,7 +180,7 @@ class _OnDemand(dict[str, Any]):
 class LiftedMechanism:
     """A mechanism in the form that loads take (`Moving`), with its derivatives by q as dual parts."""
 
-    __slots__ = ("_of", "bodies", "links", "pins", "turns")
+    __slots__ = ("_of", "bodies", "links", "pins", "slides", "turns")
 
     def __init__(self, m: Mechanism, links: Mapping[str, Third], pins: Mapping[str, Vec2]) -> None:
         """
@@ -164,21 +193,22 @@ class LiftedMechanism:
         self.pins: Mapping[str, Motion] = _OnDemand(lambda name: m.pins[name].lifted(pins.get(name, ZERO)))
         self.bodies: Mapping[str, Body] = {}
         self.turns: Mapping[Joint, Any] = {}
+        self.slides: Mapping[Joint, Slide] = {}
 
     def carrier(self, pin: str) -> str:
         """The link that carries a pin or a point."""
         return self._of.carrier(pin)
 
 
-def _pins(xp: Any, linkage: Linkage, derived: Sequence[Any], q: float) -> dict[str, Motion]:
-    return Mechanism(xp, linkage, q, derived).pins
+def _placed(xp: Any, linkage: Linkage, derived: Sequence[Any], q: float) -> Mechanism:
+    return Mechanism(xp, linkage, q, derived)
 
 
 def derived_numbers(xp: Any, linkage: Linkage) -> list[Any]:
     """Values that the groups derive from the lengths, once before a run."""
     numbers: list[Any] = []
     for k, group in enumerate(linkage.groups):
-        numbers += group.derive(xp, functools.partial(_pins, xp, linkage.before(k), tuple(numbers)))
+        numbers += group.derive(xp, functools.partial(_placed, xp, linkage.before(k), tuple(numbers)))
     return numbers
 
 
@@ -259,7 +289,7 @@ class MachineState:
         reactions = {}
         for joint, f in self.steady.reactions.items():
             more = inertial[joint]
-            reactions[joint] = Vec2(f.x + more.x * a, f.y + more.y * a)
+            reactions[joint] = f.plus(more, a)
         return reactions
 
     def torque_by_reactions(self, a: Any) -> Any:

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from typing import Any, ClassVar
 
-from ..groups.loads import Joint
+from ..groups.group import Joint
 from ..model import Model, Part, Requirement
 from ..ports import PortSlopes, PortValues, ShaftMotion, Start, flanges, load_terminal
 from ..quantities import Layout, Value, declaration, quantity
@@ -300,7 +300,7 @@ class DirectMachine(LinkageModel):
     def requirements(cls, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
         """The limits of the inverse model, and those of an inertia that never vanishes."""
         yield from cls.inverse.requirements(xp, p)
-        yield p.J_added * p.ratio * p.ratio + cls.linkage(p, cls.Inputs()).crank.inertia, 0.0, math.inf
+        yield p.J_added * p.ratio * p.ratio + cls.linkage(p, cls.Inputs()).driver.inertia, 0.0, math.inf
 
     @classmethod
     def start_from(cls, outputs: Mapping[str, float]) -> dict[str, float]:

@@ -116,7 +116,7 @@ def dimensions(machine: Machine) -> dict[tuple[str, ...], Dimension]:
         return None if v is None or v.unit != "m" else Dimension(v.name, v.description, values[v.name])
 
     matches: dict[tuple[str, ...], Dimension | None] = {}
-    for group in (marked_linkage.crank, *marked_linkage.groups):
+    for group in (marked_linkage.driver, *marked_linkage.groups):
         for bar in group.bars:
             matches["link", bar.name] = dimension_of(getattr(bar, "length", 0.0) or 0.0)
             for name, (s, _) in bar.points.items():
@@ -135,7 +135,7 @@ def drawing(machine: Machine, phi: float = 1.0) -> str:
     turns = np.linspace(0.0, 2.0 * math.pi, 73)
     orbit = machine.state(machine.inputs({"phi": turns * machine.ratio})).m
     places = {name: (float(x), float(y)) for name, (x, y) in linkage.places(whole).items()}
-    crank, canvas = whole.linkage.crank, _Canvas()
+    crank, canvas = whole.linkage.driver, _Canvas()
     to_page = _scale([*places.values(), *_curve(linkage.places(orbit)[crank.end])])
     at = {name: to_page(place) for name, place in places.items()}
     links = [_straightened(link, at) for link in linkage.links(whole.linkage, {})]

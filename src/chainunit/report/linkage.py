@@ -16,7 +16,7 @@ def links(linkage: Linkage, looks: Mapping[str, str]) -> Iterator[DrawnLink]:
     """The links as they are drawn, the crank first. Links with a pin in the ground are heavier than the others; a
     link with more than two pins is an area. `looks` has the looks of links that differ from this rule."""
     for name, pins in linkage.topology.links.items():
-        crank, grounded = name == linkage.crank.bar.name, any(pin in linkage.ground for pin in pins)
+        crank, grounded = name == linkage.driver.bar.name, any(pin in linkage.ground for pin in pins)
         usual = "crank" if crank else "heavy" if grounded else "light"
         yield DrawnLink(name, pins, looks.get(name, usual), closed=len(pins) > 2)
 

@@ -37,7 +37,7 @@ def motion(study: StudyRecord) -> Animation:
     supplement = (organ_motion if model.sides else EdgeMotion if model.cuts else Supplement)(study)
     angles = np.linspace(0.0, 2.0 * math.pi, _PER_TURN + 1)
     whole = machine.state(machine.inputs({"phi": angles * machine.ratio})).m
-    paths, crank = linkage.paths(whole), whole.linkage.crank
+    paths, crank = linkage.paths(whole), whole.linkage.driver
     thin = f"; a thin line is the {', the '.join(paths)}" if paths else ""
     return Animation(
         tuple(_links(whole, supplement)),

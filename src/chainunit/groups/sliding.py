@@ -1,0 +1,511 @@
+"""The dyads with sliding joints (class II Assur groups): RRP, RPR, PRP and RPP, each in closed form.
+
+A sliding joint keeps two links at a fixed angle to each other and a point of one on a line of the other. `d` is the
+direction of that line, `n` the direction that is turned from it by +90 degrees. The joint carries a force N n and a
+moment, the couple of its guide.
+
+A line that belongs to a link that moves in a known way is a `Rail`. Where it is placed, it is a `Link` of its own: it
+starts from a point of the line, and its unit vector is `d`. The base points are chosen so that the group's pin itself
+lies on the rail: a constant offset between the block and the pin turns with the rail, as the block does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from ..planar import Link, Motion, Vec2
+from .body import Bar, Load
+from .group import Group, GuideForce, Placed, Rail, Slide, SolvedGroup, Third
+
+
+def _coriolis(frame: Link, carried: Motion, slid: Vec2) -> Vec2:
+    """Second derivative of a point that the frame carries and that slides by `slid` per q at a constant rate."""
+    return carried.p2 + slid.turned() * (2.0 * frame.t1)
+
+
+def _coriolis_third(frame: Link, third: Vec2, slid: Vec2, slid2: Vec2) -> Vec2:
+    """Third derivative of a point that slides by `slid` per q, which itself changes by `slid2` in the frame, from
+    `third` of the point that the frame carries; the third derivative of the way is left out."""
+    t1 = frame.t1
+    return third + slid.turned() * (3.0 * frame.t2) - slid * (3.0 * (t1 * t1)) + slid2.turned() * (3.0 * t1)
+
+
+def _rod_angle(r: Vec2, k1: Vec2, k2: Vec2, per_square: Any) -> tuple[Any, Any]:
+    """Derivatives of the angle of a rod of constant length along `r`, from those of its end against its start."""
+    return r.cross(k1) * per_square, r.cross(k2) * per_square
+
+
+@dataclass
+class RRP(Group):
+    """Coupler and slider: the rod `first` from a pin that moves in a known way to the `inner` pin, which the `slider`
+    carries along a `rail`.
+
+    The slider's frame starts at the inner pin and has the direction of the rail. `side` is +1 where the inner pin
+    lies beyond the foot of the perpendicular from the outer pin to the rail, in the rail's direction, -1 where
+    before it. `guide` is the pin at which the force of the sliding joint acts on the slider.
+    """
+
+    inner: str
+    first: Bar
+    slider: Bar
+    rail: Rail
+    guide: str
+    side: float
+
+    @property
+    def bars(self) -> tuple[Bar, ...]:
+        """See `Group`."""
+        return self.first, self.slider
+
+    @property
+    def pins(self) -> dict[str, str]:
+        """See `Group`."""
+        return {self.inner: self.slider.name}
+
+    @property
+    def joints(self) -> tuple[tuple[str, str], ...]:
+        """See `Group`."""
+        first, slider = self.first.name, self.slider.name
+        return (self.first.pin, first), (self.inner, first), (self.guide, slider)
+
+    @property
+    def guides(self) -> Mapping[tuple[str, str], str | None]:
+        """See `Group`."""
+        return {(self.guide, self.slider.name): self.rail.of}
+
+    @property
+    def rails(self) -> tuple[Rail, ...]:
+        """See `Group`."""
+        return (self.rail,)
+
+    def solve(self, xp: Any, q: Any, at: Placed, derived: Sequence[Any]) -> SolvedRRP:
+        """See `Group`."""
+        return SolvedRRP.between(
+            xp, at.pins[self.first.pin], self.rail.placed(at.links), self.first.length, self.side
+        )
+
+
+class SolvedRRP(SolvedGroup):
+    """A solved RRP dyad; its margin is the cosine of the angle between rod and rail."""
+
+    __slots__ = ("_per_along", "_per_square", "_rail")
+
+    def __init__(
+        self,
+        rail: Link,
+        per: tuple[Any, Any],
+        links: tuple[Link, ...],
+        pins: tuple[Motion, ...],
+        margin: Any,
+        slides: tuple[Slide, ...],
+    ) -> None:
+        super().__init__(links, pins, margin, slides)
+        self._rail, (self._per_along, self._per_square) = rail, per
+
+    @classmethod
+    def between(cls, xp: Any, p: Motion, rail: Link, a: Any, side: float) -> SolvedRRP:
+        """
+        Parameters
+        ----------
+        p : motion of the outer pin of the rod
+        rail : line of the inner pin
+        a : length of the rod [m]
+        side : see `RRP`
+        """
+        d = rail.u
+        w = rail.pin.p - p.p
+        across = w.cross(d)
+        along = side * xp.sqrt(a * a - across * across)  # r . d
+        s = along - w.dot(d)
+        r = w + d * s
+        carried = rail.carried(d * s)
+        minus_per_along = -1.0 / along
+        s1 = r.dot(carried.p1 - p.p1) * minus_per_along
+        slid = d * s1
+        r1 = carried.p1 + slid - p.p1
+        most = _coriolis(rail, carried, slid)
+        s2 = (r.dot(most - p.p2) + r1.squared()) * minus_per_along
+        r2 = most + d * s2 - p.p2
+        per_square = 1.0 / (a * a)
+        inner = Motion(carried.p, carried.p1 + slid, most + d * s2)
+        rod = Link(p, r * (1.0 / a), *_rod_angle(r, r1, r2, per_square))
+        slider = Link(inner, d, rail.t1, rail.t2)
+        per = minus_per_along, per_square
+        return cls(rail, per, (rod, slider), (inner,), along / a, (Slide(d, s, s1, s2),))
+
+    def third(
+        self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
+    ) -> tuple[Sequence[Third], Sequence[Vec2]]:
+        """See `SolvedGroup`."""
+        (p,), ((base, t3),), (rod, slider), rail = outer, rails, self.links, self._rail
+        (slide,), inner = self.slides, slider.pin
+        r, r1, r2 = inner.p - rod.pin.p, inner.p1 - rod.pin.p1, inner.p2 - rod.pin.p2
+        carried = rail.third(inner.p - rail.pin.p, base, t3)
+        most = _coriolis_third(rail, carried, slide.d * slide.s1, slide.d * slide.s2)
+        s3 = (r.dot(most - p) + 3.0 * r1.dot(r2)) * self._per_along
+        end = most + rail.u * s3
+        turn = r.cross(end - p) * self._per_square + rod.t1 * rod.t1 * rod.t1
+        return [(p, turn), (end, t3)], [end]
+
+    def reactions(self, loads: Sequence[Load]) -> tuple[Vec2, ...]:
+        """Forces on the rod at its outer pin and at the inner pin, and on the slider from the rail [N], from the
+        loads on the rod, about its outer pin, and on the slider, about the inner pin."""
+        (f1, m1), (f2, m2) = loads
+        rod, slider = self.links
+        d, r = slider.u, slider.pin.p - rod.pin.p
+        n = d.turned()
+        along = f2.dot(d)
+        # moment about the outer pin: m1 + r x (d along + n across) = 0, with r x n = r . d
+        across = (m1 + r.cross(d) * along) * self._per_along
+        inner = d * along + n * across
+        return -(f1 + inner), inner, GuideForce.along(n, across - f2.dot(n), -m2)
+
+
+@dataclass
+class RPR(Group):
+    """Oscillating slide: the links `first` and `second` on pins that move in a known way, with a sliding joint
+    between them.
+
+    The frames of both links start at these pins and have the direction of the line. The first pin lies on the line,
+    or `offset` [m] to the left of the parallel to it through the second pin. `side` is +1 where the first pin lies
+    beyond the second one, in the direction of the line, -1 where before it. `guide` is the pin at which the force of
+    the sliding joint acts on the first link, from the second.
+    """
+
+    first: Bar
+    second: Bar
+    offset: Any
+    guide: str
+    side: float
+
+    @property
+    def bars(self) -> tuple[Bar, ...]:
+        """See `Group`."""
+        return self.first, self.second
+
+    @property
+    def pins(self) -> dict[str, str]:
+        """See `Group`: none."""
+        return {}
+
+    @property
+    def joints(self) -> tuple[tuple[str, str], ...]:
+        """See `Group`."""
+        first, second = self.first, self.second
+        return (first.pin, first.name), (self.guide, first.name), (second.pin, second.name)
+
+    @property
+    def guides(self) -> Mapping[tuple[str, str], str | None]:
+        """See `Group`."""
+        return {(self.guide, self.first.name): self.second.name}
+
+    def solve(self, xp: Any, q: Any, at: Placed, derived: Sequence[Any]) -> SolvedRPR:
+        """See `Group`."""
+        return SolvedRPR.between(
+            xp, at.pins[self.first.pin], at.pins[self.second.pin], self.offset, self.side
+        )
+
+
+class SolvedRPR(SolvedGroup):
+    """A solved RPR dyad; its margin is the sine of the angle between the line of the pins and the normal of the
+    slide: 0 where the first pin lies beside the second one."""
+
+    __slots__ = ("_offset", "_per_way")
+
+    def __init__(
+        self,
+        offset: Any,
+        per_way: Any,
+        links: tuple[Link, ...],
+        pins: tuple[Motion, ...],
+        margin: Any,
+        slides: tuple[Slide, ...],
+    ) -> None:
+        super().__init__(links, pins, margin, slides)
+        self._offset, self._per_way = offset, per_way
+
+    @classmethod
+    def between(cls, xp: Any, p: Motion, q: Motion, offset: Any, side: float) -> SolvedRPR:
+        """
+        Parameters
+        ----------
+        p, q : motion of the pins of the first and of the second link
+        offset, side : see `RPR`
+        """
+        # v = P - Q = L d + offset n
+        v, v1, v2 = p.p - q.p, p.p1 - q.p1, p.p2 - q.p2
+        square = v.squared()
+        way = side * xp.sqrt(square - offset * offset)
+        per = 1.0 / square
+        d = (v * way - v.turned() * offset) * per
+        n = d.turned()
+        per_way = 1.0 / way
+        t1 = v1.dot(n) * per_way
+        s1 = v1.dot(d) + t1 * offset
+        # v'' = t2 (L n - offset d) - t1^2 v + 2 t1 L' n + L'' d
+        t2 = (v2.dot(n) + t1 * t1 * offset - 2.0 * t1 * s1) * per_way
+        s2 = v2.dot(d) + t2 * offset + t1 * t1 * way
+        links = Link(p, d, t1, t2), Link(q, d, t1, t2)
+        return cls(offset, per_way, links, (), way / xp.sqrt(square), (Slide(d, way, s1, s2),))
+
+    def third(
+        self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
+    ) -> tuple[Sequence[Third], Sequence[Vec2]]:
+        """See `SolvedGroup`."""
+        (p, q), (slide,), (link, _) = outer, self.slides, self.links
+        n, t1, t2 = slide.d.turned(), link.t1, link.t2
+        # the part along n of v''' = (t3 - t1^3) (L n - offset d) - 3 t1 t2 v + 3 t2 L' n - 3 t1^2 L' d
+        #   + 3 t1 L'' n + L''' d
+        rest = (p - q).dot(n) + 3.0 * t1 * t2 * self._offset - 3.0 * (t2 * slide.s1 + t1 * slide.s2)
+        t3 = rest * self._per_way + t1 * t1 * t1
+        return [(p, t3), (q, t3)], []
+
+    def reactions(self, loads: Sequence[Load]) -> tuple[Vec2, ...]:
+        """Forces on the first link at its pin and from the slide, and on the second at its pin [N], from the loads on
+        each link, about its pin."""
+        (f1, m1), (f2, m2) = loads
+        first, _ = self.links
+        n = first.u.turned()
+        # on the second link, about its pin: m2 + m1 - (P - Q) x N n = 0
+        force = (m1 + m2) * self._per_way
+        guide = GuideForce.along(n, force, -m1)
+        return -(f1 + guide), guide, guide - f2
+
+
+@dataclass
+class PRP(Group):
+    """Cross slide: two sliders, `first` and `second`, on a rail each, with the `inner` pin between them.
+
+    The frame of each slider starts at the inner pin and has the direction of its rail. `guides_at` are the pins at
+    which the forces of the sliding joints act on the sliders.
+    """
+
+    inner: str
+    first: Bar
+    second: Bar
+    first_rail: Rail
+    second_rail: Rail
+    guides_at: tuple[str, str]
+
+    @property
+    def bars(self) -> tuple[Bar, ...]:
+        """See `Group`."""
+        return self.first, self.second
+
+    @property
+    def pins(self) -> dict[str, str]:
+        """See `Group`."""
+        return {self.inner: self.second.name}
+
+    @property
+    def joints(self) -> tuple[tuple[str, str], ...]:
+        """See `Group`."""
+        first, second = self.first.name, self.second.name
+        return (self.guides_at[0], first), (self.inner, first), (self.guides_at[1], second)
+
+    @property
+    def guides(self) -> Mapping[tuple[str, str], str | None]:
+        """See `Group`."""
+        first, _, second = self.joints
+        return {first: self.first_rail.of, second: self.second_rail.of}
+
+    @property
+    def rails(self) -> tuple[Rail, ...]:
+        """See `Group`."""
+        return self.first_rail, self.second_rail
+
+    def solve(self, xp: Any, q: Any, at: Placed, derived: Sequence[Any]) -> SolvedPRP:
+        """See `Group`."""
+        return SolvedPRP.between(self.first_rail.placed(at.links), self.second_rail.placed(at.links))
+
+
+class SolvedPRP(SolvedGroup):
+    """A solved PRP dyad; its margin is the sine of the angle between the rails."""
+
+    __slots__ = ("_rails",)
+
+    def __init__(
+        self,
+        rails: tuple[Link, Link, Any],
+        links: tuple[Link, ...],
+        pins: tuple[Motion, ...],
+        margin: Any,
+        slides: tuple[Slide, ...],
+    ) -> None:
+        super().__init__(links, pins, margin, slides)
+        self._rails = rails
+
+    @classmethod
+    def between(cls, a: Link, b: Link) -> SolvedPRP:
+        """
+        Parameters
+        ----------
+        a, b : the rails of the first and of the second slider
+        """
+        per = 1.0 / a.u.cross(b.u)
+
+        def ways(gap: Vec2) -> tuple[Any, Any]:
+            """Ways along both rails that close a gap: a.u x - b.u y = gap."""
+            return gap.cross(b.u) * per, gap.cross(a.u) * per
+
+        x, y = ways(b.pin.p - a.pin.p)
+        on_a, on_b = a.carried(a.u * x), b.carried(b.u * y)
+        x1, y1 = ways(on_b.p1 - on_a.p1)
+        most_a, most_b = _coriolis(a, on_a, a.u * x1), _coriolis(b, on_b, b.u * y1)
+        x2, y2 = ways(most_b - most_a)
+        inner = Motion(on_a.p, on_a.p1 + a.u * x1, most_a + a.u * x2)
+        links = Link(inner, a.u, a.t1, a.t2), Link(inner, b.u, b.t1, b.t2)
+        slides = Slide(a.u, x, x1, x2), Slide(b.u, y, y1, y2)
+        return cls((a, b, per), links, (inner,), a.u.cross(b.u), slides)
+
+    def third(
+        self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
+    ) -> tuple[Sequence[Third], Sequence[Vec2]]:
+        """See `SolvedGroup`."""
+        (a, b, per), (one, other), (inner,) = self._rails, self.slides, self.pins
+        most = []
+        for rail, slide, (base, t3) in ((a, one, rails[0]), (b, other, rails[1])):
+            carried = rail.third(inner.p - rail.pin.p, base, t3)
+            most.append(_coriolis_third(rail, carried, slide.d * slide.s1, slide.d * slide.s2))
+        x3 = (most[1] - most[0]).cross(b.u) * per
+        end = most[0] + a.u * x3
+        return [(end, rails[0][1]), (end, rails[1][1])], [end]
+
+    def reactions(self, loads: Sequence[Load]) -> tuple[Vec2, ...]:
+        """Forces on the first slider from its rail and at the inner pin, and on the second slider from its rail [N],
+        from the loads on each slider, about the inner pin."""
+        (f1, m1), (f2, m2) = loads
+        a, b, per = self._rails
+        # along the rails: (f1 + X) . a = 0, (f2 - X) . b = 0; with X = -turned(a) x .. solved for its parts
+        along_a, along_b = -f1.dot(a.u), f2.dot(b.u)
+        inner = (a.u * along_b - b.u * along_a).turned() * per
+        na, nb = a.u.turned(), b.u.turned()
+        return (
+            GuideForce.along(na, -(f1 + inner).dot(na), -m1),
+            inner,
+            GuideForce.along(nb, (inner - f2).dot(nb), -m2),
+        )
+
+
+@dataclass
+class RPP(Group):
+    """Yoke: the `block` on a pin that moves in a known way, in a slot of the `yoke`, which slides on a `rail`.
+
+    The frame of the block starts at its pin, that of the yoke at the point of its slot that moves along the rail;
+    both have the direction of the rail. `slot` is the direction of the slot in that frame, a unit vector.
+    `guides_at` are the pins at which the forces of the sliding joints act: on the block from the yoke, and on the
+    yoke from the rail.
+    """
+
+    block: Bar
+    yoke: Bar
+    rail: Rail
+    slot: Vec2
+    guides_at: tuple[str, str]
+
+    @property
+    def bars(self) -> tuple[Bar, ...]:
+        """See `Group`."""
+        return self.block, self.yoke
+
+    @property
+    def pins(self) -> dict[str, str]:
+        """See `Group`: none."""
+        return {}
+
+    @property
+    def joints(self) -> tuple[tuple[str, str], ...]:
+        """See `Group`."""
+        block, yoke = self.block, self.yoke
+        return (block.pin, block.name), (self.guides_at[0], block.name), (self.guides_at[1], yoke.name)
+
+    @property
+    def guides(self) -> Mapping[tuple[str, str], str | None]:
+        """See `Group`."""
+        _, slot, rail = self.joints
+        return {slot: self.yoke.name, rail: self.rail.of}
+
+    @property
+    def rails(self) -> tuple[Rail, ...]:
+        """See `Group`."""
+        return (self.rail,)
+
+    def solve(self, xp: Any, q: Any, at: Placed, derived: Sequence[Any]) -> SolvedRPP:
+        """See `Group`."""
+        return SolvedRPP.between(at.pins[self.block.pin], self.rail.placed(at.links), self.slot)
+
+
+class SolvedRPP(SolvedGroup):
+    """A solved RPP dyad; its margin is the sine of the angle between rail and slot."""
+
+    __slots__ = ("_per", "_rail")
+
+    def __init__(
+        self,
+        rail: Link,
+        per: Any,
+        links: tuple[Link, ...],
+        pins: tuple[Motion, ...],
+        margin: Any,
+        slides: tuple[Slide, ...],
+    ) -> None:
+        super().__init__(links, pins, margin, slides)
+        self._rail, self._per = rail, per
+
+    @classmethod
+    def between(cls, p: Motion, rail: Link, slot: Vec2) -> SolvedRPP:
+        """
+        Parameters
+        ----------
+        p : motion of the pin of the block
+        rail : the rail of the yoke
+        slot : see `RPP`
+        """
+        d = rail.u
+        e = d * slot.x + d.turned() * slot.y
+        per = 1.0 / slot.y  # d x e
+
+        def ways(gap: Vec2) -> tuple[Any, Any]:
+            """Ways along rail and slot: d x + e y = gap."""
+            return gap.cross(e) * per, d.cross(gap) * per
+
+        w = p.p - rail.pin.p
+        x, y = ways(w)
+        carried = rail.carried(w)
+        x1, y1 = ways(p.p1 - carried.p1)
+        slid = d * x1 + e * y1
+        x2, y2 = ways(p.p2 - _coriolis(rail, carried, slid))
+        on_rail = rail.carried(d * x)
+        start = Motion(on_rail.p, on_rail.p1 + d * x1, _coriolis(rail, on_rail, d * x1) + d * x2)
+        links = Link(p, d, rail.t1, rail.t2), Link(start, d, rail.t1, rail.t2)
+        return cls(rail, per, links, (), slot.y, (Slide(e, y, y1, y2), Slide(d, x, x1, x2)))
+
+    def third(
+        self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
+    ) -> tuple[Sequence[Third], Sequence[Vec2]]:
+        """See `SolvedGroup`."""
+        (p,), ((base, t3),), rail, (slot, way) = outer, rails, self._rail, self.slides
+        block, yoke = self.links
+        d, e = way.d, slot.d
+        slid, slid2 = d * way.s1 + e * slot.s1, d * way.s2 + e * slot.s2
+        carried = rail.third(block.pin.p - rail.pin.p, base, t3)
+        x3 = (p - _coriolis_third(rail, carried, slid, slid2)).cross(e) * self._per
+        on_rail = rail.third(yoke.pin.p - rail.pin.p, base, t3)
+        start = _coriolis_third(rail, on_rail, d * way.s1, d * way.s2) + d * x3
+        return [(p, t3), (start, t3)], []
+
+    def reactions(self, loads: Sequence[Load]) -> tuple[Vec2, ...]:
+        """Forces on the block at its pin and from the slot, and on the yoke from the rail [N], from the loads on the
+        block, about its pin, and on the yoke, about the start of its frame."""
+        (f1, m1), (f2, m2) = loads
+        block, yoke = self.links
+        slot, way = self.slides
+        across, n = slot.d.turned(), way.d.turned()
+        # along the rail, on the yoke: f2 - across N = 0, and across . d = -d x e
+        force = -f2.dot(way.d) * self._per
+        in_slot = GuideForce.along(across, force, -m1)
+        # on the yoke acts the opposite at the pin of the block
+        moment = m2 + m1 - (block.pin.p - yoke.pin.p).cross(in_slot)
+        return -(f1 + in_slot), in_slot, GuideForce.along(n, (in_slot - f2).dot(n), -moment)
