@@ -1,7 +1,7 @@
 """The drivers, which move in a given way: a crank on a fixed bearing, and a ram on a fixed rail.
 
-Each gives the coordinate q of the linkage. That of the packaged machines is the crank angle, counted from the upward
-vertical and positive clockwise: the counter-clockwise angle of the crank falls at the rate -1.
+Each has the coordinate q of the linkage. In the packaged machines q is the crank angle, which counts from the upward
+vertical, positive clockwise, so that the derivative of the crank's counter-clockwise angle by q is -1.
 """
 
 from __future__ import annotations
@@ -18,9 +18,10 @@ UPWARD = Vec2(0.0, 1.0)
 
 
 class Driver(Group):
-    """The link that is driven, as data."""
+    """The link that is driven, as data: its bar, and the pin that shows its motion."""
 
     bar: Bar
+    end: str
 
     @property
     def bars(self) -> tuple[Bar, ...]:
@@ -36,18 +37,23 @@ class Driver(Group):
 
 @dataclass
 class Crank(Driver):
-    """A crank as data: a bar on a ground pin, the name of the pin at its end, if it has one there, the direction of
-    the bar at q = 0, a unit vector, and `sense`: +1 where q counts counter-clockwise, -1 where clockwise."""
+    """A crank as data: its bar, which starts from a ground pin; the pin at the bar's `end`, or one of its points if
+    the bar has no length; the direction of the bar at q = 0, a unit vector; and `sense`: +1 where q counts
+    counter-clockwise, -1 where clockwise."""
 
     bar: Bar
-    end: str = ""
+    end: str
     start: Vec2 = UPWARD
     sense: float = -1.0
 
     @property
     def pins(self) -> dict[str, str]:
         """The pin at its end."""
-        return {self.end: self.bar.name} if self.end else {}
+        return {self.end: self.bar.name} if self._ends else {}
+
+    @property
+    def _ends(self) -> bool:
+        return self.bar.length is not None
 
     @property
     def joints(self) -> tuple[tuple[str, str], ...]:
@@ -67,18 +73,19 @@ class Crank(Driver):
     def solve(self, xp: Any, q: Any, at: Placed, derived: Sequence[Any]) -> SolvedDriver:
         """The crank at the angle `q` [rad]."""
         link = crank(xp, at.pins[self.bar.pin].p, q, self.start, self.sense)
-        return TurnedCrank((link,), (link.at(self.bar.length),) if self.end else ())
+        return TurnedCrank((link,), (link.at(self.bar.length),) if self._ends else ())
 
 
 @dataclass
 class Ram(Driver):
-    """A ram as data, such as the rod of a hydraulic cylinder: a bar without a pin, which moves along a `rail` of the
+    """A ram as data, such as the rod of a hydraulic cylinder: its bar, without a pin, moves along a `rail` of the
     ground. Its frame starts at the point of the rail that q [m] counts from and has the direction of the rail.
     `guide` is the pin at which the reaction of the rail acts on it."""
 
     bar: Bar
     rail: Rail
     guide: str
+    end: str = ""
 
     @property
     def pins(self) -> dict[str, str]:

@@ -9,13 +9,13 @@ from ..planar import ZERO, Link, Motion, Vec2
 from .body import Bar, Load
 
 Third = tuple[Vec2, Any]
-"""Third derivatives by q of a link: of its pin and of its angle."""
+"""Third derivatives of a link by q: of its pin and of its angle."""
 Joint = tuple[str, str]
 """A joint of a linkage by the names of its pin and of the link on which its reaction acts."""
 
 
 class Placed(Protocol):
-    """The part of a linkage that stands before a group, where it is: `pins` with points, and `links`, by name."""
+    """The linkage before a group at one position: its `pins` with points, and its `links`, by name."""
 
     @property
     def pins(self) -> Mapping[str, Motion]:
@@ -35,7 +35,7 @@ class Rail(NamedTuple):
     along: Vec2
 
     def placed(self, links: Mapping[str, Link]) -> Link:
-        """The line where its link is: it starts from the point and has the direction of the line."""
+        """The line at the position of its link, as a link of its own: it starts from the point."""
         if self.of is None:
             return Link(Motion(self.at), self.along, 0.0, 0.0)
         link, along = links[self.of], self.along
@@ -94,8 +94,8 @@ class SolvedGroup:
     def third(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
-        """Third derivatives by q of each link and of each pin that the group adds, from those of the pins that its
-        bars start from, and of its rails: of the point that a rail starts from, and of its angle."""
+        """Third derivatives by q of each link and of each pin that the group adds, from the third derivatives of the
+        pins that its bars start from and of its rails (of the start of the rail, and of its angle)."""
         raise NotImplementedError
 
     def reactions(self, loads: Sequence[Load]) -> Sequence[Vec2]:
@@ -117,12 +117,12 @@ class Group:
 
     @property
     def pins(self) -> Mapping[str, str]:
-        """Pins that it adds, each with the link that carries all else that hangs on it."""
+        """The pins that the group adds, each with the link on which further groups at this pin hang."""
         raise NotImplementedError
 
     @property
     def joints(self) -> tuple[Joint, ...]:
-        """Pin and link of each reaction, as `SolvedGroup.reactions` gives them."""
+        """Pin and link of each reaction, in the order of `SolvedGroup.reactions`."""
         raise NotImplementedError
 
     @property
@@ -132,15 +132,16 @@ class Group:
 
     @property
     def rails(self) -> tuple[Rail, ...]:
-        """The lines of links before it on which its own links slide."""
+        """The lines of earlier links on which its own links slide."""
         return ()
 
     def derive(self, xp: Any, before: Callable[[float], Placed]) -> list[Any]:
-        """Numbers that follow from its lengths; `before` gives what stands before it at a crank angle [rad]."""
+        """Numbers that follow from its lengths; `before` gives the linkage before the group at a crank angle
+        [rad]."""
         return []
 
     def solve(self, xp: Any, q: Any, at: Placed, derived: Sequence[Any]) -> SolvedGroup:
-        """The group at the coordinate `q` [rad], with what stands before it as it is placed `at` it."""
+        """The group at the coordinate `q` [rad]; `at` is the linkage before the group at this coordinate."""
         raise NotImplementedError
 
 

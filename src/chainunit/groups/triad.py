@@ -163,7 +163,7 @@ class Triad(Group):
 
     def derive(self, xp: Any, before: Callable[[float], Placed]) -> list[Any]:
         """The series of the pose over the crank angle, the largest misfit and the least margin around; `before` gives
-        what stands before the triad at a crank angle [rad]."""
+        the linkage before the triad at a crank angle [rad]."""
         angles = [2.0 * math.pi * k / SAMPLES for k in range(SAMPLES)]
         lengths, arms = self._lengths(), tuple(self.arms.values())
 
