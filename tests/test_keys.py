@@ -6,7 +6,6 @@ import re
 import tomllib
 from pathlib import Path
 
-import jsonschema
 import pytest
 from command import chainunit
 
@@ -20,7 +19,7 @@ from chainunit.study.commented import commented
 from chainunit.study.config import parse
 from chainunit.study.event import TYPES
 from chainunit.study.keys import catalogue_columns, key_tables
-from chainunit.study.parts import EXAMPLES, Parts, example
+from chainunit.study.parts import Parts, example
 from chainunit.study.schema import json_schema
 
 ROOT = Path(__file__).parents[1]
@@ -147,37 +146,6 @@ def test_each_line_of_the_full_example_has_a_comment():
     for line in commented(example("full")).splitlines():
         if "=" in line:
             assert "#" in line.lstrip("# "), line
-
-
-VALIDATOR = jsonschema.Draft7Validator(json_schema())
-
-
-@pytest.mark.parametrize("file", [*sorted((ROOT / "examples").glob("*.toml")), *EXAMPLES], ids=str)
-def test_examples_meet_the_schema(file):
-    text = file.read_text("utf-8") if isinstance(file, Path) else example(file)
-    assert [error.message for error in VALIDATOR.iter_errors(tomllib.loads(text))] == []
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "[machine]\nradus = 3",
-        "[machine]\nr = -1",
-        "[machin]",
-        'organ = "belt"',
-        'empty_start = "yes"',
-        '[[event]]\nforce = "3 kN"',
-        '[[event]]\ntype = "jam"\nspeed = 3',
-        "[run]\nstep = 1",
-        '[machine]\nr = "long"',
-        "[monte_carlo]\nevent = { force = [1, 2, 3] }",
-    ],
-)
-def test_the_schema_marks_what_the_reader_refuses(text):
-    data = tomllib.loads(text)
-    assert list(VALIDATOR.iter_errors(data))
-    with pytest.raises(InputError):
-        parse(text)
 
 
 def test_the_commands(tmp_path):

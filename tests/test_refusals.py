@@ -5,6 +5,7 @@ import re
 
 import pytest
 from command import chainunit
+from wrong_files import FILES
 
 from chainunit.drives.motors import MOTORS
 from chainunit.errors import InputError, shown
@@ -13,135 +14,6 @@ from chainunit.places import lines_of
 from chainunit.reading import in_file
 from chainunit.study.config import parse
 from chainunit.study.keys import key_tables
-
-# the file, and for each fault its line, its key and words of the remedy
-FILES = [
-    ("organs = 'chain'", [(1, "organs", 'was "organ" meant?')]),
-    ("[machine]\nr = '150 kg'", [(2, "machine.r", 'such as "2 mm"')]),
-    ("[machine]\nr = '1,5 m'", [(2, "machine.r", 'was "1.5 m" meant?')]),
-    ("[machine]\nr = -0.1", [(2, "machine.r", "must be > 0 m")]),
-    ("[machine]\nr = true", [(2, "machine.r", "must be a number in m")]),
-    ("[machine]\ncrank.mass = 3", [(2, "machine.crank.mass", "known here: m, s, I")]),
-    ("[machine]\n\n# a comment\ncrank = { m = -3 }", [(4, "machine.crank.m", "must be >= 0 kg")]),
-    ("[machine]\nwebshare = 1", [(2, "machine.webshare", 'was "web_share" meant?')]),
-    ("[machine]\ncrank_speed = 3", [(2, "machine.crank_speed", "it stands in [run]")]),
-    ("[machine]\nfeed_forward = true", [(2, "machine.feed_forward", "it stands before all tables")]),
-    ("[machin]\nr = 1", [(1, "machin", 'was "machine" meant?')]),
-    ("[machine]\nr = 0.9", [(2, "machine: r", "must be > 0 and < 0.703476 m")]),
-    ("[ratios]\nmu = 1.0", [(1, "ratios: rho = 0.1, mu", "mu = e/l1 < 1")]),
-    ("[ratios]\nrho = 0.1\n[machine]\nr = 0.2", [(4, "machine.r", "leave out one of the two")]),
-    ("[run]\ncrank_speed = '3 1/s'", [(2, "run.crank_speed", 'such as "2 rev/min"')]),
-    ("[run]\ncrank_speed = '30 RPM'", [(2, "run.crank_speed", 'was "30 rpm" meant?')]),
-    ("[run]\nstep = 1", [(2, "run.step", 'was "1 ms" meant?')]),
-    ("[run]\nturns = 2.5", [(2, "run.turns", "must be a whole number")]),
-    ("[coupling]\ntrip = '4 kNm'", [(2, "coupling.trip", "known here: trip_torque")]),
-    ("[coupling]\ntrip_torque = '4 kN'", [(2, "coupling.trip_torque", 'such as "2 N m"')]),
-    ("[[event]]\ntype = 'jamm'", [(2, "event 1: type", 'was "jam" meant?')]),
-    ("[[event]]\nside = 'left'", [(1, "event 1: type", "must be given, one of jam, lumps")]),
-    ("[[event]]\ntype = 'jam'", [(1, "event 1 (jam): side", '"left" or "right"')]),
-    (
-        "[[event]]\ntype='dip'\n\n[[event]]\ntype = 'jam'\nside = 'left'\nforce = '3 m'",
-        [(7, "event.jam_left.force", 'such as "2 N"')],
-    ),
-    ("[[event]]\ntype = 'jam'\nside = 'up'", [(3, "event 1 (jam): side", '"left" or "right"')]),
-    ("[[event]]\ntype = 'lumps'\nside = 'left'\nnumber = 1.5", [(4, "event.lumps_left.number", "whole number")]),
-    ("[event]\ntype = 'jam'", [(1, "event", "each below [[event]]")]),
-    ("[system]\nmachine = 'KnifeDriv'", [(2, "system.machine", 'was "KnifeDrive" meant?')]),
-    ("[system]\nmotor = 'DcMotr'", [(2, "system.motor", 'was "DcMotor" meant?')]),
-    ("[system]\nmotor = 'IE3 4-pole 2,2 kW, 100L'", [(2, "system.motor", 'was "IE3 4-pole 2.2 kW, 100L" meant?')]),
-    ("[system]\nmotor = 'pump.fmu'", [(2, "system.motor", "no such FMU")]),
-    ("[run]\nturns = '500 %'", [(2, "run.turns", "must be a pure number")]),
-    ("[feed]\nleft.processing_force = '1,500 N'", [(2, "feed.left.processing_force", "must be a number in N")]),
-    ("[feed]\nleft.processing_force = '2*1000 N'", [(2, "feed.left.processing_force", "must be a number in N")]),
-    ('catalogue = "a\\u0000b"\n[sizing]', [(1, "catalogue", "must be the name of a file")]),
-    (f"[system]\nmotor = '{5000 * 'x'}.fmu'", [(2, "system.motor", "must be the name of a file")]),
-    (
-        "[machine]\ncrank.m = '30 mg'\n[run]\nturns = 2.5",
-        [(4, "run.turns = 2.5: must be a whole number", "must be a whole number")],
-    ),
-    ("start = 'softly'\n[sizing]", [(1, "start", 'was "soft" meant?')]),
-    ("start = 'soft'", [(1, "start", "add [sizing] or system.motor")]),
-    ("organ = 'belt'", [(1, "organ", '"two-bar" or "chain"')]),
-    ("[sizing]\n[motor]\nrotor = { J = 1 }", [(2, "motor", "leave out one of the two")]),
-    ("[sizing]\npoles_least = 6\npoles_most = 4", [(3, "sizing.poles_most", "must be >= sizing.poles_least")]),
-    ("catalogue = 'none.csv'\n[sizing]", [(1, "catalogue", "none.csv: cannot be read")]),
-    ("[report]\nunits = { speed = 'rpm' }", [(2, "report.units.speed", '"rad/s" or "rev/min"')]),
-    ("[report]\nunits = { sped = 'rpm' }", [(2, "report.units.sped", 'was "speed" meant?')]),
-    (
-        "[driveline]\nc2 = 3\nshaft2 = { section = 'round', outer = '30 mm' }",
-        [(2, "driveline.c2", "leave out one of the two")],
-    ),
-    ("[driveline]\nalpha1 = '95 deg'", [(1, "driveline.alpha1", "must be < 1.5708 rad")]),
-    ("[monte_carlo]\nevent = { force = [5000, 100] }", [(2, "monte_carlo.event.force", ">= the first")]),
-    ("[torsion]\npoints = 50", [(1, "torsion", "add [driveline]")]),
-    ("[[motor]]\ndesignation = 'x'", [(1, "motor", "name this file in a study file by catalogue")]),
-    ("designation,power [kW],voltage,poles\nx,1,2,3", [(1, "no valid TOML", "it is a CSV table")]),
-    (
-        "[report]\nunits = { speed = 'a', sped = 'b', power = 3 }",
-        [
-            (2, "report.units.speed", '"rad/s" or "rev/min"'),
-            (2, "report.units.sped", 'was "speed" meant?'),
-            (2, "report.units.power = 3", '"W" or "kW"'),
-        ],
-    ),
-    (
-        "[[event]]\ntype = 'jam'\nside = 'lef'\nname = 'Big one'\nforce = '3 m'\n[[event]]\ntype = 'jam'",
-        [
-            (3, 'event 1 (jam): side = "lef"', 'was "left" meant?'),
-            (4, 'event 1 (jam): name = "Big one"', "must be small letters"),
-            (5, "event.jam.force", 'such as "2 N"'),
-            (6, "event 2 (jam): side", "must be given"),
-        ],
-    ),
-    (
-        "[run]\nstep = 1\n[monte_carlo]\n[monte_carlo.event]\nside = 'up'\nturns = 2\nforce = [1, 2, 3]\n"
-        "duration = ['1 s', '1 m']\nfoce = 3",
-        [
-            (2, "run.step", "must be"),
-            (5, "monte_carlo.event: side", '"left" or "right"'),
-            (6, "monte_carlo.event.turns", "at any crank angle"),
-            (7, "monte_carlo.event.force = [1, 2, 3]", "from where to where"),
-            (8, "monte_carlo.event.duration", 'such as "2 s"'),
-            (9, "monte_carlo.event.foce", 'was "force" meant?'),
-        ],
-    ),
-    (
-        "[machine]\nr = 150 mm\nl = 1,5 # m\n[run]\nturns = .5\n[report]\nauthor = Ann",
-        [
-            (2, "no valid TOML: r = 150 mm", 'r = "150 mm"'),
-            (3, "no valid TOML: l = 1,5", "l = 1.5"),
-            (5, "no valid TOML: turns = .5", "turns = 0.5"),
-            (7, "no valid TOML: author = Ann", 'author = "Ann"'),
-        ],
-    ),
-    ("feed_forward = True", [(1, "no valid TOML: feed_forward = True", "feed_forward = true")]),
-    ("[run]\n[machine]\n[run]", [(3, "no valid TOML", "[run] stands twice, first in line 1")]),
-    ("[run]\nturns = 1\nturns = 2", [(3, "no valid TOML", "turns stands twice")]),
-    ("title = 'a", [(1, "no valid TOML", "a quotation mark is missing")]),
-    ("title =\n", [(1, "no valid TOML", "its value is missing")]),
-    ("[machine\nr = 1", [(1, "no valid TOML: [machine", "']'")]),
-    (f"[machine]\nr = 1{5000 * '0'}", [(2, "no valid TOML", "more than 4300 digits")]),
-    ('{"a": 1}', [(1, "no valid TOML", "it is JSON")]),
-    ("PK\x03\x04", [(0, "", "is a ZIP archive, such as an FMU")]),
-    (
-        "organs = 'chain'\n[machine]\nr = '3 kg'\ncrank = { m = -3 }\n[run]\nstep = 1\n[[event]]\ntype = 'jamm'",
-        [
-            (1, "organs", "was"),
-            (3, "machine.r", "such as"),
-            (4, "machine.crank.m", "must be"),
-            (6, "run.step", "must be"),
-            (8, "event 1: type", "must be"),
-        ],
-    ),
-    (
-        "[sizing]\npoles_least = 6\npoles_most = 4\n[ratios]\nmu = 1.0\n[run]\nturns = 1.5",
-        [
-            (3, "sizing.poles_most", "must be"),
-            (4, "ratios: rho", "needs"),
-            (7, "run.turns", "must be a whole number"),
-        ],
-    ),
-]  # fmt: skip
 
 
 def test_the_list_is_long_enough():

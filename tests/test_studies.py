@@ -191,14 +191,31 @@ def test_a_text_and_a_file_tell_the_line(tmp_path):
     assert Study.from_file().config.packaged and not Study().config.packaged
 
 
+OWN_MOTOR = """[[motor]]
+designation = "pump"
+power = "2.2 kW"
+poles = 4
+speed = "1455 rev/min"
+efficiency = 0.867
+power_factor = 0.8
+breakdown_ratio = 3
+locked_torque_ratio = 2.4
+locked_current_ratio = 6.9
+J = 0.0086
+locked_time = 12
+"""
+
+
 def test_what_a_run_refuses_names_file_and_line(tmp_path):
     (tmp_path / "mine.toml").write_text('catalogue = "own.toml"\n[sizing]\n')
+    (tmp_path / "own.toml").write_text(OWN_MOTOR)
     study = Study.from_file(tmp_path / "mine.toml")
     # beside the study file, as for the command
     assert study.config.catalogue == tmp_path / "own.toml"
+    changed = study.with_values({"sizing.temperature": 400.0})
+    (tmp_path / "own.toml").unlink()
     with pytest.raises(InputError, match=r"mine.toml:1: catalogue = .*own.toml: cannot be read"):
         study.run()
-    changed = study.with_values({"sizing.temperature": 400.0})
     assert changed.config.catalogue == tmp_path / "own.toml"
     with pytest.raises(InputError, match=r"^catalogue = .*own.toml: cannot be read"):
         changed.run(tmp_path / "out")

@@ -57,7 +57,7 @@ def to_number(variable: Variable, given: Any) -> float:
     return variable.quantity.within_bounds(value)
 
 
-def _may_be_share(variable: Variable) -> bool:
+def may_be_share(variable: Variable) -> bool:
     """Whether a quantity may be given in percent: no count, and no ratio of gears."""
     low, high = variable.quantity.low, variable.quantity.high
     return variable.unit != "1" or variable.kind == "percent" or (low < 1.0 and high <= 100.0)
@@ -68,7 +68,7 @@ def _converted(variable: Variable, text: str) -> float:
     try:
         if parts is not None:
             number, written = parts
-            if set(written) & set("%‰") and not _may_be_share(variable):
+            if set(written) & set("%‰") and not may_be_share(variable):
                 raise ValueError(written)
             return units.convert(number, written, variable.unit, variable.kind) if written else number
     except ValueError:

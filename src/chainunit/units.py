@@ -61,6 +61,7 @@ _OTHERS = """
 _NAMES = _ANGLES | frozenset(_OTHERS.split()) | _PINT.keys()
 """Names of units that are read. Pint knows more, which nobody means (its k is Boltzmann's constant, its ton
 the American one)."""
+_PREFIXES = "k M G T m µ u n p d c da"
 _PREFIXED = re.compile(r"(?:[kMGTmµunpdc]|da)(?:m|g|s|N|J|W|V|A|K|Hz|Pa|ohm|H|Wb|T|F)")
 
 FITTING: dict[str, tuple[str, ...]] = {
@@ -125,6 +126,38 @@ def _ascii(text: str) -> str:
     for sign, letters in _SIGNS.items():
         plain = plain.replace(sign, letters)
     return " ".join(plain.split())
+
+
+@cache
+def single_names() -> tuple[str, ...]:
+    """All units that are read and have one name, without a power."""
+    prefixed = [
+        f"{prefix}{name}"
+        for prefix in _PREFIXES.split()
+        for name in "m g s N J W V A K Hz Pa ohm H Wb T F".split()
+    ]
+    glued = [
+        f"{first}{length}{time}"
+        for first in "N kN MN mN µN g kg A V W kA kV kW MA MV MW".split()
+        for length in ("", "mm", "cm", "m")
+        for time in ("", "s")
+    ]
+    names = dict.fromkeys([*sorted(_NAMES), *prefixed, *glued])
+    return tuple(name for name in names if _is_name(name))
+
+
+@cache
+def dimension(unit_text: str) -> Any:
+    """The dimension of a unit, as pint has it: angles have none, and "C" is a charge."""
+    return _registry().parse_units(_joined(_factors(_ascii(unit_text)))).dimensionality
+
+
+def _is_name(name: str) -> bool:
+    try:
+        _factors(name)
+    except ValueError:
+        return False
+    return True
 
 
 @cache

@@ -11,6 +11,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, Field
@@ -22,6 +23,9 @@ from .cardan import ShaftLine
 from .shafts import SECTIONS, Shaft, stiffness_of
 
 SHAFTS = {"shaft2": "c2", "shaft3": "c3"}
+
+CORNER = Variable("outline", "coordinate of a corner", Quantity("m", "", None, -10.0, 10.0))
+"""A coordinate in the outline of a polygon."""
 
 
 @declaration
@@ -53,7 +57,7 @@ def form(declared: type[ShaftLine], title: str, prefix: str, **others: Any) -> t
 
 
 def _shaft(title: str, prefix: str) -> type[BaseModel]:
-    corner = Variable(prefix + "outline", "coordinate of a corner", Quantity("m", "", None, -10.0, 10.0))
+    corner = replace(CORNER, name=prefix + CORNER.name)
     coordinate = Annotated[float, BeforeValidator(lambda entry: to_number(corner, entry))]
     outline = list[tuple[coordinate, coordinate]]
     return schema(

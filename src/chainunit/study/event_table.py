@@ -28,7 +28,9 @@ from .events import Jam
 
 RESERVED = ("start_up", "settling", "steady", "constant", "unfinished")
 """Names of other runs of a study."""
-_NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
+LONGEST_NAME = 40
+"""letters"""
+_NAME = re.compile(rf"[a-z][a-z0-9_]{{0,{LONGEST_NAME - 1}}}")
 
 
 def read_events(tables: Sequence[Any]) -> dict[str, Event]:
@@ -91,7 +93,8 @@ class RandomEvent:
         return {"type": self.of.kind, "side": self.side, "p": fixed, "ranges": dict(self.ranges)}
 
 
-_PLACED = ("crank_angle", "turns")
+PLACED = ("crank_angle", "turns")
+"""Quantities that an event at random does not have."""
 
 
 def read_random_event(table: Mapping[str, Any], where: str) -> RandomEvent:
@@ -108,7 +111,7 @@ def read_random_event(table: Mapping[str, Any], where: str) -> RandomEvent:
     if of.from_rest:
         key = f"{where}.type"
         raise InputError(f'{key} = "{of.kind}": must be an event in steady running', key)
-    for name in (*_PLACED, "name"):
+    for name in (*PLACED, "name"):
         if name in table:
             key = f"{where}.{name}"
             faults.add([InputError(f"{key}: is not of random overloads, which come at any crank angle", key)])
@@ -117,7 +120,7 @@ def read_random_event(table: Mapping[str, Any], where: str) -> RandomEvent:
     for v in given:
         with faults.collected():
             ranges[v.name] = _range(replace(v, name=f"{where}.{v.name}"), table[v.name])
-    drawn = {*ranges, *(v.name for v in given), *_PLACED, "name"}
+    drawn = {*ranges, *(v.name for v in given), *PLACED, "name"}
     ordered = {name: ranges[name] for name in Layout(of.Parameters).names if name in ranges}
     side = _side(of, table, where, where, faults)
     with faults.collected():
@@ -174,7 +177,7 @@ def _name(
     if "name" in table:
         name = table["name"]
         if not isinstance(name, str) or not _NAME.fullmatch(name) or name.endswith("_coasting"):
-            words = "must be small letters, digits and _, at most 40, with a letter first"
+            words = f"must be small letters, digits and _, at most {LONGEST_NAME}, with a letter first"
         elif name in others or name in RESERVED:
             words = "is that of another run"
         else:

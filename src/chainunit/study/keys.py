@@ -4,7 +4,7 @@ commented example, and of the schema for editors."""
 from __future__ import annotations
 
 import typing
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 
 from ..drives.catalogue import LAYOUT as CATALOGUE
 from ..drives.catalogue import TEXTS
-from ..drives.line_table import SHAFTS, Damping
+from ..drives.line_table import CORNER, SHAFTS, Damping
 from ..drives.motors import MOTORS
 from ..drives.shafts import SECTIONS as PROFILES
 from ..drives.shafts import Shaft
@@ -52,6 +52,12 @@ class Key:
     sort: typing.Literal["number", "text", "switch", "list", "table"] = "number"
     left_out: str = ""
     """the value, as a file states it, that it has where a file leaves it out; empty where there is none"""
+    whole: bool = False
+    """whether the number must be a whole one"""
+    items: Variable | None = None
+    """of a list: the quantity of its entries"""
+    most: int = 0
+    """of a list: its greatest length; 0 where there is none"""
     follows: str = ""
     """from what its value follows, where a file leaves it out"""
 
@@ -127,14 +133,24 @@ def _study(machine: str = "ChamberForces", motor: str = "") -> Config:
     return parse("\n".join(["[system]", *names]))
 
 
-def _numbers(declared: type, values: Any = None, prefix: str = "", table: str = "") -> Iterator[Key]:
-    """Keys of declared quantities; `values` are those of a file that leaves them out."""
+def _numbers(
+    declared: type, values: Any = None, prefix: str = "", table: str = "", whole: Collection[str] = ()
+) -> Iterator[Key]:
+    """Keys of declared quantities; `values` are those of a file that leaves them out, `whole` the names of those
+    that are whole numbers."""
     known = Layout(declared).by_name(values) if values is not None else {}
     for v in variables(declared):
         value = known.get(v.name, v.quantity.start)
         left_out = "" if value is None else shortest_text(value, v.unit, v.kind)
         follows = _FOLLOWS.get(f"{table}.{v.name}", "")
-        yield Key(prefix + v.name, v.description, v, left_out="" if follows else left_out, follows=follows)
+        yield Key(
+            prefix + v.name,
+            v.description,
+            v,
+            left_out="" if follows else left_out,
+            whole=v.name in whole,
+            follows=follows,
+        )
 
 
 def _of_machine(name: str, table: str) -> Iterator[Key]:
@@ -153,7 +169,7 @@ def _of_section(name: str) -> Iterator[Key]:
     values = getattr(_study(), name)
     if values is None:
         values = section.default or section.declared()
-    yield from _numbers(section.declared, values, table=name)
+    yield from _numbers(section.declared, values, table=name, whole=section.whole)
     yield from _of_fields(section.keys)
     if name == "driveline":
         yield from _numbers(Damping)
@@ -161,8 +177,13 @@ def _of_section(name: str) -> Iterator[Key]:
             words = f"its profile, in place of {stiffness}"
             yield Key(f"{shaft}.section", words, words=tuple(f'"{name}"' for name in PROFILES), sort="text")
             yield from _numbers(Shaft, prefix=f"{shaft}.")
-            yield Key(f"{shaft}.outline", "corners of a profile of any form, as pairs [m]", sort="list")
-            yield Key(f"{shaft}.holes", "outlines of the holes in it", sort="list")
+            yield Key(
+                f"{shaft}.outline",
+                "corners of a profile of any form, as pairs [m]",
+                sort="list",
+                items=CORNER,
+            )
+            yield Key(f"{shaft}.holes", "outlines of the holes in it", sort="list", items=CORNER)
 
 
 def _of_system() -> Iterator[Key]:
@@ -206,7 +227,7 @@ def _of_event(of: type[Event]) -> Iterator[Key]:
     if of.sided:
         yield Key("side", "side that it comes on", words=('"left"', '"right"'), sort="text")
     yield Key("name", "name of its run, in small letters, digits and _", sort="text", follows="type and side")
-    yield from _numbers(of.Parameters, of.Parameters())
+    yield from _numbers(of.Parameters, of.Parameters(), whole=of.counts)
 
 
 def _of_fields(fields: Mapping[str, Any], config: Config | None = None) -> Iterator[Key]:
@@ -216,9 +237,12 @@ def _of_fields(fields: Mapping[str, Any], config: Config | None = None) -> Itera
 
 
 def _of_field(name: str, annotation: Any, field: FieldInfo, value: Any) -> Key:
-    base = annotation
+    base, more = annotation, list[Any]()
     while typing.get_origin(base) is typing.Annotated:
-        base = typing.get_args(base)[0]
+        base, *inner = typing.get_args(base)
+        more += inner
+    items = next((each for each in more if isinstance(each, Variable)), None)
+    lengths = [limit.max_length for each in more for limit in getattr(each, "metadata", ())]
     words: tuple[str, ...] = ()
     sort: typing.Literal["text", "switch", "list", "table"] = "text"
     if typing.get_origin(base) is typing.Literal:
@@ -231,7 +255,13 @@ def _of_field(name: str, annotation: Any, field: FieldInfo, value: Any) -> Key:
         {True: "true", False: "false"}.get(value, "") if sort == "switch" else f'"{value}"' if value else ""
     )
     return Key(
-        name, str(field.description), words=words, sort=sort, left_out=shown if sort != "table" else ""
+        name,
+        str(field.description),
+        words=words,
+        sort=sort,
+        left_out=shown if sort != "table" else "",
+        items=items,
+        most=max(lengths, default=0),
     )
 
 

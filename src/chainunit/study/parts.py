@@ -6,7 +6,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from datetime import date
-from functools import cache, cached_property
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -82,25 +82,27 @@ class Parts:
         motor = self.motor if self.gives_motor else MOTORS["DcMotor"]
         return sections_of(self.machine, motor)
 
-    @cached_property
+    @property
     def form(self) -> type[BaseModel]:
         """The form of the file."""
-        return file_form(
-            "Config",
-            {
-                name: section.form(section.declared, name, f"{name}.", **section.keys)
-                for name, section in self.sections.items()
-            }
-            | {"report": ReportTable, "system": SystemTable},
-            **CHOICES,
-            event=(list[Any], []),
-        )
+        return _form(self.machine, self.motor if self.gives_motor else MOTORS["DcMotor"])
 
     @property
     def example(self) -> dict[str, Any]:
         """The tables of the example, empty where there is none."""
         name = _examples_of_machines().get(self.machine.name)
         return toml(example(name)) if name else {}
+
+
+@lru_cache(maxsize=32)
+def _form(machine: type[MachineModel], motor: type[Motor]) -> type[BaseModel]:
+    """The form of a file with that machine and motor. It takes longer to make than a file takes to read."""
+    tables: dict[str, type[BaseModel]] = {
+        name: section.form(section.declared, name, f"{name}.", **section.keys)
+        for name, section in sections_of(machine, motor).items()
+    }
+    tables |= {"report": ReportTable, "system": SystemTable}
+    return file_form("Config", tables, **CHOICES, event=(list[Any], []))
 
 
 def _is_fmu(name: str) -> bool:
@@ -166,7 +168,7 @@ def _examples_of_machines() -> dict[str, str]:
     return {read_table(SystemTable, table, "system.").machine: name for name, table in tables.items()}
 
 
-_LONGEST = 1000
+LONGEST_FILE = 1000
 """letters of a file's name"""
 
 
@@ -178,8 +180,8 @@ def beside(name: str, source: str) -> Path:
     InputError
         for a text that names no file on any system.
     """
-    if not name.isprintable() or len(name) > _LONGEST:
-        raise InputError(f"{shown(name)}: must be the name of a file, of at most {_LONGEST} letters")
+    if not name.isprintable() or len(name) > LONGEST_FILE:
+        raise InputError(f"{shown(name)}: must be the name of a file, of at most {LONGEST_FILE} letters")
     return Path(source).parent / name
 
 

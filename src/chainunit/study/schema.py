@@ -1,4 +1,9 @@
-"""The JSON Schema of study files, by which editors complete and check them. It is made of the keys (`keys`)."""
+"""The JSON Schema of study files, by which editors complete and check them. It is made of the keys (`keys`); which of
+them go together, `schema_rules` says.
+
+An editor sees a date of TOML as a text. A schema cannot see what depends on the sizes of two values, such as lengths
+with which no crank turns, nor what another file has: that is left to the reader of study files.
+"""
 
 from __future__ import annotations
 
@@ -6,43 +11,177 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
-from ..quantities import Quantity
+from ..drives.catalogue import catalogue
+from ..quantities import Variable
+from ..reading import may_be_share
+from ..unit_patterns import pattern, zero
+from .event import TYPES
+from .event_table import LONGEST_NAME, PLACED, RESERVED
 from .keys import Key, KeyTable, key_tables
+from .parts import LONGEST_FILE
+from .schema_rules import OF_PARTS, rules
 
 FILE = "chainunit.schema.json"
 """The name by which examples refer to it."""
-_WITH_UNIT = r"^\s*[+−-]?[\d.]"
+_EVENT_NAME = {
+    "pattern": rf"^[a-z][a-z0-9_]{{0,{LONGEST_NAME - 1}}}$",
+    "not": {"anyOf": [{"enum": list(RESERVED)}, {"pattern": "_coasting$"}]},
+}
+_FORMS: dict[str, dict[str, Any]] = {
+    "event.name": _EVENT_NAME,
+    "catalogue": {"maxLength": LONGEST_FILE, "pattern": r"^[^\x00-\x1f\x7f]*$"},
+    "system.machine": {"minLength": 1, "maxLength": LONGEST_FILE},
+    "system.motor": {"minLength": 1, "maxLength": LONGEST_FILE},
+}
+"""What is known of texts beside their words, by the name of the key."""
 
 
 def json_schema() -> dict[str, Any]:
-    """The schema of a study file with any machine and motor: a key of several machines takes the values of each."""
-    tables = key_tables()
-    properties: dict[str, Any] = {}
-    for table in tables:
-        if table.name == "event":
-            continue
-        place = properties if not table.name else _object(properties, table.name, table.title)["properties"]
+    """The schema of a study file."""
+    return _Schema().whole()
+
+
+class _Schema:
+    """A schema while it is made: texts of quantities and tables of machines and motors are its `definitions`."""
+
+    def __init__(self) -> None:
+        self.definitions: dict[str, Any] = {}
+        self._texts: dict[tuple[str, bool], str] = {}
+
+    def whole(self) -> dict[str, Any]:
+        """The schema of a whole file."""
+        properties: dict[str, Any] = {}
+        tables = key_tables()
+        for table in tables:
+            if table.name == "event":
+                self.definitions[f"event.{table.of}"] = self._event(table)
+                continue
+            place = properties
+            if table.name:
+                place = _object(properties, table.name, table.title)["properties"]
+            for key in table.keys:
+                self._add(place, key, table)
+            if table.name in OF_PARTS:
+                own: dict[str, Any] = {}
+                inside = _object(own, table.name)["properties"]
+                for key in table.keys:
+                    self._add(inside, key, table)
+                self.definitions[f"{table.name}.{table.of}"] = own[table.name]
+        for name in OF_PARTS:
+            # which keys there are depends on the machine and the motor: `rules` say it
+            del properties[name]["additionalProperties"]
+        properties["event"] = {
+            "type": "array",
+            "description": "events, each followed from steady running, or in a start; a file that has none has "
+            "those of the example",
+            "items": {"anyOf": [_reference(f"event.{name}") for name in TYPES]},
+        }
+        properties["monte_carlo"]["properties"]["event"] = {
+            "description": "the event; a quantity may be a range, [least, most]",
+            "anyOf": [
+                self._event(table, random=True)
+                for table in tables
+                if table.name == "event" and not TYPES[table.of].from_rest
+            ],
+        }
+        properties["system"]["properties"]["motor"]["examples"] += [each.designation for each in catalogue()]
+        return {
+            "$schema": "http://json-schema.org/draft-07/schema#",
+            "title": "Study file of chainunit",
+            "type": "object",
+            "additionalProperties": False,
+            "properties": properties,
+            "allOf": list(rules()),
+            "definitions": self.definitions,
+        }
+
+    def _add(self, place: dict[str, Any], key: Key, table: KeyTable) -> None:
+        """Add a key to the properties of a table; one that has it already takes the values of both."""
+        *tables, name = key.name.split(".")
+        for each in tables:
+            place = _object(place, each)["properties"]
+        form = self._form(key, table)
+        if table.of:
+            form["description"] = f"{table.of}: {form['description']}"
+        if name in place:
+            others = place[name].get("anyOf", [place[name]]) if "anyOf" in place[name] else [place[name]]
+            if form not in others:
+                words = "; ".join(dict.fromkeys((place[name]["description"], form["description"])))
+                place[name] = {"anyOf": [*others, form], "description": words}
+        else:
+            place[name] = form
+
+    def _event(self, table: KeyTable, *, random: bool = False) -> dict[str, Any]:
+        properties: dict[str, Any] = {}
         for key in table.keys:
-            _add(place, key, table)
-    events = [table for table in tables if table.name == "event"]
-    properties["event"] = {
-        "type": "array",
-        "description": "events, each followed from steady running, or in a start; of a file that has none, those "
-        "of the example",
-        "items": {"anyOf": [_event(table) for table in events]},
-    }
-    # the event of random overloads may have ranges in place of numbers
-    properties["monte_carlo"]["properties"]["event"] = {
-        "description": "the event; a quantity may be a range, [least, most]",
-        "anyOf": [_event(table, random=True) for table in events],
-    }
-    return {
-        "$schema": "http://json-schema.org/draft-07/schema#",
-        "title": "Study file of chainunit",
-        "type": "object",
-        "additionalProperties": False,
-        "properties": properties,
-    }
+            if random and key.name in (*PLACED, "name"):
+                continue
+            form = self._form(key, table)
+            if random and key.variable is not None:
+                ends = self._quantity(key.variable)
+                pair = {"type": "array", "items": ends, "minItems": 2, "maxItems": 2}
+                form = {"anyOf": [*form["anyOf"], pair], "description": form["description"]}
+            properties[key.name] = form
+        needed = ["type"] if not random or table.of != "jam" else []
+        if "side" in properties and not random:
+            needed.append("side")
+        return {
+            "type": "object",
+            "title": table.of,
+            "description": table.title,
+            "additionalProperties": False,
+            "properties": properties,
+            "required": needed,
+        }
+
+    def _form(self, key: Key, table: KeyTable) -> dict[str, Any]:
+        description = {"description": _sentence(key)}
+        if key.variable is not None:
+            return self._quantity(key.variable, whole=key.whole) | description
+        if key.sort == "switch":
+            return {"type": "boolean"} | description
+        if key.sort == "list":
+            return self._list(key) | description
+        if key.sort == "table":
+            return {"type": "object"} | description
+        choices = [word.strip('"') for word in key.words if word.startswith('"')]
+        if choices and len(choices) == len(key.words):
+            return {"type": "string", "enum": choices} | description
+        # beside the known names there may be a file or a designation
+        name = f"{table.name}.{key.name}".lstrip(".")
+        form: dict[str, Any] = {"type": "string"} | _FORMS.get(
+            name, {"minLength": 1} if "_names." in name else {}
+        )
+        return form | ({"examples": choices} if choices else {}) | description
+
+    def _list(self, key: Key) -> dict[str, Any]:
+        assert key.items is not None  # each list is one of numbers
+        entry = self._quantity(key.items)
+        if not key.name.startswith("shaft"):
+            return {"type": "array", "items": entry, "maxItems": key.most}
+        corner = {"type": "array", "items": entry, "minItems": 2, "maxItems": 2}
+        outline = {"type": "array", "items": corner, "minItems": 3}
+        return {"type": "array", "items": outline} if key.name.endswith("holes") else outline
+
+    def _quantity(self, variable: Variable, *, whole: bool = False) -> dict[str, Any]:
+        """A number within its bounds, or a text with a unit that fits."""
+        q = variable.quantity
+        form: dict[str, Any] = {"type": "number"}
+        if math.isfinite(q.low):
+            form |= {"exclusiveMinimum": q.low} if q.open_low else {"minimum": q.low - q.slack}
+        if math.isfinite(q.high):
+            form["maximum"] = q.high + q.slack
+        if whole:
+            form["multipleOf"] = 1
+        positive = q.open_low and q.low == 0.0 and q.unit != "K"
+        text = (pattern(q, whole=whole, share=may_be_share(variable)), positive)
+        if text not in self._texts:
+            self._texts[text] = f"text {len(self._texts) + 1}"
+            written: dict[str, Any] = {"type": "string", "pattern": text[0]}
+            if positive:
+                written["not"] = {"pattern": zero()}
+            self.definitions[self._texts[text]] = written
+        return {"anyOf": [form, _reference(self._texts[text])]}
 
 
 def _object(place: dict[str, Any], name: str, description: str = "") -> dict[str, Any]:
@@ -54,67 +193,8 @@ def _object(place: dict[str, Any], name: str, description: str = "") -> dict[str
     return inner
 
 
-def _add(place: dict[str, Any], key: Key, table: KeyTable) -> None:
-    """Add a key to the properties of a table; one that has it already takes the values of both."""
-    *tables, name = key.name.split(".")
-    for each in tables:
-        place = _object(place, each)["properties"]
-    form = _form(key)
-    if table.of:
-        form["description"] = f"{table.of}: {form['description']}"
-    if name in place:
-        others = place[name].get("anyOf", [place[name]])
-        if form not in others:
-            words = "; ".join(dict.fromkeys((place[name]["description"], form["description"])))
-            place[name] = {"anyOf": [*others, form], "description": words}
-    else:
-        place[name] = form
-
-
-def _event(table: KeyTable, *, random: bool = False) -> dict[str, Any]:
-    properties: dict[str, Any] = {}
-    for key in table.keys:
-        form = _form(key)
-        if random and key.variable is not None:
-            pair = {"type": "array", "items": dict(form), "minItems": 2, "maxItems": 2}
-            form = {"anyOf": [form, pair], "description": form["description"]}
-        properties[key.name] = form
-    required = [] if random and table.of == "jam" else ["type"]
-    return {
-        "type": "object",
-        "title": table.of,
-        "description": table.title,
-        "additionalProperties": False,
-        "properties": properties,
-        "required": required,
-    }
-
-
-def _form(key: Key) -> dict[str, Any]:
-    description = {"description": _sentence(key)}
-    if key.variable is not None:
-        return {
-            "anyOf": [_number(key.variable.quantity), {"type": "string", "pattern": _WITH_UNIT}]
-        } | description
-    if key.sort == "switch":
-        return {"type": "boolean"} | description
-    if key.sort in ("list", "table"):
-        return {"type": "array" if key.sort == "list" else "object"} | description
-    choices = [word.strip('"') for word in key.words]
-    if choices and all(word.startswith('"') for word in key.words):
-        return {"type": "string", "enum": choices} | description
-    # beside the known names there may be a file or a designation
-    return {"type": "string"} | ({"examples": choices} if choices else {}) | description
-
-
-def _number(quantity: Quantity) -> dict[str, Any]:
-    form: dict[str, Any] = {"type": "number"}
-    slack = quantity.slack
-    if math.isfinite(quantity.low):
-        form |= {"exclusiveMinimum": quantity.low} if quantity.open_low else {"minimum": quantity.low - slack}
-    if math.isfinite(quantity.high):
-        form["maximum"] = quantity.high + slack
-    return form
+def _reference(name: str) -> dict[str, Any]:
+    return {"$ref": f"#/definitions/{name}".replace(" ", "%20")}
 
 
 def _sentence(key: Key) -> str:

@@ -246,7 +246,7 @@ def numbers(declared: type, quantity_name: str, name: str, most: int) -> Any:
     variable = next(v for v in variables(declared) if v.name == quantity_name)
     variable = dataclasses.replace(variable, name=name)
     value = Annotated[float, BeforeValidator(lambda entry: to_number(variable, entry))]
-    return Annotated[list[value], Field(max_length=most)]
+    return Annotated[list[value], Field(max_length=most), variable]
 
 
 ORGANS = ("two-bar", "chain")

@@ -1,0 +1,59 @@
+"""Texts of numbers with units as patterns of a JSON Schema. A text that does not match is surely refused by `units`.
+
+A unit of one name must be one of those that fit the quantity. Products, quotients and powers, and characters that
+have no place in a unit, are left to the reader. The patterns use what the regular expressions of Python, ECMAScript
+and Rust have in common.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+
+from . import units
+from .quantities import Quantity
+
+_POWER = r"[eE][+−-]?\d{1,3}|\s?[x×*]\s?10(?:\^[+−-]?\d{1,3}|[⁺⁻]?[⁰¹²³⁴⁵⁶⁷⁸⁹]{1,3})"
+_DIGITS = rf"(?:\d{{1,3}}(?:\s\d{{3}})+(?:\.\d*)?|\d+\.?\d*|\.\d+)(?:{_POWER})?"
+_WHOLE = r"(?:\d{1,3}(?:\s\d{3})+|\d+)(?:\.0*)?"
+"""A number without its sign, and a whole one."""
+_ZERO = r"(?:0+\.?0*|\.0+)"
+_SIGNS = "°Ω℃µμ−‰⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻·⋅×"
+"""Characters beyond ASCII that have a place in a number or a unit."""
+_COMPOUND = r"(?:1\s?/.*|[A-Za-zµμ°Ω℃%‰(/].*[*/.()\s\d⁰¹²³⁴⁵⁶⁷⁸⁹⁻·⋅×^].*|[(/].*)"
+_SPELLINGS = (("degC", "°C"), ("degC", "℃"), ("deg", "°"), ("ohm", "Ω"), ("ohm", "Ohm"), ("µ", "μ"))
+
+
+def pattern(quantity: Quantity, *, whole: bool, share: bool) -> str:
+    """The pattern of the texts that may state a quantity: `whole` where only a whole number may, `share` where one in
+    percent may."""
+    digits = rf"(?:{_WHOLE}|\d+\.?\d*[eE]\+?\d{{1,3}})" if whole else _DIGITS
+    signed = rf"[+−-]?{digits}"
+    if quantity.unit != "K" and quantity.low >= 0.0:
+        signed = rf"(?:\+?{digits}|[−-]{_ZERO})"
+    names = [name for name in _names(quantity.unit, quantity.kind) if share or not set(name) & set("%‰")]
+    unit = "|".join([*map(re.escape, names), _COMPOUND])
+    return rf"^(?:\s*{signed}\s*(?:{unit})?\s*|.*[^\x00-\x7F\s{_SIGNS}].*)$".replace("\\%", "%")
+
+
+def zero() -> str:
+    """The pattern of texts that state zero in any unit."""
+    return r"^\s*[+−-]?[0.]+\s*(?:[A-Za-z%‰°µμΩ(/].*)?$"
+
+
+@cache
+def _names(unit: str, kind: str) -> tuple[str, ...]:
+    """The units of one name that fit a quantity, in each of their spellings."""
+    fitting = [name for name in units.single_names() if _fits(name, unit, kind)]
+    other = [name.replace(plain, sign) for plain, sign in _SPELLINGS for name in fitting if plain in name]
+    return tuple(dict.fromkeys([*fitting, *other]))
+
+
+def _fits(name: str, unit: str, kind: str) -> bool:
+    if unit != "K" and units.dimension(name) != units.dimension(unit):
+        return False
+    try:
+        units.convert(1.0, name, unit, kind)
+    except ValueError:
+        return False
+    return True

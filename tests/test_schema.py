@@ -1,0 +1,209 @@
+"""The JSON Schema of study files against the reader: it marks no right file, and of the wrong ones all that it can
+express. It is applied as editors do, which show it a date of TOML as a text."""
+
+import datetime
+import re
+import tomllib
+from pathlib import Path
+
+import jsonschema
+import pytest
+from wrong_files import FILES
+
+from chainunit import units
+from chainunit.errors import InputError
+from chainunit.places import lines_of
+from chainunit.reading import in_file
+from chainunit.study.commented import commented
+from chainunit.study.config import parse
+from chainunit.study.keys import key_tables
+from chainunit.study.parts import EXAMPLES, example
+from chainunit.study.schema import json_schema
+
+ROOT = Path(__file__).parents[1]
+SCHEMA = json_schema()
+VALIDATOR = jsonschema.Draft7Validator(SCHEMA)
+
+
+def as_in_editor(data):
+    """The data of a file as an editor shows them to a schema."""
+    if isinstance(data, dict):
+        return {name: as_in_editor(value) for name, value in data.items()}
+    if isinstance(data, list):
+        return [as_in_editor(value) for value in data]
+    return data.isoformat() if isinstance(data, datetime.date | datetime.time) else data
+
+
+def marks(text):
+    """What the schema says of a file."""
+    return [error.message for error in VALIDATOR.iter_errors(as_in_editor(tomllib.loads(text)))]
+
+
+def refused(text):
+    try:
+        with in_file("mine.toml", lambda: lines_of(text)):
+            parse(text)
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+def test_it_is_a_schema():
+    jsonschema.Draft7Validator.check_schema(SCHEMA)
+    named = re.findall(r"'#/definitions/(.*?)'", str(SCHEMA))
+    assert {name.replace("%20", " ") for name in named} == set(SCHEMA["definitions"])
+
+
+BLOCKS = [
+    text
+    for page in sorted((ROOT / "docs").rglob("*.md"))
+    for text in re.findall(r"^```toml[^\n]*\n(.*?)^```", page.read_text("utf-8"), re.MULTILINE | re.DOTALL)
+    if not refused(text)
+]
+RIGHT = [
+    *(file.read_text("utf-8") for file in sorted((ROOT / "examples").glob("*.toml"))),
+    *map(example, EXAMPLES),
+    commented(example("full")),
+    *BLOCKS,
+    "",
+    "[report]\ndate = 2026-11-22\nunits = { speed = 'rev/min' }",
+    "[report]\ndate = '22.11.2026'",
+    "[run]\nturns = 2.0",
+    "[run]\nturns = '2.0'",
+    "[run]\nturns = '2e0'",
+    "[[event]]\ntype = 'lumps'\nside = 'left'\nnumber = 3.0\nname = 'three_lumps'",
+    "[[event]]\ntype = 'dip'",
+    "[monte_carlo]\nevent = { force = ['1 kN', 3000] }",
+    "[monte_carlo]\nevent = { type = 'lumps', number = [1, 3], side = 'left' }",
+    "[flywheel]\ncompare = [0.1, '0.2 kg m²', '20 kg·cm²']",
+    "[driveline]\nshaft2 = { section = 'hollow', outer = '90 mm', inner = 0.07, length = '1.2 m' }\n"
+    "[torsion]\ndamping_ratios = ['2 %', 0.05]",
+    "[driveline]\nshaft3.section = 'polygon'\nshaft3.length = 1\n"
+    "shaft3.outline = [[0, 0], ['9 cm', 0], [0, 0.1]]\nshaft3.holes = [[[0.01, 0.01], [0.02, 0.01], [0.01, 0.02]]]",
+    "organ = 'chain'\n[chain]\nrods = 8.0",
+    "start = 'soft'\n[sizing]\nambient = '-10 °C'",
+    "[system]\nmotor = 'IE3 4-pole 0.75 kW, 80M'\n[gear]\nefficiency = '96 %'",
+    "start = 'soft'\n[system]\nmachine = 'KnifeDrive'",
+    "[motor]\nrotor.J = 0.01",
+    "[system]\nmotor = 'InductionMotor'\n[motor]\npole_pairs = 2",
+    "[system]\nmachine = 'KnifeDrive'\n[[event]]\ntype = 'cut'",
+    "[ratios]\nrho = 0.1\n[machine]\ng = 9.81",
+]
+
+
+@pytest.mark.parametrize("text", RIGHT, ids=range(len(RIGHT)))
+def test_no_right_file_is_marked(text):
+    assert refused(text) == "" and marks(text) == []
+
+
+def test_pages_have_study_files():
+    assert len(BLOCKS) >= 5
+
+
+FOREIGN = [
+    "[system]\nmotor = 'pump.FMU'\nmotor_names = { phi = 'shaft.phi' }",
+    "[system]\nmachine = 'mill.fmu'\n[machine]\nx = 1\ny.z = '3 m'\n[feed]\na = 2",
+    "catalogue = 'own.csv'\n[system]\nmotor = 'of our own'",
+]
+
+
+@pytest.mark.parametrize("text", FOREIGN, ids=range(len(FOREIGN)))
+def test_files_that_name_others_are_not_marked(text):
+    assert marks(text) == []
+
+
+UNSEEN = {
+    "[machine]\nr = 0.9": "lengths of a crank that turns",
+    "[ratios]\nmu = 1.0": "lengths of a crank that turns",
+    "[run]\ncrank_speed = '3 1/s'": "dimension of a product of units",
+    "[sizing]\npoles_least = 6\npoles_most = 4": "order of two values",
+    "catalogue = 'none.csv'\n[sizing]": "another file",
+    "[driveline]\nalpha1 = '95 deg'": "size of a number in a text",
+    "[monte_carlo]\nevent = { force = [5000, 100] }": "order of two values",
+}
+"""Wrong files whose fault a schema cannot express, with the reason."""
+WRONG = [text for text, _ in FILES if "no valid TOML" not in refused(text) and "pump.fmu" not in text]
+WRONG += [
+    "[run]\nturns = '2.5'",
+    "[run]\nturns = true",
+    "[[event]]\ntype = 'jam'\nside = 'left'\nname = 'Big'",
+    "[[event]]\ntype = 'dip'\nname = 'steady'",
+    "[[event]]\ntype = 'dip'\nname = 'dip_coasting'",
+    "[[event]]\ntype = 'dip'\nside = 'left'",
+    "[[event]]\ntype = 'cut'",
+    "[system]\nmachine = 'KnifeDrive'\n[[event]]\ntype = 'jam'\nside = 'left'",
+    "[system]\nmachine = 'KnifeDrive'\n[machine]\nweb_share = 1",
+    "[system]\nmachine = 'KnifeDrive'\n[ratios]",
+    "[system]\nmotor = 'InductionMotor'\n[motor]\narmature.R = 1",
+    "[system]\nmotor = 'InductionMotor'\n[sizing]",
+    "[system]\nmotor = 'IE3 4-pole 0.75 kW, 80M'\n[motor]",
+    "feed_forward = true\n[system]\nmotor = 'InductionMotor'",
+    "[system]",
+    "[system]\nmotor = ''",
+    "[system]\nmotor_names = { phi = 'x' }",
+    "[sizing]\n[run]\nwinding_temperature = 400",
+    "[sizing]\n[machine]\nratio = 50",
+    "[sizing]\n[flywheel]\nJ = 1",
+    "[gear]",
+    "[chain]",
+    "[monte_carlo]\nevent = { type = 'start', side = 'left' }",
+    "[monte_carlo]\nevent = { type = 'lumps', turns = 3 }",
+    "[monte_carlo]\nevent = { force = [1] }",
+    "[monte_carlo]\nevent = { force = ['1 m', 2] }",
+    "[flywheel]\ncompare = ['1 kg']",
+    "[flywheel]\ncompare = 3",
+    "[driveline]\n[torsion]\ndamping_ratios = [0.1, 0.2, 0.3, 0.4, 0.5]",
+    "[driveline]\nshaft2 = { outer = 1 }",
+    "[driveline]\nshaft2 = { section = 'round', outer = 1 }",
+    "[driveline]\nshaft2 = { section = 'round', outer = 1, length = 1, inner = 0.5 }",
+    "[driveline]\nshaft2 = { section = 'polygon', length = 1, outline = [[0, 0], [1]] }",
+    "[driveline]\nd2 = 3\ndamping_ratio = 0.1",
+    "[machine]\nr = '-3 mm'",
+    "[machine]\nr = '0 mm'",
+    "[machine]\nr = '3 deg'",
+    "[machine]\nr = '1.2.3 m'",
+    "[machine]\nr = 'm'",
+    "[machine]\nr = ''",
+    "[machine]\ncrank.m = '3 N'",
+    "[run]\ncrank_speed = '15 upm'",
+    "[run]\nwinding_temperature = '120 V'",
+    "[run]\nturns = '5 %'",
+    "[report]\nunits = { speed = 'rpm' }",
+    "[report]\ndate = 3",
+    "title = 3",
+]
+
+
+@pytest.mark.parametrize("text", WRONG, ids=range(len(WRONG)))
+def test_a_wrong_file_is_marked_where_a_schema_can_see_the_fault(text):
+    assert refused(text)
+    assert bool(marks(text)) == (text not in UNSEEN)
+
+
+def test_each_unit_that_is_read_is_matched_and_no_other_of_one_name():
+    """Each key of a quantity with each unit of one name, as the reader takes it."""
+    seen = set()
+    for table in key_tables():
+        for key in table.keys:
+            v = key.variable
+            if v is None or key.whole or (v.unit, v.kind) in seen or v.unit == "1":
+                continue
+            seen.add((v.unit, v.kind))
+            form = table.keys and VALIDATOR.evolve(schema=_property(table, key.name))
+            for name in units.single_names():
+                try:
+                    units.convert(1.0, name, v.unit, v.kind)
+                    fits = True
+                except ValueError:
+                    fits = False
+                assert form.is_valid(f"1 {name}") == fits, (table.name, key.name, name)
+    assert len(seen) > 20
+
+
+def _property(table, name):
+    """The schema of a key; those of machines, motors and events are definitions."""
+    own = f"{table.name}.{table.of}"
+    inner = SCHEMA["definitions"][own] if own in SCHEMA["definitions"] else SCHEMA["properties"][table.name]
+    for each in name.split("."):
+        inner = inner["properties"][each]
+    return inner
