@@ -1,9 +1,10 @@
-"""A system: models or FMU files that are joined by terminals, and all that follows from that graph.
+"""A system: models or FMU files that are joined by terminals, and their simulation and export.
 
-`System` is the graph. From it come the FMUs (`export`), the co-simulation (`CoSimulation`), the whole as one ODE of
-Model Exchange FMUs (`ModelExchange`), the reference of the models' own equations (`monolithic`), the certificate of
-a run (`energy_residual` of every power bond), the SSP package (`chainunit.system.ssp`), and twins with a part left
-out (`without`, `rigid`, `hold_loads`). An FMU of somebody else is a component, too: `foreign_component`."""
+`System` is the graph of components and connections. From it come the FMUs (`export`), the co-simulation
+(`CoSimulation`), one ODE of Model Exchange FMUs (`ModelExchange`), the reference from the models' own equations
+(`monolithic`), the certificate of a run (`energy_residual` of every power bond), the SSP package
+(`chainunit.system.ssp`), and twins without one part (`without`, `rigid`, `hold_loads`). A foreign FMU can be a
+component, too: `foreign_component`."""
 
 from .certificate import certify, energy_residual, shaft_torque, through
 from .fmus import export

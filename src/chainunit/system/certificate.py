@@ -1,8 +1,9 @@
 """The energy residual of a power bond: the certificate that every run carries.
 
-The energy that the driver gave to the load inside its own steps must be stored and dissipated by the machine, less
-that which the feed brought. The two are computed on different sides of the coupling, from different equations. An
-FMU of somebody else may not count its energies: then only what the coupling itself loses is known."""
+The energy that the driver gave to the load inside its own steps, plus the energy of the feed, must equal the energy
+that the machine stored and dissipated. The two sides come from different components and different equations. A
+foreign FMU may not have outputs for its energies: then the residual is only the energy that the coupling itself
+loses."""
 
 from __future__ import annotations
 
@@ -17,41 +18,42 @@ from ..errors import InputError
 from .graph import Bond, System
 
 Feed = Mapping[str, Callable[[xr.Dataset], Any]]
-"""Of each mass input that changes in a run, by full name: dE/dm [J/kg] as a function of the run's Dataset, the energy
-that a kilogram has on its place in the machine."""
+"""By the full name of each mass input that changes in a run: a function of the run's Dataset that gives dE/dm [J/kg],
+the energy of one kilogram at its place in the machine."""
 
 
 def energy_residual(
     run: xr.Dataset, bond: Bond, feed: Feed | None = None, lead: xr.Dataset | None = None
 ) -> tuple[xr.DataArray, float]:
-    """The energy that is missing at each instant [J], shape (time,), and its largest size in relation to the
-    energy that went to and fro through the bond (integral of |tau w|), or to a millionth of the energy that the
-    machine holds, where that is more: in a machine that stands nothing but rounding moves.
+    """The missing energy at each instant [J], shape (time,), and its largest absolute value over a reference energy.
 
-    Powers are integrated by Simpson's rule over the communication points. Where they jump at an instant, `lead` is
-    the run up to there with the values before the jump, of which the `run` has those after it: each side is
-    integrated by itself.
+    The reference is the energy that went to and fro through the bond (integral of |tau w|), or a millionth of the
+    stored energy if this is more: in a machine at rest only rounding errors flow.
+
+    Powers are integrated by Simpson's rule over the communication points. For a run with a jump, `lead` is the run up
+    to the jump with the values before it, while `run` has the values after the jump at that instant: each side is
+    integrated separately.
     """
     parts = [run] if lead is None else [lead, run.sel(time=slice(float(lead["time"][-1]), None))]
-    given, throughput = np.zeros(1), 0.0
+    balance, throughput = np.zeros(1), 0.0
     for part in parts:
         time = part["time"].values
         tau, w = through(part, bond)
         supply = _supply(part, bond, tau, w)
         loss_power = _storage(part, bond)[1]
         if loss_power is None:
-            # what the machine does with the energy is not known: its own torque against that of the driver
+            # the losses of the machine are not known: the torque of the machine counts against that of the driver
             loss_power = _shaft_power(part, bond.machine, bond.flanges[1], tau, w)
         net = supply - supply[0] - cumulative_simpson(loss_power, x=time, initial=0.0)
         for mass, per_kg in (feed or {}).items():
             if mass.partition(".")[0] == bond.machine:
                 net = net + _stieltjes(per_kg(part), part[mass].values)
-        given = np.concatenate([given[:-1], given[-1] + net])
+        balance = np.concatenate([balance[:-1], balance[-1] + net])
         throughput += float(np.trapezoid(np.abs(tau * w), time))
     storage = _storage(run, bond)[0]
     if storage is None:
-        storage = np.zeros_like(given)
-    gap = given - (storage - storage[0])
+        storage = np.zeros_like(balance)
+    gap = balance - (storage - storage[0])
     residual = xr.DataArray(
         gap,
         dims="time",
@@ -69,12 +71,12 @@ def certify(
 
 
 def shaft_torque(run: xr.Dataset, bond: Bond) -> Any:
-    """Torque [N m] of the shaft, shape (time,), of the side that gives it.
+    """Torque of the shaft [N m], shape (time,), from the side that has it as a variable.
 
     Raises
     ------
     InputError
-        where neither gives it.
+        where neither side has it.
     """
     driver, machine = bond.flanges
     sides = ((bond.machine, machine), (bond.driver, driver))
@@ -94,7 +96,7 @@ def through(run: xr.Dataset, bond: Bond) -> tuple[Any, Any]:
 
 
 def _shaft_power(run: xr.Dataset, name: str, terminal: Any, tau: Any, w: Any) -> Any:
-    """Power at a terminal [W], shape (time,), of the torque there where it is known."""
+    """Power at a terminal [W], shape (time,), with the torque of that terminal if the run has it, else with `tau`."""
     full = f"{name}.{terminal.members.get('tau', '')}"
     return (run[full].values if full in run else tau) * w
 
@@ -109,8 +111,8 @@ def _supply(run: xr.Dataset, bond: Bond, tau: Any, w: Any) -> Any:
 
 
 def _storage(run: xr.Dataset, bond: Bond) -> tuple[Any, Any]:
-    """The energy that the machine holds or has passed on [J] and the power that it dissipates [W], shape (time,);
-    None twice where it does not count them."""
+    """The energy that the machine holds or has passed on [J], and the power that it dissipates [W], shape (time,);
+    None for both where the run does not have them."""
     names = [f"{bond.machine}.{x}" for x in ("kinetic_energy", "potential_energy", "dissipated_power")]
     if any(full not in run for full in names):
         return None, None

@@ -18,12 +18,11 @@ def export(
     report: Callable[[str], None] = lambda what: None,
 ) -> tuple[System, dict[str, Origin]]:
     """Write an FMU for each model of the system that has none, with the component's start values, to `folder`.
-    Components of one model share the file of the first.
+    Components of one model share the file of the first. `report` is called with texts on the progress.
 
     Returns
     -------
-    the system of these files, and how each component's was made. `report` is called with the model and what is done
-    with it.
+    the system with these files, and by component how its file was made.
     """
     components: dict[str, Component] = {}
     origins: dict[str, Origin] = {}
@@ -35,9 +34,9 @@ def export(
                 file = folder / f"{model.name}.fmu"
                 if file in files.values():
                     file = folder / f"{model.name}_{name}.fmu"
-                said = _of_model(model.name, report)
-                said("exporting")
-                origins[name] = export_fmu(model, file, component.start, backend=backend, report=said)
+                progress = _of_model(model.name, report)
+                progress("exporting")
+                origins[name] = export_fmu(model, file, component.start, backend=backend, report=progress)
                 files[model] = file
             component = replace(component, file=files[model])
         components[name] = component
@@ -45,5 +44,5 @@ def export(
 
 
 def _of_model(name: str, report: Callable[[str], None]) -> Callable[[str], None]:
-    """A report that names the model."""
+    """A report that puts the name of the model before each text."""
     return lambda what: report(f"{name}: {what}")

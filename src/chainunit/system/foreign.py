@@ -1,14 +1,14 @@
-"""FMUs of somebody else as components: a motor or a machine with the terminals that ours have.
+"""Foreign FMUs as components: a motor or a machine with the terminals of this package.
 
-A *flange* is angle `phi` [rad], speed `w` [rad/s], acceleration `a` [rad/s2] and torque `tau` [N.m] of a shaft; a
-motor gives the motion and takes a *load*, a machine takes the motion and gives one. The load is torque at constant
-speed `tau_bias` and inertia `J` at the angle `phi0` and speed `w0`, with their slopes (`chainunit.ports`). What
-beyond torque and inertia an FMU leaves out is not connected: without the slopes the load is held constant over a
-step.
+A *flange* has the angle `phi` [rad], the speed `w` [rad/s], the acceleration `a` [rad/s2] and the torque `tau` [N.m]
+of a shaft. A motor gives the motion and takes a *load*; a machine takes the motion and gives a load. The load is the
+torque at constant speed `tau_bias` and the inertia `J` at the angle `phi0` and speed `w0`, with their slopes
+(`chainunit.ports`). An FMU may omit all members of the load except `tau_bias` and `J`; without the slopes the load is
+held constant over a step.
 
-Terminals come from the FMU's terminalsAndIcons.xml, where it has one, else from the names of its variables: `phi`,
-`w`, `a`, `tau`; `load.tau_bias` ... at a motor, `tau_bias` ... at a machine. Where its names are others, a mapping
-from ours to its own tells them. An FMU that leaves a unit out is taken to have ours."""
+Terminals come from terminalsAndIcons.xml of the FMU, if it has this file, else from the names of its variables:
+`phi`, `w`, `a`, `tau`; `load.tau_bias` and so on for a motor, `tau_bias` and so on for a machine. A mapping gives the
+names of an FMU with other names. A variable without unit counts as one in the unit of this package."""
 
 from __future__ import annotations
 
@@ -28,15 +28,16 @@ from .graph import Connector, FmuComponent
 from .instance import Fmu, Kind
 
 Role = Literal["motor", "machine"]
-"""Which side of a shaft an FMU stands on."""
+"""The side of a shaft on which an FMU stands."""
 
 _UNITS = {"phi": "rad", "w": "rad/s", "a": "rad/s2", "tau": "N.m"} | {
     v.name: v.unit for v in Layout(LoadPort).variables
 }
 """Unit of each member of a terminal."""
-_NEEDED = {FLANGE: ("phi", "w"), LOAD: ("tau_bias", "J")}
+_REQUIREMENTS = {FLANGE: ("phi", "w"), LOAD: ("tau_bias", "J")}
+"""Members that a terminal must have."""
 _MOTOR = {"w_ref": "rad/s", "tau_ff": "N.m", "load_energy": "J", "air_gap_tau": "N.m", "supply_power": "W"}
-"""Unit of each signal that a system reads or sets at a motor beside its terminals, where it has it."""
+"""Unit of each optional signal of a motor, besides its terminals, that a system reads or sets."""
 _MACHINE = {
     "ratio": "1",
     "power": "W",
@@ -44,7 +45,7 @@ _MACHINE = {
     "potential_energy": "J",
     "dissipated_power": "W",
 }
-"""The same of a machine."""
+"""Unit of each optional signal of a machine that a system reads or sets."""
 NAMES: Mapping[Role, tuple[str, ...]] = {
     "motor": (*flange("outflow").members.values(), *load_terminal("load.").members.values(), *_MOTOR),
     "machine": (*flange("inflow").members.values(), *load_terminal().members.values(), *_MACHINE),
@@ -56,19 +57,19 @@ _TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
 def fmu_component(
     file: Path, names: Mapping[str, str] | None = None, *, kind: Kind = "Co-Simulation"
 ) -> FmuComponent:
-    """An FMU with the terminals that it has.
+    """An FMU as a component, with its terminals.
 
     Parameters
     ----------
     file : the FMU
-    names : of our names those that it calls otherwise, such as ``{"w": "speed"}``
-    kind : interface that is needed of it
+    names : by a name of this package, the FMU's name where it differs, such as ``{"w": "speed"}``
+    kind : interface that the FMU must have
 
     Raises
     ------
     InputError
-        where it is no FMU 2.0 of that kind, a name is not in it, or the unit of a terminal's variable is not
-        ours.
+        where the file is no FMU 2.0 of that kind, the FMU has no variable of a name, or the unit of a terminal's
+        variable is another one than that of this package.
     """
     names, file = dict(names or {}), Path(file)
     fmu = Fmu(file, kind)
@@ -117,12 +118,12 @@ def fmu_component(
 
 
 def foreign_component(file: Path, role: Role, names: Mapping[str, str] | None = None) -> FmuComponent:
-    """An FMU that can stand in a system as its motor or its machine; see `fmu_component`.
+    """An FMU as the motor or the machine of a system; see `fmu_component`.
 
     Raises
     ------
     InputError
-        also where a variable is missing, or stands on the wrong side: in one line, with what to do.
+        also where a variable is missing, or an input is an output or the reverse: in one line, with the remedy.
     """
     outsider = fmu_component(file, names)
     motor = role == "motor"
@@ -131,7 +132,7 @@ def foreign_component(file: Path, role: Role, names: Mapping[str, str] | None = 
     for name, kind in kinds.items():
         terminal = outsider.terminals.get(name)
         prefix = "load." if kind == LOAD and motor else ""
-        for member in _NEEDED[kind]:
+        for member in _REQUIREMENTS[kind]:
             variable = terminal.members.get(member, "") if terminal else prefix + member
             connector = outsider.connectors.get(variable)
             label = outsider.names.get(variable, variable) or prefix + member
@@ -150,8 +151,8 @@ def foreign_component(file: Path, role: Role, names: Mapping[str, str] | None = 
 
 
 def _dimension(unit: str | None, definitions: Mapping[str, Any]) -> Mapping[str, Any] | None:
-    """Powers of the base units, with the factor and offset to them where there are any; None where the unit is not
-    known."""
+    """Powers of the base units, with factor and offset if they differ from 1 and 0; None where the unit is
+    unknown."""
     if not unit:
         return None
     definition = definitions.get(unit)
@@ -169,7 +170,7 @@ def _dimension(unit: str | None, definitions: Mapping[str, Any]) -> Mapping[str,
 def _with_units(
     file: Path, units: Mapping[str, str], connectors: Mapping[str, Connector]
 ) -> dict[str, Connector]:
-    """The variables among `units`, by name, with the units that they must have."""
+    """The connectors of the variables in `units`, by name, with these units."""
     variables = {}
     for name, unit in units.items():
         connector = connectors[name]
@@ -182,15 +183,15 @@ def _with_units(
 
 
 def _by_names(connectors: Mapping[str, Connector]) -> list[Terminal]:
-    """Terminals, by the names of variables as ours have them."""
+    """Terminals that follow from the names of variables."""
     ends = {name for name, c in connectors.items() if c.causality != "parameter"}
     terminals = []
-    for prefix in _prefixes(ends, _NEEDED[FLANGE]):
+    for prefix in _prefixes(ends, _REQUIREMENTS[FLANGE]):
         shaft = flange("outflow")
         terminals.append(_of(ends, shaft, prefix.rstrip(".") or shaft.name, prefix))
-    prefixes = _prefixes(ends, _NEEDED[LOAD])
+    prefixes = _prefixes(ends, _REQUIREMENTS[LOAD])
     for prefix in prefixes:
-        # beside a load that it shows itself, the one that it takes is that of the machine behind it
+        # if the FMU also gives a load itself, the load that it takes is that of the machine behind it
         name = "load" if prefix in ("", "load.") else prefix.rstrip(".")
         if prefix == "load." and "" in prefixes:
             name = "machine"
@@ -199,19 +200,19 @@ def _by_names(connectors: Mapping[str, Connector]) -> list[Terminal]:
 
 
 def _prefixes(names: Iterable[str], members: Iterable[str]) -> list[str]:
-    """What stands before the names of all `members` among the names."""
+    """The prefixes with which the names contain all `members`."""
     sets = [{n[: -len(m)] for n in names if n == m or n.endswith(f".{m}")} for m in members]
     return sorted(set.intersection(*sets))
 
 
 def _of(ends: Iterable[str], like: Terminal, name: str, prefix: str) -> Terminal:
-    """A terminal as `like`, of the members that the FMU has."""
+    """A terminal of the kind of `like`, with those of its members that the FMU has."""
     members = {m: prefix + m for m in like.members if prefix + m in ends}
     return Terminal(name, like.kind, like.description, members)
 
 
 def _declared(file: Path, ours: Mapping[str, str]) -> list[Terminal]:
-    """The terminals of our kinds that an FMU declares, if it declares any."""
+    """The terminals of the kinds flange and load in the FMU's own declaration; none where it has no declaration."""
     with zipfile.ZipFile(file) as archive:
         if _TERMINALS not in archive.namelist():
             return []

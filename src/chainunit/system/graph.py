@@ -1,8 +1,8 @@
 """A system: components by name, joined by terminals.
 
-A component is a model with its parameters or an FMU file. Two terminals of one kind are joined: of each member that
-both have, the side that gives it is connected with the side that takes it. Where both sides give a member, such as
-the torque of a shaft, nothing is connected: there the two can be compared. A shaft with a load port makes two
+A component is a model with its parameters or an FMU file. A joint joins two terminals of one kind. For each member
+that both have, it connects the side that gives the member with the side that takes it. A member that both sides give,
+such as the torque of a shaft, is not connected: the two values can be compared. A shaft with a load port makes two
 joints, `shaft_joints`."""
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ Connection = tuple[str, str]
 
 @dataclass(frozen=True)
 class Connector:
-    """A variable of a component that a connection can begin or end at, or that has a `start` value: `causality` is
-    "parameter", "input" or "output". `dimension` holds the powers of the base units; None where the unit is not
-    known. Of an FMU of somebody else also its bounds and `description`."""
+    """A variable of a component at which a connection can begin or end, or that has a `start` value: `causality` is
+    "parameter", "input" or "output". `dimension` holds the powers of the base units; None where the unit is unknown.
+    For a foreign FMU it also holds the bounds and the `description`."""
 
     name: str
     causality: str
@@ -43,8 +43,8 @@ class Connector:
 
 @dataclass(frozen=True)
 class ModelComponent:
-    """A model with its `parameters`, an instance of its declaration; `file` is its FMU, whatever start values that
-    carries, once there is one."""
+    """A model with its `parameters`, an instance of its declaration. `file` is its FMU, or None before the export;
+    the start values in the file do not count."""
 
     model: type[Model]
     parameters: Any
@@ -85,8 +85,8 @@ class ModelComponent:
 
 @dataclass(frozen=True)
 class FmuComponent:
-    """An FMU `file`; see `chainunit.system.foreign`. `names` maps the names that the system knows to those of the
-    FMU, where they differ; `connectors` and `terminals` are by the system's names."""
+    """An FMU `file`; see `chainunit.system.foreign`. `names` maps names of the system to names of the FMU, where they
+    differ; `connectors` and `terminals` use the names of the system."""
 
     file: Path
     connectors: Mapping[str, Connector]
@@ -120,7 +120,7 @@ class System:
 
     Parameters
     ----------
-    components : by name; of two that drive each other the machine comes first
+    components : by name; a machine comes before its driver
     joints : pairs of terminals by full name, such as ``("motor.flange", "machine.flange")``
     wires : single connections from an output to an input
     start : start values of parameters and inputs by full name, beside those of the components
@@ -129,8 +129,8 @@ class System:
     Raises
     ------
     InputError
-        for a name that is not there, a terminal that is joined twice, terminals that do not fit, an input with two
-        sources, and units that differ.
+        for an unknown name, a terminal that is joined twice, terminals that do not fit, an input with two sources,
+        and units that differ.
     """
 
     components: Mapping[str, Component]
@@ -141,7 +141,7 @@ class System:
 
     def __post_init__(self) -> None:
         for name in self.components:
-            # these become names of files, and full names are cut at the first dot
+            # names of components become names of files, and full names are split at the first dot
             if not re.fullmatch(r"[A-Za-z_]\w*", name, re.ASCII):
                 raise InputError(f"{shown(name)}: a component's name must be of letters, digits and _")
         partners: dict[str, str] = {}
@@ -162,7 +162,7 @@ class System:
     # -- names
 
     def component(self, full: str) -> tuple[str, str, Component]:
-        """Name of the component, rest of the name and component of a full name."""
+        """For a full name: the name of the component, the rest of the full name, and the component."""
         name, _, rest = full.partition(".")
         if name not in self.components:
             raise InputError(
@@ -171,12 +171,12 @@ class System:
         return name, rest, self.components[name]
 
     def connector(self, full: str, *causalities: str) -> Connector:
-        """The variable of that full name, of one of these causalities.
+        """The variable of this full name, with one of these causalities.
 
         Raises
         ------
         InputError
-            where there is none.
+            where there is no such variable.
         """
         _, rest, component = self.component(full)
         connector = component.connectors.get(rest)
@@ -185,11 +185,11 @@ class System:
         return connector
 
     def terminal(self, full: str) -> tuple[str, Terminal]:
-        """Name of the component and terminal of that full name."""
+        """For the full name of a terminal: the name of the component, and the terminal."""
         name, rest, component = self.component(full)
         if rest not in component.terminals:
-            known = ", ".join(component.terminals) or "none"
-            raise InputError(f"{full}: no such terminal; {name} ({component.title}) has {known}")
+            terminals = ", ".join(component.terminals) or "none"
+            raise InputError(f"{full}: no such terminal; {name} ({component.title}) has {terminals}")
         return name, component.terminals[rest]
 
     # -- connections
@@ -197,15 +197,17 @@ class System:
     @cached_property
     def connections(self) -> list[Connection]:
         """All connections between variables, those of the joints first."""
-        held = () if self.slopes else Layout(PortSlopes).names
-        connections = [c for joint in self.joints for member, c in self._joined(*joint) if member not in held]
+        excluded = () if self.slopes else Layout(PortSlopes).names
+        connections = [
+            c for joint in self.joints for member, c in self._joint(*joint) if member not in excluded
+        ]
         for source, target in self.wires:
             self.connector(source, "output")
             self.connector(target, "input")
         return [*connections, *self.wires]
 
-    def _joined(self, one: str, other: str) -> list[tuple[str, Connection]]:
-        """Connections of a joint, by the name of the member."""
+    def _joint(self, one: str, other: str) -> list[tuple[str, Connection]]:
+        """The connections of a joint, each with the name of the member."""
         (name, left), (name2, right) = self.terminal(one), self.terminal(other)
         if left.kind != right.kind:
             raise InputError(
@@ -228,8 +230,8 @@ class System:
 
     def _check_units(self, source: str, target: str) -> None:
         one, other = self.connector(source), self.connector(target)
-        known = one.dimension is not None and other.dimension is not None
-        if known and one.dimension != other.dimension:
+        comparable = one.dimension is not None and other.dimension is not None
+        if comparable and one.dimension != other.dimension:
             raise InputError(f"{source} in {one.unit} cannot be connected to {target} in {other.unit}")
 
     @cached_property
@@ -263,8 +265,8 @@ class System:
             if isinstance(component, ModelComponent) and rest in component.model.parameter_layout.names:
                 layout, before = component.model.parameter_layout, components[name]
                 assert isinstance(before, ModelComponent)
-                changed = layout.from_names({rest: value}, before.parameters)
-                components[name] = replace(before, parameters=changed)
+                parameters = layout.from_names({rest: value}, before.parameters)
+                components[name] = replace(before, parameters=parameters)
             else:
                 start[full] = value
         return replace(self, components=components, start=start)
@@ -278,8 +280,8 @@ def shaft_joints(
 
 
 def in_line(parts: Mapping[str, Component]) -> System:
-    """The machine and the parts that drive it, each behind the one after it, the motor last. What stands between has
-    the terminals `driven` and `machine` towards the machine."""
+    """A system of parts in one line: the machine first, then each part that drives the one before it, the motor last.
+    A part between machine and motor has the terminals `driven` and `machine` on its side towards the machine."""
     joints: list[tuple[str, str]] = []
     for machine, driver in pairwise(parts):
         ends = ("driven", "machine") if "driven" in parts[driver].terminals else ("flange", "load")
@@ -287,16 +289,17 @@ def in_line(parts: Mapping[str, Component]) -> System:
     return System(parts, joints)
 
 
-# -- in which order values are known
+# -- the order of evaluation
 
 Direct = Mapping[str, Mapping[str, set[str]]]
-"""By component, of each output the inputs that it depends on directly."""
+"""By component and output: the inputs on which the output depends directly."""
 
 
-def direct_inputs(component: Component, declared: Mapping[str, set[str] | None]) -> dict[str, set[str]]:
-    """Of each output the inputs that it depends on directly: as `declared`, and where a component does not say, as
-    its terminals promise. Who gives the motion of a shaft owns its inertia, so that angle and speed are states; who
-    gives a load port gives it at a point, whatever the acceleration. All else is taken to depend on all inputs."""
+def direct_inputs(component: Component, dependencies: Mapping[str, set[str] | None]) -> dict[str, set[str]]:
+    """By output, the inputs on which it depends directly: those in `dependencies`; or, where this is None, those that
+    follow from the terminals. The component that gives the motion of a shaft owns its inertia, so that angle and
+    speed are states. A load port is given at a point and does not depend on the acceleration. Every other output
+    counts as dependent on all inputs."""
     kinds: dict[str, list[Terminal]] = {FLANGE: [], LOAD: []}
     for terminal in component.terminals.values():
         kinds.setdefault(terminal.kind, []).append(terminal)
@@ -305,16 +308,20 @@ def direct_inputs(component: Component, declared: Mapping[str, set[str] | None])
     ports = {variable for t in kinds[LOAD] for variable in t.members.values()}
     inputs = {c.name for c in component.connectors.values() if c.causality == "input"}
 
-    def promised(output: str) -> set[str]:
+    def by_terminals(output: str) -> set[str]:
         if output in states:
             return set()
         return inputs - accelerations if output in ports else inputs
 
-    return {output: promised(output) if known is None else known for output, known in declared.items()}
+    return {
+        output: by_terminals(output) if inputs_of is None else inputs_of
+        for output, inputs_of in dependencies.items()
+    }
 
 
 def order(connections: Sequence[Connection], direct: Direct) -> list[tuple[str, list[str]]]:
-    """Groups of connected outputs, each of one component, in an order in which each follows from those before.
+    """Groups of connected outputs, each of one component, in an order in which each group depends only on earlier
+    ones.
 
     Raises
     ------
@@ -331,9 +338,9 @@ def order(connections: Sequence[Connection], direct: Direct) -> list[tuple[str, 
         if output not in level:
             name, _, variable = output.partition(".")
             feeding = [
-                sources[f"{name}.{known}"]
-                for known in sorted(direct[name].get(variable, ()))
-                if f"{name}.{known}" in sources
+                sources[f"{name}.{entry}"]
+                for entry in sorted(direct[name].get(variable, ()))
+                if f"{name}.{entry}" in sources
             ]
             level[output] = 1 + max((rank(source, (*above, output)) for source in feeding), default=-1)
         return level[output]
@@ -348,11 +355,12 @@ def order(connections: Sequence[Connection], direct: Direct) -> list[tuple[str, 
     return [(name, groups[at, name]) for at, name in sorted(groups, key=lambda g: (g[0], places[g[1]]))]
 
 
-# -- twins: the system with a part left out
+# -- twins: the system without one part
 
 
 def without(system: System, names: Collection[str]) -> System:
-    """The system without these components and what connects to them; inputs that they fed keep their start values."""
+    """The system without these components and without their connections; inputs without a source keep their start
+    values."""
     for name in names:
         system.component(name)
 
@@ -374,7 +382,7 @@ def hold_loads(system: System) -> System:
 
 
 def bridge(system: System, name: str) -> System:
-    """The system without the component `name`, with what drives it joined to what it drives."""
+    """The system without the component `name`; its driver is joined to the component that it drives."""
     rest = without(system, (name,))
     ends: dict[str, list[str]] = {}
     for joint in system.joints:
@@ -395,7 +403,7 @@ def rigid(system: System, line: str) -> System:
     Raises
     ------
     InputError
-        where one of those has no such parameter, as a foreign FMU may.
+        where a component has no such parameter, such as a foreign FMU.
     """
     values = system.values
     driver = next((bond.driver for bond in system.bonds if bond.machine == line), "what drives it")

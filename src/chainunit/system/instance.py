@@ -24,20 +24,20 @@ _WARNING, _DISCARD, _FATAL = 1, 2, 4  # of fmi2Status
 Kind = Literal["Co-Simulation", "Model Exchange"]
 """Interface of an FMU."""
 _working_directory = threading.Lock()
-"""Held while fmpy loads a library: all threads of the process have one working directory."""
-_unpacked: set[str] = set()
-"""Folders of the FMUs that this process has unpacked."""
+"""Locked while fmpy loads a library: all threads of the process share one working directory."""
+_folders: set[str] = set()
+"""The folders into which this process has unpacked FMUs."""
 
 
 @atexit.register
 def remove_unpacked() -> None:
-    """Remove the files of every FMU that nobody closed, for a process that ends."""
-    while _unpacked:
-        shutil.rmtree(_unpacked.pop(), ignore_errors=True)
+    """Remove the unpacked files of every FMU that was not closed, at the end of the process."""
+    while _folders:
+        shutil.rmtree(_folders.pop(), ignore_errors=True)
 
 
 class DiscardError(RunError):
-    """An FMU cannot compute at the point that it was given; at a nearer one it may."""
+    """An FMU cannot compute at a point; at a point nearer to the last one it may."""
 
 
 class Fmu:
@@ -46,13 +46,13 @@ class Fmu:
     Parameters
     ----------
     file : the FMU
-    kind : interface that is needed of it
-    names : of the names that it is to be known by those of the FMU, where they differ
+    kind : interface that the FMU must have
+    names : by the name that callers use, the name in the FMU, where they differ
 
     Raises
     ------
     InputError
-        where it is no FMU, or has not that interface.
+        where the file is no FMU, or the FMU does not have that interface.
     """
 
     def __init__(
@@ -64,7 +64,9 @@ class Fmu:
         if not Path(file).is_file():
             raise InputError(f"{file}: no such FMU")
         self.folder = str(Path(tempfile.gettempdir()) / f"chainunit_fmu_{secrets.token_hex(8)}")
-        _unpacked.add(self.folder)  # before it is there: a signal may end the process between any two lines
+        _folders.add(
+            self.folder
+        )  # before the folder exists: a signal may end the process between any two lines
         try:
             Path(self.folder).mkdir(0o700)
             extract(str(file), unzipdir=self.folder)
@@ -82,11 +84,11 @@ class Fmu:
 
     @property
     def identifier(self) -> str:
-        """Name of its library."""
+        """Name of the FMU's library."""
         return str(self.interface.modelIdentifier)
 
     def _interface(self) -> Any:
-        """What it says of the interface that is needed, where it can run here."""
+        """The description of the interface `kind`, checked so that the FMU can run here."""
         description = self.description
         there = {"Co-Simulation": description.coSimulation, "Model Exchange": description.modelExchange}
         interface = there[self.kind]
@@ -100,7 +102,7 @@ class Fmu:
                 f"{self.file}: is FMI {printable(description.fmiVersion)}, {has}; must be FMI 2.0 for {self.kind}"
             )
         identifier = interface.modelIdentifier
-        # it becomes part of a path: a foreign one must not lead out of the folder
+        # the identifier becomes part of a path, which must not lead out of the folder
         if re.fullmatch(r"[A-Za-z_]\w*", identifier, re.ASCII) is None:
             raise InputError(
                 f"{self.file}: modelIdentifier = {shown(identifier)}: must be a name in C (letters, digits, _)"
@@ -112,7 +114,7 @@ class Fmu:
         return [name for name, v in self.variables.items() if v.causality == "output" and v.type == "Real"]
 
     def feedthrough(self) -> dict[str, set[str] | None]:
-        """Of each output: the inputs that it depends on directly; None where the FMU does not say."""
+        """By output, the inputs on which it depends directly; None where the FMU does not declare them."""
         inputs = {name for name, v in self.variables.items() if v.causality == "input"}
         return {
             unknown.variable.name: None
@@ -124,7 +126,7 @@ class Fmu:
     def close(self) -> None:
         """Remove the unpacked files."""
         shutil.rmtree(self.folder, ignore_errors=True)
-        _unpacked.discard(self.folder)
+        _folders.discard(self.folder)
 
 
 def _unloadable(fmu: Fmu, error: Exception) -> str:
@@ -140,14 +142,14 @@ def _unloadable(fmu: Fmu, error: Exception) -> str:
 
 
 class Instance:
-    """A running instance for Co-Simulation; every failing call becomes a `RunError` that cites what the FMU
-    logged."""
+    """A running instance for Co-Simulation; every failing call becomes a `RunError` that cites the log of the FMU."""
 
     _api: ClassVar[str] = "FMU2Slave"
     """fmpy's class."""
 
     def __init__(self, fmu: Fmu, name: str, journal: list[str] | None = None) -> None:
-        """`journal` takes what the FMU says, for several instances in the order in which they said it."""
+        """The messages of the FMU are added to `journal`, which several instances may share: their messages then
+        stand in the order of time."""
         from fmpy import calloc, free
         from fmpy import fmi2 as api
 
@@ -177,17 +179,17 @@ class Instance:
                     modelIdentifier=fmu.identifier,
                     instanceName=name,
                 )
-            except Exception as error:  # fmpy knows no class of its own for this
+            except Exception as error:  # fmpy has no error class of its own for this
                 raise InputError(f"{fmu.file}: {_unloadable(fmu, error)}") from error
             finally:
-                os.chdir(here)  # fmpy goes to the library, and stays there on an error or an interrupt
+                os.chdir(here)  # fmpy changes to the folder of the library, and stays there after an error
         try:
             self._fmi.instantiate(callbacks=self._callbacks, loggingOn=True)
         except Exception as error:
             complaint = f": {self.messages[-1]}" if self.messages else ""
             raise RunError(f"{name}: cannot be instantiated{complaint}") from error
         self._alive = True
-        # the functions that a run calls at every step, without fmpy's layer around them, which takes twice their time
+        # a run calls these functions at every step: without fmpy's layer, which takes twice their time
         self._library, self._component = self._fmi.dll, self._fmi.component
         self._get, self._set = self._library.fmi2GetReal, self._library.fmi2SetReal
 
@@ -211,7 +213,7 @@ class Instance:
             raise self._failure(what, status)
 
     def initialize(self, start: Mapping[str, float], time: float) -> None:
-        """Set start values and enter the initialization mode; `finish_initialization` leaves it."""
+        """Set start values and enter the initialization mode, which `finish_initialization` leaves."""
         self._call("setup", self._fmi.setupExperiment, None, time)
         self.set(list(start), list(start.values()))
         self._call("initialization", self._fmi.enterInitializationMode)
@@ -268,7 +270,7 @@ class Instance:
         self._call("freeing a state", self._fmi.freeFMUState, state)
 
     def close(self) -> None:
-        """End and free the instance; one that reported a fatal error must not be called again."""
+        """End and free the instance; after a fatal error no function of it may be called again."""
         if not self._alive:
             return
         self._alive = False
@@ -291,7 +293,7 @@ class ExchangeInstance(Instance):
         self._indicators = (ctypes.c_double * self.n_indicators)()
 
     def put(self, time: float, states: Sequence[float]) -> None:
-        """Go to an instant and to these states, shape (states,)."""
+        """Set the time [s] and the states, shape (states,)."""
         library, component = self._library, self._component
         self._check(library.fmi2SetTime(component, time), "setting the time")
         if self.n_states:
@@ -300,14 +302,14 @@ class ExchangeInstance(Instance):
             self._check(status, "setting the states")
 
     def rates(self) -> Any:
-        """Derivatives of the states there, shape (states,)."""
+        """Derivatives of the states at the present point, shape (states,)."""
         if self.n_states:
             status = self._library.fmi2GetDerivatives(self._component, self._rates, self.n_states)
             self._check(status, "computing derivatives")
         return self._rates
 
     def indicators(self) -> Any:
-        """The event indicators there: where one changes its sign, there is an event."""
+        """The event indicators at the present point: a change of sign of one of them is an event."""
         if self.n_indicators:
             status = self._library.fmi2GetEventIndicators(
                 self._component, self._indicators, self.n_indicators
@@ -316,7 +318,7 @@ class ExchangeInstance(Instance):
         return self._indicators
 
     def states(self) -> list[float]:
-        """The states as the FMU has them, such as after an event."""
+        """The states in the FMU, which an event may have changed."""
         if self.n_states:
             self._call("reading the states", self._fmi.getContinuousStates, self._states, self.n_states)
         return list(self._states)
@@ -328,8 +330,8 @@ class ExchangeInstance(Instance):
             self._call("reading nominal sizes", self._fmi.getNominalsOfContinuousStates, sizes, self.n_states)
         return list(sizes)
 
-    def completed(self) -> bool:
-        """End a step of the solver; whether the FMU wants an event there."""
+    def complete_step(self) -> bool:
+        """Tell the FMU that a step of the solver is complete; whether the FMU requests an event there."""
         event, ends = self._call("completing a step", self._fmi.completedIntegratorStep)
         if ends:
             raise RunError(f"{self.name}: ends the simulation")
@@ -340,12 +342,12 @@ class ExchangeInstance(Instance):
         self._call("an event", self._fmi.enterEventMode)
 
     def update(self) -> tuple[bool, float]:
-        """Compute discrete states once, in event mode; whether something changed, so that all must be asked again,
-        and the time of the next event that is known beforehand [s]."""
-        again, ends, _, moved, timed, time = self._call("an event", self._fmi.newDiscreteStates)
+        """Update the discrete states once, in event mode. Returns whether anything changed, so that all FMUs have to
+        be updated again, and the time of the next time event [s]."""
+        again, ends, _, new_states, has_next, time = self._call("an event", self._fmi.newDiscreteStates)
         if ends:
             raise RunError(f"{self.name}: ends the simulation")
-        return bool(again or moved), float(time) if timed else math.inf
+        return bool(again or new_states), float(time) if has_next else math.inf
 
     def leave_event(self) -> None:
         """Return to continuous time."""

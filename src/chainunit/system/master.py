@@ -1,7 +1,7 @@
 """The master of a co-simulation: fixed communication step, all signals consistent at every communication point.
 
 With a load port the driver sees the linearised load inside its step, and the coupling is of second order. An external
-signal that varies within a step acts with its value at the step's middle, second order as well.
+signal that varies within a step acts with its value at the middle of the step, which is of second order, too.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from .instance import Instance
 from .simulation import Simulation, Watch
 
 _Table = list[tuple[Instance, Any, Any]]
-"""Of each instance a handle and the values of its signals, shape (n, signals)."""
+"""For each instance a handle and the values of its signals, shape (n, signals)."""
 
 
 class CoSimulation(Simulation):
@@ -29,7 +29,7 @@ class CoSimulation(Simulation):
         self._transfer()
 
     def _meet(self, watches: Sequence[Watch]) -> None:
-        """It cannot go back into a step."""
+        """Do nothing: a co-simulation cannot go back into a step."""
 
     def _steps(self, times: Any) -> Iterator[None]:
         points = self._signal_values(times)
@@ -55,8 +55,8 @@ def _apply(signals: _Table, row: int) -> None:
 
 
 def _moves(points: _Table, middles: _Table, n: int) -> tuple[list[bool], list[bool]]:
-    """In which of the `n` steps a signal moves, whose value at the middle then acts; in which it is another one at
-    the end."""
+    """For each of the `n` steps: whether a signal changes within it, so that its value at the middle acts, and
+    whether the values have to be set at its end."""
     inside, over = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
     for (_, _, at), (_, _, between) in zip(points, middles, strict=True):
         inside |= ((between != at[:-1]) | (between != at[1:])).any(axis=1)

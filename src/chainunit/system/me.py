@@ -2,10 +2,10 @@
 
 There is no communication step between the FMUs: at each evaluation of the derivatives the connected variables are
 transferred in the order of their true dependencies, with each load at exactly the present angle and speed. Rows come
-from the dense output of the solver. It stops at events: where a signal has a corner, where an FMU has named a time,
-where an event indicator changes its sign, and where an FMU asks for one after a step, as a chain does whose states
-have drifted off its constraints. After an event the solver begins anew from the states that the FMUs have then. A
-guard ends a run at the instant at which it is passed."""
+from the dense output of the solver. The solver stops at events: where a signal has a corner, at a time event of an
+FMU, where an event indicator changes its sign, and where an FMU requests an event after a step, such as a chain whose
+states have drifted off its constraints. After an event the solver starts anew from the present states of the FMUs. A
+guard ends a run at the instant at which its limit is passed."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from .signals import at_time, corners
 from .simulation import Simulation, Watch, beyond
 
 METHODS = ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")
-"""Solvers of scipy. The explicit ones suit motors, shafts and chains; Radau and BDF suit what is stiff."""
+"""Solvers of scipy. The explicit ones suit motors, shafts and chains; Radau and BDF suit stiff systems."""
 _ROUNDS = 100
-"""Rounds of an event, in which the FMUs must agree."""
+"""Largest number of rounds of one event, after which the FMUs must agree."""
 _SAMPLES = 8
-"""of a step, at which event indicators are looked at: the solver of a smooth motion takes long ones"""
+"""Number of points in a step at which event indicators are evaluated: for a smooth motion the steps are long."""
 _HALVINGS = 60
-"""with which an event is placed in its step"""
+"""Number of bisections that locate an event in its step."""
 
 
 class ModelExchange(Simulation):
@@ -38,9 +38,9 @@ class ModelExchange(Simulation):
 
     Parameters
     ----------
-    system, signals, start_time : see `Simulation`; a signal that jumps or bends must tell its `corners`
-    rtol : relative tolerance of the solver; the absolute one is its thousandth of each state's nominal size, and at
-        least 1e-12
+    system, signals, start_time : see `Simulation`; a signal that jumps or bends must have `corners`
+    rtol : relative tolerance of the solver; the absolute tolerance of a state is a thousandth of it times the state's
+        nominal size, and at least 1e-12
     method : one of `METHODS`
     """
 
@@ -60,13 +60,13 @@ class ModelExchange(Simulation):
             raise InputError(f"method = {method}: must be one of {', '.join(METHODS)}")
         self._rtol, self._method = rtol, getattr(scipy.integrate, method)
         self._pace: float | None = None
-        """step that the solver would take next [s]"""
-        self._refused: DiscardError | None = None
+        """next step of the solver [s]"""
+        self._refusal: DiscardError | None = None
         """why the last evaluation failed, if it did"""
         self._next_event = math.inf
-        """time of the next event that an FMU has named [s]"""
+        """next time event of the FMUs [s]"""
         self.events = 0
-        """events since the start, those at the begin of a run left out"""
+        """number of events since the start, without those at the begin of a run"""
         super().__init__(system, signals, start_time)
 
     def _initialize(self) -> None:
@@ -83,7 +83,8 @@ class ModelExchange(Simulation):
     # -- one ODE
 
     def _put(self, t: float, x: Any, inputs_at: float | None = None) -> None:
-        """Make all values consistent at the time `t` [s] and states `x`; signals may be those of another time."""
+        """Make all values consistent at the time `t` [s] and the states `x`; `inputs_at` is the time of the signals
+        if it differs."""
         for unit, own in zip(self._units, self._slices, strict=True):
             unit.put(t, x[own])
         self._set_inputs(t if inputs_at is None else inputs_at)
@@ -94,19 +95,19 @@ class ModelExchange(Simulation):
         self._transfer()
 
     def _within(self, t: float) -> float:
-        """A time at which a signal has the value that it has in the stretch of the solver: just behind the begin,
-        where it may have jumped, and before the end."""
+        """The time `t` limited to the present interval of the solver: from just after its begin, where a signal may
+        have jumped, to its end."""
         return min(max(t, self._from), self._until)
 
     def _rates(self, t: float, x: Any) -> Any:
-        """Derivatives of all states; not a number where an FMU cannot compute, so that the solver steps shorter."""
+        """Derivatives of all states; NaN where an FMU cannot compute, so that the solver takes a shorter step."""
         dx = np.empty_like(self._x)
         try:
             self._put(t, x, self._within(t))
             for unit, own in zip(self._units, self._slices, strict=True):
                 dx[own] = unit.rates()
         except DiscardError as error:
-            self._refused = error
+            self._refusal = error
             dx[:] = math.nan
         return dx
 
@@ -118,9 +119,9 @@ class ModelExchange(Simulation):
     # -- events
 
     def _settle(self, t: float) -> None:
-        """Let the FMUs, in event mode, agree on what is discrete, and go on in continuous time; takes their
-        states."""
-        self._inputs = self._driven()
+        """Update the FMUs, in event mode, until their discrete states agree; then enter continuous time and read
+        their states."""
+        self._inputs = self._signal_inputs()
         for _ in range(_ROUNDS):
             self._set_inputs(np.nextafter(t, math.inf))
             answers = [unit.update() for unit in self._units]
@@ -141,7 +142,7 @@ class ModelExchange(Simulation):
     # -- the solver
 
     def _begin(self, stop: float) -> None:
-        """Signals may be others than before: an event."""
+        """Begin a run with an event, as the signals may have changed since the last run."""
         self._stop = stop
         self._corners = corners(self.signals.values())
         self._event(self.time)
@@ -150,12 +151,12 @@ class ModelExchange(Simulation):
         self._put(self.time, self._x, self._from)
 
     def _restart(self, t: float) -> None:
-        """A new solver from the time `t` [s] to the next event that is known beforehand, or the end of the run."""
+        """A new solver from the time `t` [s] to the next corner or time event, or to the end of the run."""
         ahead = (*(c for c in self._corners if c > t), self._next_event, self._stop)
         self._from = float(np.nextafter(t, math.inf))
         self._reached, self._until = t, max(min(ahead), self._from)
         self._dense: Any = None
-        self._refused = None
+        self._refusal = None
         nominal = np.concatenate([np.array(unit.nominals()) for unit in self._units])
         self._solver = self._method(
             self._rates,
@@ -170,13 +171,13 @@ class ModelExchange(Simulation):
         self._signs, self._unsigned = indicators > 0.0, indicators == 0.0
 
     def _advance(self) -> None:
-        """One step of the solver, at most to the first change of sign of an event indicator in it."""
+        """One step of the solver, ended at the first change of sign of an event indicator."""
         if self._dense is not None:
             self._complete()
         before = float(self._solver.t)
         message = self._solver.step()
         if self._solver.status == "failed":
-            why = f": {self._refused}" if self._refused else ""
+            why = f": {self._refusal}" if self._refusal else ""
             raise RunError(f"step at t = {before:g} s: the solver gives up ({message}){why}")
         self._dense = self._solver.dense_output()
         self._reached, self._crossed = float(self._solver.t), False
@@ -184,10 +185,10 @@ class ModelExchange(Simulation):
             self._find_event(before)
 
     def _complete(self) -> None:
-        """End the last step of the solver, with the events at its end."""
+        """Complete the last step of the solver, with the events at its end."""
         t, x = self._reached, self._dense(self._reached)
         self._put(t, x, self._within(t))
-        events = [unit.completed() for unit in self._units]
+        events = [unit.complete_step() for unit in self._units]
         if self._crossed or any(events) or t >= self._until:
             self._pace = getattr(self._solver, "h_abs", None)
             self.events += 1
@@ -195,25 +196,25 @@ class ModelExchange(Simulation):
             self._restart(t)
 
     def _find_event(self, low: float) -> None:
-        """Shorten the step to just behind the first change of sign of an event indicator. Two changes between the
-        same two samples are not seen."""
+        """Shorten the step to just after the first change of sign of an event indicator. Two changes between the same
+        two samples are not detected."""
 
-        def changed(t: float) -> bool:
+        def has_crossed(t: float) -> bool:
             signs = self._indicators(t, self._dense(t)) > 0.0
-            # one that is zero at the begin of a step has no sign yet, such as the height of a ball that bounces
+            # an indicator that is zero at the begin of a step has no sign yet, such as the height of a bouncing ball
             self._signs = np.where(self._unsigned, signs, self._signs)
             self._unsigned[:] = False
             return bool((signs != self._signs).any())
 
         for high in np.linspace(low, self._reached, _SAMPLES + 1)[1:].tolist():
-            if changed(high):
+            if has_crossed(high):
                 break
             low = high
         else:
             return
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
-            low, high = (low, middle) if changed(middle) else (middle, high)
+            low, high = (low, middle) if has_crossed(middle) else (middle, high)
         self._reached, self._crossed = high, True
 
     def _steps(self, times: Any) -> Iterator[None]:
@@ -228,7 +229,8 @@ class ModelExchange(Simulation):
             yield
 
     def _meet(self, watches: Sequence[Watch]) -> None:
-        """See `Simulation`: by bisection in the dense output since the last row, to the time just behind it."""
+        """See `Simulation`: go back by bisection in the dense output since the last row, to just after the
+        instant."""
         row, now = self._row, self.time
         pieces = ((max(begin, row), min(end, now), dense) for begin, end, dense in self._pieces)
         low, high, dense = next(piece for piece in pieces if self._at(*piece[1:], watches))
@@ -239,14 +241,14 @@ class ModelExchange(Simulation):
         self.time = high
 
     def _at(self, t: float, dense: Any, watches: Sequence[Watch]) -> bool:
-        """Go to an instant of a step of the solver; whether a guard is passed there."""
+        """Set the values at an instant in a step of the solver; whether a guard is passed there."""
         self._put(t, dense(t))
         return beyond(watches)
 
     # -- branching
 
     def save(self) -> float:
-        """See `Simulation.save`; a branch begins with the same step of the solver."""
+        """See `Simulation.save`; every branch begins with the same step of the solver."""
         self._saved_pace = self._pace
         return super().save()
 

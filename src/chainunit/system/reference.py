@@ -1,8 +1,8 @@
 """The monolithic reference: the models' own equations as one ODE under an error-controlled solver.
 
-No communication step and no linearised load: each evaluation gives the driver the machine's load at exactly the
-present angle and speed. A co-simulation converges to it. The equations are traced in casadi once, which is
-several times as fast as the kernels themselves.
+There is no communication step and no linearised load: each evaluation gives the driver the load of the machine at
+exactly the present angle and speed. A co-simulation converges to this solution. casadi traces the equations once,
+which is several times as fast as the equations in Python.
 """
 
 from __future__ import annotations
@@ -36,17 +36,18 @@ def monolithic(
 
     Parameters
     ----------
-    system : whose components are all models; slopes of load ports vanish from the equations at the ports' own points
+    system : a system whose components are all models; the slopes of load ports have no effect, since each load is
+        evaluated at its own point
     signals : by full name of an input, a number or a function of time; the solver stops at their `corners`
-    times : where the solution is wanted [s], shape (n,)
-    rtol : relative tolerance of the solver (DOP853); the absolute one is its thousandth of each
+    times : times of the rows [s], shape (n,)
+    rtol : relative tolerance of the solver (DOP853); the absolute tolerance of a state is a thousandth of it times the
         state's nominal size, and at least 1e-12
-    start : every state by full name at the first of the times, to go on from another solution; by default the
+    start : every state by full name at the first of the times, to continue another solution; by default the
         models' own start
 
     Returns
     -------
-    every state and output but slopes, over ``time``, named as in a co-simulation of the same system.
+    every state and output except slopes, over ``time``, with the names of a co-simulation of the same system.
 
     Raises
     ------
@@ -71,9 +72,9 @@ def monolithic(
         )  # fmt: skip
         if not solution.success:
             raise RunError(f"monolithic reference: {solution.message}")
-        chosen = (times >= low) & (times <= high)
-        if chosen.any():
-            states[:, chosen] = solution.sol(times[chosen])
+        here = (times >= low) & (times <= high)
+        if here.any():
+            states[:, here] = solution.sol(times[here])
         x = solution.y[:, -1]
     return equations.dataset(times, states)
 
@@ -96,15 +97,15 @@ class _Unit:
 
     @cached_property
     def direct(self) -> dict[str, set[str]]:
-        """Of each state and output the inputs that it depends on directly."""
-        known: dict[str, set[str]] = {name: set() for name in (*self.state_names, *self.output_names)}
+        """By state and output, the inputs on which it depends directly."""
+        inputs: dict[str, set[str]] = {name: set() for name in (*self.state_names, *self.output_names)}
         names = self.model.input_layout.names
         for row, column in zip(*self.function.jac_sparsity(0, 0).get_triplet(), strict=True):
-            known[self.output_names[row]].add(names[column])
-        return known
+            inputs[self.output_names[row]].add(names[column])
+        return inputs
 
 
-def _traced(name: str, component: Any) -> _Unit:
+def _trace(name: str, component: Any) -> _Unit:
     import casadi
 
     if not isinstance(component, ModelComponent):
@@ -130,7 +131,7 @@ class _Equations:
     """The system as one ODE in the states of all models."""
 
     def __init__(self, system: System, signals: Mapping[str, Any]) -> None:
-        self._units = {name: _traced(name, c) for name, c in system.components.items()}
+        self._units = {name: _trace(name, c) for name, c in system.components.items()}
         self._connections = hold_loads(system).connections
         self._sources = {target: source for source, target in self._connections}
         self.states = [f"{name}.{x}" for name, unit in self._units.items() for x in unit.state_names]
@@ -146,7 +147,7 @@ class _Equations:
         self._compose()
 
     def _compose(self) -> None:
-        """Functions of the inputs from outside and of all states: derivatives, and all outputs."""
+        """Compose the functions of the external inputs and of all states: the derivatives, and all outputs."""
         import casadi
 
         symbols = [casadi.SX.sym(s, len(of)) for s, of in (("u", self._outside), ("x", self.states))]
@@ -156,20 +157,20 @@ class _Equations:
         for name, outputs in order(self._connections, direct):
             missing = [output for output in outputs if f"{name}.{output}" not in values]
             if missing:
-                known, _ = self._call(name, values)
-                values |= {f"{name}.{output}": known[output] for output in missing}
+                own, _ = self._call(name, values)
+                values |= {f"{name}.{output}": own[output] for output in missing}
         rates: list[Any] = []
         all_outputs: dict[str, Any] = {}
         for name in self._units:
-            known, dx = self._call(name, values)
-            all_outputs |= {f"{name}.{output}": y for output, y in known.items()}
+            own, dx = self._call(name, values)
+            all_outputs |= {f"{name}.{output}": y for output, y in own.items()}
             rates.append(dx)
         self._outputs = list(all_outputs)
         self._rates = casadi.Function("rates", symbols, [casadi.cse(casadi.vertcat(*rates))])
         self._all = casadi.Function("outputs", symbols, [casadi.cse(casadi.vertcat(*all_outputs.values()))])
 
     def _call(self, name: str, values: Mapping[str, Any]) -> tuple[dict[str, Any], Any]:
-        """Outputs by name and derivatives of a model; inputs that are not known yet are undefined."""
+        """Outputs by name and derivatives of a model; inputs without a value yet are NaN."""
         import casadi
 
         unit = self._units[name]
@@ -193,24 +194,24 @@ class _Equations:
         return [max(1e-12, rtol * 1e-3 * size) for size in sizes]
 
     def start(self, t: float) -> list[float]:
-        """States at the start. Where one depends on an input that is another model's state, a pass for each on the
-        way."""
-        known = dict(zip(self._outside, self._inputs(t), strict=True))
+        """States at the start. A state may depend on an input that is a state of another model, and so on: each pass
+        resolves one such dependency."""
+        values = dict(zip(self._outside, self._inputs(t), strict=True))
         x: list[float] = []
         for _ in range(len(self._units) + 1):
             before, x = x, []
             for name, unit in self._units.items():
                 if unit.model.state_layout:
                     inputs = {
-                        v: known[self._sources.get(f"{name}.{v}", f"{name}.{v}")]
+                        v: values[self._sources.get(f"{name}.{v}", f"{name}.{v}")]
                         for v in unit.model.input_layout.names
-                        if self._sources.get(f"{name}.{v}", f"{name}.{v}") in known
+                        if self._sources.get(f"{name}.{v}", f"{name}.{v}") in values
                     }
                     u = unit.model.input_layout.from_names(inputs)
                     x += unit.model.state_layout.values(unit.model.start(MATH, unit.p, u))
-            known |= zip(self.states, x, strict=True)
+            values |= zip(self.states, x, strict=True)
             outputs = self._all(self._inputs(t), x).full().ravel()
-            known |= zip(self._outputs, map(float, outputs), strict=True)
+            values |= zip(self._outputs, map(float, outputs), strict=True)
             if x == before:
                 break
         return x
@@ -219,7 +220,7 @@ class _Equations:
         """All states and outputs; `states` have the shape (states, times)."""
         outside = [np.broadcast_to(u, times.shape) for u in self._inputs(times)]
         outputs = np.asarray(self._all(np.array(outside).reshape(-1, len(times)), states))
-        described = {
+        declarations = {
             f"{name}.{v.name}": v
             for name, unit in self._units.items()
             for layout in (unit.model.state_layout, unit.model.parts[0].layout)
@@ -228,7 +229,11 @@ class _Equations:
         }
         rows = [*zip(self.states, states, strict=True), *zip(self._outputs, outputs, strict=True)]
         variables = {
-            full: ("time", row, {"units": described[full].unit, "long_name": described[full].description})
+            full: (
+                "time",
+                row,
+                {"units": declarations[full].unit, "long_name": declarations[full].description},
+            )
             for full, row in rows
         }
         return xr.Dataset(variables, {"time": ("time", times, {"units": "s", "long_name": "time"})})

@@ -20,7 +20,7 @@ BLOCK = 4096
 
 
 class Rows:
-    """The rows of a run: in memory, or in a NetCDF file that takes a block of them at a time."""
+    """The rows of a run: in memory, or in a NetCDF file, to which they are written in blocks."""
 
     def __init__(self, recorders: Sequence[Recorder], room: int, file: Path | None) -> None:
         self._recorders = recorders
@@ -57,12 +57,12 @@ class Rows:
 
     def _attributes(self) -> dict[str, dict[str, str]]:
         """Units and descriptions, of the time first."""
-        described = {"time": {"units": "s", "long_name": "time"}}
+        attributes = {"time": {"units": "s", "long_name": "time"}}
         for instance, _, names in self._recorders:
             for full in names:
-                declared = instance.fmu.variables[full.partition(".")[2]]
-                described[full] = {"units": declared.unit or "1", "long_name": declared.description or full}
-        return described
+                variable = instance.fmu.variables[full.partition(".")[2]]
+                attributes[full] = {"units": variable.unit or "1", "long_name": variable.description or full}
+        return attributes
 
     def _create(self, file: Path) -> Any:
         import netCDF4
@@ -73,7 +73,7 @@ class Rows:
             for name, attributes in self._attributes().items():
                 variable = out.createVariable(name, "f8", ("time",), chunksizes=(BLOCK,))
                 variable.setncatts(attributes)
-                # by itself the library keeps megabytes of each variable
+                # by default the library keeps megabytes of each variable in memory
                 variable.set_var_chunk_cache(size=8 * BLOCK, nelems=3, preemption=1.0)
         return out
 
@@ -87,7 +87,7 @@ class Rows:
         self._written, self._filled = end, 0
 
     def dataset(self) -> xr.Dataset:
-        """The rows in memory. Their variables share it."""
+        """The rows in memory; the variables share the memory of this table."""
         rows = {
             name: ("time", values[: self._filled], attributes)
             for values, (name, attributes) in zip(self._values, self._attributes().items(), strict=True)

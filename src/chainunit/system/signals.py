@@ -1,7 +1,7 @@
 """Loads and references over time.
 
-A signal is a number, or a function of the time [s]. Where it jumps or bends it says so by an attribute `corners`, the
-times of that: a solver stops there.
+A signal is a number, or a function of the time [s]. If it jumps or bends, its attribute `corners` lists the times at
+which it does so: a solver stops there.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Profile:
-    """A value that changes smoothly from time to time.
+    """A value with smooth changes at given times.
 
     `changes` lists (time at which the change begins [s], its duration [s], value after it), in order and
     without overlap; each change is a quintic step, continuous to the second derivative, so that a
@@ -24,7 +24,7 @@ class Profile:
     Raises
     ------
     ValueError
-        where changes overlap or last no time.
+        where changes overlap, or a duration is not positive.
     """
 
     start: float
@@ -50,7 +50,7 @@ class Profile:
         return value if np.ndim(t) else float(value)
 
     def rate(self, t: Any) -> Any:
-        """Its derivative at time `t` (float or array)."""
+        """The derivative of the value at time `t` (float or array)."""
         value: Any = 0.0
         before = self.start
         for at, duration, after in self.changes:
@@ -67,7 +67,7 @@ class Profile:
 
 @dataclass(frozen=True)
 class Jump:
-    """A value that is `before` up to the time `at` [s] and `after` behind it."""
+    """A value that is `before` up to and including the time `at` [s], and `after` later."""
 
     at: float
     before: float

@@ -1,7 +1,7 @@
 """The common parts of every run of a system of FMUs: set-up, transfer of values, rows, branches.
 
-At each communication point the connected variables are transferred in the order that the FMUs' true dependencies
-allow (states first, then what follows from them), so that every recorded row belongs to one instant.
+At each communication point the connected variables are transferred in the order of the FMUs' true dependencies: the
+states first, then the outputs that depend on them. So every recorded row belongs to one instant.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from .instance import Fmu, Instance, Kind
 from .signals import Profile, at_time
 
 Watch = tuple[Instance, Any, list[float]]
-"""An instance, the handle of its outputs that are guarded, and their limits."""
+"""An instance, the handle of its guarded outputs, and their limits."""
 
 
 @contextmanager
 def stoppable() -> Iterator[Callable[[], bool]]:
-    """Whether Ctrl-C was pressed, asked between steps: a KeyboardInterrupt inside an FMU would be a fatal error. So
-    it is with SIGTERM, where somebody handles it by a KeyboardInterrupt. The KeyboardInterrupt of which nobody was
-    told, since nobody asked any more, comes at the end."""
+    """Hold a KeyboardInterrupt back, since it would be a fatal error inside an FMU, and give a function that tells,
+    between steps, whether one came. It may come from Ctrl-C, or from a handler of SIGTERM that raises it. An
+    interrupt after the last call of the function is raised at the end of the context."""
     interrupts: list[KeyboardInterrupt] = []
     reports: list[bool] = []
     if threading.current_thread() is not threading.main_thread():
@@ -72,7 +72,7 @@ class Simulation(ABC):
     ----------
     system : a system whose components all have an FMU; see `chainunit.system.export`
     signals : by full name of an input, a number or a function of time; see `chainunit.system.signals`
-    start_time : [s]
+    start_time : time at the start [s]
 
     Raises
     ------
@@ -139,8 +139,8 @@ class Simulation(ABC):
             self._instances[name] = self.instances(archives[key], name, self._journal)
 
     def _schedule(self) -> list[tuple[Instance, Any, list[tuple[Instance, Any, list[int]]]]]:
-        """Groups of connected outputs in an order in which each is final when it is read: of each the instance, the
-        handle, and the inputs that they go to."""
+        """Groups of connected outputs in an order in which each output is final when it is read. A group has its
+        instance, the handle of the outputs, and the inputs that take their values."""
         direct = {
             name: direct_inputs(component, self._fmus[name].feedthrough())
             for name, component in self.system.components.items()
@@ -180,11 +180,11 @@ class Simulation(ABC):
     # -- values
 
     def _by_instance(self, fulls: Iterable[str]) -> dict[str, list[str]]:
-        """Full names, by the component that they belong to."""
-        split: dict[str, list[str]] = {}
+        """Full names by the name of their component."""
+        groups: dict[str, list[str]] = {}
         for full in fulls:
-            split.setdefault(full.partition(".")[0], []).append(full)
-        return split
+            groups.setdefault(full.partition(".")[0], []).append(full)
+        return groups
 
     def _handles(self, fulls: Iterable[str]) -> list[tuple[Instance, Any, list[str]]]:
         """Instances, handles and full names, by component."""
@@ -197,8 +197,8 @@ class Simulation(ABC):
             for name, own in self._by_instance(fulls).items()
         ]
 
-    def _driven(self) -> list[tuple[Instance, Any, list[str]]]:
-        """Handles of the inputs that have signals."""
+    def _signal_inputs(self) -> list[tuple[Instance, Any, list[str]]]:
+        """Handles of the inputs with signals."""
         connected = {target for _, target in self.system.connections}
         for full in self.signals:
             self.system.connector(full, "input")
@@ -207,12 +207,12 @@ class Simulation(ABC):
         return self._handles(self.signals)
 
     def _signal_values(self, times: Any) -> list[tuple[Instance, Any, Any]]:
-        """The signals at `times`, shape (n,): of each instance a handle and a table (n, signals)."""
+        """The signals at `times`, shape (n,): for each instance a handle and a table (n, signals)."""
 
-        def column(given: Any) -> Any:
-            if callable(given) and not isinstance(given, Profile):
-                return [given(float(t)) for t in times]
-            return np.broadcast_to(at_time(given, times), len(times))
+        def column(source: Any) -> Any:
+            if callable(source) and not isinstance(source, Profile):
+                return [source(float(t)) for t in times]
+            return np.broadcast_to(at_time(source, times), len(times))
 
         return [
             (
@@ -220,7 +220,7 @@ class Simulation(ABC):
                 handle,
                 np.stack([np.asarray(column(self.signals[full]), float) for full in names], axis=1),
             )
-            for instance, handle, names in self._driven()
+            for instance, handle, names in self._signal_inputs()
         ]
 
     def _transfer(self) -> None:
@@ -233,11 +233,11 @@ class Simulation(ABC):
 
     @abstractmethod
     def _begin(self, stop: float) -> None:
-        """Make all values consistent at the present time, from which a run to the time `stop` goes on."""
+        """Make all values consistent at the present time, at which a run to the time `stop` begins."""
 
     @abstractmethod
     def _steps(self, times: Any) -> Iterator[None]:
-        """Go from the first of the `times` to each other one, with all values consistent there."""
+        """Go from the first of the `times` to each of the others in turn, with all values consistent there."""
 
     def run(
         self,
@@ -256,25 +256,25 @@ class Simulation(ABC):
         ----------
         stop, step : [s]
         progress : is called with the simulated time now and then
-        guards : limits by full name of an output: where its size passes the limit at the end of a step, the run ends
-            with that row; one of Model Exchange with a row at the instant of it
-        every : each so many rows one is kept, beside the first and the last
-        names : full names of the outputs and driven inputs that are kept; all by default
-        file : a NetCDF file that the rows are written to as they come; then of a row no more than its time stays in
-            memory
+        guards : limits by full name of an output: where the absolute value passes the limit at the end of a step, the
+            run ends with that row; in Model Exchange it ends with a row at the instant of the passage
+        every : keep one of so many rows, besides the first and the last
+        names : full names of the outputs and of the inputs with signals to keep; all by default
+        file : a NetCDF file to which the rows are written in blocks during the run; the memory then does not grow with
+            the number of rows
 
         Returns
         -------
-        every output and connected or driven input, or those of `names`, over the dimension ``time``, with units and
-        descriptions; of a `file` a Dataset that reads from it when asked (close it at the end). A further call goes
-        on from where this one ended.
+        every output and every input with a signal, or those in `names`, over the dimension ``time``, with units and
+        descriptions. With a `file` the Dataset reads from it lazily; close it at the end. A further call continues
+        the run.
 
         Raises
         ------
         InputError
-            for a run that does not go forward, and for a name that cannot be watched or kept.
+            for a run that does not go forward, and for a name that cannot be guarded or kept.
         RunError
-            where an FMU fails; its attribute ``partial`` holds the Dataset up to there.
+            where an FMU fails; the attribute ``partial`` of the error holds the Dataset up to the failure.
         WriteError
             where the `file` cannot be written.
         """
@@ -286,7 +286,7 @@ class Simulation(ABC):
         if every < 1 or every != int(every):
             raise InputError(f"every = {every:g}: must be a whole number >= 1")
         n = max(1, math.ceil((stop - start) / step - 1e-9))
-        recorders, watches = self._recorders(names), self._watched(guards or {})
+        recorders, watches = self._recorders(names), self._watches(guards or {})
         room = n // every + 2 if file is None else rows.BLOCK
         failure: RunError | None = None
         try:
@@ -299,12 +299,12 @@ class Simulation(ABC):
                 try:
                     self._record(table, stop, step, n, every, watches, progress, stopped, complaints)
                 except RunError as error:
-                    failure = complaints.explained(error)
+                    failure = complaints.explain(error)
         except KeyboardInterrupt:
-            # after the last step: the rows are there
+            # the interrupt came after the last step: the rows are complete
             if self.time == start:
                 raise
-            failure = self._interrupted()
+            failure = self._interruption()
         run = table.dataset() if file is None else xr.open_dataset(file, decode_times=False)
         if failure is not None:
             failure.partial = run
@@ -335,34 +335,34 @@ class Simulation(ABC):
             times = np.minimum(start + step * np.arange(first, min(first + rows.BLOCK, n) + 1), stop)
             for _ in self._steps(times):
                 done += 1
-                passed = beyond(watches)
-                if passed:
+                is_beyond = beyond(watches)
+                if is_beyond:
                     self._meet(watches)
-                interrupted = stopped()
-                ends = passed or interrupted or done == n
+                is_interrupted = stopped()
+                ends = is_beyond or is_interrupted or done == n
                 if ends or done % every == 0:
                     table.add(self.time)
                 if progress and done % often == 0:
                     progress(self.time)
-                if interrupted:
-                    raise self._interrupted()
+                if is_interrupted:
+                    raise self._interruption()
                 if ends:
                     return
                 complaints.step()
 
     @abstractmethod
     def _meet(self, watches: Sequence[Watch]) -> None:
-        """Go back from a row beyond a guard to the instant at which it was passed, where a simulation can."""
+        """Go back from a row beyond a guard to the instant of the passage, if the simulation can."""
 
-    def _interrupted(self) -> InterruptedRunError:
+    def _interruption(self) -> InterruptedRunError:
         return InterruptedRunError(f"interrupted at t = {self.time:g} s")
 
     def _recorders(self, names: Iterable[str] | None) -> list[rows.Recorder]:
-        """The outputs to be kept of each instance, in declared order."""
+        """The outputs and inputs of each instance to keep, in declared order."""
         there: list[str] = []
         for name, fmu in self._fmus.items():
-            driven = sorted(full for full in self.signals if full.startswith(f"{name}."))
-            there += [*(f"{name}.{v}" for v in fmu.outputs()), *driven]
+            inputs = sorted(full for full in self.signals if full.startswith(f"{name}."))
+            there += [*(f"{name}.{v}" for v in fmu.outputs()), *inputs]
         if names is not None:
             selection = set(names)
             for full in sorted(selection - set(there)):
@@ -370,7 +370,7 @@ class Simulation(ABC):
             there = [full for full in there if full in selection]
         return self._handles(there)
 
-    def _watched(self, guards: Mapping[str, float]) -> list[Watch]:
+    def _watches(self, guards: Mapping[str, float]) -> list[Watch]:
         """Handles and limits of the guards, by instance."""
         for full in guards:
             self.system.connector(full, "output")
@@ -382,7 +382,7 @@ class Simulation(ABC):
     # -- branching
 
     def save(self) -> float:
-        """Keep the present state of every FMU, in place of the one kept before; returns the time.
+        """Save the present state of every FMU, in place of the last saved one; returns the time.
 
         Raises
         ------
@@ -413,14 +413,14 @@ class Simulation(ABC):
                 )
 
     def restore(self) -> None:
-        """Return to the state that `save` kept, from which another branch can run."""
+        """Return to the saved state, from which another branch can run."""
         for name, instance in self._instances.items():
             instance.restore(self._state[name])
         self.time = self._saved_at
 
 
 def beyond(watches: Sequence[Watch]) -> bool:
-    """Whether a guarded output passes its limit."""
+    """Whether the absolute value of a guarded output is above its limit."""
     return any(
         abs(value) > limit
         for instance, handle, limits in watches
@@ -429,19 +429,19 @@ def beyond(watches: Sequence[Watch]) -> bool:
 
 
 class _Complaints:
-    """What FMUs say in the course of a run, to explain its failure: the call that fails may only pass on what another
-    FMU complained of before, or while the values for its step were set."""
+    """The messages of the FMUs during a run, to explain a failure: its cause may be an earlier message of another
+    FMU, also one from the transfer of values before the step."""
 
     def __init__(self, journal: Sequence[str]) -> None:
         self._journal = journal
         self._first = self._last = 0
 
     def step(self) -> None:
-        """A step begins."""
+        """Mark the begin of a step."""
         self._first, self._last = self._last, len(self._journal)
 
-    def explained(self, error: RunError) -> RunError:
-        """The error with the first complaint since the step before."""
+    def explain(self, error: RunError) -> RunError:
+        """The error with the first message since the begin of the previous step."""
         hint = f" (before: {self._journal[self._first]})" if len(self._journal) > self._first + 1 else ""
         failure = type(error)(f"{error}{hint}")
         failure.__cause__ = error

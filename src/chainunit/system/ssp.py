@@ -1,10 +1,10 @@
 """Export of models and their connections as an SSP 1.0 package: FMUs, parameter sets, the structure of the system.
 
-FMUs of somebody else are in it as they are, with their own names; what the system sets of them is in their sets.
-The package runs as it is in libcosim, which reads every component's parameter set and, from an annotation, the
-step; and in ecos, which takes the set by name (``init(parameter_set="start")``). Each FMU carries its start values,
-too, so that a tool that passes the sets by runs the same system. Neither of the two reads connections to
-connectors of the system itself: inputs that are not connected are left open, with their values in the sets.
+Foreign FMUs are packaged unchanged, with their own names; the values that the system sets in them are in their
+parameter sets. The package runs without changes in libcosim, which reads every component's parameter set and, from an
+annotation, the step; and in ecos, which takes the set by name (``init(parameter_set="start")``). Each FMU also has
+its start values, so that a tool that ignores the sets runs the same system. Neither of the two reads connections to
+connectors of the system itself: inputs without connection stay open, with their values in the sets.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from ..model import Model
 from .graph import Connector, FmuComponent, System
 
 PARAMETER_SET = "start"
-"""Name of every component's parameter set: tools that choose sets by name apply all that share one."""
+"""Name of every component's parameter set: a tool that selects sets by name applies all sets of that name."""
 
 _SSP = "http://ssp-standard.org/SSP1/SystemStructure"
-# libcosim and ecos compare names with these very prefixes
+# libcosim and ecos expect exactly these prefixes
 _NAMESPACES = {
     "ssc": f"{_SSP}Common",
     "ssd": f"{_SSP}Description",
@@ -49,29 +49,29 @@ def export(
     backend: Backend | None = None,
     report: Callable[[str], None] = lambda what: None,
 ) -> str:
-    """Write `system` as an SSP 1.0 package and say, in words, what is in it. The same system gives the same file.
+    """Write `system` as an SSP 1.0 package and return a text on its contents. The same system gives the same file.
 
     Parameters
     ----------
-    system : its models become FMUs, the FMUs of somebody else are packaged as they are
-    file : path of the package; a file there is replaced, in one step
-    name, description : of the whole
+    system : its models become FMUs, foreign FMUs are packaged unchanged
+    file : path of the package; an existing file is replaced, in one step
+    name, description : name and description of the system
     stop, step : end of the default experiment, and its communication step, an annotation that libcosim reads [s]
-    backend : of the FMUs, which are FMI 2.0; see `chainunit.fmu.backends.export`
-    report : is told what is being done
+    backend : backend of the FMUs, which are FMI 2.0; see `chainunit.fmu.backends.export`
+    report : is called with texts on the progress
 
     Raises
     ------
     InputError
-        for start values out of bounds or that make no machine, an experiment without end or step, and what
-        `chainunit.fmu.backends.export` refuses.
+        for start values out of bounds or that make no machine, for an experiment without end or step, and where
+        `chainunit.fmu.backends.export` raises it.
     RunError
         where the compiler fails.
     """
     if not (0.0 < step < math.inf and 0.0 < stop < math.inf):
         raise InputError(f"an experiment of {stop:g} s in steps of {step:g} s: must go forward")
     parts = _parts(system)
-    driven = {target for _, target in system.connections}
+    targets = {target for _, target in system.connections}
     file = Path(file)
     folder(file.parent)
     contents: dict[str, bytes] = {}
@@ -93,7 +93,7 @@ def export(
                 contents[paths[alike]] = fmu.read_bytes()
             sources[name_of] = paths[alike]
     for name_of, part in parts.items():
-        free = [c for c in part.of_kind("input") if f"{name_of}.{c.name}" not in driven]
+        free = [c for c in part.of_kind("input") if f"{name_of}.{c.name}" not in targets]
         set_here = [c for c in part.of_kind("parameter") if c.name in part.start]
         contents[_parameter_file(name_of)] = xml_bytes(_parameter_set(part, [*set_here, *free]))
     structure = _description(system, parts, sources, (name, description), (stop, step))
@@ -106,7 +106,7 @@ def export(
 
 @dataclass(frozen=True)
 class _Part:
-    """A component in the package: its model or the file of somebody else, its variables, and their names in the FMU
+    """A component in the package: its model or the file of a foreign FMU, its variables, and their names in the FMU
     where they differ."""
 
     of: type[Model] | Path
@@ -114,7 +114,7 @@ class _Part:
     description: str
     connectors: Sequence[Connector]
     start: dict[str, float]
-    """start values of parameters and inputs, as the FMU carries them or the package sets them"""
+    """start values of parameters and inputs, in the FMU itself or in its parameter set"""
     names: Mapping[str, str]
 
     def of_kind(self, causality: str) -> list[Connector]:
@@ -145,13 +145,13 @@ def _parts(system: System) -> dict[str, _Part]:
             interface = interface_of(component.model, start[name])
         known = component.connectors
         own = [replace(known[s.name], start=float(s.start or 0.0)) for s in interface.signals]
-        described = [
+        connectors = [
             replace(c, description=s.variable.description)
             for c, s in zip(own, interface.signals, strict=True)
         ]
-        given = {c.name: c.start for c in described if c.causality != "output"}
+        values = {c.name: c.start for c in connectors if c.causality != "output"}
         model = component.model
-        parts[name] = _Part(model, model.name, model.description, described, given, {})
+        parts[name] = _Part(model, model.name, model.description, connectors, values, {})
     return parts
 
 
@@ -204,10 +204,10 @@ def _description(
     experiment: tuple[float, float],
 ) -> Element:
     """The XML tree of SystemStructure.ssd; `sources` are the FMUs' paths by component, `title` is name and
-    description of the whole, `experiment` end and step [s]."""
-    # a title may hold characters that XML cannot
-    described = "".join(c if c.isprintable() else " " for c in title[1])
-    root = _root("ssd:SystemStructureDescription", title[0], ("ssd", "ssc", "osp"), described)
+    description of the system, `experiment` end and step [s]."""
+    # a description may hold characters that XML does not allow
+    words = "".join(c if c.isprintable() else " " for c in title[1])
+    root = _root("ssd:SystemStructureDescription", title[0], ("ssd", "ssc", "osp"), words)
     top = SubElement(root, "ssd:System", name=title[0])
     elements = SubElement(top, "ssd:Elements")
     for name, part in parts.items():
