@@ -173,10 +173,11 @@ class Study:
         Parameters
         ----------
         folder : the folder to which the files of ``chainunit study -o`` are written; without it only
-            `StudyResult.save` leaves files on the disk check : whether every run is also compared with the
-            monolithic solution backend : backend of the FMUs, "native" or "python"; by default native where
-            there is a C compiler progress : a function that is called with the task, the amount of work that
-            is complete, and the total amount
+            `StudyResult.save` leaves files on the disk
+        check : whether every run is also compared with the monolithic solution
+        backend : backend of the FMUs, "native" or "python"; by default native where there is a C compiler
+        progress : a function that is called with the task, the amount of work that is complete, and the total
+            amount
 
         Raises
         ------

@@ -28,8 +28,8 @@ class Machine:
     Parameters
     ----------
     model : the inverse model of the machine
-    parameters : its `Parameters`, or values (SI) by the names of parameters, e.g. ``{"r": 0.2, "crank.m": 35.0}``; all
-        other parameters have the values of the packaged machine.
+    parameters : its `Parameters`, or values (SI) by the names of parameters, e.g. ``{"r": 0.2, "crank.m": 35.0}``;
+        all other parameters have the values of the packaged machine.
     **values : values by names without a dot.
 
     Raises

@@ -40,8 +40,8 @@ def monolithic(
         evaluated at its own point
     signals : by full name of an input, a number or a function of time; the solver stops at their `corners`
     times : times of the rows [s], shape (n,)
-    rtol : relative tolerance of the solver (DOP853); the absolute tolerance of a state is a thousandth of it times the
-        state's nominal size, and at least 1e-12
+    rtol : relative tolerance of the solver (DOP853); the absolute tolerance of a state is a thousandth of it times
+        the state's nominal size, and at least 1e-12
     start : every state by full name at the first of the times, to continue another solution; by default the
         models' own start
 

@@ -260,8 +260,8 @@ class Simulation(ABC):
             run ends with that row; in Model Exchange it ends with a row at the instant of the passage
         every : keep one of so many rows, besides the first and the last
         names : full names of the outputs and of the inputs with signals to keep; all by default
-        file : a NetCDF file to which the rows are written in blocks during the run; the memory then does not grow with
-            the number of rows
+        file : a NetCDF file to which the rows are written in blocks during the run; the memory then does not grow
+            with the number of rows
 
         Returns
         -------
