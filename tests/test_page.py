@@ -877,6 +877,22 @@ def test_the_page_in_a_browser(study, written, tmp_path):
     assert stage.count('class="link') == 7 and stage.count('class="arrow') == 11
 
 
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium here")
+@pytest.mark.parametrize(("width", "scrolls"), [(500, True), (1400, False)])
+def test_a_table_that_is_wider_than_the_screen_says_that_it_scrolls(written, tmp_path, width, scrolls):
+    arguments = f"--headless --no-sandbox --disable-gpu --window-size={width},900 --virtual-time-budget=10000"
+    done = subprocess.run(
+        ["chromium", *arguments.split(), "--dump-dom", f"--user-data-dir={tmp_path}", written.as_uri()],
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 0 and ('class="wide scrolls' in done.stdout) is scrolls
+    # the hint itself stands in the style, for all that scrolls
+    assert '.scrolls::before { content: "' in done.stdout
+
+
 def test_plots_mark_running_margin_and_where_two_bars_end(study):
     """Each mark against the numbers of the study, computed otherwise."""
     figures = {figure.name: figure for figure in study_report.report(study).figures}

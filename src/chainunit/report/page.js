@@ -48,16 +48,16 @@
     for (const [box, height] of drawn) resize(box, null, height, 13);
   });
 
-  /* wide tables say that they scroll */
-  const tables = document.querySelectorAll(".wide");
+  /* tables and drawings that are wider than the screen say that they scroll */
+  const wideBoxes = document.querySelectorAll(".wide, .drawing");
   const markWide = () => {
-    for (const table of tables) {
-      const room = table.scrollWidth - table.clientWidth;
-      table.classList.toggle("scrolls", getComputedStyle(table).overflowX === "auto" && room > 1);
-      table.classList.toggle("at-end", table.scrollLeft > room - 2);
+    for (const box of wideBoxes) {
+      const room = box.scrollWidth - box.clientWidth;
+      box.classList.toggle("scrolls", getComputedStyle(box).overflowX === "auto" && room > 1);
+      box.classList.toggle("at-end", box.scrollLeft > room - 2);
     }
   };
-  for (const table of tables) table.addEventListener("scroll", markWide, { passive: true });
+  for (const box of wideBoxes) box.addEventListener("scroll", markWide, { passive: true });
   window.addEventListener("resize", markWide);
   markWide();
 
