@@ -13,10 +13,12 @@ from chainunit.groups.body import Bar, Mass
 from chainunit.groups.driver import Crank, Ram
 from chainunit.groups.dyad import Dyad
 from chainunit.groups.group import Rail
+from chainunit.groups.legs import BlockLeg, RodLeg, SlotLeg
 from chainunit.groups.loads import GuideLosses, PinLosses, Push, Weight
 from chainunit.groups.sliding import PRP, RPP, RPR, RRP
+from chainunit.groups.triad import Pose, Triad
 from chainunit.mechanism.linkage import Linkage
-from chainunit.mechanism.machine import MachineState, Mechanism
+from chainunit.mechanism.machine import MachineState, Mechanism, derived_numbers
 from chainunit.planar import Vec2
 
 PIN = SimpleNamespace(friction=0.1, diameter=0.05, w_smooth=0.02)
@@ -73,7 +75,18 @@ def rpp(rng):
     return RPP(block, yoke, rail, unit(1.2), ("G", "H"))
 
 
-DYADS = {"RRP": rrp, "RPR": rpr, "PRP": prp, "RPP": rpp}
+def triad(rng):
+    """On a rod, a block on a rail that turns, and a block in a slot."""
+    legs = (
+        RodLeg(bar(rng, "rod", "O3", 0.57), "C", Vec2(0.0, 0.38)),
+        BlockLeg(bar(rng, "block", "", None, G=(0.03, 0.02)), "D", Vec2(0.25, -0.15), RAIL, "G"),
+        SlotLeg(bar(rng, "sliding", "A", None, H=(0.0, 0.0)), Vec2(0.08, -0.1), unit(0.41), "H"),
+    )
+    return Triad("plate", mass(rng), legs, {"end_plate": (0.2, 0.1)}, Pose(0.3, 0.3, 0.0))
+
+
+RAIL = Rail("rocker", Vec2(0.23, 0.29), unit(-0.18))
+DYADS = {"RRP": rrp, "RPR": rpr, "PRP": prp, "RPP": rpp, "triad": triad}
 
 
 def linkage(kind, seed, losses=True):
@@ -87,10 +100,14 @@ def linkage(kind, seed, losses=True):
     return Linkage(GROUND, driver, (dyad, group), loads)
 
 
+def mechanism(bars, q, xp=MATH):
+    return Mechanism(xp, bars, q, derived_numbers(MATH, bars))
+
+
 def clear(kind, seed):
     """A crank angle at which the dyad is clear of its dead positions."""
     bars = linkage(kind, seed)
-    return max((0.7 + seed, 2.2 + seed), key=lambda q: min(map(abs, Mechanism(MATH, bars, q).margins())))
+    return max((0.7 + seed, 2.2 + seed), key=lambda q: min(map(abs, mechanism(bars, q).margins())))
 
 
 CASES = [(kind, seed, clear(kind, seed)) for kind in DYADS for seed in range(3)]
@@ -110,8 +127,8 @@ def names_and_values(m):
 def test_motion_has_the_derivatives_that_it_states(kind, seed, q):
     """Against central differences of higher order, and the constraints themselves at the ends."""
     bars, h = linkage(kind, seed), 1e-3
-    here = list(names_and_values(Mechanism(MATH, bars, q)))
-    around = [list(names_and_values(Mechanism(MATH, bars, q + k * h))) for k in (-2, -1, 1, 2)]
+    here = list(names_and_values(mechanism(bars, q)))
+    around = [list(names_and_values(mechanism(bars, q + k * h))) for k in (-2, -1, 1, 2)]
 
     def difference(place, order):
         a, b, c, d = (np.array(each[place][order]) for each in around)
@@ -126,8 +143,8 @@ def test_motion_has_the_derivatives_that_it_states(kind, seed, q):
 @pytest.mark.parametrize(("kind", "seed", "q"), CASES)
 def test_third_derivatives(kind, seed, q):
     bars, h = linkage(kind, seed), 1e-3
-    links, pins = Mechanism(MATH, bars, q).third()
-    around = [Mechanism(MATH, bars, q + k * h) for k in (-2, -1, 1, 2)]
+    links, pins = mechanism(bars, q).third()
+    around = [mechanism(bars, q + k * h) for k in (-2, -1, 1, 2)]
 
     def difference(value):
         a, b, c, d = (np.array(value(m)) for m in around)
@@ -147,7 +164,7 @@ def test_third_derivatives(kind, seed, q):
 @pytest.mark.parametrize(("kind", "seed", "q"), CASES)
 def test_the_torque_by_reactions_is_that_of_virtual_work(kind, seed, q):
     bars = linkage(kind, seed, losses=False)
-    state = MachineState(MATH, Mechanism(MATH, bars, q), 6.0)
+    state = MachineState(MATH, mechanism(bars, q), 6.0)
     assert state.torque_by_reactions(-25.0) == pytest.approx(state.torque(-25.0), rel=1e-11)
 
 
@@ -155,7 +172,7 @@ def test_the_torque_by_reactions_is_that_of_virtual_work(kind, seed, q):
 def test_each_link_is_in_balance(kind, seed, q):
     """Newton's and Euler's equations of every link, from the reactions alone."""
     bars, w, a = linkage(kind, seed, losses=False), 6.0, -25.0
-    m = Mechanism(MATH, bars, q)
+    m = mechanism(bars, q)
     state = MachineState(MATH, m, w)
     reactions = state.reactions(a)
     force = {name: np.zeros(2) for name in m.links}
@@ -196,12 +213,12 @@ def test_each_link_is_in_balance(kind, seed, q):
 def test_slopes_of_the_port(kind, seed, q):
     """By dual numbers through everything, losses in guides and pins included."""
     bars, w = linkage(kind, seed), 6.0
-    by_angle, by_speed = MachineState(MATH, Mechanism(MATH, bars, q), w).slopes()
+    by_angle, by_speed = MachineState(MATH, mechanism(bars, q), w).slopes()
     xp = dual(MATH)
-    assert slope(MachineState(xp, Mechanism(xp, bars, Dual(q, 1.0)), w).bias) == pytest.approx(
+    assert slope(MachineState(xp, mechanism(bars, Dual(q, 1.0), xp), w).bias) == pytest.approx(
         by_angle, rel=1e-9
     )
-    assert slope(MachineState(xp, Mechanism(xp, bars, q), Dual(w, 1.0)).bias) == pytest.approx(
+    assert slope(MachineState(xp, mechanism(bars, q, xp), Dual(w, 1.0)).bias) == pytest.approx(
         by_speed, rel=1e-9
     )
 
@@ -219,7 +236,7 @@ def test_slider_crank_is_the_textbooks():
     ram = Bar("ram", "", None, None, {"G": (0.0, 0.0)})
     bars = slider_crank(Bar("rod", "A", l), ram, Push("C", Vec2(-force, 0.0)))
     for q in np.linspace(0.1, 6.2, 23):
-        m = Mechanism(MATH, bars, q)
+        m = mechanism(bars, q)
         s, c = math.sin(q), math.cos(q)
         root = math.sqrt(l * l - r * r * s * s)
         beta = math.asin(r * s / l)
@@ -244,7 +261,7 @@ def test_scotch_yoke_is_harmonic():
         {},
     )
     for q in np.linspace(0.0, 6.0, 13):
-        slot, way = Mechanism(MATH, bars, q).slides.values()
+        slot, way = mechanism(bars, q).slides.values()
         x, y = r * math.cos(q), r * math.sin(q)
         assert (way.s, way.s1, way.s2) == pytest.approx((x, -y, -x), abs=1e-15)
         assert (slot.s, slot.s1, slot.s2) == pytest.approx((y, x, -y), abs=1e-15)
@@ -259,7 +276,7 @@ def test_elliptic_trammel():
     group = RRP("C", rod, top, Rail(None, Vec2(0.0, 0.0), Vec2(0.0, 1.0)), "H", 1.0)
     bars = Linkage({}, Ram(ram, ALONG_X, "P", "P"), (group,), {"weight": Weight(9.81)})
     for q in (0.1, 0.25, 0.4):
-        m = Mechanism(MATH, bars, q)
+        m = mechanism(bars, q)
         height = math.sqrt(l * l - q * q)
         assert m.pins["C"].p.y == pytest.approx(height, rel=1e-14)
         middle = m.bodies["rod"].c.p

@@ -9,6 +9,7 @@ import pytest
 from scipy.optimize import brentq
 
 from chainunit.engines import MATH, Dual, dual, slope
+from chainunit.groups.legs import rods_at
 from chainunit.groups.triad import LEGS, Pose, SolvedTriad, assembly_modes, correct_pose
 from chainunit.planar import Motion, Vec2
 
@@ -69,6 +70,10 @@ def scanned(pins, lengths, arms, points=400_000):
     return sorted(math.remainder(theta, 2.0 * math.pi) for theta in found)
 
 
+def still(pins, lengths, arms):
+    return rods_at([Motion(p) for p in pins], lengths, arms)
+
+
 @pytest.mark.parametrize("seed", range(10))
 def test_all_assembly_modes(seed):
     """Of a random triad each, against the scan of the four-bar's two branches."""
@@ -103,8 +108,8 @@ def searched(pins, lengths, arms, tries=600):
     for _ in range(tries):
         try:
             start = Pose(*rng.uniform(-2.0, 3.0, 2), rng.uniform(-math.pi, math.pi))
-            pose = correct_pose(MATH, pins, lengths, arms, start, 40)
-            triad = SolvedTriad.at(MATH, tuple(Motion(p) for p in pins), lengths, arms, pose)
+            pose = correct_pose(MATH, still(pins, lengths, arms), start, 40)
+            triad = SolvedTriad.at(MATH, still(pins, lengths, arms), pose)
         except (ArithmeticError, ValueError):
             continue
         gaps = [math.sqrt((k.p - p).squared()) - l for k, p, l in zip(triad.pins, pins, lengths, strict=True)]
@@ -156,19 +161,19 @@ def test_motion_is_that_of_the_followed_pose(collinear):
     while checked < 40:
         pins, lengths, arms, pose = random_triad(rng, collinear)
         outer, at = moved(rng, pins)
-        triad = SolvedTriad.at(MATH, outer, lengths, arms, pose)
+        triad = SolvedTriad.at(MATH, rods_at(outer, lengths, arms), pose)
         if abs(triad.margin) < 0.1:
             continue
         checked += 1
         h = 1e-5
 
         def rates(t, outer=outer, at=at, lengths=lengths, arms=arms, pose=pose):
-            here = correct_pose(MATH, at(t), lengths, arms, pose, 12)
+            here = correct_pose(MATH, still(at(t), lengths, arms), pose, 12)
             pins = tuple(
                 Vec2(Dual(p.x, m.p1.x + m.p2.x * t), Dual(p.y, m.p1.y + m.p2.y * t))
                 for p, m in zip(at(t), outer, strict=True)
             )
-            return np.array([slope(v) for v in correct_pose(dual(MATH), pins, lengths, arms, here, 2)])
+            return np.array([slope(v) for v in correct_pose(dual(MATH), still(pins, lengths, arms), here, 2)])
 
         *legs, link = triad.links
         np.testing.assert_allclose([link.pin.p1.x, link.pin.p1.y, link.t1], rates(0.0), rtol=1e-9, atol=1e-9)
@@ -189,7 +194,7 @@ def test_forces_keep_every_link_in_balance(collinear):
     rng = np.random.default_rng(5)
     for _ in range(60):
         pins, lengths, arms, pose = random_triad(rng, collinear)
-        triad = SolvedTriad.at(MATH, tuple(Motion(p) for p in pins), lengths, arms, pose)
+        triad = SolvedTriad.at(MATH, still(pins, lengths, arms), pose)
         if abs(triad.margin) < 1e-2:
             continue
         legs = tuple((Vec2(*rng.uniform(-9, 9, 2)), rng.uniform(-9, 9)) for _ in range(LEGS))
@@ -217,7 +222,7 @@ def test_three_moments_are_singular_on_a_line_and_this_is_not():
     """docs/papers.md, paper 003, item 6: the paper's three moment equations about C, D, E against ours."""
     rng = np.random.default_rng(6)
     pins, lengths, arms, pose = random_triad(rng, collinear=True)
-    triad = SolvedTriad.at(MATH, tuple(Motion(p) for p in pins), lengths, arms, pose)
+    triad = SolvedTriad.at(MATH, still(pins, lengths, arms), pose)
     at = [pin.p for pin in triad.pins]
     pull = [leg.u for leg in triad.links[:LEGS]]
     moments = np.array([[(at[k] - at[i]).cross(pull[k]) for k in range(3)] for i in range(3)])
@@ -232,11 +237,6 @@ def test_the_margin_vanishes_where_the_legs_meet():
     meet = Vec2(0.3, 2.0)
     pins = tuple(a + (meet - a) * 0.5 for a in arms)
     lengths = tuple(math.sqrt((p - a).squared()) for p, a in zip(pins, arms, strict=True))
-    triad = SolvedTriad.at(
-        MATH,
-        tuple(Motion(p) for p in (pins[0], pins[1], pins[2] + Vec2(1e-9, 0.0))),
-        lengths,
-        arms,
-        Pose(0.0, 0.0, 0.0),
-    )
+    nearly = pins[0], pins[1], pins[2] + Vec2(1e-9, 0.0)
+    triad = SolvedTriad.at(MATH, still(nearly, lengths, arms), Pose(0.0, 0.0, 0.0))
     assert abs(triad.margin) < 1e-8

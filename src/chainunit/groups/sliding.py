@@ -20,19 +20,19 @@ from .body import Bar, Load
 from .group import Group, GuideForce, Placed, Rail, Slide, SolvedGroup, Third
 
 
-def _coriolis(frame: Link, carried: Motion, slid: Vec2) -> Vec2:
+def coriolis(frame: Link, carried: Motion, slid: Vec2) -> Vec2:
     """Second derivative of a point that the frame carries and that slides by `slid` per q at a constant rate."""
     return carried.p2 + slid.turned() * (2.0 * frame.t1)
 
 
-def _coriolis_third(frame: Link, third: Vec2, slid: Vec2, slid2: Vec2) -> Vec2:
+def coriolis_third(frame: Link, third: Vec2, slid: Vec2, slid2: Vec2) -> Vec2:
     """Third derivative of a point that slides by `slid` per q, which itself changes by `slid2` in the frame, from
     `third` of the point that the frame carries; the third derivative of the way is left out."""
     t1 = frame.t1
     return third + slid.turned() * (3.0 * frame.t2) - slid * (3.0 * (t1 * t1)) + slid2.turned() * (3.0 * t1)
 
 
-def _rod_angle(r: Vec2, k1: Vec2, k2: Vec2, per_square: Any) -> tuple[Any, Any]:
+def rod_rates(r: Vec2, k1: Vec2, k2: Vec2, per_square: Any) -> tuple[Any, Any]:
     """Derivatives of the angle of a rod of constant length along `r`, from those of its end against its start."""
     return r.cross(k1) * per_square, r.cross(k2) * per_square
 
@@ -125,12 +125,12 @@ class SolvedRRP(SolvedGroup):
         s1 = r.dot(carried.p1 - p.p1) * minus_per_along
         slid = d * s1
         r1 = carried.p1 + slid - p.p1
-        most = _coriolis(rail, carried, slid)
+        most = coriolis(rail, carried, slid)
         s2 = (r.dot(most - p.p2) + r1.squared()) * minus_per_along
         r2 = most + d * s2 - p.p2
         per_square = 1.0 / (a * a)
         inner = Motion(carried.p, carried.p1 + slid, most + d * s2)
-        rod = Link(p, r * (1.0 / a), *_rod_angle(r, r1, r2, per_square))
+        rod = Link(p, r * (1.0 / a), *rod_rates(r, r1, r2, per_square))
         slider = Link(inner, d, rail.t1, rail.t2)
         per = minus_per_along, per_square
         return cls(rail, per, (rod, slider), (inner,), along / a, (Slide(d, s, s1, s2),))
@@ -143,7 +143,7 @@ class SolvedRRP(SolvedGroup):
         (slide,), inner = self.slides, slider.pin
         r, r1, r2 = inner.p - rod.pin.p, inner.p1 - rod.pin.p1, inner.p2 - rod.pin.p2
         carried = rail.third(inner.p - rail.pin.p, base, t3)
-        most = _coriolis_third(rail, carried, slide.d * slide.s1, slide.d * slide.s2)
+        most = coriolis_third(rail, carried, slide.d * slide.s1, slide.d * slide.s2)
         s3 = (r.dot(most - p) + 3.0 * r1.dot(r2)) * self._per_along
         end = most + rail.u * s3
         turn = r.cross(end - p) * self._per_square + rod.t1 * rod.t1 * rod.t1
@@ -353,7 +353,7 @@ class SolvedPRP(SolvedGroup):
         x, y = ways(b.pin.p - a.pin.p)
         on_a, on_b = a.carried(a.u * x), b.carried(b.u * y)
         x1, y1 = ways(on_b.p1 - on_a.p1)
-        most_a, most_b = _coriolis(a, on_a, a.u * x1), _coriolis(b, on_b, b.u * y1)
+        most_a, most_b = coriolis(a, on_a, a.u * x1), coriolis(b, on_b, b.u * y1)
         x2, y2 = ways(most_b - most_a)
         inner = Motion(on_a.p, on_a.p1 + a.u * x1, most_a + a.u * x2)
         links = Link(inner, a.u, a.t1, a.t2), Link(inner, b.u, b.t1, b.t2)
@@ -368,7 +368,7 @@ class SolvedPRP(SolvedGroup):
         most = []
         for rail, slide, (base, t3) in ((a, one, rails[0]), (b, other, rails[1])):
             carried = rail.third(inner.p - rail.pin.p, base, t3)
-            most.append(_coriolis_third(rail, carried, slide.d * slide.s1, slide.d * slide.s2))
+            most.append(coriolis_third(rail, carried, slide.d * slide.s1, slide.d * slide.s2))
         x3 = (most[1] - most[0]).cross(b.u) * per
         end = most[0] + a.u * x3
         return [(end, rails[0][1]), (end, rails[1][1])], [end]
@@ -476,9 +476,9 @@ class SolvedRPP(SolvedGroup):
         carried = rail.carried(w)
         x1, y1 = ways(p.p1 - carried.p1)
         slid = d * x1 + e * y1
-        x2, y2 = ways(p.p2 - _coriolis(rail, carried, slid))
+        x2, y2 = ways(p.p2 - coriolis(rail, carried, slid))
         on_rail = rail.carried(d * x)
-        start = Motion(on_rail.p, on_rail.p1 + d * x1, _coriolis(rail, on_rail, d * x1) + d * x2)
+        start = Motion(on_rail.p, on_rail.p1 + d * x1, coriolis(rail, on_rail, d * x1) + d * x2)
         links = Link(p, d, rail.t1, rail.t2), Link(start, d, rail.t1, rail.t2)
         return cls(rail, per, links, (), slot.y, (Slide(e, y, y1, y2), Slide(d, x, x1, x2)))
 
@@ -491,9 +491,9 @@ class SolvedRPP(SolvedGroup):
         d, e = way.d, slot.d
         slid, slid2 = d * way.s1 + e * slot.s1, d * way.s2 + e * slot.s2
         carried = rail.third(block.pin.p - rail.pin.p, base, t3)
-        x3 = (p - _coriolis_third(rail, carried, slid, slid2)).cross(e) * self._per
+        x3 = (p - coriolis_third(rail, carried, slid, slid2)).cross(e) * self._per
         on_rail = rail.third(yoke.pin.p - rail.pin.p, base, t3)
-        start = _coriolis_third(rail, on_rail, d * way.s1, d * way.s2) + d * x3
+        start = coriolis_third(rail, on_rail, d * way.s1, d * way.s2) + d * x3
         return [(p, t3), (start, t3)], []
 
     def reactions(self, loads: Sequence[Load]) -> tuple[Vec2, ...]:

@@ -1,9 +1,9 @@
-"""The triad (class III Assur group, order 3): a ternary link C-D-E on three binary links, the legs.
+"""The triad (class III Assur group, order 3): a ternary link on three legs.
 
-The motion of the outer pins P is known; each leg keeps the distance `l` between its P and its pin on the ternary
-link. The pose of the ternary link is (x, y, theta): its origin and the direction of its own x axis. A pin at `arm` in
-the frame of the ternary link stands at (x, y) + R(theta) arm. With r = pin - P and A = R(theta) arm, each leg gives a
-row
+A leg is a rod between two pins, a block on a rail, or a block in a slot of the ternary link
+(`chainunit.groups.legs`). The pose of the ternary link is (x, y, theta): its origin and the direction of its own x
+axis. Each leg gives a row, the wrench that it can exert on the ternary link; of a rod from P to a pin, with r = pin
+- P and A from the origin to the pin, it is
 
     (r.x, r.y, A x r).
 
@@ -32,7 +32,8 @@ from typing import Any, ClassVar, NamedTuple
 from ..model import Requirement
 from ..planar import Link, Motion, Vec2
 from .body import Bar, Load, Mass
-from .group import Group, Placed, SolvedGroup, Third
+from .group import Group, Joint, Placed, Rail, Slide, SolvedGroup, Third
+from .legs import Leg, LegAt, PlacedLeg, RodLeg, rods_at
 
 LEGS = 3
 SAMPLES = 20
@@ -52,27 +53,25 @@ class Pose(NamedTuple):
 
 
 class _Rows:
-    """The three rows (r.x, r.y, A x r) at a pose, and the solution of linear systems with them."""
+    """The rows of the three legs at a pose, and the solution of linear systems with them."""
 
-    __slots__ = ("arms", "cofactors", "det", "minus_per_det", "r")
+    __slots__ = ("cofactors", "det", "legs", "minus_per_det")
 
-    def __init__(self, arms: tuple[Vec2, ...], r: tuple[Vec2, ...]) -> None:
-        self.arms, self.r = arms, r
-        rows = [(v.x, v.y, a.cross(v)) for v, a in zip(r, arms, strict=True)]
+    def __init__(self, legs: tuple[LegAt, ...]) -> None:
+        self.legs = legs
+        rows = [leg.row for leg in legs]
         self.cofactors = tuple(_cross(rows[(i + 1) % LEGS], rows[(i + 2) % LEGS]) for i in range(LEGS))
         self.det = _dot(rows[0], self.cofactors[0])
         # see `chainunit.groups.dyad` for the sign
         self.minus_per_det = -1.0 / self.det
 
     @classmethod
-    def at(cls, xp: Any, pins: Sequence[Vec2], arms: Sequence[Vec2], pose: Pose) -> _Rows:
-        """The rows at a pose; `arms` are given in the frame of the ternary link [m]."""
-        c, s = xp.cos(pose.theta), xp.sin(pose.theta)
-        origin = Vec2(pose.x, pose.y)
-        arms_now = tuple(Vec2(c * a.x - s * a.y, s * a.x + c * a.y) for a in arms)
-        return cls(arms_now, tuple(origin + a - p for a, p in zip(arms_now, pins, strict=True)))
+    def at(cls, xp: Any, legs: Sequence[PlacedLeg], pose: Pose) -> _Rows:
+        """The rows at a pose."""
+        origin, u = Vec2(pose.x, pose.y), Vec2(xp.cos(pose.theta), xp.sin(pose.theta))
+        return cls(tuple(leg(origin, u) for leg in legs))
 
-    def solve(self, b: tuple[Any, ...]) -> tuple[Any, Any, Any]:
+    def solve(self, b: Sequence[Any]) -> tuple[Any, Any, Any]:
         """z with row_i . z = b_i."""
         (b0, b1, b2), (c0, c1, c2) = b, self.cofactors
         k = self.minus_per_det
@@ -95,32 +94,28 @@ def _dot(a: tuple[Any, Any, Any], b: tuple[Any, Any, Any]) -> Any:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def correct_pose(
-    xp: Any, pins: Sequence[Vec2], lengths: Sequence[Any], arms: Sequence[Vec2], near: Pose, steps: int
-) -> Pose:
+def correct_pose(xp: Any, legs: Sequence[PlacedLeg], near: Pose, steps: int) -> Pose:
     """The pose after `steps` of Newton's method from `near`. From a pose that is nearly right each step doubles the
     number of right digits. It also doubles the order up to which the derivatives of the pose are right."""
     pose = near
     for _ in range(steps):
-        rows = _Rows.at(xp, pins, arms, pose)
-        wrong = tuple(0.5 * (l * l - r.squared()) for l, r in zip(lengths, rows.r, strict=True))
-        dx, dy, turn = rows.solve(wrong)
+        rows = _Rows.at(xp, legs, pose)
+        dx, dy, turn = rows.solve([leg.gap for leg in rows.legs])
         pose = Pose(pose.x + dx, pose.y + dy, pose.theta + turn)
     return pose
 
 
 @dataclass
 class Triad(Group):
-    """A triad as data: the ternary link with its `mass`, three legs, which start from pins of known motion, the pins
-    of the ternary link in its own frame (`arms` [m], in the order of the legs), further points on it, and the pose
-    `assembly`, from which Newton's method leads to the assembly mode at crank angle 0."""
+    """A triad as data: the ternary link with its `mass`, three legs, further points on the ternary link, and the pose
+    `assembly`, from which Newton's method leads to the assembly mode at the crank angle `start` [rad]."""
 
     name: str
     mass: Mass
-    legs: tuple[Bar, Bar, Bar]
-    arms: Mapping[str, Vec2]
+    legs: tuple[Leg, Leg, Leg]
     points: Mapping[str, tuple[Any, Any]]
     assembly: Pose
+    start: float = 0.0
 
     derived: ClassVar[int] = 3 * (2 * HARMONICS + 1) + 2
     """The number of values that `derive` gives: the series of the pose, the largest misfit, the least margin."""
@@ -128,49 +123,60 @@ class Triad(Group):
     @property
     def bars(self) -> tuple[Bar, ...]:
         """Its links, the ternary one last."""
-        return *self.legs, Bar(self.name, "", None, self.mass, self.points)
+        return *(leg.bar for leg in self.legs), Bar(self.name, "", None, self.mass, self.points)
 
     @property
     def pins(self) -> dict[str, str]:
         """The pins that the triad adds, each with the link that carries it."""
-        return dict.fromkeys(self.arms, self.name)
+        return {leg.inner: self.name for leg in self.legs if leg.inner}
 
     @property
-    def joints(self) -> tuple[tuple[str, str], ...]:
+    def joints(self) -> tuple[Joint, ...]:
         """Pin and link of each reaction, in the order of `SolvedTriad.reactions`."""
-        outer = ((leg.pin, leg.name) for leg in self.legs)
-        return *outer, *((pin, leg.name) for pin, leg in zip(self.arms, self.legs, strict=True))
+        return *(leg.joints[0] for leg in self.legs), *(leg.joints[1] for leg in self.legs)
 
-    def _lengths(self) -> tuple[Any, ...]:
-        return tuple(leg.length for leg in self.legs)
+    @property
+    def guides(self) -> Mapping[Joint, str | None]:
+        """See `Group`."""
+        return {
+            leg.joints[0] if leg.rail else leg.joints[1]: leg.rail.of if leg.rail else self.name
+            for leg in self.legs
+            if leg.rail or not leg.inner
+        }
 
-    def outer(self, pins: Mapping[str, Motion]) -> tuple[Motion, ...]:
-        """Motion of the outer pins of the legs."""
-        return tuple(pins[leg.pin] for leg in self.legs)
+    @property
+    def rails(self) -> tuple[Rail, ...]:
+        """See `Group`."""
+        return tuple(leg.rail for leg in self.legs if leg.rail)
 
     def solve(self, xp: Any, q: Any, at: Placed, derived: Sequence[Any]) -> SolvedTriad:
-        """The triad where its outer pins are, on the branch that the series `derived` gives."""
-        outer, arms = self.outer(at.pins), tuple(self.arms.values())
+        """The triad with the linkage `at` before it, on the branch that the series `derived` gives."""
+        legs = self.placed(at)
         near = pose_of_series(derived, xp.cos(q), xp.sin(q))
-        pose = correct_pose(xp, [pin.p for pin in outer], self._lengths(), arms, near, _STEPS)
-        return SolvedTriad.at(xp, outer, self._lengths(), arms, pose)
+        return SolvedTriad.at(xp, legs, correct_pose(xp, legs, near, _STEPS))
+
+    def placed(self, at: Placed) -> tuple[PlacedLeg, ...]:
+        """The legs, with the linkage `at` before them, for any pose of the ternary link."""
+        return tuple(leg.placed(at) for leg in self.legs)
 
     def modes(self, pins: Mapping[str, Motion]) -> list[Pose]:
-        """All poses in which the triad can be assembled at the position of its outer `pins`."""
+        """All poses in which the triad, with rods for legs, can be assembled at the position of its outer `pins`."""
+        rods = [leg for leg in self.legs if isinstance(leg, RodLeg)]
         return assembly_modes(
-            tuple(pin.p for pin in self.outer(pins)), self._lengths(), tuple(self.arms.values())
+            tuple(pins[leg.bar.pin].p for leg in rods),
+            tuple(leg.bar.length for leg in rods),
+            tuple(leg.arm for leg in rods),
         )
 
     def derive(self, xp: Any, before: Callable[[float], Placed]) -> list[Any]:
         """The series of the pose over the crank angle, the largest misfit and the least margin around; `before` gives
         the linkage before the triad at a crank angle [rad]."""
-        angles = [2.0 * math.pi * k / SAMPLES for k in range(SAMPLES)]
-        lengths, arms = self._lengths(), tuple(self.arms.values())
+        angles = [self.start + 2.0 * math.pi * k / SAMPLES for k in range(SAMPLES)]
 
         def pose(q: float, near: Pose, steps: int = _STEPS) -> Pose:
-            return correct_pose(xp, [pin.p for pin in self.outer(before(q).pins)], lengths, arms, near, steps)
+            return correct_pose(xp, self.placed(before(q)), near, steps)
 
-        poses = [pose(0.0, self.assembly, 8)]
+        poses = [pose(angles[0], self.assembly, 8)]
         for q in angles[1:]:
             near = poses[-1]
             if len(poses) > 1:
@@ -188,11 +194,9 @@ class Triad(Group):
         misfit, first, least = 0.0, None, None
         for q in angles:
             middle = q + math.pi / SAMPLES
-            at = before(middle)
-            triad = self.solve(xp, middle, at, series)
-            for pin, o, l in zip(triad.pins, self.outer(at.pins), lengths, strict=True):
-                off = xp.abs(xp.sqrt((pin.p - o.p).squared()) / l - 1.0)
-                misfit = xp.maximum(misfit, xp.minimum(off, 1.0))
+            triad = self.solve(xp, middle, before(middle), series)
+            for leg in triad.legs:
+                misfit = xp.maximum(misfit, xp.minimum(leg.misfit(xp), 1.0))
             # relative to the sign of the first margin: a margin that changes sign has passed a dead position
             first = triad.margin if first is None else first
             margin = triad.margin * first / xp.abs(first)
@@ -240,95 +244,87 @@ def limits(derived: Sequence[Any]) -> Iterator[tuple[Any, Any, Any]]:
 
 
 class SolvedTriad(SolvedGroup):
-    """A solved triad. Its `links` are the legs from their outer pins and then the ternary link (origin and x axis of
-    its frame); its `pins` are in the order of the legs; its `margin` is the determinant over the lengths of the legs
-    and the size of the ternary link: 0 is a dead position."""
+    """A solved triad. Its `links` are the legs and then the ternary link (origin and x axis of its frame); its `pins`
+    are in the order of the legs; its `margin` is the determinant over the lengths of the rods and the size of the
+    ternary link: 0 is a dead position."""
 
-    __slots__ = ("_per_square", "_rows")
+    __slots__ = ("_rows",)
 
     def __init__(
         self,
         rows: _Rows,
-        per_square: tuple[Any, ...],
         links: tuple[Link, ...],
         pins: tuple[Motion, ...],
-        margin: Any = 1.0,
+        margin: Any,
+        slides: tuple[Slide, ...],
     ) -> None:
-        super().__init__(links, pins, margin)
-        self._rows, self._per_square = rows, per_square
+        super().__init__(links, pins, margin, slides)
+        self._rows = rows
+
+    @property
+    def legs(self) -> tuple[LegAt, ...]:
+        """The legs at the pose."""
+        return self._rows.legs
 
     @classmethod
-    def at(
-        cls, xp: Any, outer: Sequence[Motion], lengths: Sequence[Any], arms: Sequence[Vec2], pose: Pose
-    ) -> SolvedTriad:
+    def at(cls, xp: Any, placed: Sequence[PlacedLeg], pose: Pose) -> SolvedTriad:
         """
         Parameters
         ----------
         xp : engine (see `chainunit.engines`)
-        outer : motion of the outer pins of the three legs
-        lengths : of the legs [m]
-        arms : pins on the ternary link, in its own frame [m]
+        placed : the three legs, see `Leg.placed`
         pose : pose of the ternary link, see `correct_pose`
         """
-        rows = _Rows.at(xp, [p.p for p in outer], arms, pose)
-        x1, y1, t1 = rows.solve(tuple(r.dot(p.p1) for r, p in zip(rows.r, outer, strict=True)))
+        rows = _Rows.at(xp, placed, pose)
+        x1, y1, t1 = rows.solve([leg.first() for leg in rows.legs])
         origin1 = Vec2(x1, y1)
-        pins1 = tuple(origin1 + a.turned() * t1 for a in rows.arms)
-        second = []
-        for r, a, k1, p in zip(rows.r, rows.arms, pins1, outer, strict=True):
-            second.append(r.dot(p.p2 + a * (t1 * t1)) - (k1 - p.p1).squared())
-        x2, y2, t2 = rows.solve(tuple(second))
-        origin2 = Vec2(x2, y2)
-        pins2 = tuple(origin2 + a.turned() * t2 - a * (t1 * t1) for a in rows.arms)
-        origin = Motion(Vec2(pose.x, pose.y), origin1, origin2)
+        x2, y2, t2 = rows.solve([leg.second(origin1, t1) for leg in rows.legs])
+        origin = Motion(Vec2(pose.x, pose.y), origin1, Vec2(x2, y2))
         ternary = Link(origin, Vec2(xp.cos(pose.theta), xp.sin(pose.theta)), t1, t2)
-        pins = tuple(
-            Motion(p.p + r, k1, k2) for p, r, k1, k2 in zip(outer, rows.r, pins1, pins2, strict=True)
+        solved = [leg.solved(ternary) for leg in rows.legs]
+        size = xp.sqrt(sum((rows.legs[i].spot - rows.legs[i - 1].spot).squared() for i in range(LEGS)))
+        margin = rows.det / (rows.legs[0].size * rows.legs[1].size * rows.legs[2].size * size)
+        return cls(
+            rows,
+            (*(link for link, _, _ in solved), ternary),
+            tuple(pin for _, pin, _ in solved if pin is not None),
+            margin,
+            tuple(slide for _, _, slide in solved if slide is not None),
         )
-        per_square = tuple(1.0 / (l * l) for l in lengths)
-        legs = tuple(
-            Link(p, r * (1.0 / l), r.cross(k.p1 - p.p1) * per, r.cross(k.p2 - p.p2) * per)
-            for p, r, l, k, per in zip(outer, rows.r, lengths, pins, per_square, strict=True)
-        )
-        size = xp.sqrt(sum((arms[i] - arms[i - 1]).squared() for i in range(LEGS)))
-        margin = rows.det / (lengths[0] * lengths[1] * lengths[2] * size)
-        return cls(rows, per_square, (*legs, ternary), pins, margin)
 
     def third(
         self, outer: Sequence[Vec2], rails: Sequence[Third] = ()
     ) -> tuple[Sequence[Third], Sequence[Vec2]]:
         """See `SolvedGroup`."""
-        (*legs, ternary), rows = self.links, self._rows
-        t1, t2 = ternary.t1, ternary.t2
-        spin, mixed_term = t1 * t1 * t1, 3.0 * (t1 * t2)
-        b = []
-        for r, a, k, leg, p in zip(rows.r, rows.arms, self.pins, legs, outer, strict=True):
-            centripetal = 3.0 * (k.p1 - leg.pin.p1).dot(k.p2 - leg.pin.p2)
-            b.append(r.dot(p + a.turned() * spin + a * mixed_term) - centripetal)
-        x, y, t3 = rows.solve(tuple(b))
-        origin = Vec2(x, y)
-        pins = [ternary.third(a, origin, t3) for a in rows.arms]
-        thirds: list[Third] = []
-        for r, k3, leg, p, per in zip(rows.r, pins, legs, outer, self._per_square, strict=True):
-            thirds.append((p, r.cross(k3 - p) * per + leg.t1 * leg.t1 * leg.t1))
-        return [*thirds, (origin, t3)], pins
+        *_, ternary = self.links
+        starts, lines = iter(outer), iter(rails)
+        before = [next(lines) if leg.on_rail else (next(starts), 0.0) for leg in self.legs]
+        x, y, t3 = self._rows.solve(
+            [leg.third(ternary, each) for leg, each in zip(self.legs, before, strict=True)]
+        )
+        own = Vec2(x, y), t3
+        ends = [leg.link_third(ternary, own, each) for leg, each in zip(self.legs, before, strict=True)]
+        return [*(link for link, _ in ends), own], [pin for _, pin in ends if pin is not None]
 
     def reactions(self, loads: Sequence[Load]) -> tuple[Vec2, ...]:
-        """Forces on the legs at their outer pins, then at the ternary link [N].
+        """Outer reactions of the legs, then their inner ones [N].
 
-        The loads are force and moment: of each leg about its outer pin, of the ternary link about its origin. The
-        moment about the outer pin of a leg gives the part of the force across this leg; the pulls along the legs
-        follow from the balance of two forces and one moment on the ternary link.
+        The loads are force and moment: of each leg about the start of its frame, of the ternary link about its
+        origin. The load of a leg gives the part of its action that does not belong to its row; the factors of the
+        rows follow from the balance of two forces and one moment on the ternary link.
         """
         *legs, (force, moment) = loads
-        across = []
-        for (_, m), r, a, per in zip(legs, self._rows.r, self._rows.arms, self._per_square, strict=True):
-            part = r.turned() * (-m * per)
-            across.append(part)
-            force, moment = force - part, moment - a.cross(part)
-        along = self._rows.combine(force, moment)
-        inner = tuple(t + r * x for t, r, x in zip(across, self._rows.r, along, strict=True))
-        return *(-(f + q) for (f, _), q in zip(legs, inner, strict=True)), *inner
+        known = []
+        for leg, load in zip(self.legs, legs, strict=True):
+            part, couple = leg.known_part(load)
+            known.append(part)
+            force, moment = force - part, moment - couple
+        pulls = self._rows.combine(force, moment)
+        both = [
+            leg.reactions(load, part, pull)
+            for leg, load, part, pull in zip(self.legs, legs, known, pulls, strict=True)
+        ]
+        return *(outer for outer, _ in both), *(inner for _, inner in both)
 
 
 def assembly_modes(pins: tuple[Vec2, ...], lengths: tuple[float, ...], arms: tuple[Vec2, ...]) -> list[Pose]:
@@ -346,6 +342,7 @@ def assembly_modes(pins: tuple[Vec2, ...], lengths: tuple[float, ...], arms: tup
 
     from ..engines import MATH
 
+    legs = rods_at([Motion(p) for p in pins], lengths, arms)
     (p1, p2, p3), (l1, l2, l3) = pins, lengths
     c, e = arms[0] - arms[1], arms[2] - arms[1]
 
@@ -384,14 +381,12 @@ def assembly_modes(pins: tuple[Vec2, ...], lengths: tuple[float, ...], arms: tup
             start = p2 + d - arm
             try:
                 near = Pose(float(start.x), float(start.y), theta)
-                pose = correct_pose(MATH, pins, lengths, arms, near, 20)
-                rows = _Rows.at(MATH, pins, arms, pose)
+                pose = correct_pose(MATH, legs, near, 20)
+                rows = _Rows.at(MATH, legs, pose)
             except (ArithmeticError, ValueError):
                 continue
             angle = math.remainder(pose.theta, 2.0 * math.pi)
-            closes = all(
-                abs(r.squared() - l * l) < 1e-9 * size * size for r, l in zip(rows.r, lengths, strict=True)
-            )
+            closes = all(abs(leg.gap) < 5e-10 * size * size for leg in rows.legs)
             if closes and not any(
                 abs(math.remainder(angle - other.theta, 2.0 * math.pi)) < 1e-7
                 and math.hypot(pose.x - other.x, pose.y - other.y) < 1e-7 * size

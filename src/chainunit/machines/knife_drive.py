@@ -17,6 +17,7 @@ from ..groups import triad
 from ..groups.body import Bar, Mass
 from ..groups.driver import Crank
 from ..groups.dyad import Dyad
+from ..groups.legs import RodLeg
 from ..groups.loads import Cut, PinLosses, Push, Weight
 from ..groups.triad import Pose, Triad
 from ..mechanism.linkage import Linkage
@@ -261,11 +262,10 @@ class KnifeDrive(InverseMachine):
                     "knife",
                     Mass(knife.m, knife.centroid.x, knife.I, knife.centroid.y),
                     (
-                        Bar("leg_b", "B", p.bc, p.leg_b),
-                        Bar("leg_3", "O3", p.o3d, p.leg_3),
-                        Bar("leg_4", "O4", p.o4e, p.leg_4),
+                        RodLeg(Bar("leg_b", "B", p.bc, p.leg_b), "C", _vector(knife.c)),
+                        RodLeg(Bar("leg_3", "O3", p.o3d, p.leg_3), "D", _vector(knife.d)),
+                        RodLeg(Bar("leg_4", "O4", p.o4e, p.leg_4), "E", _vector(knife.e)),
                     ),
-                    {"C": _vector(knife.c), "D": _vector(knife.d), "E": _vector(knife.e)},
                     {"blade": (knife.blade.x, knife.blade.y)},
                     Pose(p.assembly.x, p.assembly.y, p.assembly.theta),
                 ),
