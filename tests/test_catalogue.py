@@ -354,6 +354,21 @@ def test_all_wrong_headings_are_told_at_once(tmp_path):
     ]
 
 
+def test_missing_columns_are_told_once_beside_wrong_cells(tmp_path):
+    file = tmp_path / "own.csv"
+    columns = {name: cell for name, cell in ROW.items() if name not in ("poles", "J [kg.m2]")}
+    rows = [columns | {"power [kW]": "-1"}, columns | {"designation": "fan", "efficiency": "x"}]
+    file = csv_file(tmp_path, *rows)
+    with pytest.raises(InputError) as refused:
+        catalogue(file)
+    said = [line.removeprefix(f"{file}:") for line in str(refused.value).splitlines()]
+    assert said[:2] == [
+        '1: column poles: is missing; add the heading "poles"',
+        '1: column J: is missing; add the heading "J [kg.m2]"',
+    ]
+    assert [line.partition(" = ")[0] for line in said[2:]] == ["2: column power", "3: column efficiency"]
+
+
 def test_thousands_with_blanks_have_the_unit_of_their_column(tmp_path):
     rows = ROW | {"speed [rev/min]": "1\u202f455"}, ROW | {"designation": "2", "speed [rev/min]": "1.455e3"}
     for motor in catalogue(csv_file(tmp_path, *rows))[54:]:
@@ -389,7 +404,7 @@ def test_wrong_values_of_a_toml_catalogue_have_their_own_lines(tmp_path):
             "designation,power [V]\nx,1\n",
             'a.csv:1: heading "power [V]": must have a unit such as power [W]',
         ),
-        ("a.csv", "designation,poles\nx\n", "a.csv:2: has 1 cells; must have 2"),
+        ("a.csv", f"{','.join(ROW)}\nx\n", f"a.csv:2: has 1 cells; must have {len(ROW)}"),
         ("a.csv", 'designation\n"x\n', "a.csv:2: no valid CSV"),
         ("a.toml", "x = ", "a.toml:1: no valid TOML"),
         ("a.toml", "x = 1", '"x": unknown; each motor is a table'),

@@ -14,6 +14,7 @@ from chainunit.places import lines_of
 from chainunit.reading import in_file
 from chainunit.study.config import parse
 from chainunit.study.keys import key_tables
+from chainunit.study.parts import example
 
 
 def test_the_list_is_long_enough():
@@ -32,6 +33,39 @@ def test_every_fault_has_its_line_key_and_remedy(text, faults, tmp_path):
         assert re.match(rf"chainunit: {re.escape(place)}{re.escape(key)}", line), line
         assert remedy in line, line
         assert not (number == 4 and "crank.m" in line and key.startswith("run")), line
+
+
+@pytest.mark.parametrize(
+    ("data", "place", "remedy"),
+    [
+        (example().encode("utf-16"), "", "save it as UTF-8"),
+        (example().encode("utf-16-le"), "", "save it as UTF-8"),
+        ("[run]\ntitle = 'Mühle'".encode("latin-1"), "2:", "save it as UTF-8"),
+        (b"\x89PNG\r\n", "", "is a picture"),
+        (b"\x1f\x8b\x08", "", "is a compressed file"),
+        (b"\x7fELF\x02", "", "is a program"),
+        (b"\xef\xbb\xbf[machine]\r\nr = '3 kg'\r\n", "2:", 'such as "2 mm"'),
+    ],
+)
+def test_files_of_other_kinds_are_told(data, place, remedy, tmp_path):
+    (tmp_path / "mine.toml").write_bytes(data)
+    done = chainunit("study", "mine.toml", "-o", "out", cwd=tmp_path)
+    assert done.returncode == 2 and not done.stdout and [*tmp_path.iterdir()] == [tmp_path / "mine.toml"]
+    assert done.stderr.startswith(f"chainunit: mine.toml:{place}") and remedy in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_wrong_cells_of_a_catalogue_stand_behind_the_faults_of_the_file(tmp_path):
+    (tmp_path / "cat.csv").write_text("designation,power [kW]\na,-1\nb,x\n")
+    (tmp_path / "mine.toml").write_text(
+        "catalogue = 'cat.csv'\n[sizing]\n[run]\nstep = 1\n[ratios]\nmu = 1\n"
+    )
+    said = chainunit("study", "mine.toml", cwd=tmp_path).stderr.splitlines()
+    begins = ["mine.toml:4: run.step", "mine.toml:5: ratios", *(8 * ["cat.csv:1: column"])]
+    begins += ["cat.csv:2: column power", "cat.csv:3: column power"]
+    assert len(said) >= len(begins) and said[-1].startswith("chainunit: cat.csv:3: column power")
+    for line, begin in zip(said[:10], begins, strict=False):
+        assert line.startswith(f"chainunit: {begin}"), line
 
 
 WRONG = ("{ type = 'jams' }", "['a']", "nan", "-inf", "07:32:00", "[[1, 2], [3]]", "true", "1979-05-27")

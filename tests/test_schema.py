@@ -48,6 +48,14 @@ def refused(text):
     return ""
 
 
+def _is_toml(text):
+    try:
+        tomllib.loads(text)
+    except ValueError:
+        return False
+    return True
+
+
 def test_it_is_a_schema():
     jsonschema.Draft7Validator.check_schema(SCHEMA)
     named = re.findall(r"'#/definitions/(.*?)'", str(SCHEMA))
@@ -116,13 +124,14 @@ UNSEEN = {
     "[machine]\nr = 0.9": "lengths of a crank that turns",
     "[ratios]\nmu = 1.0": "lengths of a crank that turns",
     "[run]\ncrank_speed = '3 1/s'": "dimension of a product of units",
+    "[driveline]\n[torsion]\nslowest = 3\nfastest = 2": "order of two values",
     "[sizing]\npoles_least = 6\npoles_most = 4": "order of two values",
     "catalogue = 'none.csv'\n[sizing]": "another file",
     "[driveline]\nalpha1 = '95 deg'": "size of a number in a text",
     "[monte_carlo]\nevent = { force = [5000, 100] }": "order of two values",
 }
 """Wrong files whose fault a schema cannot express, with the reason."""
-WRONG = [text for text, _ in FILES if "no valid TOML" not in refused(text) and "pump.fmu" not in text]
+WRONG = [text for text, _ in FILES if _is_toml(text) and "pump.fmu" not in text]
 WRONG += [
     "[run]\nturns = '2.5'",
     "[run]\nturns = true",
@@ -168,6 +177,7 @@ WRONG += [
     "[run]\ncrank_speed = '15 upm'",
     "[run]\nwinding_temperature = '120 V'",
     "[run]\nturns = '5 %'",
+    "[driveline]\n[torsion]\nslowest = 3\nfastest = 2",
     "[report]\nunits = { speed = 'rpm' }",
     "[report]\ndate = 3",
     "title = 3",

@@ -55,8 +55,75 @@ FILES = [
     ("[report]\nunits = { sped = 'rpm' }", [(2, "report.units.sped", 'was "speed" meant?')]),
     (
         "[driveline]\nc2 = 3\nshaft2 = { section = 'round', outer = '30 mm' }",
-        [(2, "driveline.c2", "leave out one of the two")],
+        [(2, "driveline.c2", "leave out one of the two"), (3, "driveline.shaft2.length", "missing")],
     ),
+    (
+        "[driveline]\nd2 = 1\nd3 = 1\ndamping_ratio = 0.1\nshaft2 = { section = 'hollow', outer = 1, wall = 1 }",
+        [
+            (2, "driveline.d2", "leave out one of the two"),
+            (3, "driveline.d3", "leave out one of the two"),
+            (5, "driveline.shaft2.inner", "missing"),
+            (5, "driveline.shaft2.length", "missing"),
+            (5, "driveline.shaft2.wall", 'not of section "hollow"'),
+        ],
+    ),
+    (
+        "[machine]\nr = '0.9 m'\n[run]\nturn = 3\n[sizing]\npoles_least = 6\npoles_most = 4\nambient = '20 C'",
+        [
+            (2, "machine: r = 0.9 m", "must be > 0 and < 0.703476 m"),
+            (4, "run.turn", 'was "turns" meant?'),
+            (7, "sizing.poles_most", "must be >= sizing.poles_least"),
+        ],
+    ),
+    (
+        "[driveline]\n[torsion]\nslowest = 3\nfastest = 2\npoints = 10.5\njoint = 'alpha3'",
+        [
+            (4, "torsion.fastest", "must be > torsion.slowest"),
+            (5, "torsion.points", "must be a whole number"),
+            (6, "torsion.joint", 'was "alpha2" meant?'),
+        ],
+    ),
+    (
+        "[driveline]\n[torsion]\nslowest = '3 m'\nfastest = 0.1\npoints = 10.5",
+        [(3, "torsion.slowest", "must be a pure number"), (5, "torsion.points", "must be a whole number")],
+    ),
+    (
+        "[run]\nstep = 1\n[machine]\nr = 1\n[system]\nmachine = 'knifedrive'\nmotor = 'IE3 4 pole 2.2kW'\n"
+        "[coupling]\ntrip_torque = 0",
+        [
+            (2, "run.step", "must be"),
+            (6, "system.machine", 'was "KnifeDrive" meant?'),
+            (7, "system.motor", 'was "IE3 4-pole 2.2 kW, 100L" meant?'),
+            (9, "coupling.trip_torque", "must be > 0 N m"),
+        ],
+    ),
+    (
+        "[ratios]\nrho = 0.1\n[machine]\nr = '15 cm'\nl = 1.5",
+        [(4, "machine.r", "leave out one of the two"), (5, "machine.l", "leave out one of the two")],
+    ),
+    ("[sizing]\n[gear]\nratio = 0\nefficiency = '120 %'\nJ = '1 kg'", [
+        (3, "gear.ratio", "must be > 0"), (4, "gear.efficiency", "<= 1"), (5, "gear.J", 'such as "2 kg m2"'),
+    ]),
+    ("[motor]\nrotor = { J = 0 }\nsupply = 3", [(2, "motor.rotor.J", "> 0"), (3, "motor.supply", "known here")]),
+    ("[feed]\nleft.mass = 30\nright.processing_force = '1 kNm'", [
+        (2, "feed.left.mass", "known here: material_mass"), (3, "feed.right.processing_force", 'such as "2 N"'),
+    ]),
+    ("[machine]\nr = nan\n[run]\nstep = inf\n[feed]\nleft.material_mass = -inf", [
+        (2, "machine.r = nan m", "must be finite"), (4, "run.step = inf s", "must be finite"),
+        (6, "feed.left.material_mass = -inf kg", "must be finite"),
+    ]),
+    (f"[machine]\nr = 1e300\ncrank.m = '1e308 kg'\nl = {400 * '9'}", [
+        (2, "machine.r", "<= 10000 m"), (3, "machine.crank.m", "<= 1e+06 kg"), (4, "machine.l", "too large"),
+    ]),
+    ("[run]\ncrank_speed = '1,500 rpm'", [(2, "run.crank_speed", 'was "1500 rpm" or "1.500 rpm" meant?')]),
+    ("[machine]\ng = '9,81 m/s²'", [(2, "machine.g", 'was "9.81 m/s^2" meant?')]),
+    ("[driveline]\nshaft2 = { section = 'tube', outer = 3 }", [(2, "driveline.shaft2.section", '"round", "hollow"')]),
+    ("title = ['a']\nproject = 'x'", [(1, "title", "a text"), (2, "project", "it stands in [report]")]),
+    ("machine = 'KnifeDrive'", [(1, "machine", "must be a table")]),
+    ("[[machine]]\nr = 3", [(1, "machine = [{ r = 3 }]", "must be a table, below [machine]")]),
+    ("machine:\n  r: 150 mm", [(1, "no valid TOML", "it is YAML")]),
+    ("designation;power [kW];voltage;poles", [(1, "no valid TOML", "it is a CSV table")]),
+    ("<?xml version='1.0'?>", [(0, "", "is HTML or XML")]),
     ("[driveline]\nalpha1 = '95 deg'", [(1, "driveline.alpha1", "must be < 1.5708 rad")]),
     ("[monte_carlo]\nevent = { force = [5000, 100] }", [(2, "monte_carlo.event.force", ">= the first")]),
     ("[torsion]\npoints = 50", [(1, "torsion", "add [driveline]")]),

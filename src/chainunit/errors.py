@@ -84,7 +84,7 @@ class Faults:
     """Refusals that are collected, to be raised together."""
 
     def __init__(self) -> None:
-        self._errors: list[InputError] = []
+        self.errors: list[InputError] = []
 
     @contextmanager
     def collected(self) -> Iterator[None]:
@@ -92,11 +92,11 @@ class Faults:
         try:
             yield
         except InputError as error:
-            self._errors += error.faults
+            self.errors += error.faults
 
     def add(self, errors: Iterable[InputError]) -> None:
         """Take some more."""
-        self._errors += errors
+        self.errors += errors
 
     def refuse(self) -> None:
         """Raise what was collected, if there is anything.
@@ -106,8 +106,8 @@ class Faults:
         InputError
             with all of it.
         """
-        if self._errors:
-            raise InputError.of(self._errors)
+        if self.errors:
+            raise InputError.of(self.errors)
 
 
 def near_name(given: str, known: Iterable[str]) -> str:

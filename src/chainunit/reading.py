@@ -366,6 +366,11 @@ _OTHER_KINDS = {
     b"CDF": "a NetCDF file",
     b"%PDF": "a PDF file",
     b"\x89PNG": "a picture",
+    b"\xff\xd8\xff": "a picture",
+    b"\x1f\x8b": "a compressed file",
+    b"\x7fELF": "a program",
+    b"MZ": "a program",
+    b"<": "HTML or XML",
 }
 """By their first bytes, files that are taken for another kind."""
 
@@ -380,11 +385,18 @@ def file_text(file: Path) -> str:
     """
     try:
         data = file.read_bytes()
-        for begin, kind in _OTHER_KINDS.items():
-            if data.startswith(begin):
-                raise InputError(f"{file}: is {kind}; must be a text file")
-        return data.decode("utf-8-sig")
     except OSError as error:
         raise InputError(f"{file}: cannot be read ({error.strerror or error})") from error
+    for begin, kind in _OTHER_KINDS.items():
+        if data.startswith(begin):
+            raise InputError(f"{file}: is {kind}; must be a text file")
+    try:
+        text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(f"{file}: is not UTF-8 text") from error
+        if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+            raise InputError(f"{file}: is not UTF-8 text but UTF-16; save it as UTF-8") from error
+        line = 1 + data[: error.start].count(b"\n")
+        raise InputError(f"{file}:{line}: is not UTF-8 text; save it as UTF-8", placed=True) from error
+    if "\0" in text:
+        raise InputError(f"{file}: is not UTF-8 text; save it as UTF-8")
+    return text

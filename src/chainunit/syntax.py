@@ -99,9 +99,20 @@ def _words(lines: list[str], line: int, error: Exception) -> str:
     if own.rstrip().endswith("="):
         return f"{printable(own.strip(), 80)}: its value is missing"
     first = next(filter(None, (each.strip() for each in lines)), "")
-    kind = "; it is JSON" if first.startswith("{") else "; it is a CSV table" if first.count(",") > 2 else ""
+    kind = _kind(first)
     cited = f"{printable(own.strip(), 80)}: " if own.strip() and not kind else ""
     return f"{cited}{printable(said[:1].lower() + said[1:])}{kind}"
+
+
+def _kind(first: str) -> str:
+    """Another kind of text, by its first line that is not empty, as words to follow a refusal."""
+    if first.startswith("{"):
+        return "; it is JSON"
+    if max(first.count(","), first.count(";"), first.count("\t")) > 2:
+        return "; it is a CSV table"
+    return (
+        "; it is YAML: a table begins with [name], and a key stands before =" if first.endswith(":") else ""
+    )
 
 
 def _twice(lines: list[str], line: int, heading: re.Match[str]) -> str:

@@ -14,8 +14,8 @@ from . import units
 from .quantities import Quantity
 
 _POWER = r"[eE][+−-]?\d{1,3}|\s?[x×*]\s?10(?:\^[+−-]?\d{1,3}|[⁺⁻]?[⁰¹²³⁴⁵⁶⁷⁸⁹]{1,3})"
-_DIGITS = rf"(?:\d{{1,3}}(?:\s\d{{3}})+(?:\.\d*)?|\d+\.?\d*|\.\d+)(?:{_POWER})?"
-_WHOLE = r"(?:\d{1,3}(?:\s\d{3})+|\d+)(?:\.0*)?"
+_DIGITS = rf"(?:\d{{1,3}}(?:[\s']\d{{3}})+(?:\.\d*)?|\d+\.?\d*|\.\d+)(?:{_POWER})?"
+_WHOLE = r"(?:\d{1,3}(?:[\s']\d{3})+|\d+)(?:\.0*)?"
 """A number without its sign, and a whole one."""
 _ZERO = r"(?:0+\.?0*|\.0+)"
 _SIGNS = "°Ω℃µμ−‰⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻·⋅×"

@@ -7,6 +7,7 @@ program prints can be read back.
 
 from __future__ import annotations
 
+import math
 import re
 import unicodedata
 from functools import cache
@@ -15,14 +16,14 @@ from typing import Any
 from .quantities import base_units
 
 _NUMBER = re.compile(
-    r"([+-]?(?:\d{1,3}(?: \d{3})+(?:\.\d*)?|\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3}| ?[x*] ?10\^[+-]?\d{1,3})?)"
+    r"([+-]?(?:\d{1,3}(?:[ ']\d{3})+(?:\.\d*)?|\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3}| ?[x*] ?10\^[+-]?\d{1,3})?)"
     r" ?(\D.*|)"
 )
 _THOUSANDS = re.compile(r"^\s*[+-]?\d{1,3},\d{3}(?!\d)")
 _COMMA = re.compile(r"([+-]?\d+),(\d+)(?![\d,.])(.*)")
 _TOKEN = re.compile(r" ?([A-Za-zµ%‰]+(?:\^|\*\*)?(?:[+-]?\d)?|[*./()]|1(?!\d)) ?")
 _FACTOR = re.compile(r"([A-Za-zµ%‰]+)(?:\^|\*\*)?([+-]?\d)?")
-_GLUED = re.compile(r"([kMmµ]?N|k?g|[kM]?[AVW])(mm|cm|m)?(s)?")
+_GLUED = re.compile(r"((?:[kMmµ]|da)?N|kp|k?g|[kM]?[AVW])(mm|cm|m)?(s)?")
 _SIGNS = {
     "−": "-",
     "°C": "degC",
@@ -61,6 +62,8 @@ _OTHERS = """
 _NAMES = _ANGLES | frozenset(_OTHERS.split()) | _PINT.keys()
 """Names of units that are read. Pint knows more, which nobody means (its k is Boltzmann's constant, its ton
 the American one)."""
+_TORQUE_CONSTANT = base_units("N.m/A")
+"""As a voltage constant it is in V s/rad."""
 _PREFIXES = "k M G T m µ u n p d c da"
 _PREFIXED = re.compile(r"(?:[kMGTmµunpdc]|da)(?:m|g|s|N|J|W|V|A|K|Hz|Pa|ohm|H|Wb|T|F)")
 
@@ -88,6 +91,8 @@ FITTING: dict[str, tuple[str, ...]] = {
 """By declared unit, the units in which people write a quantity, the usual one first."""
 
 
+_WRITTEN_TOO = {"rad/s": ("U/min", "1/min", "r/min"), "N.m": ("Nmm", "Ncm"), "H": ("µH",), "s": ("µs",)}
+"""Units that people write beside them, by the declared unit."""
 _RARE = ("cm", "g", "t", "h", "kg cm2", "mOhm", "rpm", "Hz")
 """Units that are read but never written."""
 
@@ -104,12 +109,12 @@ def split(text: str) -> tuple[float, str] | None:
     """The number with which a text begins, and the unit behind it; None where the text does not begin with a
     number.
 
-    Blanks between thousands are read (``10 500 N``), as is a power of ten (``2.3 × 10⁻⁷``).
+    Blanks and apostrophes between thousands are read (``10 500 N``), as is a power of ten (``2.3 × 10⁻⁷``).
     """
     match = _NUMBER.fullmatch(_ascii(text))
     if match is None:
         return None
-    number = re.sub(r" ?[x*] ?10\^", "e", match[1]).replace(" ", "")
+    number = re.sub(r" ?[x*] ?10\^", "e", match[1]).replace(" ", "").replace("'", "")
     return float(number), match[2]
 
 
@@ -121,6 +126,8 @@ def with_point(text: str) -> str:
 
 def _ascii(text: str) -> str:
     """The text in one spelling: superscripts, signs and blanks of all kinds become plain characters."""
+    # a dash that stands for a minus, and the sign for an ordinal number that looks like a degree
+    text = re.sub(r"^(\s*)[–‒]", r"\1-", text).replace("º", "°").replace("’", "'")
     with_carets = re.sub("([⁺⁻]?[⁰¹²³⁴-⁹]+)", r"^\1", text)
     plain = unicodedata.normalize("NFKC", with_carets)
     for sign, letters in _SIGNS.items():
@@ -138,7 +145,7 @@ def single_names() -> tuple[str, ...]:
     ]
     glued = [
         f"{first}{length}{time}"
-        for first in "N kN MN mN µN g kg A V W kA kV kW MA MV MW".split()
+        for first in "N daN kN MN mN µN kp g kg A V W kA kV kW MA MV MW".split()
         for length in ("", "mm", "cm", "m")
         for time in ("", "s")
     ]
@@ -189,17 +196,36 @@ def convert(number: float, unit_text: str, unit: str, kind: str = "") -> float:
 
 def probable_text(text: str, unit: str, kind: str = "") -> str:
     """The text that the user probably meant, for a quantity of this `unit` and `kind`: with a point in place
-    of a comma, or with the right case of letters. Empty where there is none."""
-    # three digits behind a comma may be thousands
-    text = text if _THOUSANDS.search(text) else with_point(text) or text
+    of a comma, or with the right case of letters. Empty where there is none; two texts where a comma may be
+    a decimal one or stand between thousands."""
+    if _THOUSANDS.search(text):
+        both = [text.replace(",", sign, 1) for sign in ("", ".")]
+        return (
+            '" or "'.join(each.strip() for each in both)
+            if all(_reads(each, unit, kind) for each in both)
+            else ""
+        )
+    text = with_point(text) or text
+    if _reads(text, unit, kind):
+        return text.strip()
     parts = split(text)
     if parts is None:
         return ""
     number, unit_text = parts
-    for usual in ("", *fitting(unit, kind)):
-        if usual.lower().replace(" ", "") == unit_text.lower().replace(" ", ""):
+    for usual in ("", *fitting(unit, kind), *_WRITTEN_TOO.get(unit, ()), *single_names()):
+        same = usual.lower().replace(" ", "") == unit_text.lower().replace(" ", "")
+        if same and _reads(f"{number:.15g} {usual}", unit, kind):
             return f"{number:.15g} {usual}".strip()
     return ""
+
+
+def _reads(text: str, unit: str, kind: str) -> bool:
+    """Whether the text is a number of that unit and kind."""
+    parts = split(text)
+    try:
+        return parts is not None and (not parts[1] or math.isfinite(convert(*parts, unit, kind)))
+    except ValueError:
+        return False
 
 
 def _joined(factors: list[tuple[str, int]]) -> str:
@@ -214,10 +240,13 @@ def _of_angle(factors: list[tuple[str, int]], base: dict[str, int]) -> list[tupl
     Raises
     ------
     ValueError
-        where the unit names an angle and the quantity has none, or the reverse.
+        where the unit names an angle and the quantity has none, or the reverse. The torque constant of a motor is
+        also a voltage per speed.
     """
     angles = [power for name, power in factors if name in _ANGLES]
     power = base.get("rad", 0)
+    if base == _TORQUE_CONSTANT and sum(angles) == -1:
+        return factors
     if angles and sum(angles) != power:
         raise ValueError("an angle is named that the quantity does not have")
     if angles or power <= 0:
@@ -282,6 +311,7 @@ def _of_name(token: str, sign: int) -> list[tuple[str, int]]:
     if product is None or (product[2] is None and product[3] is None) or name == "gs":
         raise ValueError(f"{name}: is no unit")
     parts = [part for part in product.groups() if part]
+    parts = [_PINT.get(part, part) for part in parts]
     return [*((part, sign) for part in parts[:-1]), (parts[-1], power)]
 
 

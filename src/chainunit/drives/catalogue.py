@@ -48,6 +48,8 @@ LAYOUT = Layout(CatalogueData)
 _VARIABLES = {v.name: v for v in LAYOUT.variables}
 TEXTS = {"designation": "name of the motor, as [system] names it", "source": "where its values are from"}
 """Columns of words, with their descriptions."""
+REQUIRED = ("designation", *(v.name for v in LAYOUT.variables if v.quantity.start is None))
+"""Columns that each file has."""
 _LONGEST = 200
 _HEADING = re.compile(r"\s*(\w+)\s*(?:\[\s*(.*?)\s*\])?\s*")
 
@@ -162,6 +164,8 @@ class _Row:
     """what stands before the name of a column in a refusal"""
     lines: Mapping[str, int] = field(default_factory=dict)
     """of the values, where they stand in lines of their own"""
+    absent: Collection[str] = ()
+    """columns that the whole file lacks, which is a fault of its headings"""
 
     @property
     def origin(self) -> str:
@@ -184,10 +188,11 @@ def _motors(
             motors.append(_motor(row, others))
         others.add(str(row.values.get("designation", "")).strip())
     faults.refuse()
-    return motors
+    return [motor for motor in motors if motor is not None]
 
 
-def _motor(row: _Row, others: set[str]) -> CatalogueMotor:
+def _motor(row: _Row, others: set[str]) -> CatalogueMotor | None:
+    """The motor of a row; None where its file lacks a column."""
     faults, values = Faults(), dict[str, float]()
     for name in row.values:
         if name not in _VARIABLES and name not in TEXTS:
@@ -196,6 +201,8 @@ def _motor(row: _Row, others: set[str]) -> CatalogueMotor:
             faults.add([InputError(f"{shown(name)}: {known}", name)])
     texts = {name: row.values.get(name, row.origin if name == "source" else "") for name in TEXTS}
     for name, text in texts.items():
+        if name in row.absent:
+            continue
         if not isinstance(text, str) or not text.strip() or not text.isprintable() or len(text) > _LONGEST:
             words = f"must be a text of one line, of at most {_LONGEST} characters"
             faults.add([InputError(f"{name} = {shown(text)}: {words}", name)])
@@ -208,10 +215,12 @@ def _motor(row: _Row, others: set[str]) -> CatalogueMotor:
                 values[name] = to_number(variable, row.values[name])
             except ValueError as error:
                 faults.add([InputError(str(error), name)])
-        elif variable.quantity.start is None:
+        elif variable.quantity.start is None and name not in row.absent:
             allowed = f"{variable.quantity.allowed_range} ({variable.description})"
             faults.add([InputError(f"{name}: is missing; must be {allowed}", name)])
     faults.refuse()
+    if row.absent:
+        return None
     nameplate = LAYOUT.from_names(values)
     check(nameplate)
     own = {name: text.strip() for name, text in texts.items()}
@@ -224,11 +233,16 @@ def _csv_rows(text: str, file: str, faults: Faults) -> Iterator[_Row]:
         raise InputError(f"{file}: is empty; must begin with a row of headings, parted by commas")
     (first, headings), *others = rows
     columns = _columns(headings, file, first)
+    missing = {name for name in REQUIRED if name not in dict(columns)}
+    for name in (name for name in REQUIRED if name in missing):
+        whole = heading(_VARIABLES[name]) if name in _VARIABLES else name
+        words = f"is missing; add the heading {shown(whole)}"
+        faults.add([InputError(f"{file}:{first}: column {name}: {words}", placed=True)])
     for line, row in others:
         if len(row) == len(columns):
             cells = zip(columns, map(str.strip, row), strict=True)
             values = {name: _with_unit(cell, unit) for (name, unit), cell in cells if cell}
-            yield _Row(file, line, values, "column ")
+            yield _Row(file, line, values, "column ", absent=missing)
         else:
             quotes = "; a comma in a cell needs quotation marks around it" if len(row) > len(columns) else ""
             words = f"has {len(row)} cells; must have {len(columns)}, as the headings{quotes}"

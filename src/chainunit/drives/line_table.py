@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, Field
 
-from ..errors import InputError, refusal_prefix
+from ..errors import Faults, InputError, refusal_prefix
 from ..quantities import Quantity, Value, Variable, declaration, quantity, variables
 from ..reading import number, schema, to_number
 from .cardan import ShaftLine
@@ -80,22 +80,17 @@ def line_values(table: BaseModel, prefix: str) -> dict[str, Any]:
         in one line: for a stiffness or a damping that is given twice, and see `shafts.stiffness_of`.
     """
     numbers = {name: getattr(table, name) for name in table.model_fields_set}
+    faults = Faults()
+    twice = [(stiffness, shaft) for shaft, stiffness in SHAFTS.items()]
+    for name, other in (*twice, ("d2", "damping_ratio"), ("d3", "damping_ratio")):
+        if name in numbers and other in numbers:
+            words = f"given beside {prefix}{other}, which sets it; leave out one of the two"
+            faults.add([InputError(f"{prefix}{name}: {words}", prefix + name)])
     for shaft, stiffness in SHAFTS.items():
         described = numbers.pop(shaft, None)
-        if described is None:
-            continue
-        if stiffness in numbers:
-            raise InputError(
-                f"{prefix}{stiffness}: given beside {prefix}{shaft}, which sets it; leave out one of the two",
-                prefix + stiffness,
-            )
-        keys = {name: getattr(described, name) for name in described.model_fields_set}
-        with refusal_prefix(f"{prefix}{shaft}.", prefix + shaft):
-            numbers[stiffness] = stiffness_of(keys)
-    for name in ("d2", "d3"):
-        if name in numbers and "damping_ratio" in numbers:
-            raise InputError(
-                f"{prefix}{name}: given beside {prefix}damping_ratio, which sets it; leave out one of the two",
-                prefix + name,
-            )
+        if described is not None:
+            keys = {name: getattr(described, name) for name in described.model_fields_set}
+            with faults.collected(), refusal_prefix(f"{prefix}{shaft}.", prefix + shaft):
+                numbers[stiffness] = stiffness_of(keys)
+    faults.refuse()
     return numbers

@@ -144,14 +144,18 @@ def stiffness_of(keys: Mapping[str, Any]) -> float:
         raise InputError(f"section: missing; one of {', '.join(SECTIONS)}")
     section = SECTIONS[name]
     required = (*section.takes, "length")
-    for key in required:
-        if key not in keys:
-            raise InputError(f'{key}: missing; section "{name}" needs {", ".join(required)}')
-    for key in keys:
-        if key not in (*required, *section.also, "section", "shear_modulus"):
-            raise InputError(
-                f'{key}: not of section "{name}", which takes {", ".join((*required, *section.also))}'
-            )
+    faults = [
+        InputError(f'{key}: missing; section "{name}" needs {", ".join(required)}')
+        for key in required
+        if key not in keys
+    ]
+    faults += [
+        InputError(f'{key}: not of section "{name}", which takes {", ".join((*required, *section.also))}')
+        for key in keys
+        if key not in (*required, *section.also, "section", "shear_modulus")
+    ]
+    if faults:
+        raise InputError.of(faults)
     constant = section.constant(*(keys[key] for key in (*section.takes, *section.also) if key in keys))
     modulus = {"shear_modulus": keys["shear_modulus"]} if "shear_modulus" in keys else {}
     return stiffness(constant, keys["length"], **modulus)

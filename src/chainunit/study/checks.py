@@ -93,6 +93,7 @@ _ORDER = (
     ("torsion.bend_low", ">", "torsion.bend_high"),
 )
 """Quantities of which the second has to be more than the first."""
+LOWER_LIMITS = {high: low for low, _, high in _ORDER}
 
 
 def check_order(values: Mapping[str, Any], sections: Mapping[str, FileSection]) -> Iterator[InputError]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..drives.cardan import check
-from ..drives.catalogue import CatalogueMotor, catalogue, motor_of_catalogue
+from ..drives.catalogue import CatalogueMotor
 from ..drives.gearing import Transmission
 from ..drives.motor import Motor
 from ..drives.motors import MOTORS
@@ -24,12 +24,13 @@ from ..reading import Slip, filled, given_values, read, read_table, slips, toml
 from ..refusals import unit_behind
 from ..system.signals import Profile
 from ..text import DEFAULT_UNITS, Units, chosen_units
-from .checks import check_company, check_order
+from .checks import check_order
 from .event import Event
 from .event_table import RandomEvent, read_events, read_random_event
 from .events import OneSidedFeed
+from .first_checks import check_values, independent, plate_of, without
 from .foreign_machine import ForeignMachine, ForeignModel
-from .parts import Parts, beside, example, named_table, over_example, parts_of
+from .parts import Parts, beside, example, over_example
 from .sections import (
     CHOICES,
     ChainOrgans,
@@ -195,29 +196,25 @@ def of_tables(data: Mapping[str, Any], source: str) -> Config:
     InputError
         with a line for each fault.
     """
-    faults = Faults()
     if isinstance(data.get("motor"), list):
         raise InputError(
             "motor: tables [[motor]] make a catalogue; name this file in a study file by catalogue", "motor"
         )
-    parts = parts_of(data, source)
-    with faults.collected():
-        read_table(parts.form, data)
-    with faults.collected():
-        if isinstance(data.get("event", []), list):
-            read_events(data.get("event", []))
-    with faults.collected():
-        random = named_table(data, "monte_carlo").get("event")
-        if isinstance(random, Mapping):
-            read_random_event(random, "monte_carlo.event")
-    with faults.collected():
-        _read_catalogue(data, source)
-    with faults.collected():
-        units = named_table(data, "report").get("units", {})
-        if isinstance(units, Mapping):
-            chosen_units(units)
-    faults.add(check_company(data, parts))
-    faults.refuse()
+    parts, faults = check_values(data, source)
+    if parts is None:
+        raise InputError.of(faults)
+    if not faults:
+        return _of_values(data, parts, source)
+    # the values that are right are put together, too: what does not fit does not depend on the others
+    try:
+        _of_values(without(data, faults), parts, source)
+    except InputError as error:
+        faults += independent(error.faults, faults, parts)
+    raise InputError.of(faults)
+
+
+def _of_values(data: Mapping[str, Any], parts: Parts, source: str) -> Config:
+    """The study of a file whose values are each allowed; see `of_tables`."""
     whole = over_example(data, parts)
     form = read_table(parts.form, whole)
     declared = {name: section.declared for name, section in parts.sections.items()}
@@ -272,7 +269,7 @@ def _config(
     with faults.collected():
         machine = _machine(parts, tables["machine"], tables["ratios"])
     with faults.collected():
-        plate = _plate(parts.designation, own_motors)
+        plate = plate_of(parts.designation, own_motors)
     with faults.collected(), refusal_prefix("driveline.", "driveline"):
         if "driveline" in data:
             check(values["driveline"])
@@ -349,22 +346,6 @@ def _choices(checked: Any, parts: Parts) -> dict[str, Any]:
     return known
 
 
-def _read_catalogue(data: Mapping[str, Any], source: str) -> None:
-    """Refuse a catalogue that cannot be read, and the wrong values in one."""
-    name = data.get("catalogue")
-    if isinstance(name, str) and name:
-        with refusal_prefix("catalogue = ", "catalogue"):
-            catalogue(beside(name, source))
-
-
-def _plate(designation: str, file: Path | None) -> CatalogueMotor | None:
-    """The motor of the catalogue that [system] names."""
-    if not designation:
-        return None
-    with refusal_prefix("system.motor = ", "system.motor"):
-        return motor_of_catalogue(designation, file, MOTORS)
-
-
 def _names(data: Mapping[str, Any], events: Mapping[str, Event], prefix: str = "") -> Iterator[str]:
     """Names of all values that a file gives, events by the names of their runs."""
     for name, value in data.items():
@@ -384,10 +365,8 @@ def _machine(parts: Parts, given: dict[str, float], of_papers: Mapping[str, floa
             lengths = ratios(**filled(Ratios, of_papers))
         twice = sorted(set(lengths) & set(given))
         if twice:
-            key = f"machine.{twice[0]}"
-            raise InputError(
-                f"{key}: given beside [ratios], which sets it; leave out one of the two", key=key
-            )
+            words = "given beside [ratios], which sets it; leave out one of the two"
+            raise InputError.of([InputError(f"machine.{name}: {words}", f"machine.{name}") for name in twice])
         given = given | lengths
     try:
         of: Any = ForeignMachine if issubclass(parts.machine, ForeignModel) else machine_of

@@ -15,7 +15,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from ..drives.line_table import SHAFTS
 from ..drives.motor import Motor
 from ..drives.motors import MOTORS
-from ..errors import InputError, near_name, refusal_prefix, shown
+from ..errors import Faults, InputError, near_name, refusal_prefix, shown
 from ..mechanism.models import MachineModel
 from ..models import MACHINES
 from ..reading import Title, file_form, given_values, merged, packaged, read_table, toml
@@ -109,19 +109,35 @@ def _is_fmu(name: str) -> bool:
     return name.lower().endswith(".fmu")
 
 
+def is_designation(motor: str) -> bool:
+    """Whether the name of a motor is a designation of the catalogue: no model, and no FMU."""
+    return bool(motor) and motor not in MOTORS and not _is_fmu(motor)
+
+
 def parts_of(data: Mapping[str, Any], source: str) -> Parts:
-    """Machine and motor of a file, checked before all else: the other tables depend on them."""
+    """Machine and motor of a file, checked before all else: the other tables depend on them.
+
+    Raises
+    ------
+    InputError
+        with a line for each that is wrong.
+    """
+    faults = Faults()
     table = read_table(SystemTable, named_table(data, "system"), "system.")
-    machine = _machine_model(table, source)
     motor = table.motor
+    machine: type[MachineModel] = MACHINES["ChamberForces"]
+    with faults.collected(), refusal_prefix("system.motor = ", "system.motor"):
+        if _is_fmu(motor):
+            beside(motor, source)
+    with faults.collected():
+        machine = _machine_model(table, source)
+    faults.refuse()
     parts = Parts(machine, MOTORS["DcMotor"])
     if not motor and "motor" not in data and "sizing" not in data:
         motor = parts.example.get("system", {}).get("motor", "")
     if not motor:
         return parts
     if _is_fmu(motor):
-        with refusal_prefix("system.motor = ", "system.motor"):
-            beside(motor, source)
         return Parts(machine, Motor, file=motor)
     if motor in MOTORS:
         return Parts(machine, MOTORS[motor])

@@ -1,0 +1,124 @@
+"""The faults of a study file that are found value by value, before its values are put together."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..drives.catalogue import CatalogueMotor, catalogue, motor_of_catalogue
+from ..drives.motors import MOTORS
+from ..errors import Faults, InputError, refusal_prefix
+from ..models import MACHINES
+from ..reading import read_table
+from ..text import chosen_units
+from .checks import LOWER_LIMITS, check_company
+from .event_table import read_events, read_random_event
+from .parts import Parts, beside, is_designation, named_table, parts_of
+
+_OF_MACHINE = ("machine", "ratios", "feed", "motor", "system")
+"""Tables that nothing is known of without machine and motor."""
+
+
+def check_values(data: Mapping[str, Any], source: str) -> tuple[Parts | None, list[InputError]]:
+    """The machine and motor of a file, None where it names wrong ones, and all faults of its single values."""
+    faults = Faults()
+    parts = None
+    with faults.collected():
+        parts = parts_of(data, source)
+    known = parts or Parts(MACHINES["ChamberForces"], MOTORS["DcMotor"])
+    own = data if parts else {name: x for name, x in data.items() if name not in _OF_MACHINE}
+    with faults.collected():
+        read_table(known.form, own)
+    with faults.collected():
+        if isinstance(data.get("event", []), list):
+            read_events(data.get("event", []))
+    with faults.collected():
+        random = named_table(data, "monte_carlo").get("event")
+        if isinstance(random, Mapping):
+            read_random_event(random, "monte_carlo.event")
+    with faults.collected():
+        _check_catalogue(data, source)
+    with faults.collected():
+        units = named_table(data, "report").get("units", {})
+        if isinstance(units, Mapping):
+            chosen_units(units)
+    if parts is not None:
+        faults.add(check_company(data, parts))
+    return parts, _without_repeated(faults.errors)
+
+
+def _without_repeated(faults: Sequence[InputError]) -> list[InputError]:
+    """The faults, of which those of the same key and the same words stand once."""
+    return list({(fault.key, str(fault)): fault for fault in faults}.values())
+
+
+def _check_catalogue(data: Mapping[str, Any], source: str) -> None:
+    """Refuse a catalogue that cannot be read, wrong values in one, and a motor that none has."""
+    name, file = data.get("catalogue"), None
+    if isinstance(name, str) and name:
+        with refusal_prefix("catalogue = ", "catalogue"):
+            file = beside(name, source)
+            catalogue(file)
+    motor = named_table(data, "system").get("motor")
+    if isinstance(motor, str) and is_designation(motor):
+        plate_of(motor, file)
+
+
+def plate_of(designation: str, file: Path | None) -> CatalogueMotor | None:
+    """The motor of the catalogue that [system] names.
+
+    Raises
+    ------
+    InputError
+        where the catalogue has none of that name.
+    """
+    if not designation:
+        return None
+    with refusal_prefix("system.motor = ", "system.motor"):
+        return motor_of_catalogue(designation, file, MOTORS)
+
+
+def without(data: Mapping[str, Any], faults: Collection[InputError]) -> dict[str, Any]:
+    """The tables of a file without the values that are refused; of its events there are none where one is."""
+    rest = copy.deepcopy(dict(data))
+    for key in map(_key, faults):
+        names = key.split(".")
+        if "event" in names:
+            names = names[: names.index("event") + 1]
+        inner: Any = rest
+        while len(names) > 1 and isinstance(inner.get(names[0]), dict):
+            inner = inner[names.pop(0)]
+        inner.pop(names[0], None)
+    return rest
+
+
+def _key(fault: InputError) -> str:
+    """The key that a fault concerns; those in another file concern the catalogue."""
+    return "catalogue" if fault.placed else fault.key
+
+
+def independent(
+    further: Collection[InputError], faults: Collection[InputError], parts: Parts
+) -> list[InputError]:
+    """Of the refusals of values that do not fit together, those that do not hang on a refused value: they concern
+    other tables, or a count, or two limits that are both right."""
+    wrong = set(map(_key, faults))
+    tables = {key.partition(".")[0] for key in wrong}
+    if tables & {"system", ""}:
+        return []
+    if "catalogue" in wrong:
+        # whether it has the motor is not known
+        tables.add("system")
+    counts = {f"{name}.{key}" for name, section in parts.sections.items() for key in section.whole}
+    return [
+        fault
+        for fault in further
+        if fault.key not in wrong
+        and (
+            fault.key.partition(".")[0] not in tables
+            or fault.key in counts
+            or (fault.key in LOWER_LIMITS and LOWER_LIMITS[fault.key] not in wrong)
+        )
+    ]
