@@ -1,6 +1,8 @@
-"""Analyses of a study: each is made where the system has what it needs, and adds what it finds to the study.
+"""Analyses of a study: each is made where the system has the parts that it needs, and adds its findings to
+the study.
 
-A new one is a module with a subclass of `Analysis` and a line in `chainunit.study.analyses`; its section on the page
+A new analysis is a module with a subclass of `Analysis` and a line in `chainunit.study.analyses`; its section
+on the page
 is a function of the same name in `chainunit.report.analyses`.
 """
 
@@ -23,34 +25,36 @@ class Findings(ABC):
 
     @abstractmethod
     def as_dict(self) -> dict[str, Any]:
-        """Ready for JSON, each number with its unit: the part of the result that has the name of the analysis."""
+        """The findings ready for JSON, each number with its unit: the part of the result under the name of
+        the analysis."""
 
     @abstractmethod
     def remark(self, study: StudyRecord) -> None:
-        """Add to the study what the reader has to know beside the numbers."""
+        """Add to the study the remarks that the reader needs beside the numbers."""
 
 
 class Analysis(ABC):
-    """An analysis by its `name`: that of its part of result.json and of its section on the page."""
+    """An analysis. Its `name` is the name of its part of result.json and of its section on the page."""
 
     name: ClassVar[str]
     needs_runs: ClassVar[bool] = False
-    """whether it follows the runs of the study and has the FMUs; else it comes before all FMUs"""
+    """whether it comes after the runs of the study and uses the FMUs; otherwise it comes before any FMU is
+    made"""
 
     @staticmethod
     def applies(config: Config, drive: Drive) -> bool:
-        """Whether the system has what it needs; every system does where an analysis does not say."""
+        """Whether the system has the parts that the analysis needs; by default every system has them."""
         return True
 
     @staticmethod
     @abstractmethod
     def find(study: StudyRecord, rig: Rig, report: Report) -> Findings | None:
-        """Make it; before the runs the rig has no FMUs.
+        """Make the analysis; before the runs the rig has no FMUs.
 
         Raises
         ------
         InputError
-            for values of the file that it cannot work with, where it comes before the runs.
+            for values of the file with which the analysis cannot work, if it comes before the runs.
         RunError
-            where a run of its own fails: the study keeps what it has.
+            where a run of the analysis itself fails; the study keeps its other results.
         """

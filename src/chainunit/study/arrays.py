@@ -13,6 +13,6 @@ def peak(x: Any) -> float:
 
 
 def stretches(inside: Any) -> list[tuple[int, int]]:
-    """Begin and end, as of a slice, of each stretch of an array of shape (n,) in which all are true."""
+    """Begin and end, as of a slice, of each stretch of true values in an array of shape (n,)."""
     edge = np.diff(np.concatenate([[False], inside, [False]]).astype(int))
     return list(zip(np.flatnonzero(edge > 0).tolist(), np.flatnonzero(edge < 0).tolist(), strict=True))

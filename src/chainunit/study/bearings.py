@@ -1,4 +1,4 @@
-"""What the pins of the machine carry in a run."""
+"""The loads of the machine's pins in a run."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from .window import mean, whole_turns
 
 
 def pin_loads(drive: Drive, run: xr.Dataset) -> dict[str, dict[str, float]]:
-    """Peak, RMS and equivalent load (mean of ISO 281 over what the pin turns) of the reaction of every pin [N]; none
-    of a machine that is an FMU of somebody else."""
+    """Peak, RMS and equivalent load (mean of ISO 281 over the angle that the pin turns) of the reaction of
+    every pin [N]; empty for a machine that is a foreign FMU."""
     if drive.outsider:
         return {}
     table, turns = {}, whole_turns(drive, run)
@@ -33,7 +33,7 @@ def pin_loads(drive: Drive, run: xr.Dataset) -> dict[str, dict[str, float]]:
 
 
 def mean_load(force: Any, turned: Any, exponent: float = 3.0) -> float:
-    """Equivalent load of a bearing [N]: the mean of ISO 281 over what it turns.
+    """Equivalent load of a bearing [N]: the mean of ISO 281 over the angle that it turns.
 
     P = (integral of F^p |d alpha| / integral of |d alpha|)^(1/p), with `force` [N] and the angle `turned` [rad] of
     the pin in its bearing, both of shape (n,); p = 3 for ball bearings, 10/3 for rollers. Zero where nothing turns.

@@ -42,7 +42,8 @@ class Cutting:
 
 @dataclass(frozen=True)
 class BladeFindings(Findings):
-    """The turn with the cut, and its numbers; place and tilt of the blade are arrays over the crank angle."""
+    """The turn with the cut, and its numbers; position and tilt of the blade are arrays over the crank
+    angle."""
 
     turn: Cycle
     stack: Stack
@@ -50,7 +51,8 @@ class BladeFindings(Findings):
 
     @property
     def blade(self) -> Any:
-        """Place `x` and `y` [m] of the middle of the edge, and `tilt` [rad], each of shape (POINTS,)."""
+        """Position `x` and `y` [m] of the middle of the cutting edge, and `tilt` [rad], each of shape
+        (POINTS,)."""
         return self.turn.outputs.blade
 
     @property
@@ -71,7 +73,8 @@ class BladeFindings(Findings):
         return {**entries(self.numbers), "over_turn": over_turn}
 
     def remark(self, study: StudyRecord) -> None:
-        """Where the blade does not go through the stack, and what the work of a cut rests on."""
+        """Warn where the blade does not pass through the whole stack; note the assumptions behind the work of
+        a cut."""
         n, warn = self.numbers, study.warn
         top, table = (float(x) for x in (self.stack.top, self.stack.table))
         if n.blade_bottom > top:
@@ -159,7 +162,8 @@ def _numbers(turn: Cycle, stack: Stack, config: Config) -> Cutting:
         cut_work=work,
         cut_path=path,
         cut_work_by_path=config.feed.cut_force * path,
-        losses=losses if losses > 1e-9 * work else 0.0,  # of two sums that differ by roundoff alone
+        # a smaller difference of the two sums is roundoff
+        losses=losses if losses > 1e-9 * work else 0.0,
     )
 
 
@@ -169,7 +173,8 @@ def _way(x: Any, y: Any) -> Any:
 
 
 def in_stack(stack: Stack, x: Any, y: Any) -> Any:
-    """Share of each piece of the blade's closed path that goes down between top and table, shape (n,)."""
+    """Share of each piece of the blade's closed path that leads downward between the top of the stack and the
+    table, shape (n,)."""
     after = np.roll(y, -1)
     within = np.clip(y, stack.table, stack.top) - np.clip(after, stack.table, stack.top)
     fall = y - after

@@ -1,8 +1,9 @@
 """The organs as chains at constant crank speed: their torques beside two bars, and the speeds to avoid.
 
-Above a certain speed the motion is chaotic: no single peak is a prediction. At each speed several starts, the crank
-at other angles, are followed over many turns; of the peak of each turn medians and quantiles over all turns of all
-starts are given. A rod is slack while its mean axial pull is below zero.
+Above a certain speed the motion is chaotic: no single peak is a prediction. At each speed the machine is
+therefore started several times, with the crank at different angles, and followed over many turns. The results
+are medians and quantiles of the peaks of single turns, over all turns of all starts. A rod is slack while its
+mean axial pull is below zero.
 """
 
 from __future__ import annotations
@@ -36,25 +37,25 @@ from .drive import Drive
 from .quantiles import CONFIDENCE, counted, quantile
 
 SETTLE = 5
-"""Turns of each start that are left out."""
+"""Number of turns at the begin of each start that are not evaluated."""
 POINTS = 256
-"""Points of a turn at which outputs are read."""
+"""Number of points of a turn at which outputs are read."""
 HIGH = 0.95
 """The quantile that is given beside the median."""
 AVOID_RATIO = 1.25
-"""Where the rocker torque of chains is that many times the one of two bars, at this speed and at rest, a speed is to
-be avoided. At rest, too: the torque of two bars passes a minimum where weight and inertia cancel; chains that do not
-follow it there ask no more of the machine than at lower speeds."""
+"""A speed is to be avoided where the rocker torque of chains exceeds that of two bars by this factor, both at
+this speed and at rest. The torque at rest counts, as the torque of two bars has a minimum where weight and
+inertia cancel; there a larger torque of chains loads the machine no more than lower speeds do."""
 AVOID_SLACK = 0.01
-"""Where a rod is slack for that share of the time, too."""
+"""A speed is to be avoided, too, where a rod is slack for more than this share of the time."""
 
 
 @declaration
 class SpeedNumbers:
     """Chains and two bars at one crank speed. Peaks are those of single turns, over all turns of all starts.
 
-    The turns of a start are not independent; where they count for too few, a quantile has no interval (NaN): the
-    starts do not tell it."""
+    The turns of a start are not independent. Where they count as too few independent ones, the interval of a
+    quantile is NaN."""
 
     speed: Value = quantity("rad/s", "crank speed", kind="speed")
     crank_torque_median: Value = quantity("N.m", "crank torque, peak of a turn, median")
@@ -94,7 +95,7 @@ class Turns:
     """Steady running of the machine with chains, sampled: arrays of shape (starts, turns, points)."""
 
     angle: Any
-    """of the crank in a turn [rad], shape (points,); that of start k is ahead by k/starts of a turn"""
+    """crank angle in a turn [rad], shape (points,); the angle of start k is ahead by k/starts of a turn"""
     values: Mapping[str, Any]
     """outputs by name"""
     pulls: Mapping[str, Any]
@@ -110,7 +111,7 @@ class Band:
     why: str
 
     def __str__(self) -> str:
-        """From where to where, in words; a study without a sweep has but one speed."""
+        """The range in words; a single speed in a study without a sweep."""
         ends = [self.low, self.high] if self.high > self.low else [self.low]
         return " to ".join(number(end, "rad/s", "speed", 4, full=False, beside=False) for end in ends)
 
@@ -123,18 +124,19 @@ class ChainResult:
     sweep: tuple[SpeedNumbers, ...]
     avoid: tuple[Band, ...]
     critical: tuple[tuple[int, int, float], ...]
-    """(mode, order, crank speed [rad/s]) at which a multiple of the crank speed meets a natural frequency"""
+    """(mode, order, crank speed [rad/s]): at this speed `order` times the crank speed is a natural
+    frequency"""
     slack_by_rod: Mapping[str, Any]
     """by side: share of the time in which each rod is slack, from A1 on, at the study's own speed"""
     starts: int
     turns: int
     rods: tuple[int, int]
     failed: Mapping[float, str]
-    """by crank speed [rad/s], why it is missing in the sweep"""
+    """by crank speed [rad/s], the reason why the speed is missing in the sweep"""
 
     @property
     def resonance(self) -> float | None:
-        """Crank speed that is the lowest natural frequency of an organ [rad/s]; None without weight."""
+        """Crank speed that equals the lowest natural frequency of an organ [rad/s]; None without weight."""
         return next((speed for mode, order, speed in self.critical if mode == order == 1), None)
 
     @property
@@ -143,8 +145,8 @@ class ChainResult:
         return None if self.resonance is None else float(self.own.speed / self.resonance - 1.0)
 
     def within_sweep(self, apart: float = 0.0) -> list[tuple[int, int, float]]:
-        """The critical speeds within the sweep, low orders first, without those that are nearer than `apart` of the
-        sweep's width to one before them."""
+        """The critical speeds within the sweep, low orders first. A speed is left out if its distance to an
+        earlier one is less than the share `apart` of the width of the sweep."""
         low, high = self.sweep[0].speed, self.sweep[-1].speed
         kept: list[tuple[int, int, float]] = []
         for each in sorted(self.critical, key=lambda found: (found[1], found[0])):
@@ -209,16 +211,16 @@ def run_turns(
     Parameters
     ----------
     fmu : the machine with chains
-    drive : whose machine it is
-    outputs : names of the wanted outputs
+    drive : the drive with this machine
+    outputs : names of the outputs to read
     starts, turns, settle, points : see `Turns`, `SETTLE`, `POINTS`
-    progress : is told the share done
-    stopped : whether to stop, see `stoppable`; by default Ctrl-C stops it
+    progress : a function that is called with the share of the work that is complete
+    stopped : a function that says whether to stop, see `stoppable`; by default Ctrl-C stops the run
 
     Raises
     ------
     InterruptedRunError, RunError
-        where it was stopped, or a run fails.
+        where the run was stopped, or a run fails.
     """
     model, p = drive.load_model()
     rods = [f"{side}.pull_{k + 1}" for side in SIDES for k in range(sum(drive.rods))]
@@ -231,7 +233,7 @@ def run_turns(
     def one(start: int, stop: Callable[[], bool]) -> Any:
         unit = Instance(fmu, f"start {start}")
         try:
-            # inside the FMU the angle runs on along the speed: nothing is set any more
+            # the FMU extrapolates the angle by the speed: no input has to be set any more
             phi = 2.0 * math.pi * start / starts
             unit.initialize(parameters | {"phi": phi * ratio, "w": crank_speed * ratio, "a": 0.0}, 0.0)
             unit.finish_initialization()
@@ -264,8 +266,8 @@ def run_turns(
 
 
 def duty(fmu: Fmu, drive: Drive, crank_speed: float, feed: Feed) -> Cycle:
-    """The machine with chains over all turns of all starts, of shape (turns, points), where `cycle` gives the one
-    turn of two bars: the begin of sizing."""
+    """The machine with chains over all turns of all starts, of shape (turns, points), for sizing; `cycle`
+    gives the single turn of two bars."""
     chain = drive.chain
     sample = run_turns(
         fmu, drive, crank_speed, feed, ("tau", "J"), starts=int(chain.starts), turns=int(chain.turns)
@@ -275,8 +277,9 @@ def duty(fmu: Fmu, drive: Drive, crank_speed: float, feed: Feed) -> Cycle:
 
 
 def two_bar_pulls(machine: ChainUnitMachine, angle: Any, crank_speed: float, feed: Feed) -> Any:
-    """Mean axial pull [N] in wall and web of both sides of two bars at crank angles `angle` [rad], shape (4, n): as
-    two rods without damping, so that slack means the same of both."""
+    """Mean axial pull [N] in wall and web of both sides, with two bars, at crank angles `angle` [rad], shape
+    (4, n). It is computed as for two rods without damping, so that slack means the same for bars and
+    chains."""
     model, xp = flexible(1, 1), numpy_()
     named = ChamberForces.parameter_layout.by_name(machine.p) | {
         f"organ.{name}": 0.0 for name in ("eta", "end_damping", "fold_stiffness")
@@ -297,7 +300,8 @@ def numbers_at(
     progress: Progress = lambda share: None,
     stopped: Callable[[], bool] | None = None,
 ) -> tuple[SpeedNumbers, dict[str, Any]]:
-    """The numbers at one speed with the study's feed, and by side the share of time in which each rod is slack."""
+    """The numbers at one speed with the study's feed, and by side the share of the time in which each rod is
+    slack."""
     chain, feed = config.chain, config.feed
     assert chain is not None
     forces = [f"{side}.rocker_joint.{x}" for side in SIDES for x in ("fx", "fy")]
@@ -361,8 +365,8 @@ def numbers_at(
 
 
 def rest_forces(machine: ChainUnitMachine, side: str, feed: Any, rods: int) -> tuple[float, float]:
-    """Force at A2 with the machine at rest, the rocker in the middle [N], of a chain and of two bars: each snatch is
-    in parts of its own. NaN without weight, as nothing is pulled at rest."""
+    """Forces at A2 with the machine at rest and the rocker in the middle [N], of a chain and of two bars: the
+    snatch of each is relative to its own force at rest. NaN without weight, as nothing is pulled at rest."""
     if machine.p.g == 0.0:
         return math.nan, math.nan
     bars = getattr(machine.chamber(0.0, left=feed.left, right=feed.right), side).rocker_joint
@@ -373,8 +377,9 @@ def rest_forces(machine: ChainUnitMachine, side: str, feed: Any, rods: int) -> t
 def study_chain(
     config: Config, drive: Drive, file: Path, report: Report
 ) -> tuple[ChainResult, RunError | None]:
-    """The study's own speed and the sweep of a study whose organs are chains, by the FMU `file` of the machine; and
-    why the sweep ended early, if it did. A speed of the sweep whose run fails is left out and named in `failed`.
+    """The numbers of a study whose organs are chains, at its own speed and over the sweep, by the FMU `file`
+    of the machine; and the error that ended the sweep early, or None. A speed of the sweep whose run fails is
+    left out and stands in `failures`.
 
     Raises
     ------
@@ -390,7 +395,7 @@ def study_chain(
             critical += [(mode, order, float(frequency) / order) for order in (1, 2)]
     speeds = np.linspace(chain.sweep_lowest, chain.sweep_highest, int(chain.sweep_points)).tolist()
     if speeds:
-        # the resonance itself, beside the grid
+        # the resonance itself is added to the grid
         speeds += [w for _, _, w in critical[:1] if chain.sweep_lowest < w < chain.sweep_highest]
     spacing = (chain.sweep_highest - chain.sweep_lowest) / max(1, len(speeds) - 2)
     others = sorted({w for w in speeds if abs(w - own) > 1e-9 * own})
@@ -405,7 +410,7 @@ def study_chain(
             report_share(0.0)
             return numbers_at(fmu, drive, config, w, report_share, stopped)
 
-        # first the study's own speed, so that an early end costs the sweep alone
+        # the study's own speed comes first, so that an early end loses only the sweep
         mine, by_rod = at(0, own)
         rows = [mine]
         for k, w in enumerate(others, 1):
@@ -432,15 +437,16 @@ def study_chain(
 
 
 def _rocker_at_rest(config: Config, drive: Drive) -> float:
-    """The rocker torque of two bars, largest of a turn that takes for ever [N.m]."""
+    """Largest rocker torque of two bars in a very slow turn [N.m]."""
     slowly = cycle(drive.machine, 1e-6, config.feed)
     return peak(slowly.outputs.rocker.tau)
 
 
 def bands(rows: Sequence[SpeedNumbers], at_rest: float, reach: float = math.inf) -> list[Band]:
-    """Speeds to avoid, from the rows of a sweep in rising order: neighbours with the same reason are one band, from
-    halfway to the last good speed to halfway to the next, but no farther than `reach` [rad/s] from one that was run.
-    `at_rest`: the rocker torque of two bars at rest [N.m]."""
+    """Speeds to avoid, from the rows of a sweep in rising order. Neighbours with the same reason are one
+    band. The band begins halfway to the last good speed below and ends halfway to the next good speed above,
+    but no farther than `reach` [rad/s] from a speed that was run. `at_rest` is the rocker torque of two bars
+    at rest [N.m]."""
 
     def why(n: SpeedNumbers) -> str:
         reasons = []

@@ -1,4 +1,4 @@
-"""The values of a study file that do not go together."""
+"""Checks of values of a study file that contradict each other."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from .sections import FileSection
 
 
 def check_company(data: Mapping[str, Any], parts: Parts) -> list[InputError]:
-    """Refusals of values that would be passed over in silence."""
+    """Refusals of values that would otherwise be ignored without a word."""
     return [InputError(f"{key}: {words}", key=key) for key, words in _company(data, parts)]
 
 
 def _company(data: Mapping[str, Any], parts: Parts) -> Iterator[tuple[str, str]]:
-    """The key that is refused, and why."""
+    """Pairs of a refused key and the reason."""
     named = data.get("system", {}).get("motor")
     if data.get("system") == {}:
         yield ("system", 'names nothing; add motor = "file.fmu", or leave [system] out')
@@ -92,12 +92,12 @@ _ORDER = (
     ("torsion.slowest", ">", "torsion.fastest"),
     ("torsion.bend_low", ">", "torsion.bend_high"),
 )
-"""Quantities of which the second has to be more than the first."""
+"""Triples (low, relation, high): the value of `high` has to have this relation to that of `low`."""
 LOWER_LIMITS = {high: low for low, _, high in _ORDER}
 
 
 def check_order(values: Mapping[str, Any], sections: Mapping[str, FileSection]) -> Iterator[InputError]:
-    """Refusals of limits that leave nothing between them, and of counts that are none."""
+    """Refusals of limits with no value between them, and of counts that are not whole numbers."""
 
     def value(name: str) -> tuple[float, str]:
         section, _, key = name.partition(".")

@@ -1,5 +1,5 @@
-"""The drive of a study: the motor that it gives, tuned, the motor that sizing chooses, or the FMU of somebody else
-that it names."""
+"""The drive of a study: the tuned motor of the file, the motor that sizing chooses, or the foreign FMU that
+the file names."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from .sizing import SizingResult, size
 
 @dataclass(frozen=True)
 class Choice:
-    """The drive, and how it came about: tuned gains, or the list of candidates."""
+    """The drive, with the tuning or the sizing by which it was chosen."""
 
     drive: Drive
     tuning: Tuning | None = None
@@ -37,8 +37,8 @@ class Choice:
 
 
 def choose(config: Config, folder: Path, report: Report, backend: Backend | None = None) -> Choice:
-    """The drive of a study, with the nearest motor where sizing finds none that fits; FMUs that sizing needs are
-    written to `folder`."""
+    """The drive of a study; it has the nearest motor where sizing finds none that fits. The FMUs for sizing
+    are written to `folder`."""
     if config.foreign is not None:
         return _with_foreign(config)
     if config.sizing is None:
@@ -48,7 +48,8 @@ def choose(config: Config, folder: Path, report: Report, backend: Backend | None
 
 
 def _given(config: Config) -> Drive:
-    """The drive by the motor whose parameters the file gives, or by the one of the catalogue that it names."""
+    """The drive with the motor whose parameters the file gives, or with the motor of the catalogue that the
+    file names."""
     if config.plate is not None:
         turn = cycle(config.machine, config.run.crank_speed, config.feed)
         drive = catalogue_drive(config, config.plate, turn.crank_torque)
@@ -60,7 +61,7 @@ def _given(config: Config) -> Drive:
 
 
 def check_files(config: Config) -> None:
-    """Refuse a file that the study names and cannot use.
+    """Refuse a file that the study names but cannot use.
 
     Raises
     ------
@@ -82,17 +83,17 @@ def _with_foreign(config: Config) -> Choice:
 
 
 def with_motor(config: Config, file: Path, names: Mapping[str, str] | None = None) -> Choice:
-    """The machine of a study, driven by a motor of somebody else.
+    """The machine of a study, driven by a foreign motor.
 
     Parameters
     ----------
     file : the FMU
-    names : of our names those that it calls otherwise, see `chainunit.system.foreign_component`
+    names : the FMU's names by ours, where they differ; see `chainunit.system.foreign_component`
 
     Raises
     ------
     InputError
-        where the FMU does not fit, or the study asks for what only a motor of this package can tell.
+        where the FMU does not fit, or the study asks for a quantity that only a motor of this package has.
     """
     motor = foreign_component(file, "motor", names)
     if config.driveline is not None:
@@ -121,7 +122,8 @@ def with_motor(config: Config, file: Path, names: Mapping[str, str] | None = Non
 
 
 def with_line(config: Config, drive: Drive) -> Drive:
-    """The drive with the driveline of the study, if it has one: on the crank's shaft behind the gear, or before."""
+    """The drive with the driveline of the study, if it has one: on the crank's shaft behind the gear, or on
+    the motor's shaft before it."""
     if config.driveline is None:
         return drive
     given = Layout(type(config.driveline)).by_name(config.driveline)
@@ -136,7 +138,7 @@ def with_line(config: Config, drive: Drive) -> Drive:
 
 
 def tune(config: Config, drive: Drive) -> tuple[Drive, Tuning | None]:
-    """The drive with controller gains tuned to its inertia, where the config does not give them."""
+    """The drive with controller gains that are tuned to its inertia, unless the config gives them."""
     both = cycle(drive.machine, config.run.crank_speed, config.feed)
     fixed = {name.removeprefix("motor.") for name in config.given if name.startswith("motor.")}
     inertia = drive.rotor_inertia + float(np.mean(both.outputs.J))

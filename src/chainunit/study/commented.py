@@ -1,4 +1,4 @@
-"""A study file with every key that it may have, and what each means: those that it leaves out as comments."""
+"""A study file with every possible key and its meaning; the keys that the file leaves out are comments."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from .keys import Key, KeyTable, key_tables
 from .schema import FILE
 
 _OF_OTHERS = ("motor_names.", "machine_names.")
-"""Keys for FMUs of somebody else, of which an example has none."""
+"""Prefixes of keys for foreign FMUs, which an example does not have."""
 _COLUMN = 34
-"""The column at which comments begin, where there is room."""
+"""The column at which comments begin, if the line is not longer."""
 
 
 def commented(text: str, machine: str = "ChamberForces") -> str:
-    """The study file `text` of that machine, with a comment from the declarations on each line that has none. Keys
-    that it leaves out follow in comments at the end of their tables, tables that it leaves out at its end."""
+    """The study file `text` of that machine, with a comment from the declarations on each line that has none.
+    The keys that it leaves out follow as comments at the end of each table, the tables that it leaves out at
+    the end of the file."""
     lines = text.splitlines()
     types = [str(event["type"]) for event in toml(text).get("event", [])]
     found = [*statements(text)]
@@ -59,7 +60,7 @@ def _absent(present: set[str], machine: str) -> Iterable[KeyTable]:
 
 
 def _comment(lines: list[str], statement: Statement, keys: dict[str, Key]) -> None:
-    """Put the meaning of each key that a statement sets behind it, where its line has no comment."""
+    """Add the meaning of each key that a statement sets, where its line has no comment."""
     meanings = [keys[name].description for name in statement.keys if name in keys]
     line = lines[statement.line - 1]
     if meanings and "#" not in re.sub(r"\"[^\"]*\"|'[^']*'", "", line):
@@ -67,7 +68,7 @@ def _comment(lines: list[str], statement: Statement, keys: dict[str, Key]) -> No
 
 
 def _line(key: Key) -> str:
-    """A key that the file leaves out, with the value that it has then, if that is one."""
+    """The line of a key that the file leaves out, with its default value, if it has one."""
     allowed = f" ({', '.join(key.words)})" if key.words else ""
     follows = f"; left out: {key.follows}" if key.follows else ""
     text = f"# {key.name} = {key.left_out}".rstrip()

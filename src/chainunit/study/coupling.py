@@ -1,4 +1,5 @@
-"""The safety coupling of a drive: the one that it should have, and whether the one that it has does its work."""
+"""The safety coupling of a drive: the recommended setting, and whether a given coupling protects the
+drive."""
 
 from __future__ import annotations
 
@@ -16,13 +17,13 @@ from .window import BURNT
 
 
 def on_coupling(drive: Drive, run: xr.Dataset) -> float:
-    """Peak torque on a coupling on the motor shaft in a run, at the crank [N m]."""
+    """Peak torque in a run on a coupling that sits on the motor shaft, reduced to the crank [N m]."""
     return peak(run["motor.tau"].values) * drive.ratio
 
 
 def peaks_on_coupling(study: StudyRecord, *roles: Role) -> dict[str, float]:
-    """Peak on the coupling in each event of these roles, of any without, at the crank [N m]; a start direct on line
-    is judged apart."""
+    """Peak torque on the coupling in each event with one of these `roles`, or in every event without `roles`,
+    at the crank [N m]. A start direct on line is left out, as it is judged apart."""
     events = study.config.events
     return {
         name: on_coupling(study.drive, study.runs[name].sel(time=slice(begin, None)))
@@ -34,8 +35,8 @@ def peaks_on_coupling(study: StudyRecord, *roles: Role) -> dict[str, float]:
 
 
 def recommended(study: StudyRecord) -> Setting | None:
-    """The safety coupling that a sized drive should have, tried in the events of the study. None where no motor was
-    chosen, or a coupling is given, or the study ended before the machine ran steadily."""
+    """The recommended safety coupling of a sized drive, judged by the events of the study. None where no
+    motor was chosen, where the file gives a coupling, or where the study ended before steady running."""
     if not study.sizing or study.insufficient or study.config.coupling or "steady" not in study.answers:
         return None
     best, drive = study.sizing.best, study.drive
@@ -53,7 +54,7 @@ def recommended(study: StudyRecord) -> Setting | None:
 
 
 def pull_out(study: StudyRecord) -> float:
-    """Most that the warm motor gives at the crank in steady running [N m]."""
+    """Largest torque of the warm motor at the crank in steady running [N m]."""
     return study.drive.pull_out(study.steady, min(BURNT, study.answers["steady"].winding_temperature))
 
 
@@ -62,18 +63,19 @@ def _torque(value: float) -> str:
 
 
 def _listed(study: StudyRecord, peaks: Mapping[str, float]) -> str:
-    """Runs with their peaks on the coupling [N m]."""
+    """A list of runs with their peaks on the coupling [N m], in words."""
     return ", ".join(f"{study.called(name)} ({_torque(peak)})" for name, peak in peaks.items())
 
 
 def _starts_above(study: StudyRecord, torque: float) -> dict[str, float]:
-    """The parts of starting that put more than this `torque` [N m] on the coupling, with their peaks [N m]."""
+    """The parts of the start in which the coupling carries more than `torque` [N m], with their peaks [N
+    m]."""
     return {name: peak for name, peak in study.start_torques.items() if peak > torque}
 
 
 def coupling_sentence(study: StudyRecord) -> str:
-    """Which safety coupling the sized drive should have and what it does in the overloads, or why none protects
-    it."""
+    """A sentence on the recommended safety coupling of a sized drive and its effect in the overloads, or on
+    the reason why no coupling protects the drive."""
     setting = study.setting
     assert setting is not None
     caveat = f" ({study.verdict.caveat})" if study.verdict and study.verdict.caveat else ""
@@ -117,8 +119,8 @@ def coupling_sentence(study: StudyRecord) -> str:
 
 
 def remark_on_coupling(study: StudyRecord, trip: float) -> None:
-    """Where the coupling that is given, set to `trip` [N m], does not do its work."""
-    # of a motor of somebody else it is not known
+    """Warn where a given coupling, set to `trip` [N m], does not protect the drive as it should."""
+    # the limit of a foreign motor is not known
     most = None if study.drive.foreign else pull_out(study)
     peaks, shocks = peaks_on_coupling(study), peaks_on_coupling(study, Role.SHOCK)
     amounts = {"trip": (trip, "N.m")} | ({} if most is None else {"motor": (most, "N.m")})

@@ -1,4 +1,4 @@
-"""One crank turn at constant speed: the torque that the mechanism takes, by inverse dynamics."""
+"""One crank turn at constant speed: the torque that the machine needs, by inverse dynamics."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Cycle:
     crank_torque: Any
     """[N m]"""
     outputs: Any
-    """as the machine declares them; of chains the `tau` and `J` alone"""
+    """outputs as the machine declares them; only `tau` and `J` for chains"""
 
 
 def cycle(machine: Machine, crank_speed: float, feed: Any, points: int = 720) -> Cycle:
@@ -32,25 +32,25 @@ def cycle(machine: Machine, crank_speed: float, feed: Any, points: int = 720) ->
 
 
 def energy_swing(torque: Any) -> float:
-    """Energy [J] that runs ahead of the mean over a turn, largest less least: what the moving masses have to store
-    where the drive gives the mean of the `torque` [N m], evenly spaced in angle, shape (n,) (Wittenbauer's method
-    with the torque at constant speed)."""
+    """Energy [J] that the moving masses have to store over a turn if the drive gives the mean torque: largest
+    less least integral of the deviation from the mean (Wittenbauer's method with the torque at constant
+    speed). The `torque` [N m] is evenly spaced in angle, shape (n,)."""
     torque = np.asarray(torque, dtype=float)
     excess = np.cumsum(torque - np.mean(torque)) * (2.0 * math.pi / len(torque))
     return float(np.ptp(excess))
 
 
 def needed_inertia(swing: float, speed: float, fluctuation: float, there: float = 0.0) -> float:
-    """Inertia [kg m2] that a shaft needs beside the one that is `there` to keep (largest - least)/mean of its `speed`
-    [rad/s] at `fluctuation`; 0 where it needs none.
+    """Inertia [kg m2] that has to be added to the inertia `there` [kg m2] of a shaft, so that (largest -
+    least)/mean of its `speed` [rad/s] is `fluctuation`; 0 where none is needed.
 
-    The drive gives a constant torque, and the masses lend the energy `swing` [J], see `energy_swing`:
-    J = dE/(fluctuation w^2).
+    The drive gives a constant torque, and the masses store the energy dE = `swing` [J], see `energy_swing`: J
+    = dE/(fluctuation w^2).
     """
     return max(0.0, swing / (fluctuation * speed * speed) - there)
 
 
 def no_feed(feed: Any) -> Any:
-    """A feed of that kind with nothing in it; a quantity that cannot be zero is at its start."""
+    """A feed of the same kind without material; a quantity that cannot be zero has its start value."""
     layout = Layout(type(feed))
     return layout.instance([0.0 if v.quantity.admits(0.0) else v.quantity.start for v in layout.variables])

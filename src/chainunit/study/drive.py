@@ -1,4 +1,4 @@
-"""The system of a study: a motor and the machine that it drives, as they are co-simulated."""
+"""The co-simulated system of a study: a motor and the machine that it drives."""
 
 from __future__ import annotations
 
@@ -42,7 +42,8 @@ from .foreign_machine import ForeignMachine
 
 
 class AbsentError(InputError):
-    """A quantity that this motor or machine does not give; `part` is its name in the system."""
+    """A quantity that this motor or machine does not have; `part` is the name of motor or machine in the
+    system."""
 
     def __init__(self, part: str, text: str) -> None:
         super().__init__(text)
@@ -51,34 +52,36 @@ class AbsentError(InputError):
 
 @dataclass(frozen=True)
 class Drive:
-    """`motor` with its `parameters` turns `machine`; `follows` says whether it follows the reference `w_ref`."""
+    """A `motor` with its `parameters` that turns a `machine`; `follows` says whether it follows the reference
+    `w_ref`."""
 
     motor: type[Motor]
     parameters: Any
     machine: Machine
     follows: bool = True
     rated_current: float | None = None
-    """[A], where a nameplate tells it"""
+    """rated current [A], where a nameplate gives it"""
     feed_forward: bool = False
-    """whether the speed control is told the torque of the machine with its normal feed, from a second machine FMU at
-    the motor's angle and speed and the acceleration that is asked for"""
+    """whether the speed control has feed-forward: a second machine FMU computes the torque of the machine
+    with its normal feed, at the motor's angle and speed and the requested acceleration"""
 
     chain: Any = None
     """the organs as chains, a `sections.ChainOrgans`; None for two bars"""
 
     line: Any = None
-    """parameters of the driveline between motor and machine, if there is one; its `ratio` is the gear before it"""
+    """parameters of the driveline between motor and machine, or None; its `ratio` is that of the gear before
+    it"""
 
     flywheel: float = 0.0
     """inertia of a flywheel on the motor's shaft [kg m2]"""
 
     gear_inertia: float = 0.0
     gear_friction: float = 0.0
-    """of the gear of a motor of the catalogue, at the motor's shaft [kg m2], [N m s/rad]"""
+    """inertia [kg m2] and friction [N m s/rad] of the gear of a catalogue motor, at the motor's shaft"""
 
     foreign: FmuComponent | None = None
-    """the motor, where it is an FMU of somebody else: then `motor` is `Motor`, of which no more is known than its
-    terminals, and there are no `parameters`"""
+    """the motor, if it is a foreign FMU; then `motor` is `Motor` itself, of which only the terminals are
+    known, and there are no `parameters`"""
 
     @property
     def ratio(self) -> float:
@@ -87,12 +90,12 @@ class Drive:
 
     @cached_property
     def driven(self) -> Machine:
-        """The machine as its FMU is: with the gear that is left behind the driveline."""
+        """The machine as its FMU has it: with the gear ratio that remains behind the driveline."""
         return self.machine if self.line is None else self.machine.replace(ratio=self.ratio / self.line.ratio)
 
     @cached_property
     def fmu_parameters(self) -> Any:
-        """Parameters of the motor's FMU: those of the motor, whose rotor takes along the gear and the flywheel."""
+        """Parameters of the motor's FMU: those of the motor, with gear and flywheel added to the rotor."""
         p = self.parameters
         if not (self.flywheel or self.gear_inertia or self.gear_friction):
             return p
@@ -101,19 +104,19 @@ class Drive:
 
     @property
     def rotor_inertia(self) -> float:
-        """Inertia that turns with the rotor at the motor [kg m2]: its own, that of gear and flywheel, and the
-        driveline's where there is one."""
+        """Inertia that turns with the rotor, at the motor's shaft [kg m2]: of rotor, gear and flywheel, and
+        of the driveline where there is one."""
         self.needs_own("the inertia of its rotor")
         line = 0.0 if self.line is None else self.line.J4 / self.line.ratio**2
         return float(self.fmu_parameters.rotor.J + line)
 
     def needs_own(self, quantity: str) -> None:
-        """Refuse what only a motor of this package can tell.
+        """Refuse a `quantity`, named in words, that only a motor of this package has.
 
         Raises
         ------
         AbsentError
-            where the motor is an FMU of somebody else.
+            where the motor is a foreign FMU.
         """
         if self.foreign is not None:
             raise AbsentError(
@@ -122,12 +125,12 @@ class Drive:
 
     @property
     def chain_unit(self) -> ChainUnitMachine:
-        """The machine, where it is a chain unit.
+        """The machine, if it is a chain unit.
 
         Raises
         ------
         AbsentError
-            where it is another.
+            where it is another machine.
         """
         if isinstance(self.machine, ChainUnitMachine):
             return self.machine
@@ -139,15 +142,15 @@ class Drive:
         Raises
         ------
         AbsentError
-            where motor or machine do not give it.
+            where motor or machine do not have the variable.
         """
         if name not in run:
             raise AbsentError(name.partition(".")[0], f"{name}: is not known of this motor or machine")
         return run[name].values
 
     def load_inertia(self, run: xr.Dataset) -> Any:
-        """Inertia at the motor's shaft beside the rotor [kg m2], shape (time,); with a driveline that of its even
-        ratio."""
+        """Inertia at the motor's shaft beside the rotor [kg m2], shape (time,); with a driveline, as if its
+        ratio were even."""
         J = run["machine.J"].values / self.gear**2
         return J if self.line is None else (J + self.line.J4) / self.line.ratio**2
 
@@ -165,18 +168,18 @@ class Drive:
 
     @property
     def rods(self) -> tuple[int, int]:
-        """How many rods the wall and the web have, where the organs are chains."""
+        """Numbers of rods of wall and web, where the organs are chains."""
         walls, webs = split((self.machine.p.l1, self.machine.p.l2), int(self.chain.rods))
         return walls, webs
 
     @property
     def outsider(self) -> ForeignMachine | None:
-        """The machine as the shaft behind the line drives it, where it is an FMU of somebody else."""
+        """The machine as the shaft behind the driveline drives it, if it is a foreign FMU; else None."""
         return self.driven if isinstance(self.driven, ForeignMachine) else None
 
     @property
     def outsiders(self) -> list[str]:
-        """Names of the FMUs of somebody else."""
+        """Titles of the foreign FMUs."""
         parts = self.outsider and self.outsider.component, self.foreign
         return [part.title for part in parts if part]
 
@@ -190,7 +193,7 @@ class Drive:
 
     @cached_property
     def simulated(self) -> Machine:
-        """The machine as its FMU is, with chains where it has chains."""
+        """The machine as its FMU has it, with chains where the organs are chains."""
         return self.driven if self.chain is None else machine_of(*self.load_model())
 
     def machine_series(self, run: xr.Dataset) -> dict[str, Any]:
@@ -202,7 +205,7 @@ class Drive:
         }
 
     def organ(self) -> dict[str, float]:
-        """What the model with chains has beside the parameters of the one with two bars."""
+        """The parameters that the model with chains has beside those of the model with two bars."""
         if self.chain is None:
             return {}
         law = Layout(type(self.chain)).by_name(self.chain)
@@ -210,8 +213,8 @@ class Drive:
 
     @cached_property
     def graph(self) -> System:
-        """The system of the models, each before what drives it; with feed-forward also the machine that the control
-        asks, `model`."""
+        """The system of the models, each before the part that drives it. With feed-forward it also has the
+        second machine, `model`, that the control uses."""
         outsider = self.outsider
         between: dict[str, Component] = {}
         if self.gear != 1.0 or (outsider and self.line is not None and not outsider.model.has_gear()):
@@ -227,14 +230,15 @@ class Drive:
         )
         if not self.feed_forward:
             return system
-        # it turns with the motor's shaft, before the driveline
+        # the second machine turns with the motor's shaft, before the driveline
         model = ModelComponent(*self.load_model(self.machine))
         wires = [("motor.phi", "model.phi"), ("motor.w", "model.w"), ("model.tau", "motor.tau_ff")]
         return replace(system, components={**system.components, "model": model}, wires=wires)
 
     @property
     def gear(self) -> float:
-        """Ratio of the gear that is a part of its own before the machine; 1 where the machine has it inside."""
+        """Ratio of the gear that stands before the machine as a separate part; 1 where the machine includes
+        its gear."""
         outsider = self.outsider
         return outsider.ratio if outsider and outsider.needs_gear else 1.0
 
@@ -257,18 +261,19 @@ class Drive:
         return next(bond for bond in self.graph.bonds if bond.machine == "machine")
 
     def crank_torque(self, run: xr.Dataset) -> Any:
-        """Torque at the crank in a run [N m], shape (time,), also of a machine that turns by itself."""
+        """Torque at the crank in a run [N m], shape (time,), also for a machine without its motor."""
         return shaft_torque(run, self._last_bond) * (self.driven.ratio / self.gear)
 
     @property
     def crank_speed(self) -> tuple[str, float]:
-        """Name of the output that turns the machine in a run, and how many times as fast as the crank it is."""
+        """Name of the speed output that turns the machine in a run, and the ratio of that speed to the
+        crank's."""
         bond = self._last_bond
         return f"{bond.driver}.{bond.flanges[0].members['w']}", self.driven.ratio / self.gear
 
     def crank_motion(self, run: xr.Dataset) -> tuple[Any, Any]:
-        """Angle [rad] and speed [rad/s] of the crank in a run, shape (time,), also of a machine that turns by
-        itself."""
+        """Angle [rad] and speed [rad/s] of the crank in a run, shape (time,), also for a machine without its
+        motor."""
         bond, ratio = self._last_bond, self.driven.ratio / self.gear
         given = (f"{bond.driver}.{bond.flanges[0].members[x]}" for x in ("phi", "w"))
         pairs = (("machine.phi0", "machine.w0"), ("machine.phi", "machine.w"), tuple(given))
@@ -281,10 +286,10 @@ class Drive:
         return float(angle[-1] - angle[0]) / (2.0 * math.pi)
 
     def whole_turns(self, run: xr.Dataset, most: float = math.inf) -> xr.Dataset | None:
-        """The run up to the instant at which the crank has made whole turns since the first row, both ends included:
-        as many turns as it makes, at most `most`; None where it makes less than one.
+        """The part of the run from its first row until the crank has made the largest number of whole turns,
+        at most `most`, both ends included; None where it makes less than one turn.
 
-        The last row is interpolated linearly; where the running is periodic it equals the first.
+        The last row is interpolated linearly; in periodic running it equals the first.
         """
         angle, _ = self.crank_motion(run)
         turned = (angle - angle[0]) / (2.0 * math.pi)
@@ -311,21 +316,21 @@ class Drive:
         backend: Backend | None = None,
         report: Callable[[str], None] = lambda what: None,
     ) -> tuple[dict[str, Path], dict[str, Origin]]:
-        """Write the FMUs, with these start values; returns files by component, and how they were made. `report` is
-        called with what is done."""
+        """Write the FMUs, with the start values of the drive. Returns the files by component, and the origin
+        of each FMU. `report` is called with a text on the current task."""
         exported, origins = export(self.graph, folder, backend, report)
         return {name: c.file for name, c in exported.components.items() if c.file}, origins
 
     def export_machine(self, folder: Path, backend: Backend | None = None) -> Path:
-        """Write the machine's FMU alone; the same as `export` writes."""
+        """Write only the machine's FMU, as `export` writes it."""
         model, p = self.load_model()
         file = folder / f"{model.name}.fmu"
         export_fmu(model, file, model.parameter_layout.by_name(p), backend=backend)
         return file
 
     def system(self, files: Mapping[str, Path]) -> System:
-        """The system of FMUs that were made of these models, whatever start values they carry."""
-        # the machine that the control asks is the same FMU as the machine
+        """The system of the FMU `files` of these models; their start values may be different ones."""
+        # the machine in the feed-forward is the same FMU as the machine
         known = {"model": files["machine"], **files}
         components: dict[str, Component] = {
             name: replace(c, file=known[name]) for name, c in self.graph.components.items()
@@ -333,7 +338,8 @@ class Drive:
         return replace(self.graph, components=components)
 
     def reference(self, crank_speed: float, ramp: float | None = None) -> dict[str, Any]:
-        """The signal of the speed reference for this crank speed [rad/s], after a ramp from rest where given [s]."""
+        """The signal of the speed reference for this crank speed [rad/s], after a `ramp` from rest [s] if one
+        is given."""
         if not self.follows:
             return {}
         w = crank_speed * self.ratio
@@ -343,7 +349,7 @@ class Drive:
         return {"motor.w_ref": rise} | ({"model.a": rise.rate} if self.feed_forward else {})
 
     def loads(self, feed: Any) -> dict[str, Any]:
-        """Signals of the loads in normal running: of the machine, and of the one that the control asks."""
+        """Signals of the loads in normal running: of the machine, and of the machine in the feed-forward."""
         named = Layout(type(feed)).by_name(feed)
         model = {f"model.{name}": value for name, value in named.items()} if self.feed_forward else {}
         return {f"machine.{name}": value for name, value in named.items()} | model
@@ -365,30 +371,30 @@ class Drive:
         return np.array(limits)[np.reshape(which, -1)]
 
     def pull_out(self, run: xr.Dataset, T: float) -> float:
-        """Largest torque at the crank [N m] that a load meets which slows the motor down from the mean of a run until
-        it stalls, with the winding at `T` [K]; see `Motor.pull_out`."""
+        """Largest torque at the crank [N m] that the motor gives while a rising load slows it down from the
+        mean state of a run until it stalls, with the winding at `T` [K]; see `Motor.pull_out`."""
         self.needs_own("the pull-out torque")
         return self.motor.pull_out(self.fmu_parameters, T, *self._mean_supply(run)) * self.ratio
 
     def breakdown_speed(self, run: xr.Dataset) -> float:
-        """Speed of the crank [rad/s] below which a load stalls the motor, at the mean supply and temperature of a
-        run; 0 where there is none. See `Motor.breakdown_speed`."""
+        """Speed of the crank [rad/s] below which a load stalls the motor, at the mean supply and temperature
+        of a run; 0 where the motor has no such speed. See `Motor.breakdown_speed`."""
         self.needs_own("the breakdown speed")
         T = float(np.mean(run[f"motor.{self.motor.temperature}"].values))
         return self.motor.breakdown_speed(self.fmu_parameters, T, *self._mean_supply(run)) / self.ratio
 
     def _mean_supply(self, run: xr.Dataset) -> list[float]:
-        """The means of `Motor.limited_by` over a run."""
+        """The means over a run of the variables `Motor.limited_by`."""
         return [float(np.mean(run[f"motor.{name}"].values)) for name in self.motor.limited_by]
 
     @property
     def coasting_model(self) -> type[DirectMachine]:
-        """The machine that turns by itself."""
+        """The model of the machine that turns without its motor."""
         return self.simulated.model.direct()
 
     def coasting(self, folder: Path, backend: Backend | None = None) -> Path | None:
-        """Write the FMU of the machine that turns by itself, and with it what is on its shaft; None where the machine
-        is an FMU of somebody else, of which there is no such model."""
+        """Write the FMU of the machine that turns without its motor, with the inertia on its shaft. None for
+        a machine that is a foreign FMU, as there is no such model of it."""
         if self.outsider:
             return None
         file = folder / f"{self.coasting_model.name}.fmu"
@@ -396,6 +402,6 @@ class Drive:
         return file
 
     def coasting_parameters(self) -> dict[str, float]:
-        """Its parameters by name."""
+        """Parameters of the `coasting_model` by name."""
         added = {} if self.line is None else {"J_added": self.line.J4}
         return self.simulated.by_name | added

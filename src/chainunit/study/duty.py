@@ -1,6 +1,6 @@
 """The duty of any drive of a machine: turns at constant speed, and the inertia that evens the speed.
 
-The turns are by inverse dynamics, of chains by their FMU."""
+The turns are computed by inverse dynamics; chains are run by their FMU."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def rms(*parts: tuple[float, Any]) -> float:
 
 @declaration
 class CycleNumbers:
-    """The torque of a machine over a turn at constant crank speed; at the crank."""
+    """The torque of a machine over a turn at constant crank speed; all values at the crank."""
 
     power_mean: Value = quantity("W", "mean power")
     torque_mean: Value = quantity("N.m", "mean torque, normal feed")
@@ -52,9 +52,10 @@ class CycleNumbers:
 
 @dataclass(frozen=True)
 class Duty:
-    """The duty of any drive, at constant speed of the crank: the turn with the feed of normal running, and of a
-    machine with two sides those with all feed on one side, and which of these asks the larger RMS torque with two
-    bars, as the rocker swings farther to one side than to the other; with chains of many turns."""
+    """The duty of any drive, at constant speed of the crank: the turn with the feed of normal running and,
+    for a machine with two sides, the turns with all feed on one side. `heavier` is the side with the larger
+    RMS torque of two bars; the sides differ, as the rocker swings farther to one of them. With chains each is
+    many turns."""
 
     normal: Cycle
     one_sided: Mapping[SideName, Cycle]
@@ -69,13 +70,13 @@ class Duty:
 
 
 def duty_of(config: Config, folder: Path, backend: Backend | None) -> Duty:
-    """The duty of a study with `sizing`; chains are run by their FMU, which is written to `folder`."""
+    """The duty of a study with `sizing`; chains are run by an FMU that is written to `folder`."""
     feed, w = config.feed, config.run.crank_speed
     loads = {side: all_on_one(side, feed) for side in SIDES if side in config.machine.model.sides}
     normal = cycle(config.machine, w, feed)
     one_sided = {side: cycle(config.machine, w, case) for side, case in loads.items()}
     sizes = [(rms((1.0, turn.crank_torque)), side) for side, turn in one_sided.items()]
-    # of two that ask alike the left one
+    # if both sides are alike it is the left one
     heavier = min(sizes, key=lambda each: -each[0])[1] if sizes else None
     if config.chain is not None:
         drive = Drive(Motor, None, config.machine, chain=config.chain)
@@ -89,8 +90,8 @@ def duty_of(config: Config, folder: Path, backend: Backend | None) -> Duty:
 
 
 def _peak(cycle: Cycle) -> float:
-    """Largest crank torque of a cycle; of many turns of chains the quantile of their peaks, as no single one is a
-    prediction."""
+    """Largest crank torque of a cycle; for the many turns of chains the quantile of their peaks, as no single
+    peak is a prediction."""
     peaks = np.max(np.abs(np.atleast_2d(cycle.crank_torque)), axis=1)
     return float(np.quantile(peaks, HIGH))
 
@@ -98,8 +99,8 @@ def _peak(cycle: Cycle) -> float:
 def cycle_numbers(
     config: Config, normal: Cycle, one_sided: Mapping[SideName, Cycle], heavier: SideName | None
 ) -> CycleNumbers:
-    """Of a duty: with all feed on one side the RMS torque of the heavier, and the larger of both peaks, which may be
-    that of the other side."""
+    """The numbers of a duty. With all feed on one side the RMS torque is that of the heavier side, and the
+    peak the larger of both sides."""
     assert config.sizing is not None
     w, share = config.run.crank_speed, config.sizing.one_sided_share
     inertia = normal.outputs.J * config.machine.ratio**2

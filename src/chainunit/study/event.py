@@ -1,9 +1,10 @@
-"""An event of a study: what happens to a machine that runs steadily, or in its start.
+"""The base class of events: an event happens to a machine in steady running or in its start.
 
-A type of event is a subclass of `Event`; those of the package are in `events`. It declares its quantities, names the
-inputs that it acts on, gives their values over time, and says how long it is followed. A class of that kind anywhere
-is a type that study files may name. Inputs are called as the machine or the motor that has them calls them
-(``left.processing_force``, ``voltage``); a study leaves out an event whose inputs its system does not have.
+A type of event is a subclass of `Event`; the types of the package are in `events`. A type declares its
+quantities, names the inputs that it acts on, gives their values over time, and says how long the machine is
+followed. Every subclass, in whatever module, is a type that study files may name. An input has the name that
+it has in the machine or the motor (``left.processing_force``, ``voltage``); a study leaves out an event whose
+inputs its system does not have.
 """
 
 from __future__ import annotations
@@ -25,18 +26,18 @@ Values: TypeAlias = Mapping[str, float]
 Signals: TypeAlias = dict[str, OverTime]
 """Values of inputs, over time, by name."""
 AnySide: TypeAlias = SideName | Literal[""]
-"""A side, or none."""
+"""A side; empty for none."""
 
 
 class Role(StrEnum):
-    """What an event is to a safety coupling."""
+    """The meaning of an event for a safety coupling."""
 
     DUTY = "duty"
-    """it may last, or comes with every start: a coupling has to carry it"""
+    """the event may last, or comes with every start: a coupling has to carry its torque"""
     SHOCK = "shock"
-    """a coupling is there to open in it"""
+    """the event is one that a coupling should open in"""
     DISTURBANCE = "disturbance"
-    """it passes, and a coupling has to ride it out"""
+    """the event passes by itself: a coupling should stay shut in it"""
 
 
 TYPES: dict[str, type[Event]] = {}
@@ -65,29 +66,31 @@ class Timing:
 
 @dataclass(frozen=True)
 class Event:
-    """An event with its quantities `p`, as the run `name` follows it; `side` is empty where it has none.
+    """An event with its quantities `p`, which is followed by the run `name`; `side` is empty for an event
+    without a side.
 
-    In the texts of a type ``{side}`` stands for that side and ``{other}`` for the one across.
+    In the texts of a type ``{side}`` stands for that side and ``{other}`` for the opposite side.
     """
 
     kind: ClassVar[str] = ""
-    """its type, as a study file names it"""
+    """name of the type in a study file"""
     run: ClassVar[str] = ""
-    """name of the run, where the study file gives none"""
+    """name of the run, if the study file gives none"""
     words: ClassVar[str] = ""
-    """what happens, as in a sentence"""
+    """the event as a clause of a sentence"""
     heading: ClassVar[str] = ""
-    """the same in two or three words"""
+    """the event in two or three words"""
     role: ClassVar[Role]
     sided: ClassVar[bool] = True
     from_rest: ClassVar[bool] = False
-    """whether it is a start, and has its signals from rest on"""
+    """whether the event is a start, with signals from rest on"""
     acts_on: ClassVar[tuple[str, ...]] = ()
-    """inputs that it changes"""
+    """inputs that the event changes"""
     reads: ClassVar[tuple[str, ...]] = ()
-    """outputs whose values at its begin decide its signals, which are numbers then: they jump"""
+    """outputs whose values at the begin of the event set its signals; these are then single numbers, and the
+    inputs jump to them"""
     draws: ClassVar[Mapping[str, tuple[float, float]]] = {}
-    """quantities that random overloads draw, where the study file says nothing: from where to where"""
+    """range of each quantity that random overloads draw, if the study file gives none: from, to"""
     counts: ClassVar[tuple[str, ...]] = ()
     """quantities that are whole numbers"""
     Parameters: ClassVar[type] = Timing
@@ -103,80 +106,84 @@ class Event:
 
     @classmethod
     def on(cls, side: AnySide = "", p: Any = None, name: str = "") -> Event:
-        """The event on that side, its quantities at their defaults where none are given."""
+        """The event on that side, with the quantities `p` or, without them, the default quantities."""
         return cls(name or on_side(cls.run, side), side, cls.Parameters() if p is None else p)
 
     @classmethod
     def inputs(cls, side: AnySide) -> tuple[str, ...]:
-        """Inputs that it changes on that side."""
+        """The inputs that the event changes on that side."""
         return tuple(on_side(name, side) for name in cls.acts_on)
 
     @property
     def _mark(self) -> str:
-        """The name of the run, where the side and the type alone do not tell it from others."""
+        """The name of the run, where side and type alone do not distinguish the event from others; else
+        empty."""
         usual = on_side(self.run, self.side)
         return "" if self.name == usual else self.name.removeprefix(f"{usual}_").replace("_", " ")
 
     @property
     def title(self) -> str:
-        """What happens, as in a sentence."""
+        """The event as a clause of a sentence."""
         return on_side(self.words, self.side) + (f" ({self._mark})" if self._mark else "")
 
     @property
     def short(self) -> str:
-        """The same as a heading of a narrow column."""
+        """The event as the heading of a narrow column."""
         return " ".join(filter(None, (on_side(self.heading, self.side), self._mark)))
 
     @property
     def loaded_side(self) -> AnySide:
-        """The side that has to carry it; none where both do."""
+        """The side that has to carry the load of the event; empty where both have to."""
         return self.side
 
     @property
     def empties(self) -> bool:
-        """Whether an organ carries no material in it."""
+        """Whether an organ carries no material during the event."""
         return False
 
     @property
     def without(self) -> str:
-        """Why a system without its inputs leaves it out, in words."""
+        """The reason, in words, why a system without the inputs of the event leaves the event out."""
         return f"the system has no {' or '.join(self.inputs(self.side))}"
 
     def signals(self, normal: Values, at: float, state: Values) -> Signals:
-        """Values of the inputs that it changes, from its begin `at` [s] on.
+        """Values of the inputs that the event changes, from its begin `at` [s] on.
 
-        `normal` are all inputs in steady running, `state` the outputs that it `reads`, at its begin.
+        `normal` has the values of all inputs in steady running, `state` those of the outputs `reads` at the
+        begin.
         """
         raise NotImplementedError
 
     def follow(self, turn: float) -> float:
-        """Time that is followed from its begin on [s], where a turn of the crank takes `turn` [s]: the turns that are
-        asked for, and a turn after the last change at least."""
-        # a little more than asked, so that a dip in speed does not cost a whole turn
+        """Time for which the machine is followed from the begin of the event on [s]: the requested turns, and
+        at least one turn after the last change. A turn of the crank takes `turn` [s]."""
+        # a little longer than requested, so that a dip in speed does not cost a whole turn
         return float(max((self.p.turns + 0.1) * turn, self.lasts + turn))
 
     @property
     def lasts(self) -> float:
-        """Time from its begin to the last change of its signals [s]."""
+        """Time from the begin of the event to the last change of its signals [s]."""
         signals = self.signals(defaultdict(float), 0.0, defaultdict(float))
         return max([0.0, *corners(signals.values())])
 
     def variants(self) -> tuple[Event, ...]:
-        """The same event with what is assumed in it at the ends of its range; none where nothing is."""
+        """The same event with its assumed quantity at either end of the range; empty for an event without
+        assumptions."""
         return ()
 
     def assumption(self, peaks: Mapping[str, tuple[float, float]]) -> str:
-        """What the variants say of the assumption, from the range of each peak over them [N m], in words."""
+        """A sentence on the effect of the assumption, from the range of each peak over the variants [N m]."""
         return ""
 
 
 def on_side(text: str, side: AnySide) -> str:
-    """The text with that side and the other in their places."""
+    """The text with this side and the opposite side in place of ``{side}`` and ``{other}``."""
     return text.format(side=side, other=other(side)) if side else text
 
 
 def in_groups(events: Mapping[str, Event], names: Collection[str]) -> list[list[str]]:
-    """The events among `names`: what the left side has to carry, the right side, both; without empty groups."""
+    """The events among `names` in groups: those that the left side has to carry, the right side, both;
+    without empty groups."""
     groups = [
         [name for name, event in events.items() if name in names and event.loaded_side == side]
         for side in (*SIDES, "")

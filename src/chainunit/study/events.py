@@ -34,7 +34,7 @@ class Jam(Event):
 
     @declaration
     class Parameters(Timing):
-        """Of a lump."""
+        """Quantities of a lump."""
 
         force: Value = quantity("N", "processing force of the lump", default=2000.0, min=0.0)
         duration: Value = quantity(
@@ -50,7 +50,7 @@ class Jam(Event):
         )
 
     def signals(self, normal: Values, at: float, state: Values) -> Signals:
-        """The force on the web, on top of that of normal running."""
+        """The force on the web, added to that of normal running."""
         (name,), p = self.inputs(self.side), self.p
         return {name: _pulses(normal[name], p.force, self._begins(at), p.rise, p.duration)}
 
@@ -67,7 +67,7 @@ class Lumps(Jam):
 
     @declaration
     class Parameters(Jam.Parameters):
-        """Of the lumps, all alike."""
+        """Quantities of the lumps, which are all alike."""
 
         number: Value = quantity("1", "number of lumps", default=4.0, min=1.0, max=1000.0)
         pause: Value = quantity(
@@ -118,20 +118,20 @@ class Empties(Event):
 
     @declaration
     class Parameters(Timing, FeedShift):
-        """Of the side that empties."""
+        """Quantities of the side that empties."""
 
     @property
     def loaded_side(self) -> AnySide:
-        """The one across."""
+        """The opposite side."""
         return other(self.side) if self.side else ""
 
     @property
     def empties(self) -> bool:
-        """The side that it is named after."""
+        """True: the side of the event carries no material."""
         return True
 
     def signals(self, normal: Values, at: float, state: Values) -> Signals:
-        """Its material and processing force go away."""
+        """The material and the processing force of the side fall to zero."""
         return {name: Profile(normal[name], ((at, self.p.shift, 0.0),)) for name in self.inputs(self.side)}
 
 
@@ -145,15 +145,15 @@ class OneSidedFeed(Event):
 
     @declaration
     class Parameters(Timing, FeedShift, FeedShare):
-        """Of the feed that moves."""
+        """Quantities of the feed that moves."""
 
     @property
     def empties(self) -> bool:
-        """The other side, where all its feed moves."""
+        """Whether all feed of the opposite side moves, so that the opposite side is empty."""
         return bool(self.p.share == 1.0)
 
     def ends(self, normal: Mapping[str, float]) -> dict[str, float]:
-        """What each side carries in the end."""
+        """The inputs of both sides after the feed has moved."""
         ends, share = {}, self.p.share
         for load in _LOADS:
             here, there = (on_side(f"{{{side}}}.{load}", self.side) for side in ("side", "other"))
@@ -177,7 +177,8 @@ class LoadedStart(OneSidedFeed):
 
     @declaration
     class Parameters(FeedShare):
-        """Of the feed in the start; it begins at rest and is followed as long as the start-up."""
+        """Quantities of the feed in the start. The start begins at rest and is followed as long as the
+        start-up."""
 
     def signals(self, normal: Values, at: float, state: Values) -> Signals:
         """The feed on one side from rest on."""
@@ -199,7 +200,7 @@ class Blocked(Event):
 
     @declaration
     class Parameters(Timing):
-        """Of the stop."""
+        """Quantities of the stop."""
 
         stiffness: Value = quantity(
             "N.m/rad", "stiffness of the stop that blocks the rocker", default=2e5, above=0.0, max=1e9
@@ -209,7 +210,7 @@ class Blocked(Event):
         )
 
     def signals(self, normal: Values, at: float, state: Values) -> Signals:
-        """The stop where the rocker stands."""
+        """The stop, at the angle at which the rocker stands."""
         return {
             "stop.stiffness": self.p.stiffness,
             "stop.damping": self.p.damping,
@@ -217,7 +218,8 @@ class Blocked(Event):
         }
 
     def variants(self) -> tuple[Event, ...]:
-        """Stops over a decade of stiffness, the damping with its root, as in a swing of the same damping ratio."""
+        """Stops over a decade of stiffness. The damping is proportional to the root of the stiffness, so that
+        the damping ratio stays the same."""
         p = self.p
         return tuple(
             replace(self, p=replace(p, stiffness=factor * p.stiffness, damping=math.sqrt(factor) * p.damping))
@@ -225,7 +227,8 @@ class Blocked(Event):
         )
 
     def assumption(self, peaks: Mapping[str, tuple[float, float]]) -> str:
-        """Whether the stiffness decides the peak of the crank torque, and where one takes it from."""
+        """A sentence on how much the stiffness changes the peak of the crank torque, and on how to estimate
+        the stiffness."""
         low, high = peaks["crank_torque"]
         decides = "but hardly change the peak here" if high < _FLAT * low else "and decide the peak"
         soft, stiff = (number(variant.p.stiffness, "N.m/rad", "assumed") for variant in self.variants())
@@ -238,7 +241,7 @@ class Blocked(Event):
 
 
 _FLAT = 1.05
-"""Largest over least of the peaks over a decade of stiffness up to which the stop is said to matter little."""
+"""Ratio of the largest to the least peak over a decade of stiffness, up to which the stop hardly matters."""
 
 
 class Dip(Event):
@@ -251,7 +254,7 @@ class Dip(Event):
 
     @declaration
     class Parameters(Timing):
-        """Of the dip."""
+        """Quantities of the dip."""
 
         depth: Value = quantity(
             "1", "share of the voltage that the dip takes away", default=0.5, min=0.0, max=1.0
@@ -262,7 +265,7 @@ class Dip(Event):
 
     @property
     def without(self) -> str:
-        """A DC motor has a supply of its own."""
+        """See `Event`: a DC motor has its own supply."""
         return "this motor's drive has no line voltage of its own"
 
     def signals(self, normal: Values, at: float, state: Values) -> Signals:
@@ -274,7 +277,7 @@ class Dip(Event):
 
 
 class HardCut(Event):
-    """The blade meets a harder stack, or something in it that hardly gives way."""
+    """The blade meets a harder stack, or a hard object in it."""
 
     kind, run = "cut", "hard_cut"
     words, heading = "the blade meets a hard stack", "hard cut"
@@ -284,7 +287,7 @@ class HardCut(Event):
 
     @declaration
     class Parameters(Timing):
-        """Of the stack."""
+        """Quantities of the hard stack."""
 
         force: Value = quantity("N", "resistance of the hard stack to the blade", default=6e4, min=0.0)
         duration: Value = quantity(
@@ -292,7 +295,7 @@ class HardCut(Event):
         )
 
     def signals(self, normal: Values, at: float, state: Values) -> Signals:
-        """The resistance of the hard stack in place of the usual one; it changes within 10 ms."""
+        """The resistance of the hard stack in place of the usual resistance; it changes within 10 ms."""
         edge, usual = 1e-2, normal["cut_force"]
         changes = ((at, edge, self.p.force), (at + self.p.duration, edge, usual))
         return {"cut_force": Profile(usual, changes)}
@@ -309,7 +312,7 @@ class Overload(Event):
 
     @declaration
     class Parameters(Timing):
-        """Of the load."""
+        """Quantities of the load."""
 
         torque: Value = quantity(
             "N.m", "torque of the material beside that of normal running", default=500.0, min=0.0
@@ -322,6 +325,6 @@ class Overload(Event):
         )
 
     def signals(self, normal: Values, at: float, state: Values) -> Signals:
-        """The torque of the material, on top of that of normal running."""
+        """The torque of the material, added to that of normal running."""
         p = self.p
         return {"load": _pulses(normal["load"], p.torque, [at], p.rise, p.duration)}

@@ -1,4 +1,5 @@
-"""Flywheels of a drive whose load comes and goes: their runs, and the least one that keeps the speed even enough."""
+"""Flywheels of a drive with a varying load: their runs, and the least flywheel that keeps the permitted
+fluctuation."""
 
 from __future__ import annotations
 
@@ -30,17 +31,18 @@ from .wheel import FlywheelAnswers, Wheel
 from .window import Phase, Window, whole_turns
 
 CLOSE = 0.03
-"""Relative width below the permitted fluctuation in which that of the least flywheel lies."""
+"""The fluctuation with the least flywheel lies below the permitted one by at most this share of it."""
 _TRIALS = 8
 _WORSE = 1.1
-"""Times the fluctuation with a lighter flywheel from which on a heavier one is said to be worse."""
+"""Ratio of the fluctuation with a heavier flywheel to that with a lighter one, from which on the heavier one
+is called worse."""
 
 
 @dataclass
 class FlywheelFindings(Findings):
-    """The flywheels by their inertia, the least that keeps the `permitted` fluctuation where one was found, and what
-    the hand formula takes: the `swing` of the energy in a turn [J], the speed of the motor [rad/s], and all inertia
-    on its shaft but for a flywheel (`bare`) [kg m2]."""
+    """The flywheels by their inertia, the `least` one that keeps the `permitted` fluctuation, if there is
+    one, and the inputs of the hand formula: the `swing` of the energy in a turn [J], the speed of the motor
+    [rad/s], and the inertia on its shaft without a flywheel (`bare`) [kg m2]."""
 
     own: float
     """flywheel of the study [kg m2]"""
@@ -49,19 +51,19 @@ class FlywheelFindings(Findings):
     speed: float
     bare: float
     mean_torque: float
-    """of the machine at the motor's shaft, at constant speed [N m]"""
+    """mean torque of the machine at the motor's shaft, at constant speed [N m]"""
     wheels: list[Wheel] = field(default_factory=list)
     least: Wheel | None = None
     searched: bool = False
     retuned: bool = False
-    """whether gains of the speed control differ, as they are tuned to the inertia with each flywheel"""
+    """whether the gains of the speed control differ, as they are tuned to the inertia with each flywheel"""
 
     def by_hand(self, flywheel: float) -> float:
         """Fluctuation with that flywheel [kg m2] where the drive gives a constant torque."""
         return self.swing / ((self.bare + flywheel) * self.speed * self.speed)
 
     def permits(self, wheel: Wheel) -> bool:
-        """Whether a flywheel keeps the fluctuation and passes no other limit."""
+        """Whether a flywheel keeps the permitted fluctuation and exceeds no other limit."""
         return wheel.keeps(self.permitted) and not wheel.passed
 
     @property
@@ -71,7 +73,7 @@ class FlywheelFindings(Findings):
 
     @property
     def rows(self) -> list[tuple[str, Wheel, str]]:
-        """By inertia: in words what each flywheel is, its run, and its place in the result."""
+        """For each flywheel, by inertia: its description, its run, and its place in the result."""
         runs = [(wheel, f"flywheels.compared.{i}") for i, wheel in enumerate(self.wheels)]
         if self.least is not None and self.least not in self.wheels:
             runs.append((self.least, "flywheels.least"))
@@ -94,7 +96,7 @@ class FlywheelFindings(Findings):
         }
 
     def remark(self, study: StudyRecord) -> None:
-        """What an engineer should change, and what the least flywheel does."""
+        """Add the troubles with their remedies, and a note on the least flywheel."""
         _on_wheels(self, study)
         _on_fluctuation(self, study)
         if not study.drive.follows:
@@ -105,24 +107,24 @@ class FlywheelFindings(Findings):
 
 
 class FlywheelAnalysis(Analysis):
-    """The flywheels of the table [flywheel]; each has the run of the study, with gains tuned to its inertia."""
+    """The flywheels of the table [flywheel]. Each is run as the study is, with gains tuned to its inertia."""
 
     name = "flywheels"
     needs_runs = True
 
     @staticmethod
     def applies(config: Config, drive: Drive) -> bool:
-        """Whether flywheels are asked for, and the motor is of this package."""
+        """Whether the study asks for flywheels, and the motor is one of this package."""
         return config.flywheel is not None and drive.foreign is None
 
     @staticmethod
     def find(study: StudyRecord, rig: Rig, report: Report) -> FlywheelFindings:
-        """Run them.
+        """Run the flywheels.
 
         Raises
         ------
         RunError
-            where a run fails; what was found before is in the study.
+            where a run fails; the earlier results are in the study.
         """
         config, table, drive = study.config, study.config.flywheel, study.drive
         assert table is not None
@@ -151,7 +153,7 @@ class FlywheelAnalysis(Analysis):
 
 
 def _own(study: StudyRecord, found: FlywheelFindings) -> Wheel:
-    """The flywheel of the study, whose run has been made."""
+    """The flywheel of the study, from the run that the study has."""
     assert study.start is not None
     residual = worst_residual(study.certificate["start_up"])
     return _wheel(study, found, found.own, study.answers[STEADY], study.start, study.steady, residual)
@@ -184,7 +186,7 @@ def _wheel(
     turns: xr.Dataset,
     residual: float,
 ) -> Wheel:
-    """A flywheel with its answers; a machine that stands or creeps has none in steady running."""
+    """A flywheel with its answers; a machine that stands or creeps has no answers of steady running."""
     turning = steady.speed_mean > CREEPS * study.config.run.crank_speed
     drive, motor_ripple = study.drive, None
     if drive.line is not None and turning:
@@ -193,7 +195,7 @@ def _wheel(
         "flywheel": flywheel,
         "inertia": found.bare + flywheel,
         "start_time": start.start_time,
-        # a ripple of more than 2 is none: the formula does not hold there
+        # the formula does not hold for a ripple of more than 2
         "by_hand": by_hand if (by_hand := found.by_hand(flywheel)) < 2.0 else None,
         "motor_ripple": motor_ripple,
         "residual": residual,
@@ -212,18 +214,18 @@ def least_flywheel(
 ) -> Wheel | None:
     """The least flywheel that keeps the `permitted` fluctuation, to `CLOSE` of the fluctuation.
 
-    None where none of the `wheels` does, in order of their inertia, nor that of the hand formula, nor one a fifth
-    heavier than the heaviest. The fluctuation falls with the inertia, and between two flywheels nearly as a power of
-    it.
+    The `wheels` are in order of their inertia. The result is None where none of them keeps it, nor the
+    flywheel of the hand formula, nor one that is a fifth heavier than the heaviest. The fluctuation falls
+    with the inertia; between two flywheels it is nearly a power of the inertia.
 
     Parameters
     ----------
     bare : inertia on the motor shaft without a flywheel [kg m2]
     by_hand : flywheel by the hand formula [kg m2]
-    run : the run with a flywheel [kg m2]
+    run : makes the run with a flywheel of that inertia [kg m2]
     """
     above = next((wheel for wheel in wheels if wheel.keeps(permitted)), None)
-    # a flywheel with which the motor does not start is not too light
+    # a flywheel with which the motor does not start is no lower end of the search
     starting = [wheel for wheel in wheels if wheel.answers.start_time is not None]
     below = next((w for w in reversed(starting) if above is None or w.flywheel < above.flywheel), None)
     if below is None:
@@ -259,8 +261,8 @@ def least_flywheel(
 
 @dataclass(frozen=True)
 class Trouble:
-    """What may go wrong with flywheels: which have it, the answer that shows it, and the limit of the motor that is
-    passed where it is one, of which the study warns with its own flywheel."""
+    """A kind of trouble with flywheels: the test for it, the answer that shows it, and the limit of the motor
+    that is exceeded, if it is one; of such a limit the study itself warns for its own flywheel."""
 
     kind: str
     has: Callable[[Wheel], bool]
@@ -279,7 +281,7 @@ class Trouble:
         if not self.number:
             return size
         value, *unit = self.amount(wheel)
-        # a winding whose loss grows faster than its cooling comes to no temperature
+        # a winding whose loss grows faster than its cooling reaches no final temperature
         return f"{size} ({'without end' if value == math.inf else number(value, *unit)})"
 
 
@@ -331,7 +333,8 @@ _TROUBLES = (
 
 
 def _on_wheels(found: FlywheelFindings, study: StudyRecord) -> None:
-    """A warning for each kind of trouble, with all flywheels that have it; the study warns of its own."""
+    """A warning for each kind of trouble, with all flywheels that have it; the study itself warns for its own
+    flywheel."""
     plate = study.config.plate
     too_small = plate is not None and found.mean_torque > plate.nameplate.torque
     remedy = "a larger motor" if too_small else "a larger motor or flywheel"
@@ -359,7 +362,7 @@ def _on_wheels(found: FlywheelFindings, study: StudyRecord) -> None:
 
 
 def _limit(wheel: Wheel, name: str, study: StudyRecord) -> str:
-    """A limit of the motor, in words; that of its winding as a temperature, not as a rise."""
+    """A limit of the motor, in words; the limit of the winding is a temperature, not a rise."""
     if name == "temperature":
         return number(study.config.permitted_temperature[1], "K", full=False)
     check = wheel.checks.get(name)
@@ -367,7 +370,7 @@ def _limit(wheel: Wheel, name: str, study: StudyRecord) -> str:
 
 
 def _on_fluctuation(found: FlywheelFindings, study: StudyRecord) -> None:
-    """Whether the flywheel of the study keeps the fluctuation, and the least that does."""
+    """Warn where the flywheel of the study, or every flywheel, does not keep the permitted fluctuation."""
     permitted = number(found.permitted, "1", "percent")
     own = next((wheel for wheel in found.wheels if wheel.flywheel == found.own), None)
     if (
@@ -383,7 +386,7 @@ def _on_fluctuation(found: FlywheelFindings, study: StudyRecord) -> None:
             flywheel=(own.flywheel, "kg.m2"),
             permitted=(found.permitted, "1", "percent"),
         )
-    # a flywheel without a run is not judged
+    # flywheels without a run are not judged
     if found.searched and not any(wheel.keeps(found.permitted) for wheel in found.wheels):
         more = "." if found.least is not None else ", nor does a larger one that was tried."
         study.warn(
@@ -396,7 +399,8 @@ def _on_fluctuation(found: FlywheelFindings, study: StudyRecord) -> None:
 
 
 def _on_line(found: FlywheelFindings, study: StudyRecord) -> None:
-    """That the ripple is made behind the flywheel, where the motor runs even enough and the crank does not."""
+    """Warn where the motor runs evenly enough and the crank does not: the ripple is made behind the
+    flywheel."""
     ripples = [(wheel, wheel.answers.motor_ripple) for wheel in found.wheels]
     even = [wheel for wheel, ripple in ripples if ripple is not None and ripple <= found.permitted]
     if not even:
@@ -415,7 +419,7 @@ def _on_line(found: FlywheelFindings, study: StudyRecord) -> None:
 
 
 def _on_heavier(found: FlywheelFindings, study: StudyRecord) -> None:
-    """The flywheels that keep the speed less even than a lighter one."""
+    """Warn of flywheels with which the speed fluctuates more than with a lighter one."""
     running = [wheel for wheel in found.wheels if wheel.answers.speed_ripple is not None]
     amounts: dict[str, Amount] = {
         f"{heavier.flywheel:g}.speed_ripple": (heavier.answers.speed_ripple, "1", "percent")
@@ -430,7 +434,8 @@ def _on_heavier(found: FlywheelFindings, study: StudyRecord) -> None:
 
 
 def _on_least(found: FlywheelFindings, least: Wheel, study: StudyRecord) -> None:
-    """The least flywheel that keeps the fluctuation; it is no recommendation where another limit stays passed."""
+    """Note the least flywheel that keeps the fluctuation; it is not recommended if another limit is still
+    exceeded."""
     a, by_hand, close = least.answers, found.flywheel_by_hand, number(CLOSE, "1", "percent", full=False)
     text = (
         "A fluctuation of {permitted} takes a flywheel of {flywheel} at least (the search ends within "

@@ -1,4 +1,4 @@
-"""A machine of somebody else in a study: an FMU, declared by its own variables."""
+"""A foreign machine in a study: an FMU of somebody else, declared by its own variables."""
 
 from __future__ import annotations
 
@@ -22,10 +22,11 @@ _GEAR = Connector("ratio", "parameter", "1", {}, 1.0, "gear ratio, motor turns p
 
 
 class ForeignModel(MachineModel):
-    """What a study knows of the machine in an FMU: its parameters, and as `Feed` its inputs beside its shaft.
+    """The model of a machine that is a foreign FMU: its parameters, and as `Feed` its inputs other than the
+    shaft.
 
-    A machine whose FMU has a parameter `ratio` has the gear inside and shows the motor's shaft; else its shaft is the
-    crank, and a gear stands before it where it is needed.
+    An FMU with a parameter `ratio` includes the gear, and its shaft is the motor's. Otherwise its shaft is
+    the crank, and a gear stands before it where one is needed.
     """
 
     component: ClassVar[FmuComponent]
@@ -34,12 +35,12 @@ class ForeignModel(MachineModel):
 
     @classmethod
     def has_gear(cls) -> bool:
-        """Whether the gear is inside."""
+        """Whether the FMU includes the gear."""
         return "ratio" in cls.component.connectors
 
 
 def foreign_model(file: Path, names: Mapping[str, str]) -> type[ForeignModel]:
-    """The machine in an FMU; `names` are of ours those that it calls otherwise.
+    """The machine in an FMU; `names` gives the FMU's names by ours, where they differ.
 
     Raises
     ------
@@ -66,7 +67,8 @@ def foreign_model(file: Path, names: Mapping[str, str]) -> type[ForeignModel]:
 
 
 def _declared(title: str, connectors: Iterable[Connector]) -> type:
-    """The declaration of variables; those with dots stand in groups. One whose name no table can have is left out."""
+    """The declaration of variables; those with dots in their names are in groups. A variable is left out if
+    no table of a file can have its name."""
     groups: dict[str, list[Connector]] = {}
     for c in connectors:
         head, _, rest = c.name.partition(".")
@@ -86,7 +88,7 @@ def _declared(title: str, connectors: Iterable[Connector]) -> type:
 
 
 def _quantity(c: Connector) -> Any:
-    """The declaration of one variable; a unit that is not known here is told in the description."""
+    """The declaration of one variable; an unknown unit is given in the description."""
     try:
         base_units(c.unit or "1")
         unit, words = c.unit or "1", c.description
@@ -96,13 +98,13 @@ def _quantity(c: Connector) -> Any:
 
 
 class ForeignMachine(Machine):
-    """A machine that is an FMU of somebody else, with its parameters: it has no bearings and no direct model."""
+    """A machine that is a foreign FMU, with its parameters. It has no bearings and no direct model."""
 
     model: Any
 
     @property
     def needs_gear(self) -> bool:
-        """Whether a gear has to stand before it."""
+        """Whether a gear has to stand before the machine."""
         return self.ratio != 1.0 and not self.model.has_gear()
 
     @property
@@ -113,8 +115,9 @@ class ForeignMachine(Machine):
         return replace(own, start={name: x for name, x in self.by_name.items() if name in known})
 
     def outputs(self, phi: Any, w: Any = 0.0, a: Any = 0.0, feed: Any = None) -> Any:
-        """See `Machine`: torque `tau` and inertia `J` at the motor, by the FMU alone, which turns at the constant
-        speed `w` from `phi` back by a turn of the crank to the angles `phi`, which rise evenly, shape (n,)."""
+        """See `Machine`: torque `tau` [N m] and inertia `J` [kg m2] at the motor. The FMU alone is run at the
+        constant speed `w` [rad/s]. The run begins a turn of the crank before the angles `phi` [rad], which
+        rise evenly, shape (n,)."""
         gear = self.ratio if self.needs_gear else 1.0
         first, w, turn = float(phi[0]) / gear, float(w) / gear, 2.0 * math.pi * self.ratio / float(w)
         times = (np.asarray(phi) - phi[0]) / (w * gear)

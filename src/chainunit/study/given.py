@@ -1,4 +1,4 @@
-"""What a study was given, section by section as in a study file: only what the study uses."""
+"""The given values of a study, by the sections of a study file: only those that the study uses."""
 
 from __future__ import annotations
 
@@ -17,22 +17,23 @@ from .sections import CHOICES, SECTIONS, SystemTable
 
 @dataclass(frozen=True)
 class GivenSection:
-    """A table of the file, or with "" for a name what stands before all tables."""
+    """A table of the file; the one with an empty name holds the keys before all tables."""
 
     name: str
     title: str
     values: Any = None
-    """declared quantities, None where there are none"""
+    """an instance of the declared quantities, or None"""
     choices: Mapping[str, Any] = field(default_factory=dict)
     """words, switches and lists, by key"""
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    """of the quantities that are drawn at random"""
+    """ranges of the quantities that are drawn at random"""
     unused: frozenset[str] = frozenset()
-    """quantities that something else stands in for"""
+    """quantities in whose place the study uses something else"""
 
     @property
     def place(self) -> str:
-        """Where it stands in the result; apart where the result has other things of the same names there."""
+        """Its place in the result; it is under `asked` where the result has other things of the same
+        names."""
         table, _, inner = self.name.partition(".")
         if table not in SECTIONS or not SECTIONS[table].apart:
             return self.name
@@ -40,7 +41,7 @@ class GivenSection:
 
     @property
     def names(self) -> list[str]:
-        """Names of all in it, as in a study file."""
+        """Full names of all its values, as in a study file."""
         prefix = f"{self.name}." if self.name else ""
         quantities = [v.name for v in variables(type(self.values))] if self.values is not None else []
         used = [name for name in quantities if name not in self.unused]
@@ -61,7 +62,7 @@ def _choice(value: Any) -> Any:
 
 
 def given(study: StudyRecord) -> list[GivenSection]:
-    """All that a study was given, from which it can be repeated."""
+    """All given values of a study; with them the study can be repeated."""
     config = study.config
     sections = [
         GivenSection("", "Study", None, _of_study(config)),
@@ -90,7 +91,7 @@ def _of_study(config: Config) -> dict[str, Any]:
 
 
 def _system(config: Config) -> dict[str, Any]:
-    """Names of machine and motor, and what their FMUs call our variables."""
+    """Names of machine and motor, and the names of our variables in their FMUs."""
     own = {
         name.removeprefix("system."): x for name, x in config.choices.items() if name.startswith("system.")
     }
@@ -106,7 +107,7 @@ def _tables(study: StudyRecord) -> Iterator[GivenSection]:
         prefix = f"{name}."
         keys = {full.removeprefix(prefix): x for full, x in config.choices.items() if full.startswith(prefix)}
         event = keys.pop("event", None)
-        # without a ratio of its own the gear has that of the machine, which follows from the motor's speed
+        # without its own ratio the gear has that of the machine, which follows from the motor's speed
         follows = frozenset({"ratio"} if name == "gear" and "gear.ratio" not in config.given else ())
         chosen = {key: x for key, x in keys.items() if x}
         yield GivenSection(name, section.title, values, chosen, unused=follows)
@@ -120,7 +121,7 @@ def _tables(study: StudyRecord) -> Iterator[GivenSection]:
 
 
 def description(name: str) -> str:
-    """What a key that is no quantity says, by its name in a study file."""
+    """The description of a key that is no quantity, by its name in a study file."""
     table, _, key = name.partition(".")
     if name in CHOICES:
         return str(CHOICES[name][1].description)

@@ -1,4 +1,4 @@
-"""Whether the model and the motor do what is asked of them, from the numbers of the runs."""
+"""The verdicts on the model and on the motor, from the numbers of the runs."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .verdict import RESIDUAL, STEADY, Holds, Verdict
 
 
 def model_verdict(study: StudyRecord) -> Verdict:
-    """Whether the model of the machine holds, from the numbers of the runs."""
+    """The verdict on the model of the machine, from the numbers of the runs."""
     config, organs, answers = study.config, study.findings.get(OrganAnalysis.name), study.answers
     steady = answers.get(STEADY)
     mean = steady.speed_mean if steady else config.run.crank_speed
@@ -57,7 +57,7 @@ def model_verdict(study: StudyRecord) -> Verdict:
 
 
 def _residuals(study: StudyRecord) -> dict[str, float]:
-    """By run, the largest energy residual over the energy moved; the start-up and steady running are one."""
+    """By run, the largest energy residual over the energy moved; start-up and steady running are one run."""
     return {
         STEADY if name == verdict.START else name: worst_residual(shares)
         for name, shares in study.certificate.items()
@@ -65,8 +65,8 @@ def _residuals(study: StudyRecord) -> dict[str, float]:
 
 
 def motor_limits(study: StudyRecord) -> dict[str, Check]:
-    """What the motor does in its start and in steady running beside its limits, by name; of a motor that sizing chose
-    the temperature alone, as its starts and its duty are among the checks of sizing."""
+    """The values of the motor in its start and in steady running beside its limits, by name. For a motor that
+    sizing chose only the temperature is checked here, as sizing checks its starts and its duty."""
     steady, start = study.answers.get(STEADY), study.start
     if steady is None or start is None:
         return {}
@@ -80,29 +80,30 @@ _PASSED = {
     "current": "its RMS current in steady running passes the rated one",
     "start": "its start takes too long",
 }
-"""What it means that a limit of the motor is passed."""
+"""By limit of the motor, the words that say that it is exceeded."""
 
 AMPLE = 0.02
-"""Reserve of torque from which on the motor counts as strong enough: with less it stands at its limit."""
+"""Reserve of torque from which on the motor counts as strong enough; with less it is at its limit."""
 
 
 def no_reserve(run: str, reserve: float) -> str:
-    """How far the motor's torque in a run passes what it gives for long, of a `reserve` below 0."""
+    """Words on how far the motor's torque in a run exceeds its lasting torque, where the `reserve` is below
+    0."""
     over = number(-reserve, "1", "percent") + (" or more" if reserve <= -1.0 else "")
     when = "in each turn" if run == STEADY else "for a moment"
     return f"no reserve of torque: {when} it passes the largest torque of a steady state by {over}"
 
 
 def motor_verdict(study: StudyRecord) -> dict[str, Any] | None:
-    """Whether the motor reaches the speed and stays cool ("false" where not), and its least reserve of torque with
-    the run of it ("in part" where none is left or known, another limit is passed, or sizing found it insufficient),
-    ready for JSON; None without steady running. Runs whose energy balance is not kept say nothing of the motor: they
-    are left out."""
+    """The verdict on the motor, ready for JSON; None without steady running. It is "false" where the motor
+    does not reach the speed or becomes too hot. It is "in part" where no reserve of torque is left or known,
+    another limit is exceeded, or sizing found the motor insufficient. The least reserve is given with its
+    run. Runs whose energy balance is not kept are left out, as they say nothing about the motor."""
     steady, asked = study.answers.get(STEADY), study.config.run.crank_speed
     if steady is None:
         return None
     residuals, kept = _residuals(study), reaches(steady.speed_mean, asked)
-    # NaN, too, is no balance
+    # a balance of NaN is not kept either
     left_out = [name for name in study.answers if not residuals.get(name, 0.0) < RESIDUAL]
     reserves = {
         name: a.torque_reserve

@@ -1,4 +1,4 @@
-"""The limits of a motor: sizing checks its candidates by them, and a study the motor that it was given."""
+"""The limits of a motor: sizing checks its candidates by them, and a study checks a given motor."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from .drive import Drive
 from .window import BURNT
 
 SPEED_DEVIATION = 0.03
-"""Of the crank's mean speed from the one that is asked for, in parts of it, up to which a drive keeps that."""
+"""Relative deviation of the crank's mean speed from the requested one, up to which a drive keeps the
+speed."""
 
 
 @dataclass(frozen=True)
@@ -28,20 +29,20 @@ class Check:
 
     @property
     def utilisation(self) -> float | None:
-        """value/limit; None where there is no value: the candidate does not get that far. Where nothing is permitted,
-        any value passes it without end."""
+        """value/limit; None where the candidate does not get so far that there is a value. It is infinite for
+        any value where nothing is permitted."""
         if self.value is None:
             return None
         return self.value / self.limit if self.limit > 0.0 else math.inf
 
     @property
     def over(self) -> bool:
-        """Whether a value is known, and passes the limit."""
+        """Whether the value is known and exceeds the limit."""
         return self.utilisation is not None and self.utilisation > 1.0
 
     @property
     def passed(self) -> str:
-        """A limit that is passed, in words."""
+        """Words on a limit that is exceeded."""
         value, limit = (number(x, self.unit, self.kind, full=False) for x in (self.value, self.limit))
         used = number(self.utilisation, "1", "used")
         return f"{self.title} {value}, {used}{' of' if used.endswith('%') else ''} the permitted {limit}"
@@ -57,14 +58,15 @@ class Check:
 
 
 def heating(temperature: float, ambient: float, permitted: float) -> Check:
-    """The rise of a winding that comes to rest at `temperature` over the `ambient`, beside the permitted one [K]."""
+    """The rise of a winding from the `ambient` to its final `temperature`, beside the `permitted`
+    temperature's rise [K]."""
     hot = min(BURNT, temperature)
     return Check("rise of temperature", hot - ambient, permitted - ambient, "K", "difference")
 
 
 def starting(time: float | None, plate: Nameplate) -> Check:
-    """The time of a start on the line [s], beside that for which the rotor of a warm motor may be locked: as long as
-    it speeds up, it takes about the locked-rotor current."""
+    """The time of a start on the line [s], beside the permitted locked-rotor time of a warm motor: while the
+    motor speeds up, it takes about the locked-rotor current."""
     return Check("time to start", time, plate.locked_time, "s")
 
 
@@ -74,12 +76,13 @@ def lasting_current(rms: float, plate: Nameplate) -> Check:
 
 
 def keeping_speed(speed: float, asked: float) -> Check:
-    """How far the mean speed of the crank, or of the motor at its ratio, is from the one `asked` [rad/s]."""
+    """The deviation of the mean speed of the crank from the `requested` one [rad/s]; both may be motor speeds
+    as well."""
     return Check("deviation of the crank speed", abs(speed / asked - 1.0), SPEED_DEVIATION, "1", "percent")
 
 
 def reaches(speed: float, asked: float) -> bool:
-    """Whether the crank runs at the speed that is asked of it."""
+    """Whether the crank runs at the `requested` speed [rad/s]."""
     check = keeping_speed(speed, asked)
     return check.utilisation is not None and check.utilisation <= 1.0
 
@@ -87,14 +90,14 @@ def reaches(speed: float, asked: float) -> bool:
 def given_motor(
     config: Config, drive: Drive, temperature: float | None, current: float | None, start: float | None
 ) -> dict[str, Check]:
-    """The limits of the motor that a study gives, by name; none of a motor of somebody else, and of one without a
-    nameplate that of the winding alone.
+    """The limits of the motor that a study gives, by name. A foreign motor has none; a motor without a
+    nameplate has only that of the winding.
 
     Parameters
     ----------
-    temperature : at which the winding comes to rest if steady running goes on for ever [K]
-    current : RMS of steady running [A]
-    start : time of the start [s]; one by an inverter has no limit
+    temperature : final temperature of the winding if steady running goes on for ever [K]
+    current : RMS current of steady running [A]
+    start : time of the start [s]; a start by an inverter has no limit
     """
     if drive.foreign is not None:
         return {}

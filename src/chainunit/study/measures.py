@@ -1,4 +1,4 @@
-"""What is read from a run: each measure is declared once, with the function that reads it from a `Window`."""
+"""The measures of a run: each is declared once, with the function that reads it from a `Window`."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ from .stored import stored_shares
 from .window import Phase, Window, drift, end_gap
 
 CREEPS = 0.5
-"""Share of the speed that is asked for below which a machine is said to stand."""
+"""Share of the requested speed below which a machine counts as standing."""
 STARTED = 0.95
-"""Share of the speed at which a start is over, see `time_to_start`."""
+"""Share of the speed at which a start ends, see `time_to_start`."""
 
 _ALL = frozenset(Phase)
 _RUNNING = _ALL - {Phase.START_UP, Phase.SETTLING}
 _STEADY = frozenset({Phase.STEADY})
 _EVENTS = frozenset({Phase.EVENT, Phase.LOADED_START})
-# a start begins at rest, and its motor gives for a moment more than it ever does in running
+# a start begins at rest, and for a moment its motor gives more torque than it ever does in running
 _AT_SPEED = frozenset({Phase.STEADY, Phase.EVENT})
 
 
 def torque_reserve(limit: Any, torque: Any) -> float:
-    """Least part of the largest torque that a motor can give which is left over in a run: (limit - |torque|)/limit at
-    the instant at which that is least; both of the motor [N m], shape (time,).
+    """Least reserve of torque in a run: the minimum over time of (limit - |torque|)/limit. Both arguments are
+    of the motor [N m], shape (time,).
 
-    0 where the motor gives all it can, less where a transient passes that, and -1 where one is twice as large or
-    more, as where it can give none at all.
+    The reserve is 0 where the motor gives all the torque that it can, and negative where a transient exceeds
+    that. Its lower bound is -1, for a torque of twice the limit or more, or a limit of 0.
     """
     limit, torque = np.asarray(limit), np.abs(torque)
     free = limit - torque
@@ -45,17 +45,17 @@ def torque_reserve(limit: Any, torque: Any) -> float:
 
 
 def _reserve(w: Window) -> float:
-    # the field that is left in a dip brakes for a moment, which is no lack of torque
+    # in a dip the remaining field brakes for a moment, which is no lack of torque
     driving = np.maximum(w.value("motor.air_gap_tau") * np.sign(w.value("motor.w")), 0.0)
     if w.drive.follows and (w.steady or w).speed_mean < 0.99 * w.asked:
-        # a controlled motor that falls behind gives all that it can
+        # a controlled motor that falls behind gives all the torque that it can
         return 0.0
     return torque_reserve(w.drive.largest_torque(w.run, w.warm), driving)
 
 
 def _recovery(w: Window) -> float | None:
-    """Time after the event from which the speed stays in the band of steady running, widened by 0.5 %; None if
-    it does not return in the time followed, or only at its very end."""
+    """Time after the event from which the speed stays in the band of steady running, widened by 0.5 %; None
+    if it does not return before the end of the run, or only at the very end."""
     assert w.steady is not None
     if w.drive.follows and not reaches(w.steady.speed_mean, w.asked):
         return None
@@ -68,20 +68,20 @@ def _recovery(w: Window) -> float | None:
 
 
 def _relay(w: Window) -> float | None:
-    """When the thermal relay, set to the motor's rated current, trips after the event; behind a coupling that opened
-    no load is left that could trip it."""
+    """Time after the event at which the thermal relay trips, set to the motor's rated current. None after the
+    coupling opened, as no load is left that could trip the relay."""
     setting = w.drive.rated_current
     if setting is None or w.trip is not None:
         return None
     assert w.steady is not None
     current = w.value(w.current)
-    # what flows at the end is taken to flow on
+    # the current at the end is assumed to flow on
     lasts = float(np.sqrt(np.mean(current[-max(1, len(current) // 5) :] ** 2)))
     return protection.relay_trip(w.since, current, setting, w.steady.rms(w.current), lasts)
 
 
 def _slack_time(w: Window) -> float | None:
-    """Share of the time in which some rod of a chain is slack."""
+    """Share of the time in which at least one rod of a chain is slack."""
     if w.drive.chain is None:
         return None
 
@@ -99,14 +99,15 @@ def _fold(w: Window) -> float | None:
 
 
 def time_to_start(time: Any, speed: Any, settled: float, asked: float) -> float | None:
-    """When a shaft first turns at `STARTED` of the speed `asked` of it or, where it settles at another, of that one;
-    None where it does not. One that stands or creeps in the end may have started before: it stalled under its load.
+    """Time at which a shaft first turns at the share `STARTED` of the `requested` speed or, if it settles at
+    another speed, of that one; None where it never does. A shaft that stands or creeps at the end may have
+    started before: then it stalled under its load.
 
     Parameters
     ----------
-    time, speed : of the run [s], [rad/s], shape (time,)
-    settled : mean speed of steady running [rad/s]
-    asked : [rad/s]
+    time, speed : time [s] and speed [rad/s] in the run, shape (time,)
+    final : mean speed of steady running [rad/s]
+    requested : requested speed [rad/s]
     """
     misses = CREEPS * asked < settled and not reaches(settled, asked)
     at_speed = np.flatnonzero(np.asarray(speed) >= STARTED * (settled if misses else asked))
@@ -126,7 +127,7 @@ def _lent(w: Window) -> tuple[float | None, float | None]:
 
 
 def _standstill(w: Window) -> float | None:
-    """When the machine behind an open coupling stands, after the event."""
+    """Time after the event at which the machine behind an open coupling stands still."""
     run = w.coasting
     if run is None:
         return None
@@ -139,9 +140,9 @@ Read = Callable[[Window], float | None]
 
 @dataclass(frozen=True)
 class Measure:
-    """How a measure is read, in which runs it means something, and how it is shown: those of one thing, `of`, are a
-    family; a family whose first measure is on a `card` is shown large; what is `minor` is left out where there is
-    little room."""
+    """How a measure is read, in which runs it has a meaning, and how it is shown. The measures with the same
+    subject `of` are a family. A family whose first measure is on a `card` is shown large. A `minor` measure
+    is left out where there is little room."""
 
     read: Read
     during: frozenset[Phase]
@@ -162,7 +163,8 @@ def measure(
     card: bool = False,
     minor: bool = False,
 ) -> Any:
-    """A field that declares a `Measure`: as `quantity`, described by what it is `of` and its `words`."""
+    """A field that declares a `Measure`, as `quantity` does; its description is the subject `of` and the
+    `words`."""
     declared = quantity(unit, f"{of}, {words}" if of else words, kind=kind)
     own = Measure(read, during, words, of or words, card, minor)
     return dataclasses.field(metadata={**declared.metadata, "measure": own})
@@ -170,21 +172,21 @@ def measure(
 
 @declaration
 class Answers:
-    """What a run asks of the drive; torques and speeds are the crank's unless they are called the motor's. Means
-    and RMS are over the time of whole turns of the crank; steady running is the turns that `load_cycle.csv` holds.
-    `power_peak` is the most that the motor gives, 0 where it only brakes.
+    """The demands of a run on the drive. Torques and speeds are the crank's unless they are called the
+    motor's. Means and RMS are over the time of whole turns of the crank. Steady running is the turns in
+    `load_cycle.csv`. Times count from the event.
 
-    The ripple is (largest - least)/mean of the speed; `shaft_share` the peak torque on the machine's shaft over
-    that of the motor (the rest is the rotor's inertia); `start_time` is `time_to_start`; `shaking_*` the
-    largest deviation of the frame's load from its mean, the moment about C; `torque_reserve` the least part that is
-    left of the driving torque that the warm motor can give at an instant, at its speed, voltage and frequency: 0 at
-    the limit, less where a transient passes
-    it, None in a start;
-    `winding_temperature` is where the winding comes to rest if the steady turns go on for ever;
-    `cycle_gap` is the difference between the ends of the steady turns, of speed or torque, over the largest value;
-    `speed_drift` the change of the speed from one to the other over its ripple, 0 where it hardly changes;
-    times count from the event; `energy_after_trip` passes the safety coupling while it opens, `energy_behind`
-    stays in the machine."""
+    - ripple: (largest - least)/mean of the speed - `power_peak`: the largest power that the motor gives, 0
+    where it only brakes - `shaft_share`: the peak torque on the machine's shaft over that of the motor (the
+    rest is the rotor's inertia) - `start_time`: see `time_to_start` - `shaking_*`: the largest deviation of
+    the frame's load from its mean, the moment about C - `torque_reserve`: the least remaining share of the
+    driving torque that the warm motor can give at an instant, at its speed, voltage and frequency: 0 at the
+    limit, negative where a transient exceeds it, None in a start - `winding_temperature`: the final
+    temperature of the winding if the steady turns go on for ever - `cycle_gap`: the difference between the
+    ends of the steady turns, of speed or torque, over the largest value - `speed_drift`: the change of the
+    speed between these ends over its ripple, 0 where it hardly changes - `energy_after_trip`: the energy that
+    passes the safety coupling while it opens - `energy_behind`: the energy that stays in the machine behind
+    the coupling"""
 
     crank_torque_peak: Value = measure(
         "N.m", "peak", lambda w: peak(w.crank_torque), during=_ALL, of="crank torque", card=True
@@ -325,17 +327,17 @@ class Answers:
 MEASURES: Mapping[str, Measure] = {
     each.name: each.metadata["measure"] for each in dataclasses.fields(Answers)
 }
-"""By the names of their fields."""
+"""The measures by the names of their fields."""
 
 
 def same_measure(name: str) -> Any:
-    """A field that declares the measure of that name in another declaration, too."""
+    """A field that declares the measure of that name in another declaration."""
     (declared,) = (each for each in dataclasses.fields(Answers) if each.name == name)
     return dataclasses.field(metadata=declared.metadata)
 
 
 def read_answers(window: Window) -> Answers:
-    """All measures of a window; None where one means nothing there, or there is no such thing."""
+    """All measures of a window; a measure is None where it has no meaning in this run or no value."""
     return Answers(
         **{
             name: read_measure(name, window) if window.phase in each.during else None
@@ -345,7 +347,8 @@ def read_answers(window: Window) -> Answers:
 
 
 def not_known(window: Window) -> dict[str, str]:
-    """The measures of a window that motor or machine do not tell, by name, each with the part that does not."""
+    """The measures of a window that cannot be read, by name, each with the part (motor or machine) that lacks
+    a variable."""
     parts = {}
     for name, each in MEASURES.items():
         if window.phase in each.during:
@@ -357,7 +360,7 @@ def not_known(window: Window) -> dict[str, str]:
 
 
 def read_measure(name: str, window: Window) -> Any:
-    """One measure of a window; None where there is no such thing."""
+    """One measure of a window; None where it has no value."""
     try:
         return MEASURES[name].read(window)
     except AbsentError:
@@ -365,5 +368,5 @@ def read_measure(name: str, window: Window) -> Any:
 
 
 def measures_of(phase: Phase) -> tuple[Variable, ...]:
-    """The measures that mean something in a run of that part."""
+    """The measures that have a meaning in a run of that phase."""
     return tuple(v for v in Layout(Answers).variables if phase in MEASURES[v.name].during)

@@ -1,8 +1,9 @@
 """Overloads at random sides, crank angles, times and sizes, in local processes.
 
-Each run branches from the same steady state and is determined by the study and its own number alone. Its row is
-appended, when it ends, to ``monte_carlo_<study>.jsonl``, where <study> is a digest of all that the rows depend on: a
-study that is killed goes on from there, and another study never mixes with them. Rows that are none are left out.
+Each run branches from the same steady state and is determined by the study and its own number alone. When a
+run ends, its row is appended to ``monte_carlo_<study>.jsonl``, where <study> is a digest of everything on
+which the rows depend. A study that was killed goes on from these rows, and never uses the rows of another
+study. Lines that are no rows are left out.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ from .window import Phase, Window
 
 @declaration
 class Sample:
-    """One run: what happened, and what came of it."""
+    """One run: its event and its results."""
 
     crank_angle: Value = quantity("rad", "crank angle at which the event begins")
     event: Value = quantity("s", "time at which the event begins")
@@ -60,8 +61,8 @@ class Sample:
 
 
 def _row_form() -> type[BaseModel]:
-    """The form of a row, from the declaration of a sample. A number that a failed run lacks is null; so is the
-    trip torque without a coupling."""
+    """The form of a row, from the declaration of a sample. The missing numbers of a failed run are null, and
+    so is the trip torque without a coupling."""
     number = float | None
     fields: dict[str, Any] = {v.name: (number, Field(allow_inf_nan=False)) for v in Layout(Sample).variables}
     return create_model(
@@ -81,14 +82,14 @@ QUANTILES = (0.05, 0.5, 0.95, 0.99)
 
 @dataclass(frozen=True)
 class Task:
-    """All that a worker needs: the study, its drive, the FMUs, the time of the steady state [s]."""
+    """The data that a worker needs: the study, its drive, the FMUs, the time of the steady state [s]."""
 
     config: Config
     drive: Drive
     files: Mapping[str, Path]
     steady: float
     fed_from: float | None = None
-    """when a machine that starts empty was fed [s]"""
+    """time at which a machine that starts empty was fed [s]"""
     absent: frozenset[str] = frozenset()
     """names of the measures that this motor or machine does not have"""
 
@@ -98,7 +99,8 @@ class Task:
         return Rig(self.config, self.drive, self.files, fed_from=self.fed_from)
 
     def digest(self) -> str:
-        """Name of all that the results depend on: every parameter, and the content of the FMUs."""
+        """A digest of everything on which the results depend: every parameter, and the content of the
+        FMUs."""
         config, drive = self.config, self.drive
         relevant = {
             "chainunit": __version__,
@@ -130,10 +132,11 @@ def _close() -> None:
 
 
 def _begin() -> None:
-    """Prepare a process: the one that started it handles Ctrl-C; nothing stays behind after SIGTERM."""
+    """Prepare a worker process: it leaves Ctrl-C to the process that started it, and leaves no files behind
+    after SIGTERM."""
 
     def leave(number: int, frame: Any) -> None:
-        # perhaps out of the middle of an FMU, which then cannot be closed
+        # the process may be inside an FMU, which then cannot be closed
         remove_unpacked()
         os._exit(128 + number)
 
@@ -143,7 +146,7 @@ def _begin() -> None:
 
 
 def _prepared(task: Task, digest: str) -> Simulation:
-    """The co-simulation of this process, started up and saved in its steady state."""
+    """The co-simulation of this process, after the start-up, with its steady state saved."""
     if digest not in _worker:
         _close()
         simulation = task.rig.from_rest()
@@ -159,15 +162,16 @@ class Draw:
 
     event: Event
     values: dict[str, float]
-    """of the quantities of the event that are drawn"""
+    """values of the drawn quantities of the event, by name"""
     offset: float
     """time from the saved state to the event [s]"""
     trip_torque: float
-    """[N m] at the crank; infinite without a coupling"""
+    """trip torque at the crank [N m]; infinite without a coupling"""
 
 
 def draw(config: Config, number: int) -> Draw:
-    """The event of the run of that number: the same by any process, and in any order."""
+    """The event of the run with that number. It is the same in every process, and in whatever order the runs
+    are made."""
     random = np.random.default_rng([int(config.monte_carlo.seed), number])
     offset = random.uniform(0.0, config.turn)
     values = config.random.draw(random)
@@ -184,7 +188,7 @@ def draw(config: Config, number: int) -> Draw:
 
 
 def one(task: Task, number: int, simulation: Simulation) -> Sample:
-    """Run the overload of that number from the steady state that `simulation` has saved."""
+    """Run the overload with that number from the saved steady state of the `simulation`."""
     config, drive, chance = task.config, task.drive, draw(task.config, number)
     run, trip = config.run, chance.trip_torque
     event = task.steady + chance.offset
@@ -193,7 +197,7 @@ def one(task: Task, number: int, simulation: Simulation) -> Sample:
     series = task.rig.follow(simulation, chance.event, event, stop, guards=guards).run
     angle = float(np.interp(event, series["time"].values, drive.crank_motion(series)[0]))
     tripped = simulation.time < stop - 0.5 * run.step
-    # from the saved state on: a lump may come in the middle of a step
+    # from the saved state on, as the event may begin inside a step
     window = Window(Phase.EVENT, series, drive, (), run.crank_speed)
     stalls = not tripped and read_measure("stall_time", window) is not None
     return Sample(
@@ -207,7 +211,7 @@ def one(task: Task, number: int, simulation: Simulation) -> Sample:
 
 
 def row_of(task: Task, digest: str, number: int) -> dict[str, Any]:
-    """The result of the run of that number, as a row of the file."""
+    """The result of the run with that number, as a row of the file."""
     simulation = _prepared(task, digest)
     layout = Layout(Sample)
     chance = draw(task.config, number)
@@ -217,16 +221,16 @@ def row_of(task: Task, digest: str, number: int) -> dict[str, Any]:
     except InterruptedRunError:
         raise
     except RunError as error:
-        # one run that fails is an answer, too; the next starts from the saved state again
+        # a run that fails is a result, too; the next run starts from the saved state again
         return {**named, "failed": str(error), **dict.fromkeys(layout.names)}
 
 
 def read(file: Path, absent: frozenset[str] = frozenset()) -> tuple[dict[int, dict[str, Any]], int]:
-    """Rows of a results file by their number, and how many lines were left out.
+    """The rows of a results file by their number, and the number of lines that were left out.
 
-    A line counts that is a row in its whole form: every number is there and finite, but for those of `absent`
-    measures, or the run failed and none is. Of
-    rows of one number that differ none counts. A last line that a kill cut off is passed over.
+    A line counts as a row if it has the complete form: every number is present and finite, except those of
+    the `absent` measures; or the run failed and no number is present. Rows of the same number that differ do
+    not count. A last line that was cut off when the study was killed is ignored.
     """
     rows: dict[int, dict[str, Any]] = {}
     twice: set[int] = set()
@@ -246,7 +250,7 @@ def read(file: Path, absent: frozenset[str] = frozenset()) -> tuple[dict[int, di
 
 
 def _checked(line: bytes, absent: frozenset[str]) -> dict[str, Any] | None:
-    """The row of a line, or None where it is none."""
+    """The row in a line; None where the line is no row."""
     try:
         row = _Row.model_validate_json(line).model_dump()
     except ValidationError:
@@ -260,18 +264,19 @@ def _checked(line: bytes, absent: frozenset[str]) -> dict[str, Any] | None:
 
 @dataclass(frozen=True)
 class MonteCarloResult:
-    """The results of the runs: rows as in the file, and the file."""
+    """The results of the runs: the rows of the file, and the file."""
 
     rows: list[dict[str, Any]]
     file: Path
     resumed: int
-    """runs that were there before"""
+    """number of runs that the file had before"""
     left_out: int = 0
-    """lines of the file that were no rows, or rows of one run that differ; their runs were computed anew"""
+    """number of lines that were no rows, or were differing rows of the same run; these runs were computed
+    anew"""
 
     def quantiles(self) -> dict[str, dict[str, Estimate]]:
-        """Quantiles of every answer, and shares of runs that stall or trip, each with its interval; a quantile of
-        which the number of runs tells nothing is left out."""
+        """Quantiles of every answer, and shares of the runs that stall or trip, each with its interval. A
+        quantile is left out where there are too few runs for its interval."""
         estimates_of: dict[str, dict[str, Estimate]] = {}
         for v in Layout(Sample).variables:
             values = [row[v.name] for row in self.rows if row[v.name] is not None]
@@ -286,7 +291,7 @@ class MonteCarloResult:
 
     @property
     def remark(self) -> str:
-        """Which quantiles the runs do not tell, in words; empty where they tell all."""
+        """Words on the quantiles for which there are too few runs; empty where there are enough."""
         count = len(self.rows) - self.failed
         omitted = [q for q in QUANTILES if count < runs_needed(q)]
         if not omitted:
@@ -296,7 +301,7 @@ class MonteCarloResult:
 
     @property
     def sides(self) -> dict[SideName, int]:
-        """Number of runs by the side on which the event came; empty where it has none."""
+        """Number of runs by the side of the event; empty for an event without a side."""
         sides = {row["side"] for row in self.rows}
         return {side: sum(row["side"] == side for row in self.rows) for side in SIDES if sides != {None}}
 
@@ -323,7 +328,7 @@ class MonteCarloResult:
 
 
 def run(task: Task, folder: Path, report: Report, workers: int | None = None) -> MonteCarloResult:
-    """Run the missing ones of the task's runs, on all processors, and append each row to the file in `folder` when
+    """Make the missing runs of the task on all processors, and append each row to the file in `folder` when
     its run ends.
 
     Raises
@@ -344,7 +349,7 @@ def run(task: Task, folder: Path, report: Report, workers: int | None = None) ->
     complete = count - len(open_runs)
     report(what, complete, count)
     if left_out or (file.exists() and not file.read_bytes().endswith(b"\n")):
-        # a line that is no row, or was cut off by a kill, must not run into the next one
+        # the next row must not be appended to a last line that was cut off
         with whole(file) as part:
             part.write_text("".join(_line(row) for row in rows.values()), "utf-8")
     with writing(file):
@@ -354,7 +359,7 @@ def run(task: Task, folder: Path, report: Report, workers: int | None = None) ->
         numbers = iter(open_runs)
         try:
             while True:
-                # a few at a time: a study may have a million
+                # a few runs at a time, as a study may have a million
                 for k in islice(numbers, 2 * workers - len(waiting)):
                     waiting.add(pool.submit(row_of, task, digest, k))
                 if not waiting:

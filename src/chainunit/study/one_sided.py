@@ -7,7 +7,7 @@ from ..machines.chain_unit import Feed, SideLoads, SideName, other
 
 
 def all_on_one(side: SideName, feed: Feed) -> Feed:
-    """The feed where the organ of `side` has the load of both."""
+    """The feed with which the organ of `side` has the load of both organs."""
     left, right = feed.left, feed.right
     whole = SideLoads(
         material_mass=left.material_mass + right.material_mass,
@@ -28,7 +28,7 @@ def alone(machine: ChainUnitMachine, side: SideName) -> ChainUnitMachine:
 
 
 def one_sided_feeds(feed: Feed) -> dict[str, Feed]:
-    """The feed of both sides, and what may be left of it, by how the organs are loaded."""
+    """The feed of both sides and the one-sided feeds, by the name of the case."""
     return {
         "both sides": feed,
         "right side empty": without("right", feed),

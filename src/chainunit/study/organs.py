@@ -1,4 +1,5 @@
-"""The organs of a chain unit without co-simulation: one side against both, and where two bars end as a model."""
+"""The organs of a chain unit without co-simulation: one side against both, and the limits of two bars as a
+model."""
 
 from __future__ import annotations
 
@@ -27,14 +28,14 @@ from .rig import Rig
 def _cycle_alone(
     machine: ChainUnitMachine, side: SideName, crank_speed: float, feed: Feed, points: int = 720
 ) -> Cycle:
-    """A turn with the organ of that side alone, which keeps its load."""
+    """A turn with only the organ of that side, which keeps its load."""
     return cycle(alone(machine, side), crank_speed, without(other(side), feed), points)
 
 
 @declaration
 class OverloadFactors:
-    """How much more one side asks than both, five ways for as many questions; see `overload_factors`. The first is
-    the one that sizes the drive."""
+    """Five ratios of a load from one side to the load from both, each for another question; see
+    `overload_factors`. The first one sizes the drive."""
 
     feed_crank_torque: Value = quantity("1", "crank torque, all feed on the side, ratio of cycle maxima")
     feed_rocker_torque: Value = quantity("1", "rocker torque, all feed on the side, ratio of cycle maxima")
@@ -46,7 +47,7 @@ class OverloadFactors:
 
 
 def factors_for(factors: Mapping[SideName, OverloadFactors]) -> dict[str, str]:
-    """The use of each overload factor, by its name; of the first, the feed that sizes the drive."""
+    """The use of each overload factor, by its name; for the first one also the feed that sizes the drive."""
     side = max(factors, key=lambda name: factors[name].feed_crank_torque)
     feed = f"all on the {side}" if factors[side].feed_crank_torque > 1.0 else "on both sides"
     return {
@@ -63,17 +64,18 @@ def overload_factors(
 ) -> OverloadFactors:
     """The overload factors of the machine on its `side` against both.
 
-    The first two are for one-sided feed: ratios of cycle maxima at `crank_speed`, all feed on that side to feed
-    on both, with both organs in place. The others are of a machine with its organ of `side` alone, as the papers'.
+    The first two factors are for one-sided feed: ratios of cycle maxima at `crank_speed` [rad/s], with all
+    feed on that side over feed on both sides. Both organs are in place. The other factors are for a machine
+    that has only the organ of `side`, as in the papers.
 
-    `static_at_extreme` is, of the left organ, the papers' R_left/(R_left - R_right) at the right extreme of the
-    rocker, at rest; of the right organ R_right/(R_right - R_left) at the left extreme, which is not as far out.
-    It diverges as the swing shrinks, and its value at the extreme is its minimum, so that it is no design
-    factor (docs/physics.md). In the ratios of one organ alone to both, gravity and inertia cancel or add up, and
-    above a certain speed both sides together are the heavier case.
+    `static_at_extreme` of the left organ is the papers' R_left/(R_left - R_right) at the right extreme of the
+    rocker, at rest. For the right organ it is R_right/(R_right - R_left) at the left extreme, which is not as
+    far out. The factor diverges as the swing shrinks, and its value at the extreme is its minimum; so it is
+    no design factor (docs/physics.md). In the ratios of one organ alone to both, gravity and inertia cancel
+    or add up, and above a certain speed both sides together are the heavier case.
     """
     extremes = machine.rocker_extremes()
-    # each organ pulls hardest at the rocker where this is farthest from it
+    # each organ pulls hardest at the rocker where the rocker is farthest from it
     psi = extremes[0 if side == "left" else 1][0]
     static = machine.chamber(psi, 0.0, 0.0, feed.left, feed.right)
     both = cycle(machine, crank_speed, feed)
@@ -95,15 +97,15 @@ def overload_factors(
 
 @dataclass(frozen=True)
 class Sides:
-    """Cycle maxima of the torques [N m] over crank speed [rad/s], each of shape (speeds,), as `rocker_both`: of the
-    rocker or crank, with both organs, the left or the right one alone; and where one alone and both are alike."""
+    """Cycle maxima of the torques [N m] over crank speed [rad/s], each of shape (speeds,), of rocker and
+    crank, with both organs (`rocker_both`), only the left one, or only the right one."""
 
     speed: Any
     peaks: Mapping[str, Any]
 
     def crossings(self) -> dict[str, dict[SideName, list[float]]]:
-        """Crank speeds at which one side alone and both ask the same [rad/s], linear between the points, by torque
-        ("rocker", "crank") and side."""
+        """Crank speeds at which the torque of one side alone equals that of both [rad/s], interpolated
+        linearly, by torque ("rocker", "crank") and side."""
         speeds: dict[str, dict[SideName, list[float]]] = {}
         for torque in _TORQUES:
             speeds[torque] = {}
@@ -133,8 +135,9 @@ _TORQUES = ("rocker", "crank")
 
 
 def sides_over_speed(machine: ChainUnitMachine, feed: Feed, highest: float = 15.0, points: int = 30) -> Sides:
-    """Two-sided against one-sided over crank speeds up to `highest` [rad/s]: at low speed one side alone is the
-    heavier case, since nothing balances its weight; at high speed both are, since inertia adds up."""
+    """Both organs against one alone, at crank speeds up to `highest` [rad/s]. At low speed one side alone is
+    the heavier case, since nothing balances its weight; at high speed both sides are, since their inertia
+    adds up."""
     speed = np.linspace(highest / points, highest, points)
     peaks: dict[str, list[float]] = {
         f"{torque}_{which}": [] for torque in _TORQUES for which in ("both", *SIDES)
@@ -151,7 +154,7 @@ def sides_over_speed(machine: ChainUnitMachine, feed: Feed, highest: float = 15.
 
 @declaration
 class Limits:
-    """Where the model ends."""
+    """The limits of two bars as a model."""
 
     slack_speed: Value = quantity(
         "rad/s", "crank speed at which a web first goes slack with this feed", kind="speed"
@@ -169,11 +172,11 @@ class Limits:
 
 @dataclass(frozen=True)
 class OrganFindings(Findings):
-    """What the organs of a chain unit ask at constant speed: one side against both, over the speed, and the limits of
-    two bars."""
+    """The torques that the organs of a chain unit cause at constant speed: one side against both, also over
+    the speed, and the limits of two bars."""
 
     factors: dict[SideName, OverloadFactors]
-    """of the organ of that side alone"""
+    """overload factors, by side"""
     sides: Sides
     limits: Limits
 
@@ -190,7 +193,7 @@ class OrganFindings(Findings):
         }
 
     def remark(self, study: StudyRecord) -> None:
-        """The numbers say it all."""
+        """No remarks: the numbers are enough."""
 
 
 class OrganAnalysis(Analysis):
@@ -205,7 +208,7 @@ class OrganAnalysis(Analysis):
 
     @staticmethod
     def find(study: StudyRecord, rig: Rig, report: Report) -> OrganFindings:
-        """As two bars, also where they are chains."""
+        """The findings for two bars, also where the organs are chains."""
         machine, feed, speed = study.drive.chain_unit, study.config.feed, study.config.run.crank_speed
         (right, _), (left, _) = machine.rocker_extremes()
         modes = machine.chain_modes(feed.left, feed.right)

@@ -27,15 +27,15 @@ from .drive import Drive
 
 
 def study_system(config: Config, drive: Drive) -> System:
-    """Machine, driveline and motor of a study, from rest: the speed reference is the crank speed at the motor from
-    the start on, feed and processing forces are those of normal running; with feed-forward, the machine that the
-    control asks is in the system, too."""
+    """Machine, driveline and motor of a study, from rest. The speed reference is the crank speed at the motor
+    from the start on; feed and processing forces are those of normal running. With feed-forward, the system
+    has the second machine that the control uses."""
     start = drive.loads(config.feed) if drive.outsider else {}
     if "w_ref" in drive.graph.components["motor"].connectors:
         start["motor.w_ref"] = config.run.crank_speed * drive.ratio
     for name, machine in (("machine", drive.driven), ("model", drive.machine)):
         if name in drive.graph.components and not drive.outsider:
-            # a connected input needs no start value, but an FMU that runs alone has one
+            # a connected input needs no start value, but an FMU that runs alone needs one
             values = _machine(config, machine.model, machine)
             start |= {f"{name}.{variable}": x for variable, x in values.items()}
     return replace(drive.graph, start=start)
@@ -48,13 +48,13 @@ def start_of(
     backend: Backend | None = None,
     report: Callable[[str], None] = lambda what: None,
 ) -> dict[str, float]:
-    """Start values of `model`'s parameters and inputs, by name, as the study has them: gains tuned, or the motor and
-    the ratio that sizing chooses.
+    """Start values of the parameters and inputs of the `model`, by name, with the values of the study: with
+    tuned gains, or with the motor and the ratio that sizing chooses.
 
     Raises
     ------
     InputError
-        where the study's motor or machine is another, or it has no driveline.
+        where the study has another motor or machine, or no driveline.
     RunError
         where sizing finds no motor.
     """
@@ -75,13 +75,13 @@ def start_of(
 
 
 def with_rods(number: int, start: Mapping[str, float]) -> type[Model]:
-    """ChainUnitFlexible with `number` rods an organ, as many in wall and web as brings them nearest to equal length
-    with the lengths among the `start` values.
+    """ChainUnitFlexible with `number` rods an organ. They are divided between wall and web so that the rods
+    are nearest to equal length, by the lengths among the `start` values.
 
     Raises
     ------
     InputError
-        for a number that it cannot have.
+        for a number of rods that the model cannot have.
     """
     if not LEAST <= number <= MOST:
         raise InputError(f"{number} rods an organ: must be >= {LEAST} and <= {MOST}")
@@ -90,7 +90,7 @@ def with_rods(number: int, start: Mapping[str, float]) -> type[Model]:
 
 
 def _is_of(model: type[Model], drive: Drive) -> bool:
-    """Whether a model is that of the machine, its direct one, or the one with chains."""
+    """Whether the model is the machine of the drive, its direct model, or its model with chains."""
     if drive.outsider:
         return False
     own = drive.driven.model
@@ -99,7 +99,7 @@ def _is_of(model: type[Model], drive: Drive) -> bool:
 
 
 def _machine(config: Config, model: type[Model], machine: Machine) -> dict[str, float]:
-    """The machine with its feed and the gear that it has, at the speed of the study."""
+    """Start values of the machine with its feed and gear, at the speed of the study."""
     speed = config.run.crank_speed * machine.ratio
     direct = issubclass(model, DirectMachine)
     turning = {"w_start": speed} if direct else {"phi": 0.0, "w": speed, "a": 0.0}
@@ -121,13 +121,13 @@ def export_study(
     backend: Backend | None = None,
     report: Callable[[str], None] = lambda what: None,
 ) -> str:
-    """Write machine and motor of a study as an SSP package and say, in words, what is in it. With `sizing` the motor
-    is chosen first. The default experiment is as long as the study's start-up and steady running.
+    """Write machine and motor of a study as an SSP package; returns its contents in words. With `sizing` the
+    motor is chosen first. The default experiment is as long as the study's start-up and steady running.
 
     Raises
     ------
     InputError, RunError
-        see `chainunit.system.ssp.export`; also where sizing finds no motor, or it is an FMU of somebody else.
+        see `chainunit.system.ssp.export`; also where sizing finds no motor, or the motor is a foreign FMU.
     """
     drive = _drive(config, backend, report)
     run = config.run

@@ -1,5 +1,5 @@
-"""What a study file names: the kinds of machine and motor, the form of its tables that follows from them, and the
-example from which it takes what it leaves out."""
+"""The parts that a study file names: the kinds of machine and motor, the form of its tables that follows from
+them, and the example that gives the values that the file leaves out."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from .sections import CHOICES, FileSection, SystemTable, sections_of
 
 
 def _as_text(given: Any) -> Any:
-    """A date of TOML as text."""
+    """The text of a TOML date; any other value as it is."""
     return given.isoformat() if isinstance(given, date) else given
 
 
 class ReportTable(BaseModel):
-    """How the report on a study shows it."""
+    """The table [report]: the heading of a report and the units in it."""
 
     model_config = ConfigDict(extra="forbid")
     units: dict[str, Any] = {}
@@ -40,7 +40,7 @@ class ReportTable(BaseModel):
 
     @property
     def labels(self) -> dict[str, str]:
-        """What stands at the head of the report, by its name; only what is given."""
+        """The entries at the head of the report, by their names; only those that are given."""
         named = {name: getattr(self, name) for name in type(self).model_fields if name != "units"}
         return {name: text for name, text in named.items() if text}
 
@@ -60,20 +60,20 @@ class Parts:
 
     machine: type[MachineModel]
     motor: type[Motor]
-    """`Motor` itself where the motor is an FMU of somebody else"""
+    """model of the motor; `Motor` itself if the motor is a foreign FMU"""
     designation: str = ""
-    """of a motor in the catalogue"""
+    """designation of a motor in the catalogue; empty for another motor"""
     file: str = ""
-    """of a motor that is an FMU of somebody else"""
+    """file of a motor that is a foreign FMU; empty for another motor"""
 
     @property
     def named_motor(self) -> str:
-        """The motor as a file names it."""
+        """The name of the motor in a study file."""
         return self.file or self.designation or self.motor.name
 
     @property
     def gives_motor(self) -> bool:
-        """Whether the table [motor] gives the motor."""
+        """Whether the table [motor] describes the motor."""
         return not self.designation and not self.file
 
     @property
@@ -115,12 +115,12 @@ def is_designation(motor: str) -> bool:
 
 
 def parts_of(data: Mapping[str, Any], source: str) -> Parts:
-    """Machine and motor of a file, checked before all else: the other tables depend on them.
+    """Machine and motor of a file. They are checked first, as the other tables depend on them.
 
     Raises
     ------
     InputError
-        with a line for each that is wrong.
+        with a line for each fault.
     """
     faults = Faults()
     table = read_table(SystemTable, named_table(data, "system"), "system.")
@@ -179,13 +179,14 @@ def example(name: str = "chain-unit") -> str:
 
 @cache
 def _examples_of_machines() -> dict[str, str]:
-    """By machine, the first example that has it, from which a study takes what its file leaves out."""
+    """By machine, the first example with that machine; a study takes the values that its file leaves out from
+    it."""
     tables = {name: named_table(toml(example(name)), "system") for name in reversed(EXAMPLES)}
     return {read_table(SystemTable, table, "system.").machine: name for name, table in tables.items()}
 
 
 LONGEST_FILE = 1000
-"""letters of a file's name"""
+"""largest number of characters of a file's name"""
 
 
 def beside(name: str, source: str) -> Path:
@@ -194,7 +195,7 @@ def beside(name: str, source: str) -> Path:
     Raises
     ------
     InputError
-        for a text that names no file on any system.
+        for a text that is no file name on any system.
     """
     if not name.isprintable() or len(name) > LONGEST_FILE:
         raise InputError(f"{shown(name)}: must be the name of a file, of at most {LONGEST_FILE} letters")
@@ -205,8 +206,9 @@ LENGTHS = ("r", "l", "h", "c", "hy", "e", "l1", "l2", "z")
 
 
 def over_example(data: Mapping[str, Any], parts: Parts) -> dict[str, Any]:
-    """A study file laid over the example of its machine: a value that is not named is the example's. Its ratios give
-    way to lengths of the user's own, its motor to another one, its shafts and their damping to the user's."""
+    """The tables of a study file, completed by the example of its machine: a value that the file leaves out
+    is the example's. The example's ratios are dropped if the file gives lengths, its motor if the file names
+    another, its shafts and their damping if the file gives its own."""
     base = parts.example
     if any(name in named_table(data, "machine") for name in LENGTHS) and "ratios" not in data:
         base.pop("ratios", None)

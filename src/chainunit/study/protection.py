@@ -1,4 +1,5 @@
-"""The protection of a drive: thermal relay and safety coupling; and the stall that they protect from."""
+"""The protection of a drive by thermal relay and safety coupling, and the stall from which they protect
+it."""
 
 from __future__ import annotations
 
@@ -12,19 +13,20 @@ import numpy as np
 
 TRIP_CLASS = 10.0
 """Time in which a relay of this class trips at 7.2 times its setting, from cold [s] (IEC 60947-4-1)."""
-_PICK_UP = 1.1  # mid of the 1.05 .. 1.2 in which such a relay must trip
+_PICK_UP = 1.1  # middle of the range 1.05 .. 1.2 in which such a relay has to trip
 
 
 def relay_time_constant(trip_class: float = TRIP_CLASS) -> float:
-    """Time constant [s] of the thermal image that trips at 7.2 times the setting after `trip_class` seconds."""
+    """Time constant [s] of a thermal image that trips after `trip_class` seconds at 7.2 times the setting."""
     heating = 7.2**2
     return trip_class / math.log(heating / (heating - _PICK_UP**2))
 
 
 def relay_image(time: Any, current: Any, setting: float, before: float) -> Any:
-    """Thermal image of a relay set to `setting` [A] over `time` [s], both of shape (n,): 1 is where it trips.
+    """Thermal image of a relay, set to `setting` [A], over `time` [s] with `current` [A], shape (n,); it
+    trips at 1.
 
-    First order in the square of the current; `before` is the RMS current that ran until then [A].
+    The image is of first order in the square of the current; `before` is the RMS current before the run [A].
     """
     tau = relay_time_constant()
     heating = (np.asarray(current) / (setting * _PICK_UP)) ** 2
@@ -39,7 +41,8 @@ def relay_image(time: Any, current: Any, setting: float, before: float) -> Any:
 
 
 def relay_trip(time: Any, current: Any, setting: float, before: float, holds: float) -> float | None:
-    """Time at which the relay trips [s]; after the run, `holds` [A] flows on. None where it never does."""
+    """Time at which the relay trips [s], also after the run, with the lasting current `holds` [A]; None where
+    it never trips."""
     image = relay_image(time, current, setting, before)
     over = np.flatnonzero(image >= 1.0)
     if over.size:
@@ -51,29 +54,30 @@ def relay_trip(time: Any, current: Any, setting: float, before: float, holds: fl
 
 
 MARGIN = 1.25
-"""Setting of a safety coupling over the largest torque of normal duty."""
+"""Ratio of the setting of a safety coupling to the largest torque of normal duty."""
 
 
 class Obstacle(StrEnum):
     """Why no setting of a safety coupling protects a drive."""
 
     MOTOR = "the motor"
-    """it cannot give the setting"""
+    """the motor cannot give the torque of the setting"""
     GEAR = "the gear"
-    """it may not carry the setting"""
+    """the gear may not carry the torque of the setting"""
     OVERLOADS = "the overloads"
-    """none of them gives the setting"""
+    """no overload reaches the torque of the setting"""
 
 
 @dataclass(frozen=True)
 class Setting:
     """A safety coupling between motor and gear, judged by the torques in a study; all at the crank [N m].
 
-    The setting is `MARGIN` times the largest torque of `normal` duty: below the limit of the `gear`, and below the
-    torque of at least one of the `overloads`, by name their peaks: the shocks that a coupling is for. Otherwise
-    `obstacle` says why there is none. The largest torque of the `motor` in steady running may be less, as rotor and
-    flywheel, too, give torque in a shock: then what brakes slowly stalls the motor. `disturbances` are the peaks that
-    it has to ride out, by name, such as a dip of the voltage.
+    The setting is `MARGIN` times the largest torque of `normal` duty. It has to be below the limit of the
+    `gear`, and below the peak of at least one of the `overloads` (peaks by name), the shocks that a coupling
+    is for. Otherwise `obstacle` says why there is no setting. The largest torque of the `motor` in steady
+    running may be less than the setting, as rotor and flywheel also give torque in a shock; then a load that
+    rises slowly stalls the motor. `disturbances` are the peaks, by name, in which the coupling should stay
+    shut, such as a dip of the voltage.
     """
 
     normal: float
@@ -89,7 +93,7 @@ class Setting:
 
     @property
     def obstacle(self) -> Obstacle | None:
-        """Why there is no setting."""
+        """The reason why there is no setting; None where there is one."""
         if self.least >= self.gear:
             return Obstacle.GEAR
         if self.opens:
@@ -98,7 +102,7 @@ class Setting:
 
     @property
     def torque(self) -> float | None:
-        """The setting, if there is one."""
+        """The setting [N m]; None where there is none."""
         return self.least if self.obstacle is None else None
 
     @property
@@ -108,18 +112,18 @@ class Setting:
 
     @property
     def stalls(self) -> bool:
-        """Whether the motor stalls before it opens, where the load rises slowly."""
+        """Whether the motor stalls before the coupling opens, if the load rises slowly."""
         return self.least >= self.motor
 
     @property
     def nuisances(self) -> dict[str, float]:
-        """The disturbances in which it opens, too, with their peaks: it protects nothing there."""
+        """The disturbances in which the coupling opens, too, with their peaks; it protects nothing there."""
         return {name: peak for name, peak in self.disturbances.items() if peak > self.least}
 
 
 def stall(time: Any, speed: Any, asked: float, share: float = 0.1) -> float | None:
-    """Time from which the speed stays below `share` of the speed `asked` to the end of the run; None where it does
-    not, or only in the last tenth of the run."""
+    """Time [s] from which the speed stays below `share` of the `requested` speed until the end of the run;
+    None where it does not, or only in the last tenth of the run."""
     below = np.abs(np.asarray(speed)) < share * asked
     if not below[-1]:
         return None

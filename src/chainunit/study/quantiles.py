@@ -1,12 +1,12 @@
 """Quantiles and shares of random runs, as exactly as their number allows: binomial intervals.
 
-For any distribution, the number of runs below its quantile q is binomial. So an interval of two of the ordered
-values holds the quantile with a known confidence. Where too few runs are there, even the largest of them may lie
-below it, and the interval has no end: such a quantile is left out.
+For any distribution, the number of runs below its quantile q is binomial. So an interval between two of the
+ordered values holds the quantile with a known confidence. If there are too few runs, even the largest value
+may lie below the quantile, and the interval has no upper end: such a quantile is left out.
 
-Several values of one run (the turns of a start) are not independent. They count for as many as the differences
-between the runs say (Kish's design effect; Woodruff's interval). Few runs say little of these differences, so that
-the most counts which they may be.
+Several values of one run (the turns of a start) are not independent. They count as a smaller number of
+independent values, which follows from the differences between the runs (Kish's design effect; Woodruff's
+interval). A few runs determine these differences badly, so the largest differences that are likely are used.
 """
 
 from __future__ import annotations
@@ -20,17 +20,18 @@ import numpy as np
 from ..text import entry
 
 LESS_ALIKE = 0.9
-"""Confidence with which the values of one run are no more alike than they are taken for."""
+"""Confidence that the values of one run are no more alike than assumed."""
 CONFIDENCE = 0.95
-"""Confidence of all intervals: each end is missed with half of the rest."""
+"""Confidence of all intervals; the rest is divided equally between both ends."""
 ALIKE = 0.05
-"""Values of several runs that differ by less than this part of their median are alike, as those of a motion that
-repeats itself: then nothing is random, and the interval holds all of them."""
+"""Values of several runs that differ by less than this share of their median count as alike, as in a motion
+that repeats itself: then nothing is random, and the interval holds all values."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A number that was found from random runs, and the interval in which the true one lies with `CONFIDENCE`."""
+    """A number that is estimated from random runs, and the interval that holds the true number with
+    `CONFIDENCE`."""
 
     value: float
     low: float
@@ -43,8 +44,9 @@ class Estimate:
 
 
 def quantile(values: Any, q: float) -> Estimate | None:
-    """The quantile `q` of independent values, shape (n,), or of runs with several values each, shape (runs, n),
-    between two of the ordered values; None where they count for fewer than `runs_needed`."""
+    """The quantile `q` of independent values, shape (n,), or of runs with several values each, shape (runs,
+    n); its interval is between two of the ordered values. None where the values count as fewer than
+    `runs_needed`."""
     from scipy.stats import binom
 
     values = np.asarray(values, float)
@@ -62,10 +64,11 @@ def quantile(values: Any, q: float) -> Estimate | None:
 
 
 def counted(values: Any, q: float) -> int:
-    """For how many independent ones the values count at the quantile `q`: all of them, but of several runs, shape
-    (runs, n), which are not alike, divided by the larger of two design effects: that of the runs' shares above the
-    quantile, as it is found, and that of the ranks of all values, as large as it may be. The shares alone would be
-    too few numbers: what makes them look independent by chance would be told, and nothing else."""
+    """The number of independent values as which the `values` count at the quantile `q`. All values count if
+    they are of shape (n,), or of several runs, shape (runs, n), that are alike. Otherwise their number is
+    divided by the larger of two design effects: the estimate from the shares of each run above the quantile,
+    and the upper confidence limit from the ranks of all values. The shares alone are too few numbers: by
+    chance they may look independent."""
     values = np.asarray(values, float)
     if values.ndim == 1 or values.shape[1] == 1 or _alike(values):
         return int(values.size)
@@ -73,15 +76,15 @@ def counted(values: Any, q: float) -> int:
     if runs == 1:
         return 1
     limit = np.quantile(values, q)
-    # where many values are the same, the quantile is one of them
+    # many equal values may be the quantile themselves
     shares = [np.mean(above, axis=1) for above in (values > limit, values >= limit)]
     effect = float(np.max(np.var(shares, axis=1, ddof=1))) * n / (q * (1.0 - q))
     return int(values.size / max(1.0, effect, 1.0 + (n - 1) * _alikeness(values)))
 
 
 def _alikeness(values: Any) -> float:
-    """How much the values of one run have in common: the upper confidence limit of the intraclass correlation of
-    their ranks, from the analysis of variance in one way; values of shape (runs, n)."""
+    """The correlation of the values of one run: the upper confidence limit of the intraclass correlation of
+    their ranks, by a one-way analysis of variance; values of shape (runs, n)."""
     from scipy.stats import f, rankdata
 
     runs, n = values.shape
@@ -93,7 +96,7 @@ def _alikeness(values: Any) -> float:
 
 
 def _alike(values: Any) -> bool:
-    """Whether the values are of several runs and alike."""
+    """Whether the values are of several runs and count as alike, see `ALIKE`."""
     return values.ndim == 2 and bool(np.ptp(values) <= ALIKE * abs(np.median(values)))
 
 
@@ -106,6 +109,6 @@ def share(count: int, runs: int) -> Estimate:
 
 
 def runs_needed(q: float) -> int:
-    """The least number of independent runs of which the quantile `q` has an interval: all of n lie on one side of it
-    with a probability of q^n or (1 - q)^n, which must be within half of the rest of `CONFIDENCE`."""
+    """The least number of independent runs with which the quantile `q` has an interval. All n runs lie on one
+    side of the quantile with the probability q^n or (1 - q)^n, which must be at most (1 - `CONFIDENCE`)/2."""
     return math.ceil(math.log(0.5 * (1.0 - CONFIDENCE)) / math.log(max(q, 1.0 - q)))

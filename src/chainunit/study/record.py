@@ -28,40 +28,41 @@ from .verdict import STEADY, Verdict
 from .window import Phase, Trip, Window, whole_turns
 
 LOAD_CYCLE = "load_cycle.csv"
-"""File with the steady turns as the motor's shaft sees them."""
+"""Name of the file with torque and speed of the motor's shaft in the steady turns."""
 
 
 INSUFFICIENT = "No motor of the catalogue fits; all is run with the nearest, which is insufficient."
-"""What is said of a study whose sizing found no motor."""
+"""The sentence on a study whose sizing found no motor that fits."""
 
 Amount: TypeAlias = (
     tuple[float | None, str] | tuple[float | None, str, str] | tuple[float | None, str, str, int]
 )
-"""A number, its unit, and perhaps how people show it, and with how many digits."""
+"""A number and its unit; optionally the kind by which it is shown, and the number of digits."""
 
 
 Origins: TypeAlias = Literal["file", "example", "declared", "tuned", "catalogue", "sizing"]
-"""Where a value comes from."""
+"""The origin of a value."""
 
 
 @dataclass(frozen=True)
 class Remark:
-    """Something that the reader has to know beside the numbers: a `warning` of a fault, or of a demand that
-    is not met, or a `note` on an assumption behind the numbers. `kind` names its subject, `runs` the runs of it."""
+    """A remark that the reader needs beside the numbers: a `warning` of a fault or of a demand that is not
+    met, or a `note` on an assumption behind the numbers. `kind` names its subject, `runs` the runs that it is
+    about."""
 
     severity: Literal["warning", "note"]
     kind: str
     text: str
-    """the remark in words"""
+    """the text of the remark"""
     runs: tuple[str, ...] = ()
     quantities: Mapping[str, Amount] = field(default_factory=dict)
-    """numbers of the text; what differs from run to run is named ``run.quantity``"""
+    """the numbers of the text; a number of one run among several is named ``run.quantity``"""
 
     @classmethod
     def of(
         cls, severity: Literal["warning", "note"], kind: str, text: str, /, *runs: str, **parts: Amount | str
     ) -> Remark:
-        """A remark; in its `text` the names of the `parts`, amounts and words, stand in braces."""
+        """Make a remark; its `text` has the names of the `parts` (amounts and words) in braces."""
         amounts = {name: part for name, part in parts.items() if not isinstance(part, str)}
         words = {name: part if isinstance(part, str) else number(*part) for name, part in parts.items()}
         return cls(severity, kind, text.format_map(words), runs, amounts)
@@ -81,18 +82,20 @@ class Remark:
 
 @dataclass
 class Spread:
-    """What is assumed in an event, and the peaks over the range of the assumption: from and to, by quantity."""
+    """The assumed quantities of an event, and the peaks over the range of the assumption: from and to, by
+    quantity."""
 
     assumed: dict[str, tuple[float, float]]
-    """in the declared units of the event"""
+    """range of each assumed quantity, in the declared units of the event"""
     peaks: dict[str, tuple[float, float]]
-    """crank_torque, motor_torque, rocker_torque [N m]"""
+    """range of the peaks crank_torque, motor_torque and rocker_torque [N m]"""
 
 
 @dataclass
 class StudyRecord:
-    """The record of a study, which `run_study` fills; everything is by the names of the runs: ``start_up``,
-    ``steady`` (its last turns), one for each event. `failure` says why the study stopped early, if it did."""
+    """The record of a study, which `run_study` fills. Its mappings are by the names of the runs:
+    ``start_up``, ``steady`` (the last turns of it), and one for each event. `failure` is the error that
+    stopped the study early, or None."""
 
     config: Config
     drive: Drive
@@ -100,43 +103,43 @@ class StudyRecord:
     tuning: Tuning | None = None
     sizing: SizingResult | None = None
     fmus: dict[str, Origin] = field(default_factory=dict)
-    """how each FMU was made"""
+    """the origin of each FMU"""
     runs: dict[str, xr.Dataset] = field(default_factory=dict)
     steady_from: float | None = None
-    """when running became steady [s], where that was later than `config.settled`"""
+    """time at which running became steady [s], if that was later than the study planned"""
     fed_from: float | None = None
-    """when the feed came to a machine that starts empty [s]"""
+    """time at which the feed came to a machine that starts empty [s]"""
     event: dict[str, float] = field(default_factory=dict)
-    """when each event that was run began [s]"""
+    """time at which each event began [s]"""
     answers: dict[str, Answers] = field(default_factory=dict)
     start: Answers | None = None
-    """what the start-up asks, once the machine ran steadily"""
+    """answers of the start-up, once the machine ran steadily"""
     settling: Answers | None = None
-    """what the coming of the feed asks of a machine that starts empty, until it runs steadily"""
+    """answers of a machine that starts empty, from the coming of its feed until it runs steadily"""
     pins: dict[str, dict[str, dict[str, float]]] = field(default_factory=dict)
-    """By run and pin: peak, RMS and equivalent (ISO 281) load."""
+    """by run and pin: peak, RMS and equivalent (ISO 281) load [N]"""
     certificate: dict[str, dict[str, float]] = field(default_factory=dict)
     shaft: dict[str, ShaftAnswers] = field(default_factory=dict)
-    """what each run asks of the driveline, where there is one"""
+    """answers of the driveline in each run, where there is a driveline"""
     cycles_of: dict[str, Cycles] = field(default_factory=dict)
-    """rainflow cycles of the torque in shaft 2"""
+    """rainflow cycles of the torque in shaft 2, by run"""
     spreads: dict[str, Spread] = field(default_factory=dict)
-    """of the events that rest on an assumption"""
+    """the spread of each event that rests on an assumption"""
     start_torques: dict[str, float] = field(default_factory=dict)
-    """peak on the coupling in each part of starting that is judged apart, at the crank [N m]: in the start-up, in the
-    settling under the feed, and in each start under load"""
+    """peak on the coupling at the crank [N m] in each part of the start that is judged apart: in the
+    start-up, in the settling under the feed, and in each start under load"""
     setting: Setting | None = None
-    """the safety coupling that a sized drive should have, where none is given: one that is given cuts off the peaks
-    which would set it"""
+    """the recommended safety coupling of a sized drive; None where the file gives a coupling, as that one
+    cuts off the peaks from which the setting follows"""
     ripple_without: float | None = None
-    """fluctuation of the speed in steady running without the feed-forward that the study has"""
+    """fluctuation of the speed in steady running without the study's feed-forward"""
     findings: dict[str, Any] = field(default_factory=dict)
     """`Findings` of each analysis, by its name"""
     chain: ChainResult | None = None
-    """the organs as chains at constant speed, where the study has them"""
+    """results of the organs as chains at constant speed, where the study has chains"""
     monte_carlo: MonteCarloResult | None = None
     verdict: Verdict | None = None
-    """whether the model of the organs holds, once there are runs"""
+    """the verdict on the model, once there are runs"""
     remarks: list[Remark] = field(default_factory=list)
     failure: RunError | None = None
 
@@ -160,18 +163,19 @@ class StudyRecord:
 
     @property
     def titles(self) -> dict[str, str]:
-        """Runs by name, as sentences call them."""
+        """By run, its title for use in sentences."""
         named = {STEADY: "steady running", verdict.START: "start-up"}
         named |= {verdict.SETTLING: "settling under the feed", "constant": "chains at constant speed"}
         return named | {name: event.title for name, event in self.config.events.items()}
 
     def called(self, run: str) -> str:
-        """How sentences call a run."""
+        """The title of a run for use in sentences."""
         return self.titles.get(run, run.replace("_", " "))
 
     def origin(self, name: str) -> Origins:
-        """Where the value of a quantity comes from, by its name in a study file ("motor.rotor.J"): the file, the
-        example, tuning, the catalogue with the motor that the file names or that sizing chose, or its declaration."""
+        """The origin of the value of a quantity, by its name in a study file ("motor.rotor.J"): the file, the
+        example, tuning, the catalogue (by the motor that the file names or that sizing chose), or its
+        declaration."""
         section, _, parameter = name.partition(".")
         if section == "motor" and self.tuning is not None and parameter in self.tuning.parameters:
             return "file" if name in self.config.given else "tuned"
@@ -187,13 +191,13 @@ class StudyRecord:
         return self._of(name)
 
     def _of(self, name: str) -> Origins:
-        """Of a value that only the study file and the example tell."""
+        """The origin of a value that only the study file or the example can give."""
         if name in self.config.given:
             return "file"
         return "example" if name in self.config.of_example else "declared"
 
     def _told(self, parameter: str) -> str:
-        """The name in a study file of a parameter that the motor of the catalogue does not set, else ""."""
+        """The name in a study file of a motor's `parameter`; empty for one that the catalogue sets."""
         config = self.config
         if parameter == "ratio":
             return "gear.ratio" if self._of("gear.ratio") != "declared" else ""
@@ -210,34 +214,35 @@ class StudyRecord:
 
     @property
     def kind(self) -> str:
-        """What is studied, as the heading of a report."""
+        """The heading of a report on this kind of study."""
         return f"{self.noun.capitalize()}: forces, torque and overload"
 
     @property
     def noun(self) -> str:
-        """What people call the machine."""
+        """The common noun for the machine."""
         return self.drive.machine.model.noun
 
     @property
     def turning(self) -> str:
-        """What people call the link of the machine that the motor turns: "crank", but of a machine that has none."""
+        """The noun for the part of the machine that the motor turns: "crank", or another word for a machine
+        without one."""
         return "crank" if self.drive.outsider else self.drive.machine.model.turning
 
     @property
     def reaches(self) -> bool:
-        """Whether the crank turns at the speed that is asked for, as far as is known."""
+        """Whether the crank turns at the requested speed; True while that is not known."""
         steady = self.answers.get(STEADY)
         return steady is None or reaches(steady.speed_mean, self.config.run.crank_speed)
 
     @property
     def returns(self) -> bool:
-        """Whether there is a band of steady running that the speed could return to: a motor that follows the speed
-        asked for has to reach it."""
+        """Whether there is a band of steady running to which the speed could return: a motor that follows the
+        requested speed has to reach that speed."""
         return STEADY in self.answers and (not self.drive.follows or self.reaches)
 
     @property
     def overloads(self) -> list[str]:
-        """The events that were run and read."""
+        """The names of the events with answers."""
         return [name for name in self.answers if name in self.config.events]
 
     @property
@@ -252,9 +257,9 @@ class StudyRecord:
 
     @property
     def start_apart(self) -> bool:
-        """Whether the start is judged apart: switched on to the line, a motor gives more for a moment than it ever
-        does in running. A coupling that is given is held shut where the file says so; one that is recommended has to
-        be."""
+        """Whether the start is judged apart: a motor that is switched to the line gives, for a moment, more
+        torque than it ever does in running. A given coupling is held shut in the start if the file says so; a
+        recommended one has to be."""
         config = self.config
         if config.coupling is not None:
             return config.held_in_start
@@ -267,27 +272,28 @@ class StudyRecord:
 
     @property
     def not_known(self) -> frozenset[str]:
-        """Names of the measures that the motor, an FMU of somebody else, does not tell in steady running."""
+        """Names of the measures of steady running that cannot be read, as the motor is a foreign FMU."""
         if self.drive.foreign is None:
             return frozenset()
         return frozenset(name for name, part in self.absent.items() if part == "motor")
 
     @property
     def absent(self) -> Mapping[str, str]:
-        """The measures that motor or machine do not tell in steady running, each with the part that does not."""
+        """The measures of steady running that cannot be read, each with the part (motor or machine) that
+        lacks a variable."""
         if verdict.STEADY not in self.answers:
             return {}
         return not_known(self.window(Phase.STEADY, self.steady))
 
     @property
     def steady(self) -> xr.Dataset:
-        """The steady turns that are evaluated, both ends included; where the crank does not make them, all that was
-        run since it should be steady."""
+        """The steady turns that are evaluated, both ends included; where the crank does not make whole turns,
+        the whole run from the time at which it should be steady."""
         run = self.runs["start_up"].sel(time=slice(self.settled, None))
         return whole_turns(self.drive, run, self.config.run.turns)
 
     def window(self, phase: Phase, run: xr.Dataset, begin: float = 0.0, trip: Trip | None = None) -> Window:
-        """The rows of a run to read measures from."""
+        """The window of a run from which measures are read."""
         sides = self.drive.machine.loaded_sides(self.config.feed)
         asked = self.config.run.crank_speed
         steady = None

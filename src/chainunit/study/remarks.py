@@ -1,4 +1,4 @@
-"""What the reader has to know beside the numbers."""
+"""The remarks of a study, which the reader needs beside the numbers."""
 
 from __future__ import annotations
 
@@ -80,11 +80,11 @@ def conclude(study: StudyRecord) -> None:
 
 
 _RATING = ("limit.i", "limit.v", "armature.k")
-"""Parameters of a motor without a nameplate that set what it can give."""
+"""Parameters that limit the torque of a motor without a nameplate."""
 
 
 def _left_out(study: StudyRecord) -> Iterator[str]:
-    """Values that decide the result and that the file leaves to the packaged ones."""
+    """Values that decide the result, but that the file leaves out, so that the packaged values are used."""
     config, coupling = study.config, study.config.coupling
     if config.packaged:
         return
@@ -102,7 +102,7 @@ def _left_out(study: StudyRecord) -> Iterator[str]:
 
 
 def _on_start(study: StudyRecord) -> None:
-    """That the feed came to a machine that had not its speed."""
+    """Warn where the feed came to a machine that did not have its speed yet."""
     run, fed = study.runs["start_up"], study.fed_from
     if fed is None:
         return
@@ -130,11 +130,11 @@ _LIMITS = {
     "and a start that takes longer overheats it as a locked rotor does: a lighter flywheel, a larger motor, or "
     'start = "inverter".',
 }
-"""What is said where a limit of the motor is passed."""
+"""By limit of the motor, the warning where it is exceeded."""
 
 
 def _on_limits(study: StudyRecord) -> None:
-    """That the motor does not stand its start or its steady running."""
+    """Warn where the motor exceeds a limit in its start or in steady running."""
     steady, warn = study.answers[STEADY], study.warn
     key, permitted = study.config.permitted_temperature
     for name, check in motor_limits(study).items():
@@ -144,7 +144,7 @@ def _on_limits(study: StudyRecord) -> None:
         if name == "temperature":
             value, limit = steady.winding_temperature, permitted
             if not math.isfinite(value):
-                # there is a remark of its own
+                # that case has its own remark
                 continue
         peak = 0.0 if study.start is None else study.start.current_peak
         unit = check.unit
@@ -171,8 +171,8 @@ def _on_limits(study: StudyRecord) -> None:
 
 
 def _stalled(study: StudyRecord, steady: Answers) -> float | None:
-    """The crank speed [rad/s] below which a load stalls the motor, where this one does; of a motor of somebody else
-    that is not known."""
+    """The crank speed [rad/s] below which a load stalls the motor, if this motor is stalled; else None. It is
+    not known for a foreign motor."""
     if study.reaches or study.drive.foreign is not None:
         return None
     breakdown = study.drive.breakdown_speed(study.steady)
@@ -180,7 +180,7 @@ def _stalled(study: StudyRecord, steady: Answers) -> float | None:
 
 
 def _why_missed(study: StudyRecord, steady: Answers) -> str:
-    """Why the crank does not turn at the speed asked for."""
+    """The reason why the crank does not turn at the requested speed."""
     if (breakdown := _stalled(study, steady)) is not None:
         below = number(breakdown, "rad/s", "speed", beside=False)
         return (
@@ -259,11 +259,11 @@ _HAPPENED = {
     "trip": "The safety coupling opens after the event",
     "not recovered": "The speed does not return to its steady band within the time followed",
 }
-"""What may happen in a run, by kind, with the limit that it passes."""
+"""By kind of happening in a run, the begin of its warning, with the limit that is exceeded."""
 
 
 def _on_runs(study: StudyRecord) -> None:
-    """What happened in the runs, a remark for each kind of happening with all runs in which it did."""
+    """A remark for each kind of happening in the runs, with all runs in which it occurred."""
     limits: dict[str, Amount] = {"gear passed": (study.config.gear.torque_limit, "N.m")}
     if (largest := study.drive.motor.current_limit(study.motor)) is not None:
         limits["current limit"] = largest, "A"
@@ -284,7 +284,7 @@ def _on_runs(study: StudyRecord) -> None:
 
 
 def _happenings(study: StudyRecord, name: str) -> Iterator[tuple[str, str, dict[str, Amount]]]:
-    """What happened in a run: kind, numbers in words, the same as data."""
+    """Each happening in a run: its kind, its numbers in words, and its numbers as data."""
     config, answers = study.config, study.answers[name]
     pulls = answers.web_pull_least, answers.wall_pull_least
     pushed = any(pull is not None and pull < 0.0 for pull in pulls)
@@ -313,11 +313,13 @@ def _happenings(study: StudyRecord, name: str) -> Iterator[tuple[str, str, dict[
 
 
 _SHORT_TIME = 1.5
-"""Times the rated current that an inverter gives for a short time; few give twice."""
+"""Current that an inverter gives for a short time, over the rated current; few give twice the rated
+current."""
 
 
 def _on_inverter(study: StudyRecord) -> None:
-    """The runs whose current an inverter hardly gives: its own limit is not in the model of the motor."""
+    """Note the runs with a current that an inverter can hardly give; its own limit is not in the model of the
+    motor."""
     rated = study.drive.rated_current
     if rated is None or study.config.start != "inverter":
         return
@@ -342,7 +344,7 @@ _SPOILED = {
     "trips": "in {share} of them the safety coupling opens",
     "stalls": "in {share} of them the crank stands at the end",
 }
-"""What a run of a random overload may end in, by its quantity."""
+"""By quantity of a random run, the words on the share of the runs that end so."""
 
 
 def _on_random_overloads(study: StudyRecord) -> None:
@@ -369,7 +371,7 @@ def _on_random_overloads(study: StudyRecord) -> None:
 
 
 def _on_assumptions(study: StudyRecord) -> None:
-    """What the assumption of an event makes of its peaks."""
+    """Note the effect of the assumption of an event on its peaks."""
     coupling = study.config.coupling
     for name, spread in study.spreads.items():
         event = study.config.events[name]
@@ -388,7 +390,7 @@ def _on_assumptions(study: StudyRecord) -> None:
 
 
 def _on_chains(study: StudyRecord, chain: ChainOrgans) -> None:
-    """What the reader has to know of the chains."""
+    """The remarks on chains."""
     (walls, webs), result = study.drive.rods, study.chain
     warn, note = study.warn, study.note
     note(
@@ -421,11 +423,11 @@ def _on_chains(study: StudyRecord, chain: ChainOrgans) -> None:
 
 
 FELT = 1.1
-"""A lump whose peak torque is below that many times the one of steady running is hardly felt by the drive."""
+"""The drive hardly feels a lump whose peak torque is below this multiple of the peak in steady running."""
 
 
 def _on_folding(study: StudyRecord) -> None:
-    """Lumps on a stroke on which the web folds before them: the drive feels them on the other stroke alone."""
+    """Warn of lumps on the stroke on which the web folds: the drive feels a lump only on the other stroke."""
     steady = study.answers.get(STEADY)
     for run, event in study.config.events.items():
         answers = study.answers.get(run)
@@ -443,7 +445,7 @@ def _on_folding(study: StudyRecord) -> None:
 
 
 def _on_shaft(study: StudyRecord) -> None:
-    """What the reader has to know of the driveline."""
+    """The remarks on the driveline."""
     line, modes = study.drive.line, study.statics.torsion
     assert modes is not None
     warn, note = study.warn, study.note

@@ -1,4 +1,4 @@
-"""Everything that a study found as data: what result.json holds."""
+"""All results of a study as data: the content of result.json."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ def _motor(study: StudyRecord) -> dict[str, Any]:
     kind = study.drive.graph.components["motor"].title
     plate = study.sizing.best.motor if study.sizing else study.config.plate
     titles = {"kind": kind, "title": plate.designation if plate else kind}
-    # of an FMU of somebody else no parameters are known
+    # the parameters of a foreign motor are not known
     return titles | _rating(plate) | ({} if study.motor is None else entries(study.motor))
 
 
 def _rating(motor: CatalogueMotor | None) -> dict[str, Any]:
-    """Of a motor of the catalogue."""
+    """The rating of a motor of the catalogue."""
     if motor is None:
         return {}
     plate = motor.nameplate
@@ -38,7 +38,7 @@ def _rating(motor: CatalogueMotor | None) -> dict[str, Any]:
 
 
 def as_dict(study: StudyRecord) -> dict[str, Any]:
-    """Everything but the time series, ready for JSON: each number with its unit."""
+    """All results except the time series, ready for JSON, each number with its unit."""
     with shown_in(study.config.units):
         return _as_dict(study)
 
@@ -72,7 +72,8 @@ def _on_model(study: StudyRecord) -> dict[str, Any] | None:
 
 
 def _given(study: StudyRecord) -> dict[str, Any]:
-    """What the study was given; `origins` says where values come from that are not at their declared start value."""
+    """The given values of the study; `origins` gives the origin of each value that is not its declared start
+    value."""
     sections = given(study)
     names = [name for section in sections for name in section.names]
     found: dict[str, Any] = {"event": {}, "motor": _motor(study)}
@@ -91,7 +92,7 @@ def _put(tree: dict[str, Any], place: str, values: dict[str, Any]) -> None:
 
 
 def _statics(study: StudyRecord) -> dict[str, Any]:
-    """What needs no co-simulation."""
+    """The results that need no co-simulation."""
     statics = study.statics
     return {
         "speed_loop": {
@@ -113,7 +114,7 @@ def _statics(study: StudyRecord) -> dict[str, Any]:
 
 
 def _runs(study: StudyRecord) -> dict[str, Any]:
-    """What was read from the runs, by their names."""
+    """The results of the runs, by the names of the runs."""
     begins = {"start_up": (Phase.START_UP, study.start), "settling": (Phase.SETTLING, study.settling)}
     return {
         "events": {
@@ -145,7 +146,7 @@ def _runs(study: StudyRecord) -> dict[str, Any]:
 
 
 def _spread(study: StudyRecord, name: str) -> dict[str, Any]:
-    """The range that an event assumes, and the peaks over it."""
+    """The range of the assumed quantities of an event, and the peaks over it."""
     spread, units = (
         study.spreads[name],
         {v.name: v.unit for v in variables(study.config.events[name].Parameters)},
@@ -160,7 +161,7 @@ def _spread(study: StudyRecord, name: str) -> dict[str, Any]:
 
 
 def _parts(study: StudyRecord) -> dict[str, Any]:
-    """What only some studies have."""
+    """The parts of the result that only some studies have."""
     config = study.config
     parts = {name: found.as_dict() for name, found in study.findings.items()}
     if study.sizing:
@@ -175,7 +176,7 @@ def _parts(study: StudyRecord) -> dict[str, Any]:
 
 
 def _protection(study: StudyRecord) -> dict[str, Any]:
-    """Settings of the protection of the drive that sizing chose; none for a motor that is insufficient."""
+    """Settings of the protection of the drive that sizing chose; empty where the motor is insufficient."""
     assert study.sizing is not None
     if study.insufficient:
         return {}

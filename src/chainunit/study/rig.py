@@ -1,4 +1,5 @@
-"""The drive of a study on its co-simulation: started, followed through events, left to itself behind a coupling."""
+"""The drive of a study in its co-simulation: the start, the runs through events, and the machine behind an
+open coupling."""
 
 from __future__ import annotations
 
@@ -35,22 +36,23 @@ from .measures import STARTED
 from .window import settled, whole_turns
 
 _LONGEST_START = 30.0
-"""Time after the ramp after which an empty machine is fed, unless it would reach its speed in `_LONGEST_RISE` [s]."""
+"""Time after the ramp at which an empty machine is fed, unless it would reach its speed in `_LONGEST_RISE`
+[s]."""
 _LONGEST_RISE = 600.0
-"""Time after the ramp after which an empty machine is fed, however slowly it turns [s]."""
+"""Time after the ramp at which an empty machine is fed, however slowly it turns [s]."""
 _FEED_RISE = 0.1
-"""Part of a turn in which the feed comes."""
+"""Share of a turn in which the feed comes."""
 PATIENCE = 20.0
-"""Turns, at the speed that is asked, that a study runs on until the motor has settled and made its turns; of a fast
-machine at least as many seconds as `_SETTLES`."""
+"""Number of turns, at the requested speed, for which a study runs on until the motor has settled and made its
+turns; for a fast machine at least the time `_SETTLES`."""
 _SETTLES = 5.0
-"""Time in which a drive settles, whatever the speed of its crank [s]."""
+"""Time in which every drive settles, whatever the speed of its crank [s]."""
 
 
 @dataclass(frozen=True)
 class Transient:
-    """A run with an event that began at `begin` [s]; `signals` are those that it had from there on, `jumps`
-    those among them that are numbers which an event sets at its begin; `lead` is then the run up to there."""
+    """A run with an event that began at `begin` [s]. `signals` are its signals from there on. `jumps` are
+    those among them that the event sets to a number at its begin; `lead` is then the run up to the begin."""
 
     event: Event
     begin: float
@@ -62,8 +64,8 @@ class Transient:
 
 @dataclass(frozen=True)
 class StartUp:
-    """Start-up and steady running: the run, the time from which it is steady and that to which it should have run
-    [s], and the `rig` that it leaves."""
+    """Start-up and steady running: the run, the time from which it is steady and the time to which it should
+    have run [s], and the `rig` with which the study goes on."""
 
     run: xr.Dataset
     steady_from: float
@@ -73,15 +75,15 @@ class StartUp:
 
 @dataclass(frozen=True)
 class Rig:
-    """A drive as the FMUs of `files`, with the loads and the speed of the study; or its `twin`, a function of the
-    system that leaves a part out."""
+    """A drive as the FMUs of `files`, with the loads and the speed of the study; or, with a `twin`, the drive
+    whose system that function has changed, so that a part is left out."""
 
     config: Config
     drive: Drive
     files: Mapping[str, Path]
     twin: Callable[[System], System] | None = None
     fed_from: float | None = None
-    """when the feed came [s], of a machine that starts empty, once it is known"""
+    """time at which the feed came to a machine that starts empty [s], once it is known"""
 
     @property
     def step(self) -> float:
@@ -93,33 +95,33 @@ class Rig:
 
     @property
     def system(self) -> System:
-        """The FMUs and how they are joined."""
+        """The FMUs and their connections."""
         return self._twin(self.drive.system(self.files))
 
     @cached_property
     def graph(self) -> System:
-        """The models and how they are joined."""
+        """The models and their connections."""
         return self._twin(self.drive.graph)
 
     @property
     def rigid(self) -> Rig:
-        """The same without the elasticity and unevenness of the driveline."""
+        """The same rig without the elasticity and unevenness of the driveline."""
         return replace(self, twin=partial(rigid, line="driveline"))
 
     @property
     def plain(self) -> Rig:
-        """The same without feed-forward."""
+        """The same rig without feed-forward."""
         return replace(self, twin=partial(without, names=("model",)))
 
     @property
     def guards(self) -> dict[str, float]:
-        """The torque at which a safety coupling opens, at the motor."""
+        """The variable on the motor's shaft at which a safety coupling opens, with its limit."""
         coupling = self.config.coupling
         return {self.drive.motor_torque: coupling.trip_torque / self.drive.ratio} if coupling else {}
 
     @cached_property
     def _inputs(self) -> dict[str, tuple[str, float]]:
-        """Of each input that an event may act on the full name and the value in normal running."""
+        """By input that an event may act on, its full name and its value in normal running."""
         inputs = {
             c.name: (f"{name}.{c.name}", c.start)
             for name in ("motor", "machine")
@@ -138,14 +140,14 @@ class Rig:
         return set(event.inputs(event.side)) <= set(self._inputs) and set(event.reads) <= set(machine)
 
     def event_signals(self, event: Event, begin: float, state: Values) -> Signals:
-        """The signals of the event, by full name, where it begins at `begin` [s] with the outputs `state`."""
+        """The signals of the event, by full name, if it begins at `begin` [s] with the outputs `state`."""
         normal = {name: value for name, (_, value) in self._inputs.items()}
         signals = event.signals(normal, begin, state)
         return {self._inputs[name][0]: signal for name, signal in signals.items()}
 
     def signals(self, given: Mapping[str, OverTime] | None = None, *, ramp: bool = False) -> Signals:
-        """Loads of normal running with what is `given` in their place, and the speed reference, from rest with
-        `ramp`."""
+        """Loads of normal running, or the `changes` in their place, and the speed reference, with `ramp` from
+        rest."""
         run = self.config.run
         loads = self.drive.loads(self.config.feed)
         if ramp and self.config.empty_start:
@@ -156,27 +158,27 @@ class Rig:
             **(given or {}),
             **self.drive.reference(run.crank_speed, run.ramp if ramp else None),
         }
-        # a twin has no use for those of the part that is left out
+        # a twin lacks the inputs of the part that is left out
         return {full: x for full, x in signals.items() if full.partition(".")[0] in self.graph.components}
 
     def _coming(self, empty: float, value: float) -> OverTime:
-        """A load of a machine that starts empty."""
+        """A load of a machine that starts empty, over time."""
         if self.fed_from is None:
             return empty
         return Profile(empty, ((self.fed_from, _FEED_RISE * self.config.turn, value),))
 
     def from_rest(self, event: Event | None = None) -> Simulation:
-        """The simulation from rest on, with the event of a start if there is one."""
+        """The simulation from rest on, with the `event` of a start, if one is given."""
         given = self.event_signals(event, 0.0, {}) if event else {}
         return self.simulation(self.system, self.signals(given, ramp=True))
 
     def simulation(self, system: System, signals: Mapping[str, Any], begin: float = 0.0) -> Simulation:
-        """A system in the way that the study runs.
+        """The simulation of a system by the method of the study.
 
         Raises
         ------
         InputError
-            for an FMU that is not for Model Exchange, where the study asks for that.
+            for an FMU without Model Exchange, if the study uses Model Exchange.
         """
         if self.config.simulation == "cs":
             return CoSimulation(system, signals, begin)
@@ -184,8 +186,9 @@ class Rig:
             return ModelExchange(system, signals, begin)
 
     def lead(self, event: Event, angle: float, speed: float) -> float:
-        """Time of steady running at `speed`, from the crank angle `angle` on, until the crank next stands where the
-        event begins, at least an eighth of a turn [s]; a crank that hardly turns is not waited for."""
+        """Time of steady running at `speed` [rad/s] from the crank angle `angle` [rad] until the crank angle
+        at which the event begins, at least an eighth of a turn [s]. The event does not wait for a crank that
+        hardly turns."""
         ahead = (getattr(event.p, "crank_angle", 0.0) - angle) % (2.0 * math.pi)
         if ahead < 0.25 * math.pi:
             ahead += 2.0 * math.pi
@@ -194,8 +197,9 @@ class Rig:
     def start_empty(
         self, simulation: Simulation, progress: Progress, guards: Mapping[str, float]
     ) -> tuple[xr.Dataset, Rig]:
-        """The start of an empty machine, until its crank turns at `STARTED` of its speed or a guard ends it, or it
-        speeds up too slowly to get there in time; and the rig that is fed from then on."""
+        """The start of an empty machine, until its crank turns at the share `STARTED` of its speed, until a
+        guard ends it, or until it is clear that the machine speeds up too slowly; and the rig that is fed
+        from then on."""
         # behind a shaft line the crank is not where the motor is
         name, ratio = self.drive.crank_speed
         goal = STARTED * self.config.run.crank_speed * ratio
@@ -217,8 +221,8 @@ class Rig:
     def start_up(
         self, simulation: Simulation, stop: float, progress: Progress, guards: Mapping[str, float]
     ) -> StartUp:
-        """Start-up and steady running to the time `stop`, or longer, see `_missing`; of a machine that starts empty
-        as long after it is fed."""
+        """Start-up and steady running to the time `stop` [s], or longer, see `_missing`; a machine that
+        starts empty runs so long after it is fed."""
         rig, pieces, steady_from = self, [], self.config.settled
         if self.config.empty_start:
             run, rig = self.start_empty(simulation, progress, guards)
@@ -235,14 +239,15 @@ class Rig:
             lack, steady_from = self._missing(run, steady_from)
             if lack is None:
                 break
-            # at the speed that is asked at most; what is still missing then is seen in the next round
+            # at most at the requested speed; the next round finds the turns that are still missing then
             stop = min(longest, stop + max(lack * self.config.turn, self.step))
             run = joined([run, simulation.run(stop, self.step, progress, guards=guards)])
         return StartUp(run, steady_from, stop, rig)
 
     def _missing(self, run: xr.Dataset, steady_from: float) -> tuple[float | None, float]:
-        """Turns that are missing of those that are evaluated, where the crank turns too slowly, or the motor has not
-        settled: then running is steady a turn later. None where nothing is missing."""
+        """The number of turns that are still missing for the evaluation, as the crank turns too slowly or the motor
+        has not settled, or None where none is missing; and the time from which running is steady [s], a turn later
+        if the motor has not settled."""
         turns_asked = self.config.run.turns
         since = run.sel(time=slice(steady_from, None))
         turns = self.drive.whole_turns(since, turns_asked)
@@ -263,7 +268,7 @@ class Rig:
         progress: Progress | None = None,
         guards: Mapping[str, float] | None = None,
     ) -> Transient:
-        """An event from the state that was saved, to the time `stop` [s] or until a guard ends it."""
+        """Run an event from the saved state to the time `stop` [s], or until a guard ends it."""
         simulation.restore()
         before: dict[str, float] = {}
         state: dict[str, float] = {}
@@ -284,8 +289,8 @@ class Rig:
         return Transient(event, begin, joined(pieces), signals, jumps, pieces[0] if jumps else None)
 
     def coast(self, transient: Transient, run: xr.Dataset, stop: float, file: Path) -> xr.Dataset:
-        """The machine of the FMU `file` behind the coupling that opened at the end of the `run`, with the loads that
-        it had, for as long as the motor would have been followed and a second more."""
+        """The run of the machine (FMU `file`) behind the coupling that opened at the end of `run`, with the
+        same loads. It ends a second after the time `stop` [s] to which the motor would have been followed."""
         begin = float(run["time"][-1])
         model = self.drive.coasting_model
         start = model.start_from({k: float(x[-1]) for k, x in self.drive.machine_series(run).items()})
@@ -297,8 +302,9 @@ class Rig:
             return simulation.run(max(stop, begin) + 1.0, self.step)
 
     def residuals(self, run: xr.Dataset, lead: xr.Dataset | None = None) -> dict[str, float]:
-        """Writes the energy residual of each shaft into the run, named after what it drives, where that is not the
-        machine; its share of the energy moved. `lead` as of `Transient`."""
+        """Write the energy residual of each shaft into the run; a shaft that does not drive the machine
+        itself is named after the part that it drives. Returns each residual over the energy moved. For `lead`
+        see `Transient`."""
         stored = self.drive.simulated.stored_per_unit
         feed = {f"machine.{name}": partial(self._held, per_unit) for name, per_unit in stored.items()}
         shares = {}
@@ -314,8 +320,9 @@ class Rig:
     def compare(
         self, run: xr.Dataset, transient: Transient | None = None, start: Mapping[str, float] | None = None
     ) -> tuple[dict[str, float], dict[str, float]]:
-        """Compare a run with the monolithic solution of the same signals, from the states `start` on or from rest:
-        the differences of torque and speed in parts of their peaks, and the states at its end."""
+        """Compare a run with the monolithic solution of the same signals, from the states `start` on or from
+        rest. Returns the differences of torque and speed, relative to their peaks, and the states at the
+        end."""
         profiles = transient.signals if transient else {}
         signals: dict[str, Any] = dict(self.signals(profiles, ramp=start is None))
         if transient:
@@ -329,8 +336,8 @@ class Rig:
         return differences, {full: float(reference[full][-1]) for full in map(str, reference.data_vars)}
 
     def release(self, simulation: Simulation, run: xr.Dataset, time: float) -> tuple[xr.Dataset, float]:
-        """A run that ended as the coupling opened, followed until no torque passes it, `time` [s]; with the energy
-        that passed [J]."""
+        """A run that ended when the coupling opened, continued for the `time` [s] until no torque passes the
+        coupling; and the energy that passes in that time [J]."""
         if time <= 0.0:
             return run, 0.0
         release = simulation.run(simulation.time + time, min(self.step, time))
@@ -343,15 +350,17 @@ _SHARE = "energy_residual_share"
 
 
 def worst_residual(shares: Mapping[str, float]) -> float:
-    """The largest energy residual of a run over the energy moved, among its certificates by name."""
+    """The largest of a run's energy residuals over the energy moved; `shares` are its certificates by
+    name."""
     return max(share for name, share in shares.items() if name.endswith(_SHARE))
 
 
 DIFFERENCE = "_difference_to_monolithic"
-"""Ends the name of a variable's largest difference to the monolithic solution, over its peak."""
+"""Suffix of the name of a variable for its largest difference to the monolithic solution, over its peak."""
 
 
 def joined(pieces: list[xr.Dataset]) -> xr.Dataset:
-    """One run from pieces that follow each other; of the instant that two share the later holds."""
+    """One run from pieces that follow each other; at an instant that two pieces share, the later piece
+    counts."""
     shortened = [piece.isel(time=slice(None, -1)) for piece in pieces[:-1]]
     return xr.concat([*shortened, pieces[-1]], "time", data_vars="all") if shortened else pieces[-1]

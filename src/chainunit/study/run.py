@@ -1,7 +1,7 @@
 """The main job: start-up, steady running and overloads of a machine with its motor.
 
-The FMUs are exported, co-simulated, and the answers are read from what they did. Every overload branches from the
-same steady state, saved once.
+The FMUs are exported and co-simulated, and the answers are read from their runs. Every overload branches from
+the same steady state, which is saved once.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from .statics import statics
 from .window import Phase, Trip, whole_turns
 
 _PEAKS = ("crank_torque", "motor_torque", "rocker_torque")
-"""What is told over the range of an assumption."""
+"""The peaks that are given over the range of an assumption."""
 
 
 def run_study(
@@ -50,14 +50,14 @@ def run_study(
     """Run the study; FMUs are written to ``folder/fmu``, by `backend` (see `chainunit.fmu.backends`).
 
     With `check`, every run is also compared with the monolithic solution.
-    A run that fails ends the study early: what was computed is in it, and `failure` says why.
+    A run that fails ends the study early: the record has the earlier results, and `failure` is the error.
 
     Raises
     ------
     InputError
-        for a communication step that is too long for the driveline, a catalogue that sizing cannot use, random
-        overloads that the drive has no inputs for, and a motor of somebody else that does not fit or cannot save its
-        state.
+        for a communication step that is too long for the driveline, a catalogue that sizing cannot use,
+        random overloads for which the drive has no inputs, and a foreign motor that does not fit or cannot
+        save its state.
     """
     with shown_in(config.units):
         return _run_study(config, folder, report or (lambda what, done, todo: None), check, backend)
@@ -95,7 +95,7 @@ def _run_study(
             study.runs["unfinished"] = error.partial
         study.failure = error
     except KeyboardInterrupt:
-        # between two runs, or in one that is not a co-simulation
+        # Ctrl-C came between two runs, or in a run that is not a co-simulation
         study.failure = InterruptedRunError("interrupted")
     study.setting = recommended(study)
     if drive.chain is not None and not isinstance(study.failure, InterruptedRunError):
@@ -105,7 +105,7 @@ def _run_study(
 
 
 def _analyse(study: StudyRecord, rig: Rig, report: Report, *, needs_runs: bool) -> None:
-    """Every analysis that the system has the parts for."""
+    """Make every analysis for which the system has the parts."""
     for analysis in ANALYSES:
         if analysis.needs_runs == needs_runs and analysis.applies(study.config, study.drive):
             found = analysis.find(study, rig, report)
@@ -114,14 +114,15 @@ def _analyse(study: StudyRecord, rig: Rig, report: Report, *, needs_runs: bool) 
 
 
 def _check_random(config: Config, rig: Rig) -> None:
-    """Refuse random overloads that the drive has no inputs for."""
+    """Refuse random overloads for which the drive has no inputs."""
     for event in config.random.hardest():
         if not rig.takes(event):
             raise InputError(f'monte_carlo.event.type = "{event.kind}": {event.without}')
 
 
 def _chains(study: StudyRecord, file: Path, report: Report) -> None:
-    """Chains at constant speed; left out where an FMU in Python would take hours for their many turns."""
+    """Run the chains at constant speed. They are left out without native code, as an FMU in Python would take
+    hours."""
     if study.fmus["machine"].backend != "native":
         study.note(
             "chains left out",
@@ -138,13 +139,13 @@ def _chains(study: StudyRecord, file: Path, report: Report) -> None:
 
 
 class Runner:
-    """Runs a study on its rig, and writes into it what it reads."""
+    """Makes the runs of a study on its rig, and writes the results into the record."""
 
     def __init__(self, study: StudyRecord, rig: Rig, report: Report) -> None:
         config = study.config
         self.study, self.rig, self.report = study, rig, report
         self.stop = config.stop
-        """to which the start-up is run [s]; later where the motor takes longer to settle"""
+        """time to which the start-up is run [s]; later where the motor takes longer to settle"""
         taken = [event for event in config.events.values() if rig.takes(event)]
         self.events = [event for event in taken if not event.from_rest]
         self.starts = [event for event in taken if event.from_rest]
@@ -154,8 +155,8 @@ class Runner:
         self._coasting: Path | None = None
 
     def run(self, check: bool, coasting: Callable[[], Path | None]) -> None:
-        """Every run of the study; `check` compares each with the monolithic solution, `coasting` writes the FMU of
-        the machine behind an open coupling."""
+        """Make every run of the study. With `check` each is compared with the monolithic solution; `coasting`
+        writes the FMU of the machine behind an open coupling."""
         self._export_coasting = coasting
         self._leave_out()
         with self.rig.from_rest() as simulation:
@@ -181,7 +182,7 @@ class Runner:
             try:
                 rigid = self._rigid()
             except RunError as error:
-                # what it has is the rigid drive's, not this one's
+                # the study's values are then those of the rigid drive, not of this one
                 error.partial = None
                 raise
             self._line(rigid)
@@ -193,7 +194,7 @@ class Runner:
         return progress
 
     def _leave_out(self) -> None:
-        """Remarks of events for which the system has no input."""
+        """Add a remark on each event for which the system has no input."""
         for event in self.study.config.events.values():
             if event not in (*self.events, *self.starts):
                 self.study.note(
@@ -201,12 +202,12 @@ class Runner:
                 )
 
     def _start_up(self, simulation: Simulation) -> None:
-        """Start-up and steady running, and what they answer.
+        """Make the start-up and steady running, and read their answers.
 
         Raises
         ------
         RunError
-            where the safety coupling opens in them.
+            where the safety coupling opens in one of them.
         """
         study, rig, config = self.study, self.rig, self.study.config
         progress = self._progress("start-up and steady running", 0.0)
@@ -226,7 +227,7 @@ class Runner:
         begin = steady["time"].values[0]
         end = begin if rig.fed_from is None else rig.fed_from
         start = run.sel(time=slice(None, end))
-        # where the feed comes before it is at speed, the start goes on under the feed
+        # if the feed comes before the machine is at speed, the start goes on under the feed
         whole = study.window(Phase.START_UP, run.sel(time=slice(None, begin)))
         started = read_measure("start_time", whole)
         study.start = replace(read_answers(study.window(Phase.START_UP, start)), start_time=started)
@@ -264,8 +265,8 @@ class Runner:
             self._compare(event.name, transient)
 
     def _close(self, simulation: Simulation, transient: Transient, stop: float, phase: Phase) -> None:
-        """What a transient answers; where the coupling tripped, also what passes it after and how the machine behind
-        it comes to rest."""
+        """Read the answers of a transient. Where the coupling opened, follow it until it passes no torque,
+        and the machine behind it until it comes to rest."""
         study, rig, coupling = self.study, self.rig, self.study.config.coupling
         name, run, trip = transient.event.name, transient.run, None
         study.event[name] = transient.begin
@@ -283,7 +284,7 @@ class Runner:
         self._bearings(name, after)
 
     def _held_shut(self, name: str, run: xr.Dataset) -> None:
-        """What a coupling has to carry that is held shut in starting."""
+        """Record the torque that a coupling has to carry if it is held shut in the start."""
         if self.study.start_apart:
             self.study.start_torques[name] = on_coupling(self.rig.drive, run)
 
@@ -296,8 +297,8 @@ class Runner:
         self.study.runs[name] = run
 
     def _assumption(self, simulation: Simulation, transient: Transient, done: float) -> None:
-        """The peaks over the range that an event assumes, from the steady state that was saved; all without a
-        safety coupling, which would cut them off."""
+        """Record the peaks over the range of the assumption of an event, run from the saved steady state. The
+        runs are without a safety coupling, which would cut the peaks off."""
         event, begin = transient.event, transient.begin
         variants = event.variants()
         if not variants:
@@ -318,12 +319,12 @@ class Runner:
         }
         self.study.spreads[event.name] = Spread(
             {name: (min(x), max(x)) for name, x in ranges.items()},
-            # of a motor of somebody else no torque is known
+            # the torque of a foreign motor is not known
             {name: (min(x), max(x)) for name, x in peaks.items() if None not in x},
         )
 
     def _check(self, transients: list[Transient]) -> None:
-        """Every run from the start-up on beside the monolithic solution."""
+        """Compare every run from the start-up on with the monolithic solution."""
         self.report("monolithic reference of the start-up", self.total, self.total)
         states = self._compare("start_up", None)
         for transient in transients:
@@ -338,7 +339,7 @@ class Runner:
         return end
 
     def _without_feed_forward(self) -> None:
-        """The fluctuation of the speed that the study would have without its feed-forward."""
+        """Record the fluctuation of the speed that the study would have without its feed-forward."""
         study, run = self.study, self.study.config.run
         with self.rig.plain.from_rest() as simulation:
             steady = simulation.run(self.stop, self.rig.step).sel(time=slice(study.settled, None))
@@ -346,8 +347,8 @@ class Runner:
         study.ripple_without = read_answers(study.window(Phase.STEADY, steady)).speed_ripple
 
     def _rigid(self) -> dict[str, xr.Dataset]:
-        """Every run again without the line's elasticity and unevenness, at the same times and with the same
-        coupling."""
+        """Repeat every run without the elasticity and unevenness of the driveline, at the same times and with
+        the same coupling."""
         rig, begins = self.rig.rigid, self.study.event
         runs = {}
         with rig.from_rest() as simulation:
@@ -363,14 +364,14 @@ class Runner:
         return runs
 
     def _line(self, rigid: dict[str, xr.Dataset]) -> None:
-        """What each run asks of the driveline."""
+        """Record the load of the driveline in each run."""
         study, line = self.study, self.study.config.driveline
         assert line is not None
         for name, twin in rigid.items():
             study.runs[name] = with_rigid(study.drive, study.runs[name], twin)
         steady = study.steady
         ended = slice(None, steady["time"].values[0])
-        # the damage of steady running is the measure of the others
+        # the damage of steady running comes first, as that of the other runs is relative to it
         parts = [("steady", steady, rigid["start_up"].sel(time=slice(study.settled, None)))]
         parts.append(("start_up", study.runs["start_up"].sel(time=ended), rigid["start_up"].sel(time=ended)))
         for name, begin in study.event.items():

@@ -24,7 +24,7 @@ from ..system import NAMES
 
 @declaration
 class Ratios:
-    """The papers' ratios, in place of lengths."""
+    """The ratios of the papers, which a file may give in place of lengths."""
 
     rho: Value = quantity("1", "r/l, crank to coupler", default=0.1, above=0.0, max=1.0)
     lam: Value = quantity("1", "h/l, rocker to coupler", default=2.0 / 3.0, above=0.0)
@@ -36,7 +36,7 @@ class Ratios:
 
 @declaration
 class Run:
-    """How the machine is run."""
+    """Speed, duration and step of the runs."""
 
     crank_speed: Value = quantity(
         "rad/s", "speed of the crank in normal running", default=3.0, min=0.01, max=1000.0, kind="speed"
@@ -165,7 +165,8 @@ class FlywheelTable:
 
 @declaration
 class Starter:
-    """How an induction motor is started, where `start` is "soft" or "inverter"; `start` alone says which feeds it."""
+    """The starter of an induction motor, where `start` is "soft" or "inverter"; the key `start` chooses
+    between them."""
 
     soft_start: SoftStart = group(SoftStart, "soft starter", default=SoftStart(voltage=0.5, time=1.0))
     inverter: InverterControl = group(InverterControl, "inverter", default=InverterControl())
@@ -173,7 +174,8 @@ class Starter:
 
 @declaration
 class Driveline(Mounted):
-    """A cardan driveline between motor and machine. The start values are ours: the paper prints no dimensions."""
+    """A cardan driveline between motor and machine. The start values are those of this package, as the paper
+    prints no dimensions."""
 
     exponent: Value = quantity(
         "1",
@@ -186,8 +188,8 @@ class Driveline(Mounted):
 
 @declaration
 class TorsionTable:
-    """The analysis of the torsion of a cardan line in rotation: the speeds of the shaft that it looks at, what is
-    permitted, and the grid of its map of stability."""
+    """The analysis of the torsion of a cardan line in rotation: the speeds of the shaft that are analysed,
+    the permitted values, and the grid of the map of stability."""
 
     slowest: Value = quantity(
         "1", "least speed, in parts of that of normal running", default=0.3, above=0.0, max=1e3
@@ -242,7 +244,8 @@ class ChainOrgans(OrganLaw):
 
 
 def numbers(declared: type, quantity_name: str, name: str, most: int) -> Any:
-    """The type of a list of at most `most` values of a declared quantity, called `name` in a refusal."""
+    """The type of a list of at most `most` values of a quantity of the `declaration`; a refusal calls the
+    list `name`."""
     variable = next(v for v in variables(declared) if v.name == quantity_name)
     variable = dataclasses.replace(variable, name=name)
     value = Annotated[float, BeforeValidator(lambda entry: to_number(variable, entry))]
@@ -250,16 +253,16 @@ def numbers(declared: type, quantity_name: str, name: str, most: int) -> Any:
 
 
 ORGANS = ("two-bar", "chain")
-"""How the organs are modelled."""
+"""The models of the organs."""
 
 JOINTS = ("alpha1", "alpha2", "both")
 """The bends that the map of stability may vary."""
 
 PLACES = ("crank", "motor")
-"""Where a driveline is: on the crank's shaft, behind the gear, or on the motor's, before it."""
+"""The places of a driveline: on the crank's shaft behind the gear, or on the motor's shaft before it."""
 
 SIMULATIONS = ("cs", "me")
-"""How the system runs: as a co-simulation, or as one ODE of Model Exchange FMUs."""
+"""The methods of simulation: as a co-simulation, or as one ODE of Model Exchange FMUs."""
 
 STARTS = ("direct", "soft", "inverter")
 
@@ -323,23 +326,23 @@ SystemTable = create_model(
     motor_names=(_MotorNames, Field(default_factory=_MotorNames)),
     machine_names=(_MachineNames, Field(default_factory=_MachineNames)),
 )
-"""Machine and motor of the system: names of models, of motors in the catalogue, or FMUs of somebody else with the
-names of theirs that differ from ours."""
+"""Machine and motor of the system: names of models, of motors in the catalogue, or of foreign FMUs, with the
+variables whose names differ from ours."""
 
 
 @dataclasses.dataclass(frozen=True)
 class ForeignMotor:
-    """A motor that is an FMU of somebody else."""
+    """A motor that is a foreign FMU."""
 
     file: Path
     names: Mapping[str, str]
-    """names of the FMU by ours, where they differ"""
+    """the FMU's names by ours, where they differ"""
 
 
 @dataclasses.dataclass(frozen=True)
 class FileSection:
-    """A table of a study file. The study has its values, or None where it is `optional` and the file does not have
-    it; a value that it does not name is of `default`."""
+    """A table of a study file. The study has its values, or None if the table is `optional` and the file does
+    not have it; a value that the table does not name is that of `default`."""
 
     declared: type
     default: Any = None
@@ -349,9 +352,9 @@ class FileSection:
     keys: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     """other keys than quantities, as pydantic fields with their descriptions"""
     title: str = ""
-    """of the table in a report"""
+    """title of the table in a report"""
     used: Callable[[Any], bool] = lambda config: True
-    """whether a study, by its configuration, uses a table that it has"""
+    """whether a study uses the table, by its configuration"""
     apart: bool = False
     """whether the result has other things of the same names"""
     form: Callable[..., type[BaseModel]] = schema
@@ -428,7 +431,7 @@ SECTIONS: Mapping[str, FileSection] = {
         title="Torsion of the driveline",
     ),
 }
-"""Tables of every study file, besides those of its machine, its feed, and its motor."""
+"""The tables of every study file, except those of its machine, its feed, and its motor."""
 
 
 def sections_of(machine: type[MachineModel], motor: type[Motor]) -> dict[str, FileSection]:

@@ -21,26 +21,27 @@ from .arrays import peak
 from .drive import Drive
 
 LONGEST_STEP = 0.3
-"""Communication step times natural frequency: above it the coupling feeds the vibration more than it damps."""
+"""Largest product of communication step and natural frequency; above it the coupling excites the vibration
+more than it damps it."""
 RIGID = "driveline.tau2_rigid"
-"""Name in a run's Dataset of the torque in shaft 2 in the same run of the rigid drive."""
+"""Name, in the Dataset of a run, of the torque in shaft 2 in the same run of the rigid drive."""
 UNEVEN = 1e-6
-"""Variation of i23 up to which the line counts as even."""
+"""Variation of the ratio i23 up to which the line counts as even."""
 AMPLIFIED = 1.2
-"""Amplification that is worth a word."""
+"""Amplification from which on a remark is made."""
 ROUNDING = 1e-6
-"""Range of a cycle, in parts of the largest torque, up to which it is rounding and no cycle."""
+"""Range of a cycle, relative to the largest torque, up to which it is rounding and no cycle."""
 CLASSES = 10
-"""Classes of torque range that a table of cycles has."""
+"""Number of classes of torque range in a table of cycles."""
 
 
 @declaration
 class ShaftAnswers:
-    """The load of the shaft line in a run. The rigid drive is the same without elasticity and uneven ratio, inertia
-    kept. `amplification` is the peak torque over that of the rigid drive. `range_equivalent` does, once a turn of
-    the crank, the damage of steady running by Woehler's line with the exponent `driveline.exponent`;
-    `turns_of_steady` is the number of turns of steady running that do the damage of an event; none where it has no
-    cycles."""
+    """The load of the shaft line in a run. The rigid drive is the same drive without elasticity and uneven
+    ratio, with the same inertia. `amplification` is the peak torque over that of the rigid drive. A cycle of
+    `range_equivalent` in each turn of the crank does the damage of steady running, by Woehler's line with the
+    exponent `driveline.exponent`. `turns_of_steady` is the number of turns of steady running that do the
+    damage of an event; None where steady running has no cycles."""
 
     tau2_peak: Value = quantity("N.m", "shaft 2, peak torque")
     tau3_peak: Value = quantity("N.m", "shaft 3, peak torque")
@@ -55,8 +56,8 @@ class ShaftAnswers:
 
 @declaration
 class Torsion:
-    """The line's torsional vibration with this motor and machine, by the formula of paper 002 at i23 = 1, over the
-    machine's inertia in a turn."""
+    """The torsional vibration of the line with this motor and machine, by the formula of paper 002 at i23 =
+    1, over the range of the machine's inertia in a turn."""
 
     k_least: Value = quantity("rad/s", "least natural frequency of torsion")
     k_largest: Value = quantity("rad/s", "largest natural frequency of torsion")
@@ -75,7 +76,7 @@ class Cycles:
     count: Any
 
     def above(self, least: float) -> Cycles:
-        """Those with a range of more than `least` [N m]."""
+        """The cycles with a range of more than `least` [N m]."""
         counted = self.range > least
         return Cycles(self.range[counted], self.mean[counted], self.count[counted])
 
@@ -84,7 +85,8 @@ class Cycles:
         return float(np.sum(self.count * self.range**exponent))
 
     def classes(self, largest: float) -> list[dict[str, float]]:
-        """Number of cycles in equal classes of range up to the `largest`, from above; empty ones are left out."""
+        """Number of cycles in equal classes of range up to the `largest` [N m], largest class first; empty
+        classes are left out."""
         if not largest > 0.0:
             return []
         edges = np.linspace(0.0, largest, CLASSES + 1)
@@ -102,15 +104,15 @@ def rainflow(torque: Any) -> Cycles:
 
 
 def from_peak(torque: Any) -> Any:
-    """A torque that repeats, turned so that it begins and ends at its largest value: then no cycle stays open,
-    for any phase of the window."""
+    """A periodic torque, shifted so that it begins and ends at its largest value. Then no cycle stays open,
+    whatever the phase of the window."""
     first = int(np.argmax(torque))
     return np.concatenate([torque[first:], torque[: first + 1]])
 
 
 def two_masses(drive: Drive, inertia: float) -> Cardan:
-    """The drive's line between its rotor and the machine of that `inertia` at the motor [kg m2]: both inertias at
-    the line's shafts."""
+    """The drive's line between its rotor and a machine with the `inertia` at the motor [kg m2]. Both inertias
+    are reduced to the shafts of the line."""
     line = drive.line
     shafts = {v.name: getattr(line, v.name) for v in variables(ShaftLine)}
     J1 = drive.fmu_parameters.rotor.J * line.ratio**2
@@ -128,7 +130,7 @@ def torsion(drive: Drive, inertia: Any) -> Torsion:
 
 
 def remedies(line: ShaftLine) -> list[str]:
-    """What would make i23 even, in words."""
+    """The changes, in words, that make the ratio i23 even."""
     wanted = []
     if not math.isclose(line.alpha1, line.alpha2, abs_tol=1e-6):
         bends = (number(bend, "rad") for bend in (line.alpha1, line.alpha2))
@@ -141,7 +143,7 @@ def remedies(line: ShaftLine) -> list[str]:
 
 
 def rigid_torque(drive: Drive, rigid: xr.Dataset) -> Any:
-    """Torque in shaft 2 [N m], shape (time,), in a run of the twin with a rigid shaft."""
+    """Torque in shaft 2 [N m], shape (time,), in the run `rigid` of the rigid drive."""
     line, gear = drive.line, "gear.tau" in rigid
     return (
         line.ratio * rigid["gear.tau" if gear else "machine.tau"].values
@@ -150,9 +152,9 @@ def rigid_torque(drive: Drive, rigid: xr.Dataset) -> Any:
 
 
 def with_rigid(drive: Drive, run: xr.Dataset, rigid: xr.Dataset) -> xr.Dataset:
-    """The `run` with the torque in shaft 2 of the same run of the twin with a rigid shaft beside it."""
+    """The `run`, with the torque in shaft 2 in the same run of the rigid drive added."""
     torque = rigid_torque(drive, rigid)
-    # a coupling opens at its own time in each; behind that of the rigid drive there is nothing
+    # a coupling opens at different times in the two runs; after that of the rigid drive there is no value
     there = np.interp(run["time"].values, rigid["time"].values, torque, right=np.nan)
     attributes = {"units": "N.m", "long_name": "torque in shaft 2 of the same drive with a rigid shaft"}
     return run.assign({RIGID: ("time", there, attributes)})
@@ -165,9 +167,9 @@ def shaft_answers(
     exponent: float,
     steady_damage_per_turn: float | None = None,
 ) -> tuple[ShaftAnswers, Cycles, float]:
-    """The load of the line in a `run`, beside the same run of the rigid drive; its cycles, and their damage per
-    turn of the crank, in the unit (N m)^exponent. Without the damage of steady running it is steady running itself:
-    then its cycles close."""
+    """The load of the line in a `run`, compared with the same run of the rigid drive; its cycles; and their
+    damage per turn of the crank, in the unit (N m)^exponent. Without the damage of steady running the run is
+    steady running itself: its cycles are then closed."""
     tau2 = run["driveline.tau2"].values
     peak2, peak_rigid = peak(tau2), peak(rigid_torque(drive, rigid))
     steady = steady_damage_per_turn is None

@@ -1,8 +1,9 @@
 """Sizing of the drive: which motor of the catalogue, behind which gear, with which flywheel.
 
-First the cycle by inverse dynamics, then every candidate is co-simulated by its FMU: a start under load, steady
-running, and steady running with all feed on one side. Each check is a utilisation, value over
-limit. Hand formulas (RMS torque, flywheel, relay) stand here and in `protection`; the rest is read from the runs.
+First the cycle is computed by inverse dynamics. Then the FMU of every candidate is co-simulated: a start
+under load, steady running, and steady running with all feed on one side. Each check is a utilisation, value
+over limit. Hand formulas (RMS torque, flywheel, relay) are here and in `protection`; all else is read from
+the runs.
 """
 
 from __future__ import annotations
@@ -40,26 +41,27 @@ class Flywheel:
 
 
 class Standing(StrEnum):
-    """How a candidate came off."""
+    """The result of a candidate."""
 
     CHOSEN = "chosen"
     FITS = "fits"
     INSUFFICIENT = "insufficient"
-    """the nearest of those that do not fit, where none does: the study goes on with it"""
+    """the nearest candidate, where none fits; the study goes on with it"""
     REJECTED = "rejected"
 
 
 _EVENED = ("speed", "rms_torque", "peak_torque", "temperature")
-"""Checks that a flywheel eases: it evens the speed, and with it the torque of a load that comes and goes."""
+"""Checks that a flywheel improves: it evens the speed, and with it the torque of a varying load."""
 _WORSE_WITH_INERTIA = ("start", "inertia")
-"""Checks that it makes worse."""
+"""Checks that a flywheel makes worse."""
 _SMALL = 0.1
-"""Share of the inertia that is there below which a flywheel evens next to nothing."""
+"""Inertia of a flywheel, relative to all other inertia, below which it hardly evens the speed."""
 _NEAR = 0.2
-"""Relative difference of flywheels that decides nothing between motors: the search finds each to a tenth or so."""
+"""Relative difference of flywheels up to which they count as equal in the ranking, as the search finds each
+flywheel only to about a tenth."""
 _ALIKE = 0.05
-"""Difference of utilisations that decides nothing between motors: one that is just sufficient leaves a limit used by
-90 to 100 %, as the search has it."""
+"""Difference of utilisations up to which they count as equal in the ranking, as the search for a flywheel
+ends where a limit is used by 90 to 100 %."""
 
 
 @dataclass
@@ -70,29 +72,31 @@ class Candidate:
     drive: Drive
     checks: dict[str, Check]
     peak_torque: float = math.nan
-    """of the crank, over start and steady running with either load [N m]"""
+    """largest torque at the crank, in the start and in steady running with either load [N m]"""
     breakdown_torque: float = math.nan
-    """of the motor [N m]"""
+    """breakdown torque of the motor [N m]"""
     duty_torque: float = math.nan
-    """peak at the crank in steady running, and while all feed moves to either side and runs there [N m]"""
+    """peak torque at the crank in steady running, and while all feed moves to either side and stays there [N
+    m]"""
     fluctuation: float = math.nan
     verdict: Standing | None = None
-    """None until it is judged or ranked"""
+    """None until the candidate is judged or ranked"""
     reason: str = ""
 
     @property
     def sizes(self) -> dict[str, float]:
-        """Utilisation by check; infinite where the candidate does not get that far."""
+        """Utilisation by check; infinite where the candidate does not get so far."""
         return {n: math.inf if c.utilisation is None else c.utilisation for n, c in self.checks.items()}
 
     @property
     def violation(self) -> float:
-        """Utilisation of the check that is used most; infinite where its run failed."""
+        """Largest utilisation of all checks; infinite where the run of the candidate failed."""
         return max(self.sizes.values(), default=math.inf)
 
     @property
     def flywheel_at_crank(self) -> float:
-        """Inertia of the flywheel as the crank feels it [kg m2]: behind any gear, a measure of its energy."""
+        """Inertia of the flywheel reduced to the crank [kg m2]: a measure of its energy, whatever the
+        gear."""
         return float(self.drive.flywheel * self.drive.ratio**2)
 
     @property
@@ -103,16 +107,18 @@ class Candidate:
 
 @dataclass
 class SizingResult:
-    """Cycle, candidates in the order of their rank, and which of them is chosen."""
+    """Cycle, candidates in the order of their rank, and the chosen candidate."""
 
     config: Config
     duty: Duty
     candidates: list[Candidate]
     notes: list[str]
     motors: int
-    """motors of the catalogue with a permitted number of poles; `candidates` are those of them that were tried"""
+    """number of motors of the catalogue with a permitted number of poles; `candidates` are those that were
+    tried"""
     weak: int = 0
-    """those that were left out, since their nameplate has not 0.7 times the power that the cycle needs"""
+    """number of motors that were left out, as their rated power is less than 0.7 times the power that the
+    cycle needs"""
 
     @property
     def chosen(self) -> Candidate | None:
@@ -164,8 +170,8 @@ class SizingResult:
 
 
 def size(config: Config, folder: Path, report: Report, backend: Backend | None = None) -> SizingResult:
-    """Choose a motor of the catalogue for the study: at least `sizing.candidates` are tried, from small to large, and
-    then more until one fits or the catalogue ends.
+    """Choose a motor of the catalogue for the study. At least `sizing.candidates` motors are tried, from
+    small to large, and then more until one fits or the catalogue ends.
 
     Parameters
     ----------
@@ -176,7 +182,7 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
     Raises
     ------
     InputError
-        for a catalogue that cannot be read, or that has no motor with the poles that are asked.
+        for a catalogue that cannot be read, or that has no motor with the requested numbers of poles.
     """
     limits = config.sizing
     assert limits is not None
@@ -195,7 +201,8 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
     motors = [
         m for m in catalogue(config.catalogue) if limits.poles_least <= m.nameplate.poles <= limits.poles_most
     ]
-    # from below what the mean power and RMS torque need, so that the first that fits is the smallest
+    # the search begins below the power that the cycle needs, so that the first motor that fits is the
+    # smallest
     power = max(numbers.power_mean, numbers.torque_rms * config.run.crank_speed)
     motors.sort(key=lambda m: (m.nameplate.power, abs(m.nameplate.poles - 4.0)))
     if not motors:
@@ -229,12 +236,14 @@ def _exporting(report: Report, what: str) -> None:
 
 
 def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[str, Path]) -> Candidate:
-    """The candidate as it is, or with the least flywheel, to about a tenth, that keeps the speed as asked and the
-    motor within its torque and temperature; as it is, too, where it misses a limit that no flywheel heals. Where the
-    flywheels that do so miss another limit, the one that comes nearest to all.
+    """The candidate with the least flywheel, to about a tenth, that keeps the permitted fluctuation and the
+    limits of torque and temperature. It has no flywheel where none is needed, or where it exceeds a limit
+    that no flywheel improves. If such a flywheel exceeds another limit, it is the flywheel that comes nearest
+    to all limits.
 
-    The largest tried is that of the hand formulas for the speed, which leaves out that a motor's torque falls with
-    speed and evens it, too, and for the torque; none is where that is a small part of the inertia which is there."""
+    The largest flywheel that is tried is that of the hand formulas for speed and torque. It is on the safe
+    side for the speed, as the formula leaves out that a motor's torque falls with speed, which evens the
+    speed, too. None is tried where this flywheel is a small part of the other inertia."""
     there = bare.drive.rotor_inertia + duty.numbers.inertia_mean / bare.drive.ratio**2
     tried: list[Candidate] = []
 
@@ -273,18 +282,19 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
 
 
 def torque_evening_inertia(c: Candidate, numbers: CycleNumbers, crank_speed: float) -> float:
-    """Inertia on the motor's shaft [kg m2] that brings the RMS and peak torque of a candidate, where it passes their
-    limits, down to them by hand; 0 where it passes none, or the mean torque does alone.
+    """Inertia on the motor's shaft [kg m2] that brings the RMS and peak torque of a candidate down to their
+    limits, by hand; 0 where it exceeds neither limit, or where the mean torque alone exceeds one.
 
-    A motor whose torque falls by D [N m s/rad] with speed gives 1/sqrt(1 + (n w J/D)^2) of the n-th harmonic of the
-    load, w the crank speed [rad/s]; that of the first is taken for all, which is on the safe side."""
+    A motor whose torque falls by D [N m s/rad] with speed gives 1/sqrt(1 + (n w J/D)^2) of the n-th harmonic
+    of the load, with the crank speed w [rad/s]. The factor of the first harmonic is taken for all, which is
+    on the safe side."""
     plate, ratio = c.motor.nameplate, c.drive.ratio
     mean, rms = numbers.torque_mean / ratio, numbers.torque_rms / ratio
     peak = max(numbers.torque_peak, numbers.torque_peak_one_sided or 0.0) / ratio
     limit = {
         name: c.checks[name].limit for name in ("rms_torque", "peak_torque") if c.sizes.get(name, 0.0) > 1.0
     }
-    # of load and limit what is beyond the mean
+    # the parts of load and limit above the mean
     beyond = []
     if "rms_torque" in limit:
         beyond.append((rms**2 - mean**2, limit["rms_torque"] ** 2 - mean**2))
@@ -296,14 +306,14 @@ def torque_evening_inertia(c: Candidate, numbers: CycleNumbers, crank_speed: flo
 
 
 def evened(c: Candidate) -> bool:
-    """Whether no check is passed that a flywheel eases."""
+    """Whether the candidate keeps every limit that a flywheel improves."""
     return not any(1.0 < c.sizes.get(name, 0.0) < math.inf for name in _EVENED)
 
 
 def too_heavy(c: Candidate) -> bool:
-    """Whether a check is passed that a flywheel makes worse, or the run failed."""
+    """Whether the candidate exceeds a limit that a flywheel makes worse, or its run failed."""
     sizes = {name: c.sizes.get(name, 0.0) for name in (*_WORSE_WITH_INERTIA, "starts", "temperature")}
-    # a winding that is too hot from running alone permits no starts either
+    # a winding that is too hot from running alone permits no starts, too
     return (
         not c.checks
         or any(sizes[name] > 1.0 for name in _WORSE_WITH_INERTIA)
@@ -312,7 +322,7 @@ def too_heavy(c: Candidate) -> bool:
 
 
 def proposed(config: Config, motor: CatalogueMotor, duty: Duty) -> Candidate:
-    """A motor with the gear ratio at which the crank has its speed, without a flywheel."""
+    """A candidate without a flywheel, with the gear ratio at which the crank has its speed."""
     assert config.sizing is not None
     drive = catalogue_drive(config, motor, duty.normal.crank_torque, config.sizing.ambient)
     return Candidate(motor, drive, {})
@@ -333,8 +343,9 @@ def judge(config: Config, c: Candidate, duty: Duty, files: Mapping[str, Path]) -
 
 
 def rank(candidates: list[Candidate]) -> None:
-    """Order by rank and say why: what fits as `in_rank` has it, then what does not by how far it is off, which is the
-    utilisation of its most used check; of those that do not start at all the larger is nearer."""
+    """Order the candidates by rank and set their reasons. First come those that fit, see `in_rank`, then
+    those that do not fit, by their largest utilisation; among those that do not start at all a larger motor
+    comes first."""
     for c in candidates:
         over = [check for name, check in c.checks.items() if c.sizes[name] > 1.0]
         if c.fits:
@@ -344,7 +355,7 @@ def rank(candidates: list[Candidate]) -> None:
                 f"most used: {most.title}, {number(c.violation, '1', 'used')}",
             )
         elif not c.checks:
-            # its run failed, and the reason is there
+            # the run failed, and the reason is already set
             c.verdict = Standing.REJECTED
         elif math.isinf(c.violation):
             c.verdict, c.reason = Standing.REJECTED, "it does not bring the machine up to speed"
@@ -367,8 +378,8 @@ def rank(candidates: list[Candidate]) -> None:
 
 
 def in_rank(fitting: list[Candidate]) -> list[Candidate]:
-    """Candidates that fit, best first: the smaller power; of equal power the lighter flywheel beyond `_NEAR`; of
-    equal flywheels the one whose limits are less used beyond `_ALIKE`; else by designation."""
+    """Candidates that fit, best first: by smaller power, then by lighter flywheel if they differ by more than
+    `_NEAR`, then by smaller utilisation if they differ by more than `_ALIKE`, then by designation."""
     rest, ordered = sorted(fitting, key=lambda c: c.motor.designation), []
     while rest:
         power = min(c.motor.nameplate.power for c in rest)
@@ -382,7 +393,7 @@ def in_rank(fitting: list[Candidate]) -> list[Candidate]:
 
 
 def _behind(c: Candidate, best: Candidate) -> str:
-    """Why a candidate that fits comes after the best."""
+    """The reason why a candidate that fits comes after the best one."""
     if c.motor.nameplate.power > best.motor.nameplate.power:
         return "larger than needed"
     if c.flywheel_at_crank > (1.0 + _NEAR) * best.flywheel_at_crank:

@@ -18,14 +18,14 @@ from .shaft import Torsion, torsion
 
 @dataclass(frozen=True)
 class DriveStatics:
-    """Results on a machine and its drive before they run."""
+    """Results on a machine and its drive that need no run."""
 
     cycles: dict[str, Cycle]
-    """turns at constant speed, by how the machine is loaded"""
+    """turns at constant speed, by load case"""
     loops: dict[str, Loop] = field(default_factory=dict)
-    """the linearised speed loop of a controlled motor, by which inertia"""
+    """the linearised speed loop of a controlled motor, by the inertia that is used (mean, least, largest)"""
     torsion: Torsion | None = None
-    """of the driveline, if there is one"""
+    """torsion of the driveline, if there is one"""
 
     @property
     def normal(self) -> Cycle:
@@ -34,7 +34,7 @@ class DriveStatics:
 
 
 def statics(config: Config, drive: Drive) -> DriveStatics:
-    """Everything of a study that needs no co-simulation.
+    """All results of a study that need no co-simulation.
 
     Raises
     ------
@@ -57,12 +57,12 @@ def statics(config: Config, drive: Drive) -> DriveStatics:
 
 
 _CONSTANT = 1e-9
-"""Relative variation of the inertia in a turn up to which it is constant."""
+"""Relative variation of the inertia in a turn up to which it counts as constant."""
 
 
 def _loops(drive: Drive, inertia: Any) -> dict[str, Loop]:
-    """The speed loop with the mean, the least and the largest inertia of the turn, where the motor has one; with the
-    mean alone where the inertia is constant."""
+    """The speed loop with the mean, the least and the largest inertia of the turn; only with the mean where
+    the inertia is constant. Empty for a motor without a speed loop."""
     sizes = {"mean inertia": np.mean(inertia)}
     if np.ptp(inertia) > _CONSTANT * np.max(inertia):
         sizes |= {"least inertia": np.min(inertia), "largest inertia": np.max(inertia)}
@@ -74,7 +74,7 @@ def _loops(drive: Drive, inertia: Any) -> dict[str, Loop]:
 
 
 def _torsion(config: Config, drive: Drive, inertia: Any) -> Torsion:
-    """The line's natural frequencies, for which the communication step has to be short enough."""
+    """The natural frequencies of the line; a communication step that is too long for them is refused."""
     line = torsion(drive, inertia)
     if config.run.step > line.step_longest:
         raise InputError(

@@ -17,11 +17,11 @@ def cutting_power(run: xr.Dataset) -> Any:
 
 
 def stored_shares(turns: xr.Dataset, inertia: float) -> tuple[float | None, float | None]:
-    """Energy that rotor, flywheel (together of this `inertia` [kg m2]) and machine lend to a cut, over its work: from
-    the beginning of the cut to its end, and from its beginning to their least energy. None where nothing is cut.
-
-    The rest comes from the motor through the air gap, less friction; towards the end of a cut, where the blade slows
-    down, the motor may already give back to them. `turns` are whole ones, that go on as they began.
+    """Energy that rotor and flywheel (together with the `inertia` [kg m2]) and machine give to a cut, over
+    the work of the cut: from the begin of the cut to its end, and from the begin to their least energy. None
+    where nothing is cut. The rest of the work comes from the motor through the air gap, less friction.
+    Towards the end of a cut, where the blade slows down, the motor may already restore their energy. `turns`
+    are whole, periodic turns.
     """
     power, time = cutting_power(turns), turns["time"].values
     if not np.max(power) > 0.0:

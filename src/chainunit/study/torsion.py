@@ -1,7 +1,7 @@
 """A line with a cardan shaft in rotation: natural frequency, resonance and stability.
 
-The mechanics are in `drives.cardan` and `drives.torsion`; here are the grids of speeds and bends. The analysis of a
-study is in `torsion_findings`.
+The mechanics are in `drives.cardan` and `drives.torsion`. This module makes the grids of speeds and bends.
+The analysis as a part of a study is in `torsion_findings`.
 """
 
 from __future__ import annotations
@@ -43,33 +43,33 @@ from .sections import TorsionTable
 TONGUES = (1, 2, 3, 4)
 """n of the parametric resonances 2 speed = 2 k/n."""
 DENSER = (*TONGUES, 6)
-"""n of the speeds k/n about which the curves have more points; order 6 comes with large bends"""
+"""n of the speeds k/n around which the curves have more points; order 6 appears with large bends"""
 MOST_STEPS = 200_000
-"""of a time simulation"""
+"""largest number of steps of a time simulation"""
 LOST = 0.01
-"""share of the speed by which a time simulation may be off"""
+"""permitted relative deviation of the speed in a time simulation"""
 LEAST_DAMPING = 0.003
-"""below which time simulation would take too long"""
+"""damping ratio below which a time simulation would take too long"""
 DRIFT = 0.01
-"""growth of a deviation of the mean speed [1/s] from which on it is worth a word"""
+"""growth of a deviation of the mean speed [1/s] from which on a remark is made"""
 PEAK = 8
-"""points between a peak of the coarse resonance curve and its neighbours"""
+"""number of points between a peak of the coarse resonance curve and its neighbours"""
 ROUNDOFF = 1e-9
-"""amplitude of an order up to which it is none [rad]"""
+"""amplitude of an order up to which it is roundoff [rad]"""
 SIMULATED = 5
-"""every so many points of the resonance curve are simulated"""
+"""one of so many points of the resonance curve is simulated"""
 
 
 @declaration
 class Rotation:
-    """How the line runs."""
+    """Speed and load at which the line runs."""
 
     speed: Value = quantity("rad/s", "mean speed of the shaft in normal running", kind="speed")
     load: Value = quantity("N.m", "mean torque on the driven inertia")
 
 
 BENT = {"alpha1": ("alpha1",), "alpha2": ("alpha2",), "both": ("alpha1", "alpha2")}
-"""The bends that the map varies, by its joint."""
+"""By joint of the map, the bends that it varies."""
 
 
 def speeds(low: float, high: float, k: float, points: int) -> Any:
@@ -93,7 +93,7 @@ class StabilityMap:
     ratio: tuple[float, ...]
     """damping ratios"""
     joint: str
-    """of the bend: "alpha1", "alpha2" or "both"; any other bend is that of the line"""
+    """the bend that the map varies: "alpha1", "alpha2" or "both"; the other bend is that of the line"""
     growth: Any
     """[1/s], (ratios, bends, speeds); NaN without a steady motion"""
     unstable: Any
@@ -109,7 +109,7 @@ class LineAnalysis:
     ranges: TorsionTable
     damping_ratio: float
     band: FrequencyBand
-    """over a turn of the shaft, with the inertia J4 of `line`"""
+    """natural frequency over a turn of the shaft, with the inertia J4 of `line`"""
     span: tuple[float, float]
     """least and largest natural frequency [rad/s] over a turn of the shaft and a turn of the machine"""
     at_even: float
@@ -117,20 +117,20 @@ class LineAnalysis:
     excitation: dict[int, float]
     """amplitude of phi3 - phi2 by order [rad]"""
     angle: Any
-    """over a turn [rad], (points,)"""
+    """angle of the shaft over a turn [rad], (points,)"""
     ratio: Any
     """i23 over `angle`"""
     frequency: Any
-    """frozen-angle natural frequency over `angle` [rad/s]"""
+    """natural frequency at each fixed `angle` [rad/s]"""
     sensitivity: dict[str, float]
     speed: Any
-    """[rad/s], (speeds,), of `steady` and `rigid`"""
+    """speeds of `steady` and `rigid` [rad/s], (speeds,)"""
     steady: SteadyMotion
     rigid: RigidPeaks
     operating: SteadyMotion
     simulated: SimulatedPeaks | None
     simulated_speed: Any
-    """speeds at which it was to run [rad/s]"""
+    """speeds at which the line should run in the time simulation [rad/s]"""
     map: StabilityMap
 
     @property
@@ -145,7 +145,7 @@ class LineAnalysis:
 
     @property
     def shaken(self) -> bool:
-        """Whether i23 varies."""
+        """Whether the ratio i23 varies."""
         return float(np.ptp(self.ratio)) > 1e-9
 
     @property
@@ -155,46 +155,51 @@ class LineAnalysis:
 
     @property
     def on_speed(self) -> Any:
-        """Which points of the time simulation kept their speed, bool."""
+        """Whether each point of the time simulation kept its speed, an array of bool."""
         assert self.simulated is not None
         return np.abs(self.simulated.speed / self.simulated_speed - 1.0) < LOST
 
     def crossings(self) -> dict[int, tuple[float, float]]:
-        """Speeds at which an order meets the natural frequency, or 2 speed = 2 k/n [rad/s], by n: from and to."""
+        """By n, the range of speeds (from, to) at which order n meets the natural frequency k, or 2 speed = 2
+        k/n [rad/s]."""
         low, high = self.span
         return {n: (low / n, high / n) for n in TONGUES}
 
     def unstable_ranges(self) -> list[tuple[float, float]]:
-        """Ranges of speed in which a torsional disturbance grows [rad/s], between points of the resonance curve."""
+        """Ranges of speed in which a torsional disturbance grows [rad/s], to half the spacing of the
+        resonance curve."""
         return _ranges(self.speed, self.steady.unstable)
 
     def drifting_ranges(self) -> list[tuple[float, float]]:
-        """Ranges of speed that a constant torque does not hold, though torsion is stable [rad/s]."""
+        """Ranges of speed that a motor of constant torque does not hold, though the torsion is stable
+        [rad/s]."""
         return _ranges(self.speed, (self.steady.free_growth > DRIFT) & ~self.steady.unstable)
 
     def missing_ranges(self) -> list[tuple[float, float]]:
-        """Ranges of speed without a steady motion that repeats itself after half a turn [rad/s]."""
+        """Ranges of speed without a steady motion of the period of half a turn [rad/s]."""
         return _ranges(self.speed, ~self.steady.exists)
 
     def resonances(self) -> list[tuple[float, float]]:
-        """Speed [rad/s] and torque of shaft 2 [N.m] of each peak of the resonance curve, by speed."""
+        """Speed [rad/s] and torque of shaft 2 [N.m] at each peak of the resonance curve, in order of the
+        speed."""
         peak = self.steady.peak2
         return [(float(self.speed[j]), float(peak[j])) for j in _peaks(peak)]
 
 
 def _peaks(curve: Any) -> Any:
-    """Places of the inner maxima that stand out by 2 %, above the ripple of torques that are sampled once a step."""
+    """Indices of the inner maxima with a prominence of at least 2 %, which is above the ripple of torques
+    that are sampled once a step."""
     known = np.isfinite(curve)
     if not known.any():
         return []
     height = np.log(np.maximum(np.where(known, curve, 1.0), 1e-9))
-    # a gap counts as higher than all: beside it no point can be told to be a peak
+    # a gap counts as higher than all points: beside it no point is certain to be a peak
     places, _ = find_peaks(np.where(known, height, height[known].max() + 1.0), prominence=0.02)
     return [int(j) for j in places if known[j]]
 
 
 def _refined(line: Cardan, load: float, speed: Any, curve: SteadyMotion) -> tuple[Any, SteadyMotion]:
-    """The resonance curve with more points about each of its peaks, whose heights a coarse grid misses."""
+    """The resonance curve with more points around each of its peaks, as a coarse grid misses their height."""
     near = [np.linspace(speed[j - 1], speed[j + 1], 2 * PEAK + 1)[1:-1] for j in _peaks(curve.peak2)]
     if not near:
         return speed, curve
@@ -206,7 +211,7 @@ def _refined(line: Cardan, load: float, speed: Any, curve: SteadyMotion) -> tupl
 
 
 def _ranges(x: Any, inside: Any) -> list[tuple[float, float]]:
-    """Ends of the runs of points that are `inside`, half-way to their neighbours outside."""
+    """The ranges of `x` whose points are `inside`; each end is half-way to the next point outside."""
     middle = np.concatenate([x[:1], 0.5 * (x[1:] + x[:-1]), x[-1:]])
     return [(float(middle[a]), float(middle[b])) for a, b in stretches(inside)]
 
@@ -220,9 +225,10 @@ def analyse(
     report: Report = lambda task, done, whole: None,
     varied: tuple[float, ...] = (),
 ) -> LineAnalysis:
-    """Compute everything. `joint` is the bend of the map, for each of the `damping_ratios`, by default that of the
-    line; `varied` are natural frequencies that the line has, too, as the machine's inertia varies [rad/s]; `report`
-    gets the present task, and how much of it is done."""
+    """Make the whole analysis. `joint` names the bend that the map varies; there is a map for each of the
+    `damping_ratios`, by default for that of the line. `varied` are further natural frequencies of the line,
+    as the inertia of the machine varies [rad/s]. `report` is called with the current task and its
+    progress."""
     xp = numpy_()
     k = float(frozen_frequency(xp, line, 1.0))
     angle = np.linspace(0.0, 2.0 * math.pi, 721)
@@ -268,13 +274,13 @@ def analyse(
 
 
 def _excitation(lead: Any, angle: Any) -> dict[int, float]:
-    """Amplitude [rad] of the lead of shaft 3 by order; the last angle of the turn is the first."""
+    """Amplitude [rad] of the lead of shaft 3 by order; the last angle of the turn equals the first."""
     amplitudes = {n: float(2.0 * abs(np.mean(lead[:-1] * np.exp(-1j * n * angle[:-1])))) for n in ORDERS}
     return {n: size if size > ROUNDOFF else 0.0 for n, size in amplitudes.items()}
 
 
 def _simulated(line: Cardan, speed: Any, load: float, progress: Progress) -> SimulatedPeaks | None:
-    """The peaks in time simulation; None where transients take too long to die."""
+    """The peaks in time simulation; None where transients take too long to die out."""
     settle = settling_time(line, 0.01)
     if damping_ratio(line) < LEAST_DAMPING or simulation_steps(line, speed, settle) > MOST_STEPS:
         return None

@@ -1,5 +1,5 @@
-"""The torsion of a cardan line in rotation as an analysis of a study: made of the study's own line, its remarks and
-every number for a file."""
+"""The torsion of a cardan line in rotation as an analysis of a study: the analysis of the study's line, its
+remarks, and its numbers for a file."""
 
 from __future__ import annotations
 
@@ -24,18 +24,20 @@ from .torsion import DRIFT, LineAnalysis, Rotation, analyse
 from .verdict import STEADY
 
 ROUNDOFF_TORQUE = 1e-6
-"""torque up to which it is none [N.m]"""
+"""torque up to which it is roundoff [N.m]"""
 SLOW = 1.0 / 6.0
-"""Speed of the shaft, in parts of the natural frequency, below which no order of the joints comes near it."""
+"""Ratio of the shaft's speed to the natural frequency below which no order of the joints comes near a
+resonance."""
 SLOWEST = 1.0 / 50.0
-"""The same below which the analysis resolves nothing."""
+"""Ratio of the shaft's speed to the natural frequency below which the analysis has no resolution."""
 APART = 1.1
-"""Ratio of two peaks from which on it is worth a word."""
+"""Ratio of two peaks from which on a remark is made."""
 
 
 class TorsionAnalysis(Analysis):
-    """Natural frequency, resonance and Floquet stability of a cardan line between a motor of this package and the
-    machine. It is left out where the line turns too slowly for any resonance, unless the file has its table."""
+    """Natural frequency, resonance and Floquet stability of a cardan line between a motor of this package and
+    the machine. The analysis is left out where the line turns too slowly for any resonance, unless the file
+    has the table [torsion]."""
 
     name = "torsion"
 
@@ -88,7 +90,7 @@ def _torque(x: float) -> Amount:
 
 @dataclass(frozen=True)
 class TorsionFindings(Findings):
-    """What the analysis found."""
+    """The findings of the analysis."""
 
     analysis: LineAnalysis
 
@@ -113,7 +115,7 @@ class TorsionFindings(Findings):
             )
 
     def remarks(self) -> Iterator[Remark]:
-        """What the analysis alone says."""
+        """The remarks that follow from the analysis alone."""
         yield from self._crossings()
         if not self.analysis.operating.exists[0]:
             yield Remark.of(
@@ -130,7 +132,7 @@ class TorsionFindings(Findings):
         yield from self._simulation()
 
     def _crossings(self) -> Iterator[Remark]:
-        """Orders near whose resonance the line runs."""
+        """Remarks on each order near whose resonance the line runs."""
         analysis = self.analysis
         at, margin = analysis.rotation.speed, analysis.ranges.margin
         for n, (low, high) in analysis.crossings().items() if analysis.shaken else ():
@@ -196,7 +198,7 @@ class TorsionFindings(Findings):
             )
 
     def _over_speed(self) -> Iterator[Remark]:
-        """Ranges of speed in which the line does not run well."""
+        """Remarks on ranges of speed in which the line does not run well."""
         analysis = self.analysis
         for low, high in analysis.unstable_ranges():
             yield Remark.of(
@@ -227,7 +229,7 @@ class TorsionFindings(Findings):
             )
 
     def _gains(self) -> Remark:
-        """What raises the natural frequency."""
+        """A remark on the changes that raise the natural frequency."""
         by = self.analysis.sensitivity
         names = {"J1": "rotor J1", "J4": "driven inertia J4", "c2": "shaft 2", "c3": "shaft 3"}
         strongest = sorted(by, key=lambda name: -abs(by[name]))
@@ -239,7 +241,7 @@ class TorsionFindings(Findings):
         return Remark.of("note", "natural frequency", text, **gains)
 
     def _simulation(self) -> Iterator[Remark]:
-        """What the resonance curve and its time simulation leave out."""
+        """Remarks on the limits of the resonance curve and of its time simulation."""
         analysis = self.analysis
         if analysis.damping_ratio <= 0.0:
             text = (

@@ -33,8 +33,9 @@ _GAP = "motor.air_gap_tau"
 
 @dataclass(frozen=True)
 class Trial:
-    """Runs of a motor from the catalogue in a `drive`: a start, steady running, and with all feed on each side;
-    between them those (`shifts`) in which the feed comes or moves and the motor settles."""
+    """Runs of a motor from the catalogue in a `drive`: a start, steady running, and steady running with all
+    feed on each side. The runs `shifts` are between these: in them the feed comes or moves and the motor
+    settles."""
 
     config: Config
     motor: CatalogueMotor
@@ -55,7 +56,7 @@ class Trial:
 
     @cached_property
     def speed(self) -> float:
-        """Of the motor, mean [rad/s]."""
+        """Mean speed of the motor [rad/s]."""
         return float(np.mean(self.steady["motor.w"]))
 
     @cached_property
@@ -66,25 +67,26 @@ class Trial:
 
     @cached_property
     def duty_torque(self) -> float:
-        """Peak at the crank in steady running, and while feed comes, moves to either side and runs there [N m]."""
+        """Peak torque at the crank in steady running, and while the feed comes, moves to either side and
+        stays there [N m]."""
         runs = (self.steady, *self.shifts, *self.one_sided.values())
         return max(peak(self.drive.crank_torque(run)) for run in runs)
 
     @cached_property
     def peak_torque(self) -> float:
-        """The same, and in the start [N m]."""
+        """Peak torque at the crank in all runs, the start included [N m]."""
         return max(self.duty_torque, peak(self.drive.crank_torque(self.start)))
 
     @cached_property
     def frequency(self) -> float:
-        """Of the supply in steady running [Hz]."""
+        """Frequency of the supply in steady running [Hz]."""
         plate = self.motor.nameplate
         return max(self.speed * plate.poles / (4.0 * math.pi), 1.0) if self.drive.follows else plate.frequency
 
     @cached_property
     def breakdown_torque(self) -> float:
-        """Of the motor [N m], as warm as it may become, at the frequency at which it runs: above the corner an
-        inverter has no more voltage."""
+        """Breakdown torque of the motor [N m] at its permitted temperature and at the frequency at which it
+        runs: above the corner frequency the voltage of an inverter does not rise any more."""
         assert self.config.sizing is not None
         p = self.drive.fmu_parameters
         voltage = float(volts_per_hertz(MATH, p, self.frequency)) if self.drive.follows else 1.0
@@ -93,7 +95,8 @@ class Trial:
 
     @cached_property
     def temperature(self) -> float:
-        """Of the winding, as if the duty with its starts went on for ever [K]; `BURNT` where it does not settle."""
+        """Final temperature of the winding if the duty with its starts goes on for ever [K]; `BURNT` where
+        there is none."""
         assert self.config.sizing is not None
         steady, extra = self._heat
         mean = steady + self.config.sizing.starts_per_hour * extra / 3600.0
@@ -102,17 +105,19 @@ class Trial:
 
     @cached_property
     def permitted_starts(self) -> float:
-        """Starts per hour that the winding permits, and of a motor on the line the catalogue."""
+        """Starts per hour that the winding permits; for a motor on the line at most those that the catalogue
+        permits."""
         assert self.config.sizing is not None
         p, plate = self.drive.fmu_parameters, self.motor.nameplate
         warm, cold = (
             1.0 + p.stator.alpha * (T - T_RATED) for T in (self.config.sizing.temperature, self._ran_at)
         )
-        # the runs are short and the winding in them as cold as the surroundings: as warm as it becomes, it heats more
+        # the runs are short and their winding is as cold as the surroundings; a warm winding has larger
+        # losses
         running, start = (warm / cold * heat for heat in self._heat)
         permitted = permitted_starts(p, running, start, self._cooling, self.config.sizing.temperature)
         if plate.starts and self.config.start == "direct":
-            # the catalogue's number is that of the bare rotor
+            # the number of starts in the catalogue is that of the bare rotor
             total = p.rotor.J + float(np.mean(self.drive.load_inertia(self.steady)))
             permitted = min(permitted, plate.starts * plate.J / total)
         return permitted
@@ -128,8 +133,8 @@ class Trial:
 
     @cached_property
     def _heat(self) -> tuple[float, float]:
-        """Heat of the duty [W], and that of a start [J] beyond the running that it leads to: the duty or, of a
-        machine that starts empty, a turn without feed."""
+        """Heat of the duty [W], and the additional heat of a start [J] beyond that of the running which
+        follows it: of the duty or, for a machine that starts empty, of a turn without feed."""
         steady = after = sum(share * float(np.mean(run["motor.heat"])) for share, run in self._cases)
         time, heat = self.start["time"].values, self.start["motor.heat"].values
         if self.config.empty_start:
@@ -146,7 +151,8 @@ class Trial:
         return [(1.0 - share, self.steady), (share, self.one_sided[self.heavier])]
 
     def checks(self) -> dict[str, Check]:
-        """Each value beside its limit, by name; without a value where the machine does not get up to speed."""
+        """Each value beside its limit, by name; the value is None where the machine does not get up to
+        speed."""
         asked, plate, p = self.config.sizing, self.motor.nameplate, self.drive.fmu_parameters
         assert asked is not None
 
@@ -204,13 +210,13 @@ def try_motor(
     """
     plate, turn = motor.nameplate, config.turn
     ramp = config.run.ramp if drive.follows else 0.0
-    # three times as long as the rated torque takes to bring everything up to speed, and at least the ramp of the
-    # start
+    # three times as long as the rated torque takes to bring all inertia up to speed, and at least the ramp of
+    # the start
     inertia = drive.fmu_parameters.rotor.J + duty.numbers.inertia_mean / drive.ratio**2
     rise = config.starter.soft_start.time if config.start == "soft" else ramp
     window = max(1.0, 3.0 * inertia * plate.speed / plate.torque, 1.5 * rise)
     if config.empty_start:
-        # with a turn without feed at its end
+        # the run ends with a turn without feed
         window += turn
     rig = Rig(config, drive, files)
     shifts, one_sided = [], {}
@@ -232,7 +238,8 @@ def try_motor(
 
 
 def _until_settled(rig: Rig, simulation: Simulation, stop: float) -> list[xr.Dataset]:
-    """Runs of two turns, the first to the time `stop` [s], until the ends of one meet; chains' turns never do."""
+    """Runs of two turns, the first to the time `stop` [s], until the turns of a run close; those of chains
+    never close."""
     turn, drive = rig.config.turn, rig.drive
     runs = [simulation.run(stop, rig.step)]
     while drive.chain is None and simulation.time < stop + PATIENCE * turn:
@@ -246,7 +253,7 @@ def _until_settled(rig: Rig, simulation: Simulation, stop: float) -> list[xr.Dat
 def permitted_starts(
     p: Any, running_heat: float, start_heat: float, cooling: float, temperature: float
 ) -> float:
-    """Starts per hour that bring the winding to its permitted `temperature` [K], beside `running_heat` [W], with
-    `start_heat` [J] each; a ten-thousandth where running alone is too hot."""
+    """Starts per hour that bring the winding to its permitted `temperature` [K], with the `running_heat` [W]
+    and the `start_heat` [J] of each start; a ten-thousandth where running alone is too hot."""
     spare = (temperature - p.ambient.T) * cooling / p.stator.R_th - running_heat
     return max(1e-4, 3600.0 * spare / start_heat) if start_heat > 0.0 else 1e6

@@ -18,14 +18,15 @@ from .record import StudyRecord
 from .rig import Rig
 
 POINTS = 3600
-"""Crank angles of the turn."""
+"""Number of crank angles of the turn."""
 EVERY = 10
-"""One of so many angles stands in the result."""
+"""One of so many angles is in the result."""
 
 
 @declaration
 class Turn:
-    """A turn of the crank at constant speed, with the feed of normal running where nothing else is said."""
+    """A turn of the crank at constant speed, with the feed of normal running unless a description says
+    otherwise."""
 
     torque_peak: Value = quantity("N.m", "crank torque, peak")
     torque_peak_free: Value = quantity("N.m", "crank torque, peak, without feed")
@@ -51,12 +52,13 @@ class Reaction:
 
 @dataclass(frozen=True)
 class TurnFindings(Findings):
-    """The turn with the feed (`fed`) and without it (`free`), its numbers, and the reactions by the pins' titles."""
+    """The turn with the feed (`loaded`) and without it (`free`), its numbers, and the reactions by the titles
+    of the pins."""
 
     fed: Cycle
     free: Cycle
     inertia: Any
-    """at the crank [kg m2], shape (POINTS,)"""
+    """inertia at the crank [kg m2], shape (POINTS,)"""
     numbers: Turn
     pins: dict[str, Reaction]
 
@@ -75,11 +77,11 @@ class TurnFindings(Findings):
         }
 
     def remark(self, study: StudyRecord) -> None:
-        """Its numbers speak for themselves."""
+        """No remarks: the numbers are enough."""
 
 
 class TurnAnalysis(Analysis):
-    """Of every machine; of organs that are chains the two bars in their place."""
+    """The turn of every machine; for organs that are chains, with two bars in their place."""
 
     name = "constant_speed"
 
@@ -111,7 +113,8 @@ class TurnAnalysis(Analysis):
 
 
 def _lost(cycle: Cycle, turn: float) -> float:
-    """The energy that is lost in a turn [J]; of an FMU that does not count it, the energy that comes in."""
+    """The energy that is dissipated in a turn [J]; for an FMU without that output, the energy that the shaft
+    brings in."""
     if hasattr(cycle.outputs, "dissipated_power"):
         return float(np.mean(cycle.outputs.dissipated_power)) * turn
     return float(np.mean(cycle.crank_torque)) * 2.0 * np.pi

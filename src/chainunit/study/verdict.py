@@ -1,8 +1,9 @@
 """Whether the model of the organs holds for a machine at its speed: a rule on numbers, and its words.
 
-Two bars hold a chain's place as long as neither is pushed and the crank turns well below the chain's lowest natural
-frequency. Chains hold as long as their energy balance does, no rod folds through its stop, and peaks do not depend on
-the start. Of a machine whose links are not known only the energy balance is judged.
+Two bars are a good model of a chain as long as no bar is pushed and the crank turns well below the lowest
+natural frequency of the chain. Chains are a good model as long as their energy balance is kept, no rod folds
+through its stop, and the peaks do not depend on the start. Only the energy balance is judged for a machine
+whose links are not known.
 """
 
 from __future__ import annotations
@@ -15,13 +16,13 @@ from typing import Any, Literal
 from ..text import entry, number
 
 ROCKER_GOOD, ROCKER_GOOD_EMPTY, CRANK_GOOD = 0.4, 0.2, 0.6
-"""Crank speeds, in parts of the organ's lowest natural frequency, up to which two bars give the rocker torque
-(loaded, with an empty side) and the crank torque to a tenth of the peak of chains: on the packaged machine, see
-docs/physics.md."""
+"""Crank speeds, relative to the lowest natural frequency of the organ, up to which two bars give the rocker
+torque (loaded, with an empty side) and the crank torque to a tenth of the peak of chains; found on the
+packaged machine, see docs/physics.md."""
 RESIDUAL = 1e-3
-"""Energy residual, in parts of the energy moved, up to which a run is taken for right."""
+"""Energy residual, relative to the energy moved, up to which a run counts as right."""
 STEADY = "steady"
-"""Run of normal running; what spoils it leaves nothing that the model is good for."""
+"""Run of normal running; if the model fails in it, the model does not hold at all."""
 START = "start_up"
 """Run from rest to normal running, or to the coming of the feed."""
 SETTLING = "settling"
@@ -31,8 +32,8 @@ _CHAINS = 'take organ = "chain"'
 
 Holds = Literal["true", "in part", "false"]
 Subject = Literal["organs", "machine", "energy balance"]
-"""What is judged: how the organs are modelled, how the machine is, or the energy balance alone, of a machine whose
-own model is not known."""
+"""The subject of the verdict: the model of the organs, the model of the machine, or only the energy balance,
+for a machine whose own model is not known."""
 _SUBJECTS: Mapping[Subject, str] = {
     "organs": "The model of the organs",
     "machine": "The model of the machine",
@@ -87,13 +88,13 @@ _TOPICS = {
         "raise chain.starts",
     ),
 }
-"""What may be wrong: in short for the verdict, as the begin of a line with the numbers, and what helps against it."""
+"""By kind of fault: its words in the verdict, the begin of the line with its numbers, and its remedy."""
 
 
 @dataclass(frozen=True)
 class Reason:
-    """A quantity that passes a limit of the model. `topic` is a key of the words, `run` where it does ("" for the
-    machine itself, at its crank speed)."""
+    """A quantity that exceeds a limit of the model. `topic` is the key of its words; `run` is the run in
+    which it does (empty for the machine itself, at its crank speed)."""
 
     topic: str
     quantity: str
@@ -103,11 +104,11 @@ class Reason:
     run: str = ""
     kind: str = ""
     grave: bool = False
-    """whether it spoils every number of normal running"""
+    """whether it makes every number of normal running wrong"""
 
     @property
     def numbers(self) -> str:
-        """Its value in words, and the limit where the words of the topic do not say it."""
+        """The value in words, with the limit if the words of the topic do not give it."""
         rod = {"web_pull": "web ", "wall_pull": "wall "}.get(self.quantity, "")
         said = self.topic in ("pushed", "slack")
         value, limit = (number(x, self.unit, self.kind, beside=False) for x in (self.value, self.limit))
@@ -123,16 +124,18 @@ class Verdict:
 
     subject: Subject
     model: str
-    """in words: of the organs of a chain unit, of the links of another machine; "" where it is not known"""
+    """the model in words: of the organs of a chain unit, or of the links of another machine; empty if it is
+    not known"""
     speed: float
-    """of the crank, at which the model is judged [rad/s]"""
+    """crank speed at which the model is judged [rad/s]"""
     reasons: tuple[Reason, ...] = ()
     reached: float | None = None
-    """speed that the crank has, where it is judged at the one that is asked for [rad/s]"""
+    """crank speed in the runs [rad/s], if the model is judged at the requested speed instead; else None"""
 
     @property
     def holds(self) -> Holds:
-        """False where normal running is spoiled; in part where an overload or some of the numbers are."""
+        """ "false" where the numbers of normal running are wrong, "in part" where those of an overload or some
+        numbers are."""
         if not self.reasons:
             return "true"
         return "false" if any(reason.grave for reason in self.reasons) else "in part"
@@ -147,12 +150,12 @@ class Verdict:
 
     @property
     def _asked(self) -> bool:
-        """Whether it is judged at a speed that the crank does not have."""
+        """Whether the model is judged at a speed that the crank does not have."""
         return self._turns != self._judged
 
     @property
     def caveat(self) -> str:
-        """To be said beside what rests on a model that does not hold; empty where it does, or fails in part alone."""
+        """Words to add to results of a model that does not hold; empty where it holds, or holds in part."""
         if self.holds != "false":
             return ""
         return (
@@ -174,11 +177,11 @@ class Verdict:
             if runs:
                 why.append(short + _where(runs))
                 remedies.append(remedy)
-        # a remedy against several is named once
+        # a remedy for several faults is named once
         return "; ".join((line, *why, *dict.fromkeys(filter(None, remedies)))) + "."
 
     def details(self, called: Mapping[str, str]) -> list[str]:
-        """A line for each topic: the runs, by what they are `called`, with their numbers."""
+        """A line for each topic: the runs, by their `titles`, with their numbers."""
         lines = []
         for topic, (_, begin, _) in _TOPICS.items():
             runs: dict[str, list[str]] = {}
@@ -232,7 +235,7 @@ def _at_speed(topic: str, speed: float, limit: float, run: str = "", grave: bool
 
 
 def _where(runs: Collection[str]) -> str:
-    """In which of the runs, in words; empty where the machine itself is meant."""
+    """Words on the runs; empty where only the machine itself is meant."""
     if "" in runs:
         return ""
     if STEADY in runs:
@@ -257,13 +260,13 @@ def two_bars(
 
     Parameters
     ----------
-    speed : of the crank, at which it is judged [rad/s]
+    speed : crank speed at which the model is judged [rad/s]
     mode : lowest natural frequency of an organ as a chain [rad/s], infinite where there is none
     slack_speed : crank speed at which a web first goes slack [rad/s], infinite where none does
     pulls : by run, the least pull in a web and in a wall [N], negative where it is pushed
     residuals : by run, the energy residual over the energy moved
-    empty : runs in which a side carries no material, "" where it is so in all
-    reached : speed that the crank has, where that is another [rad/s]
+    empty : runs in which a side carries no material; "" stands for all runs
+    actual : crank speed in the runs, if that is another [rad/s]
     """
     reasons = [
         Reason("pushed", name, pull, 0.0, "N", run, grave=run == STEADY)
@@ -289,18 +292,18 @@ def rigid_links(speed: float, residuals: Mapping[str, float], *, reached: float 
 
     Parameters
     ----------
-    speed, reached : of the crank, at which it is judged, and that it has, where that is another [rad/s]
-    residuals : by run, the energy residual over the energy moved
+    speed, actual : crank speed at which the model is judged, and crank speed in the runs, if that is another
+        [rad/s] residuals : by run, the energy residual over the energy moved
     """
     return Verdict("machine", "rigid links", speed, tuple(_unbalanced(residuals)), reached)
 
 
 def outsider(speed: float, residuals: Mapping[str, float], *, reached: float | None = None) -> Verdict:
-    """The verdict on a machine that is an FMU of somebody else: on its energy balance alone.
+    """The verdict on a machine that is a foreign FMU: only on its energy balance.
 
     Parameters
     ----------
-    speed, reached, residuals : see `rigid_links`
+    speed, actual, residuals : see `rigid_links`
     """
     return Verdict("energy balance", "", speed, tuple(_unbalanced(residuals)), reached)
 
@@ -320,12 +323,11 @@ def chains(
 
     Parameters
     ----------
-    speed : of the crank, at which it is judged [rad/s]
-    residuals, folds, slack : by run, the energy residual over the energy moved, the largest angle between two rods
-        [rad], the share of the time with a slack rod
-    fold_limit : angle from which two rods meet the stop between them [rad]
-    independent, needed : turns at constant speed that count as independent, and how many the quantile takes
-    reached : speed that the crank has, where that is another [rad/s]
+    speed : crank speed at which the model is judged [rad/s] residuals, folds, slack : by run, the energy
+        residual over the energy moved, the largest angle between two rods [rad], the share of the time with a
+        slack rod fold_limit : angle at which two rods meet the stop between them [rad] independent,
+        least_turns : turns at constant speed that count as independent, and the number that the quantile
+        needs actual : crank speed in the runs, if that is another [rad/s]
     """
     reasons: list[Reason] = []
     for run, fold in folds.items():
@@ -347,6 +349,6 @@ def _unbalanced(residuals: Mapping[str, float]) -> list[Reason]:
     return [
         Reason("energy", "energy_residual", share, RESIDUAL, "1", run, grave=run == STEADY)
         for run, share in residuals.items()
-        # NaN, too, is no balance
+        # a balance of NaN is not kept either
         if not share < RESIDUAL
     ]

@@ -1,4 +1,4 @@
-"""A drive with one of the flywheels that a study compares: its answers and the limits that it keeps."""
+"""A drive with one of the flywheels that a study compares: its answers and its limits."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from .window import closes
 
 @declaration
 class FlywheelAnswers:
-    """The drive with a flywheel, in steady running; None where the motor does not start, or stalls under the load."""
+    """Answers of the drive with a flywheel, in steady running; None where the motor does not start, or stalls
+    under the load."""
 
     flywheel: Value = quantity("kg.m2", "flywheel, on the motor shaft")
     inertia: Value = quantity("kg.m2", "all inertia on the motor shaft, mean of the machine's")
@@ -41,8 +42,8 @@ class FlywheelAnswers:
 
 @dataclass(frozen=True)
 class Wheel:
-    """A flywheel with its run; `turns` are the steady ones, or where it makes none all of the run; `checks` are the
-    limits of the motor, by name."""
+    """A flywheel with its run. `turns` are the steady turns, or the whole run where the crank makes none;
+    `checks` are the limits of the motor, by name."""
 
     answers: FlywheelAnswers
     turns: xr.Dataset
@@ -60,19 +61,20 @@ class Wheel:
 
     @property
     def settled(self) -> bool:
-        """Whether its turns close."""
+        """Whether the turns of its run close."""
         return closes(self.answers.cycle_gap or 0.0, self.answers.speed_drift or 0.0)
 
     @property
     def passed(self) -> list[str]:
-        """Limits of motor and start that its run passes, in words."""
+        """Words on each limit of motor and start that its run exceeds."""
         return [check.title for check in self.checks.values() if check.over]
 
     def passes(self, limit: str) -> bool:
-        """Whether its run passes a limit of the motor, if there is one of that name."""
+        """Whether its run exceeds the `limit` of the motor, if the motor has a limit of that name."""
         return limit in self.checks and self.checks[limit].over
 
     def keeps(self, permitted: float) -> bool:
-        """Whether it runs steadily, not on the way to a stall, and keeps the `permitted` fluctuation."""
+        """Whether the drive runs steadily with it, does not approach a stall, and keeps the `permitted`
+        fluctuation."""
         ripple = self.answers.speed_ripple
         return ripple is not None and ripple <= permitted and self.settled

@@ -18,19 +18,20 @@ from .drive import Drive
 BURNT = 2000.0
 """Temperature that stands for a winding without a thermal steady state [K]."""
 CLOSED = 0.01
-"""Gap between the ends of the steady turns up to which they count as closed."""
+"""Gap between the ends of the steady turns up to which the turns count as closed."""
 DRIFT = 0.1
-"""Change of the speed over the steady turns, in parts of its ripple, up to which it counts as steady."""
+"""Change of the speed over the steady turns, relative to its ripple, up to which the speed counts as
+steady."""
 _EVEN = 1e-4
-"""Change of the speed over the steady turns, in parts of itself, that is none."""
+"""Relative change of the speed over the steady turns that counts as none."""
 
 
 class Phase(Enum):
-    """Which part of a study a run is."""
+    """The part of a study to which a run belongs."""
 
     START_UP = auto()
     SETTLING = auto()
-    """of a machine that starts empty: from the coming of its feed to steady running"""
+    """the run of a machine that starts empty, from the coming of its feed to steady running"""
     STEADY = auto()
     EVENT = auto()
     LOADED_START = auto()
@@ -38,8 +39,8 @@ class Phase(Enum):
 
 @dataclass(frozen=True)
 class Trip:
-    """A safety coupling that opened: when [s], the energy that passed it until no torque did [J], and the run of the
-    machine behind it, where it could be followed."""
+    """A safety coupling that opened: the time [s], the energy that passed it before its torque was zero [J],
+    and the run of the machine behind it, where that could be followed."""
 
     time: float
     passed: float
@@ -48,14 +49,15 @@ class Trip:
 
 @dataclass(frozen=True)
 class Window:
-    """The rows of a run that measures are read from, with the drive and the crank speed `asked` for [rad/s]; of an
-    overload when it began [s], the steady running before it, and what opened the coupling."""
+    """The rows of a run from which measures are read, with the drive and the `requested` crank speed [rad/s].
+    For an overload it has the begin [s], the steady running before it, and the opening of the coupling, if it
+    opened."""
 
     phase: Phase
     run: xr.Dataset
     drive: Drive
     sides: tuple[str, ...]
-    """sides whose organs have weight"""
+    """sides whose organs have a weight"""
     asked: float
     begin: float = 0.0
     steady: Window | None = None
@@ -72,22 +74,22 @@ class Window:
 
     @cached_property
     def crank_torque(self) -> Any:
-        """[N m], shape (time,)."""
+        """Torque at the crank [N m], shape (time,)."""
         return self.drive.crank_torque(self.run)
 
     @cached_property
     def speed(self) -> Any:
-        """Of the crank [rad/s], shape (time,)."""
+        """Speed of the crank [rad/s], shape (time,)."""
         return self.drive.crank_motion(self.run)[1]
 
     @cached_property
     def speed_mean(self) -> float:
-        """Of the crank over whole turns [rad/s]."""
+        """Mean speed of the crank over whole turns [rad/s]."""
         return self.mean(lambda run: self.drive.crank_motion(run)[1])
 
     @property
     def coasting(self) -> xr.Dataset | None:
-        """The run of the machine behind the coupling that opened, if there is one."""
+        """The run of the machine behind a coupling that opened; else None."""
         return self.trip.coasting if self.trip else None
 
     @property
@@ -103,15 +105,15 @@ class Window:
 
     @property
     def kept(self) -> float:
-        """Crank speed that the drive keeps where nothing happens [rad/s]: the one that is asked for, or the one that
-        a motor on the line takes."""
+        """Crank speed that the drive keeps without an event [rad/s]: the requested speed, or the speed that a
+        motor on the line takes."""
         if self.drive.follows or self.steady is None:
             return self.asked
         return self.steady.speed_mean
 
     @cached_property
     def settled_temperature(self) -> float:
-        """At which the winding comes to rest if the turns go on for ever [K]; infinite where it does not."""
+        """Final temperature of the winding if the turns go on for ever [K]; infinite where there is none."""
         drive = self.drive
         drive.needs_own("the temperature of the winding")
         names = ("heat", drive.motor.temperature, "w")
@@ -120,7 +122,7 @@ class Window:
 
     @property
     def warm(self) -> float:
-        """Temperature of the winding in steady running [K]; see `BURNT`."""
+        """Temperature of the winding in steady running [K], at most `BURNT`."""
         return min(BURNT, (self.steady or self).settled_temperature)
 
     def mean(self, of: str | Callable[[xr.Dataset], Any]) -> float:
@@ -143,7 +145,8 @@ class Window:
         return float(np.max(np.sqrt(sum((x - middle) ** 2 for x, middle in parts))))
 
     def least_pull(self, rod: str) -> float:
-        """Of a kind of rod on either side [N]; infinite where no organ has weight."""
+        """Least pull in a kind of rod ("web" or "wall") on either side [N]; infinite where no organ has a
+        weight."""
         assert self.drive.chain_unit
         pulls = (float(np.min(self.value(f"machine.{side}.{rod}_pull"))) for side in self.sides)
         return min(pulls, default=math.inf)
@@ -162,24 +165,25 @@ def whole_turns(drive: Drive, run: xr.Dataset, most: float = math.inf) -> xr.Dat
 
 
 def end_gap(drive: Drive, turns: xr.Dataset) -> float:
-    """Difference between the ends of `turns`, of crank speed or torque, over the largest value."""
+    """Difference between the ends of `turns` over the largest value: the larger one of crank speed and
+    torque."""
     _, speed = drive.crank_motion(turns)
     sizes = ((x[-1] - x[0]) / max(np.max(np.abs(x)), 1e-9) for x in (speed, drive.crank_torque(turns)))
     return max(abs(float(size)) for size in sizes)
 
 
 def drift(drive: Drive, turns: xr.Dataset) -> float:
-    """Change of the crank speed from one end of `turns` to the other in parts of its ripple, 1 where it only rises or
-    falls; positive where it rises, 0 where it hardly changes."""
+    """Change of the crank speed between the ends of `turns`, relative to its ripple: 0 where it hardly
+    changes, positive where it rises, 1 or -1 where it only rises or falls."""
     _, speed = drive.crank_motion(turns)
     change = float(speed[-1] - speed[0])
     return change / float(np.ptp(speed)) if abs(change) > _EVEN * float(np.max(np.abs(speed))) else 0.0
 
 
 def closes(gap: float, drifts: float) -> bool:
-    """Whether turns close, by their `end_gap` and `drift`. A heavy flywheel that still speeds up hardly changes its
-    speed in a turn, but may take more power for that than the machine: the change has to be small beside the ripple,
-    too."""
+    """Whether turns close, by their `end_gap` and `drift`. A heavy flywheel that still speeds up hardly
+    changes its speed in a turn, but may take more power for that than the machine. So the change has to be
+    small beside the ripple, too."""
     return gap <= CLOSED and abs(drifts) <= DRIFT
 
 
