@@ -17,7 +17,7 @@ def event_line(*runs: str, **quantities: float) -> str:
 
 def _table(run: str, quantities: dict[str, float]) -> str:
     for kind, of in TYPES.items():
-        for side in ("left", "right") if of.sided else ("",):
+        for side in ("left", "right") if of.has_side else ("",):
             if of.on(side).name == run:
                 names = Layout(of.Parameters).names
                 keys = [f'type = "{kind}"', *([f'side = "{side}"'] if side else [])]

@@ -24,7 +24,7 @@ class Sticking(Event):
 
     kind, run = "sticking", "sticking"
     words, heading = "the pusher sticks", "sticking"
-    role, sided = Role.SHOCK, False
+    role, has_side = Role.SHOCK, False
     acts_on = ("resistance",)
 
     @declaration

@@ -602,7 +602,7 @@ def test_an_even_line_has_nothing_to_warn_of():
 
 def test_without_damping_it_says_so():
     found = findings("[driveline]\nd2 = 0\n" + SMALL)
-    assert found.analysis.simulated is None and found.analysis.damping_ratio == 0.0
+    assert found.analysis.simulation is None and found.analysis.damping_ratio == 0.0
     assert said(found, "Without damping no transient dies", "note")
 
 

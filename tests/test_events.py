@@ -111,7 +111,7 @@ def test_an_event_is_followed_to_its_end_and_a_turn_more(kind):
     """However long it lasts, and however short the turns that are asked for are."""
     of, turn = TYPES[kind], 0.25
     longer = {n: 7.0 for n in Layout(of.Parameters).names if n in ("duration", "shift")}
-    event = of.on("left" if of.sided else "", of.Parameters(turns=1.0, **longer))
+    event = of.on("left" if of.has_side else "", of.Parameters(turns=1.0, **longer))
     normal = dict.fromkeys(event.inputs(event.side), 50.0)
     signals = event.signals(normal, 0.0, dict.fromkeys(event.reads, 0.1)).values()
     end = event.follow(turn) - turn

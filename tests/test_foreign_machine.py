@@ -70,7 +70,7 @@ def burst():
         """The back pressure rises."""
 
         kind, run, words, heading = "burst", "burst", "the back pressure rises", "burst"
-        role, sided = Role.SHOCK, False
+        role, has_side = Role.SHOCK, False
         acts_on = ("back_pressure",)
 
         @declaration
@@ -189,7 +189,9 @@ def test_motor_and_machine_of_somebody_else(folder, burst):
         error = np.abs(study.drive.crank_torque(run) - whole)[inside]
         assert np.max(error) < 0.02 * np.max(np.abs(whole))
     steady = study.answers["steady"]
-    turns = exact(np.linspace(study.settled, study.settled + 2.0 * math.pi / SPEED, 2000))[1] / RATIO
+    turns = (
+        exact(np.linspace(study.steady_begin, study.steady_begin + 2.0 * math.pi / SPEED, 2000))[1] / RATIO
+    )
     assert steady.speed_ripple == pytest.approx(np.ptp(turns) / np.mean(turns), rel=5e-3)
     assert study.answers["burst"].speed_least < steady.speed_least
     # absent: what only a model of motor or machine can tell
@@ -271,7 +273,7 @@ def compare_with_pump(best):
 
 def test_sizing_finds_a_motor_for_it(folder):
     study = run_study(parse(folder, SIZED), folder / "sized")
-    assert study.failure is None and study.sizing.chosen is not None
+    assert study.failure is None and study.sizing.chosen_candidate is not None
     assert study.answers["steady"].speed_mean == pytest.approx(SPEED, rel=1e-2)
     assert study.drive.graph.components["gear"].parameters.ratio == study.drive.ratio
     compare_with_pump(study.sizing.best)

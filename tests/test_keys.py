@@ -64,7 +64,7 @@ def test_each_key_says_what_it_means():
 def _one_key(table, key):
     """A study file with that key alone, at the value that it has where it is left out."""
     if table.name == "event":
-        side = 'side = "left"\n' if TYPES[table.of].sided else ""
+        side = 'side = "left"\n' if TYPES[table.of].has_side else ""
         own = "" if key.name in ("type", "side") else f"{key.name} = {key.left_out}\n"
         machine = {"cut": "KnifeDrive", "overload": "Accelerator"}.get(table.of, "ChamberForces")
         return f'[system]\nmachine = "{machine}"\n[[event]]\ntype = "{table.of}"\n{side}{own}'

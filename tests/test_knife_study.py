@@ -142,7 +142,7 @@ def test_the_share_of_a_path_in_the_stack():
 def test_the_energy_swing_is_that_of_the_torque_above_its_mean():
     """Only one rise of the torque: the swing is what it takes above the mean."""
     found = bare().findings["constant_speed"]
-    torque = found.fed.crank_torque
+    torque = found.loaded.crank_torque
     above = np.maximum(torque - np.mean(torque), 0.0)
     assert found.numbers.energy_swing == pytest.approx(np.sum(above) * 2.0 * math.pi / len(above), rel=1e-9)
 
@@ -188,9 +188,9 @@ def test_cutting_against_the_static_torque_of_the_motor(rig):
     study, rig = rig
     _, answers = steady_turns(at_speed(rig, 0.8))
     found, drive = study.findings["constant_speed"], study.drive
-    p, ratio, angle = drive.fmu_parameters, drive.ratio, study.findings["constant_speed"].fed.angle
+    p, ratio, angle = drive.fmu_parameters, drive.ratio, study.findings["constant_speed"].loaded.angle
     # torque at the speed asked for; what goes with the square of the speed is small here
-    torque, inertia = found.fed.crank_torque / ratio, found.inertia / ratio**2
+    torque, inertia = found.loaded.crank_torque / ratio, found.inertia / ratio**2
 
     def table(phi, y):
         return np.interp(phi / ratio % (2.0 * math.pi), np.append(angle, 2.0 * math.pi), np.append(y, y[0]))
@@ -452,7 +452,7 @@ def test_a_flywheel_is_recommended_where_it_keeps_every_limit(current, start, me
         )
         for J, ripple, share, time, T in sizes
     )
-    FlywheelFindings(2.0, 0.05, 1e3, 150.0, 0.1, mean, [heavy], least, searched=True).remark(study)
+    FlywheelFindings(2.0, 0.05, 1e3, 150.0, 0.1, mean, [heavy], least, is_searched=True).remark(study)
     said = next(remark.text for remark in study.remarks if remark.kind == "least flywheel")
     assert said.endswith(ending)
     assert ("It is not recommended" in said) == ("the limit" in said)

@@ -70,7 +70,7 @@ def test_means_are_over_whole_turns_and_peaks_over_all():
 
 def test_each_measure_has_its_reader_and_its_runs():
     for each in MEASURES.values():
-        assert callable(each.read) and each.during <= set(Phase)
+        assert callable(each.reader) and each.during <= set(Phase)
     assert {v.name for v in measures_of(Phase.START_UP)} == {
         "start_time", "crank_torque_peak", "motor_torque_peak", "current_peak", "rocker_torque_peak",
         "web_pull_least", "wall_pull_least", "slack_time", "fold_largest",

@@ -248,7 +248,7 @@ def test_a_run_that_fails_is_a_row(killed, monkeypatch):
     monte_carlo._worker.popitem()[1].close()
     assert [row["failed"] for row in rows] == [None, "machine: it broke", None]
     result = monte_carlo.MonteCarloResult(rows, killed[0], 0)
-    assert result.failed == 1 and result.quantiles()["crank_torque_peak"] == {}
+    assert result.failures == 1 and result.quantiles()["crank_torque_peak"] == {}
 
 
 def line(number, **changed):

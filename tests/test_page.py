@@ -358,9 +358,11 @@ def test_steady_running_begins_where_the_study_takes_it(study):
     slow = dataclasses.replace(study, config=config, steady_from=None)
     start_up = next(each for each in study_report.report(slow).figures if each.name == "time-start-up")
     (mark,) = page_figures.figure(start_up, DEFAULT_UNITS).layout.annotations
-    assert mark.text == "steady from here" and mark.x == slow.settled == pytest.approx(0.7 + math.pi / 3.0)
+    assert mark.text == "steady from here" and mark.x == slow.steady_begin == pytest.approx(
+        0.7 + math.pi / 3.0
+    )
     first = pictures(study_motion.motion(slow))["runs"][0]
-    assert first["time"][first["still"] - 1] < slow.settled <= first["time"][first["still"]]
+    assert first["time"][first["still"] - 1] < slow.steady_begin <= first["time"][first["still"]]
 
 
 def test_the_verdict_comes_first_everywhere(study, written):

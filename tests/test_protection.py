@@ -164,7 +164,7 @@ def test_one_sided_feed_and_a_loaded_soft_start_are_normal_duty(tmp_path, monkey
     fed = float(abs(study.runs["feed_right"]["motor.tau"]).max()) * study.drive.ratio
     assert study.sizing.best.duty_torque == pytest.approx(fed, rel=0.01)
     (warning,) = [warning for warning in study.warnings if warning.kind == "gear passed"]
-    assert "the gear's permitted 450 N m" in warning.text and study.called("jam_right") in warning.text
+    assert "the gear's permitted 450 N m" in warning.text and study.title_of("jam_right") in warning.text
     assert warning.runs == ("jam_right",) and warning.quantities["passed"] == (450.0, "N.m")
 
 
@@ -333,7 +333,7 @@ def test_the_coming_of_the_feed_belongs_to_the_start_of_a_coupling(tmp_path, mon
     motor = '[system]\nmotor = "IE3 4-pole 0.55 kW, 80M"\n'
     study, said = held_shut(empty + motor + HELD.format(trip=60), tmp_path)
     first = largest(study, "start_up", end=study.fed_from)
-    fed = largest(study, "start_up", study.fed_from, study.settled)
+    fed = largest(study, "start_up", study.fed_from, study.steady_begin)
     assert first > fed > 60.0
     assert study.start_torques == pytest.approx({"start_up": first, "settling": fed})
     assert said.severity == "warning" and said.runs == ("start_up", "settling")

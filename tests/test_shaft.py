@@ -155,7 +155,7 @@ def test_damage_of_a_steady_swing(study, turns, phase):
     does that of as many, but for its open ends."""
     angle = np.linspace(0.0, turns, turns * 400 + 1)
     swing = 7.0 * np.sin(2.0 * np.pi * angle + phase)
-    zero, gear = np.zeros_like(angle), study.drive.driven.p.ratio
+    zero, gear = np.zeros_like(angle), study.drive.driven_machine.p.ratio
     series = {
         "driveline.tau2": swing, "driveline.tau3": swing, "driveline.twist2": zero, "driveline.twist3": zero,
         "machine.phi0": 2.0 * np.pi * angle * gear, "machine.w0": zero,
@@ -178,7 +178,7 @@ def test_rounding_is_no_cycle(study):
     measure of an event."""
     angle = np.linspace(0.0, 2.0, 801)
     even = 375.0 + 8e-7 * np.sin(2.0 * np.pi * 49.0 * angle)
-    zero, gear = np.zeros_like(angle), study.drive.driven.p.ratio
+    zero, gear = np.zeros_like(angle), study.drive.driven_machine.p.ratio
     series = {"driveline.tau2": even, "driveline.tau3": even, "machine.tau": even}
     series |= dict.fromkeys(("driveline.twist2", "driveline.twist3", "machine.w0", "motor.a"), zero)
     series["machine.phi0"] = 2.0 * np.pi * angle * gear
@@ -205,7 +205,9 @@ def test_no_more_runs_are_drawn_beside_each_other_than_fit(study):
     assert len(panels) == 2 * 7 and max(c for _, c, _ in panels) == 2
     # torque above cycles, each with the labels of its own axes
     assert all(drawn.sharing(r, c) == [r] for r, c, _ in panels)
-    assert [panel.title for r, _, panel in panels if r % 2 == 0] == [more.called(name) for name in more.shaft]
+    assert [panel.title for r, _, panel in panels if r % 2 == 0] == [
+        more.title_of(name) for name in more.shaft
+    ]
 
 
 def test_the_report_shows_it(study, tmp_path):
@@ -225,7 +227,7 @@ def test_the_report_shows_it(study, tmp_path):
     head, first = (tmp_path / "load_cycle.csv").read_text().splitlines()[:2]
     assert head == "time [s],speed [rad/s],torque [N.m],inertia [kg.m2]"
     # at the motor: J4 and the machine's inertia through the gear
-    steady = study.runs["start_up"].sel(time=slice(study.settled, None))
+    steady = study.runs["start_up"].sel(time=slice(study.steady_begin, None))
     inertia = (float(steady["machine.J"][0]) + study.drive.line.J4) / 25.0**2
     assert float(first.split(",")[3]) == pytest.approx(inertia, rel=1e-8)
     assert float(first.split(",")[2]) == pytest.approx(float(steady["driveline.tau"][0]), rel=1e-8)
@@ -265,7 +267,7 @@ def test_without_a_motor_that_fits_the_shaft_is_that_of_the_nearest(tmp_path):
     sizing = "[sizing]\ncandidates = 1\ninertia_ratio = 1e-6\npoles_least = 2\npoles_most = 2\n"
     text = f"{LINE}{sizing}[run]\nstep = 0.002\n"
     study = run_study(config.parse(text), tmp_path)
-    assert study.sizing.chosen is None and study.insufficient
+    assert study.sizing.chosen_candidate is None and study.insufficient
     assert study.drive.ratio == study.sizing.best.drive.ratio
     assert set(as_dict(study)["shaft"]) == {"start_up", *study.answers} and "steady" in study.shaft
     write(study, tmp_path)

@@ -275,7 +275,7 @@ def sized(tmp_path_factory):
 
 
 def test_the_smallest_that_fits_is_chosen_and_the_others_are_told_why(sized):
-    chosen = sized.chosen
+    chosen = sized.chosen_candidate
     assert chosen is not None and sized.candidates[0] is chosen
     for c in sized.candidates:
         assert c.reason
@@ -304,7 +304,7 @@ def test_peaks_are_of_both_sides(sized, tmp_path):
     assert sized.duty.numbers.torque_peak_one_sided == pytest.approx(peaks["right"], rel=1e-9)
     assert np.mean(turns["left"] ** 2) > np.mean(turns["right"] ** 2)
 
-    best = sized.chosen
+    best = sized.chosen_candidate
     files, _ = best.drive.export(tmp_path)
     rig = Rig(config, best.drive, files)
     signals = rig.signals(rig.event_signals(config.one_sided("right"), 2.0, {}))
@@ -317,7 +317,7 @@ def test_peaks_are_of_both_sides(sized, tmp_path):
 
 
 def test_the_crank_turns_as_asked(sized, tmp_path):
-    drive = sized.chosen.drive
+    drive = sized.chosen_candidate.drive
     files, _ = drive.export(tmp_path)
     config = parse(HEAVY)
     with Rig(config, drive, files).from_rest() as simulation:
@@ -336,7 +336,7 @@ def test_a_fixed_ratio_is_kept_and_must_give_the_speed(tmp_path, monkeypatch):
     monkeypatch.setattr(sizing, "catalogue", lambda extra: small(1))
     found = sizing.size(one_candidate("[gear]\nratio = 62\n", fluctuation=0.5), tmp_path, lambda *said: None)
     (c,) = found.candidates
-    assert c.drive.ratio == 62.0 and c.verdict is Standing.INSUFFICIENT and found.chosen is None
+    assert c.drive.ratio == 62.0 and c.verdict is Standing.INSUFFICIENT and found.chosen_candidate is None
     assert c.checks["crank_speed"].value == pytest.approx(1.0 - 52.0 / 62.0, abs=0.02)
 
 
@@ -351,7 +351,7 @@ def test_without_a_fit_the_whole_catalogue_is_tried_and_the_nearest_is_named(tmp
     found = sizing.size(
         one_candidate("[gear]\ntorque_limit = 150\n", fluctuation=0.5), tmp_path, lambda *said: None
     )
-    assert found.chosen is None and len(found.candidates) == found.motors == 4
+    assert found.chosen_candidate is None and len(found.candidates) == found.motors == 4
     violations = [c.checks["gear"].utilisation for c in found.candidates]
     assert violations == sorted(violations) and violations[0] > 1.0
     assert [c.verdict for c in found.candidates] == [Standing.INSUFFICIENT] + 3 * [Standing.REJECTED]
@@ -382,8 +382,8 @@ def test_the_remedy_of_the_rejected_example_works(tmp_path):
     assert 'start = "direct"' in text and 'with start = "soft" a motor of 0.55 kW fits' in text
     soft = parse(text.replace('start = "direct"', 'start = "soft"'))
     found = sizing.size(soft, tmp_path, lambda *said: None)
-    assert found.chosen is not None and found.chosen.motor.nameplate.power == 550.0
-    assert all(u <= 1.0 for u in found.chosen.sizes.values())
+    assert found.chosen_candidate is not None and found.chosen_candidate.motor.nameplate.power == 550.0
+    assert all(u <= 1.0 for u in found.chosen_candidate.sizes.values())
 
 
 def test_sizing_climbs_until_one_fits(tmp_path, monkeypatch):
@@ -391,10 +391,10 @@ def test_sizing_climbs_until_one_fits(tmp_path, monkeypatch):
     monkeypatch.setattr(sizing, "catalogue", lambda extra: small(8))
     config = one_candidate("", starts_per_hour=700.0, fluctuation=0.9)
     found = sizing.size(config, tmp_path, lambda *said: None)
-    assert found.chosen is not None and 1 < len(found.candidates) < found.motors
-    others = [c for c in found.candidates if c is not found.chosen]
+    assert found.chosen_candidate is not None and 1 < len(found.candidates) < found.motors
+    others = [c for c in found.candidates if c is not found.chosen_candidate]
     assert all(c.verdict is Standing.REJECTED for c in others)
-    assert all(c.motor.nameplate.power < found.chosen.motor.nameplate.power for c in others)
+    assert all(c.motor.nameplate.power < found.chosen_candidate.motor.nameplate.power for c in others)
 
 
 def test_a_limit_of_the_inertia_ratio_is_for_inverters_or_who_asks_for_it(tmp_path, monkeypatch):

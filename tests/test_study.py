@@ -152,12 +152,12 @@ def test_what_blocks_the_rocker_decides_the_peak(tmp_path):
     study = run_study(config.parse(event_line("blocked", turns=1) + BLOCKED), tmp_path, check=True)
     assert study.failure is None
     found, stop = study.spreads["blocked"], study.config.events["blocked"].p
-    soft, stiff = found.assumed["stiffness"]
+    soft, stiff = found.ranges["stiffness"]
     assert stiff == pytest.approx(10.0 * soft) and soft < stop.stiffness < stiff
     low, high = found.peaks["crank_torque"]
     assert low < study.answers["blocked"].crank_torque_peak < high
     damping = stop.damping * (stiff / stop.stiffness) ** 0.5
-    assert found.assumed["damping"][1] == pytest.approx(damping)
+    assert found.ranges["damping"][1] == pytest.approx(damping)
     line = event_line("blocked", turns=1, stiffness=stiff, damping=damping)
     other = run_study(config.parse(line + BLOCKED), tmp_path)
     for name in ("crank_torque", "motor_torque", "rocker_torque"):
@@ -594,7 +594,7 @@ UNSETTLED = LIGHT + "settle_turns = 0\nramp = 0.01\n"
 def test_the_study_waits_until_the_turns_close(tmp_path):
     """The crank still starts in the first turn; the one that is evaluated is a later one."""
     study, _ = ran(UNSETTLED, tmp_path)
-    assert study.settled > study.config.settled + 1.5
+    assert study.steady_begin > study.config.steady_begin + 1.5
     assert study.answers["steady"].cycle_gap < 0.01 and study.answers["steady"].speed_ripple < 0.05
     assert not any(warning.kind == "turns do not close" for warning in study.warnings)
 
@@ -644,7 +644,7 @@ def test_each_overload_has_its_mirror_on_the_other_side():
         for c in (config.parse(lopsided % sides) for sides in (("left", "right"), ("right", "left")))
     ]
     assert tuple(config.parse("").events) == STANDARD
-    sided = [of for of in TYPES.values() if of.sided]
+    sided = [of for of in TYPES.values() if of.has_side]
     assert {of.kind for of in sided} >= {"empties", "feed", "jam", "lumps", "start"}
     swap = {"left": "right", "right": "left"}
     for of in sided:

@@ -65,7 +65,7 @@ def test_a_pull_below_zero_in_the_start_up_is_told_by_name():
 
 def test_the_speed_is_the_one_that_the_crank_has():
     """Judged at the larger one that is asked for, which is named as such."""
-    slow = bars(30.0, 50.0, 4.58, reached=1.57)
+    slow = bars(30.0, 50.0, 4.58, actual=1.57)
     assert "two bars, the crank at 1.57 rad/s, judged at the 30.0 rad/s asked for; " in slow.text
     assert slow.details(CALLED)[0] == (
         "Crank speed at or above that at which a web goes slack, as it is asked for; the crank turns at 1.57 rad/s: "
@@ -73,7 +73,7 @@ def test_the_speed_is_the_one_that_the_crank_has():
     )
     data = slow.as_dict()
     assert (data["speed"]["value"], data["reached"]["value"]) == (30.0, 1.57)
-    assert "asked" not in bars(3.0, reached=2.999).text
+    assert "asked" not in bars(3.0, actual=2.999).text
     rest = bars(1.57, 50.0, 0.0).details(CALLED)[0]
     assert rest.endswith("a web goes slack: 1.57 rad/s, and it is slack at rest already.")
 

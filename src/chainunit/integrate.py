@@ -125,10 +125,10 @@ def controlled(
 
     Parameters
     ----------
-    rates : gives the derivatives of the states, from the time since the start of the step and the states at
-        that time close : gives states near its argument that meet the model's constraints at that time;
-        called after each substep pace, longest : first substep, 0 where none is known, and longest substep
-        [s] tolerance, nominal : permitted error of a substep, relative to each state or to its nominal size
+    rates : gives the derivatives of the states, from the time since the start of the step and the states at that time
+    close : gives states near its argument that meet the model's constraints at that time; called after each substep
+    pace, longest : first substep, 0 where none is known, and longest substep [s]
+    tolerance, nominal : permitted error of a substep, relative to each state or to its nominal size
 
     Raises
     ------

@@ -43,8 +43,8 @@ class Requirement:
         those = "".join(
             f.format(name=n, value=values[n]) for f, n in zip(formats, self.context, strict=False)
         )
-        bounded = math.isfinite(low), math.isfinite(high)
-        limits = {(True, False): refusals.ABOVE, (False, True): refusals.BELOW}.get(bounded, refusals.BETWEEN)
+        sides = math.isfinite(low), math.isfinite(high)
+        limits = {(True, False): refusals.ABOVE, (False, True): refusals.BELOW}.get(sides, refusals.BETWEEN)
         return refusals.REQUIREMENT.format(
             subject=self.subject,
             value=value,

@@ -384,8 +384,8 @@ def complaint(variable: Variable, x: Any) -> str:
     q = variable.quantity
     free = math.isinf(q.low) and math.isinf(q.high)
     finite = refusals.NUMBER if free else refusals.FINITE.format(allowed=q.allowed_range)
-    allowed = q.allowed_range if math.isfinite(x) else finite
+    allowed_text = q.allowed_range if math.isfinite(x) else finite
     line = refusals.VALUE.format(
-        name=variable.name, value=x, unit=refusals.unit_behind(q.unit), allowed=allowed
+        name=variable.name, value=x, unit=refusals.unit_behind(q.unit), allowed=allowed_text
     )
     return f"{line} ({variable.description})"

@@ -72,11 +72,11 @@ def chosen_units(choices: Mapping[str, Any]) -> Units:
     for kind, unit in choices.items():
         key = f"report.units.{printable(kind, 80)}"
         if kind not in CHOICES:
-            known = f"unknown kind; must be one of {', '.join(CHOICES)}{near_name(kind, CHOICES)}"
-            faults.add([InputError(f"{key}: {known}", key)])
+            problem = f"unknown kind; must be one of {', '.join(CHOICES)}{near_name(kind, CHOICES)}"
+            faults.add([InputError(f"{key}: {problem}", key)])
         elif unit not in CHOICES[kind]:
-            allowed = " or ".join(f'"{name}"' for name in CHOICES[kind])
-            faults.add([InputError(f"{key} = {shown(unit)}: must be {allowed}", key)])
+            allowed_units = " or ".join(f'"{name}"' for name in CHOICES[kind])
+            faults.add([InputError(f"{key} = {shown(unit)}: must be {allowed_units}", key)])
     faults.refuse()
     return {**DEFAULT_UNITS, **{kind: (unit,) for kind, unit in choices.items()}}
 
@@ -109,10 +109,10 @@ def unit_text(unit: str) -> str:
     """A declared unit as it is printed: ``kg.m2`` -> kg m², ``1`` -> nothing."""
     if unit == "1":
         return ""
-    named = unit.replace("Ohm", "Ω").replace("degC", "°C")
-    named = re.sub(r"\bdeg\b", "°", named)
-    raised = re.sub(r"(?<=[A-Za-zΩ])-?\d+", lambda power: power[0].translate(_SUPERSCRIPTS), named)
-    return raised.replace(".", _SPACE)
+    name = unit.replace("Ohm", "Ω").replace("degC", "°C")
+    name = re.sub(r"\bdeg\b", "°", name)
+    text = re.sub(r"(?<=[A-Za-zΩ])-?\d+", lambda power: power[0].translate(_SUPERSCRIPTS), name)
+    return text.replace(".", _SPACE)
 
 
 def digits_text(value: float, digits: int = 3, *, full: bool = True) -> str:
@@ -188,11 +188,11 @@ def array_entry(x: Any, unit: str, kind: str = "") -> dict[str, Any]:
     return {"value": value, "unit": unit} | ({"kind": kind} if kind else {})
 
 
-def entries(instance: Any, *, titled: bool = False) -> dict[str, Any]:
-    """The declared values of an instance as ``{name: entry}``; with `titled`, each with its description."""
+def entries(instance: Any, *, with_titles: bool = False) -> dict[str, Any]:
+    """The declared values of an instance as ``{name: entry}``; with `with_titles`, each with its description."""
     layout = Layout(type(instance))
     return {
-        v.name: entry(value, v.unit, v.kind) | ({"title": v.description} if titled else {})
+        v.name: entry(value, v.unit, v.kind) | ({"title": v.description} if with_titles else {})
         for v, value in zip(layout.variables, layout.values(instance), strict=True)
     }
 
@@ -235,11 +235,11 @@ def turning(text: str, word: str) -> str:
 
 
 def plain(text: str) -> str:
-    """A number and its unit in letters that can be typed, but for the powers of units: 2.34 × 10⁻⁷ kg m² ->
+    """A number and its unit in characters that can be typed, except the powers of units: 2.34 × 10⁻⁷ kg m² ->
     2.34e-7 kg m²."""
     for sign, letters in _PLAIN.items():
         text = text.replace(sign, letters)
-    typed = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+    digits = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
     exponent = f"{_SPACE}×{_SPACE}10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)"
-    text = re.sub(exponent, lambda power: f"e{power[1].translate(typed)}", text)
+    text = re.sub(exponent, lambda power: f"e{power[1].translate(digits)}", text)
     return text.replace(_SPACE, " ")

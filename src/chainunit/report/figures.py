@@ -243,7 +243,7 @@ def _marks(study: StudyRecord, name: str, event: float | None) -> Callable[[bool
             shade = [] if changing is None else [fig.Shade(changing[0] - event, changing[1] - event)]
             return [*shade, fig.Mark(0.0, words="event" if words else "")]
         if name == "start_up" and study.answers:
-            return [fig.Mark(study.settled, words="steady from here" if words else "")]
+            return [fig.Mark(study.steady_begin, words="steady from here" if words else "")]
         return []
 
     return marks
@@ -302,7 +302,7 @@ def _reactions(s: b.Source, study: StudyRecord) -> fig.Figure:
     items = []
     for look, name in enumerate(runs):
         places = np.arange(len(pins)) - 0.42 + (look + 0.5) * height
-        peak = f"{study.called(name)}: peak"
+        peak = f"{study.title_of(name)}: peak"
         for words, size, wide in ((peak, "peak", 0.92), ("dark inner bar: RMS", "rms", 0.34)):
             sizes = [study.pins[name][pin][size] for pin in pins]
             items.append(fig.Bars(words, places, sizes, wide * height, look, slim=size == "rms"))

@@ -41,7 +41,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         yield b.Text(s.line(f"Motor: {{motor.title}}, rated {nameplate}; ratio {{machine.ratio:4}}."))
     if findings.wheels:
         yield _table(s, findings)
-        if findings.retuned:
+        if findings.is_retuned:
             yield b.Text(
                 "The gains of the speed control are tuned to the inertia with each flywheel, except gains that the "
                 "file gives: the runs compare drives as they would be commissioned.",
@@ -128,12 +128,12 @@ def _ripple(findings: FlywheelFindings, running: list[Wheel]) -> fig.Panel:
     items: list[fig.Item] = [
         fig.Curve("by hand, dE/(J w2)", ends, by_hand, 1),
         fig.Curve("co-simulated", inertia, sizes, marker="o"),
-        fig.Mark(findings.permitted, "permitted", axis="y", look=3),
+        fig.Mark(findings.permitted_fluctuation, "permitted", axis="y", look=3),
     ]
     if findings.least in running:
         a = findings.least.answers
         items.append(fig.Curve("least flywheel", [a.inertia], [a.speed_ripple], marker="s", has_line=False))
-    low, high = 0.7 * min(*sizes, findings.permitted), min(2.0, 1.5 * max(by_hand))
+    low, high = 0.7 * min(*sizes, findings.permitted_fluctuation), min(2.0, 1.5 * max(by_hand))
     y = fig.Axis("ripple of the speed", "1", "percent", low=low, high=high, log=True)
     x = fig.Axis("inertia on the motor's shaft", "kg.m2", log=True)
     return fig.Panel(x, y, tuple(items), "Ripple over inertia")

@@ -32,7 +32,7 @@ def title(study: StudyRecord, run: str) -> str:
     """The title of a run."""
     if run.endswith(COASTING):
         return f"{title(study, run.removesuffix(COASTING))}: behind the open coupling"
-    return _TITLES.get(run) or study.called(run)
+    return _TITLES.get(run) or study.title_of(run)
 
 
 def motor_runs(study: StudyRecord) -> list[str]:

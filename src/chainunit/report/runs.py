@@ -35,7 +35,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
 
 def _begin(s: b.Source, study: StudyRecord, run: str, phase: Phase) -> Iterator[b.Block]:
     """The demands of a phase before the steady turns: the start-up, or the settling."""
-    title = study.called(run)
+    title = study.title_of(run)
     numbers = [(v, s.number(f"{run}.{v.name}")) for v in measures_of(phase)]
     rows = [(v.description, size) for v, size in numbers if size.value is not None]
     sizes = join((line(f"{words} ", size) for words, size in rows), "; ")
@@ -68,7 +68,7 @@ def over_runs(
     study: StudyRecord, runs: list[str], rows: Iterable[b.TableRow], title: str, first: str = ""
 ) -> b.Table:
     """A table with a column for each run; the columns of the overloads of a side form a group."""
-    columns = (b.Column(study.called(run), read.short(study, run)) for run in runs)
+    columns = (b.Column(study.title_of(run), read.short(study, run)) for run in runs)
     groups = (tuple(runs.index(run) + 1 for run in group) for group in read.groups(study, runs))
     return b.Table(tuple(rows), (b.Column("", first), *columns), title=title, groups=tuple(groups))
 
@@ -104,7 +104,7 @@ def _pins(s: b.Source, study: StudyRecord) -> b.Table:
         worst = max(tables, key=lambda run: tables[run][pin]["peak"]["value"])
         own = (s.number(f"pins.{reference}.{pin}.{size}") for size in sizes)
         return b.TableRow(
-            (pin, *own, s.number(f"pins.{worst}.{pin}.peak"), study.called(worst), read.short(study, worst))
+            (pin, *own, s.number(f"pins.{worst}.{pin}.peak"), study.title_of(worst), read.short(study, worst))
         )
 
     columns = (

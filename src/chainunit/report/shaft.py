@@ -46,12 +46,12 @@ def _driveline(s: b.Source, study: StudyRecord) -> fig.Figure:
     largest = max(answers.range_largest for answers in study.shaft.values())
     above, below = [], []
     for name in study.shaft:
-        since = 0.0 if name == START else study.settled if name == STEADY else study.event[name]
-        until = study.settled if name == START else None
+        since = 0.0 if name == START else study.steady_begin if name == STEADY else study.event[name]
+        until = study.steady_begin if name == START else None
         run = study.runs[START if name == STEADY else name].sel(time=slice(since, until))
         time = run["time"].values - since
         x = fig.Axis("time", "s", low=0.0, high=float(time[-1]))
-        title = study.called(name)
+        title = study.title_of(name)
         above.append(fig.Panel(x, TORQUE, tuple(shaft_torque(run, time)), title))
         classes = study.cycles_of[name].classes(largest)
         middle = [0.5 * (row["from"] + row["to"]) for row in classes]

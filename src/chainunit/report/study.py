@@ -189,7 +189,7 @@ def _certificate(
         "moved."
     )
     yield b.Text(words, form="long")
-    titles = {run: study.called(run) for run in certificate}
+    titles = {run: study.title_of(run) for run in certificate}
     yield runs.matrix(s, "certificate", titles, "Energy certificate", "run", form="long")
     for name in dict.fromkeys(name for shares in certificate.values() for name in shares):
         run_names = [run for run, shares in certificate.items() if name in shares]

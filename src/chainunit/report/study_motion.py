@@ -104,5 +104,5 @@ def _run(study: StudyRecord, name: str, interval: float, supplement: Supplement)
         (*forces, *details.arrows),
         details.loads,
         event is not None,
-        still=study.settled if event is None else 0.0,
+        still=study.steady_begin if event is None else 0.0,
     )

@@ -178,7 +178,7 @@ def _stability(analysis: LineAnalysis) -> fig.Figure:
 
 
 def _resonance(analysis: LineAnalysis) -> fig.Figure:
-    simulation, panels = analysis.simulated, []
+    simulation, panels = analysis.simulation, []
     for shaft, static in ((2, analysis.static2), (3, analysis.rotation.load)):
         steady, rigid = (np.asarray(getattr(of, f"peak{shaft}")) for of in (analysis.steady, analysis.rigid))
         items: list[fig.Item] = [

@@ -38,7 +38,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
 
 
 def _figure(turn: TurnFindings) -> fig.Figure:
-    inertia = fig.Curve("inertia", turn.fed.angle, turn.inertia, in_legend=False)
+    inertia = fig.Curve("inertia", turn.loaded.angle, turn.inertia, in_legend=False)
     panels = [fig.Panel(ANGLE, fig.Axis("reflected inertia", "kg.m2", low=0.0), (inertia,))]
     if turn.pins:
         panels.append(_reactions(turn))

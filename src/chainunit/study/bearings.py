@@ -18,28 +18,28 @@ def pin_loads(drive: Drive, run: xr.Dataset) -> dict[str, dict[str, float]]:
     if drive.outsider:
         return {}
     table, turns = {}, whole_turns(drive, run)
-    machine = drive.simulated
-    turned = machine.pin_turns(drive.machine_series(turns))
+    machine = drive.simulated_machine
+    angles = machine.pin_turns(drive.machine_series(turns))
     for title, name in machine.model.pins.items():
-        size, evaluated = (
+        forces, forces_of_turns = (
             np.hypot(of[f"machine.{name}.fx"].values, of[f"machine.{name}.fy"].values) for of in (run, turns)
         )
         table[title] = {
-            "peak": float(np.max(size)),
-            "rms": math.sqrt(mean(turns, evaluated**2)),
-            "equivalent": mean_load(evaluated, turned[name]),
+            "peak": float(np.max(forces)),
+            "rms": math.sqrt(mean(turns, forces_of_turns**2)),
+            "equivalent": mean_load(forces_of_turns, angles[name]),
         }
     return table
 
 
-def mean_load(force: Any, turned: Any, exponent: float = 3.0) -> float:
+def mean_load(force: Any, angle: Any, exponent: float = 3.0) -> float:
     """Equivalent load of a bearing [N]: the mean of ISO 281 over the angle that it turns.
 
-    P = (integral of F^p |d alpha| / integral of |d alpha|)^(1/p), with `force` [N] and the angle `turned` [rad] of
+    P = (integral of F^p |d alpha| / integral of |d alpha|)^(1/p), with `force` [N] and the `angle` [rad] of
     the pin in its bearing, both of shape (n,); p = 3 for ball bearings, 10/3 for rollers. Zero where nothing turns.
     """
     force = np.asarray(force)
-    weight = np.abs(np.diff(np.asarray(turned)))
+    weight = np.abs(np.diff(np.asarray(angle)))
     total = float(np.sum(weight))
     if total == 0.0:
         return 0.0

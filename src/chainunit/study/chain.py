@@ -131,7 +131,7 @@ class ChainResult:
     starts: int
     turns: int
     rods: tuple[int, int]
-    failed: Mapping[float, str]
+    failures: Mapping[float, str]
     """by crank speed [rad/s], the reason why the speed is missing in the sweep"""
 
     @property
@@ -148,12 +148,12 @@ class ChainResult:
         """The critical speeds within the sweep, low orders first. A speed is left out if its distance to an
         earlier one is less than the share `apart` of the width of the sweep."""
         low, high = self.sweep[0].speed, self.sweep[-1].speed
-        kept: list[tuple[int, int, float]] = []
-        for each in sorted(self.critical, key=lambda found: (found[1], found[0])):
-            clear = all(abs(each[2] - other[2]) >= apart * (high - low) for other in kept)
+        speeds: list[tuple[int, int, float]] = []
+        for each in sorted(self.critical, key=lambda speed: (speed[1], speed[0])):
+            clear = all(abs(each[2] - other[2]) >= apart * (high - low) for other in speeds)
             if low <= each[2] <= high and clear:
-                kept.append(each)
-        return kept
+                speeds.append(each)
+        return speeds
 
     def rod_name(self, k: int) -> str:
         """The name of rod `k`, counted from 0 at A1."""
@@ -204,7 +204,7 @@ def run_turns(
     settle: int = SETTLE,
     points: int = POINTS,
     progress: Progress = lambda share: None,
-    stopped: Callable[[], bool] | None = None,
+    is_stopped: Callable[[], bool] | None = None,
 ) -> Turns:
     """Steady running at a prescribed constant speed of the crank, from the hanging position at several angles.
 
@@ -215,7 +215,7 @@ def run_turns(
     outputs : names of the outputs to read
     starts, turns, settle, points : see `Turns`, `SETTLE`, `POINTS`
     progress : a function that is called with the share of the work that is complete
-    stopped : a function that says whether to stop, see `stoppable`; by default Ctrl-C stops the run
+    is_stopped : a function that says whether to stop, see `stoppable`; by default Ctrl-C stops the run
 
     Raises
     ------
@@ -225,10 +225,10 @@ def run_turns(
     model, p = drive.load_model()
     rods = [f"{side}.pull_{k + 1}" for side in SIDES for k in range(sum(drive.rods))]
     names = [*outputs, *rods]
-    ratio = drive.driven.p.ratio
+    ratio = drive.driven_machine.p.ratio
     step = 2.0 * math.pi / crank_speed / points
     parameters = model.parameter_layout.by_name(p) | Layout(Feed).by_name(feed)
-    done = [0]
+    finished = [0]
 
     def one(start: int, stop: Callable[[], bool]) -> Any:
         unit = Instance(fmu, f"start {start}")
@@ -249,10 +249,10 @@ def run_turns(
             return rows
         finally:
             unit.close()
-            done[0] += 1
-            progress(done[0] / starts)
+            finished[0] += 1
+            progress(finished[0] / starts)
 
-    guard = nullcontext(stopped) if stopped else stoppable()
+    guard = nullcontext(is_stopped) if is_stopped else stoppable()
     with guard as stop, ThreadPoolExecutor(min(starts, os.cpu_count() or 1)) as pool:
         rows = list(pool.map(one, range(starts), [stop] * starts))
     series = np.array(rows).reshape(starts, turns, points, len(names))
@@ -273,7 +273,7 @@ def duty(fmu: Fmu, drive: Drive, crank_speed: float, feed: Feed) -> Cycle:
         fmu, drive, crank_speed, feed, ("tau", "J"), starts=int(chain.starts), turns=int(chain.turns)
     )
     tau, J = (sample.values[name].reshape(-1, POINTS) for name in ("tau", "J"))
-    return Cycle(sample.angle, tau * drive.driven.p.ratio, SimpleNamespace(J=J, tau=tau))
+    return Cycle(sample.angle, tau * drive.driven_machine.p.ratio, SimpleNamespace(J=J, tau=tau))
 
 
 def two_bar_pulls(machine: ChainUnitMachine, angle: Any, crank_speed: float, feed: Feed) -> Any:
@@ -281,10 +281,10 @@ def two_bar_pulls(machine: ChainUnitMachine, angle: Any, crank_speed: float, fee
     (4, n). It is computed as for two rods without damping, so that slack means the same for bars and
     chains."""
     model, xp = flexible(1, 1), numpy_()
-    named = ChamberForces.parameter_layout.by_name(machine.p) | {
+    values = ChamberForces.parameter_layout.by_name(machine.p) | {
         f"organ.{name}": 0.0 for name in ("eta", "end_damping", "fold_stiffness")
     }
-    p = model.parameter_layout.from_names(named)
+    p = model.parameter_layout.from_names(values)
     ratio = machine.p.ratio
     u = model.Inputs(phi=angle * ratio, w=crank_speed * ratio, a=0.0, left=feed.left, right=feed.right)
     sides = model.evaluate(xp, p, u, model.start(xp, p, u))[0]
@@ -298,7 +298,7 @@ def numbers_at(
     config: Config,
     crank_speed: float,
     progress: Progress = lambda share: None,
-    stopped: Callable[[], bool] | None = None,
+    is_stopped: Callable[[], bool] | None = None,
 ) -> tuple[SpeedNumbers, dict[str, Any]]:
     """The numbers at one speed with the study's feed, and by side the share of the time in which each rod is
     slack."""
@@ -309,9 +309,17 @@ def numbers_at(
     outputs = ("tau", "power", "rocker.tau", *others, *forces)
     starts, turns = int(chain.starts), int(chain.turns)
     sample = run_turns(
-        fmu, drive, crank_speed, feed, outputs, starts=starts, turns=turns, progress=progress, stopped=stopped
+        fmu,
+        drive,
+        crank_speed,
+        feed,
+        outputs,
+        starts=starts,
+        turns=turns,
+        progress=progress,
+        is_stopped=is_stopped,
     )
-    values, ratio = sample.values, drive.driven.p.ratio
+    values, ratio = sample.values, drive.driven_machine.p.ratio
 
     def peaks(x: Any) -> Any:
         return np.max(np.abs(x), axis=2)
@@ -324,16 +332,16 @@ def numbers_at(
         rest, two_bar_rest = rest_forces(drive.chain_unit, side, feed, sum(drive.rods))
         snatch.append(peaks(size) / rest)
         two_bar_snatch.append(np.max(np.hypot(bars.fx, bars.fy)) / two_bar_rest)
-    snatched = np.maximum(*snatch)
-    pushed = two_bar_pulls(drive.chain_unit, two.angle, crank_speed, feed) < 0.0
+    snatches = np.maximum(*snatch)
+    is_pushed = two_bar_pulls(drive.chain_unit, two.angle, crank_speed, feed) < 0.0
     duration = 2.0 * math.pi / crank_speed * turns
     energy = float(np.min(np.mean(np.abs(values["power"]), axis=(1, 2)))) * duration
     gap = max(float(np.max(np.ptp(values[f"{side}.energy_residual"], axis=(1, 2)))) for side in SIDES)
     slack = {side: sample.pulls[side] < 0.0 for side in SIDES}
     all_rods = np.concatenate([slack[side] for side in SIDES], axis=-1)
     crank, rocker = values["tau"] * ratio, values["rocker.tau"]
-    medians = np.median(snatched, axis=1)
-    of_turns = {"crank_torque": peaks(crank), "rocker_torque": peaks(rocker), "snatch": snatched}
+    medians = np.median(snatches, axis=1)
+    of_turns = {"crank_torque": peaks(crank), "rocker_torque": peaks(rocker), "snatch": snatches}
     of_peaks: dict[str, float] = {}
     for name, sizes in of_turns.items():
         estimate = quantile(sizes, HIGH)
@@ -355,7 +363,7 @@ def numbers_at(
             two_bar_crank_torque_rms=float(np.sqrt(np.mean(two.crank_torque**2))),
             two_bar_rocker_torque=peak(two.outputs.rocker.tau),
             two_bar_snatch=float(max(two_bar_snatch)),
-            two_bar_slack_time=float(np.mean(np.any(pushed, axis=0))),
+            two_bar_slack_time=float(np.mean(np.any(is_pushed, axis=0))),
             energy_residual=gap / max(energy, 1e-300),
             independent_turns=float(min(counted(sizes, HIGH) for sizes in of_turns.values())),
             **of_peaks,
@@ -399,16 +407,16 @@ def study_chain(
         speeds += [w for _, _, w in critical[:1] if chain.sweep_lowest < w < chain.sweep_highest]
     spacing = (chain.sweep_highest - chain.sweep_lowest) / max(1, len(speeds) - 2)
     others = sorted({w for w in speeds if abs(w - own) > 1e-9 * own})
-    failed: dict[float, str] = {}
-    interrupted: RunError | None = None
-    with stoppable() as stopped, closing(Fmu(file)) as fmu:
+    failures: dict[float, str] = {}
+    interruption: RunError | None = None
+    with stoppable() as is_stopped, closing(Fmu(file)) as fmu:
 
         def at(k: int, w: float) -> tuple[SpeedNumbers, dict[str, Any]]:
             def report_share(share: float) -> None:
                 report(f"chains at {w:.3g} rad/s", k + share, float(len(others) + 1))
 
             report_share(0.0)
-            return numbers_at(fmu, drive, config, w, report_share, stopped)
+            return numbers_at(fmu, drive, config, w, report_share, is_stopped)
 
         # the study's own speed comes first, so that an early end loses only the sweep
         mine, by_rod = at(0, own)
@@ -417,10 +425,10 @@ def study_chain(
             try:
                 rows.append(at(k, w)[0])
             except InterruptedRunError as error:
-                interrupted = error
+                interruption = error
                 break
             except RunError as error:
-                failed[w] = str(error)
+                failures[w] = str(error)
     rows.sort(key=lambda n: float(n.speed))
     result = ChainResult(
         own=mine,
@@ -431,9 +439,9 @@ def study_chain(
         starts=int(chain.starts),
         turns=int(chain.turns),
         rods=drive.rods,
-        failed=failed,
+        failures=failures,
     )
-    return result, interrupted
+    return result, interruption
 
 
 def _rocker_at_rest(config: Config, drive: Drive) -> float:

@@ -20,7 +20,7 @@ def check_company(data: Mapping[str, Any], parts: Parts) -> list[InputError]:
 
 def _company(data: Mapping[str, Any], parts: Parts) -> Iterator[tuple[str, str]]:
     """Pairs of a refused key and the reason."""
-    named = data.get("system", {}).get("motor")
+    motor = data.get("system", {}).get("motor")
     if data.get("system") == {}:
         yield ("system", 'names nothing; add motor = "file.fmu", or leave [system] out')
     foreign = {"motor": bool(parts.file), "machine": issubclass(parts.machine, ForeignModel)}
@@ -32,20 +32,20 @@ def _company(data: Mapping[str, Any], parts: Parts) -> Iterator[tuple[str, str]]
             )
     if foreign["machine"] and data.get("feed_forward"):
         yield ("feed_forward", "needs a model of the machine, which is an FMU; leave it out")
-    told = foreign["motor"] or "sizing" in data or "tau_ff" in parts.motor.input_layout.names
-    if data.get("feed_forward") and not told:
+    has_torque_input = foreign["motor"] or "sizing" in data or "tau_ff" in parts.motor.input_layout.names
+    if data.get("feed_forward") and not has_torque_input:
         yield (
             "feed_forward",
             f"a motor of the type {parts.motor.name} has no input for the torque; leave it out",
         )
     if foreign["machine"] and named_table(data, "monte_carlo").get("runs"):
         yield ("monte_carlo.runs", "needs a model of the machine, which is an FMU; leave it out")
-    if named is not None:
+    if motor is not None:
         for name in ("motor", "sizing"):
             if name in data and not (name == "motor" and parts.gives_motor):
                 yield (
                     name,
-                    f"given beside system.motor = {shown(named)}, which is the motor; leave out one of "
+                    f"given beside system.motor = {shown(motor)}, which is the motor; leave out one of "
                     "the two",
                 )
     if not parts.machine.sides:
@@ -101,17 +101,17 @@ def check_order(values: Mapping[str, Any], sections: Mapping[str, FileSection]) 
 
     def value(name: str) -> tuple[float, str]:
         section, _, key = name.partition(".")
-        x, declared = getattr(values[section], key), type(values[section])
-        unit = next(v.unit for v in Layout(declared).variables if v.name == key)
+        x, declaration = getattr(values[section], key), type(values[section])
+        unit = next(v.unit for v in Layout(declaration).variables if v.name == key)
         return x, f"{x:g}" + unit_behind(unit)
 
     for low, relation, high in _ORDER:
-        (least, limit), (most, given) = value(low), value(high)
+        (least, limit), (most, text) = value(low), value(high)
         if most < least or (most == least and relation == ">"):
-            yield InputError(f"{high} = {given}: must be {relation} {low}, {limit}", key=high)
+            yield InputError(f"{high} = {text}: must be {relation} {low}, {limit}", key=high)
     for section, table in sections.items():
         for key in table.whole:
-            number, given = value(f"{section}.{key}")
+            number, text = value(f"{section}.{key}")
             if number != int(number):
                 name = f"{section}.{key}"
-                yield InputError(f"{name} = {given}: must be a whole number", key=name)
+                yield InputError(f"{name} = {text}: must be a whole number", key=name)

@@ -43,8 +43,8 @@ def choose(config: Config, folder: Path, report: Report, backend: Backend | None
         return _with_foreign(config)
     if config.sizing is None:
         return Choice(*tune(config, with_line(config, _given(config))))
-    sized = size(config, folder, report, backend)
-    return Choice(with_line(config, sized.best.drive), sizing=sized)
+    sizing = size(config, folder, report, backend)
+    return Choice(with_line(config, sizing.best.drive), sizing=sizing)
 
 
 def _given(config: Config) -> Drive:
@@ -126,21 +126,21 @@ def with_line(config: Config, drive: Drive) -> Drive:
     the motor's shaft before it."""
     if config.driveline is None:
         return drive
-    given = Layout(type(config.driveline)).by_name(config.driveline)
-    values = {name: x for name, x in given.items() if name in CardanDriveline.parameter_layout.names}
+    values = Layout(type(config.driveline)).by_name(config.driveline)
+    values = {name: x for name, x in values.items() if name in CardanDriveline.parameter_layout.names}
     values["ratio"] = drive.ratio if config.place == "crank" else 1.0
     drive = replace(drive, line=CardanDriveline.parameter_layout.from_names(values))
     if config.damping_ratio is None:
         return drive
     J = cycle(drive.machine, config.run.crank_speed, config.feed).outputs.J
-    damped = with_damping_ratio(two_masses(drive, float(np.mean(J))), config.damping_ratio)
-    return replace(drive, line=replace(drive.line, d2=damped.d2, d3=damped.d3))
+    line = with_damping_ratio(two_masses(drive, float(np.mean(J))), config.damping_ratio)
+    return replace(drive, line=replace(drive.line, d2=line.d2, d3=line.d3))
 
 
 def tune(config: Config, drive: Drive) -> tuple[Drive, Tuning | None]:
     """The drive with controller gains that are tuned to its inertia, unless the config gives them."""
     both = cycle(drive.machine, config.run.crank_speed, config.feed)
-    fixed = {name.removeprefix("motor.") for name in config.given if name.startswith("motor.")}
+    given_gains = {name.removeprefix("motor.") for name in config.given if name.startswith("motor.")}
     inertia = drive.rotor_inertia + float(np.mean(both.outputs.J))
-    parameters, tuning = drive.motor.tune(drive.parameters, inertia, fixed)
+    parameters, tuning = drive.motor.tune(drive.parameters, inertia, given_gains)
     return replace(drive, parameters=parameters), tuning

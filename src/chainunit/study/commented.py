@@ -24,22 +24,22 @@ def commented(text: str, machine: str = "ChamberForces") -> str:
     the end of the file."""
     lines = text.splitlines()
     types = [str(event["type"]) for event in toml(text).get("event", [])]
-    found = [*statements(text)]
-    named = {name for each in found for name in each.keys}
+    settings = [*statements(text)]
+    names = {name for each in settings for name in each.keys}
     below: dict[int, list[str]] = {}
-    for table, group in groupby(found, key=lambda each: each.table):
+    for table, group in groupby(settings, key=lambda each: each.table):
         own = [*group]
         keys = {f"{table}.{key.name}".lstrip("."): key for key in _keys(table, machine, types)}
         for each in own:
             _comment(lines, each, keys)
-        below[own[-1].last] = [_line(key) for name, key in keys.items() if name not in named]
-    written = [f"#:schema {FILE}"]
+        below[own[-1].last] = [_line(key) for name, key in keys.items() if name not in names]
+    result = [f"#:schema {FILE}"]
     for number, line in enumerate(lines, 1):
-        written += [line, *below.get(number, [])]
-    for absent in _absent({each.table.split(".")[0] for each in found}, machine):
+        result += [line, *below.get(number, [])]
+    for absent in _absent({each.table.split(".")[0] for each in settings}, machine):
         title = f"{absent.title} of {absent.of}" if absent.of else absent.title
-        written += ["", f"{f'# [{absent.name}]':<{_COLUMN}} # {title}", *map(_line, absent.keys)]
-    return "\n".join(written) + "\n"
+        result += ["", f"{f'# [{absent.name}]':<{_COLUMN}} # {title}", *map(_line, absent.keys)]
+    return "\n".join(result) + "\n"
 
 
 def _keys(table: str, machine: str, types: list[str]) -> Iterator[Key]:
@@ -69,7 +69,7 @@ def _comment(lines: list[str], statement: Statement, keys: dict[str, Key]) -> No
 
 def _line(key: Key) -> str:
     """The line of a key that the file leaves out, with its default value, if it has one."""
-    allowed = f" ({', '.join(key.words)})" if key.words else ""
+    choices = f" ({', '.join(key.words)})" if key.words else ""
     follows = f"; left out: {key.follows}" if key.follows else ""
     text = f"# {key.name} = {key.left_out}".rstrip()
-    return f"{text:<{_COLUMN}} # {key.description}{allowed}{follows}"
+    return f"{text:<{_COLUMN}} # {key.description}{choices}{follows}"

@@ -129,7 +129,7 @@ class Config:
         return float(max(self.run.ramp, soft))
 
     @property
-    def settled(self) -> float:
+    def steady_begin(self) -> float:
         """Time from which running counts as steady [s]: `run.settle_turns` after the start, or after an empty machine
         is fed, which is later."""
         return float(self.started + self.run.settle_turns * self.turn)
@@ -137,7 +137,7 @@ class Config:
     @property
     def stop(self) -> float:
         """Time to which start-up and steady running are run [s], where the motor settles at once."""
-        return float(self.settled + (self.run.turns + 0.1) * self.turn)
+        return float(self.steady_begin + (self.run.turns + 0.1) * self.turn)
 
     @property
     def permitted_temperature(self) -> tuple[str, float]:
@@ -217,7 +217,7 @@ def _of_values(data: Mapping[str, Any], parts: Parts, source: str) -> Config:
     """The study of a file whose values are each allowed; see `of_tables`."""
     whole = over_example(data, parts)
     form = read_table(parts.form, whole)
-    declared = {name: section.declared for name, section in parts.sections.items()}
+    declared = {name: section.declaration for name, section in parts.sections.items()}
     unusual = tuple(slips(declared, data, {"run.crank_speed": parts.machine.usual_speed}))
     with each_refusal(lambda fault: _with_hints(fault, unusual)):
         events = read_events(form.event)
@@ -326,7 +326,7 @@ def _read_sections(
         tables[name] = {}
         with faults.collected():
             tables[name] = section.values(getattr(checked, name))
-        layout = Layout(section.declared)
+        layout = Layout(section.declaration)
         own = {key: x for key, x in tables[name].items() if key in layout.names}
         values[name] = layout.from_names(own, section.default)
     return tables, values
@@ -436,7 +436,7 @@ MOST_STEPS = 1e6
 def _endless(config: Config) -> Iterator[InputError]:
     """The refusal of a study that would never end."""
     run, turn = config.run, config.turn
-    seconds = config.settled + run.turns * turn
+    seconds = config.steady_begin + run.turns * turn
     seconds += sum(event.follow(turn) + 2.0 * turn for event in config.events.values())
     steps = max(seconds, config.monte_carlo.duration) / run.step
     if not steps <= MOST_STEPS:

@@ -64,7 +64,7 @@ def _torque(value: float) -> str:
 
 def _listed(study: StudyRecord, peaks: Mapping[str, float]) -> str:
     """A list of runs with their peaks on the coupling [N m], in words."""
-    return ", ".join(f"{study.called(name)} ({_torque(peak)})" for name, peak in peaks.items())
+    return ", ".join(f"{study.title_of(name)} ({_torque(peak)})" for name, peak in peaks.items())
 
 
 def _starts_above(study: StudyRecord, torque: float) -> dict[str, float]:
@@ -139,21 +139,21 @@ def remark_on_coupling(study: StudyRecord, trip: float) -> None:
             "coupling held shut",
             text,
             *(above or [hardest]),
-            where=_listed(study, above) if above else study.called(hardest),
+            where=_listed(study, above) if above else study.title_of(hardest),
             start=(starts[hardest], "N.m"),
             **amounts,
         )
-    opened = [name for name in peaks if study.answers[name].coupling_trip_time is not None]
-    if nuisances := [name for name in opened if name not in shocks]:
+    openings = [name for name in peaks if study.answers[name].coupling_trip_time is not None]
+    if nuisances := [name for name in openings if name not in shocks]:
         warn(
             "nuisance trip",
             "The safety coupling, set to {trip}, opens where no shock asks for it, a nuisance trip that protects "
             "nothing: {where}.",
             *nuisances,
-            where="; ".join(map(study.called, nuisances)),
+            where="; ".join(map(study.title_of, nuisances)),
             **amounts,
         )
-    if shocks and not set(opened) & set(shocks):
+    if shocks and not set(openings) & set(shocks):
         warn(
             "coupling never opens",
             "The safety coupling opens in no jam, lump or block of this study: it is set to {trip}, they put "

@@ -89,7 +89,7 @@ class Drive:
         return self.machine.ratio
 
     @cached_property
-    def driven(self) -> Machine:
+    def driven_machine(self) -> Machine:
         """The machine as its FMU has it: with the gear ratio that remains behind the driveline."""
         return self.machine if self.line is None else self.machine.replace(ratio=self.ratio / self.line.ratio)
 
@@ -175,7 +175,7 @@ class Drive:
     @property
     def outsider(self) -> ForeignMachine | None:
         """The machine as the shaft behind the driveline drives it, if it is a foreign FMU; else None."""
-        return self.driven if isinstance(self.driven, ForeignMachine) else None
+        return self.driven_machine if isinstance(self.driven_machine, ForeignMachine) else None
 
     @property
     def outsiders(self) -> list[str]:
@@ -184,17 +184,17 @@ class Drive:
         return [part.title for part in parts if part]
 
     def load_model(self, machine: Machine | None = None) -> tuple[type[InverseMachine], Any]:
-        """Model of the machine, with two bars or chains, and its parameters: those of `driven`, or of another."""
-        machine = machine or self.driven
+        """Model of a machine, with two bars or chains, and its parameters; by default of the `driven_machine`."""
+        machine = machine or self.driven_machine
         if self.chain is None:
             return machine.model, machine.p
         model = flexible(*self.rods)
         return model, model.parameter_layout.from_names(machine.by_name | self.organ())
 
     @cached_property
-    def simulated(self) -> Machine:
+    def simulated_machine(self) -> Machine:
         """The machine as its FMU has it, with chains where the organs are chains."""
-        return self.driven if self.chain is None else machine_of(*self.load_model())
+        return self.driven_machine if self.chain is None else machine_of(*self.load_model())
 
     def machine_series(self, run: xr.Dataset) -> dict[str, Any]:
         """The variables of the machine in a run by name, each of shape (time,)."""
@@ -262,21 +262,21 @@ class Drive:
 
     def crank_torque(self, run: xr.Dataset) -> Any:
         """Torque at the crank in a run [N m], shape (time,), also for a machine without its motor."""
-        return shaft_torque(run, self._last_bond) * (self.driven.ratio / self.gear)
+        return shaft_torque(run, self._last_bond) * (self.driven_machine.ratio / self.gear)
 
     @property
     def crank_speed(self) -> tuple[str, float]:
         """Name of the speed output that turns the machine in a run, and the ratio of that speed to the
         crank's."""
         bond = self._last_bond
-        return f"{bond.driver}.{bond.flanges[0].members['w']}", self.driven.ratio / self.gear
+        return f"{bond.driver}.{bond.flanges[0].members['w']}", self.driven_machine.ratio / self.gear
 
     def crank_motion(self, run: xr.Dataset) -> tuple[Any, Any]:
         """Angle [rad] and speed [rad/s] of the crank in a run, shape (time,), also for a machine without its
         motor."""
-        bond, ratio = self._last_bond, self.driven.ratio / self.gear
-        given = (f"{bond.driver}.{bond.flanges[0].members[x]}" for x in ("phi", "w"))
-        pairs = (("machine.phi0", "machine.w0"), ("machine.phi", "machine.w"), tuple(given))
+        bond, ratio = self._last_bond, self.driven_machine.ratio / self.gear
+        names = (f"{bond.driver}.{bond.flanges[0].members[x]}" for x in ("phi", "w"))
+        pairs = (("machine.phi0", "machine.w0"), ("machine.phi", "machine.w"), tuple(names))
         phi, w = next(pair for pair in pairs if set(pair) <= set(run))
         return run[phi].values / ratio, run[w].values / ratio
 
@@ -292,14 +292,14 @@ class Drive:
         The last row is interpolated linearly; in periodic running it equals the first.
         """
         angle, _ = self.crank_motion(run)
-        turned = (angle - angle[0]) / (2.0 * math.pi)
+        turns_made = (angle - angle[0]) / (2.0 * math.pi)
         # a run that ends on a whole turn may miss it by rounding
         rounding = 1e-9
-        turns = min(math.floor(float(np.max(turned)) + rounding), most)
+        turns = min(math.floor(float(np.max(turns_made)) + rounding), most)
         if turns < 1:
             return None
-        last = int(np.argmax(turned >= turns - rounding))
-        share = min(1.0, (turns - turned[last - 1]) / (turned[last] - turned[last - 1]))
+        last = int(np.argmax(turns_made >= turns - rounding))
+        share = min(1.0, (turns - turns_made[last - 1]) / (turns_made[last] - turns_made[last - 1]))
 
         def closed(x: Any) -> Any:
             return np.append(x[:last], x[last - 1] + share * (x[last] - x[last - 1]))
@@ -318,8 +318,8 @@ class Drive:
     ) -> tuple[dict[str, Path], dict[str, Origin]]:
         """Write the FMUs, with the start values of the drive. Returns the files by component, and the origin
         of each FMU. `report` is called with a text on the current task."""
-        exported, origins = export(self.graph, folder, backend, report)
-        return {name: c.file for name, c in exported.components.items() if c.file}, origins
+        system, origins = export(self.graph, folder, backend, report)
+        return {name: c.file for name, c in system.components.items() if c.file}, origins
 
     def export_machine(self, folder: Path, backend: Backend | None = None) -> Path:
         """Write only the machine's FMU, as `export` writes it."""
@@ -350,9 +350,9 @@ class Drive:
 
     def loads(self, feed: Any) -> dict[str, Any]:
         """Signals of the loads in normal running: of the machine, and of the machine in the feed-forward."""
-        named = Layout(type(feed)).by_name(feed)
-        model = {f"model.{name}": value for name, value in named.items()} if self.feed_forward else {}
-        return {f"machine.{name}": value for name, value in named.items()} | model
+        values = Layout(type(feed)).by_name(feed)
+        model = {f"model.{name}": value for name, value in values.items()} if self.feed_forward else {}
+        return {f"machine.{name}": value for name, value in values.items()} | model
 
     def largest_torque(self, run: xr.Dataset, T: float) -> Any:
         """Largest air-gap torque that the motor can give at each instant of a run [N m], shape (time,), with its
@@ -390,7 +390,7 @@ class Drive:
     @property
     def coasting_model(self) -> type[DirectMachine]:
         """The model of the machine that turns without its motor."""
-        return self.simulated.model.direct()
+        return self.simulated_machine.model.direct()
 
     def coasting(self, folder: Path, backend: Backend | None = None) -> Path | None:
         """Write the FMU of the machine that turns without its motor, with the inertia on its shaft. None for
@@ -403,5 +403,5 @@ class Drive:
 
     def coasting_parameters(self) -> dict[str, float]:
         """Parameters of the `coasting_model` by name."""
-        added = {} if self.line is None else {"J_added": self.line.J4}
-        return self.simulated.by_name | added
+        additions = {} if self.line is None else {"J_added": self.line.J4}
+        return self.simulated_machine.by_name | additions

@@ -66,7 +66,7 @@ class Duty:
         """Ready for JSON."""
         peaks = [(_peak(turn), side) for side, turn in self.one_sided.items()]
         sides = {"one_sided": {"larger_rms": self.heavier, "larger_peak": max(peaks)[1]}} if peaks else {}
-        return {"cycle": entries(self.numbers, titled=True), **sides}
+        return {"cycle": entries(self.numbers, with_titles=True), **sides}
 
 
 def duty_of(config: Config, folder: Path, backend: Backend | None) -> Duty:

@@ -81,7 +81,7 @@ class Event:
     heading: ClassVar[str] = ""
     """the event in two or three words"""
     role: ClassVar[Role]
-    sided: ClassVar[bool] = True
+    has_side: ClassVar[bool] = True
     from_rest: ClassVar[bool] = False
     """whether the event is a start, with signals from rest on"""
     acts_on: ClassVar[tuple[str, ...]] = ()

@@ -48,9 +48,9 @@ def read_events(tables: Sequence[Any]) -> dict[str, Event]:
             of = _type(table, f"event {k}", f"event.{k}")
             where, place = f"event {k} ({of.kind})", f"event.{k}"
             side = _side(of, table, where, place, faults)
-            if "side" not in table and of.sided:
+            if "side" not in table and of.has_side:
                 faults.add([InputError(f'{where}: side: must be given, "left" or "right"', place)])
-            usual = of.on(side).name if side or not of.sided else of.kind
+            usual = of.on(side).name if side or not of.has_side else of.kind
             name = _name(table, usual, events, where, place, faults)
             events[name] = of.on(side, _parameters(of, table, f"event.{name}.", f"{place}."), name)
     faults.refuse()
@@ -70,7 +70,7 @@ class RandomEvent:
     @property
     def title(self) -> str:
         """What happens, as in a sentence."""
-        if self.side or not self.of.sided:
+        if self.side or not self.of.has_side:
             return on_side(self.of.words, self.side)
         return self.of.words.format(side="left or the right", other="right or the left")
 
@@ -84,7 +84,7 @@ class RandomEvent:
 
     def hardest(self) -> list[Event]:
         """The event on each side that it may come on, with every drawn quantity at the end of its range."""
-        sides = (self.side,) if self.side or not self.of.sided else SIDES
+        sides = (self.side,) if self.side or not self.of.has_side else SIDES
         return [self.event(side, {name: high for name, (_, high) in self.ranges.items()}) for side in sides]
 
     def as_dict(self) -> dict[str, Any]:
@@ -161,11 +161,11 @@ def _side(of: type[Event], table: Mapping[str, Any], where: str, place: str, fau
     """The side that the table names, none where it names a wrong one: that goes to the `faults`."""
     if "side" not in table:
         return ""
-    for side in SIDES if of.sided else ():
+    for side in SIDES if of.has_side else ():
         if table["side"] == side:
             return side
     wrong = f' = {shown(table["side"])}: must be "left" or "right"{near_name(str(table["side"]), SIDES)}'
-    words = wrong if of.sided else ": this event has none; leave it out"
+    words = wrong if of.has_side else ": this event has none; leave it out"
     faults.add([InputError(f"{where}: side{words}", f"{place}.side")])
     return ""
 

@@ -194,7 +194,7 @@ class Blocked(Event):
 
     kind, run = "blocked", "blocked"
     words, heading = "the rocker is blocked", "blocked"
-    role, sided = Role.SHOCK, False
+    role, has_side = Role.SHOCK, False
     acts_on = ("stop.stiffness", "stop.damping", "stop.psi")
     reads = ("rocker.psi",)
 
@@ -249,7 +249,7 @@ class Dip(Event):
 
     kind, run = "dip", "dip"
     words, heading = "the voltage dips", "dip"
-    role, sided = Role.DISTURBANCE, False
+    role, has_side = Role.DISTURBANCE, False
     acts_on = ("voltage",)
 
     @declaration
@@ -281,7 +281,7 @@ class HardCut(Event):
 
     kind, run = "cut", "hard_cut"
     words, heading = "the blade meets a hard stack", "hard cut"
-    role, sided = Role.SHOCK, False
+    role, has_side = Role.SHOCK, False
     acts_on = ("cut_force",)
     draws: ClassVar[Mapping[str, tuple[float, float]]] = {"force": (3e4, 1e5)}
 
@@ -306,7 +306,7 @@ class Overload(Event):
 
     kind, run = "overload", "overload"
     words, heading = "the load of the machine rises", "overload"
-    role, sided = Role.SHOCK, False
+    role, has_side = Role.SHOCK, False
     acts_on = ("load",)
     draws: ClassVar[Mapping[str, tuple[float, float]]] = {"torque": (500.0, 2000.0)}
 

@@ -46,7 +46,7 @@ class FlywheelFindings(Findings):
 
     own: float
     """flywheel of the study [kg m2]"""
-    permitted: float
+    permitted_fluctuation: float
     swing: float
     speed: float
     bare: float
@@ -54,8 +54,8 @@ class FlywheelFindings(Findings):
     """mean torque of the machine at the motor's shaft, at constant speed [N m]"""
     wheels: list[Wheel] = field(default_factory=list)
     least: Wheel | None = None
-    searched: bool = False
-    retuned: bool = False
+    is_searched: bool = False
+    is_retuned: bool = False
     """whether the gains of the speed control differ, as they are tuned to the inertia with each flywheel"""
 
     def by_hand(self, flywheel: float) -> float:
@@ -64,12 +64,12 @@ class FlywheelFindings(Findings):
 
     def permits(self, wheel: Wheel) -> bool:
         """Whether a flywheel keeps the permitted fluctuation and exceeds no other limit."""
-        return wheel.keeps(self.permitted) and not wheel.passed
+        return wheel.keeps(self.permitted_fluctuation) and not wheel.excesses
 
     @property
     def flywheel_by_hand(self) -> float:
         """Flywheel that keeps the permitted fluctuation by the hand formula [kg m2]; 0 where none is needed."""
-        return needed_inertia(self.swing, self.speed, self.permitted, self.bare)
+        return needed_inertia(self.swing, self.speed, self.permitted_fluctuation, self.bare)
 
     @property
     def rows(self) -> list[tuple[str, Wheel, str]]:
@@ -90,8 +90,8 @@ class FlywheelFindings(Findings):
         return {
             "compared": [entries(wheel.answers) | {"stalls": wheel.stalls} for wheel in self.wheels],
             "least": None if self.least is None else entries(self.least.answers),
-            "permitted": entry(self.permitted, "1", "percent"),
-            "retuned": self.retuned,
+            "permitted": entry(self.permitted_fluctuation, "1", "percent"),
+            "retuned": self.is_retuned,
             "by_hand": entry(self.flywheel_by_hand, "kg.m2"),
         }
 
@@ -129,41 +129,43 @@ class FlywheelAnalysis(Analysis):
         config, table, drive = study.config, study.config.flywheel, study.drive
         assert table is not None
         turn: Turn = study.findings[TurnAnalysis.name].numbers
-        found = FlywheelFindings(
+        findings = FlywheelFindings(
             own=table.J,
-            permitted=table.fluctuation,
+            permitted_fluctuation=table.fluctuation,
             swing=turn.energy_swing,
             speed=config.run.crank_speed * drive.ratio,
             bare=drive.rotor_inertia - drive.flywheel + turn.inertia_mean / drive.ratio**2,
             mean_torque=turn.torque_mean / drive.ratio,
         )
-        study.findings[FlywheelAnalysis.name] = found
+        study.findings[FlywheelAnalysis.name] = findings
         sizes = sorted({table.J, *config.flywheels})
 
         def run(flywheel: float) -> Wheel:
-            done = float(len(found.wheels))
-            report(f"flywheel of {number(flywheel, 'kg.m2')}", done, float(len(sizes) + 1))
-            return _run(study, rig, found, flywheel)
+            finished = float(len(findings.wheels))
+            report(f"flywheel of {number(flywheel, 'kg.m2')}", finished, float(len(sizes) + 1))
+            return _run(study, rig, findings, flywheel)
 
         for size in sizes:
-            found.wheels.append(_own(study, found) if size == table.J else run(size))
-        found.least = least_flywheel(found.wheels, found.permitted, found.bare, found.flywheel_by_hand, run)
-        found.searched = True
-        return found
+            findings.wheels.append(_own(study, findings) if size == table.J else run(size))
+        findings.least = least_flywheel(
+            findings.wheels, findings.permitted_fluctuation, findings.bare, findings.flywheel_by_hand, run
+        )
+        findings.is_searched = True
+        return findings
 
 
-def _own(study: StudyRecord, found: FlywheelFindings) -> Wheel:
+def _own(study: StudyRecord, findings: FlywheelFindings) -> Wheel:
     """The flywheel of the study, from the run that the study has."""
     assert study.start is not None
     residual = worst_residual(study.certificate["start_up"])
-    return _wheel(study, found, found.own, study.answers[STEADY], study.start, study.steady, residual)
+    return _wheel(study, findings, findings.own, study.answers[STEADY], study.start, study.steady, residual)
 
 
-def _run(study: StudyRecord, rig: Rig, found: FlywheelFindings, flywheel: float) -> Wheel:
+def _run(study: StudyRecord, rig: Rig, findings: FlywheelFindings, flywheel: float) -> Wheel:
     """The start-up and steady running of the study with another flywheel [kg m2], without its safety coupling."""
     config = study.config
     drive, _ = tune(config, replace(study.drive, flywheel=flywheel))
-    found.retuned = found.retuned or drive.parameters != study.drive.parameters
+    findings.is_retuned = findings.is_retuned or drive.parameters != study.drive.parameters
     sides = drive.machine.loaded_sides(config.feed)
     rig = replace(rig, drive=drive, fed_from=None)
     with rig.from_rest() as simulation:
@@ -174,12 +176,12 @@ def _run(study: StudyRecord, rig: Rig, found: FlywheelFindings, flywheel: float)
     steady = Window(Phase.STEADY, turns, drive, sides, config.run.crank_speed)
     rows = run.sel(time=slice(None, turns["time"].values[0]))
     start = Window(Phase.START_UP, rows, drive, sides, config.run.crank_speed, steady=steady)
-    return _wheel(study, found, flywheel, read_answers(steady), read_answers(start), turns, residual)
+    return _wheel(study, findings, flywheel, read_answers(steady), read_answers(start), turns, residual)
 
 
 def _wheel(
     study: StudyRecord,
-    found: FlywheelFindings,
+    findings: FlywheelFindings,
     flywheel: float,
     steady: Answers,
     start: Answers,
@@ -193,10 +195,10 @@ def _wheel(
         motor_ripple = float(np.ptp(w := turns[drive.motor_speed].values) / np.mean(w))
     own = {
         "flywheel": flywheel,
-        "inertia": found.bare + flywheel,
+        "inertia": findings.bare + flywheel,
         "start_time": start.start_time,
         # the formula does not hold for a ripple of more than 2
-        "by_hand": by_hand if (by_hand := found.by_hand(flywheel)) < 2.0 else None,
+        "by_hand": by_hand if (by_hand := findings.by_hand(flywheel)) < 2.0 else None,
         "motor_ripple": motor_ripple,
         "residual": residual,
     }
@@ -325,30 +327,30 @@ _TROUBLES = (
     ),
     Trouble(
         "flywheel not settled",
-        lambda wheel: not wheel.settled,
+        lambda wheel: not wheel.is_settled,
         "the turns do not close with a flywheel of {where}: raise run.settle_turns.",
         "cycle_gap",
     ),
 )
 
 
-def _on_wheels(found: FlywheelFindings, study: StudyRecord) -> None:
+def _on_wheels(findings: FlywheelFindings, study: StudyRecord) -> None:
     """A warning for each kind of trouble, with all flywheels that have it; the study itself warns for its own
     flywheel."""
     plate = study.config.plate
-    too_small = plate is not None and found.mean_torque > plate.nameplate.torque
+    too_small = plate is not None and findings.mean_torque > plate.nameplate.torque
     remedy = "a larger motor" if too_small else "a larger motor or flywheel"
     if plate is not None and too_small:
         study.warn(
             "motor too small",
             "the load takes {mean} of the motor on average, rated is {rated}: a larger motor helps, no flywheel "
             "does.",
-            mean=(found.mean_torque, "N.m"),
+            mean=(findings.mean_torque, "N.m"),
             rated=(plate.nameplate.torque, "N.m"),
         )
     for trouble in _TROUBLES:
-        wheels = [wheel for wheel in found.wheels if trouble.has(wheel)]
-        if trouble.limit and all(wheel.flywheel == found.own for wheel in wheels):
+        wheels = [wheel for wheel in findings.wheels if trouble.has(wheel)]
+        if trouble.limit and all(wheel.flywheel == findings.own for wheel in wheels):
             continue
         if wheels:
             amounts = {
@@ -369,14 +371,14 @@ def _limit(wheel: Wheel, name: str, study: StudyRecord) -> str:
     return "" if check is None else number(check.limit, check.unit, check.kind, full=False)
 
 
-def _on_fluctuation(found: FlywheelFindings, study: StudyRecord) -> None:
+def _on_fluctuation(findings: FlywheelFindings, study: StudyRecord) -> None:
     """Warn where the flywheel of the study, or every flywheel, does not keep the permitted fluctuation."""
-    permitted = number(found.permitted, "1", "percent")
-    own = next((wheel for wheel in found.wheels if wheel.flywheel == found.own), None)
+    limit = number(findings.permitted_fluctuation, "1", "percent")
+    own = next((wheel for wheel in findings.wheels if wheel.flywheel == findings.own), None)
     if (
         own is not None
         and own.answers.speed_ripple is not None
-        and own.answers.speed_ripple > found.permitted
+        and own.answers.speed_ripple > findings.permitted_fluctuation
     ):
         study.warn(
             "fluctuation",
@@ -384,25 +386,27 @@ def _on_fluctuation(found: FlywheelFindings, study: StudyRecord) -> None:
             STEADY,
             speed_ripple=(own.answers.speed_ripple, "1", "percent"),
             flywheel=(own.flywheel, "kg.m2"),
-            permitted=(found.permitted, "1", "percent"),
+            permitted=(findings.permitted_fluctuation, "1", "percent"),
         )
     # flywheels without a run are not judged
-    if found.searched and not any(wheel.keeps(found.permitted) for wheel in found.wheels):
-        more = "." if found.least is not None else ", nor does a larger one that was tried."
-        study.warn(
-            "no flywheel keeps it", f"no flywheel of the list keeps the speed within {permitted}{more}"
-        )
-        _on_line(found, study)
-    _on_heavier(found, study)
-    if found.least is not None:
-        _on_least(found, found.least, study)
+    if findings.is_searched and not any(
+        wheel.keeps(findings.permitted_fluctuation) for wheel in findings.wheels
+    ):
+        more = "." if findings.least is not None else ", nor does a larger one that was tried."
+        study.warn("no flywheel keeps it", f"no flywheel of the list keeps the speed within {limit}{more}")
+        _on_line(findings, study)
+    _on_heavier(findings, study)
+    if findings.least is not None:
+        _on_least(findings, findings.least, study)
 
 
-def _on_line(found: FlywheelFindings, study: StudyRecord) -> None:
+def _on_line(findings: FlywheelFindings, study: StudyRecord) -> None:
     """Warn where the motor runs evenly enough and the crank does not: the ripple is made behind the
     flywheel."""
-    ripples = [(wheel, wheel.answers.motor_ripple) for wheel in found.wheels]
-    even = [wheel for wheel, ripple in ripples if ripple is not None and ripple <= found.permitted]
+    ripples = [(wheel, wheel.answers.motor_ripple) for wheel in findings.wheels]
+    even = [
+        wheel for wheel, ripple in ripples if ripple is not None and ripple <= findings.permitted_fluctuation
+    ]
     if not even:
         return
     best = min(even, key=lambda wheel: float(wheel.answers.speed_ripple))
@@ -418,13 +422,14 @@ def _on_line(found: FlywheelFindings, study: StudyRecord) -> None:
     )
 
 
-def _on_heavier(found: FlywheelFindings, study: StudyRecord) -> None:
+def _on_heavier(findings: FlywheelFindings, study: StudyRecord) -> None:
     """Warn of flywheels with which the speed fluctuates more than with a lighter one."""
-    running = [wheel for wheel in found.wheels if wheel.answers.speed_ripple is not None]
+    running = [wheel for wheel in findings.wheels if wheel.answers.speed_ripple is not None]
     amounts: dict[str, Amount] = {
         f"{heavier.flywheel:g}.speed_ripple": (heavier.answers.speed_ripple, "1", "percent")
         for lighter, heavier in pairwise(running)
-        if heavier.answers.speed_ripple > max(found.permitted, _WORSE * lighter.answers.speed_ripple)
+        if heavier.answers.speed_ripple
+        > max(findings.permitted_fluctuation, _WORSE * lighter.answers.speed_ripple)
     }
     if amounts:
         sizes = [(float(name.rpartition(".")[0]), amount) for name, amount in amounts.items()]
@@ -433,10 +438,10 @@ def _on_heavier(found: FlywheelFindings, study: StudyRecord) -> None:
         study.warn("heavier flywheel worse", text, where=where, **amounts)
 
 
-def _on_least(found: FlywheelFindings, least: Wheel, study: StudyRecord) -> None:
+def _on_least(findings: FlywheelFindings, least: Wheel, study: StudyRecord) -> None:
     """Note the least flywheel that keeps the fluctuation; it is not recommended if another limit is still
     exceeded."""
-    a, by_hand, close = least.answers, found.flywheel_by_hand, number(CLOSE, "1", "percent", full=False)
+    a, by_hand, close = least.answers, findings.flywheel_by_hand, number(CLOSE, "1", "percent", full=False)
     text = (
         "A fluctuation of {permitted} takes a flywheel of {flywheel} at least (the search ends within "
         f"{close} of that fluctuation); "
@@ -460,22 +465,22 @@ def _on_least(found: FlywheelFindings, least: Wheel, study: StudyRecord) -> None
         "current": ("the RMS current is {current} of the rated", (a.current_share, "1", "percent")),
         "start": ("the start takes {start}", (a.start_time, "s")),
     }
-    known = {name: part for name, part in parts.items() if part[1][0] is not None}
-    text += f". {beside} {', '.join(words for words, _ in known.values())}."
+    items = {name: part for name, part in parts.items() if part[1][0] is not None}
+    text += f". {beside} {', '.join(words for words, _ in items.values())}."
     plate = study.config.plate
-    too_small = plate is not None and found.mean_torque > plate.nameplate.torque
-    if passed := [*least.passed, *(["mean torque"] if too_small else [])]:
-        fit = None if too_small else next((w for _, w, _ in found.rows if found.permits(w)), None)
+    too_small = plate is not None and findings.mean_torque > plate.nameplate.torque
+    if excesses := [*least.excesses, *(["mean torque"] if too_small else [])]:
+        fit = None if too_small else next((w for _, w, _ in findings.rows if findings.permits(w)), None)
         text += " It is not recommended; still" if least.flywheel else " Still"
-        text += f" over the limit: {', '.join(passed)}."
+        text += f" over the limit: {', '.join(excesses)}."
         text += (
             f" {number(fit.flywheel, 'kg.m2')} keeps all." if fit else " No flywheel that was run keeps all."
         )
     study.note(
         "least flywheel",
         text,
-        permitted=(found.permitted, "1", "percent"),
+        permitted=(findings.permitted_fluctuation, "1", "percent"),
         flywheel=(least.flywheel, "kg.m2"),
         by_hand=(by_hand, "kg.m2"),
-        **{name: amount for name, (_, amount) in known.items()},
+        **{name: amount for name, (_, amount) in items.items()},
     )

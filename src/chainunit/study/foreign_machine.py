@@ -110,9 +110,9 @@ class ForeignMachine(Machine):
     @property
     def component(self) -> FmuComponent:
         """The FMU with these parameters."""
-        known = self.model.component.connectors
+        names = self.model.component.connectors
         own: FmuComponent = self.model.component
-        return replace(own, start={name: x for name, x in self.by_name.items() if name in known})
+        return replace(own, start={name: x for name, x in self.by_name.items() if name in names})
 
     def outputs(self, phi: Any, w: Any = 0.0, a: Any = 0.0, feed: Any = None) -> Any:
         """See `Machine`: torque `tau` [N m] and inertia `J` [kg m2] at the motor. The FMU alone is run at the

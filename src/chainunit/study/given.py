@@ -27,7 +27,7 @@ class GivenSection:
     """words, switches and lists, by key"""
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """ranges of the quantities that are drawn at random"""
-    unused: frozenset[str] = frozenset()
+    unused_names: frozenset[str] = frozenset()
     """quantities in whose place the study uses something else"""
 
     @property
@@ -44,15 +44,15 @@ class GivenSection:
         """Full names of all its values, as in a study file."""
         prefix = f"{self.name}." if self.name else ""
         quantities = [v.name for v in variables(type(self.values))] if self.values is not None else []
-        used = [name for name in quantities if name not in self.unused]
-        return [*(prefix + name for name in used), *(prefix + key for key in self.choices)]
+        names = [name for name in quantities if name not in self.unused_names]
+        return [*(prefix + name for name in names), *(prefix + key for key in self.choices)]
 
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON, each number with its unit."""
         own = {} if self.values is None else entries(self.values)
-        own = {name: x for name, x in own.items() if name not in self.unused}
-        drawn = {name: {**own[name], "value": list(ends)} for name, ends in self.ranges.items()}
-        return own | drawn | {key: _choice(value) for key, value in self.choices.items()}
+        own = {name: x for name, x in own.items() if name not in self.unused_names}
+        ranges = {name: {**own[name], "value": list(ends)} for name, ends in self.ranges.items()}
+        return own | ranges | {key: _choice(value) for key, value in self.choices.items()}
 
 
 def _choice(value: Any) -> Any:
@@ -70,7 +70,9 @@ def given(study: StudyRecord) -> list[GivenSection]:
         GivenSection("machine", "Machine", study.drive.machine.p),
         GivenSection("feed", "Feed in normal running", config.feed),
         *(
-            GivenSection(f"event.{name}", study.called(name)[:1].upper() + study.called(name)[1:], event.p)
+            GivenSection(
+                f"event.{name}", study.title_of(name)[:1].upper() + study.title_of(name)[1:], event.p
+            )
             for name, event in config.events.items()
         ),
         *_tables(study),
@@ -80,13 +82,15 @@ def given(study: StudyRecord) -> list[GivenSection]:
 
 
 def _of_study(config: Config) -> dict[str, Any]:
-    used = {
+    is_used = {
         "organ": bool(config.machine.model.sides),
         "start": config.of_catalogue,
         "catalogue": config.of_catalogue,
     }
     return {
-        name: x for name, x in config.choices.items() if name in CHOICES and x != "" and used.get(name, True)
+        name: x
+        for name, x in config.choices.items()
+        if name in CHOICES and x != "" and is_used.get(name, True)
     }
 
 
@@ -102,15 +106,15 @@ def _tables(study: StudyRecord) -> Iterator[GivenSection]:
     config, analyses = study.config, {analysis.name for analysis in ANALYSES}
     for name, section in SECTIONS.items():
         values = getattr(config, name)
-        if values is None or not section.used(config) or (name in analyses and name not in study.findings):
+        if values is None or not section.is_used(config) or (name in analyses and name not in study.findings):
             continue
         prefix = f"{name}."
         keys = {full.removeprefix(prefix): x for full, x in config.choices.items() if full.startswith(prefix)}
         event = keys.pop("event", None)
         # without its own ratio the gear has that of the machine, which follows from the motor's speed
         follows = frozenset({"ratio"} if name == "gear" and "gear.ratio" not in config.given else ())
-        chosen = {key: x for key, x in keys.items() if x}
-        yield GivenSection(name, section.title, values, chosen, unused=follows)
+        choices = {key: x for key, x in keys.items() if x}
+        yield GivenSection(name, section.title, values, choices, unused_names=follows)
         if event is not None:
             random = config.random
             side = {"side": random.side} if random.side else {}
@@ -126,8 +130,8 @@ def description(name: str) -> str:
     if name in CHOICES:
         return str(CHOICES[name][1].description)
     if table == "system":
-        known = SystemTable.model_fields.get(key)
-        return str(known.description) if known else "name of it in the FMU"
+        field = SystemTable.model_fields.get(key)
+        return str(field.description) if field else "name of it in the FMU"
     keys = SECTIONS[table].keys if table in SECTIONS else {}
     if key in keys:
         return str(keys[key][1].description)

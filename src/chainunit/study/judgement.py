@@ -29,11 +29,11 @@ def model_verdict(study: StudyRecord) -> Verdict:
     if study.settling is not None:
         runs[verdict.SETTLING] = study.settling
     if study.drive.outsider:
-        return verdict.outsider(speed, residuals, reached=mean)
+        return verdict.outsider(speed, residuals, actual=mean)
     if organs is None:
-        return verdict.rigid_links(speed, residuals, reached=mean)
+        return verdict.rigid_links(speed, residuals, actual=mean)
     if config.chain is None:
-        emptied = {name for name in study.overloads if config.events[name].empties}
+        empty = {name for name in study.overloads if config.events[name].empties}
         always = 0.0 in (config.feed.left.material_mass, config.feed.right.material_mass)
         return verdict.two_bars(
             speed,
@@ -41,18 +41,18 @@ def model_verdict(study: StudyRecord) -> Verdict:
             organs.limits.slack_speed,
             {name: (a.web_pull_least, a.wall_pull_least) for name, a in runs.items()},
             residuals,
-            empty={""} if always else emptied,
-            reached=mean,
+            empty={""} if always else empty,
+            actual=mean,
         )
     folds = {name: a.fold_largest for name, a in runs.items()}
     slack = {name: a.slack_time for name, a in runs.items()}
-    needed, turns = runs_needed(HIGH), math.inf
+    least_turns, turns = runs_needed(HIGH), math.inf
     if study.chain is not None:
         own = study.chain.own
         folds["constant"], slack["constant"] = own.fold_largest, own.slack_time
         residuals["constant"], turns = own.energy_residual, own.independent_turns
     return verdict.chains(
-        speed, residuals, folds, config.chain.fold_limit, slack, turns, needed, reached=mean
+        speed, residuals, folds, config.chain.fold_limit, slack, turns, least_turns, actual=mean
     )
 
 
@@ -99,10 +99,10 @@ def motor_verdict(study: StudyRecord) -> dict[str, Any] | None:
     does not reach the speed or becomes too hot. It is "in part" where no reserve of torque is left or known,
     another limit is exceeded, or sizing found the motor insufficient. The least reserve is given with its
     run. Runs whose energy balance is not kept are left out, as they say nothing about the motor."""
-    steady, asked = study.answers.get(STEADY), study.config.run.crank_speed
+    steady, requested = study.answers.get(STEADY), study.config.run.crank_speed
     if steady is None:
         return None
-    residuals, kept = _residuals(study), reaches(steady.speed_mean, asked)
+    residuals, keeps_speed = _residuals(study), reaches(steady.speed_mean, requested)
     # a balance of NaN is not kept either
     left_out = [name for name in study.answers if not residuals.get(name, 0.0) < RESIDUAL]
     reserves = {
@@ -113,38 +113,44 @@ def motor_verdict(study: StudyRecord) -> dict[str, Any] | None:
     run = min(reserves, key=lambda name: float(reserves[name]), default=None)
     reserve = None if run is None else reserves[run]
     speed = number(steady.speed_mean, "rad/s", "speed", beside=False)
-    wanted = number(asked, "rad/s", "speed", full=False, beside=False)
-    if kept:
+    requested_text = number(requested, "rad/s", "speed", full=False, beside=False)
+    if keeps_speed:
         text = f"The motor keeps the crank at {speed}"
-        if speed != number(asked, "rad/s", "speed", beside=False):
-            text += f", near enough to the {wanted} asked for"
-    elif steady.speed_mean > asked:
-        text = f"The motor does NOT keep the speed: the crank turns at {speed}, faster than the {wanted} asked for"
+        if speed != number(requested, "rad/s", "speed", beside=False):
+            text += f", near enough to the {requested_text} asked for"
+    elif steady.speed_mean > requested:
+        text = (
+            f"The motor does NOT keep the speed: the crank turns at {speed}, faster than the {requested_text} "
+            "asked for"
+        )
     else:
-        text = f"The motor does NOT reach the speed: {speed} in place of {wanted}"
+        text = f"The motor does NOT reach the speed: {speed} in place of {requested_text}"
     if study.insufficient:
-        text += f"{', but it' if kept else '; it'} is insufficient by the limits of the sizing"
+        text += f"{', but it' if keeps_speed else '; it'} is insufficient by the limits of the sizing"
     limits = {} if STEADY in left_out else motor_limits(study)
-    passed = [name for name, check in limits.items() if check.utilisation is None or check.utilisation > 1.0]
-    if passed:
-        text += f"{', but' if kept and not study.insufficient else ';'} {', '.join(_PASSED[name] for name in passed)}"
+    excesses = [
+        name for name, check in limits.items() if check.utilisation is None or check.utilisation > 1.0
+    ]
+    if excesses:
+        link = ", but" if keeps_speed and not study.insufficient else ";"
+        text += f"{link} {', '.join(_PASSED[name] for name in excesses)}"
     if run is None:
         text += "; its reserve of torque is not known"
     elif reserve is not None and reserve >= 0.0:
-        text += f"; least reserve of torque {number(reserve, '1', 'percent')} ({study.called(run)})"
+        text += f"; least reserve of torque {number(reserve, '1', 'percent')} ({study.title_of(run)})"
     else:
-        text += f"; {no_reserve(run, reserves[run])} ({study.called(run)})"
+        text += f"; {no_reserve(run, reserves[run])} ({study.title_of(run)})"
     if left_out:
-        names = ", ".join(study.called(name) for name in left_out)
+        names = ", ".join(study.title_of(name) for name in left_out)
         text += f"; runs whose energy balance is not kept are left out ({names})"
-    enough = reserve is not None and reserve >= AMPLE and not study.insufficient and not passed
-    burns = not kept or "temperature" in passed
+    enough = reserve is not None and reserve >= AMPLE and not study.insufficient and not excesses
+    burns = not keeps_speed or "temperature" in excesses
     holds: Holds = "false" if burns else "true" if enough else "in part"
     return {
         "holds": holds,
         "text": turning(f"{text}.", study.turning),
         "speed": entry(steady.speed_mean, "rad/s", "speed"),
-        "asked": entry(asked, "rad/s", "speed"),
+        "asked": entry(requested, "rad/s", "speed"),
         "least_reserve": entry(reserve, "1", "percent"),
         "run": run,
         "left_out": left_out,

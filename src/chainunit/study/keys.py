@@ -168,8 +168,8 @@ def _of_section(name: str) -> Iterator[Key]:
     section = SECTIONS[name]
     values = getattr(_study(), name)
     if values is None:
-        values = section.default or section.declared()
-    yield from _numbers(section.declared, values, table=name, whole=section.whole)
+        values = section.default or section.declaration()
+    yield from _numbers(section.declaration, values, table=name, whole=section.whole)
     yield from _of_fields(section.keys)
     if name == "driveline":
         yield from _numbers(Damping)
@@ -224,7 +224,7 @@ def _of_report() -> Iterator[Key]:
 
 def _of_event(of: type[Event]) -> Iterator[Key]:
     yield Key("type", "type of the event", words=(f'"{of.kind}"',), sort="text")
-    if of.sided:
+    if of.has_side:
         yield Key("side", "side that it comes on", words=('"left"', '"right"'), sort="text")
     yield Key("name", "name of its run, in small letters, digits and _", sort="text", follows="type and side")
     yield from _numbers(of.Parameters, of.Parameters(), whole=of.counts)

@@ -41,11 +41,11 @@ class Check:
         return self.utilisation is not None and self.utilisation > 1.0
 
     @property
-    def passed(self) -> str:
+    def excess(self) -> str:
         """Words on a limit that is exceeded."""
         value, limit = (number(x, self.unit, self.kind, full=False) for x in (self.value, self.limit))
-        used = number(self.utilisation, "1", "used")
-        return f"{self.title} {value}, {used}{' of' if used.endswith('%') else ''} the permitted {limit}"
+        share = number(self.utilisation, "1", "used")
+        return f"{self.title} {value}, {share}{' of' if share.endswith('%') else ''} the permitted {limit}"
 
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON."""
@@ -75,15 +75,17 @@ def lasting_current(rms: float, plate: Nameplate) -> Check:
     return Check("RMS current", rms, plate.rated_current, "A")
 
 
-def keeping_speed(speed: float, asked: float) -> Check:
+def keeping_speed(speed: float, requested: float) -> Check:
     """The deviation of the mean speed of the crank from the `requested` one [rad/s]; both may be motor speeds
     as well."""
-    return Check("deviation of the crank speed", abs(speed / asked - 1.0), SPEED_DEVIATION, "1", "percent")
+    return Check(
+        "deviation of the crank speed", abs(speed / requested - 1.0), SPEED_DEVIATION, "1", "percent"
+    )
 
 
-def reaches(speed: float, asked: float) -> bool:
+def reaches(speed: float, requested: float) -> bool:
     """Whether the crank runs at the `requested` speed [rad/s]."""
-    check = keeping_speed(speed, asked)
+    check = keeping_speed(speed, requested)
     return check.utilisation is not None and check.utilisation <= 1.0
 
 
@@ -103,8 +105,8 @@ def given_motor(
         return {}
     checks = {}
     if temperature is not None:
-        _, permitted = config.permitted_temperature
-        checks["temperature"] = heating(temperature, drive.fmu_parameters.ambient.T, permitted)
+        _, highest = config.permitted_temperature
+        checks["temperature"] = heating(temperature, drive.fmu_parameters.ambient.T, highest)
     if config.plate is not None:
         plate = config.plate.nameplate
         if current is not None:

@@ -47,7 +47,7 @@ def torque_reserve(limit: Any, torque: Any) -> float:
 def _reserve(w: Window) -> float:
     # in a dip the remaining field brakes for a moment, which is no lack of torque
     driving = np.maximum(w.value("motor.air_gap_tau") * np.sign(w.value("motor.w")), 0.0)
-    if w.drive.follows and (w.steady or w).speed_mean < 0.99 * w.asked:
+    if w.drive.follows and (w.steady or w).speed_mean < 0.99 * w.requested_speed:
         # a controlled motor that falls behind gives all the torque that it can
         return 0.0
     return torque_reserve(w.drive.largest_torque(w.run, w.warm), driving)
@@ -57,9 +57,9 @@ def _recovery(w: Window) -> float | None:
     """Time after the event from which the speed stays in the band of steady running, widened by 0.5 %; None
     if it does not return before the end of the run, or only at the very end."""
     assert w.steady is not None
-    if w.drive.follows and not reaches(w.steady.speed_mean, w.asked):
+    if w.drive.follows and not reaches(w.steady.speed_mean, w.requested_speed):
         return None
-    steady, since, widening = w.steady.speed, w.since, 0.005 * w.kept
+    steady, since, widening = w.steady.speed, w.since, 0.005 * w.normal_speed
     outside = (w.speed < np.min(steady) - widening) | (w.speed > np.max(steady) + widening)
     if not outside.any():
         return 0.0
@@ -98,7 +98,7 @@ def _fold(w: Window) -> float | None:
     return max((float(np.max(w.value(f"machine.{side}.fold_largest"))) for side in w.sides), default=0.0)
 
 
-def time_to_start(time: Any, speed: Any, settled: float, asked: float) -> float | None:
+def time_to_start(time: Any, speed: Any, final: float, requested: float) -> float | None:
     """Time at which a shaft first turns at the share `STARTED` of the `requested` speed or, if it settles at
     another speed, of that one; None where it never does. A shaft that stands or creeps at the end may have
     started before: then it stalled under its load.
@@ -109,14 +109,14 @@ def time_to_start(time: Any, speed: Any, settled: float, asked: float) -> float 
     final : mean speed of steady running [rad/s]
     requested : requested speed [rad/s]
     """
-    misses = CREEPS * asked < settled and not reaches(settled, asked)
-    at_speed = np.flatnonzero(np.asarray(speed) >= STARTED * (settled if misses else asked))
+    misses = CREEPS * requested < final and not reaches(final, requested)
+    at_speed = np.flatnonzero(np.asarray(speed) >= STARTED * (final if misses else requested))
     return float(time[at_speed[0]]) if at_speed.size else None
 
 
 def _start_time(w: Window) -> float | None:
-    settled = w.asked if w.steady is None else w.steady.speed_mean
-    return time_to_start(w.since, w.speed, settled, w.asked)
+    final = w.requested_speed if w.steady is None else w.steady.speed_mean
+    return time_to_start(w.since, w.speed, final, w.requested_speed)
 
 
 def _lent(w: Window) -> tuple[float | None, float | None]:
@@ -131,11 +131,11 @@ def _standstill(w: Window) -> float | None:
     run = w.coasting
     if run is None:
         return None
-    still = np.flatnonzero(np.abs(w.drive.crank_motion(run)[1]) < 0.01 * w.asked)
+    still = np.flatnonzero(np.abs(w.drive.crank_motion(run)[1]) < 0.01 * w.requested_speed)
     return float(run["time"][still[0]]) - w.begin if still.size else None
 
 
-Read = Callable[[Window], float | None]
+Reader = Callable[[Window], float | None]
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ class Measure:
     subject `of` are a family. A family whose first measure is on a `card` is shown large. A `minor` measure
     is left out where there is little room."""
 
-    read: Read
+    reader: Reader
     during: frozenset[Phase]
     words: str
     of: str = ""
@@ -155,7 +155,7 @@ class Measure:
 def measure(
     unit: str,
     words: str,
-    read: Read,
+    reader: Reader,
     *,
     of: str = "",
     kind: str = "",
@@ -165,28 +165,30 @@ def measure(
 ) -> Any:
     """A field that declares a `Measure`, as `quantity` does; its description is the subject `of` and the
     `words`."""
-    declared = quantity(unit, f"{of}, {words}" if of else words, kind=kind)
-    own = Measure(read, during, words, of or words, card, minor)
-    return dataclasses.field(metadata={**declared.metadata, "measure": own})
+    own_field = quantity(unit, f"{of}, {words}" if of else words, kind=kind)
+    own = Measure(reader, during, words, of or words, card, minor)
+    return dataclasses.field(metadata={**own_field.metadata, "measure": own})
 
 
 @declaration
 class Answers:
-    """The demands of a run on the drive. Torques and speeds are the crank's unless they are called the
-    motor's. Means and RMS are over the time of whole turns of the crank. Steady running is the turns in
-    `load_cycle.csv`. Times count from the event.
+    """The demands of a run on the drive. Torques and speeds are the crank's unless they are called the motor's. Means
+    and RMS are over the time of whole turns of the crank. Steady running is the turns in `load_cycle.csv`.
+    Times count from the event.
 
-    - ripple: (largest - least)/mean of the speed - `power_peak`: the largest power that the motor gives, 0
-    where it only brakes - `shaft_share`: the peak torque on the machine's shaft over that of the motor (the
-    rest is the rotor's inertia) - `start_time`: see `time_to_start` - `shaking_*`: the largest deviation of
-    the frame's load from its mean, the moment about C - `torque_reserve`: the least remaining share of the
-    driving torque that the warm motor can give at an instant, at its speed, voltage and frequency: 0 at the
-    limit, negative where a transient exceeds it, None in a start - `winding_temperature`: the final
-    temperature of the winding if the steady turns go on for ever - `cycle_gap`: the difference between the
-    ends of the steady turns, of speed or torque, over the largest value - `speed_drift`: the change of the
-    speed between these ends over its ripple, 0 where it hardly changes - `energy_after_trip`: the energy that
-    passes the safety coupling while it opens - `energy_behind`: the energy that stays in the machine behind
-    the coupling"""
+    - ripple: (largest - least)/mean of the speed
+    - `power_peak`: the largest power that the motor gives, 0 where it only brakes
+    - `shaft_share`: the peak torque on the machine's shaft over that of the motor (the rest is the rotor's inertia)
+    - `start_time`: see `time_to_start`
+    - `shaking_*`: the largest deviation of the frame's load from its mean, the moment about C
+    - `torque_reserve`: the least remaining share of the driving torque that the warm motor can give at an instant, at
+      its speed, voltage and frequency: 0 at the limit, negative where a transient exceeds it, None in a start
+    - `winding_temperature`: the final temperature of the winding if the steady turns go on for ever
+    - `cycle_gap`: the difference between the ends of the steady turns, of speed or torque, over the largest value
+    - `speed_drift`: the change of the speed between these ends over its ripple, 0 where it hardly changes
+    - `energy_after_trip`: the energy that passes the safety coupling while it opens
+    - `energy_behind`: the energy that stays in the machine behind the coupling
+    """
 
     crank_torque_peak: Value = measure(
         "N.m", "peak", lambda w: peak(w.crank_torque), during=_ALL, of="crank torque", card=True
@@ -268,7 +270,11 @@ class Answers:
         minor=True,
     )
     speed_dip: Value = measure(
-        "1", "speed dip", lambda w: float((w.kept - np.min(w.speed)) / w.kept), kind="dip", during=_AT_SPEED
+        "1",
+        "speed dip",
+        lambda w: float((w.normal_speed - np.min(w.speed)) / w.normal_speed),
+        kind="dip",
+        during=_AT_SPEED,
     )
     recovery_time: Value = measure("s", "recovery", _recovery, during=_EVENTS)
     web_pull_least: Value = measure("N", "least pull in a web", lambda w: w.least_pull("web"), during=_ALL)
@@ -303,7 +309,10 @@ class Answers:
     shaking_moment: Value = measure("N.m", "shaking moment", lambda w: w.swing("machine.frame.moment"))
     torque_reserve: Value = measure("1", "reserve of torque", _reserve, kind="percent", during=_AT_SPEED)
     stall_time: Value = measure(
-        "s", "crank stands after", lambda w: protection.stall(w.since, w.speed, w.kept), during=_EVENTS
+        "s",
+        "crank stands after",
+        lambda w: protection.stall(w.since, w.speed, w.normal_speed),
+        during=_EVENTS,
     )
     thermal_trip_time: Value = measure("s", "thermal relay trips after", _relay, during=_EVENTS)
     coupling_trip_time: Value = measure(
@@ -313,7 +322,7 @@ class Answers:
         during=_EVENTS,
     )
     energy_after_trip: Value = measure(
-        "J", "energy after the trip", lambda w: w.trip.passed if w.trip else None, during=_EVENTS
+        "J", "energy after the trip", lambda w: w.trip.energy if w.trip else None, during=_EVENTS
     )
     energy_behind: Value = measure(
         "J",
@@ -332,8 +341,8 @@ MEASURES: Mapping[str, Measure] = {
 
 def same_measure(name: str) -> Any:
     """A field that declares the measure of that name in another declaration."""
-    (declared,) = (each for each in dataclasses.fields(Answers) if each.name == name)
-    return dataclasses.field(metadata=declared.metadata)
+    (own_field,) = (each for each in dataclasses.fields(Answers) if each.name == name)
+    return dataclasses.field(metadata=own_field.metadata)
 
 
 def read_answers(window: Window) -> Answers:
@@ -353,7 +362,7 @@ def not_known(window: Window) -> dict[str, str]:
     for name, each in MEASURES.items():
         if window.phase in each.during:
             try:
-                each.read(window)
+                each.reader(window)
             except AbsentError as absent:
                 parts[name] = absent.part
     return parts
@@ -362,7 +371,7 @@ def not_known(window: Window) -> dict[str, str]:
 def read_measure(name: str, window: Window) -> Any:
     """One measure of a window; None where it has no value."""
     try:
-        return MEASURES[name].read(window)
+        return MEASURES[name].reader(window)
     except AbsentError:
         return None
 

@@ -182,7 +182,7 @@ def draw(config: Config, number: int) -> Draw:
         else math.inf
     )
     side: AnySide = config.random.side
-    if config.random.of.sided and not side:
+    if config.random.of.has_side and not side:
         side = SIDES[random.integers(len(SIDES))]
     return Draw(config.random.event(side, values), values, offset, trip)
 
@@ -196,17 +196,17 @@ def one(task: Task, number: int, simulation: Simulation) -> Sample:
     guards = {"motor.tau": trip / drive.ratio} if config.coupling else None
     series = task.rig.follow(simulation, chance.event, event, stop, guards=guards).run
     angle = float(np.interp(event, series["time"].values, drive.crank_motion(series)[0]))
-    tripped = simulation.time < stop - 0.5 * run.step
+    has_tripped = simulation.time < stop - 0.5 * run.step
     # from the saved state on, as the event may begin inside a step
     window = Window(Phase.EVENT, series, drive, (), run.crank_speed)
-    stalls = not tripped and read_measure("stall_time", window) is not None
+    stalls = not has_tripped and read_measure("stall_time", window) is not None
     return Sample(
         crank_angle=angle % (2.0 * math.pi),
         event=event,
         trip_torque=trip if config.coupling else None,
         **{each.name: read_measure(each.name, window) for each in fields(Sample) if each.name in MEASURES},
         stalls=float(stalls),
-        trips=float(tripped),
+        trips=float(has_tripped),
     )
 
 
@@ -215,14 +215,14 @@ def row_of(task: Task, digest: str, number: int) -> dict[str, Any]:
     simulation = _prepared(task, digest)
     layout = Layout(Sample)
     chance = draw(task.config, number)
-    named = {"run": number, "side": chance.event.side or None, "drawn": chance.values}
+    head = {"run": number, "side": chance.event.side or None, "drawn": chance.values}
     try:
-        return {**named, "failed": None, **layout.by_name(one(task, number, simulation))}
+        return {**head, "failed": None, **layout.by_name(one(task, number, simulation))}
     except InterruptedRunError:
         raise
     except RunError as error:
         # a run that fails is a result, too; the next run starts from the saved state again
-        return {**named, "failed": str(error), **dict.fromkeys(layout.names)}
+        return {**head, "failed": str(error), **dict.fromkeys(layout.names)}
 
 
 def read(file: Path, absent: frozenset[str] = frozenset()) -> tuple[dict[int, dict[str, Any]], int]:
@@ -292,11 +292,11 @@ class MonteCarloResult:
     @property
     def remark(self) -> str:
         """Words on the quantiles for which there are too few runs; empty where there are enough."""
-        count = len(self.rows) - self.failed
-        omitted = [q for q in QUANTILES if count < runs_needed(q)]
-        if not omitted:
+        count = len(self.rows) - self.failures
+        omissions = [q for q in QUANTILES if count < runs_needed(q)]
+        if not omissions:
             return ""
-        each = ", ".join(f"the {100 * q:.0f} % quantile takes {runs_needed(q)}" for q in omitted)
+        each = ", ".join(f"the {100 * q:.0f} % quantile takes {runs_needed(q)}" for q in omissions)
         return f"{count} runs are too few for some quantiles: {each} (monte_carlo.runs)."
 
     @property
@@ -306,7 +306,7 @@ class MonteCarloResult:
         return {side: sum(row["side"] == side for row in self.rows) for side in SIDES if sides != {None}}
 
     @property
-    def failed(self) -> int:
+    def failures(self) -> int:
         """Number of runs in which an FMU failed."""
         return sum(row["failed"] is not None for row in self.rows)
 
@@ -316,7 +316,7 @@ class MonteCarloResult:
         return {
             "runs": entry(len(self.rows), "1"),
             "sides": {side: entry(runs, "1") for side, runs in self.sides.items()},
-            "failed": entry(self.failed, "1"),
+            "failed": entry(self.failures, "1"),
             "left_out": entry(self.left_out, "1"),
             "file": self.file.name,
             "quantiles": {
@@ -341,7 +341,7 @@ def run(task: Task, folder: Path, report: Report, workers: int | None = None) ->
     digest = task.digest()
     file = folder / f"monte_carlo_{digest}.jsonl"
     rows, left_out = read(file, task.absent)
-    resumed = len(rows)
+    earlier_runs = len(rows)
     count = int(task.config.monte_carlo.runs)
     open_runs = [k for k in range(count) if k not in rows]
     workers = workers or os.cpu_count() or 1
@@ -364,13 +364,13 @@ def run(task: Task, folder: Path, report: Report, workers: int | None = None) ->
                     waiting.add(pool.submit(row_of, task, digest, k))
                 if not waiting:
                     break
-                ended, waiting = wait(waiting, return_when=FIRST_COMPLETED)
-                new = sorted((future.result() for future in ended), key=lambda row: row["run"])
+                finished_runs, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+                new = sorted((future.result() for future in finished_runs), key=lambda row: row["run"])
                 rows |= {row["run"]: row for row in new}
                 with writing(file):
                     out.writelines(_line(row) for row in new)
                     out.flush()
-                complete += len(ended)
+                complete += len(finished_runs)
                 report(what, complete, count)
         except BrokenProcessPool as error:
             raise RunError(
@@ -385,7 +385,7 @@ def run(task: Task, folder: Path, report: Report, workers: int | None = None) ->
         except KeyboardInterrupt as error:
             pool.shutdown(wait=False, cancel_futures=True)
             raise InterruptedRunError(f"interrupted after {len(rows)} of {count} random overloads") from error
-    return MonteCarloResult([rows[k] for k in sorted(rows) if k < count], file, resumed, left_out)
+    return MonteCarloResult([rows[k] for k in sorted(rows) if k < count], file, earlier_runs, left_out)
 
 
 def _line(row: Mapping[str, Any]) -> str:

@@ -33,7 +33,7 @@ def study_system(config: Config, drive: Drive) -> System:
     start = drive.loads(config.feed) if drive.outsider else {}
     if "w_ref" in drive.graph.components["motor"].connectors:
         start["motor.w_ref"] = config.run.crank_speed * drive.ratio
-    for name, machine in (("machine", drive.driven), ("model", drive.machine)):
+    for name, machine in (("machine", drive.driven_machine), ("model", drive.machine)):
         if name in drive.graph.components and not drive.outsider:
             # a connected input needs no start value, but an FMU that runs alone needs one
             values = _machine(config, machine.model, machine)
@@ -65,9 +65,9 @@ def start_of(
         return model.parameter_layout.by_name(drive.line)
     if not issubclass(model, Motor):
         if not _is_of(model, drive):
-            raise InputError(f"the study's machine is {drive.driven.model.name}, not {model.name}")
-        given = _machine(config, model, drive.driven)
-        return given | (drive.organ() if issubclass(model, ChainedModel) else {})
+            raise InputError(f"the study's machine is {drive.driven_machine.model.name}, not {model.name}")
+        values = _machine(config, model, drive.driven_machine)
+        return values | (drive.organ() if issubclass(model, ChainedModel) else {})
     if drive.motor is not model:
         title = drive.graph.components["motor"].title
         raise InputError(f"the study's motor is {title}, not {model.name}")
@@ -93,7 +93,7 @@ def _is_of(model: type[Model], drive: Drive) -> bool:
     """Whether the model is the machine of the drive, its direct model, or its model with chains."""
     if drive.outsider:
         return False
-    own = drive.driven.model
+    own = drive.driven_machine.model
     chains = bool(own.sides) and issubclass(model, ChainedModel)
     return model is own or chains or model is own.direct()
 
@@ -109,7 +109,7 @@ def _machine(config: Config, model: type[Model], machine: Machine) -> dict[str, 
 def _drive(config: Config, backend: Backend | None, report: Callable[[str], None]) -> Drive:
     with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
         choice = choose(config, Path(scratch), lambda what, done, todo: report(what), backend)
-    if choice.sizing is not None and choice.sizing.chosen is None:
+    if choice.sizing is not None and choice.sizing.chosen_candidate is None:
         raise RunError(f"[sizing]: {choice.sizing.answer}")
     return choice.drive
 
@@ -131,7 +131,7 @@ def export_study(
     """
     drive = _drive(config, backend, report)
     run = config.run
-    stop = config.settled + run.turns * config.turn
+    stop = config.steady_begin + run.turns * config.turn
     return export(
         study_system(config, drive),
         file,

@@ -23,9 +23,9 @@ from .foreign_machine import foreign_model
 from .sections import CHOICES, FileSection, SystemTable, sections_of
 
 
-def _as_text(given: Any) -> Any:
+def _as_text(value: Any) -> Any:
     """The text of a TOML date; any other value as it is."""
-    return given.isoformat() if isinstance(given, date) else given
+    return value.isoformat() if isinstance(value, date) else value
 
 
 class ReportTable(BaseModel):
@@ -41,8 +41,8 @@ class ReportTable(BaseModel):
     @property
     def labels(self) -> dict[str, str]:
         """The entries at the head of the report, by their names; only those that are given."""
-        named = {name: getattr(self, name) for name in type(self).model_fields if name != "units"}
-        return {name: text for name, text in named.items() if text}
+        entries = {name: getattr(self, name) for name in type(self).model_fields if name != "units"}
+        return {name: text for name, text in entries.items() if text}
 
 
 EXAMPLES = {
@@ -98,7 +98,7 @@ class Parts:
 def _form(machine: type[MachineModel], motor: type[Motor]) -> type[BaseModel]:
     """The form of a file with that machine and motor. It takes longer to make than a file takes to read."""
     tables: dict[str, type[BaseModel]] = {
-        name: section.form(section.declared, name, f"{name}.", **section.keys)
+        name: section.form(section.declaration, name, f"{name}.", **section.keys)
         for name, section in sections_of(machine, motor).items()
     }
     tables |= {"report": ReportTable, "system": SystemTable}

@@ -121,10 +121,10 @@ class Setting:
         return {name: peak for name, peak in self.disturbances.items() if peak > self.least}
 
 
-def stall(time: Any, speed: Any, asked: float, share: float = 0.1) -> float | None:
+def stall(time: Any, speed: Any, requested: float, share: float = 0.1) -> float | None:
     """Time [s] from which the speed stays below `share` of the `requested` speed until the end of the run;
     None where it does not, or only in the last tenth of the run."""
-    below = np.abs(np.asarray(speed)) < share * asked
+    below = np.abs(np.asarray(speed)) < share * requested
     if not below[-1]:
         return None
     moving = np.flatnonzero(~below)

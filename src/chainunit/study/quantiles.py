@@ -50,17 +50,21 @@ def quantile(values: Any, q: float) -> Estimate | None:
     from scipy.stats import binom
 
     values = np.asarray(values, float)
-    ordered = np.sort(values, axis=None)
-    value = float(np.quantile(ordered, q))
+    ranking = np.sort(values, axis=None)
+    value = float(np.quantile(ranking, q))
     if _alike(values):
-        return Estimate(value, float(ordered[0]), float(ordered[-1]))
+        return Estimate(value, float(ranking[0]), float(ranking[-1]))
     runs = counted(values, q)
     if runs < runs_needed(q):
         return None
     least, most = binom.ppf((0.5 * (1.0 - CONFIDENCE), 0.5 * (1.0 + CONFIDENCE)), runs, q)
-    per_run = len(ordered) / runs
+    per_run = len(ranking) / runs
     low, high = math.floor((least - 1.0) * per_run), math.ceil((most + 1.0) * per_run) - 1
-    return Estimate(value, float(ordered[max(0, low)]), float(ordered[min(high, len(ordered) - 1)]))
+    return Estimate(
+        value,
+        float(ranking[max(0, low)]),
+        float(ranking[min(high, len(ranking) - 1)]),
+    )
 
 
 def counted(values: Any, q: float) -> int:

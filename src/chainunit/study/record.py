@@ -85,7 +85,7 @@ class Spread:
     """The assumed quantities of an event, and the peaks over the range of the assumption: from and to, by
     quantity."""
 
-    assumed: dict[str, tuple[float, float]]
+    ranges: dict[str, tuple[float, float]]
     """range of each assumed quantity, in the declared units of the event"""
     peaks: dict[str, tuple[float, float]]
     """range of the peaks crank_torque, motor_torque and rocker_torque [N m]"""
@@ -164,11 +164,11 @@ class StudyRecord:
     @property
     def titles(self) -> dict[str, str]:
         """By run, its title for use in sentences."""
-        named = {STEADY: "steady running", verdict.START: "start-up"}
-        named |= {verdict.SETTLING: "settling under the feed", "constant": "chains at constant speed"}
-        return named | {name: event.title for name, event in self.config.events.items()}
+        titles = {STEADY: "steady running", verdict.START: "start-up"}
+        titles |= {verdict.SETTLING: "settling under the feed", "constant": "chains at constant speed"}
+        return titles | {name: event.title for name, event in self.config.events.items()}
 
-    def called(self, run: str) -> str:
+    def title_of(self, run: str) -> str:
         """The title of a run for use in sentences."""
         return self.titles.get(run, run.replace("_", " "))
 
@@ -184,10 +184,10 @@ class StudyRecord:
         if section == "machine" and parameter in LENGTHS and "ratios.rho" in self.config.of_example:
             return "example"
         if self.config.of_catalogue and (name == "machine.ratio" or section == "motor"):
-            told = self._told(parameter)
-            if not told:
+            name_in_file = self._told(parameter)
+            if not name_in_file:
                 return "catalogue" if self.sizing is None else "sizing"
-            name = told
+            name = name_in_file
         return self._of(name)
 
     def _of(self, name: str) -> Origins:
@@ -246,14 +246,14 @@ class StudyRecord:
         return [name for name in self.answers if name in self.config.events]
 
     @property
-    def settled(self) -> float:
+    def steady_begin(self) -> float:
         """Time from which running counts as steady [s]."""
-        return self.config.settled if self.steady_from is None else self.steady_from
+        return self.config.steady_begin if self.steady_from is None else self.steady_from
 
     @property
     def insufficient(self) -> bool:
         """Whether sizing found no motor that fits, so that all is run with the nearest."""
-        return self.sizing is not None and self.sizing.chosen is None
+        return self.sizing is not None and self.sizing.chosen_candidate is None
 
     @property
     def start_apart(self) -> bool:
@@ -289,17 +289,17 @@ class StudyRecord:
     def steady(self) -> xr.Dataset:
         """The steady turns that are evaluated, both ends included; where the crank does not make whole turns,
         the whole run from the time at which it should be steady."""
-        run = self.runs["start_up"].sel(time=slice(self.settled, None))
+        run = self.runs["start_up"].sel(time=slice(self.steady_begin, None))
         return whole_turns(self.drive, run, self.config.run.turns)
 
     def window(self, phase: Phase, run: xr.Dataset, begin: float = 0.0, trip: Trip | None = None) -> Window:
         """The window of a run from which measures are read."""
         sides = self.drive.machine.loaded_sides(self.config.feed)
-        asked = self.config.run.crank_speed
+        requested = self.config.run.crank_speed
         steady = None
         if phase in (Phase.START_UP, Phase.EVENT, Phase.LOADED_START):
-            steady = Window(Phase.STEADY, self.steady, self.drive, sides, asked)
-        return Window(phase, run, self.drive, sides, asked, begin, steady, trip)
+            steady = Window(Phase.STEADY, self.steady, self.drive, sides, requested)
+        return Window(phase, run, self.drive, sides, requested, begin, steady, trip)
 
     @property
     def motor(self) -> Any:

@@ -75,8 +75,8 @@ def conclude(study: StudyRecord) -> None:
     _on_assumptions(study)
     if study.statics.torsion is not None:
         _on_shaft(study)
-    for found in study.findings.values():
-        found.remark(study)
+    for findings in study.findings.values():
+        findings.remark(study)
 
 
 _RATING = ("limit.i", "limit.v", "armature.k")
@@ -103,21 +103,21 @@ def _left_out(study: StudyRecord) -> Iterator[str]:
 
 def _on_start(study: StudyRecord) -> None:
     """Warn where the feed came to a machine that did not have its speed yet."""
-    run, fed = study.runs["start_up"], study.fed_from
-    if fed is None:
+    run, feed_time = study.runs["start_up"], study.fed_from
+    if feed_time is None:
         return
-    speed = float(np.interp(fed, run["time"].values, study.drive.crank_motion(run)[1]))
-    asked = study.config.run.crank_speed
+    speed = float(np.interp(feed_time, run["time"].values, study.drive.crank_motion(run)[1]))
+    requested = study.config.run.crank_speed
     # the row at which the speed is passed is the last of the start
-    if speed < STARTED * asked:
+    if speed < STARTED * requested:
         study.warn(
             "fed before speed",
             "start-up: the motor does not bring the empty machine to its speed in reasonable time: the feed comes "
             "after {fed}, with the crank at {speed} in place of {wanted}; a larger motor, or a lighter flywheel.",
             START,
-            fed=(fed, "s"),
+            fed=(feed_time, "s"),
             speed=(speed, "rad/s", "speed"),
-            wanted=number(asked, "rad/s", "speed", full=False, beside=False),
+            wanted=number(requested, "rad/s", "speed", full=False, beside=False),
         )
 
 
@@ -193,20 +193,20 @@ def _why_missed(study: StudyRecord, steady: Answers) -> str:
 
 
 def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
-    asked, warn = study.config.run.crank_speed, study.warn
+    requested, warn = study.config.run.crank_speed, study.warn
     if not study.reaches:
-        why, branched = _why_missed(study, steady), ""
+        why, addition = _why_missed(study, steady), ""
         if any(not study.config.events[name].from_rest for name in study.overloads):
-            branched = " Overloads are those of this state."
+            addition = " Overloads are those of this state."
         warn(
             "speed missed",
             "steady running: the crank turns at {speed_mean} in place of {wanted}; {why}.{branched}",
             STEADY,
             speed_mean=(steady.speed_mean, "rad/s", "speed"),
-            asked=(asked, "rad/s", "speed"),
-            wanted=number(asked, "rad/s", "speed", full=False),
+            asked=(requested, "rad/s", "speed"),
+            wanted=number(requested, "rad/s", "speed", full=False),
             why=why,
-            branched=branched,
+            branched=addition,
         )
     if study.drive.whole_turns(study.steady) is None:
         warn(
@@ -269,8 +269,8 @@ def _on_runs(study: StudyRecord) -> None:
         limits["current limit"] = largest, "A"
     happenings = [(name, *each) for name in study.answers for each in _happenings(study, name)]
     for kind in dict.fromkeys(kind for _, kind, *_ in happenings):
-        runs = {name: (shown, amounts) for name, each, shown, amounts in happenings if each == kind}
-        where = (f"{study.called(name)}{f' ({shown})' if shown else ''}" for name, (shown, _) in runs.items())
+        runs = {name: (text, amounts) for name, each, text, amounts in happenings if each == kind}
+        where = (f"{study.title_of(name)}{f' ({text})' if text else ''}" for name, (text, _) in runs.items())
         limit = {"passed": limits[kind]} if kind in limits else {}
         study.warn(
             kind,
@@ -287,8 +287,8 @@ def _happenings(study: StudyRecord, name: str) -> Iterator[tuple[str, str, dict[
     """Each happening in a run: its kind, its numbers in words, and its numbers as data."""
     config, answers = study.config, study.answers[name]
     pulls = answers.web_pull_least, answers.wall_pull_least
-    pushed = any(pull is not None and pull < 0.0 for pull in pulls)
-    if answers.slack_time == 0.0 and pushed:
+    is_pushed = any(pull is not None and pull < 0.0 for pull in pulls)
+    if answers.slack_time == 0.0 and is_pushed:
         yield "rod end pushed", "", {}
     largest = study.drive.motor.current_limit(study.motor)
     if largest is not None and answers.current_peak > 0.999 * largest:
@@ -303,11 +303,11 @@ def _happenings(study: StudyRecord, name: str) -> Iterator[tuple[str, str, dict[
     if answers.coupling_trip_time is not None:
         units = {"coupling_trip_time": "s", "energy_after_trip": "J", "energy_behind": "J"}
         amounts: dict[str, Amount] = {each: (getattr(answers, each), unit) for each, unit in units.items()}
-        time, passed, behind = (number(*amount) for amount in amounts.values())
+        time, energy, behind = (number(*amount) for amount in amounts.values())
         stays = "the machine behind it is an FMU and is not followed"
         if answers.energy_behind is not None:
             stays = f"{behind} stay behind it"
-        yield "trip", f"after {time}; {passed} pass it while it opens, {stays}", amounts
+        yield "trip", f"after {time}; {energy} pass it while it opens, {stays}", amounts
     elif name in config.events and answers.recovery_time is None and study.returns:
         yield "not recovered", "", {}
 
@@ -320,13 +320,17 @@ current."""
 def _on_inverter(study: StudyRecord) -> None:
     """Note the runs with a current that an inverter can hardly give; its own limit is not in the model of the
     motor."""
-    rated = study.drive.rated_current
-    if rated is None or study.config.start != "inverter":
+    rated_current = study.drive.rated_current
+    if rated_current is None or study.config.start != "inverter":
         return
     runs = {name: a.current_peak for name, a in (("start_up", study.start), *study.answers.items()) if a}
-    high = {name: peak for name, peak in runs.items() if peak is not None and peak > _SHORT_TIME * rated}
+    high = {
+        name: peak for name, peak in runs.items() if peak is not None and peak > _SHORT_TIME * rated_current
+    }
     if high:
-        where = (f"{study.called(name)} ({number(peak / rated, '1')})" for name, peak in high.items())
+        where = (
+            f"{study.title_of(name)} ({number(peak / rated_current, '1')})" for name, peak in high.items()
+        )
         study.note(
             "inverter current",
             "The inverter's own current limit is not in the model, and usual ones give {limit} to 2 times the rated "
@@ -334,7 +338,7 @@ def _on_inverter(study: StudyRecord) -> None:
             "than here. Times the rated {rated}: {where}.",
             *high,
             limit=f"{_SHORT_TIME:g}",
-            rated=(rated, "A"),
+            rated=(rated_current, "A"),
             where="; ".join(where),
             **{f"{name}.current_peak": (peak, "A") for name, peak in high.items()},
         )
@@ -351,12 +355,12 @@ def _on_random_overloads(study: StudyRecord) -> None:
     random, note = study.monte_carlo, study.note
     shares = random.quantiles() if random else {}
     for name, words in _SPOILED.items():
-        ended = shares.get(name, {}).get("share")
-        if ended is not None and ended.value > 0.0:
+        share = shares.get(name, {}).get("share")
+        if share is not None and share.value > 0.0:
             study.warn(
                 f"random overload {name}",
                 f"overloads at random: {words}.",
-                share=(ended.value, "1", "percent"),
+                share=(share.value, "1", "percent"),
             )
     if random and random.remark:
         note("too few runs", "overloads at random: {text}", text=random.remark)
@@ -411,7 +415,7 @@ def _on_chains(study: StudyRecord, chain: ChainOrgans) -> None:
         if band.low <= speed <= band.high:
             text = "chains: the crank speed lies among those to avoid, {band}: {why}."
             warn("speed to avoid", text, band=str(band), why=band.why, speed=(speed, "rad/s", "speed"))
-    for missing, why in result.failed.items():
+    for missing, why in result.failures.items():
         text = "chains: {speed} is missing in the sweep: {why}"
         warn("speed missing", text, why=str(why), speed=(missing, "rad/s", "speed"))
     residual = max(n.energy_residual for n in result.sweep)
@@ -439,7 +443,7 @@ def _on_folding(study: StudyRecord) -> None:
                 "{run}: the drive hardly feels the lump, as the web folds before it on this stroke; on the other one "
                 "the web is pulled: try crank_angle = {angle}.",
                 run,
-                run=study.called(run),
+                run=study.title_of(run),
                 angle=f'"{math.degrees((event.p.crank_angle + math.pi) % (2.0 * math.pi)):.4g} deg"',
             )
 
@@ -453,8 +457,8 @@ def _on_shaft(study: StudyRecord) -> None:
         rigid = "Sizing took the shafts for rigid and the driveline for massless; the runs have it."
         note("sized without line", rigid)
     if line.d2 == 0.0 and line.d3 == 0.0:
-        undamped = "The driveline has no damping: a vibration that was set off goes on; give d2 and d3."
-        note("undamped line", undamped)
+        text = "The driveline has no damping: a vibration that was set off goes on; give d2 and d3."
+        note("undamped line", text)
     ends: dict[str, Amount] = {
         "k_least": (modes.k_least, "rad/s", "frequency"),
         "k_largest": (modes.k_largest, "rad/s", "frequency"),
@@ -490,6 +494,6 @@ def _on_shaft(study: StudyRecord) -> None:
                 "amplification",
                 "{title}: the line's torque peaks at {amplification} times that of a rigid drive.",
                 name,
-                title=study.called(name),
+                title=study.title_of(name),
                 amplification=(shaft.amplification, "1"),
             )

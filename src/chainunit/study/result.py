@@ -56,10 +56,10 @@ def _as_dict(study: StudyRecord) -> dict[str, Any]:
         "warnings": [remark.as_dict() for remark in study.warnings],
         "notes": [remark.as_dict() for remark in study.notes],
         "slips": [slip.as_dict() for slip in config.slips],
-        **(found := _given(study)),
+        **(given := _given(study)),
         **_statics(study),
         **_runs(study),
-        **{name: found.get(name, {}) | part for name, part in _parts(study).items()},
+        **{name: given.get(name, {}) | part for name, part in _parts(study).items()},
         "fmus": {name: str(origin) for name, origin in study.fmus.items()},
     }
 
@@ -67,8 +67,8 @@ def _as_dict(study: StudyRecord) -> dict[str, Any]:
 def _on_model(study: StudyRecord) -> dict[str, Any] | None:
     if study.verdict is None:
         return None
-    found = study.verdict.as_dict()
-    return found | {"text": turning(found["text"], study.turning)}
+    verdict = study.verdict.as_dict()
+    return verdict | {"text": turning(verdict["text"], study.turning)}
 
 
 def _given(study: StudyRecord) -> dict[str, Any]:
@@ -76,12 +76,12 @@ def _given(study: StudyRecord) -> dict[str, Any]:
     value."""
     sections = given(study)
     names = [name for section in sections for name in section.names]
-    found: dict[str, Any] = {"event": {}, "motor": _motor(study)}
+    values: dict[str, Any] = {"event": {}, "motor": _motor(study)}
     for section in sections:
         if section.name != "motor":
-            _put(found, section.place, section.as_dict())
+            _put(values, section.place, section.as_dict())
     origins = {name: origin for name in names if (origin := study.origin(name)) != "declared"}
-    return {"origins": origins} | found
+    return {"origins": origins} | values
 
 
 def _put(tree: dict[str, Any], place: str, values: dict[str, Any]) -> None:
@@ -151,7 +151,7 @@ def _spread(study: StudyRecord, name: str) -> dict[str, Any]:
         study.spreads[name],
         {v.name: v.unit for v in variables(study.config.events[name].Parameters)},
     )
-    ranges = [(each, ends, units[each], "assumed") for each, ends in spread.assumed.items()]
+    ranges = [(each, ends, units[each], "assumed") for each, ends in spread.ranges.items()]
     ranges += [(each, ends, "N.m", "") for each, ends in spread.peaks.items()]
     return {
         f"{each}_{end}": entry(x, unit, kind)
@@ -163,7 +163,7 @@ def _spread(study: StudyRecord, name: str) -> dict[str, Any]:
 def _parts(study: StudyRecord) -> dict[str, Any]:
     """The parts of the result that only some studies have."""
     config = study.config
-    parts = {name: found.as_dict() for name, found in study.findings.items()}
+    parts = {name: findings.as_dict() for name, findings in study.findings.items()}
     if study.sizing:
         parts["sizing"] = study.sizing.as_dict() | {"protection": _protection(study)}
     if study.monte_carlo:
@@ -201,14 +201,14 @@ def _protection(study: StudyRecord) -> dict[str, Any]:
         "start_torque": torque(study.start_torque, "largest torque of a start on the coupling"),
         "overloads": {
             name: torque(
-                peak, f"{study.called(name)}: {'opens it' if name in setting.opens else 'leaves it shut'}"
+                peak, f"{study.title_of(name)}: {'opens it' if name in setting.opens else 'leaves it shut'}"
             )
             for name, peak in setting.overloads.items()
         },
         "disturbances": {
             name: torque(
                 peak,
-                f"{study.called(name)}: {'a nuisance trip' if name in setting.nuisances else 'leaves it shut'}",
+                f"{study.title_of(name)}: {'a nuisance trip' if name in setting.nuisances else 'leaves it shut'}",
             )
             for name, peak in setting.disturbances.items()
         },

@@ -33,7 +33,7 @@ from .cycle import no_feed
 from .drive import Drive
 from .event import Event, OverTime, Signals, Values
 from .measures import STARTED
-from .window import settled, whole_turns
+from .window import is_settled, whole_turns
 
 _LONGEST_START = 30.0
 """Time after the ramp at which an empty machine is fed, unless it would reach its speed in `_LONGEST_RISE`
@@ -145,7 +145,7 @@ class Rig:
         signals = event.signals(normal, begin, state)
         return {self._inputs[name][0]: signal for name, signal in signals.items()}
 
-    def signals(self, given: Mapping[str, OverTime] | None = None, *, ramp: bool = False) -> Signals:
+    def signals(self, changes: Mapping[str, OverTime] | None = None, *, ramp: bool = False) -> Signals:
         """Loads of normal running, or the `changes` in their place, and the speed reference, with `ramp` from
         rest."""
         run = self.config.run
@@ -155,7 +155,7 @@ class Rig:
             loads = {full: self._coming(empty[full], value) for full, value in loads.items()}
         signals = {
             **loads,
-            **(given or {}),
+            **(changes or {}),
             **self.drive.reference(run.crank_speed, run.ramp if ramp else None),
         }
         # a twin lacks the inputs of the part that is left out
@@ -169,8 +169,8 @@ class Rig:
 
     def from_rest(self, event: Event | None = None) -> Simulation:
         """The simulation from rest on, with the `event` of a start, if one is given."""
-        given = self.event_signals(event, 0.0, {}) if event else {}
-        return self.simulation(self.system, self.signals(given, ramp=True))
+        changes = self.event_signals(event, 0.0, {}) if event else {}
+        return self.simulation(self.system, self.signals(changes, ramp=True))
 
     def simulation(self, system: System, signals: Mapping[str, Any], begin: float = 0.0) -> Simulation:
         """The simulation of a system by the method of the study.
@@ -203,33 +203,33 @@ class Rig:
         # behind a shaft line the crank is not where the motor is
         name, ratio = self.drive.crank_speed
         goal = STARTED * self.config.run.crank_speed * ratio
-        watched = {**guards, name: goal}
+        speed_limit = {**guards, name: goal}
         longest, piece = self.config.started + _LONGEST_RISE, max(self.config.turn, 1.0)
         stop = self.config.started + _LONGEST_START
-        run = simulation.run(stop, self.step, progress, guards=watched)
+        run = simulation.run(stop, self.step, progress, guards=speed_limit)
         while stop - 0.5 * self.step <= simulation.time < longest:
             speed = float(run[name][-1])
             before = float(run[name].sel(time=stop - piece, method="nearest"))
             if goal - speed > (speed - before) / piece * (longest - stop):
                 break
             stop = min(stop + piece, longest)
-            run = joined([run, simulation.run(stop, self.step, progress, guards=watched)])
-        fed = replace(self, fed_from=simulation.time)
-        simulation.signals = fed.signals(ramp=True)
-        return run, fed
+            run = joined([run, simulation.run(stop, self.step, progress, guards=speed_limit)])
+        rig = replace(self, fed_from=simulation.time)
+        simulation.signals = rig.signals(ramp=True)
+        return run, rig
 
     def start_up(
         self, simulation: Simulation, stop: float, progress: Progress, guards: Mapping[str, float]
     ) -> StartUp:
         """Start-up and steady running to the time `stop` [s], or longer, see `_missing`; a machine that
         starts empty runs so long after it is fed."""
-        rig, pieces, steady_from = self, [], self.config.settled
+        rig, pieces, steady_from = self, [], self.config.steady_begin
         if self.config.empty_start:
             run, rig = self.start_empty(simulation, progress, guards)
             pieces = [run]
             # a motor that follows a ramp is not steady before its end
-            fed = max(simulation.time, self.config.started) if self.drive.follows else simulation.time
-            later = fed - self.config.started
+            feed_time = max(simulation.time, self.config.started) if self.drive.follows else simulation.time
+            later = feed_time - self.config.started
             stop, steady_from = stop + later, steady_from + later
             if any(abs(float(run[name][-1])) >= limit for name, limit in guards.items()):
                 return StartUp(run, steady_from, stop, rig)
@@ -252,7 +252,7 @@ class Rig:
         since = run.sel(time=slice(steady_from, None))
         turns = self.drive.whole_turns(since, turns_asked)
         if turns is not None and self.drive.turns(turns) > turns_asked - 0.5:
-            if self.drive.chain is not None or settled(self.drive, turns):
+            if self.drive.chain is not None or is_settled(self.drive, turns):
                 return None, steady_from
             # as if one turn more had been waited for
             steady_from = float(whole_turns(self.drive, since, 1)["time"][-1])
@@ -305,11 +305,11 @@ class Rig:
         """Write the energy residual of each shaft into the run; a shaft that does not drive the machine
         itself is named after the part that it drives. Returns each residual over the energy moved. For `lead`
         see `Transient`."""
-        stored = self.drive.simulated.stored_per_unit
-        feed = {f"machine.{name}": partial(self._held, per_unit) for name, per_unit in stored.items()}
+        energy = self.drive.simulated_machine.stored_per_unit
+        feed = {f"machine.{name}": partial(self._held, per_unit) for name, per_unit in energy.items()}
         shares = {}
-        for driven, (residual, share) in certify(run, self.graph, feed, lead).items():
-            prefix = "" if driven == "machine" else f"{driven}_"
+        for part, (residual, share) in certify(run, self.graph, feed, lead).items():
+            prefix = "" if part == "machine" else f"{part}_"
             run[f"{prefix}residual"] = residual
             shares[prefix + _SHARE] = share
         return shares
@@ -362,5 +362,5 @@ DIFFERENCE = "_difference_to_monolithic"
 def joined(pieces: list[xr.Dataset]) -> xr.Dataset:
     """One run from pieces that follow each other; at an instant that two pieces share, the later piece
     counts."""
-    shortened = [piece.isel(time=slice(None, -1)) for piece in pieces[:-1]]
-    return xr.concat([*shortened, pieces[-1]], "time", data_vars="all") if shortened else pieces[-1]
+    parts = [piece.isel(time=slice(None, -1)) for piece in pieces[:-1]]
+    return xr.concat([*parts, pieces[-1]], "time", data_vars="all") if parts else pieces[-1]

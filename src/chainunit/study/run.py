@@ -108,9 +108,9 @@ def _analyse(study: StudyRecord, rig: Rig, report: Report, *, needs_runs: bool) 
     """Make every analysis for which the system has the parts."""
     for analysis in ANALYSES:
         if analysis.needs_runs == needs_runs and analysis.applies(study.config, study.drive):
-            found = analysis.find(study, rig, report)
-            if found is not None:
-                study.findings[analysis.name] = found
+            findings = analysis.find(study, rig, report)
+            if findings is not None:
+                study.findings[analysis.name] = findings
 
 
 def _check_random(config: Config, rig: Rig) -> None:
@@ -130,12 +130,12 @@ def _chains(study: StudyRecord, file: Path, report: Report) -> None:
         )
         return
     try:
-        study.chain, ended = study_chain(study.config, study.drive, file, report)
+        study.chain, failure = study_chain(study.config, study.drive, file, report)
     except RunError as error:
-        ended = error
+        failure = error
     except KeyboardInterrupt:
-        ended = InterruptedRunError("interrupted")
-    study.failure = study.failure or ended
+        failure = InterruptedRunError("interrupted")
+    study.failure = study.failure or failure
 
 
 class Runner:
@@ -164,13 +164,13 @@ class Runner:
             self._start_up(simulation)
             begin, speed = simulation.save(), self.study.answers["steady"].speed_mean
             angle = float(self.rig.drive.crank_motion(self.study.runs["start_up"])[0][-1])
-            done, transients = 0.0, []
+            progress, transients = 0.0, []
             for event in self.events:
                 lead = self.rig.lead(event, angle, speed)
-                transients.append(self._event(simulation, event, begin + lead, done))
-                done += lead + event.follow(self.study.config.turn)
+                transients.append(self._event(simulation, event, begin + lead, progress))
+                progress += lead + event.follow(self.study.config.turn)
             for transient in transients:
-                self._assumption(simulation, transient, done)
+                self._assumption(simulation, transient, progress)
         if check:
             self._check(transients)
         if "model" in self.rig.graph.components:
@@ -229,8 +229,8 @@ class Runner:
         start = run.sel(time=slice(None, end))
         # if the feed comes before the machine is at speed, the start goes on under the feed
         whole = study.window(Phase.START_UP, run.sel(time=slice(None, begin)))
-        started = read_measure("start_time", whole)
-        study.start = replace(read_answers(study.window(Phase.START_UP, start)), start_time=started)
+        start_time = read_measure("start_time", whole)
+        study.start = replace(read_answers(study.window(Phase.START_UP, start)), start_time=start_time)
         study.fed_from = rig.fed_from
         self._bearings(verdict.START, start)
         self._held_shut(verdict.START, start)
@@ -239,16 +239,16 @@ class Runner:
             study.settling = read_answers(study.window(Phase.SETTLING, settling))
             self._bearings(verdict.SETTLING, settling)
             self._held_shut(verdict.SETTLING, settling)
-        asked = on_coupling(rig.drive, steady)
-        if config.coupling and asked > config.coupling.trip_torque:
+        torque = on_coupling(rig.drive, steady)
+        if config.coupling and torque > config.coupling.trip_torque:
             raise RunError(
-                f"the safety coupling opens in steady running, which puts {number(asked, 'N.m', digits=4)} on it; "
+                f"the safety coupling opens in steady running, which puts {number(torque, 'N.m', digits=4)} on it; "
                 "coupling.trip_torque must be above that"
             )
 
-    def _event(self, simulation: Simulation, event: Event, begin: float, done: float) -> Transient:
+    def _event(self, simulation: Simulation, event: Event, begin: float, before: float) -> Transient:
         stop = begin + event.follow(self.study.config.turn)
-        progress = self._progress(event.title, done)
+        progress = self._progress(event.title, before)
         transient = self.rig.follow(simulation, event, begin, stop, progress, self.rig.guards)
         self._close(simulation, transient, stop, Phase.EVENT)
         return transient
@@ -272,12 +272,12 @@ class Runner:
         study.event[name] = transient.begin
         if coupling and simulation.time < stop - 0.5 * rig.step:
             time = simulation.time
-            run, passed = rig.release(simulation, run, coupling.release_time)
+            run, energy = rig.release(simulation, run, coupling.release_time)
             self._coasting = self._coasting or self._export_coasting()
             coasting = rig.coast(transient, run, stop, self._coasting) if self._coasting else None
             if coasting is not None:
                 study.runs[f"{name}_coasting"] = coasting
-            trip = Trip(time, passed, coasting)
+            trip = Trip(time, energy, coasting)
         self._certify(name, run, transient.lead)
         after = run.sel(time=slice(transient.begin, None))
         study.answers[name] = read_answers(study.window(phase, after, transient.begin, trip))
@@ -296,14 +296,14 @@ class Runner:
         self.study.certificate[name] = self.rig.residuals(run, lead)
         self.study.runs[name] = run
 
-    def _assumption(self, simulation: Simulation, transient: Transient, done: float) -> None:
+    def _assumption(self, simulation: Simulation, transient: Transient, before: float) -> None:
         """Record the peaks over the range of the assumption of an event, run from the saved steady state. The
         runs are without a safety coupling, which would cut the peaks off."""
         event, begin = transient.event, transient.begin
         variants = event.variants()
         if not variants:
             return
-        self.report(f"{event.title}, over the range of its assumption", done, self.total)
+        self.report(f"{event.title}, over the range of its assumption", before, self.total)
         answers = self.study.answers[event.name]
         peaks = {name: [] if self.rig.guards else [getattr(answers, f"{name}_peak")] for name in _PEAKS}
         for variant in (*variants, event) if self.rig.guards else variants:
@@ -342,7 +342,7 @@ class Runner:
         """Record the fluctuation of the speed that the study would have without its feed-forward."""
         study, run = self.study, self.study.config.run
         with self.rig.plain.from_rest() as simulation:
-            steady = simulation.run(self.stop, self.rig.step).sel(time=slice(study.settled, None))
+            steady = simulation.run(self.stop, self.rig.step).sel(time=slice(study.steady_begin, None))
         steady = whole_turns(self.rig.drive, steady, run.turns)
         study.ripple_without = read_answers(study.window(Phase.STEADY, steady)).speed_ripple
 
@@ -370,10 +370,10 @@ class Runner:
         for name, twin in rigid.items():
             study.runs[name] = with_rigid(study.drive, study.runs[name], twin)
         steady = study.steady
-        ended = slice(None, steady["time"].values[0])
+        until = slice(None, steady["time"].values[0])
         # the damage of steady running comes first, as that of the other runs is relative to it
-        parts = [("steady", steady, rigid["start_up"].sel(time=slice(study.settled, None)))]
-        parts.append(("start_up", study.runs["start_up"].sel(time=ended), rigid["start_up"].sel(time=ended)))
+        parts = [("steady", steady, rigid["start_up"].sel(time=slice(study.steady_begin, None)))]
+        parts.append(("start_up", study.runs["start_up"].sel(time=until), rigid["start_up"].sel(time=until)))
         for name, begin in study.event.items():
             since = slice(begin, None)
             parts.append((name, study.runs[name].sel(time=since), rigid[name].sel(time=since)))

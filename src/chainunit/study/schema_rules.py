@@ -92,7 +92,7 @@ def _of_machine(name: str) -> Rule:
     model = MACHINES[name]
     inputs = {v.name for v in model.input_layout.variables}
     inputs |= {v.name for motor in MOTORS.values() for v in motor.input_layout.variables}
-    events = [kind for kind, of in TYPES.items() if {*of.inputs("left" if of.sided else "")} <= inputs]
+    events = [kind for kind, of in TYPES.items() if {*of.inputs("left" if of.has_side else "")} <= inputs]
     tables: Rule = {table: {"$ref": f"#/definitions/{table}.{name}"} for table in ("machine", "feed")}
     tables["event"] = {"items": {"properties": {"type": {"enum": events}}}}
     rule: Rule = {"properties": tables}

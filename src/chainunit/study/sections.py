@@ -243,10 +243,10 @@ class ChainOrgans(OrganLaw):
     )
 
 
-def numbers(declared: type, quantity_name: str, name: str, most: int) -> Any:
+def numbers(declaration: type, quantity_name: str, name: str, most: int) -> Any:
     """The type of a list of at most `most` values of a quantity of the `declaration`; a refusal calls the
     list `name`."""
-    variable = next(v for v in variables(declared) if v.name == quantity_name)
+    variable = next(v for v in variables(declaration) if v.name == quantity_name)
     variable = dataclasses.replace(variable, name=name)
     value = Annotated[float, BeforeValidator(lambda entry: to_number(variable, entry))]
     return Annotated[list[value], Field(max_length=most), variable]
@@ -344,7 +344,7 @@ class FileSection:
     """A table of a study file. The study has its values, or None if the table is `optional` and the file does
     not have it; a value that the table does not name is that of `default`."""
 
-    declared: type
+    declaration: type
     default: Any = None
     optional: bool = False
     whole: tuple[str, ...] = ()
@@ -353,7 +353,7 @@ class FileSection:
     """other keys than quantities, as pydantic fields with their descriptions"""
     title: str = ""
     """title of the table in a report"""
-    used: Callable[[Any], bool] = lambda config: True
+    is_used: Callable[[Any], bool] = lambda config: True
     """whether a study uses the table, by its configuration"""
     apart: bool = False
     """whether the result has other things of the same names"""
@@ -388,7 +388,7 @@ SECTIONS: Mapping[str, FileSection] = {
             )
         },
         title="Overloads at random",
-        used=lambda config: config.monte_carlo.runs > 0,
+        is_used=lambda config: config.monte_carlo.runs > 0,
         apart=True,
     ),
     "sizing": FileSection(Sizing, optional=True, title="Demands on the motor", apart=True),
@@ -404,10 +404,10 @@ SECTIONS: Mapping[str, FileSection] = {
         title="Flywheel",
     ),
     "gear": FileSection(
-        Transmission, default=KINDS["gear"], title="Gear", used=lambda config: config.of_catalogue
+        Transmission, default=KINDS["gear"], title="Gear", is_used=lambda config: config.of_catalogue
     ),
     "starter": FileSection(
-        Starter, title="Starter", used=lambda config: config.of_catalogue and config.start != "direct"
+        Starter, title="Starter", is_used=lambda config: config.of_catalogue and config.start != "direct"
     ),
     "chain": FileSection(ChainOrgans, whole=("rods", "sweep_points", "starts", "turns"), title="Chains"),
     "driveline": FileSection(
@@ -437,4 +437,4 @@ SECTIONS: Mapping[str, FileSection] = {
 def sections_of(machine: type[MachineModel], motor: type[Motor]) -> dict[str, FileSection]:
     """The tables of a study with this machine and this kind of motor."""
     own = {"machine": machine.Parameters, "ratios": Ratios, "feed": machine.Feed, "motor": motor.Parameters}
-    return {name: FileSection(declared) for name, declared in own.items()} | dict(SECTIONS)
+    return {name: FileSection(declaration) for name, declaration in own.items()} | dict(SECTIONS)

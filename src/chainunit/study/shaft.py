@@ -77,8 +77,8 @@ class Cycles:
 
     def above(self, least: float) -> Cycles:
         """The cycles with a range of more than `least` [N m]."""
-        counted = self.range > least
-        return Cycles(self.range[counted], self.mean[counted], self.count[counted])
+        mask = self.range > least
+        return Cycles(self.range[mask], self.mean[mask], self.count[mask])
 
     def damage(self, exponent: float) -> float:
         """Sum of count times range to the power of `exponent`."""
@@ -131,15 +131,15 @@ def torsion(drive: Drive, inertia: Any) -> Torsion:
 
 def remedies(line: ShaftLine) -> list[str]:
     """The changes, in words, that make the ratio i23 even."""
-    wanted = []
+    changes = []
     if not math.isclose(line.alpha1, line.alpha2, abs_tol=1e-6):
         bends = (number(bend, "rad") for bend in (line.alpha1, line.alpha2))
-        wanted.append("make the bends equal (alpha1 = {}, alpha2 = {})".format(*bends))
+        changes.append("make the bends equal (alpha1 = {}, alpha2 = {})".format(*bends))
     off = (line.delta_yokes - line.beta_planes + 0.5 * math.pi) % math.pi - 0.5 * math.pi
     if not math.isclose(off, 0.0, abs_tol=1e-6):
         turn = number(-off, "rad")
-        wanted.append(f"turn the yokes of the middle shaft by {turn} (delta_yokes = beta_planes)")
-    return wanted
+        changes.append(f"turn the yokes of the middle shaft by {turn} (delta_yokes = beta_planes)")
+    return changes
 
 
 def rigid_torque(drive: Drive, rigid: xr.Dataset) -> Any:

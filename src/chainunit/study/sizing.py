@@ -121,7 +121,7 @@ class SizingResult:
     cycle needs"""
 
     @property
-    def chosen(self) -> Candidate | None:
+    def chosen_candidate(self) -> Candidate | None:
         """The candidate that was chosen, if one fits."""
         return self.candidates[0] if self.candidates[0].verdict is Standing.CHOSEN else None
 
@@ -136,7 +136,7 @@ class SizingResult:
         count = f"{len(self.candidates)} of {self.motors} were tried"
         if self.weak:
             count += f", {self.weak} {'is' if self.weak == 1 else 'are'} too weak by the nameplate"
-        if self.chosen:
+        if self.chosen_candidate:
             return f"{self.best.motor.designation} is {self.best.reason} ({count})"
         return (
             f"no motor of the catalogue fits ({count}); {self.best.motor.designation} is {self.best.reason}"
@@ -147,9 +147,11 @@ class SizingResult:
         best = self.best
         assert self.config.sizing is not None
         return {
-            "asked": entries(self.config.sizing, titled=True),
+            "asked": entries(self.config.sizing, with_titles=True),
             **self.duty.as_dict(),
-            "flywheel": entries(Flywheel(J=best.drive.flywheel, fluctuation=best.fluctuation), titled=True),
+            "flywheel": entries(
+                Flywheel(J=best.drive.flywheel, fluctuation=best.fluctuation), with_titles=True
+            ),
             "tried": {"value": len(self.candidates), "unit": "1"},
             "motors": {"value": self.motors, "unit": "1"},
             "weak": {"value": self.weak, "unit": "1"},
@@ -163,8 +165,8 @@ class SizingResult:
                 }
                 for c in self.candidates
             ],
-            "chosen": self.candidates.index(self.chosen) if self.chosen else None,
-            "nearest": None if self.chosen else self.candidates.index(best),
+            "chosen": self.candidates.index(self.chosen_candidate) if self.chosen_candidate else None,
+            "nearest": None if self.chosen_candidate else self.candidates.index(best),
             "notes": self.notes,
         }
 
@@ -245,12 +247,12 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
     side for the speed, as the formula leaves out that a motor's torque falls with speed, which evens the
     speed, too. None is tried where this flywheel is a small part of the other inertia."""
     there = bare.drive.rotor_inertia + duty.numbers.inertia_mean / bare.drive.ratio**2
-    tried: list[Candidate] = []
+    trials: list[Candidate] = []
 
     def trial_with(flywheel: float) -> Candidate:
         candidate = dataclasses.replace(bare, drive=dataclasses.replace(bare.drive, flywheel=flywheel))
         judge(config, candidate, duty, files)
-        tried.append(candidate)
+        trials.append(candidate)
         return candidate
 
     def heavy_enough(candidate: Candidate) -> bool:
@@ -260,8 +262,8 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
     mean = duty.numbers.torque_mean / bare.drive.ratio
     if heavy_enough(first) or mean > bare.motor.nameplate.torque:
         return first
-    wanted = duty.numbers.inertia_wanted / bare.drive.ratio**2
-    whole = max(wanted, torque_evening_inertia(first, duty.numbers, config.run.crank_speed)) - there
+    inertia = duty.numbers.inertia_wanted / bare.drive.ratio**2
+    whole = max(inertia, torque_evening_inertia(first, duty.numbers, config.run.crank_speed)) - there
     if whole < _SMALL * there:
         return first
     below = 0.0
@@ -270,15 +272,19 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
             break
         below = share
     else:
-        return min(tried, key=lambda c: c.violation)
+        return min(trials, key=lambda c: c.violation)
     for _ in range(3):
         middle = 0.5 * (below + share)
         if heavy_enough(trial_with(middle * whole)):
             share = middle
         else:
             below = middle
-    healed = [c for c in tried if evened(c) and not too_heavy(c)]
-    return min(healed, key=lambda c: c.drive.flywheel) if healed else min(tried, key=lambda c: c.violation)
+    solutions = [c for c in trials if evened(c) and not too_heavy(c)]
+    return (
+        min(solutions, key=lambda c: c.drive.flywheel)
+        if solutions
+        else min(trials, key=lambda c: c.violation)
+    )
 
 
 def torque_evening_inertia(c: Candidate, numbers: CycleNumbers, crank_speed: float) -> float:
@@ -291,18 +297,18 @@ def torque_evening_inertia(c: Candidate, numbers: CycleNumbers, crank_speed: flo
     plate, ratio = c.motor.nameplate, c.drive.ratio
     mean, rms = numbers.torque_mean / ratio, numbers.torque_rms / ratio
     peak = max(numbers.torque_peak, numbers.torque_peak_one_sided or 0.0) / ratio
-    limit = {
+    limits = {
         name: c.checks[name].limit for name in ("rms_torque", "peak_torque") if c.sizes.get(name, 0.0) > 1.0
     }
     # the parts of load and limit above the mean
     beyond = []
-    if "rms_torque" in limit:
-        beyond.append((rms**2 - mean**2, limit["rms_torque"] ** 2 - mean**2))
-    if "peak_torque" in limit:
-        beyond.append(((peak - mean) ** 2, max(0.0, limit["peak_torque"] - mean) ** 2))
-    asked = max((load / permitted for load, permitted in beyond if permitted > 0.0), default=0.0)
+    if "rms_torque" in limits:
+        beyond.append((rms**2 - mean**2, limits["rms_torque"] ** 2 - mean**2))
+    if "peak_torque" in limits:
+        beyond.append(((peak - mean) ** 2, max(0.0, limits["peak_torque"] - mean) ** 2))
+    square = max((load / bound for load, bound in beyond if bound > 0.0), default=0.0)
     slope = plate.torque / (plate.synchronous - plate.speed)
-    return float(slope / crank_speed * math.sqrt(max(0.0, asked - 1.0)))
+    return float(slope / crank_speed * math.sqrt(max(0.0, square - 1.0)))
 
 
 def evened(c: Candidate) -> bool:
@@ -360,7 +366,7 @@ def rank(candidates: list[Candidate]) -> None:
         elif math.isinf(c.violation):
             c.verdict, c.reason = Standing.REJECTED, "it does not bring the machine up to speed"
         else:
-            c.verdict, c.reason = Standing.REJECTED, "; ".join(check.passed for check in over)
+            c.verdict, c.reason = Standing.REJECTED, "; ".join(check.excess for check in over)
         if c.drive.flywheel:
             c.reason += f", with a flywheel of {number(c.drive.flywheel, 'kg.m2')}"
     others = [c for c in candidates if not c.fits]
@@ -380,16 +386,16 @@ def rank(candidates: list[Candidate]) -> None:
 def in_rank(fitting: list[Candidate]) -> list[Candidate]:
     """Candidates that fit, best first: by smaller power, then by lighter flywheel if they differ by more than
     `_NEAR`, then by smaller utilisation if they differ by more than `_ALIKE`, then by designation."""
-    rest, ordered = sorted(fitting, key=lambda c: c.motor.designation), []
+    rest, ranking = sorted(fitting, key=lambda c: c.motor.designation), []
     while rest:
         power = min(c.motor.nameplate.power for c in rest)
         small = [c for c in rest if c.motor.nameplate.power == power]
         lightest = min(c.flywheel_at_crank for c in small)
         light = [c for c in small if c.flywheel_at_crank <= (1.0 + _NEAR) * lightest]
         least = min(c.violation for c in light)
-        ordered.append(next(c for c in light if c.violation <= least + _ALIKE))
-        rest.remove(ordered[-1])
-    return ordered
+        ranking.append(next(c for c in light if c.violation <= least + _ALIKE))
+        rest.remove(ranking[-1])
+    return ranking
 
 
 def _behind(c: Candidate, best: Candidate) -> str:

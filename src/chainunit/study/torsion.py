@@ -78,8 +78,8 @@ def speeds(low: float, high: float, k: float, points: int) -> Any:
     density = np.ones_like(fine)
     for n in DENSER:
         density += 6.0 / (1.0 + ((fine * n / k - 1.0) / 0.02) ** 2)
-    reached = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))])
-    return np.interp(np.linspace(0.0, reached[-1], points), reached, fine)
+    cumulative = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))])
+    return np.interp(np.linspace(0.0, cumulative[-1], points), cumulative, fine)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -128,7 +128,7 @@ class LineAnalysis:
     steady: SteadyMotion
     rigid: RigidPeaks
     operating: SteadyMotion
-    simulated: SimulatedPeaks | None
+    simulation: SimulatedPeaks | None
     simulated_speed: Any
     """speeds at which the line should run in the time simulation [rad/s]"""
     map: StabilityMap
@@ -156,8 +156,8 @@ class LineAnalysis:
     @property
     def on_speed(self) -> Any:
         """Whether each point of the time simulation kept its speed, an array of bool."""
-        assert self.simulated is not None
-        return np.abs(self.simulated.speed / self.simulated_speed - 1.0) < LOST
+        assert self.simulation is not None
+        return np.abs(self.simulation.speed / self.simulated_speed - 1.0) < LOST
 
     def crossings(self) -> dict[int, tuple[float, float]]:
         """By n, the range of speeds (from, to) at which order n meets the natural frequency k, or 2 speed = 2
@@ -189,13 +189,13 @@ class LineAnalysis:
 def _peaks(curve: Any) -> Any:
     """Indices of the inner maxima with a prominence of at least 2 %, which is above the ripple of torques
     that are sampled once a step."""
-    known = np.isfinite(curve)
-    if not known.any():
+    is_known = np.isfinite(curve)
+    if not is_known.any():
         return []
-    height = np.log(np.maximum(np.where(known, curve, 1.0), 1e-9))
+    height = np.log(np.maximum(np.where(is_known, curve, 1.0), 1e-9))
     # a gap counts as higher than all points: beside it no point is certain to be a peak
-    places, _ = find_peaks(np.where(known, height, height[known].max() + 1.0), prominence=0.02)
-    return [int(j) for j in places if known[j]]
+    places, _ = find_peaks(np.where(is_known, height, height[is_known].max() + 1.0), prominence=0.02)
+    return [int(j) for j in places if is_known[j]]
 
 
 def _refined(line: Cardan, load: float, speed: Any, curve: SteadyMotion) -> tuple[Any, SteadyMotion]:
@@ -204,9 +204,9 @@ def _refined(line: Cardan, load: float, speed: Any, curve: SteadyMotion) -> tupl
     if not near:
         return speed, curve
     more = np.setdiff1d(np.concatenate(near), speed)
-    added = steady(line, more, load)
+    addition = steady(line, more, load)
     order = np.argsort(np.concatenate([speed, more]))
-    whole = (np.concatenate([a, b], axis=-1)[..., order] for a, b in zip(curve, added, strict=True))
+    whole = (np.concatenate([a, b], axis=-1)[..., order] for a, b in zip(curve, addition, strict=True))
     return np.concatenate([speed, more])[order], SteadyMotion(*whole)
 
 
@@ -223,11 +223,11 @@ def analyse(
     joint: str = "alpha1",
     damping_ratios: tuple[float, ...] = (),
     report: Report = lambda task, done, whole: None,
-    varied: tuple[float, ...] = (),
+    other_frequencies: tuple[float, ...] = (),
 ) -> LineAnalysis:
     """Make the whole analysis. `joint` names the bend that the map varies; there is a map for each of the
-    `damping_ratios`, by default for that of the line. `varied` are further natural frequencies of the line,
-    as the inertia of the machine varies [rad/s]. `report` is called with the current task and its
+    `damping_ratios`, by default for that of the line. `other_frequencies` are further natural frequencies of
+    the line, as the inertia of the machine varies [rad/s]. `report` is called with the current task and its
     progress."""
     xp = numpy_()
     k = float(frozen_frequency(xp, line, 1.0))
@@ -238,7 +238,7 @@ def analyse(
     curve = steady(line, speed, rotation.load, lambda done: report("torsion: steady motion", done, 1.0))
     speed, curve = _refined(line, rotation.load, speed, curve)
     operating = steady(line, rotation.speed, rotation.load)
-    simulated = _simulated(
+    simulation = _time_simulation(
         line, speed[::SIMULATED], rotation.load, lambda done: report("torsion: time simulation", done, 1.0)
     )
     band = frequency_band(line)
@@ -248,7 +248,7 @@ def analyse(
         ranges=table,
         damping_ratio=damping_ratio(line),
         band=band,
-        span=(min(band.least, *varied, k), max(band.largest, *varied, k)),
+        span=(min(band.least, *other_frequencies, k), max(band.largest, *other_frequencies, k)),
         at_even=k,
         excitation=_excitation(phi3 - angle, angle),
         angle=angle,
@@ -259,7 +259,7 @@ def analyse(
         steady=curve,
         rigid=rigid(line, speed, rotation.load),
         operating=operating,
-        simulated=simulated,
+        simulation=simulation,
         simulated_speed=speed[::SIMULATED],
         map=stability_map(
             line,
@@ -279,7 +279,7 @@ def _excitation(lead: Any, angle: Any) -> dict[int, float]:
     return {n: size if size > ROUNDOFF else 0.0 for n, size in amplitudes.items()}
 
 
-def _simulated(line: Cardan, speed: Any, load: float, progress: Progress) -> SimulatedPeaks | None:
+def _time_simulation(line: Cardan, speed: Any, load: float, progress: Progress) -> SimulatedPeaks | None:
     """The peaks in time simulation; None where transients take too long to die out."""
     settle = settling_time(line, 0.01)
     if damping_ratio(line) < LEAST_DAMPING or simulation_steps(line, speed, settle) > MOST_STEPS:

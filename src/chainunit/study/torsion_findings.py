@@ -52,9 +52,9 @@ class TorsionAnalysis(Analysis):
         config, drive, modes = study.config, study.drive, study.statics.torsion
         assert modes is not None
         turn = study.statics.normal
-        speed = float(config.run.crank_speed * drive.driven.ratio)
-        wanted = config.gives("torsion")
-        if not wanted and speed < SLOW * modes.k_least:
+        speed = float(config.run.crank_speed * drive.driven_machine.ratio)
+        has_table = config.gives("torsion")
+        if not has_table and speed < SLOW * modes.k_least:
             study.note(
                 "torsion left out",
                 "The line's shaft turns at {speed}, far below its natural frequency of {k_least}: no order of the "
@@ -73,7 +73,7 @@ class TorsionAnalysis(Analysis):
                 f"torsion.slowest = {config.torsion.slowest:g}: the shaft turns at {speed:.4g} rad/s; must be >= "
                 f"{slowest / speed:.3g}, as below a fiftieth of the natural frequency nothing resonates"
             )
-        load = float(np.mean(turn.crank_torque)) / drive.driven.ratio
+        load = float(np.mean(turn.crank_torque)) / drive.driven_machine.ratio
         rotation = Rotation(speed=speed, load=load)
         return TorsionFindings(
             analyse(line, rotation, config.torsion, config.joint, config.damping_ratios, report, span)
@@ -249,7 +249,7 @@ class TorsionFindings(Findings):
                 "alone; give driveline.damping_ratio, or d2 and d3."
             )
             yield Remark.of("note", "undamped resonance", text)
-        elif analysis.simulated is None:
+        elif analysis.simulation is None:
             yield Remark.of(
                 "note",
                 "no time simulation",
@@ -305,7 +305,7 @@ def _motion(m: SteadyMotion) -> dict[str, Any]:
 
 def as_dict(analysis: LineAnalysis) -> dict[str, Any]:
     """Ready for JSON, each number with its unit; null without a steady motion."""
-    band, simulated = analysis.band, analysis.simulated
+    band, simulation = analysis.band, analysis.simulation
     return {
         "line": entries(analysis.line),
         "running": entries(analysis.rotation),
@@ -340,12 +340,12 @@ def as_dict(analysis: LineAnalysis) -> dict[str, Any]:
             "no_steady_motion": _speeds(analysis.missing_ranges()),
         },
         "simulation": None
-        if simulated is None
+        if simulation is None
         else {
             "asked_speed": _speeds(analysis.simulated_speed),
-            "speed": _speeds(simulated.speed),
-            "peak_torque2": array_entry(simulated.peak2, "N.m"),
-            "peak_torque3": array_entry(simulated.peak3, "N.m"),
+            "speed": _speeds(simulation.speed),
+            "peak_torque2": array_entry(simulation.peak2, "N.m"),
+            "peak_torque3": array_entry(simulation.peak3, "N.m"),
         },
         "stability": {
             "joint": analysis.map.joint,

@@ -26,7 +26,7 @@ from .duty import Duty, rms
 from .limits import Check, heating, keeping_speed, starting
 from .measures import CREEPS, time_to_start
 from .rig import PATIENCE, Rig
-from .window import BURNT, settled
+from .window import BURNT, is_settled
 
 _GAP = "motor.air_gap_tau"
 
@@ -47,12 +47,12 @@ class Trial:
     one_sided: Mapping[SideName, xr.Dataset]
 
     @cached_property
-    def started(self) -> float | None:
+    def start_time(self) -> float | None:
         """Time to start [s]; None where the motor does not bring the machine up to speed."""
         runs = (self.start, self.steady)
         speed, time = (np.concatenate([run[name].values for run in runs]) for name in ("motor.w", "time"))
-        asked = self.config.run.crank_speed * self.drive.ratio
-        return time_to_start(time, speed, self.speed, asked) if self.speed > CREEPS * asked else None
+        requested = self.config.run.crank_speed * self.drive.ratio
+        return time_to_start(time, speed, self.speed, requested) if self.speed > CREEPS * requested else None
 
     @cached_property
     def speed(self) -> float:
@@ -115,12 +115,12 @@ class Trial:
         # the runs are short and their winding is as cold as the surroundings; a warm winding has larger
         # losses
         running, start = (warm / cold * heat for heat in self._heat)
-        permitted = permitted_starts(p, running, start, self._cooling, self.config.sizing.temperature)
+        starts = permitted_starts(p, running, start, self._cooling, self.config.sizing.temperature)
         if plate.starts and self.config.start == "direct":
             # the number of starts in the catalogue is that of the bare rotor
             total = p.rotor.J + float(np.mean(self.drive.load_inertia(self.steady)))
-            permitted = min(permitted, plate.starts * plate.J / total)
-        return permitted
+            starts = min(starts, plate.starts * plate.J / total)
+        return starts
 
     @property
     def _cooling(self) -> float:
@@ -153,28 +153,28 @@ class Trial:
     def checks(self) -> dict[str, Check]:
         """Each value beside its limit, by name; the value is None where the machine does not get up to
         speed."""
-        asked, plate, p = self.config.sizing, self.motor.nameplate, self.drive.fmu_parameters
-        assert asked is not None
+        demands, plate, p = self.config.sizing, self.motor.nameplate, self.drive.fmu_parameters
+        assert demands is not None
 
-        def reached(check: Check) -> Check:
-            return check if self.started is not None else dataclasses.replace(check, value=None)
+        def at_speed(check: Check) -> Check:
+            return check if self.start_time is not None else dataclasses.replace(check, value=None)
 
         def check(title: str, value: float, limit: float, unit: str, kind: str = "") -> Check:
-            return reached(Check(title, value, limit, unit, kind))
+            return at_speed(Check(title, value, limit, unit, kind))
 
-        start = starting(self.started, plate)
+        start = starting(self.start_time, plate)
         if self.drive.follows:
             start = dataclasses.replace(start, limit=1.0 + 1.2 * self.config.run.ramp)
         weaker = min(1.0, plate.frequency / self.frequency)
-        cooled = min(1.0, self._cooling / self.drive.motor.cooling(MATH, p, plate.speed))
-        breakdown = self.breakdown_torque / asked.breakdown_margin
-        asked_speed = self.drive.ratio * self.config.run.crank_speed
+        cooling = min(1.0, self._cooling / self.drive.motor.cooling(MATH, p, plate.speed))
+        breakdown = self.breakdown_torque / demands.breakdown_margin
+        requested_speed = self.drive.ratio * self.config.run.crank_speed
         checks = {
             "start": start,
             "rms_torque": check(
                 "RMS torque",
                 rms(*((share, run[_GAP].values) for share, run in self._cases)),
-                plate.torque * weaker * math.sqrt(cooled),
+                plate.torque * weaker * math.sqrt(cooling),
                 "N.m",
             ),
             "peak_torque": check(
@@ -183,15 +183,15 @@ class Trial:
                 breakdown,
                 "N.m",
             ),
-            "temperature": reached(heating(self.temperature, p.ambient.T, asked.temperature)),
-            "starts": Check("starts per hour", asked.starts_per_hour, self.permitted_starts, "1"),
-            "crank_speed": reached(keeping_speed(self.speed, asked_speed)),
-            "speed": check("speed fluctuation", self.fluctuation, asked.fluctuation, "1", "percent"),
+            "temperature": at_speed(heating(self.temperature, p.ambient.T, demands.temperature)),
+            "starts": Check("starts per hour", demands.starts_per_hour, self.permitted_starts, "1"),
+            "crank_speed": at_speed(keeping_speed(self.speed, requested_speed)),
+            "speed": check("speed fluctuation", self.fluctuation, demands.fluctuation, "1", "percent"),
         }
-        if math.isfinite(asked.inertia_ratio):
-            reflected = float(np.max(self.drive.load_inertia(self.steady)))
-            ratio = (reflected + p.rotor.J - plate.J) / plate.J
-            checks["inertia"] = Check("inertia ratio", ratio, asked.inertia_ratio, "1")
+        if math.isfinite(demands.inertia_ratio):
+            inertia = float(np.max(self.drive.load_inertia(self.steady)))
+            ratio = (inertia + p.rotor.J - plate.J) / plate.J
+            checks["inertia"] = Check("inertia ratio", ratio, demands.inertia_ratio, "1")
         if "gear.torque_limit" in self.config.given:
             limit = self.config.gear.torque_limit
             checks["gear"] = Check("torque of the gear", self.peak_torque, limit, "N.m")
@@ -244,7 +244,7 @@ def _until_settled(rig: Rig, simulation: Simulation, stop: float) -> list[xr.Dat
     runs = [simulation.run(stop, rig.step)]
     while drive.chain is None and simulation.time < stop + PATIENCE * turn:
         turns = drive.whole_turns(runs[-1])
-        if turns is None or settled(drive, turns):
+        if turns is None or is_settled(drive, turns):
             break
         runs.append(simulation.run(simulation.time + 2.0 * turn, rig.step))
     return runs

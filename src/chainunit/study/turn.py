@@ -55,7 +55,7 @@ class TurnFindings(Findings):
     """The turn with the feed (`loaded`) and without it (`free`), its numbers, and the reactions by the titles
     of the pins."""
 
-    fed: Cycle
+    loaded: Cycle
     free: Cycle
     inertia: Any
     """inertia at the crank [kg m2], shape (POINTS,)"""
@@ -65,8 +65,8 @@ class TurnFindings(Findings):
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON."""
         curves = {
-            "angle": (self.fed.angle, "rad"),
-            "torque": (self.fed.crank_torque, "N.m"),
+            "angle": (self.loaded.angle, "rad"),
+            "torque": (self.loaded.crank_torque, "N.m"),
             "torque_free": (self.free.crank_torque, "N.m"),
             "inertia": (self.inertia, "kg.m2"),
         }
@@ -90,25 +90,25 @@ class TurnAnalysis(Analysis):
         """The turn at the crank speed of the study, by inverse dynamics."""
         config, machine = study.config, study.drive.machine
         feed, w = config.feed, config.run.crank_speed
-        fed, free = (cycle(machine, w, each, POINTS) for each in (feed, no_feed(feed)))
-        inertia = np.broadcast_to(fed.outputs.J * machine.ratio**2, fed.angle.shape)
+        loaded, free = (cycle(machine, w, each, POINTS) for each in (feed, no_feed(feed)))
+        inertia = np.broadcast_to(loaded.outputs.J * machine.ratio**2, loaded.angle.shape)
         return TurnFindings(
-            fed,
+            loaded,
             free,
             inertia,
             Turn(
-                torque_peak=peak(fed.crank_torque),
+                torque_peak=peak(loaded.crank_torque),
                 torque_peak_free=peak(free.crank_torque),
-                torque_mean=float(np.mean(fed.crank_torque)),
-                lost=_lost(fed, config.turn),
+                torque_mean=float(np.mean(loaded.crank_torque)),
+                lost=_lost(loaded, config.turn),
                 lost_free=_lost(free, config.turn),
-                energy_swing=energy_swing(fed.crank_torque),
+                energy_swing=energy_swing(loaded.crank_torque),
                 inertia_least=float(np.min(inertia)),
                 inertia_largest=float(np.max(inertia)),
                 inertia_mean=float(np.mean(inertia)),
-                margin=float(np.min(fed.outputs.margin)) if hasattr(fed.outputs, "margin") else None,
+                margin=float(np.min(loaded.outputs.margin)) if hasattr(loaded.outputs, "margin") else None,
             ),
-            {title: _reaction(fed, free, output) for title, output in machine.model.pins.items()},
+            {title: _reaction(loaded, free, output) for title, output in machine.model.pins.items()},
         )
 
 
@@ -120,13 +120,13 @@ def _lost(cycle: Cycle, turn: float) -> float:
     return float(np.mean(cycle.crank_torque)) * 2.0 * np.pi
 
 
-def _reaction(fed: Cycle, free: Cycle, output: str) -> Reaction:
-    forces = (attrgetter(output)(each.outputs) for each in (fed, free))
-    sizes = [np.broadcast_to(np.hypot(force.fx, force.fy), fed.angle.shape) for force in forces]
+def _reaction(loaded: Cycle, free: Cycle, output: str) -> Reaction:
+    forces = (attrgetter(output)(each.outputs) for each in (loaded, free))
+    sizes = [np.broadcast_to(np.hypot(force.fx, force.fy), loaded.angle.shape) for force in forces]
     at = [int(np.argmax(size)) for size in sizes]
     return Reaction(
         peak=float(sizes[0][at[0]]),
-        angle=float(fed.angle[at[0]]),
+        angle=float(loaded.angle[at[0]]),
         peak_free=float(sizes[1][at[1]]),
-        angle_free=float(fed.angle[at[1]]),
+        angle_free=float(loaded.angle[at[1]]),
     )

@@ -110,9 +110,9 @@ class Reason:
     def numbers(self) -> str:
         """The value in words, with the limit if the words of the topic do not give it."""
         rod = {"web_pull": "web ", "wall_pull": "wall "}.get(self.quantity, "")
-        said = self.topic in ("pushed", "slack")
+        names_limit = self.topic in ("pushed", "slack")
         value, limit = (number(x, self.unit, self.kind, beside=False) for x in (self.value, self.limit))
-        limit = "" if said else f", limit {limit}"
+        limit = "" if names_limit else f", limit {limit}"
         if self.topic == "slack speed" and self.limit == 0.0:
             limit = ", and it is slack at rest already"
         return f"{rod}{value}{limit}"
@@ -129,7 +129,7 @@ class Verdict:
     speed: float
     """crank speed at which the model is judged [rad/s]"""
     reasons: tuple[Reason, ...] = ()
-    reached: float | None = None
+    actual: float | None = None
     """crank speed in the runs [rad/s], if the model is judged at the requested speed instead; else None"""
 
     @property
@@ -146,7 +146,7 @@ class Verdict:
 
     @property
     def _turns(self) -> str:
-        return _speed(self.speed if self.reached is None else self.reached)
+        return _speed(self.speed if self.actual is None else self.actual)
 
     @property
     def _asked(self) -> bool:
@@ -180,7 +180,7 @@ class Verdict:
         # a remedy for several faults is named once
         return "; ".join((line, *why, *dict.fromkeys(filter(None, remedies)))) + "."
 
-    def details(self, called: Mapping[str, str]) -> list[str]:
+    def details(self, titles: Mapping[str, str]) -> list[str]:
         """A line for each topic: the runs, by their `titles`, with their numbers."""
         lines = []
         for topic, (_, begin, _) in _TOPICS.items():
@@ -189,7 +189,7 @@ class Verdict:
                 if reason.topic == topic:
                     runs.setdefault(reason.run, []).append(reason.numbers)
             each = [
-                f"{called.get(run, run)} ({', '.join(sizes)})" if run else ", ".join(sizes)
+                f"{titles.get(run, run)} ({', '.join(sizes)})" if run else ", ".join(sizes)
                 for run, sizes in runs.items()
             ]
             if (
@@ -211,7 +211,7 @@ class Verdict:
             "caveat": self.caveat or None,
             "text": self.text,
             "speed": entry(self.speed, "rad/s", "speed"),
-            "reached": entry(self.speed if self.reached is None else self.reached, "rad/s", "speed"),
+            "reached": entry(self.speed if self.actual is None else self.actual, "rad/s", "speed"),
             "reasons": [
                 {
                     "topic": r.topic,
@@ -254,7 +254,7 @@ def two_bars(
     residuals: Mapping[str, float],
     *,
     empty: Collection[str] = (),
-    reached: float | None = None,
+    actual: float | None = None,
 ) -> Verdict:
     """The verdict on two bars an organ.
 
@@ -284,28 +284,28 @@ def two_bars(
         limit = ROCKER_GOOD_EMPTY * mode
         runs = [""] if "" in empty else sorted(empty)
         reasons += [_at_speed("rocker torque", speed, limit, run) for run in runs]
-    return Verdict("organs", "two bars", speed, (*reasons, *_unbalanced(residuals)), reached)
+    return Verdict("organs", "two bars", speed, (*reasons, *_unbalanced(residuals)), actual)
 
 
-def rigid_links(speed: float, residuals: Mapping[str, float], *, reached: float | None = None) -> Verdict:
+def rigid_links(speed: float, residuals: Mapping[str, float], *, actual: float | None = None) -> Verdict:
     """The verdict on a linkage without organs, whose links are rigid: it holds where the energy balance is kept.
 
     Parameters
     ----------
-    speed, actual : crank speed at which the model is judged, and crank speed in the runs, if that is another
-        [rad/s] residuals : by run, the energy residual over the energy moved
+    speed, actual : crank speed at which the model is judged, and crank speed in the runs, if that is another [rad/s]
+    residuals : by run, the energy residual over the energy moved
     """
-    return Verdict("machine", "rigid links", speed, tuple(_unbalanced(residuals)), reached)
+    return Verdict("machine", "rigid links", speed, tuple(_unbalanced(residuals)), actual)
 
 
-def outsider(speed: float, residuals: Mapping[str, float], *, reached: float | None = None) -> Verdict:
+def outsider(speed: float, residuals: Mapping[str, float], *, actual: float | None = None) -> Verdict:
     """The verdict on a machine that is a foreign FMU: only on its energy balance.
 
     Parameters
     ----------
     speed, actual, residuals : see `rigid_links`
     """
-    return Verdict("energy balance", "", speed, tuple(_unbalanced(residuals)), reached)
+    return Verdict("energy balance", "", speed, tuple(_unbalanced(residuals)), actual)
 
 
 def chains(
@@ -315,19 +315,21 @@ def chains(
     fold_limit: float,
     slack: Mapping[str, float],
     independent: float,
-    needed: float,
+    least_turns: float,
     *,
-    reached: float | None = None,
+    actual: float | None = None,
 ) -> Verdict:
     """The verdict on organs as chains.
 
     Parameters
     ----------
-    speed : crank speed at which the model is judged [rad/s] residuals, folds, slack : by run, the energy
-        residual over the energy moved, the largest angle between two rods [rad], the share of the time with a
-        slack rod fold_limit : angle at which two rods meet the stop between them [rad] independent,
-        least_turns : turns at constant speed that count as independent, and the number that the quantile
-        needs actual : crank speed in the runs, if that is another [rad/s]
+    speed : crank speed at which the model is judged [rad/s]
+    residuals, folds, slack : by run, the energy residual over the energy moved, the largest angle between two rods
+        [rad], the share of the time with a slack rod
+    fold_limit : angle at which two rods meet the stop between them [rad]
+    independent, least_turns : turns at constant speed that count as independent, and the number that the quantile
+        needs
+    actual : crank speed in the runs, if that is another [rad/s]
     """
     reasons: list[Reason] = []
     for run, fold in folds.items():
@@ -340,9 +342,9 @@ def chains(
     for run, share in slack.items():
         if share > 0.0:
             reasons.append(Reason("slack", "slack_time", share, 0.0, "1", run, "percent"))
-    if independent < needed:
-        reasons.append(Reason("starts", "independent_turns", independent, needed, "1"))
-    return Verdict("organs", "chains", speed, (*reasons, *_unbalanced(residuals)), reached)
+    if independent < least_turns:
+        reasons.append(Reason("starts", "independent_turns", independent, least_turns, "1"))
+    return Verdict("organs", "chains", speed, (*reasons, *_unbalanced(residuals)), actual)
 
 
 def _unbalanced(residuals: Mapping[str, float]) -> list[Reason]:

@@ -60,12 +60,12 @@ class Wheel:
         return self.answers.start_time is not None and self.answers.speed_ripple is None
 
     @property
-    def settled(self) -> bool:
+    def is_settled(self) -> bool:
         """Whether the turns of its run close."""
         return closes(self.answers.cycle_gap or 0.0, self.answers.speed_drift or 0.0)
 
     @property
-    def passed(self) -> list[str]:
+    def excesses(self) -> list[str]:
         """Words on each limit of motor and start that its run exceeds."""
         return [check.title for check in self.checks.values() if check.over]
 
@@ -77,4 +77,4 @@ class Wheel:
         """Whether the drive runs steadily with it, does not approach a stall, and keeps the `permitted`
         fluctuation."""
         ripple = self.answers.speed_ripple
-        return ripple is not None and ripple <= permitted and self.settled
+        return ripple is not None and ripple <= permitted and self.is_settled

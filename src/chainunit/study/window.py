@@ -43,13 +43,13 @@ class Trip:
     and the run of the machine behind it, where that could be followed."""
 
     time: float
-    passed: float
+    energy: float
     coasting: xr.Dataset | None
 
 
 @dataclass(frozen=True)
 class Window:
-    """The rows of a run from which measures are read, with the drive and the `requested` crank speed [rad/s].
+    """The rows of a run from which measures are read, with the drive and the `requested_speed` of the crank [rad/s].
     For an overload it has the begin [s], the steady running before it, and the opening of the coupling, if it
     opened."""
 
@@ -58,7 +58,7 @@ class Window:
     drive: Drive
     sides: tuple[str, ...]
     """sides whose organs have a weight"""
-    asked: float
+    requested_speed: float
     begin: float = 0.0
     steady: Window | None = None
     trip: Trip | None = None
@@ -104,11 +104,11 @@ class Window:
         return f"motor.{self.drive.motor.current}"
 
     @property
-    def kept(self) -> float:
+    def normal_speed(self) -> float:
         """Crank speed that the drive keeps without an event [rad/s]: the requested speed, or the speed that a
         motor on the line takes."""
         if self.drive.follows or self.steady is None:
-            return self.asked
+            return self.requested_speed
         return self.steady.speed_mean
 
     @cached_property
@@ -187,6 +187,6 @@ def closes(gap: float, drifts: float) -> bool:
     return gap <= CLOSED and abs(drifts) <= DRIFT
 
 
-def settled(drive: Drive, turns: xr.Dataset) -> bool:
+def is_settled(drive: Drive, turns: xr.Dataset) -> bool:
     """Whether `turns` close."""
     return closes(end_gap(drive, turns), drift(drive, turns))
