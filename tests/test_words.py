@@ -113,7 +113,7 @@ def test_what_the_machine_does_not_have_is_not_spoken_of(friction, tmp_path):
     # its inertia is constant: one row of the speed loop
     loops = json.loads(json.dumps(as_dict(study)["speed_loop"]))
     assert len(loops) == 1
-    table = said_of(study).partition("The speed loop")[2]
+    table = said_of(study).partition("The linearised speed loop")[2]
     assert "constant inertia" in table and "least inertia" not in table
 
 
