@@ -161,6 +161,7 @@ def main() -> None:
         for backend in ("python", "native"):
             file = Path(folder) / f"{backend}.fmu"
             export(ChamberForces, file, backend=backend)
+            print(f"{backend} FMU of ChamberForces: {file.stat().st_size / 1000:.0f} kB")
             fmu = Fmu(file)
             unit = Instance(fmu, "unit")
             unit.initialize({}, 0.0)

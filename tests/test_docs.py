@@ -29,6 +29,8 @@ from chainunit.study.run import run_study
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 FENCE = re.compile(r"^( *)```(\w*)(?: title=\"([^\"]+)\")?\n(.*?)^\1```$", re.DOTALL | re.MULTILINE)
+INCLUDE = re.compile(r'^--8<-- "([^"]+)"\n', re.MULTILINE)
+"""A line that stands for a file, as `pymdownx.snippets` has it."""
 INSTALLS = ("pip install", "python3 -m venv")
 """Commands that `.ci/run` runs."""
 README = ROOT / "README.md"
@@ -47,8 +49,8 @@ class Block(NamedTuple):
 
 
 def blocks(page: Path) -> list[Block]:
-    """The fenced blocks of a page, in order."""
-    text = page.read_text("utf-8")
+    """The fenced blocks of a page, in order, with the files that it includes."""
+    text = INCLUDE.sub(lambda line: (ROOT / line[1]).read_text("utf-8"), page.read_text("utf-8"))
     found = []
     for indent, kind, file, body in FENCE.findall(text):
         body = re.sub(rf"^{indent}", "", body, flags=re.MULTILINE) if indent else body
