@@ -577,7 +577,7 @@ def test_peaks_are_compared_with_the_load_alone(study):
     assert analysis.static2 == pytest.approx(375.0 * np.max(analysis.ratio), rel=1e-7)
     assert number(peak, "N.m", digits=4) in str(warning)
     assert f"{number(peak / analysis.static2, '1')} times" in str(warning)
-    assert said(study, "With a motor of constant torque that of shaft 2 falls to")
+    assert said(study, "With a motor of constant torque the torque of shaft 2 falls to")
 
 
 def test_what_would_even_the_joints():

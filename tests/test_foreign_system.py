@@ -346,7 +346,7 @@ def test_a_drive_with_a_motor_of_somebody_else(file, tmp_path):
         lambda: drive.pull_out(start, 300.0),
     ):
         with pytest.raises(
-            InputError, match=r"ForeignMotor\.fmu: .* is not known of an FMU of somebody else"
+            InputError, match=r"ForeignMotor\.fmu: .* is not known, as the motor is an FMU of somebody else"
         ):
             unknown()
 

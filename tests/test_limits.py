@@ -96,14 +96,14 @@ def test_a_motor_below_its_breakdown_speed_stalls_under_the_load(tmp_path):
     )
     assert said in verdict["text"]
     # it is stalled already
-    assert warnings["no reserve"].text.endswith(f"{said}; a larger motor or a heavier flywheel.")
+    assert warnings["no reserve"].text.endswith(f"{said}; take a larger motor or a heavier flywheel.")
 
 
 def test_a_motor_above_its_breakdown_speed_has_the_speed_of_ratio_and_slip(tmp_path):
     """Overloads start from there."""
     text = JAM + '[system]\nmotor = "IE3 4-pole 0.55 kW, 80M"\n[gear]\nratio = 55\n[run]\nturns = 1\n'
     missed = studied(text, tmp_path)[2]["speed missed"].text
-    assert "the speed that gear ratio and slip give. Overloads are those of this state." in missed
+    assert "the speed that gear ratio and slip give. The overloads begin from this state." in missed
     assert "stalls" not in missed
 
 

@@ -725,7 +725,7 @@ def test_chains_stand_beside_two_bars(chains, tmp_path):
         f"{bar} {k}" for bar in ("wall", "web") for k in range(9)
     }
     (avoid,) = (warning for warning in result["warnings"] if warning["kind"] == "speed to avoid")
-    assert avoid["text"].startswith("Chains: the crank speed lies among those to avoid")
+    assert avoid["text"].startswith("Chains: the crank speed lies in a range to avoid")
 
     text = page_of(chains, result)
     reader = Reader(text)

@@ -68,7 +68,8 @@ def test_the_speed_is_the_one_that_the_crank_has():
     slow = bars(30.0, 50.0, 4.58, actual=1.57)
     assert "two bars, the crank at 1.57 rad/s, judged at the 30.0 rad/s asked for; " in slow.text
     assert slow.details(CALLED)[0] == (
-        "Crank speed at or above that at which a web goes slack, as it is asked for; the crank turns at 1.57 rad/s: "
+        "Crank speed at or above the speed at which a web goes slack, judged at the requested speed; the crank turns "
+        "at 1.57 rad/s: "
         "30.0 rad/s, limit 4.58 rad/s."
     )
     data = slow.as_dict()
@@ -163,7 +164,8 @@ def test_words_and_data():
     assert verdict.details(CALLED | {"feed_left": "feed to left"}) == [
         "Bars that are pushed, where a chain would go slack and snatch: feed to left (web -44.3 N, wall -26.2 N); "
         "a lump jams (wall -995 N).",
-        "Crank speed above that up to which two bars give the rocker torque to 10 %: 3.00 rad/s, limit 2.00 rad/s.",
+        "Crank speed above the limit up to which two bars give the rocker torque to 10 %: 3.00 rad/s, limit "
+        "2.00 rad/s.",
     ]
     data = verdict.as_dict()
     assert data["holds"] == "in part" and data["speed"] == {"value": 3.0, "unit": "rad/s", "kind": "speed"}

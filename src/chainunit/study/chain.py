@@ -462,7 +462,7 @@ def bands(rows: Sequence[SpeedNumbers], at_rest: float, reach: float = math.inf)
             reasons.append("rods go slack and snatch")
         if n.rocker_torque_high > AVOID_RATIO * max(n.two_bar_rocker_torque, at_rest):
             reasons.append(
-                f"the rocker carries over {AVOID_RATIO:g} times what two bars ask, here and at rest"
+                f"the rocker torque is over {AVOID_RATIO:g} times that of two bars, at this speed and at rest"
             )
         return ", and ".join(reasons)
 

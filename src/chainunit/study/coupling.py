@@ -96,7 +96,7 @@ def coupling_sentence(study: StudyRecord) -> str:
         return f"No safety coupling is recommended: it has to open above {above}, and " + (
             f"the jams, lumps and blocks of this study put {_torque(most)} on it at most."
             if setting.overloads
-            else "this study has no jam, lump or block that would open it."
+            else "this study has no jam, lump or block that could open it."
         )
     shut = {name: peak for name, peak in setting.overloads.items() if name not in setting.opens}
     text = (
@@ -112,7 +112,7 @@ def coupling_sentence(study: StudyRecord) -> str:
         text += f" A nuisance trip, which protects nothing: it opens, too, where {_listed(study, setting.nuisances)}."
     if starts := _starts_above(study, setting.least):
         text += (
-            f" Starting direct on line puts more on it: {_listed(study, starts)}; it has to be held shut in the "
+            f" A start direct on line puts more on it: {_listed(study, starts)}; it has to be held shut in the "
             "start (coupling.held_in_start = true)."
         )
     return text
@@ -167,7 +167,7 @@ def remark_on_coupling(study: StudyRecord, trip: float) -> None:
     elif most is not None and trip > most:
         warn(
             "coupling above motor",
-            "The safety coupling is set to {trip} and the motor gives {motor} at most: what brakes the machine "
+            "The safety coupling is set to {trip} and the motor gives {motor} at most: a load that rises "
             "slowly stalls the motor and does not open it.",
             **amounts,
         )

@@ -120,7 +120,8 @@ class Drive:
         """
         if self.foreign is not None:
             raise AbsentError(
-                "motor", f"{self.foreign.title}: {quantity} is not known of an FMU of somebody else"
+                "motor",
+                f"{self.foreign.title}: {quantity} is not known, as the motor is an FMU of somebody else",
             )
 
     @property

@@ -343,7 +343,7 @@ def _on_wheels(findings: FlywheelFindings, study: StudyRecord) -> None:
     if plate is not None and too_small:
         study.warn(
             "motor too small",
-            "the load takes {mean} of the motor on average, rated is {rated}: a larger motor helps, no flywheel "
+            "the load takes a torque of {mean} on average, rated is {rated}: a larger motor helps, no flywheel "
             "does.",
             mean=(findings.mean_torque, "N.m"),
             rated=(plate.nameplate.torque, "N.m"),
@@ -448,7 +448,7 @@ def _on_least(findings: FlywheelFindings, least: Wheel, study: StudyRecord) -> N
         if least.flywheel
         else "For a fluctuation of {permitted} no flywheel is needed; "
     )
-    none = "by the hand formula none is needed" if least.flywheel else "nor is it by hand"
+    none = "by the hand formula none is needed" if least.flywheel else "nor is one by the hand formula"
     text += "the hand formula asks for {by_hand}" if by_hand else none
     if by_hand > least.flywheel:
         text += ", as it leaves out that the motor's torque rises where the speed falls"

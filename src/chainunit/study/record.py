@@ -31,7 +31,7 @@ LOAD_CYCLE = "load_cycle.csv"
 """Name of the file with torque and speed of the motor's shaft in the steady turns."""
 
 
-INSUFFICIENT = "No motor of the catalogue fits; all is run with the nearest, which is insufficient."
+INSUFFICIENT = "No motor of the catalogue fits; all runs are with the nearest, which is insufficient."
 """The sentence on a study whose sizing found no motor that fits."""
 
 Amount: TypeAlias = (

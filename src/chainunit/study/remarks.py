@@ -25,18 +25,19 @@ from .window import CLOSED, DRIFT
 def conclude(study: StudyRecord) -> None:
     """Judge the model, and add every remark to the study."""
     config, note = study.config, study.note
-    own = "What the study file does not name is at its declared start value, which is assumed."
+    own = "Values that the study file does not name are the declared start values, which are assumed."
     if config.packaged:
         own = "Masses, pins, feed and drive are assumed; the papers print none."
     elif config.of_example:
         own = (
-            "What the study file does not name is the packaged example's, whose masses and drive are assumed."
+            "Values that the study file does not name are those of the packaged example, whose masses and drive "
+            "are assumed."
         )
     elif study.drive.outsider:
         own = (
-            f"The machine is an FMU, {study.drive.outsider.model.description}. What the study file does not name of "
-            "it is at the start value of its FMU. The turn at constant speed is by that FMU alone; bearings, and the "
-            "machine behind an open coupling, are not known of it."
+            f"The machine is an FMU, {study.drive.outsider.model.description}. Values that the study file does not "
+            "name are the start values of this FMU, which alone computes the turn at constant speed. Its bearings "
+            "and its motion behind an open coupling are not known."
         )
     note("assumed", own)
     if any(value for name, value in study.drive.machine.by_name.items() if name.endswith("friction")):
@@ -48,7 +49,7 @@ def conclude(study: StudyRecord) -> None:
     if left_out := list(_left_out(study)):
         note(
             "values left out",
-            "The file leaves out {what}: the packaged values stand for them, and the result hangs on them.",
+            "The file leaves out {what}: the packaged values are used, and the result depends on them.",
             what=" and ".join(left_out),
         )
     if study.answers:
@@ -112,8 +113,8 @@ def _on_start(study: StudyRecord) -> None:
     if speed < STARTED * requested:
         study.warn(
             "fed before speed",
-            "start-up: the motor does not bring the empty machine to its speed in reasonable time: the feed comes "
-            "after {fed}, with the crank at {speed} in place of {wanted}; a larger motor, or a lighter flywheel.",
+            "start-up: the motor does not bring the empty machine to its speed in a reasonable time: the feed comes "
+            "after {fed}, with the crank at {speed} in place of {wanted}; take a larger motor or a lighter flywheel.",
             START,
             fed=(feed_time, "s"),
             speed=(speed, "rad/s", "speed"),
@@ -123,11 +124,11 @@ def _on_start(study: StudyRecord) -> None:
 
 _LIMITS = {
     "temperature": "steady running: the winding comes to {value} if it goes on for ever, permitted is {limit} "
-    "({key}): a larger motor, less load, or for a load that comes and goes a heavier flywheel.",
-    "current": "steady running: the RMS current is {value}, rated is {limit}: what lasts heats the motor too much; a "
-    "larger motor, less load, or for a load that comes and goes a heavier flywheel.",
+    "({key}): take a larger motor, less load, or for a load that comes and goes a heavier flywheel.",
+    "current": "steady running: the RMS current is {value}, rated is {limit}: a lasting excess overheats the motor; "
+    "take a larger motor, less load, or for a load that comes and goes a heavier flywheel.",
     "start": "start-up: it takes {value}, with up to {peak}; the rotor of a warm motor may be locked for {limit}, "
-    "and a start that takes longer overheats it as a locked rotor does: a lighter flywheel, a larger motor, or "
+    "and a start that takes longer overheats it as a locked rotor does: take a lighter flywheel, a larger motor, or "
     'start = "inverter".',
 }
 """By limit of the motor, the warning where it is exceeded."""
@@ -162,7 +163,7 @@ def _on_limits(study: StudyRecord) -> None:
         stalls = ": a heavier load or a dip of the voltage stalls it" if turns else ""
         warn(
             "no reserve",
-            "steady running: the motor has {passes}{stalls}; a larger motor or a heavier flywheel.",
+            "steady running: the motor has {passes}{stalls}; take a larger motor or a heavier flywheel.",
             STEADY,
             stalls=stalls,
             passes=no_reserve(STEADY, steady.torque_reserve),
@@ -184,8 +185,8 @@ def _why_missed(study: StudyRecord, steady: Answers) -> str:
     if (breakdown := _stalled(study, steady)) is not None:
         below = number(breakdown, "rad/s", "speed", beside=False)
         return (
-            f"the motor stalls under the load: below the {below} of its breakdown torque it gives the less, the "
-            "slower it turns; a larger motor, less load, or for a load that comes and goes a heavier flywheel"
+            f"the motor stalls under the load: below {below}, the speed of its breakdown torque, its torque falls "
+            "with the speed; take a larger motor, less load, or for a load that comes and goes a heavier flywheel"
         )
     if study.drive.follows:
         return "the motor's voltage or current is at its limit, or the run is too short to settle"
@@ -197,7 +198,7 @@ def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
     if not study.reaches:
         why, addition = _why_missed(study, steady), ""
         if any(not study.config.events[name].from_rest for name in study.overloads):
-            addition = " Overloads are those of this state."
+            addition = " The overloads begin from this state."
         warn(
             "speed missed",
             "steady running: the crank turns at {speed_mean} in place of {wanted}; {why}.{branched}",
@@ -211,7 +212,7 @@ def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
     if study.drive.whole_turns(study.steady) is None:
         warn(
             "no whole turn",
-            "steady running: the crank does not make a whole turn; means are over all that was run, and there is no "
+            "steady running: the crank does not make a whole turn; means are over the whole run, and there is no "
             f"{LOAD_CYCLE}.",
             STEADY,
         )
@@ -227,7 +228,7 @@ def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
     elif abs(steady.speed_drift) > DRIFT and not study.config.chain:
         warn(
             "speed drifts",
-            "steady running: the machine still {moves}: the change of its speed over the turns that are evaluated is "
+            "steady running: the machine still {moves}: the change of its speed over the evaluated turns is "
             "{speed_drift} of the ripple, so that ripple, power and RMS are not those of steady running; raise "
             "run.settle_turns.",
             STEADY,
@@ -367,8 +368,8 @@ def _on_random_overloads(study: StudyRecord) -> None:
     if random and random.left_out:
         note(
             "rows left out",
-            "overloads at random: {rows} lines of {file} were no rows of this study and are left out; runs that they "
-            "may have stood for were computed anew.",
+            "overloads at random: {rows} lines of {file} were no rows of this study and are left out; their "
+            "runs, if they had any, were repeated.",
             rows=str(random.left_out),
             file=random.file.name,
         )
@@ -400,12 +401,10 @@ def _on_chains(study: StudyRecord, chain: ChainOrgans) -> None:
     note(
         "chains",
         f"The organs are chains of {walls} + {webs} rods; their damping (eta {chain.eta:g} N m2 s, ends "
-        f"{chain.end_damping:g} N m s), which a heavier organ wants larger, and folding are assumed.",
+        f"{chain.end_damping:g} N m s), which has to be larger for a heavier organ, and their folding are assumed.",
     )
     if walls + webs < 4:
-        few = (
-            f"{walls + webs} rods have {walls + webs - 2} natural frequencies; 8 rods show what a chain does."
-        )
+        few = f"{walls + webs} rods have {walls + webs - 2} natural frequencies; 8 rods show a chain well."
         note("few rods", f"chains: {few}")
     _on_folding(study)
     if result is None:
@@ -413,7 +412,7 @@ def _on_chains(study: StudyRecord, chain: ChainOrgans) -> None:
     speed = result.own.speed
     for band in result.avoid:
         if band.low <= speed <= band.high:
-            text = "chains: the crank speed lies among those to avoid, {band}: {why}."
+            text = "chains: the crank speed lies in a range to avoid, {band}: {why}."
             warn("speed to avoid", text, band=str(band), why=band.why, speed=(speed, "rad/s", "speed"))
     for missing, why in result.failures.items():
         text = "chains: {speed} is missing in the sweep: {why}"
@@ -421,7 +420,7 @@ def _on_chains(study: StudyRecord, chain: ChainOrgans) -> None:
     residual = max(n.energy_residual for n in result.sweep)
     if not residual < RESIDUAL:
         text = (
-            "chains: the energy residual reaches {residual} of the energy moved; lessen chain.fold_stiffness."
+            "chains: the energy residual reaches {residual} of the energy moved; lower chain.fold_stiffness."
         )
         warn("energy of chains", text, residual=(residual, "1"))
 
@@ -440,8 +439,8 @@ def _on_folding(study: StudyRecord) -> None:
         if answers.crank_torque_peak < FELT * steady.crank_torque_peak:
             study.warn(
                 "lump not felt",
-                "{run}: the drive hardly feels the lump, as the web folds before it on this stroke; on the other one "
-                "the web is pulled: try crank_angle = {angle}.",
+                "{run}: the drive hardly feels the lump, as the web folds before it on this stroke; on the other "
+                "stroke the web is pulled: try crank_angle = {angle}.",
                 run,
                 run=study.title_of(run),
                 angle=f'"{math.degrees((event.p.crank_angle + math.pi) % (2.0 * math.pi)):.4g} deg"',
@@ -454,10 +453,10 @@ def _on_shaft(study: StudyRecord) -> None:
     assert modes is not None
     warn, note = study.warn, study.note
     if study.sizing is not None:
-        rigid = "Sizing took the shafts for rigid and the driveline for massless; the runs have it."
+        rigid = "Sizing took the shafts as rigid and the driveline as massless; the runs include it."
         note("sized without line", rigid)
     if line.d2 == 0.0 and line.d3 == 0.0:
-        text = "The driveline has no damping: a vibration that was set off goes on; give d2 and d3."
+        text = "The driveline has no damping: a vibration, once excited, does not decay; give d2 and d3."
         note("undamped line", text)
     ends: dict[str, Amount] = {
         "k_least": (modes.k_least, "rad/s", "frequency"),
@@ -468,9 +467,9 @@ def _on_shaft(study: StudyRecord) -> None:
         warn(
             "control near line",
             "The speed loop crosses over at {crossover}, near {antiresonance}, at which the machine swings on the "
-            "shafts against a motor that stands: its margins are those of a rigid drive and do not hold here. A "
-            "stiffer line parts the two. Lower gains do, too, but the control also damps the torsion, and what they "
-            "make of the peaks is for a run to tell.",
+            "shafts against a standing motor: its margins are those of a rigid drive and do not hold here. A "
+            "stiffer line separates the two. Lower gains do so, too, but the control also damps the torsion: a run "
+            "shows the effect of lower gains on the peaks.",
             crossover=(fastest, "rad/s"),
             antiresonance=(modes.antiresonance, "rad/s"),
             **ends,

@@ -193,7 +193,7 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
     numbers = duty.numbers
     notes = [
         "Catalogue data are typical; iron losses are not in the motor model.",
-        "The gear's losses act as viscous drag on the motor shaft, of the mean power that its efficiency takes.",
+        "The gear's losses act as viscous drag on the motor shaft, with the mean power that its efficiency costs.",
     ]
     if config.chain is not None:
         notes.append(

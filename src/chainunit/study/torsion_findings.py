@@ -106,9 +106,9 @@ class TorsionFindings(Findings):
         if steady is not None and not 1.0 / APART < steady.tau2_peak / peak < APART:
             study.note(
                 "torque of the motor",
-                "In steady running shaft 2 peaks at {run}, in the analysis of the line in rotation at {peak}: there "
-                "the motor gives a constant torque, while speed control, slip and the machine's own unevenness act "
-                "on the torsion, too.",
+                "In steady running the torque of shaft 2 peaks at {run}, in the analysis of the line in rotation at "
+                "{peak}: the analysis assumes a motor of constant torque, while in the run speed control, slip and "
+                "the uneven load of the machine act on the torsion, too.",
                 STEADY,
                 run=_torque(steady.tau2_peak),
                 peak=_torque(peak),
@@ -121,8 +121,8 @@ class TorsionFindings(Findings):
             yield Remark.of(
                 "warning",
                 "no steady motion",
-                "No steady motion found at {speed}: either none repeats itself each half turn, or the search did not "
-                "reach it; more damping or less bend helps both.",
+                "No steady motion found at {speed}: either none has the period of half a turn, or the search did not "
+                "find it; more damping or less bend helps in both cases.",
                 speed=_speed(self.analysis.rotation.speed),
             )
         else:
@@ -165,7 +165,8 @@ class TorsionFindings(Findings):
                     "warning",
                     "peak of a shaft",
                     f"With a motor of constant torque shaft {shaft} carries {{peak}} at {{speed}}, {{times}} times "
-                    f"the torque of the load alone; permitted is {factor:g}. The runs have it with this motor.",
+                    f"the torque of the load alone; permitted is {factor:g}. The runs "
+                    "of this study show the torque with this motor.",
                     peak=_torque(peak),
                     speed=at,
                     times=(peak / static, "1"),
@@ -175,8 +176,8 @@ class TorsionFindings(Findings):
             yield Remark.of(
                 "warning",
                 "torque changes sign",
-                "With a motor of constant torque that of shaft 2 falls to {least} in each half turn: with play in "
-                "splines and joints, which is not modelled, it hammers.",
+                "With a motor of constant torque the torque of shaft 2 falls to {least} in each half turn: with play "
+                "in splines and joints, which is not modelled, the shaft hammers.",
                 least=_torque(least),
             )
         if motion.unstable[0]:
@@ -192,7 +193,7 @@ class TorsionFindings(Findings):
                 "warning",
                 "drifting speed",
                 "A motor whose torque does not fall with speed would not hold {speed}: deviations grow by {growth}, "
-                "as above a resonance faster running takes less torque; its control, or slip, must outweigh that.",
+                "as above a resonance faster running takes less torque; its control or its slip must outweigh that.",
                 speed=at,
                 growth=(float(motion.free_growth[0]), "1/s"),
             )
@@ -205,7 +206,7 @@ class TorsionFindings(Findings):
                 "warning",
                 "unstable range",
                 "Unstable from {low} to {high} at the damping ratio {damping}: torsional vibration grows by itself "
-                "(parametric resonance); more damping or less uneven joints end it.",
+                "(parametric resonance); more damping or more even joints end it.",
                 low=_speed(low),
                 high=_speed(high),
                 damping=(analysis.damping_ratio, "1"),
@@ -214,8 +215,8 @@ class TorsionFindings(Findings):
             yield Remark.of(
                 "warning",
                 "range without steady motion",
-                "No steady motion found from {low} to {high}: either none repeats itself each half turn, or the "
-                "search did not reach it.",
+                "No steady motion found from {low} to {high}: either none has the period of half a turn, or the "
+                "search did not find it.",
                 low=_speed(low),
                 high=_speed(high),
             )
@@ -223,7 +224,7 @@ class TorsionFindings(Findings):
             yield Remark.of(
                 "note",
                 "drifting range",
-                "Held by a speed control or slip only, not by a motor of constant torque: {low} to {high}.",
+                "Only a speed control or slip holds a speed from {low} to {high}, not a motor of constant torque.",
                 low=_speed(low),
                 high=_speed(high),
             )
@@ -237,7 +238,7 @@ class TorsionFindings(Findings):
         words = (
             f"{'stiffer' if name[0] == 'c' else 'lighter'} {names[name]}: {{{name}}}" for name in strongest
         )
-        text = f"What raises the natural frequency, per 1 %: {', '.join(words)}."
+        text = f"Changes that raise the natural frequency, per 1 %: {', '.join(words)}."
         return Remark.of("note", "natural frequency", text, **gains)
 
     def _simulation(self) -> Iterator[Remark]:
@@ -245,16 +246,16 @@ class TorsionFindings(Findings):
         analysis = self.analysis
         if analysis.damping_ratio <= 0.0:
             text = (
-                "Without damping no transient dies: no time simulation, and resonance peaks are bounded by the twist "
-                "alone; give driveline.damping_ratio, or d2 and d3."
+                "Without damping no transient dies out: there is no time simulation, and only the twist bounds the "
+                "resonance peaks; give driveline.damping_ratio, or d2 and d3."
             )
             yield Remark.of("note", "undamped resonance", text)
         elif analysis.simulation is None:
             yield Remark.of(
                 "note",
                 "no time simulation",
-                "Transients take too long for a time simulation (damping ratio {damping}): the resonance curve is "
-                "that of the steady motion.",
+                "Transients take too long for a time simulation (damping ratio {damping}): the resonance curve "
+                "has only the steady motion.",
                 damping=(analysis.damping_ratio, "1"),
             )
         elif not np.all(analysis.on_speed):
@@ -270,7 +271,7 @@ class TorsionFindings(Findings):
         yield Remark.of(
             "note",
             "run-up",
-            "The resonance curve is that of running at each speed for long; a run-up that passes quickly stays below "
+            "The resonance curve is for lasting running at each speed; a run-up that passes quickly stays below "
             "it.",
         )
 

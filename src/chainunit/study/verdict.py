@@ -48,29 +48,29 @@ _TOPICS = {
     ),
     "slack speed": (
         "the crank turns faster than the speed at which a web goes slack",
-        "Crank speed at or above that at which a web goes slack",
+        "Crank speed at or above the speed at which a web goes slack",
         _CHAINS,
     ),
     "crank torque": (
         "the torques of rocker and crank may be off by more than 10 %, as a chain resonates",
-        "Crank speed above that up to which two bars give the crank torque to 10 %; they give the rocker torque to "
-        "10 % up to a lower speed alone",
+        "Crank speed above the limit up to which two bars give the crank torque to 10 %; the limit for the rocker "
+        "torque is lower",
         _CHAINS,
     ),
     "rocker torque": (
         "the rocker torque may be off by more than 10 %, as a chain resonates",
-        "Crank speed above that up to which two bars give the rocker torque to 10 %",
+        "Crank speed above the limit up to which two bars give the rocker torque to 10 %",
         _CHAINS,
     ),
     "energy": (
         "the energy balance is not kept",
-        "Energy residual over the energy moved, above which a run is not taken for right",
+        "Energy residual over the energy moved; a run above the limit counts as wrong",
         "shorten run.step",
     ),
     "folded through": (
         "rods fold through their stop",
         "Rods that fold through their stop",
-        "raise chain.fold_stiffness, or take it for a machine that breaks",
+        "raise chain.fold_stiffness, or assume that the machine breaks",
     ),
     "folded": (
         "rods meet the stop between them, whose stiffness is assumed",
@@ -79,11 +79,11 @@ _TOPICS = {
     ),
     "slack": (
         "rods go slack and snatch: a single peak is no prediction",
-        "Share of the time with a slack rod; what snatches has no single peak that is a prediction",
+        "Share of the time with a slack rod; no single peak of a snatching chain is a prediction",
         "",
     ),
     "starts": (
-        "the starts differ by so much that they do not tell the quantile of peaks",
+        "the starts differ so much that they do not determine the quantile of peaks",
         "Turns that count as independent, too few for the quantile, as the starts differ",
         "raise chain.starts",
     ),
@@ -197,7 +197,7 @@ class Verdict:
                 and self._asked
                 and any(r.quantity == "crank_speed" for r in self.reasons if r.topic == topic)
             ):
-                begin = f"{begin}, as it is asked for; the crank turns at {self._turns}"
+                begin = f"{begin}, judged at the requested speed; the crank turns at {self._turns}"
             if each:
                 lines.append(f"{begin}: {'; '.join(each)}.")
         return lines
