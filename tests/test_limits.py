@@ -85,7 +85,7 @@ def test_a_motor_below_its_breakdown_speed_stalls_under_the_load(tmp_path):
     missed = warnings["speed missed"].text
     below = study.drive.breakdown_speed(study.steady)
     assert steady.speed_mean < 0.5 * below and "the motor stalls under the load" in missed
-    assert f"below the {below:.2f} rad/s of its breakdown torque" in missed
+    assert f"below {below:.2f} rad/s, the speed of its breakdown torque" in missed
     assert "slip" not in missed and "verload" not in missed
     # there the torque is the largest of all speeds
     T, w = float(study.steady["motor.stator.T"].mean()), below * study.drive.ratio
