@@ -1,1 +1,1 @@
-"""FMUs from declared models. Nothing here names a machine."""
+"""FMUs from declared models. No module here names a machine."""

@@ -1,4 +1,4 @@
-"""The files of an FMU beside its model: documentation, licences, icon and terminals, reference results."""
+"""The files of an FMU besides its model: documentation, licences, icon and terminals, reference results."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from .reference import reference_results
 def companion_files(
     interface: Interface, version: str, fmi: int, libraries: Sequence[str] = ()
 ) -> dict[str, bytes]:
-    """Files by their path inside the FMU; `libraries` are packages whose code it holds, under their own licences."""
+    """Files by their path inside the FMU; `libraries` are the packages whose code the FMU contains: their licences
+    are added."""
     model = interface.model
     png, svg = (icon(model, kind).read_bytes() for kind in ("png", "svg"))
     files = {
@@ -33,5 +34,5 @@ def companion_files(
 
 
 def licence(*packages: str) -> str:
-    """Licences of installed packages, one after the other."""
+    """The licences of installed packages, in series."""
     return "\n\n".join(f"{name}\n\n{licence_text(name)}" for name in packages)

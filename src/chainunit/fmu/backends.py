@@ -1,4 +1,4 @@
-"""Which backend makes an FMU: native code where there is a C compiler, Python inside pythonfmu otherwise."""
+"""The choice of the backend for an FMU: native code where there is a C compiler, otherwise Python by pythonfmu."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Backend = Literal["native", "python"]
 
 @dataclass(frozen=True)
 class Origin:
-    """By which backend an FMU was made, and in `words` how and why."""
+    """The backend that made an FMU, and a text on how and why: `words`."""
 
     backend: Backend
     words: str
@@ -37,7 +37,7 @@ def export(
     platforms: Sequence[str] = (),
     report: Callable[[str], None] = lambda what: None,
 ) -> Origin:
-    """Write `model` as an FMU and say which backend made it, and why.
+    """Write `model` as an FMU; the result tells which backend made it, and why.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ from .recipe import Experiment, script_of
 from .script import Script
 
 RELEASED = "2026-11-21"
-"""The day of this version's release, as CITATION.cff has it."""
+"""The day of this version's release, equal to the one in CITATION.cff."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Signal:
 
     @property
     def name(self) -> str:
-        """Its full name."""
+        """The full name of the variable."""
         return self.variable.name
 
 
@@ -45,8 +45,8 @@ class Interface:
         """
         Parameters
         ----------
-        start : start values that replace the declared ones
-        own : the class of a script of the user's; else that of the model's script in `fmu/`
+        start : start values in place of the declared ones
+        own : the class of the user's script; by default the class of the model's script in `fmu/`
 
         Raises
         ------
@@ -59,9 +59,9 @@ class Interface:
         self.inputs = model.input_layout.variables
         self.states = model.state_layout.variables if model.state_layout else ()
         self.others = tuple(v for part in model.parts for v in part.layout.variables)
-        known = {v.name for v in (*self.parameters, *self.inputs)}
+        names = {v.name for v in (*self.parameters, *self.inputs)}
         for name in start:
-            if name not in known:
+            if name not in names:
                 raise KeyError(f"{model.name} has no parameter or input {name!r}")
         self.signals: list[Signal] = []
         for causality, group in (
@@ -79,8 +79,8 @@ class Interface:
 
     @cached_property
     def trace(self) -> tuple[list[Any], Any, Any, Any, list[Any], list[Any]]:
-        """The model in symbols: (p, u, x, what is derived from p, as casadi vectors), p, u and x as declarations,
-        outputs part by part in declared order, and derivatives of the states."""
+        """The model in symbols: the casadi vectors (p, u, x, derived values); p, u and x as instances of their
+        declarations; the outputs part by part in declared order; and the derivatives of the states."""
         import casadi
 
         model = self.model
@@ -104,31 +104,33 @@ class Interface:
 
     @cached_property
     def dependencies(self) -> list[tuple[list[int], list[int]]]:
-        """Of each output, and of each state's derivative behind them: value references of its true
-        dependencies, in a run (inputs and states) and at the start (parameters and inputs), from the sparsity of the
-        traced equations. A state, in a run, depends on itself alone."""
+        """The true dependencies of each output, then of each state's derivative: value references in a run (inputs
+        and states) and at the start (parameters and inputs). They come from the sparsity of the traced equations. In
+        a run a state depends only on itself."""
         model = self.model
         symbols, p, u, x, outputs, derivatives = self.trace
-        states, started = [], []
+        states, start = [], []
         rows_at_start = [*outputs, *derivatives]
         if model.state_layout:
             states = model.state_layout.values(x)
             first = model.start(casadi_(), p, u, rounds=min(2, model.start_rounds))
-            started = model.state_layout.values(first)
+            start = model.state_layout.values(first)
             rows_at_start = [*self._outputs(p, u, first), *model.derivatives(casadi_(), p, u, first)]
         in_run = self._influences(symbols, [*states, *outputs, *derivatives])
-        at_start = self._influences(symbols, [*started, *rows_at_start])
+        at_start = self._influences(symbols, [*start, *rows_at_start])
         n = len(self.parameters)
-        return [([i for i in known if i >= n], first) for known, first in zip(in_run, at_start, strict=True)]
+        return [
+            ([i for i in entries if i >= n], first) for entries, first in zip(in_run, at_start, strict=True)
+        ]
 
     @cached_property
     def derived(self) -> list[Any]:
-        """What is derived from the parameters, in symbols.
+        """The values that `Model.derive` computes from the parameters, in symbols.
 
         Raises
         ------
         ValueError
-            where it depends on a parameter that may change in a run.
+            where one depends on a parameter that may change in a run.
         """
         import casadi
 
@@ -136,8 +138,8 @@ class Interface:
             return []
         symbols, p, *_ = self.trace
         rows = [casadi.SX(v) for v in self.model.derive(casadi_(), p)]
-        known = {i for row in self._known(symbols[:1], rows) for i in row}
-        for i in sorted(known):
+        places = {i for row in self._places(symbols[:1], rows) for i in row}
+        for i in sorted(places):
             if self.parameters[i].quantity.tunable:
                 raise ValueError(
                     f"{self.model.name}: {self.parameters[i].name} is tunable, but `derive` takes it"
@@ -145,28 +147,28 @@ class Interface:
         return rows
 
     def _influences(self, symbols: list[Any], rows: list[Any]) -> list[list[int]]:
-        """Value references of parameters, inputs and states that each row depends on, also through what is derived
-        from parameters."""
-        known = self._known(symbols, rows)
+        """Value references of the parameters, inputs and states on which each row depends, directly or through
+        derived values."""
+        direct = self._places(symbols, rows)
         first = sum(symbol.shape[0] for symbol in symbols[:3])
-        through = self._known(symbols[:1], self.derived) if self.model.derived else []
+        through = self._places(symbols[:1], self.derived) if self.model.derived else []
         return [
-            sorted({j for i in row for j in (through[i - first] if i >= first else (i,))}) for row in known
+            sorted({j for i in row for j in (through[i - first] if i >= first else (i,))}) for row in direct
         ]
 
     @staticmethod
-    def _known(symbols: list[Any], rows: list[Any]) -> list[list[int]]:
-        """Places among the symbols that each row depends on."""
+    def _places(symbols: list[Any], rows: list[Any]) -> list[list[int]]:
+        """Places of the symbols on which each row depends."""
         import casadi
 
         f = casadi.Function("rows", symbols, [casadi.vertcat(*rows)])
-        known: list[list[int]] = [[] for _ in rows]
+        places: list[list[int]] = [[] for _ in rows]
         offset = 0
         for side, symbol in enumerate(symbols):
             for row, column in zip(*f.jac_sparsity(0, side).get_triplet(), strict=True):
-                known[row].append(offset + column)
+                places[row].append(offset + column)
             offset += symbol.shape[0]
-        return known
+        return places
 
 
 def model_description(
@@ -180,8 +182,8 @@ def model_description(
     """The XML tree of an FMI 2.0 FMU.
 
     `kinds` maps "ModelExchange" and "CoSimulation" to the attributes of their elements; with Model Exchange the
-    derivatives of the states are variables, too. `sources` are the files that the FMU can be compiled from.
-    `identifier` is the name of its library, where that is not the model's.
+    derivatives of the states are variables, too. `sources` are the files from which the FMU can be compiled.
+    `identifier` is the name of its library, by default the name of the model.
     """
     exchange = "ModelExchange" in kinds
     root = _root(interface.model, version, {"fmiVersion": "2.0", "guid": guid})
@@ -206,10 +208,10 @@ def model_description(
     lists = {name: Element(name) for name in ("Outputs", "Derivatives", "InitialUnknowns")}
     first_state = len(interface.parameters) + len(interface.inputs)
     for kind, reference, influences in _structure(interface, exchange):
-        # in Co-Simulation alone no state is among the knowns
-        used = [i for i in influences if exchange or kind == "InitialUnknown" or i < first_state]
+        # in an FMU for Co-Simulation only, the knowns include no states
+        places = [i for i in influences if exchange or kind == "InitialUnknown" or i < first_state]
         where = {"Output": "Outputs", "InitialUnknown": "InitialUnknowns"}.get(kind, "Derivatives")
-        unknown = {"index": str(reference + 1), **_dependencies([i + 1 for i in used])}
+        unknown = {"index": str(reference + 1), **_dependencies([i + 1 for i in places])}
         SubElement(lists[where], "Unknown", unknown)
     structure.extend(element for name, element in lists.items() if len(element) or name != "Derivatives")
     return root
@@ -218,7 +220,7 @@ def model_description(
 def model_description_3(
     interface: Interface, token: str, kinds: Mapping[str, Mapping[str, str]], version: str
 ) -> Element:
-    """The XML tree of an FMI 3.0 FMU, with the same value references as that of FMI 2.0 and, behind them, time."""
+    """The XML tree of an FMI 3.0 FMU; the value references are those of FMI 2.0, followed by the time."""
     root = _root(interface.model, version, {"fmiVersion": "3.0", "instantiationToken": token})
     for kind, options in kinds.items():
         SubElement(root, kind, {"modelIdentifier": interface.model.name, **options})
@@ -248,8 +250,8 @@ def model_description_3(
 def _variables(
     interface: Interface, derivatives: bool
 ) -> Iterator[tuple[dict[str, str], dict[str, str], int | None]]:
-    """Of each variable, in the order of their value references: its attributes, those of its type, and the value
-    reference of the state that it is the derivative of."""
+    """For each variable, in the order of the value references: its attributes, the attributes of its type, and, for a
+    derivative, the value reference of its state."""
     for signal in interface.signals:
         yield _attributes(signal), _real(signal), None
     first = len(interface.parameters) + len(interface.inputs)
@@ -266,7 +268,7 @@ def _variables(
 
 
 def _structure(interface: Interface, derivatives: bool) -> Iterator[tuple[str, int, list[int]]]:
-    """What FMI 3.0 calls each unknown, its value reference, and the value references that it depends on."""
+    """For each unknown: its kind in FMI 3.0, its value reference, and the value references of its dependencies."""
     outputs = [s.reference for s in interface.of("output")]
     rates = [len(interface.signals) + i for i in range(len(interface.states) if derivatives else 0)]
     kinds = ["Output"] * len(outputs) + ["ContinuousStateDerivative"] * len(rates)
@@ -283,7 +285,7 @@ def _dependencies(references: Iterable[int]) -> dict[str, str]:
 
 
 def _root(model: type[Model], version: str, own: Mapping[str, str]) -> Element:
-    """The root element, with what both versions of FMI call alike."""
+    """The root element, with the attributes that are common to both versions of FMI."""
     fmi, identifier = own.items()
     return Element(
         "fmiModelDescription",
@@ -316,27 +318,27 @@ def licence_text(package: str) -> str:
 
 
 def generation_time() -> str:
-    """When the FMU was made, in UTC: SOURCE_DATE_EPOCH [s], else the day of this version's release, so that the same
-    model gives the same file.
+    """The time at which the FMU was made, in UTC: SOURCE_DATE_EPOCH [s], else the day of this version's release, so
+    that the same model gives the same file.
 
     Raises
     ------
     InputError
         where SOURCE_DATE_EPOCH is no number of seconds.
     """
-    given = os.environ.get("SOURCE_DATE_EPOCH", "")
-    if not given:
+    setting = os.environ.get("SOURCE_DATE_EPOCH", "")
+    if not setting:
         return f"{RELEASED}T00:00:00Z"
     try:
-        return datetime.fromtimestamp(int(given), UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+        return datetime.fromtimestamp(int(setting), UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
     except (ValueError, OverflowError, OSError) as error:
         raise InputError(
-            f"SOURCE_DATE_EPOCH = {given[:40]!r}: must be a whole number of seconds since 1970, or not set"
+            f"SOURCE_DATE_EPOCH = {setting[:40]!r}: must be a whole number of seconds since 1970, or not set"
         ) from error
 
 
 def _per_second(unit: str) -> str:
-    """The unit of a derivative by time, in base units where it has no name of its own."""
+    """The unit of a time derivative, in base units."""
     if unit == "1":
         return "1/s"
     powers = base_units(unit)
@@ -353,8 +355,8 @@ def _definitions(
     more: set[str],
     add_type: Callable[[Element, str, dict[str, str]], None],
 ) -> None:
-    """Definitions of the units, of those in `more`, too; a declared type for each that has a name of its kind;
-    categories of messages; and the default experiment."""
+    """Write the definitions of all units and of those in `more`, the declared types, the categories of messages, and
+    the default experiment."""
     units = more | {s.variable.unit for s in interface.signals}
     units |= {_per_second(v.unit) for v in interface.states if derivatives}
     definitions = SubElement(root, "UnitDefinitions")
@@ -362,15 +364,15 @@ def _definitions(
         node = SubElement(definitions, "Unit", name=unit)
         SubElement(node, "BaseUnit", {base: str(power) for base, power in base_units(unit).items()})
         if unit in DISPLAY_UNITS:
-            shown, factor, offset = DISPLAY_UNITS[unit]
-            attributes = {"name": shown, "factor": repr(factor)}
+            display, factor, offset = DISPLAY_UNITS[unit]
+            attributes = {"name": display, "factor": repr(factor)}
             if offset:
                 attributes["offset"] = repr(offset)
             SubElement(node, "DisplayUnit", attributes)
     types = SubElement(root, "TypeDefinitions")
     for unit in sorted(units):
         if unit in TYPES:
-            add_type(types, TYPES[unit], {"quantity": TYPES[unit], **_shown(unit)})
+            add_type(types, TYPES[unit], {"quantity": TYPES[unit], **_display_unit(unit)})
     categories = SubElement(root, "LogCategories")
     for name in ("logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal", "logAll"):
         SubElement(categories, "Category", name=name)
@@ -379,24 +381,24 @@ def _definitions(
     SubElement(root, "DefaultExperiment", {name: f"{value:g}" for name, value in values.items()})
 
 
-def _shown(unit: str) -> dict[str, str]:
+def _display_unit(unit: str) -> dict[str, str]:
     return {"unit": unit} | ({"displayUnit": DISPLAY_UNITS[unit][0]} if unit in DISPLAY_UNITS else {})
 
 
 def _unit(unit: str) -> dict[str, str]:
-    """Attributes of a variable that say what it is measured in; importers that know no types find the unit, too."""
-    return ({"declaredType": TYPES[unit]} if unit in TYPES else {}) | _shown(unit)
+    """The declared type and the unit of a variable; the unit is for importers that do not read types."""
+    return ({"declaredType": TYPES[unit]} if unit in TYPES else {}) | _display_unit(unit)
 
 
 def _attributes(signal: Signal) -> dict[str, str]:
     v, q = signal.variable, signal.variable.quantity
-    fixed = "tunable" if q.tunable else "fixed"
+    variability = "tunable" if q.tunable else "fixed"
     attributes = {
         "name": v.name,
         "valueReference": str(signal.reference),
         "description": v.description,
         "causality": signal.causality,
-        "variability": fixed if signal.causality == "parameter" else "continuous",
+        "variability": variability if signal.causality == "parameter" else "continuous",
     }
     if signal.causality != "input":
         attributes["initial"] = "calculated" if signal.causality == "output" else "exact"
@@ -418,16 +420,16 @@ def _real(signal: Signal) -> dict[str, str]:
 
 
 def terminals(interface: Interface) -> Element:
-    """The XML tree of terminalsAndIcons.xml (FMI 3.0): the model's icon, and what connects as one."""
+    """The XML tree of terminalsAndIcons.xml (FMI 3.0): the icon and the terminals of the model."""
     root = Element("fmiTerminalsAndIcons", fmiVersion="3.0")
     graphics = SubElement(root, "GraphicalRepresentation")
     box = {"x1": "-100", "y1": "-100", "x2": "100", "y2": "100"}
     SubElement(graphics, "CoordinateSystem", box, suggestedScalingFactorTo_mm="0.1")
     SubElement(graphics, "Icon", box)
-    listed = SubElement(root, "Terminals")
+    group = SubElement(root, "Terminals")
     for terminal in interface.model.terminals:
         node = SubElement(
-            listed,
+            group,
             "Terminal",
             name=terminal.name,
             matchingRule="plug",

@@ -20,15 +20,15 @@ _MOTION = " Inputs phi, w and a belong together: give all of them. As declared, 
 
 
 def page(interface: Interface, version: str) -> str:
-    """A self-contained page: what the model is, and a table of its parameters, inputs and outputs."""
+    """A self-contained page: a description of the model, and tables of its parameters, inputs and outputs."""
     model = interface.model
     text = escape(inspect.cleandoc(model.__doc__ or "")).replace("\n\n", "</p><p>")
     tables = "".join(
         f"<h2>{title}</h2>\n{_table(interface.of(causality), causality)}"
         for title, causality in (("Parameters", "parameter"), ("Inputs", "input"), ("Outputs", "output"))
     )
-    driven = {"phi", "w", "a"} <= {signal.variable.name for signal in interface.of("input")}
-    inputs = _NOT_CONNECTED + (_MOTION if driven else "")
+    has_motion = {"phi", "w", "a"} <= {signal.variable.name for signal in interface.of("input")}
+    inputs = _NOT_CONNECTED + (_MOTION if has_motion else "")
     return (
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{model.name}</title>'
         f"<style>{_STYLE}</style></head>\n<body><h1>{model.name}</h1>\n<p>{escape(model.description)}</p>\n"
@@ -48,9 +48,9 @@ def _table(signals: list[Signal], causality: str) -> str:
         v, q = signal.variable, signal.variable.quantity
         cells = [f"<td><code>{escape(v.name)}</code></td>", f"<td>{escape(v.unit)}</td>"]
         if settable:
-            allowed = escape(q.allowed_range) + (
+            bounds = escape(q.allowed_range) + (
                 "" if causality == "input" else ", tunable" if q.tunable else ", fixed"
             )
-            cells += [f'<td class="number">{signal.start:.6g}</td>', f"<td>{allowed}</td>"]
+            cells += [f'<td class="number">{signal.start:.6g}</td>', f"<td>{bounds}</td>"]
         rows.append("<tr>" + "".join(cells) + f"<td>{escape(v.description)}</td></tr>")
     return f"<table>{head}\n" + "\n".join(rows) + "</table>\n"

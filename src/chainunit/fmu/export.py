@@ -1,7 +1,7 @@
 """Export of a model as an FMU through pythonfmu.
 
-The mechanics travel inside the FMU as a package folder whose name holds a hash of all that the FMU is made
-of: two FMUs in one process never share code by accident, and the same model gives the same file, byte for byte.
+The FMU contains the mechanics as a package folder. The name of the folder has a hash of all contents of the FMU, so
+that two FMUs in one process never share code by accident. The same model gives the same file, byte for byte.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from importlib import metadata
 from pathlib import Path
 from xml.etree.ElementTree import Element, tostring
 
-# now, not at need: a Python FMU that has run in this process brings a pythonfmu of its own, without binaries
+# imported here and not later: a Python FMU that runs in this process brings its own pythonfmu, without binaries
 from pythonfmu import FmuBuilder
 
 from ..errors import InputError
@@ -48,8 +48,8 @@ def export(model: type[Model], file: Path, start: dict[str, float] | None = None
     Parameters
     ----------
     model : the model's class
-    file : path of the FMU; a file there is replaced, in one step
-    start : start values of parameters and inputs, by name, that replace the declared ones
+    file : path of the FMU; an existing file is replaced, in one step
+    start : start values of parameters and inputs, by name, in place of the declared ones
 
     Raises
     ------
@@ -64,7 +64,7 @@ def export(model: type[Model], file: Path, start: dict[str, float] | None = None
     with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
         work = Path(scratch)
         text = _script(model, start or {})
-        script = work / f"{model.name}_{_hash(interface, _imported(text), model.name)}.py"
+        script = work / f"{model.name}_{_hash(interface, _import_closure(text), model.name)}.py"
         script.write_text(text)
         raw = _build(script, work / "raw.fmu")
         version = metadata.version("chainunit")
@@ -74,8 +74,8 @@ def export(model: type[Model], file: Path, start: dict[str, float] | None = None
 
 
 def complete(slave: type[Script], resources: Path) -> Element:
-    """Describe the FMU that pythonfmu is building from a script, and put beside that script the part of this package
-    that it imports, so that the FMU needs no installed chainunit.
+    """The description of the FMU that pythonfmu is building from a script. Writes the part of this package that the
+    script imports beside the script, so that the FMU needs no installed chainunit.
 
     Parameters
     ----------
@@ -85,14 +85,14 @@ def complete(slave: type[Script], resources: Path) -> Element:
     Raises
     ------
     KeyError, InputError
-        see `export`; also for an import of the script that cannot be carried.
+        see `export`; also for an import in the script that cannot be copied into the FMU.
     """
     interface = interface_of(slave.model, slave.start, slave)
     script = resources / f"{slave.__module__}.py"
     text = script.read_text("utf-8")
-    files = _imported(text)
-    version, hashed = metadata.version("chainunit"), _hash(interface, files, slave.__name__)
-    package = resources / f"chainunit_{hashed[:12]}"
+    files = _import_closure(text)
+    version, digest = metadata.version("chainunit"), _hash(interface, files, slave.__name__)
+    package = resources / f"chainunit_{digest[:12]}"
     for name, content in files.items():
         target = package / name
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -103,12 +103,12 @@ def complete(slave: type[Script], resources: Path) -> Element:
     script.write_text(re.sub(r"(?m)^( *(?:from|import)) chainunit\b", rf"\1 {package.name}", text), "utf-8")
     # pythonfmu names the binaries by the class
     return model_description(
-        interface, f"{{{uuid.UUID(hashed)}}}", _KINDS, version, identifier=slave.__name__
+        interface, f"{{{uuid.UUID(digest)}}}", _KINDS, version, identifier=slave.__name__
     )
 
 
 def _hash(interface: Interface, files: Mapping[str, bytes], identifier: str) -> str:
-    """Of all that the FMU is made of, 32 digits."""
+    """The hash of all contents of the FMU, 32 digits."""
     digest = hashlib.sha256()
     for name, content in sorted(files.items()):
         digest.update(name.encode() + b"\0" + content + b"\0")
@@ -118,13 +118,14 @@ def _hash(interface: Interface, files: Mapping[str, bytes], identifier: str) -> 
     return digest.hexdigest()[:32]
 
 
-def _imported(script: str) -> dict[str, bytes]:
-    """Files of this package that a script imports, and what those import when they are imported, by their path.
+def _import_closure(script: str) -> dict[str, bytes]:
+    """The files of this package that a script imports, directly or through another file, by their path. Imports
+    inside functions do not count.
 
     Raises
     ------
     InputError
-        for an import that is none of a module.
+        for an import of anything but a module.
     """
     files: dict[str, bytes] = {}
     waiting = list(_imports(ast.walk(ast.parse(script)), ()))
@@ -148,8 +149,8 @@ def _imported(script: str) -> dict[str, bytes]:
 
 
 def _imports(nodes: Iterable[ast.AST], package: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
-    """Modules of chainunit that code in `package` of it imports, by the parts of their names behind "chainunit"; no
-    parts for chainunit itself."""
+    """The modules of chainunit that code in its subpackage `package` imports, by the parts of their names after
+    "chainunit"; no parts for chainunit itself."""
     for node in nodes:
         if isinstance(node, ast.Import):
             for alias in node.names:
@@ -168,7 +169,7 @@ def _imports(nodes: Iterable[ast.AST], package: tuple[str, ...]) -> Iterator[tup
 
 
 def _at_import(tree: ast.Module) -> Iterator[ast.AST]:
-    """What runs when a module is imported."""
+    """The nodes of a module that run at its import."""
     waiting: list[ast.AST] = [tree]
     while waiting:
         for node in ast.iter_child_nodes(waiting.pop()):
@@ -181,7 +182,7 @@ def _at_import(tree: ast.Module) -> Iterator[ast.AST]:
 
 
 def _file(module: tuple[str, ...]) -> Path | None:
-    """The file of a module or package inside this one."""
+    """The file of a module or package inside this package."""
     place = _PACKAGE.joinpath(*module)
     return next((p for p in (place / "__init__.py", place.with_suffix(".py")) if p.is_file()), None)
 
@@ -198,8 +199,8 @@ class {name}(ModelSlave):
 
 
 def _script(model: type[Model], start: dict[str, float]) -> str:
-    """The model's script in `fmu/`, or one like it, with those start values and, for a class that a function makes,
-    that function's arguments."""
+    """The model's script in `fmu/`, or else a script of the same form, with these start values and, for a class that
+    a function makes, the arguments of that function."""
     file = recipes() / f"{model.name}.py"
     *package, module = model.__module__.split(".")
     call = model.built_by or model.__qualname__
@@ -214,7 +215,7 @@ def _script(model: type[Model], start: dict[str, float]) -> str:
 
 
 def _build(script: Path, file: Path) -> Path:
-    """pythonfmu's build, which leaves its traces in `sys.path` and `sys.modules` behind."""
+    """Build with pythonfmu, and undo its changes of `sys.path` and `sys.modules`."""
     path = list(sys.path)
     modules = set(sys.modules)
     try:
@@ -228,6 +229,6 @@ def _build(script: Path, file: Path) -> Path:
 
 
 def _contents(raw: Path) -> dict[str, bytes]:
-    """What pythonfmu packed, the scaffold left out."""
+    """The files that pythonfmu packed, without compiled Python."""
     with zipfile.ZipFile(raw) as archive:
         return {name: archive.read(name) for name in archive.namelist() if "__pycache__" not in name}

@@ -1,4 +1,4 @@
-"""What both backends share: start values checked, archives that are the same byte for byte."""
+"""The common parts of both backends: the check of start values, and archives that are the same byte for byte."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from ..quantities import complaint
 from .description import Interface
 from .script import Script
 
-_EPOCH = (1980, 1, 1, 0, 0, 0)  # the oldest time that a zip entry can bear
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time of a zip entry
 
 
 def interface_of(
     model: type[Model], start: Mapping[str, float] | None, own: type[Script] | None = None
 ) -> Interface:
-    """The interface of `model` with its start values, which must make a model.
+    """The interface of `model` with these start values; they are checked as parameters of the model.
 
     Raises
     ------
@@ -37,7 +37,7 @@ def interface_of(
 
 
 def pack(contents: Mapping[str, bytes], file: Path) -> None:
-    """Write an archive in one order and with one time stamp."""
+    """Write an archive with a fixed order and a fixed time stamp of its entries."""
     with zipfile.ZipFile(file, "w") as archive:
         for name in sorted(contents):
             entry = zipfile.ZipInfo(name, _EPOCH)
@@ -47,6 +47,6 @@ def pack(contents: Mapping[str, bytes], file: Path) -> None:
 
 
 def xml_bytes(root: Element) -> bytes:
-    """An XML file of that root, indented."""
+    """The contents of an XML file with this root, indented."""
     indent(root)
     return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root)

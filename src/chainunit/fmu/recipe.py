@@ -1,7 +1,7 @@
-"""What only an FMU needs of a model: its default experiment, its icon, and which outputs are often asked for.
+"""Data of a model that only its FMU needs: the default experiment, the icon, and the outputs that are read often.
 
-All of it follows from the declarations and terminals, so that a new model states nothing of it. Where a value cannot
-follow, the model's script in `fmu/` has it (see `chainunit.fmu.script.Script`).
+These data follow from the declarations and terminals, so that a new model need not state them. A value that does not
+follow from them stands in the model's script in `fmu/` (see `chainunit.fmu.script.Script`).
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from .script import Script
 
 @dataclass(frozen=True)
 class Experiment:
-    """A run for a tool that was told nothing else: to `stop` [s], in steps of `step` [s], at a relative `tolerance`.
-    In a second of the reference inputs the explicit Euler method errs, at that step, by less than a fifth of any
-    state's size."""
+    """The default run of a tool: to `stop` [s], in steps of `step` [s], with a relative `tolerance`. With this step
+    the error of the explicit Euler method, over one second of the reference inputs, is less than a fifth of the size
+    of each state."""
 
     step: float = 1e-3
     stop: float = 10.0
@@ -30,14 +30,14 @@ class Experiment:
 
 
 def recipes() -> Path:
-    """The project's folder `fmu`: a script for each Python FMU, and in `native` the C layer. An installed package has
-    it beside this file."""
+    """The project's folder `fmu`: a script for each Python FMU, and in `native` the C layer. In an installed package
+    the folder stands beside this file."""
     here = Path(__file__).parent
-    return carried if (carried := here / "recipes").exists() else here.parents[2] / "fmu"
+    return inside if (inside := here / "recipes").exists() else here.parents[2] / "fmu"
 
 
 def script_of(model: type[Model]) -> type[Script]:
-    """The class of the model's script; the plain one where it has none."""
+    """The class of the model's script; `Script` itself for a model without a script."""
     return _script(model.name)
 
 
@@ -48,13 +48,13 @@ def _script(name: str) -> type[Script]:
 
 
 def often(model: type[Model]) -> set[str]:
-    """Outputs that a driver asks for at every step: those that connect."""
+    """The outputs that are read at every step: those of the terminals."""
     return {name for terminal in model.terminals for name in terminal.members.values()}
 
 
 def icon(model: type[Model], kind: str) -> Traversable:
-    """Its icon, "svg" or "png": of its own where `data/icons` has one by the model's name, else that of a machine, of
-    a motor, which takes a load port, or of a line, which takes one and shows one."""
+    """The icon of a model, "svg" or "png": the file in `data/icons` with the model's name, else the general icon of a
+    motor (the model takes a load port), of a line (it takes one and gives one), or of a machine."""
     folder = resources.files("chainunit") / "data" / "icons"
     takes = {t.members["tau_bias"] in model.input_layout.names for t in model.terminals if t.kind == LOAD}
     general = {frozenset({True}): "motor", frozenset({True, False}): "line"}.get(frozenset(takes), "machine")

@@ -1,8 +1,8 @@
 """The reference results inside an FMU.
 
-They are those of a Co-Simulation master that holds its inputs over a step, from the Python kernels, and they are
-written twice, as masters differ in when they read. They lie in the folder of the layered standard FMI-LS-REF
-(1.0.0-alpha.1), whose manifest says what each file is.
+They are the results of a Co-Simulation master that holds its inputs over a step, computed by the Python kernels.
+There are two files of them, as masters read outputs at different moments. The files lie in the folder of the layered
+standard FMI-LS-REF (1.0.0-alpha.1), whose manifest describes each file.
 """
 
 from __future__ import annotations
@@ -30,14 +30,15 @@ INPUTS, STEPPED, READ = "in", "co_simulation", "set_then_read"
 STEP, ROWS = 0.04, 26  # s
 _MANIFEST = "http://fmi-standard.org/fmi-ls-manifest"
 _MOST_STEPS = 100_000
-"""of the integrator for one step of the file; the models take some hundred at their start values"""
+"""Largest number of steps of the integrator in one step of the file; at their start values the models take some
+hundred."""
 
 log = logging.getLogger("chainunit.fmu")
 
 
 def reference_results(interface: Interface) -> dict[str, bytes]:
-    """The files of reference results; none, and a warning, where the start values let the states run away, or so
-    fast that following them would take too long."""
+    """The files of reference results. Where, with the start values, the states run away or are too fast for the
+    integrator, there are no files, and a warning is logged."""
     name = interface.model.name
     try:
         tables = _tables(interface)
@@ -78,7 +79,7 @@ def _tables(interface: Interface) -> dict[str, tuple[list[str], list[list[float]
     Raises
     ------
     ArithmeticError
-        where a value is no finite number, or the states take more than `_MOST_STEPS` for one of the file's.
+        where a value is no finite number, or one step of the file takes more than `_MOST_STEPS` of the integrator.
     """
     model = interface.model
     p = model.prepared(MATH, model.parameter_layout.instance([s.start for s in interface.of("parameter")]))
@@ -99,60 +100,60 @@ def _tables(interface: Interface) -> dict[str, tuple[list[str], list[list[float]
     x: list[float] = []
     for k in range(ROWS):
         t = k * STEP
-        given = model.input_layout.values(model.input_layout.from_names(inputs(t)))
+        new = model.input_layout.values(model.input_layout.from_names(inputs(t)))
         if k == 0:
-            u = given
-            x = layout.values(model.begin(p, model.input_layout.instance(given))) if layout else []
-        tables[INPUTS].append([t, *given])
+            u = new
+            x = layout.values(model.begin(p, model.input_layout.instance(new))) if layout else []
+        tables[INPUTS].append([t, *new])
         tables[STEPPED].append(outputs(t, u, x))
-        tables[READ].append(outputs(t, given, x))
+        tables[READ].append(outputs(t, new, x))
         if march:
-            x = march(t, given, x)
-        u = list(given)
-        for place, rate, half in model.course(given):
+            x = march(t, new, x)
+        u = list(new)
+        for place, rate, half in model.course(new):
             u[place] += STEP * (rate + STEP * half)
     heads = {kind: ["time", *(s.name for s in interface.of(kind))] for kind in ("input", "output")}
     return {end: (heads["input" if end == INPUTS else "output"], rows) for end, rows in tables.items()}
 
 
 def _march(interface: Interface, p: Any) -> Any:
-    """A function of time, inputs and states that gives the states a step later, by an integrator for stiff and other
-    equations that is accurate to 1e-9 or so; it carries nothing from call to call."""
+    """A function of time, inputs and states that gives the states one step later, with an accuracy of about 1e-9,
+    also for stiff equations. It keeps nothing from call to call."""
     import casadi
 
     model = interface.model
     layout = model.state_layout
     assert layout is not None
     (of_p, of_u, of_x, of_derived), *_, derivatives = interface.trace
-    given, since = casadi.SX.sym("given", len(model.input_layout.names)), casadi.SX.sym("since")
-    moved = [given[k] for k in range(given.numel())]
-    for place, rate, half in model.course(moved):
-        moved[place] += since * (rate + since * half)
-    # in units of their nominal size, so that one tolerance does for all states
+    inputs, since = casadi.SX.sym("u", len(model.input_layout.names)), casadi.SX.sym("since")
+    moving = [inputs[k] for k in range(inputs.numel())]
+    for place, rate, half in model.course(moving):
+        moving[place] += since * (rate + since * half)
+    # states in units of their nominal size, so that one tolerance suits all of them
     nominal = casadi.DM([v.quantity.nominal or 1.0 for v in layout.variables])
-    scaled = casadi.SX.sym("scaled", nominal.numel())
-    fixed = casadi.DM([*model.parameter_layout.values(p), *getattr(p, "derived", [])])
+    relative = casadi.SX.sym("x", nominal.numel())
+    constants = casadi.DM([*model.parameter_layout.values(p), *getattr(p, "derived", [])])
     rates = casadi.substitute(
         [casadi.vertcat(*derivatives) / nominal],
         [of_p, of_derived, of_u, of_x],
-        [fixed[: of_p.numel()], fixed[of_p.numel() :], casadi.vertcat(*moved), scaled * nominal],
+        [constants[: of_p.numel()], constants[of_p.numel() :], casadi.vertcat(*moving), relative * nominal],
     )
     solver = casadi.integrator(
         "march",
         "cvodes",
-        {"x": scaled, "u": given, "t": since, "ode": casadi.cse(rates[0])},
+        {"x": relative, "u": inputs, "t": since, "ode": casadi.cse(rates[0])},
         0.0,
         STEP,
         {"reltol": 1e-12, "abstol": 1e-14, "max_num_steps": _MOST_STEPS, "disable_internal_warnings": True},
     )
 
-    def march(t: float, given: Sequence[float], x: Sequence[float]) -> list[float]:
+    def march(t: float, u: Sequence[float], x: Sequence[float]) -> list[float]:
         if model.controlled:
             for _ in range(2):
-                inputs, states = model.input_layout.instance(list(given)), layout.instance(list(x))
-                x = model.closed(MATH, p, inputs, states)
+                values, states = model.input_layout.instance(list(u)), layout.instance(list(x))
+                x = model.closed(MATH, p, values, states)
         try:
-            later = solver(x0=casadi.DM(x) / nominal, u=given)["xf"] * nominal
+            later = solver(x0=casadi.DM(x) / nominal, u=u)["xf"] * nominal
         except RuntimeError as error:
             raise ArithmeticError(
                 f"the states are too fast to be followed from t = {t:g} s on, or run away"
@@ -176,19 +177,18 @@ def _csv(head: Sequence[str], rows: Sequence[Sequence[float]]) -> bytes:
 # -- inputs that move
 
 _SIZES = {"rad": 0.1, "rad/s": 50.0, "kg": 10.0, "N": 100.0}
-"""of an input whose declaration shows none, by unit; others 1"""
+"""Size by unit of an input whose declaration has neither start nor nominal value; for other units the size is 1."""
 _PUSH = 300.0
-"""rad/s2: the torque of a load is what gives the shaft that takes it this acceleration; a torque that turns a shaft
-gives no more"""
+"""Acceleration of a shaft by the torque of its load, and the largest one by the torque that turns it [rad/s2]."""
 _RUN = 4.0
-"""rad/s: mean speed of a shaft that runs from rest"""
+"""Mean speed of a shaft that runs from rest [rad/s]."""
 
 
 def excitation(interface: Interface) -> Callable[[float], dict[str, float]]:
-    """The inputs as functions of time [s], for the reference results: all move smoothly, within their bounds.
+    """The inputs as functions of time [s], for the reference results: all change smoothly, within their bounds.
 
-    A shaft runs from rest, unevenly. A load, or a torque, is of the size that suits the shaft that takes it.
-    Everything else swings about its start value, or about its usual size where that is 0.
+    A shaft runs from rest, unevenly. A load or a torque has a size that suits the inertia of its shaft. Every other
+    input swings about its start value, or about its usual size where the start value is 0.
     """
     model = interface.model
     sizes = interface.script.sizes
@@ -201,7 +201,7 @@ def excitation(interface: Interface) -> Callable[[float], dict[str, float]]:
             moving = _SHAFT
             turning = [s for s in interface.of("input") if s.name == terminal.members.get("tau")]
             if turning and model.state_layout:
-                # a torque that is usual for one shaft lets the states of a light one run away
+                # with a usual torque the states of a light shaft would run away
                 tau, most = turning[0], _PUSH * _inertia(interface, turning[0].name)
                 usual = _size(tau.variable.quantity, tau.start, sizes.get(tau.name))
                 sizes = {**sizes, tau.name: min(usual, most)}
@@ -224,8 +224,8 @@ _SHAFT: dict[str, Callable[[float], float]] = {
 
 
 def _load(tau: float, inertia: float) -> dict[str, Callable[[float], float]]:
-    """A load of about this torque [N m] and inertia [kg m2]. The slopes are so small that the inertia stays positive,
-    and the torque within twice its size, for a shaft that is 150 rad ahead of the load's point or behind it."""
+    """A load of about this torque [N m] and inertia [kg m2]. The slopes are so small that, for a shaft up to 150 rad
+    before or behind the point of the load, the inertia stays positive and the torque within twice its size."""
     return {
         "tau_bias": lambda t: tau * (1.0 + 0.4 * math.sin(10.0 * t)),
         "tau_bias_dphi": lambda t: 0.01 * tau * math.cos(4.0 * t),
@@ -238,8 +238,8 @@ def _load(tau: float, inertia: float) -> dict[str, Callable[[float], float]]:
 
 
 def _inertia(interface: Interface, torque: str) -> float:
-    """Of the shaft that the input `torque` slows down [kg m2], as the derivatives of the speeds by it say; 1 without
-    any."""
+    """The inertia of the shaft on which the input `torque` acts [kg m2], from the derivatives of the accelerations by
+    it; 1 for a model without states."""
     import casadi
 
     model, layout = interface.model, interface.model.state_layout
@@ -261,7 +261,7 @@ def _size(q: Quantity, start: float | None, own: float | None) -> float:
 
 
 def _swing(q: Quantity, size: float, k: int) -> Callable[[float], float]:
-    """About `size` by 40 %, or as far as the bounds let it; the `k`-th input at a rate of its own."""
+    """A swing about `size` by 40 %, limited to the bounds; the rate depends on the number `k` of the input."""
     near, far = sorted((0.6 * size, 1.4 * size))
     low, high = max(near, q.low), min(far, q.high)
     rate = 3.0 + 7.0 * (0.618 * k % 1.0)

@@ -1,4 +1,4 @@
-"""What the script of a Python FMU declares; a script in `fmu/` states no more than these."""
+"""The declarations in the script of a Python FMU; a script in `fmu/` has no others."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from ..model import Model
 
 
 class Script:
-    """A model, and what an FMU has of it where the usual does not suit."""
+    """A model, and values for its FMU in place of the usual ones."""
 
     model: ClassVar[type[Model]]
     start: ClassVar[dict[str, float]] = {}
-    """Start values of parameters and inputs, by name, that replace the declared ones."""
+    """Start values of parameters and inputs, by name, in place of the declared ones."""
     experiment: ClassVar[dict[str, float]] = {}
-    """``step``, ``stop`` [s] or ``tolerance`` of the default experiment, where the usual do not suit the model."""
+    """``step``, ``stop`` [s] or ``tolerance`` of the default experiment, in place of the usual ones."""
     sizes: ClassVar[dict[str, float]] = {}
-    """Sizes of inputs in the reference results, by name, where the usual ones do not suit the model."""
+    """Sizes of inputs in the reference results, by name, in place of the usual ones."""

@@ -1,9 +1,9 @@
-"""The slave inside a pythonfmu FMU: serves any model from its declarations.
+"""The slave inside a pythonfmu FMU, for any model, by its declarations.
 
-It computes with `math`, so that the importing Python (3.11 or later) needs nothing but the standard
-library. It never raises: pythonfmu turns an exception into a fatal status, after which the host must give
-up. Instead the outputs become NaN, the step is discarded, and the reason is logged once. Outputs are
-evaluated when they are asked for, part by part, once per state.
+It computes with `math`, so that the importing Python (3.11 or later) needs only the standard library. It never
+raises: pythonfmu turns an exception into a fatal status, after which the host must give up. Instead the outputs
+become NaN, the step is discarded, and the reason is logged once. Outputs are evaluated when they are read, part by
+part, once per state.
 """
 
 from __future__ import annotations
@@ -38,35 +38,35 @@ _LIBRARIES: set[Path] = set()
 
 
 def hold(namespace: dict[str, Any]) -> Callable[[type[_Slave]], type[_Slave]]:
-    """Decorate the class of a script with the script's own `namespace`, so that pythonfmu 0.7 runs it as it should.
+    """Decorate the class of a script with the script's own `namespace`, to mend two faults of pythonfmu 0.7.
 
-    pythonfmu imports the script by its name, runs its text again in that module's namespace at every instantiation,
-    and takes the class from the module. So each run takes a reference to the namespace, as pythonfmu gives one up
-    that it never took, and later instances in a process would work on freed memory; and it puts its class there,
-    as a second FMU with a script of the same name would get the class of the first.
+    pythonfmu imports the script by its name, runs its text again in the namespace of that module at every
+    instantiation, and takes the class from the module. It releases a reference to the namespace that it never took,
+    so that later instances in a process would work on freed memory: each run therefore takes a reference. And a
+    second FMU with a script of the same name would get the class of the first: each run therefore puts its class into
+    the namespace.
     """
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(namespace))
 
-    def held(slave: type[_Slave]) -> type[_Slave]:
+    def register(slave: type[_Slave]) -> type[_Slave]:
         namespace[slave.__name__] = slave
         return slave
 
-    return held
+    return register
 
 
 def _release_at_exit(library: Path) -> None:
-    """Have the FMU's library let go of its interpreter handle while Python still runs.
+    """Make the FMU's library release its interpreter handle while Python still runs.
 
-    On Linux, pythonfmu 0.7 releases that handle twice when the process ends, the second time in freed
-    memory, which now and then aborts the host at its exit. After this release, which sets it to null, both
-    find nothing to do.
+    On Linux, pythonfmu 0.7 releases that handle twice when the process ends, the second time in freed memory, which
+    sometimes aborts the host at its exit. The release here sets the handle to null, so that the later two do nothing.
     """
     if sys.platform != "linux" or library in _LIBRARIES or not library.is_file():
         return
     _LIBRARIES.add(library)
 
     def release() -> None:
-        # where the host has unloaded it, this has been done in the right order
+        # if the host has already unloaded the library, the handle was released in the right order
         with contextlib.suppress(OSError, AttributeError):
             ctypes.CDLL(str(library), mode=os.RTLD_NOW | os.RTLD_NOLOAD).finalizePythonInterpreter()
 
@@ -74,7 +74,7 @@ def _release_at_exit(library: Path) -> None:
 
 
 _IDENTITY = __name__.partition(".")[0]
-"""inside an FMU the name of its package, which holds a hash of all that it is made of"""
+"""Inside an FMU: the name of its package, which has a hash of all contents of the FMU."""
 
 
 class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
@@ -101,18 +101,18 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
         self._fresh = [False] * len(model.parts)
         self._shared: Any = None
         self._p: Any = None
-        self._derived: Any = None  # from fixed parameters, which stay as they are from initialization on
+        self._derived: Any = None  # from the fixed parameters, which do not change after the initialization
         self._u: Any = None
-        self._x: list[float] = []  # empty until they are started
+        self._x: list[float] = []  # empty before the start of the states
         self._pace = 0.0  # next substep of an integrator that controls its error
         self._closed = False
         self._initialized = False
         self._doubtful = True  # an input may be out of its bounds
         self._time = 0.0
-        self._stop = math.inf  # the last time that is allowed, with what rounding adds to it
+        self._stop = math.inf  # the last admissible time, with an allowance for rounding
         self._refusal = ""  # why the parameters make no model
         self._unstarted = ""  # why the states could not be started
-        self._unrestored = ""  # why the last saved state could not be taken
+        self._unrestored = ""  # why the last saved state could not be restored
         self._last_line = ""
 
     # -- life cycle
@@ -120,7 +120,7 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
     def setup_experiment(
         self, start_time: float, stop_time: float | None = None, tolerance: float | None = None
     ) -> None:
-        """Time at the start, and the last one, if it is known; `_bad_experiment` judges them."""
+        """Set the start time and, if it is known, the stop time; `_bad_experiment` checks them."""
         self._time = start_time
         self._stop = math.inf if stop_time is None else stop_time
         if start_time <= self._stop < math.inf:
@@ -129,11 +129,11 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
         self._touch()
 
     def enter_initialization_mode(self) -> None:
-        """Parameters are settled: check them and start the states."""
+        """Check the parameters and start the states."""
         self._prepare()
 
     def exit_initialization_mode(self) -> None:
-        """From here on, fixed parameters stay as they are."""
+        """End the initialization: from here on fixed parameters cannot change."""
         self._prepare()
         self._initialized = True
 
@@ -178,7 +178,7 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
             return model.derivatives(MATH, p, self._inputs(run, since), layout.instance(x))
 
         if model.controlled:
-            x = self._controlled(rates, run, step, longest)
+            x = self._integrate_with_control(rates, run, step, longest)
         else:
             x = rk4(rates, self._x, step, longest, p.solver.max_steps)
         if not all(map(math.isfinite, x)):
@@ -194,7 +194,7 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
         self._closed = model.controlled
         return True
 
-    def _controlled(self, rates: Any, run: Any, step: float, longest: float) -> list[float]:
+    def _integrate_with_control(self, rates: Any, run: Any, step: float, longest: float) -> list[float]:
         p, model, x = self._p, self.model, self._x
         layout = model.state_layout
         assert layout is not None
@@ -212,11 +212,11 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
     # -- values
 
     def set_real(self, vrs: list[int], values: list[float]) -> None:
-        """Take parameters and inputs; a fixed parameter only before initialisation."""
+        """Set parameters and inputs; a fixed parameter only before the end of the initialization."""
         for vr, value in zip(vrs, values, strict=True):
             if not 0 <= vr < self._first:
-                known = self._first <= vr < self._end
-                self._tell((refusals.OUTPUT_SET if known else refusals.NO_REFERENCE).format(reference=vr))
+                is_output = self._first <= vr < self._end
+                self._tell((refusals.OUTPUT_SET if is_output else refusals.NO_REFERENCE).format(reference=vr))
                 continue
             quantity = self._variables[vr].quantity
             if quantity.admits(value):
@@ -242,7 +242,7 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
         self._touch()
 
     def _start_anew(self) -> None:
-        """Have the states started at the next need, where the initialisation has not yet given them a good start."""
+        """Start the states again at the next use, unless the initialization has already started them."""
         if not self._initialized or self._unstarted:
             self._x, self._unstarted = [], ""
 
@@ -303,13 +303,14 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
         self._fresh[i] = True
 
     def _touch(self) -> None:
-        """Outputs are to be evaluated anew."""
+        """Mark all outputs for a new evaluation."""
         self._shared = None
         self._closed = False
         self._fresh = [False] * len(self._fresh)
 
     def _prepare(self) -> str:
-        """Parameters checked and states started, after a change of them; why not, where they make no model."""
+        """Check the parameters and start the states, after a change of either. Returns why they make no model, or an
+        empty text."""
         if bad := self._unrestored or self._bad_experiment():
             self._tell(bad)
             return bad
@@ -328,7 +329,8 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
         return self._refusal or self._unstarted
 
     def _start(self) -> None:
-        """The states at the start, or why they cannot be found; an input is judged only where they depend on it."""
+        """Compute the states at the start, or keep why there are none; the inputs are checked only if the states
+        depend on them."""
         layout = self.model.state_layout
         assert layout is not None
         try:
@@ -348,7 +350,7 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
         return ""
 
     def _inputs(self, run: list[tuple[int, float, float]] | None = None, since: float = 0.0) -> Any:
-        """The inputs, those that run on `since` [s] after they were set."""
+        """The inputs, with the running ones `run` at the time `since` [s] after they were set."""
         if run:
             values = self._set[self._n_p :]
             for at, rate, half in run:
@@ -359,7 +361,7 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
         return self._u
 
     def _running(self) -> list[tuple[int, float, float]]:
-        """Place, rate and half of the rate's rate of each input that runs along another one."""
+        """Place, rate and half of the second derivative of each input that follows another one."""
         course = self.model.course(self._set[self._n_p :])
         return [(self._n_p + place, rate, half) for place, rate, half in course]
 
@@ -380,12 +382,12 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
     # every variable is a Real; pythonfmu would raise for another type, which is fatal for the host
 
     def _get_other(self, nothing: Any, vrs: list[int]) -> list[Any]:
-        """None are there: each is `nothing`, and there is a line in the log."""
+        """There are no variables of this type: each value is `nothing`, and a line is logged."""
         self._set_other(vrs, [])
         return [nothing] * len(vrs)
 
     def _set_other(self, vrs: list[int], values: list[Any]) -> None:
-        """None are there: a line in the log."""
+        """There are no variables of this type: a line is logged."""
         if vrs:
             self._tell(refusals.OTHER_TYPE.format(type="Real"))
 
@@ -413,12 +415,12 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
 
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
         try:
-            refused = self._bad_state(state)
+            why = self._bad_state(state)
         except (KeyError, TypeError, ValueError, AttributeError):
-            refused = "it is not a saved state of this model"
+            why = "it is not a saved state of this model"
         self._touch()
-        self._unrestored = refusals.STATE.format(why=f"{refused}; not restored") if refused else ""
-        if refused:
+        self._unrestored = refusals.STATE.format(why=f"{why}; not restored") if why else ""
+        if why:
             self._tell(self._unrestored)
             return
         self._set, self._x = list(state["set"]), list(state["x"])
@@ -431,7 +433,7 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
         self._closed = state["closed"]
 
     def _bad_state(self, state: dict[str, Any]) -> str:
-        """Why the state cannot be taken; an error where it is none of this model."""
+        """Why the state cannot be restored, or an empty text; an error where it is no state of this model."""
         if "damaged" in state:
             return str(state["damaged"])
         if state["of"] != _IDENTITY:
@@ -470,8 +472,8 @@ class ModelSlave(Script, Fmi2Slave):  # type: ignore[misc]
         return saved if isinstance(saved, dict) else {}
 
     def to_xml(self, model_options: Any = None) -> Element:
-        """Called when pythonfmu builds the FMU: the description from the declarations (pythonfmu's own lacks units,
-        bounds, dependencies and initial unknowns), and into `resources` the files that the FMU needs."""
-        from .export import complete  # stays behind: importers never come here
+        """The description from the declarations, for pythonfmu's build (its own description lacks units, bounds,
+        dependencies and initial unknowns). Also writes the files that the FMU needs into `resources`."""
+        from .export import complete  # not copied into the FMU: importers never call this
 
         return complete(type(self), Path(self.resources))

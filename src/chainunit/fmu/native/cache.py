@@ -1,8 +1,9 @@
-"""Compiled code that is kept: the same files by the same command of the same compiler are compiled once.
+"""The cache of compiled code: the same files are compiled once by the same command of the same compiler.
 
-It lies in the folder ``chainunit`` of the user's cache folder, under the hash of all that it was made of. Deleting
-the folder empties the cache. The environment variable CHAINUNIT_CACHE names another folder to lie in, or is ``off``.
-A folder that cannot be read or written costs the cache and nothing else; files that are not the cache's own stay.
+The code lies in the folder ``chainunit`` of the user's cache folder, under the hash of its sources, command and
+compiler. Deleting the folder empties the cache. The environment variable CHAINUNIT_CACHE names another parent folder,
+or is ``off``. If the folder cannot be read or written, there is no cache, but no error. Files of others in the folder
+are not deleted.
 """
 
 from __future__ import annotations
@@ -21,12 +22,12 @@ from ...files import whole
 
 VARIABLE, OFF = "CHAINUNIT_CACHE", "off"
 _MOST = 256 * 2**20
-"""bytes in the folder; the code that was not used for longest goes first"""
-_ABANDONED = 3600.0  # s, after which the part of a file belongs to a process that was killed
+"""Largest number of bytes in the folder; the least recently used code is deleted first."""
+_ABANDONED = 3600.0  # s, age above which an incomplete file belongs to a killed process
 
 
 def folder() -> Path | None:
-    """Where compiled code is kept; None where it is not."""
+    """The folder of the cache; None without a cache."""
     setting = os.environ.get(VARIABLE, "")
     if setting:
         return None if setting.lower() in (OFF, "0", "no", "false") else Path(setting) / "chainunit"
@@ -41,7 +42,7 @@ def folder() -> Path | None:
 
 
 def entry(key: bytes, make: Callable[[], bytes]) -> bytes:
-    """The result of `make`, or its earlier one for this `key`."""
+    """The cached result for this `key`, or else the result of `make`, which is then cached."""
     place = folder()
     if place is None:
         return make()
@@ -62,18 +63,18 @@ def entry(key: bytes, make: Callable[[], bytes]) -> bytes:
 
 
 def _is_ours(file: Path) -> bool:
-    """Whether a file is an entry of the cache, or a part of one that a process is writing or left behind."""
+    """Whether a file is an entry of the cache, or an incomplete entry."""
     return re.fullmatch(r"[0-9a-f]{64}(\.[0-9a-f]+\.part)?", file.name) is not None
 
 
 def _shrink(place: Path) -> None:
-    """Leave the newest files, as many as there is room for."""
+    """Delete the least recently used files beyond the size of the cache, and abandoned incomplete ones."""
     files = []
     for file in filter(_is_ours, place.iterdir()):
-        with contextlib.suppress(FileNotFoundError):  # another process is at it, too
+        with contextlib.suppress(FileNotFoundError):  # another process may delete files at the same time
             files.append((file.stat().st_mtime, file.stat().st_size, file))
     room, now = _MOST, time.time()
-    for used, size, file in sorted(files, reverse=True):
+    for last_use, size, file in sorted(files, reverse=True):
         room -= size
-        if room < 0 or (file.suffix and used < now - _ABANDONED):
+        if room < 0 or (file.suffix and last_use < now - _ABANDONED):
             file.unlink(missing_ok=True)

@@ -1,8 +1,9 @@
 """C functions of symbolic expressions, in which each operation stands once.
 
-CasADi writes a function for each group of outputs, with all its operations. Here the groups share them: a `Program`
-is cut into parts, each of the operations that the same groups need, and calls the parts that a wanted group needs.
-Values that a part hands on to others lie in memory. No part is longer than a compiler is fast with.
+CasADi would write a function for each group of outputs, with all its operations. Here the groups share operations: a
+`Program` is divided into parts, each with the operations that the same groups need, and calls the parts that the
+requested groups need. Values that one part passes to another lie in memory. The length of a part is limited, as the
+time of a compiler grows faster than the length.
 """
 
 from __future__ import annotations
@@ -13,13 +14,13 @@ from itertools import pairwise
 from typing import Any
 
 _LONGEST = 2500
-"""operations of a part: the time of a compiler grows faster than the length of a function"""
+"""Largest number of operations in a part."""
 _WIDEST = 60
-"""characters of an operation that is written where it is used, and not into a line of its own"""
+"""Largest number of characters of an operation that is written inline instead of on a line of its own."""
 
 
 def _operations() -> Mapping[int, str]:
-    """How C writes each operation of CasADi."""
+    """The form of each CasADi operation in C."""
     import casadi
 
     signs = {"ADD": "+", "SUB": "-", "MUL": "*", "DIV": "/", "LT": "<", "LE": "<=", "EQ": "==", "NE": "!="}
@@ -50,12 +51,17 @@ def number(x: float) -> str:
 class Program:
     """Groups of results of the same arguments.
 
-    `text` defines the function ``kernel_NAME(arg, res, w, wanted)``, which is called with the arguments, the place of
-    the results, memory for `room` numbers, and a bit for each group that is wanted.
+    `text` defines the function ``kernel_NAME(arg, res, w, wanted)``. Its arguments are the arguments of the program,
+    the place of the results, memory for `room` numbers, and a set of bits, one for each requested group.
     """
 
     def __init__(
-        self, name: str, arguments: Sequence[Any], groups: Sequence[Any], offsets: Sequence[int], used: str
+        self,
+        name: str,
+        arguments: Sequence[Any],
+        groups: Sequence[Any],
+        offsets: Sequence[int],
+        frequency: str,
     ) -> None:
         """
         Parameters
@@ -63,17 +69,18 @@ class Program:
         arguments : symbols, as casadi vectors
         groups : results, as casadi vectors
         offsets : place of each group among the results
-        used : "OFTEN", "SELDOM" or "ONCE": the less, the more the time of the compiler counts
+        frequency : frequency of calls, "OFTEN", "SELDOM" or "ONCE": for rare calls the time of the compiler counts
+            more
         """
-        self.name, self._used = name, used
-        self._read(arguments, groups)
-        self._cut()
+        self.name, self._frequency = name, frequency
+        self._collect(arguments, groups)
+        self._divide()
         lines = [line for k, part in enumerate(self._parts) for line in self._part(k, part)]
         self.text = "\n".join([*lines, *self._function(offsets)]) + "\n"
 
-    def _read(self, arguments: Sequence[Any], groups: Sequence[Any]) -> None:
-        """All operations, each behind those it needs: how it is written, and its operands; none of a number or an
-        argument. Results are places among them."""
+    def _collect(self, arguments: Sequence[Any], groups: Sequence[Any]) -> None:
+        """Collect all operations, each after its operands: its form in C, and the places of its operands. A number
+        and an argument are operations without operands. Results are places of operations."""
         import casadi
 
         rows = casadi.densify(casadi.vertcat(*groups))
@@ -81,8 +88,10 @@ class Program:
         forms = _operations()
         self._forms: list[str] = []
         self._operands: list[tuple[int, ...]] = []
-        self._arguments: dict[int, tuple[int, int]] = {}  # which argument, and which of its values
-        places: dict[int, int] = {}  # where CasADi's registers are now
+        self._arguments: dict[
+            int, tuple[int, int]
+        ] = {}  # by place: number of the argument, number of its value
+        places: dict[int, int] = {}  # by register of CasADi: place of its present value
         simple: dict[str, int] = {}
         results = [0] * rows.numel()
 
@@ -113,9 +122,9 @@ class Program:
             ends.append(ends[-1] + group.numel())
         self._results = [results[begin:end] for begin, end in pairwise(ends)]
 
-    def _cut(self) -> None:
-        """The parts, operations in order, with the groups that need each; and slots in memory for values that go from
-        one part to another, or are results."""
+    def _divide(self) -> None:
+        """Divide the operations into parts, each with the groups that need it, and assign slots in memory to values
+        that pass from one part to another or are results."""
         users = [0] * len(self._forms)
         for bit, places in enumerate(self._results):
             for place in places:
@@ -129,7 +138,7 @@ class Program:
                 alike.setdefault(groups, []).append(place)
         self._parts: list[list[int]] = []
         self._needed_by: list[int] = []
-        # values that more groups need come first: they depend on none that fewer need
+        # parts that more groups need come first: they do not depend on parts that fewer groups need
         for groups in sorted(alike, key=lambda g: (-g.bit_count(), g)):
             places = alike[groups]
             count = -(-len(places) // _LONGEST)
@@ -153,7 +162,7 @@ class Program:
             for n, operand in enumerate(self._operands[place]):
                 uses[operand] = uses.get(operand, 0) + self._forms[place].count(f"{{{n}}}")
 
-        def named(place: int, text: str) -> str:
+        def variable(place: int, text: str) -> str:
             lines.append(f"  const double a{place}={text};")
             return f"a{place}"
 
@@ -163,7 +172,7 @@ class Program:
                 arguments.add(self._arguments[place][0])
             elif not self._operands[place]:
                 return text  # a number
-            return named(place, text) if uses[place] > 1 else text
+            return variable(place, text) if uses[place] > 1 else text
 
         for place in part:
             for operand in self._operands[place]:
@@ -171,15 +180,17 @@ class Program:
                     texts[operand] = outside(operand)
             text = self._forms[place].format(*(texts[operand] for operand in self._operands[place]))
             inline = uses.get(place, 0) == 1 and len(text) <= _WIDEST and place not in self._slots
-            texts[place] = text if inline or place not in uses else named(place, text)
+            texts[place] = text if inline or place not in uses else variable(place, text)
             if place in self._slots:
                 lines.append(f"  w[{self._slots[place]}]={texts[place]};")
         pointers = [f"  const double *i{n}=arg[{n}];" for n in sorted(arguments)] or ["  (void)arg;"]
-        head = f"{self._used} static void {self.name}_{k}(const double *const *arg, double *restrict w) {{"
+        head = (
+            f"{self._frequency} static void {self.name}_{k}(const double *const *arg, double *restrict w) {{"
+        )
         return [head, *pointers, *lines, "}"]
 
     def _function(self, offsets: Sequence[int]) -> list[str]:
-        """The definition of the function that calls them."""
+        """The definition of the function that calls the parts."""
 
         def result(place: int) -> str:
             if place in self._arguments:

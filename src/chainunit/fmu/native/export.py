@@ -27,7 +27,7 @@ _LAYER = ("model.h", "runtime.c", "fmi.h")
 
 @dataclass(frozen=True)
 class _Version:
-    """What one FMI version needs."""
+    """The files and attributes of one FMI version."""
 
     layer: str
     guid: str
@@ -80,15 +80,15 @@ def export(
     ----------
     model, file, start : see `chainunit.fmu.export.export`
     fmi : version of FMI, 2 or 3
-    platforms : names from `chainunit.fmu.native.platforms.PLATFORMS`; without any, this machine's
-    report : is told what is being done
+    platforms : names from `chainunit.fmu.native.platforms.PLATFORMS`; by default the platform of this machine
+    report : is called with texts on the progress
 
     Raises
     ------
     KeyError, InputError
-        see there; also where there is no compiler for a platform.
+        see `chainunit.fmu.export.export`; also where there is no compiler for a platform.
     RunError
-        where the compiler fails, with what it said.
+        where the compiler fails, with its messages.
     """
     names, compiler = choose(platforms, fmi)
     interface = interface_of(model, start)
@@ -97,7 +97,7 @@ def export(
     of_version = _VERSIONS[fmi]
     version = metadata.version("chainunit")
     layer = (*_LAYER, of_version.layer)
-    compiled = ("kernels.c", "model.c", of_version.layer)
+    units = ("kernels.c", "model.c", of_version.layer)
 
     kinds = dict(of_version.kinds)
     if fmi == 3 and model.state_layout:
@@ -106,7 +106,7 @@ def export(
 
     report("generating C")
     if fmi == 2:
-        description = model_description(interface, "", kinds, version, compiled)
+        description = model_description(interface, "", kinds, version, units)
     else:
         description = model_description_3(interface, "", kinds, version)
     functions, room = kernels(interface)
@@ -123,11 +123,11 @@ def export(
     contents["modelDescription.xml"] = xml_bytes(description)
     contents |= companion_files(interface, version, fmi)
     if fmi == 3:
-        contents["sources/buildDescription.xml"] = _build_description(model.name, compiled)
+        contents["sources/buildDescription.xml"] = _build_description(model.name, units)
     for name in names:
         slow = ", the first time about a minute" if compiler.zig and name == "win64" else ""
         report(f"compiling for {name}{slow}")
-        contents |= build(compiler, name, fmi, model.name, sources, compiled)
+        contents |= build(compiler, name, fmi, model.name, sources, units)
     with whole(file) as part:
         pack(contents, part)
     return file
@@ -143,7 +143,7 @@ def _build_description(identifier: str, names: Sequence[str]) -> bytes:
 
 
 def _headers() -> Path:
-    """The FMI headers, under their own licence, as fmpy ships them."""
+    """The folder of the FMI headers in fmpy; they have their own licence."""
     import fmpy
 
     return Path(fmpy.__file__).parent / "c-code"

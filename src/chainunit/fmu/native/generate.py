@@ -1,7 +1,7 @@
-"""C source of a model: its kernels, and the tables that model.h asks for.
+"""C source of a model: its kernels, and the tables that model.h declares.
 
-No equation is written here: the model's own kernels are traced with symbols, so that the C code, its exact
-derivatives and the Python results come from the same lines.
+There is no equation here: the model's own kernels are traced with symbols, so that the C code, its exact derivatives
+and the Python results come from the same lines.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from .code import Program, number
 def groups(interface: Interface) -> list[list[int]]:
     """Outputs that are evaluated together, as places among the declared outputs."""
     lists: list[list[int]] = []
-    connected, at = recipe.often(interface.model), 0
+    terminal_outputs, at = recipe.often(interface.model), 0
     for part in interface.model.parts:
         places = {name: at + i for i, name in enumerate(part.layout.names)}
         at += len(places)
-        often = [i for name, i in places.items() if name in connected - part.by_differences]
+        often = [i for name, i in places.items() if name in terminal_outputs - part.by_differences]
         apart = [i for name, i in places.items() if name in part.by_differences]
         rest = [i for i in places.values() if i not in often and i not in apart]
         lists += [group for group in (often, rest, apart) if group]
@@ -35,13 +35,13 @@ def groups(interface: Interface) -> list[list[int]]:
 
 
 def difference_groups(interface: Interface) -> set[int]:
-    """Groups without code for their derivatives, see `Part`."""
+    """The groups without code for their derivatives, see `Part`."""
     names = {name for part in interface.model.parts for name in part.by_differences}
     return {g for g, group in enumerate(groups(interface)) if interface.others[group[0]].name in names}
 
 
 def kernels(interface: Interface) -> tuple[str, int]:
-    """``kernels.c``, the model's functions, and how many numbers of memory they need."""
+    """``kernels.c`` with the model's functions, and the memory that they need, as a number of doubles."""
     programs = list(_programs(interface))
     table = [f"    .{program.name} = kernel_{program.name}," for program in programs]
     text = "\n".join([_BEFORE_KERNELS, *(program.text for program in programs), _TABLE, *table, "};", ""])
@@ -53,13 +53,13 @@ def _programs(interface: Interface) -> Iterator[Program]:
 
     model = interface.model
     (ps, us, xs, ks), p, u, x, outputs, derivatives = interface.trace
-    # what is derived from parameters comes last, and only where there is something
+    # derived values come last, and only if the model has them
     more = [ks] if model.derived else []
     point = [ps, us, xs, *more]
     outputs = list(outputs)
 
-    def one(name: str, arguments: list[Any], results: list[Any], used: str = "ONCE") -> Program:
-        return Program(name, arguments, [casadi.vertcat(*map(casadi.SX, results))], [0], used)
+    def one(name: str, arguments: list[Any], results: list[Any], frequency: str = "ONCE") -> Program:
+        return Program(name, arguments, [casadi.vertcat(*map(casadi.SX, results))], [0], frequency)
 
     places = groups(interface)
     offsets = [sum(map(len, places[:g])) for g in range(len(places))]
@@ -101,7 +101,7 @@ _BEFORE_KERNELS = """\
 
 #include "model.h"
 
-/* the compiler takes less time for a function that is not called often */
+/* a function that is seldom called is compiled with less optimization, in less time */
 #if defined __clang__
 #define OFTEN __attribute__((noinline))
 #define SELDOM OFTEN
@@ -136,8 +136,8 @@ def _array(kind: str, name: str, items: list[str]) -> str:
 
 
 def rules() -> str:
-    """``rules.h``: what native code and Python have in common, the words of `chainunit.refusals` as formats of printf
-    and the numbers of `chainunit.integrate`."""
+    """``rules.h``: the texts of `chainunit.refusals` as formats of printf, and the numbers of `chainunit.integrate`,
+    which native code and Python have in common."""
     lines = ["/* Words and numbers of an FMU, generated from those of its Python code. */"]
     for name, value in (*_capitals(refusals), *_capitals(integrate)):
         if isinstance(value, str):
@@ -160,7 +160,7 @@ def _printf(text: str) -> str:
 
 
 def _numbers(name: str, values: tuple[Any, ...]) -> str:
-    """A row of numbers, or rows that zeros fill up."""
+    """An array of numbers, or an array of rows, where zeros fill up the shorter rows."""
     if not isinstance(values[0], tuple):
         return f"static const double {name}[{len(values)}] = {{{', '.join(map(number, values))}}};"
     rows = ",\n".join(f"    {{{', '.join(map(number, row)) or '0.0'}}}" for row in values)
@@ -168,8 +168,8 @@ def _numbers(name: str, values: tuple[Any, ...]) -> str:
 
 
 def tables(interface: Interface, guid: str, room: int) -> str:
-    """``model.c``: what model.h asks for, with the GUID, which FMI 3.0 calls instantiation token, and the `room`
-    that kernels need."""
+    """``model.c``: the tables that model.h declares, with the GUID (in FMI 3.0 the instantiation token) and the
+    memory `room` of the kernels."""
     model = interface.model
 
     def quantity(v: Variable) -> str:

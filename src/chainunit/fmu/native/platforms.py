@@ -31,14 +31,14 @@ KERNELS, KERNELS_OBJECT, HEADER = "kernels.c", "kernels.o", "model.h"
 
 @dataclass(frozen=True)
 class Platform:
-    """One platform: suffix of its libraries, and for each FMI version the folders of `binaries` with the zig targets
-    of the library in it; several targets make one fat library. `tests` says how far its binaries are tested, `linked`
-    are what its libraries are linked with."""
+    """One platform: the suffix of its libraries, and for each FMI version the folders of `binaries` with the zig
+    targets of the library in it; several targets make one fat library. `tests` tells how far its binaries are tested;
+    `link_options` are further options of the linker."""
 
     suffix: str
     folders: Mapping[int, Mapping[str, tuple[str, ...]]]
     tests: str
-    linked: tuple[str, ...] = ("-lm",)
+    link_options: tuple[str, ...] = ("-lm",)
 
 
 _LINUX, _ARM_LINUX = "x86_64-linux-gnu.2.17", "aarch64-linux-gnu.2.17"
@@ -55,7 +55,7 @@ PLATFORMS: dict[str, Platform] = {
     ),
     "aarch64-linux": Platform(".so", {3: {"aarch64-linux": (_ARM_LINUX,)}}, "run under QEMU"),
 }
-"""Platforms by the names that ``--platforms`` takes. FMI 2.0 has no folder for Linux on ARM."""
+"""Platforms by their names for ``--platforms``. FMI 2.0 has no folder for Linux on ARM."""
 
 
 @dataclass(frozen=True)
@@ -67,13 +67,13 @@ class Compiler:
 
     @property
     def name(self) -> str:
-        """How it is called in messages."""
+        """The name in messages."""
         return "zig" if self.zig else self.command[0]
 
     @cached_property
     def identity(self) -> tuple[Any, ...]:
-        """What another compiler, or another version of it, has not: its command, its file, and what it says of
-        itself; with the variables that lead it to other headers and libraries."""
+        """Data that differ for another compiler or another version: the command, size and time of its file, its
+        version text, and the variables that lead it to other headers and libraries."""
         file = Path(self.command[0]).resolve().stat()
         version = subprocess.run([*self.command, "--version"], capture_output=True, text=True).stdout
         paths = [os.environ.get(name) for name in ("CPATH", "C_INCLUDE_PATH", "LIBRARY_PATH")]
@@ -96,7 +96,7 @@ def compiler() -> Compiler | None:
     """The compiler for this machine: the system's, else zig's."""
     if host() is None:
         return None
-    # elsewhere the layout of libraries is the platform's own, which zig knows
+    # other platforms have their own format of libraries, which zig knows
     if sys.platform == "linux":
         for name in ("cc", "gcc", "clang"):
             if path := shutil.which(name):
@@ -116,12 +116,12 @@ def _zig() -> Compiler | None:
 
 
 def choose(names: Sequence[str], fmi: int) -> tuple[tuple[str, ...], Compiler]:
-    """Platforms and the compiler for them; without names, this machine's.
+    """The platforms and a compiler for them; without names, the platform of this machine.
 
     Raises
     ------
     InputError
-        for an unknown platform, one that the FMI version has no folder for, or no compiler for it.
+        for an unknown platform, a platform without folder in the FMI version, or one without compiler.
     """
     for name in names:
         if name not in PLATFORMS:
@@ -139,7 +139,7 @@ def choose(names: Sequence[str], fmi: int) -> tuple[tuple[str, ...], Compiler]:
         if fmi not in PLATFORMS[here].folders:
             raise InputError(f"FMI {fmi}.0 has no folder for {here}; export with --fmi 3 or --backend python")
         return (here,), own
-    # zig where it is there, for its floors; the system's compiler knows this machine alone
+    # zig comes first, for its old system libraries; the system's compiler knows only this machine
     able = _zig() or (compiler() if set(names) == {here} else None)
     if able is None:
         raise InputError(
@@ -154,7 +154,7 @@ def build(
     fmi: int,
     identifier: str,
     sources: Mapping[str, bytes],
-    translated: Sequence[str],
+    units: Sequence[str],
 ) -> dict[str, bytes]:
     """Libraries of one platform, by their path inside the FMU.
 
@@ -163,32 +163,35 @@ def build(
     compiler : see `choose`
     name, fmi : platform and version of FMI
     identifier : model identifier, the library's name
-    sources : files by name; `translated` names those that the compiler is given
+    sources : files by name
+    units : names of the files to compile
 
     Raises
     ------
     RunError
-        where the compiler fails, with what it said.
+        where the compiler fails, with its messages.
     """
-    wanted = PLATFORMS[name]
+    target_platform = PLATFORMS[name]
     libraries = {}
-    for folder, targets in wanted.folders[fmi].items():
-        slices = [_compile(compiler, target, wanted, identifier, sources, translated) for target in targets]
+    for folder, targets in target_platform.folders[fmi].items():
+        slices = [
+            _compile(compiler, target, target_platform, identifier, sources, units) for target in targets
+        ]
         library = slices[0] if len(slices) == 1 else fat(slices)
-        libraries[f"binaries/{folder}/{identifier}{wanted.suffix}"] = library
+        libraries[f"binaries/{folder}/{identifier}{target_platform.suffix}"] = library
     return libraries
 
 
 def _compile(
     compiler: Compiler,
     target: str,
-    wanted: Platform,
+    target_platform: Platform,
     identifier: str,
     sources: Mapping[str, bytes],
     files: Sequence[str],
 ) -> bytes:
     own = ("-target", target) if compiler.zig else ("-Wl,--build-id=none", "-DCHAINUNIT_OLD_GLIBC")
-    flags, library = (*own, *_FLAGS), identifier + wanted.suffix
+    flags, library = (*own, *_FLAGS), identifier + target_platform.suffix
     # the kernels take almost all of the time, and are the same for any start values
     kernels = {name: sources[name] for name in (KERNELS, HEADER)}
     object_code = compile_code(
@@ -196,20 +199,20 @@ def _compile(
     )
     rest = {name: text for name, text in sources.items() if name != KERNELS} | {KERNELS_OBJECT: object_code}
     others = [name for name in files if name != KERNELS]
-    arguments = (*flags, *_SHARED, *others, KERNELS_OBJECT, "-o", library, *wanted.linked)
+    arguments = (*flags, *_SHARED, *others, KERNELS_OBJECT, "-o", library, *target_platform.link_options)
     return compile_code(compiler, arguments, rest, library)
 
 
 def compile_code(
     compiler: Compiler, arguments: Sequence[str], files: Mapping[str, bytes], product: str
 ) -> bytes:
-    """The file `product` that the compiler makes by `arguments` of these `files`, by their names, or has made before:
-    see `chainunit.fmu.native.cache`.
+    """The file `product` that the compiler makes with `arguments` from these `files` (contents by name), or the
+    cached one, see `chainunit.fmu.native.cache`.
 
     Raises
     ------
     RunError
-        where the compiler fails, with what it said.
+        where the compiler fails, with its messages.
     """
 
     def make() -> bytes:
@@ -217,9 +220,11 @@ def compile_code(
             work = Path(scratch)
             for name, content in files.items():
                 (work / name).write_bytes(content)
-            run = subprocess.run([*compiler.command, *arguments], cwd=work, capture_output=True, text=True)
-            if run.returncode:
-                raise RunError(f"the C compiler {compiler.name} failed: {run.stderr.strip()}")
+            process = subprocess.run(
+                [*compiler.command, *arguments], cwd=work, capture_output=True, text=True
+            )
+            if process.returncode:
+                raise RunError(f"the C compiler {compiler.name} failed: {process.stderr.strip()}")
             return (work / product).read_bytes()
 
     key = hashlib.sha256(repr((compiler.identity, list(arguments), product)).encode())
@@ -230,7 +235,7 @@ def compile_code(
 
 def fat(slices: Sequence[bytes]) -> bytes:
     """One Mach-O file for several processors, each slice on a page of its own (Apple's `fat_header`)."""
-    page = 14  # 16 KiB, as arm64 wants
+    page = 14  # 16 KiB, the page of arm64
     head = struct.pack(">II", 0xCAFEBABE, len(slices))
     at = 8 + 20 * len(slices)
     body = b""
