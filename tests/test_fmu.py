@@ -159,7 +159,7 @@ def test_two_versions_in_one_process_do_not_share_code(fmus, tmp_path, monkeypat
     other mechanics: every torque doubled."""
     from chainunit.fmu import export as module
 
-    imported = module._imported
+    imported = module._import_closure
 
     def changed(script):
         files = imported(script)
@@ -170,7 +170,7 @@ def test_two_versions_in_one_process_do_not_share_code(fmus, tmp_path, monkeypat
         )
         return files | {"mechanism/machine.py": doubled}
 
-    monkeypatch.setattr(module, "_imported", changed)
+    monkeypatch.setattr(module, "_import_closure", changed)
     other = Fmu(export(ChamberForces, tmp_path / "other.fmu"))
     monkeypatch.undo()
     one = Fmu(fmus["ChamberForces"])
