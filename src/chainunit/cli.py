@@ -48,8 +48,8 @@ _BackendOption = Annotated[
 
 
 class _Commands(typer.core.TyperGroup):
-    """The commands. Ctrl-C and SIGTERM leave them as an error of this package: typer would make a bare exit status of
-    a KeyboardInterrupt."""
+    """The group of all commands. It turns Ctrl-C and SIGTERM into an error of this package, as typer would
+    turn a KeyboardInterrupt into a bare exit status."""
 
     def invoke(self, ctx: Any) -> Any:
         try:
@@ -59,10 +59,10 @@ class _Commands(typer.core.TyperGroup):
 
 
 class _Export(typer.core.TyperCommand):
-    """The command that writes a model; its help names all of them."""
+    """The command that writes a model; its help names all models."""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
-        # a module of `machines` adds its machine by itself: they are known once all are imported
+        # a module of `machines` adds its own machine: the names are known once all modules are imported
         from .models import MODELS
 
         (name,) = (each for each in self.params if each.name == "name")
@@ -105,12 +105,12 @@ def _root(
 
 
 def _console(**options: Any) -> Console:
-    # titles and paths are the user's: they may hold text that rich takes for markup
+    # titles and paths come from the user: they may hold text that rich would take for markup
     return Console(markup=False, highlight=False, **options)
 
 
 def _study_file(file: Path | None) -> Any:
-    """A study from its file; a value that looks like a slip of a unit is named before anything is run."""
+    """The study of a file; a value that looks like a slip of a unit is named before any run."""
     from .study import config as configuration
 
     loaded = configuration.load(file)
@@ -172,8 +172,9 @@ def study(
 def _leave(
     report: Report, writers: Iterable[Callable[[], list[Path]]], *, remarks: bool = True
 ) -> WriteError | None:
-    """Write all files of a report and show it; returns the error of the first file that there was no room for. It
-    costs neither the others nor what is shown. On a terminal that has the remarks already they are not repeated.
+    """Write all files of a report and show the report. Returns the error of the first file that the disk had
+    no room for; the other files are written all the same. Without `remarks` the report is shown without its
+    remarks, which the terminal then has already.
     """
     from .report import terminal
 
@@ -194,8 +195,8 @@ def _finish(report: Report, output: Path, name: str) -> None:
 
 @contextmanager
 def _progress(console: Console) -> Iterator[Callable[[str, float, float], None]]:
-    """A progress bar, from its first report on: a fault of the input is told without one. Yields the report: the
-    present task, how much of all is done, and all."""
+    """A progress bar that begins with the first report, so that a fault of the input is shown without a bar.
+    Yields the function that reports the current task, the complete amount of work, and the total amount."""
     bar = Progress(
         TextColumn("{task.description}"),
         BarColumn(),
@@ -387,18 +388,19 @@ def _platforms(choice: str | None, fmi: int) -> list[str]:
 
 
 _end_signals: list[int] = []
-"""Signals that told this process to end, apart from Ctrl-C."""
+"""Signals that ended this process, except Ctrl-C."""
 
 
 def _end_in_order(number: int, frame: Any) -> None:
-    """Take a signal to end as Ctrl-C is taken: what was computed is written, temporary folders are taken away."""
+    """Handle a signal as Ctrl-C is handled: the results so far are written, and temporary folders are
+    removed."""
     _end_signals.append(number)
     raise KeyboardInterrupt
 
 
 @contextmanager
 def _ending_in_order() -> Iterator[None]:
-    """SIGTERM ends in order within the context, where a thread may say so."""
+    """Within the context SIGTERM ends the process in order, if this thread may set its handler."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -420,8 +422,8 @@ def _status(error: BaseException) -> int:
 
 
 def main() -> None:
-    """Run the command line: exit status 2 for bad input, in one line; 1 for a run that failed or a file that could
-    not be written, 130 for Ctrl-C, 143 for SIGTERM."""
+    """Run the command line. The exit status is 2 for bad input, with one line for each fault, 1 for a run
+    that failed or a file that could not be written, 130 for Ctrl-C, and 143 for SIGTERM."""
     try:
         with _ending_in_order():
             sys.exit(app(sys.argv[1:] or ["--help"], standalone_mode=False))

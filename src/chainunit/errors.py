@@ -1,4 +1,4 @@
-"""Errors that speak to an engineer: the quantity, its value, the allowed range, the remedy."""
+"""Errors for an engineer: they name the quantity, its value, the allowed range and the remedy."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from typing import Any
 class InputError(ValueError):
     """A value of the user is outside its allowed range; the message is one line.
 
-    `key` is the full name of the refused value, as its file has it; `faults` are the refusals of which it consists,
-    where it stands for several: its message has a line for each. The message of one that is `placed` begins with
-    the file that is at fault, and the line in it. `line` is the fault's own, where no key has it, else 0.
+    `key` is the full name of the refused value in its file. An error that stands for several refusals has
+    these as `faults`, and a line of its message for each. The message of an error that is `placed` begins
+    with the file and the line of the fault. `line` is the line of a fault that has no key, else 0.
     """
 
     def __init__(
@@ -38,18 +38,18 @@ class InputError(ValueError):
 
     @classmethod
     def of(cls, faults: Sequence[InputError]) -> InputError:
-        """One for several."""
+        """One error that stands for several."""
         return faults[0] if len(faults) == 1 else InputError("\n".join(map(str, faults)), faults=faults)
 
 
 class GeometryError(InputError):
-    """The lengths do not make a machine that turns a full crank revolution; `names` are the parameters behind it."""
+    """With these lengths the crank cannot make a full turn; `names` are the parameters that cause it."""
 
     names: tuple[str, ...] = ()
 
 
 class RunError(RuntimeError):
-    """A run stopped half-way; `partial` holds the results before that, if there are any."""
+    """A run stopped early; `partial` holds the earlier results, if there are any."""
 
     partial: Any = None
 
@@ -59,12 +59,12 @@ class InterruptedRunError(RunError):
 
 
 class WriteError(RunError):
-    """A file could not be written, such as on a full disk; the message names it."""
+    """A file could not be written, such as on a full disk; the message names the file."""
 
 
 @contextmanager
 def each_refusal(change: Callable[[InputError], InputError]) -> Iterator[None]:
-    """Put `change` of it in the place of each refusal of an InputError that is not `placed` yet."""
+    """Replace each refusal of an InputError that is not yet `placed` by the result of `change`."""
     try:
         yield
     except InputError as error:
@@ -74,55 +74,56 @@ def each_refusal(change: Callable[[InputError], InputError]) -> Iterator[None]:
 
 @contextmanager
 def refusal_prefix(prefix: str, key: str = "") -> Iterator[None]:
-    """Put `prefix`, which says where a value stands, before each line of an InputError; `key` names the value where
-    the error does not."""
+    """Put `prefix`, which names the place of a value, before each line of an InputError; `key` names the
+    value if the error does not."""
     with each_refusal(lambda fault: InputError(f"{prefix}{fault}", fault.key or key, line=fault.line)):
         yield
 
 
 class Faults:
-    """Refusals that are collected, to be raised together."""
+    """A collection of refusals that are raised together."""
 
     def __init__(self) -> None:
         self.errors: list[InputError] = []
 
     @contextmanager
     def collected(self) -> Iterator[None]:
-        """Take the InputErrors of the block, and go on behind it."""
+        """Add the InputErrors of a block, and go on after the block."""
         try:
             yield
         except InputError as error:
             self.errors += error.faults
 
     def add(self, errors: Iterable[InputError]) -> None:
-        """Take some more."""
+        """Add some errors."""
         self.errors += errors
 
     def refuse(self) -> None:
-        """Raise what was collected, if there is anything.
+        """Raise the refusals, if there are any.
 
         Raises
         ------
         InputError
-            with all of it.
+            with all refusals.
         """
         if self.errors:
             raise InputError.of(self.errors)
 
 
 def near_name(given: str, known: Iterable[str]) -> str:
-    """What to add to a refusal of a name that is near one of the `known`; else empty."""
+    """Words to add to the refusal of a name that is similar to one of the `known` names; else empty."""
     names = {name.lower(): name for name in known}
     near = difflib.get_close_matches(given.lower(), names, n=1, cutoff=0.75)
     return f'; was "{names[near[0]]}" meant?' if near else ""
 
 
-_JOINERS = "\u200c\u200d"  # some scripts and signs need them inside a word
+_JOINERS = "\u200c\u200d"  # some scripts and signs need these characters inside a word
 
 
 def printable(text: str, most: int = 200) -> str:
-    """A text from outside in one line: characters that a terminal or a page would obey (control characters,
-    directions of writing) or not show are written as escapes; of more than `most` characters the end is left out."""
+    """A text from outside in one line. Characters that control a terminal or a page (control characters,
+    directions of writing), and invisible ones, are written as escapes. Beyond `most` characters the end is
+    left out."""
     line = "".join(
         x if x.isprintable() or x in _JOINERS or unicodedata.category(x) == "Zs" else _escape(x)
         for x in text[:most]
@@ -135,11 +136,12 @@ def _escape(character: str) -> str:
 
 
 _LETTERS, _ENTRIES, _DEPTH = 60, 4, 2
-"""Most letters of a text, entries of a list or a table, and tables in one another that `shown` writes out."""
+"""Largest numbers that `shown` writes out: letters of a text, entries of a list or a table, and nested
+tables."""
 
 
 def shown(given: Any, depth: int = 0) -> str:
-    """A value from outside, as a refusal cites it: in one short line, as TOML writes it."""
+    """A value from outside for citation in a refusal: in one short line, as TOML writes it."""
     if isinstance(given, str):
         quoted = printable(json.dumps(given[:_LETTERS], ensure_ascii=False), 8 * _LETTERS)
         rest = len(given) - _LETTERS
@@ -161,7 +163,7 @@ def _first(entries: Iterable[Any]) -> Iterator[Any]:
 
 
 def _bracketed(begin: str, entries: Sequence[str], number: int, end: str, depth: int) -> str:
-    """A list or a table of `number` entries, the first of which are written out."""
+    """The text of a list or a table of `number` entries, of which the first are written out."""
     if not number:
         return begin.strip() + end.strip()
     more = ["..."] if number > len(entries) else []
@@ -174,7 +176,7 @@ def _bare(name: str) -> str:
 
 
 def _brief(given: Any) -> str:
-    """A number, or a value that no file can have, cut in length."""
+    """The shortened text of a number, or of a value that no file can have."""
     try:
         text = repr(given)
     except ValueError:  # Python writes no integer of more than 4300 digits

@@ -1,4 +1,4 @@
-"""Where the keys of a TOML text stand: tomllib gives values alone."""
+"""The lines of the keys in a TOML text, as tomllib gives only the values."""
 
 from __future__ import annotations
 
@@ -10,20 +10,21 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Statement:
-    """A heading or a key with its value: a piece of a TOML text that is complete by itself."""
+    """A heading, or a key with its value: a part of a TOML text that is complete by itself."""
 
     line: int
-    """the first of its lines, from 1"""
+    """its first line, counted from 1"""
     last: int
-    """the last of its lines"""
+    """its last line"""
     table: str
-    """the table that it is in, or that it opens; of an array with its number from 1: ``event.2``"""
+    """the table that contains it, or that it opens; an entry of an array has its number, from 1:
+    ``event.2``"""
     keys: tuple[str, ...] = ()
-    """full names of all that it sets, inner tables included; none for a heading"""
+    """full names of all keys that it sets, also in inner tables; empty for a heading"""
 
 
 def statements(text: str) -> Iterator[Statement]:
-    """The statements of a valid TOML text, in its order.
+    """The statements of a valid TOML text, in the order of the text.
 
     A statement ends with the first line up to which it is valid TOML by itself.
     """
@@ -48,7 +49,7 @@ def lines_of(text: str) -> dict[str, int]:
     found: dict[str, int] = {}
     for statement in statements(text):
         for name in statement.keys or (statement.table,):
-            # a table counts as standing where the first of its keys stands
+            # the line of a table is that of its first key
             parts = name.split(".")
             for k in range(1, len(parts) + 1):
                 found.setdefault(".".join(parts[:k]), statement.line)
@@ -56,9 +57,9 @@ def lines_of(text: str) -> dict[str, int]:
 
 
 def _loaded(lines: Sequence[str], first: int, last: int) -> dict[str, Any] | None:
-    """The data in these lines; None where they are no whole statement."""
+    """The data in these lines; None where the lines are no complete statement."""
     end = lines[last - 1].strip()
-    # a list of many lines is tried where it may end, not at each of its lines
+    # a list of many lines is parsed only at lines where it may end, not at each line
     if (
         last - first > 1
         and last < len(lines)

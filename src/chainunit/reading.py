@@ -1,4 +1,4 @@
-"""TOML tables read by declarations, through pydantic models that are generated from them.
+"""The reader of TOML tables, by pydantic models that are generated from declarations.
 
 A number is in the declared SI unit; a text may carry a unit ("150 mm", "30 rev/min", "4 kNm"), see `units`.
 Every refusal is one line that names the field, its value and the allowed range.
@@ -80,8 +80,8 @@ def _converted(variable: Variable, text: str) -> float:
 
 @dataclass(frozen=True)
 class Slip:
-    """A value that no machine of this kind has: likely a slip of the unit. `meant` is the probable value, as a
-    study file takes it, or empty."""
+    """A value that no machine of this kind has, so that a slip of the unit is likely. `meant` is the probable
+    value, in the form of a study file, or empty."""
 
     variable: Variable
     value: float
@@ -98,7 +98,7 @@ class Slip:
 
     @property
     def sentence(self) -> str:
-        """The remark with its stop."""
+        """The remark as a sentence with a full stop."""
         said = str(self)
         return said if said.endswith("?") else f"{said}."
 
@@ -115,8 +115,8 @@ def slips(
     data: Mapping[str, Any],
     usual: Mapping[str, tuple[float, float]] = MappingProxyType({}),
 ) -> Iterator[Slip]:
-    """The unusual values in the sections of a checked file, `declared` by the name of the section; `usual` are sizes
-    that are usual here in place of the declared ones, by the name of the quantity."""
+    """The unusual values in the sections of a checked file. `declared` has the declaration of each section by
+    its name. `usual` has, by the name of a quantity, the usual sizes that replace the declared ones."""
     for section, of in declared.items():
         for variable in variables(of, f"{section}."):
             given: Any = data
@@ -133,7 +133,7 @@ def slips(
 
 
 def _meant(variable: Variable, given: Any) -> str:
-    """The number that was given, with the unit in which it is allowed and usual; empty where there is none."""
+    """The given number with the unit in which it is allowed and usual; empty where there is no such unit."""
     parts = units.split(str(given))
     if parts is None or not math.isfinite(parts[0]):
         return ""
@@ -154,7 +154,7 @@ def _kind(variable: Variable) -> str:
 
 
 Title = Annotated[str, AfterValidator(printable)]
-"""A text of the user's that is shown: in one line, without characters that a terminal or a page would obey."""
+"""A text of the user for display: in one line, without characters that control a terminal or a page."""
 
 
 def number(variable: Variable) -> Any:
@@ -164,7 +164,8 @@ def number(variable: Variable) -> Any:
 
 
 def schema(declared: type, title: str, prefix: str, **more: Any) -> type[BaseModel]:
-    """The pydantic model of a declaration: the same fields and the fields `more`, none required, none unknown."""
+    """The pydantic model of a declaration. It has the fields of the declaration and the fields `more`; none
+    is required, and unknown keys are refused."""
     scalars = {v.name: v for v in variables(declared, prefix)}
     fields: dict[str, Any] = {}
     for field in dataclasses.fields(declared):
@@ -178,18 +179,19 @@ def schema(declared: type, title: str, prefix: str, **more: Any) -> type[BaseMod
 
 
 def file_form(name: str, tables: Mapping[str, type[BaseModel]], **keys: Any) -> type[BaseModel]:
-    """The form of a whole file: its title, tables, none of which is required, and other `keys`."""
+    """The form of a whole file: its title, its tables and other `keys`; none of them is required."""
     fields: dict[str, Any] = {table: (form, Field(default_factory=form)) for table, form in tables.items()}
     return create_model(name, __config__=ConfigDict(extra="forbid"), title=(Title, ""), **fields, **keys)
 
 
 def read_table(form: type[BaseModel], table: Mapping[str, Any], prefix: str = "") -> Any:
-    """A table in its form; `prefix` goes before the names of its keys in a refusal.
+    """The values of a `table`, checked by its `form`. In a refusal `prefix` stands before the names of its
+    keys.
 
     Raises
     ------
     InputError
-        with a line for each key that is not known and each value that is not allowed.
+        with a line for each unknown key and each value that is not allowed.
     """
     try:
         return form.model_validate(dict(table))
@@ -210,7 +212,8 @@ def given_values(section: BaseModel) -> dict[str, Any]:
 
 
 def refusals(error: ValidationError, file: type[BaseModel], prefix: str = "") -> list[InputError]:
-    """What is wrong with a table of the form `file`, in the order of its keys; `prefix` goes before their names."""
+    """The faults of a table of the form `file`, in the order of its keys; `prefix` stands before their
+    names."""
     return [
         InputError(_line(each, file, prefix), key=prefix + ".".join(map(str, each["loc"])))
         for each in error.errors()
@@ -236,7 +239,7 @@ def _line(error: ErrorDetails, file: type[BaseModel], prefix: str) -> str:
 
 
 def _elsewhere(key: str, file: type[BaseModel]) -> str:
-    """The tables of a file that have a key, as words to follow a refusal."""
+    """Words on the tables of a file that have the key, to follow a refusal."""
     tables = {name: field.annotation for name, field in file.model_fields.items()}
     places = [f"[{name}]" for name, form in tables.items() if key in getattr(form, "model_fields", ())]
     if key in file.model_fields:
@@ -253,11 +256,11 @@ _KINDS = {
     "dict_type": "a table",
     "tuple_type": "a list of 2",
 }
-"""What a value must be, by the kind of pydantic's error."""
+"""By pydantic's kind of error, the words on what the value must be."""
 
 
 def _allowed(error: ErrorDetails, key: str) -> str:
-    """What a value must be that pydantic refuses, in the words of a file."""
+    """Words on what a value that pydantic refuses must be."""
     kind, value = error["type"], error["input"]
     if kind == "literal_error":
         expected = error["ctx"]["expected"].replace("'", '"')
@@ -274,7 +277,7 @@ def _allowed(error: ErrorDetails, key: str) -> str:
 
 
 def merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """The table `over` laid over `base`: a value that it does not name is the base's."""
+    """The table `over`, completed by `base`: a value that `over` does not have is that of `base`."""
     result = dict(base)
     for name, value in over.items():
         below = result.get(name)
@@ -283,12 +286,12 @@ def merged(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def filled(declared: type, given: Mapping[str, float]) -> dict[str, Any]:
-    """Every value of a declaration by name: as given, else at its start."""
+    """Every value of a declaration by name: the given value, or else the start value."""
     return {v.name: given.get(v.name, v.quantity.start) for v in variables(declared)}
 
 
 def instance(declared: type, given: Mapping[str, float]) -> Any:
-    """A declaration with the values given by name; others are at their start."""
+    """An instance of a declaration with the values `given` by name; the other values are the start values."""
     return Layout(declared).from_names(dict(given))
 
 
@@ -303,7 +306,7 @@ def toml(text: str) -> dict[str, Any]:
     Raises
     ------
     InputError
-        where it is none; each fault knows its line.
+        where the text is no TOML; each fault has its line.
     """
     try:
         return tomllib.loads(text)
@@ -314,7 +317,8 @@ def toml(text: str) -> dict[str, Any]:
 
 
 def read(file: Path | None, example: Callable[[], str], parse: Callable[[str, str], T]) -> T:
-    """The result of `parse` for the text of a file and its name; without a file, of the packaged `example`.
+    """The result of `parse` for the text of a file and the file's name; without a file, for the packaged
+    `example`.
 
     Raises
     ------
@@ -339,7 +343,7 @@ def in_file(source: str, lines_of: Callable[[], Mapping[str, int]]) -> Iterator[
         def line_of(fault: InputError) -> int:
             return fault.line or _line_of(fault.key, lines)
 
-        # faults of another file that this one names stand at the end
+        # faults of another file that this file names come last
         ordered = sorted(error.faults, key=lambda fault: (fault.placed, line_of(fault)))
         raise InputError.of(
             [
@@ -354,7 +358,7 @@ def in_file(source: str, lines_of: Callable[[], Mapping[str, int]]) -> Iterator[
 
 
 def _line_of(key: str, lines: Mapping[str, int]) -> int:
-    """The line in which a key stands, or the innermost table that it is in; 0 where there is neither."""
+    """The line of a key, or else of the innermost table that contains it; 0 where the file has neither."""
     while key and key not in lines:
         key = key.rpartition(".")[0]
     return lines.get(key, 0)
@@ -372,11 +376,11 @@ _OTHER_KINDS = {
     b"MZ": "a program",
     b"<": "HTML or XML",
 }
-"""By their first bytes, files that are taken for another kind."""
+"""By first bytes, the kinds of files that are no text."""
 
 
 def file_text(file: Path) -> str:
-    """The text of a file in UTF-8, with a byte order mark or without.
+    """The text of a file in UTF-8, with or without a byte order mark.
 
     Raises
     ------

@@ -1,15 +1,16 @@
 """The words in which a value, a machine or a step is refused.
 
-Python formats these texts. The native code of FMUs has them as macros (`chainunit.fmu.native.generate.rules`): there
-the fields of a text are arguments, in the order in which they stand. A `unit` has a blank before it, a pure number
-none. Standard library only: FMUs carry this file.
+Python formats these texts. The native code of FMUs has them as macros
+(`chainunit.fmu.native.generate.rules`), where the fields of a text are arguments in the order of the text. A
+`unit` has a blank before it; a pure number has no unit and no blank. Standard library only: FMUs carry this
+file.
 """
 
 from __future__ import annotations
 
 VALUE = "{name} = {value:g}{unit}: must be {allowed}"
 NUMBER, FINITE = "a finite number", "finite, {allowed}"
-"""what a value must be that is no finite number: without bounds, and with"""
+"""what must be in place of a value that is not finite: without bounds, and with bounds"""
 
 REQUIREMENT = "{subject} = {value:g}{unit}: {why}{parameters}; {limits}"
 FIRST_PARAMETER, NEXT_PARAMETER = " with {name} = {value:g}", ", {name} = {value:g}"
@@ -43,5 +44,5 @@ STATE_OF_ANOTHER = "it belongs to another model, another version or kind of simu
 
 
 def unit_behind(unit: str) -> str:
-    """The unit as it stands behind a number: ``N.m`` -> N m."""
+    """The unit with its blank, to follow a number: ``N.m`` -> N m."""
     return "" if unit == "1" else " " + unit.replace(".", " ")

@@ -1,4 +1,5 @@
-"""Faults of a text that is no TOML, each with its line and a remedy: tomllib tells the first, in words of its own."""
+"""Faults of a text that is no TOML, each with its line and a remedy; tomllib gives only the first, in its own
+words."""
 
 from __future__ import annotations
 
@@ -17,9 +18,9 @@ _HEADING = re.compile(r"\s*(\[\[?)\s*([^]\[]+?)\s*\]")
 _DIGITS = re.compile(r"\d{4301,}")
 _SWITCHES = {"true": "true", "yes": "true", "on": "true", "false": "false", "no": "false", "off": "false"}
 _MOST = 50
-"""Faults that are told at once."""
+"""Largest number of faults that are shown at once."""
 _LONGEST = 500
-"""Letters of a line whose value is looked at."""
+"""Largest number of characters of a line whose value is checked."""
 
 
 def syntax_faults(text: str, error: Exception) -> list[InputError]:
@@ -54,7 +55,7 @@ def _line(lines: list[str], error: Exception) -> int:
 
 
 def _value_fault(line: str) -> str:
-    """What is wrong with the value in a line, and how it is written; empty where that is not clear."""
+    """Words on the fault of the value in a line and on its right form; empty where these are not clear."""
     match = _BARE.fullmatch(line) if len(line) <= _LONGEST else None
     if match is None or _is_value(match[2]):
         return ""
@@ -83,7 +84,7 @@ def _is_value(text: str) -> bool:
 
 
 def _words(lines: list[str], line: int, error: Exception) -> str:
-    """What is wrong, where it is not a value."""
+    """Words on a fault that is not one of a value."""
     said = _PLACE.sub("", str(error))
     own = lines[line - 1] if line else ""
     twice = any(word in said for word in ("Cannot", "Duplicate"))
@@ -105,7 +106,7 @@ def _words(lines: list[str], line: int, error: Exception) -> str:
 
 
 def _kind(first: str) -> str:
-    """Another kind of text, by its first line that is not empty, as words to follow a refusal."""
+    """Words on another kind of text, to follow a refusal, by its first line that is not empty."""
     if first.startswith("{"):
         return "; it is JSON"
     if max(first.count(","), first.count(";"), first.count("\t")) > 2:

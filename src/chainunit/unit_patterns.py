@@ -1,8 +1,8 @@
-"""Texts of numbers with units as patterns of a JSON Schema. A text that does not match is surely refused by `units`.
+"""Texts of numbers with units as patterns of a JSON Schema. `units` refuses every text that does not match.
 
-A unit of one name must be one of those that fit the quantity. Products, quotients and powers, and characters that
-have no place in a unit, are left to the reader. The patterns use what the regular expressions of Python, ECMAScript
-and Rust have in common.
+A unit of one name must be one of those that fit the quantity. The reader checks products, quotients and
+powers, and characters that have no place in a unit. The patterns use only features that the regular
+expressions of Python, ECMAScript and Rust have in common.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ _SPELLINGS = (("degC", "°C"), ("degC", "℃"), ("deg", "°"), ("ohm", "Ω"), ("
 
 
 def pattern(quantity: Quantity, *, whole: bool, share: bool) -> str:
-    """The pattern of the texts that may state a quantity: `whole` where only a whole number may, `share` where one in
-    percent may."""
+    """The pattern of the texts that may state a quantity: with `whole` only whole numbers, with `share` also
+    percent."""
     digits = rf"(?:{_WHOLE}|\d+\.?\d*[eE]\+?\d{{1,3}})" if whole else _DIGITS
     signed = rf"[+−-]?{digits}"
     if quantity.unit != "K" and quantity.low >= 0.0:

@@ -1,4 +1,5 @@
-"""The drive by a motor of the catalogue: its gear ratio, its starter or inverter, the losses of its gear."""
+"""The drive with a motor of the catalogue: its gear ratio, its starter or inverter, and the losses of its
+gear."""
 
 from __future__ import annotations
 
@@ -19,12 +20,12 @@ from .drive import Drive
 def catalogue_drive(
     config: Config, motor: CatalogueMotor, crank_torque: Any, ambient: float | None = None
 ) -> Drive:
-    """The motor behind the gear ratio at which the crank has its speed, or behind the one that the file gives.
+    """The motor with the gear ratio at which the crank has its speed, or with the ratio that the file gives.
 
     Parameters
     ----------
-    crank_torque : over a turn at that speed [N m], shape (points,), or (turns, points) of chains
-    ambient : temperature of the surroundings [K]; that of the motor's declaration without one
+    crank_torque : crank torque over a turn at that speed [N m], shape (points,), or (turns, points) for
+        chains ambient : temperature of the surroundings [K]; by default that of the motor's declaration
 
     Raises
     ------
@@ -41,7 +42,7 @@ def catalogue_drive(
     for _ in range(3):
         shaft = motor_side(numpy_(), dataclasses.replace(gear, ratio=ratio), crank_torque, speed)
         mean = float(np.mean(shaft))
-        # the slip goes with the torque; an inverter makes up for it
+        # the slip is proportional to the torque; an inverter compensates it
         speed = rated_speed if follows else synchronous - (synchronous - rated_speed) * mean / rated_torque
         if not given:
             ratio = speed / w

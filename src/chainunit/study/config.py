@@ -1,4 +1,4 @@
-"""Study files: their contents, and the values that must fit together; `reading` says how they are read."""
+"""Study files: their contents, and the checks of values that must fit together; `reading` has the reader."""
 
 from __future__ import annotations
 
@@ -57,9 +57,9 @@ class Config:
     feed: Any
     """loads in normal running, as the machine declares them"""
     motor_type: type[Motor]
-    """`Motor` itself where it is an FMU of somebody else"""
+    """model of the motor; `Motor` itself if the motor is a foreign FMU"""
     motor: Any
-    """its parameters, where the file gives them"""
+    """parameters of the motor, where the file gives them"""
     run: Run
     events: Mapping[str, Event]
     coupling: Coupling | None
@@ -84,42 +84,43 @@ class Config:
     catalogue: Path | None
     driveline: Driveline | None
     place: str
-    """of the driveline, one of `PLACES`"""
+    """place of the driveline, one of `PLACES`"""
     damping_ratio: float | None
-    """of the driveline's torsion, in place of d2 and d3"""
+    """damping ratio of the driveline's torsion, in place of d2 and d3"""
     torsion: TorsionTable
-    """of the analysis of a driveline in rotation"""
+    """values of the analysis of a driveline in rotation"""
     joint: str
-    """whose bend its map of stability varies, one of `JOINTS`"""
+    """joint whose bend the map of stability varies, one of `JOINTS`"""
     damping_ratios: tuple[float, ...]
-    """of that map; the line's own where there is none"""
+    """damping ratios of that map; empty for that of the line itself"""
     chain: ChainOrgans | None
     """the organs as chains, or None for two bars"""
     foreign: ForeignMotor | None
-    """the motor, where it is an FMU of somebody else; `motor` is then of no meaning"""
+    """the motor, if it is a foreign FMU; `motor` then has no meaning"""
     source: str
     given: frozenset[str]
-    """names of all that the file sets, such as "machine.crank.m"; see `of_example`"""
+    """names of all values that the file sets, such as "machine.crank.m"; see `of_example`"""
     of_example: frozenset[str] = frozenset()
-    """names of all that it leaves out and the example sets; everything else is at its declared start value"""
+    """names of all values that the file leaves out and the example sets; all others have their declared start
+    values"""
     choices: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    """by name all that is no quantity of a table, such as "start" or "driveline.place", given or not"""
+    """by name, all values that are no quantities, such as "start" or "driveline.place", given or not"""
     packaged: bool = False
     """whether the file is the packaged example"""
     slips: tuple[Slip, ...] = ()
     """values that look like a slip of the unit"""
     units: Units = dataclasses.field(default_factory=lambda: DEFAULT_UNITS)
-    """that the report shows numbers in"""
+    """units in which the report shows numbers"""
     labels: Mapping[str, str] = dataclasses.field(default_factory=dict)
     """project, author, date and revision, as far as the file gives them"""
     tables: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    """the tables and keys of the file, as it gives them"""
+    """the tables and keys as the file has them"""
     lines: Mapping[str, int] = dataclasses.field(default_factory=dict)
     """the line of each key in the file"""
 
     @property
     def turn(self) -> float:
-        """Time of a turn of the crank at the speed that is asked for [s]."""
+        """Time of a turn of the crank at the requested speed [s]."""
         return float(2.0 * math.pi / self.run.crank_speed)
 
     @property
@@ -130,18 +131,19 @@ class Config:
 
     @property
     def steady_begin(self) -> float:
-        """Time from which running counts as steady [s]: `run.settle_turns` after the start, or after an empty machine
-        is fed, which is later."""
+        """Time from which running counts as steady [s]: `run.settle_turns` after the start, or later, after
+        an empty machine is fed."""
         return float(self.started + self.run.settle_turns * self.turn)
 
     @property
     def stop(self) -> float:
-        """Time to which start-up and steady running are run [s], where the motor settles at once."""
+        """End of the run of start-up and steady running [s], if the motor settles at once."""
         return float(self.steady_begin + (self.run.turns + 0.1) * self.turn)
 
     @property
     def permitted_temperature(self) -> tuple[str, float]:
-        """Of the winding if the steady turns go on for ever [K], with its name in the study file."""
+        """Permitted temperature of the winding if the steady turns go on for ever [K], after its name in the
+        study file."""
         if self.sizing is not None:
             return "sizing.temperature", float(self.sizing.temperature)
         return "run.winding_temperature", float(self.run.winding_temperature)
@@ -156,7 +158,7 @@ class Config:
         return any(name.startswith(f"{section}.") for name in self.given)
 
     def one_sided(self, side: SideName) -> Event:
-        """All feed on that side: the event of the study, where it has one, else the example's."""
+        """The event of all feed on that side: that of the study, if it has one, else that of the example."""
         of_study = (
             event
             for event in self.events.values()
@@ -171,7 +173,7 @@ def load(file: Path | None = None) -> Config:
     Raises
     ------
     InputError
-        in one line: the file, the field, its value and the allowed range.
+        with a line for each fault: the file, the key, its value and the allowed range.
     """
     return dataclasses.replace(read(file, example, parse), packaged=file is None)
 
@@ -188,8 +190,8 @@ def parse(text: str, source: str = "config") -> Config:
 
 
 def of_tables(data: Mapping[str, Any], source: str) -> Config:
-    """A study from the tables and keys of its file. What they leave out is the example's: the packaged file's, and
-    where that does not name it, as declared. Files that they name are beside the file `source`.
+    """A study from the tables and keys of its file. A value that they leave out is that of the packaged
+    example, or else the declared start value. Paths are relative to the file `source`.
 
     Raises
     ------
@@ -205,7 +207,7 @@ def of_tables(data: Mapping[str, Any], source: str) -> Config:
         raise InputError.of(faults)
     if not faults:
         return _of_values(data, parts, source)
-    # the values that are right are put together, too: what does not fit does not depend on the others
+    # the right values are checked together, too, as far as they do not depend on the wrong ones
     try:
         _of_values(without(data, faults), parts, source)
     except InputError as error:
@@ -214,7 +216,7 @@ def of_tables(data: Mapping[str, Any], source: str) -> Config:
 
 
 def _of_values(data: Mapping[str, Any], parts: Parts, source: str) -> Config:
-    """The study of a file whose values are each allowed; see `of_tables`."""
+    """The study of a file each of whose values is allowed; see `of_tables`."""
     whole = over_example(data, parts)
     form = read_table(parts.form, whole)
     declared = {name: section.declaration for name, section in parts.sections.items()}
@@ -231,8 +233,8 @@ def _of_values(data: Mapping[str, Any], parts: Parts, source: str) -> Config:
 
 
 def _with_hints(fault: InputError, unusual: Iterable[Slip]) -> InputError:
-    """A refusal, and behind it the unusual values of its table: where values do not fit together, one may be a slip
-    of the unit."""
+    """A refusal, followed by the unusual values of its table: where values do not fit together, one may be a
+    slip of the unit."""
     table = fault.key.partition(".")[0]
     hints = [
         f'was {slip.variable.name} = "{slip.meant}" meant?'
@@ -250,7 +252,7 @@ def _config(
     source: str,
     unusual: tuple[Slip, ...],
 ) -> Config:
-    """The study of a file whose values are each allowed."""
+    """The study of a file each of whose values is allowed."""
     sections, faults = parts.sections, Faults()
     tables, values = _read_sections(sections, checked, faults)
     faults.add(check_order(values, sections))
@@ -259,7 +261,7 @@ def _config(
         name: values[name] if name in data else None for name, each in sections.items() if each.optional
     }
     if "sizing" in data and checked.start != "inverter" and "inertia_ratio" not in tables["sizing"]:
-        # of motors on the line only where it is given
+        # for motors on the line only where the file gives it
         of_study["sizing"] = dataclasses.replace(of_study["sizing"], inertia_ratio=math.inf)
     own_motors = None
     with faults.collected(), refusal_prefix("catalogue = ", "catalogue"):
@@ -319,7 +321,8 @@ def _config(
 def _read_sections(
     sections: Mapping[str, FileSection], checked: Any, faults: Faults
 ) -> tuple[dict[str, dict[str, Any]], dict[str, Any]]:
-    """By table, all that the file gives, and the declared quantities with those that it leaves out."""
+    """By table, the values that the file gives, and the declared quantities completed by those that it leaves
+    out."""
     tables: dict[str, dict[str, Any]] = {}
     values = {}
     for name, section in sections.items():
@@ -333,7 +336,7 @@ def _read_sections(
 
 
 def _choices(checked: Any, parts: Parts) -> dict[str, Any]:
-    """All of a file that is no quantity of a table."""
+    """All values of a file that are no quantities of a table."""
     known = {name: getattr(checked, name) for name in CHOICES}
     for name, section in parts.sections.items():
         known |= {f"{name}.{key}": getattr(getattr(checked, name), key) for key in section.keys}
@@ -379,7 +382,7 @@ def _machine(parts: Parts, given: dict[str, float], of_papers: Mapping[str, floa
 
 
 def _taken_over(error: InputError, machine: type[MachineModel], given: Mapping[str, float]) -> str:
-    """The lengths behind a refusal that neither file nor example give, as words to follow it."""
+    """Words to follow a refusal: the lengths behind it that neither file nor example give."""
     names = error.names if isinstance(error, GeometryError) else ()
     declared = Layout(machine.Parameters).by_name(machine.Parameters())
     taken = [f"{name} = {declared[name]:g}" for name in names if name in declared and name not in given]
@@ -387,7 +390,8 @@ def _taken_over(error: InputError, machine: type[MachineModel], given: Mapping[s
 
 
 def _loads_beyond(config: Config) -> Iterator[InputError]:
-    """Refusals of loads that, together, no machine reaches: all on one side, and at the height of each event."""
+    """Refusals of loads that are beyond any machine together: all on one side, and at the height of each
+    event."""
     feed, model = config.feed, config.machine.model
     for v in Layout(SideLoads).variables if model.sides else ():
         most = getattr(feed.left, v.name) + getattr(feed.right, v.name)
@@ -413,7 +417,7 @@ def _loads_beyond(config: Config) -> Iterator[InputError]:
                 yield InputError(
                     f"{where}: the {model.name} has no {' or '.join(sorted(needed))}; leave it out", key=key
                 )
-            # of a motor: the study says whether it has the input
+            # an input of the motor: the study checks whether the motor has it
             continue
         for name, signal in event.signals(normal, 0.0, dict.fromkeys(event.reads, 0.0)).items():
             most = (

@@ -5,9 +5,10 @@
     side = "right"
     force = "2 kN"
 
-A quantity that it does not name has its declared default. The run is called after type and side, further ones of the
-same kind get a number (``jam_right_2``), or are called as ``name`` says. The event of random overloads is such a
-table, too; there a quantity may be a range, ``force = ["1 kN", "3 kN"]``, and a side that is not named is drawn.
+A quantity that the table does not name has its declared default. The key ``name`` gives the name of the run.
+Without it, the name is made from type and side, with a number for further events of the same kind
+(``jam_right_2``). The event of random overloads is such a table, too. There a quantity may be a range,
+``force = ["1 kN", "3 kN"]``, and the side is drawn if the table does not name it.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from .event import TYPES, AnySide, Event, on_side
 from .events import Jam
 
 RESERVED = ("start_up", "settling", "steady", "constant", "unfinished")
-"""Names of other runs of a study."""
+"""Names that an event may not have, as other runs of a study have them."""
 LONGEST_NAME = 40
 """letters"""
 _NAME = re.compile(rf"[a-z][a-z0-9_]{{0,{LONGEST_NAME - 1}}}")
@@ -59,8 +60,8 @@ def read_events(tables: Sequence[Any]) -> dict[str, Event]:
 
 @dataclass(frozen=True)
 class RandomEvent:
-    """The event of random overloads: quantities that are fixed, and ranges of those that are drawn; without a side
-    one is drawn, too."""
+    """The event of random overloads: the fixed quantities, and the ranges of the drawn ones. Without a side,
+    the side is drawn, too."""
 
     of: type[Event]
     side: AnySide
@@ -69,37 +70,37 @@ class RandomEvent:
 
     @property
     def title(self) -> str:
-        """What happens, as in a sentence."""
+        """The event as a clause of a sentence."""
         if self.side or not self.of.has_side:
             return on_side(self.of.words, self.side)
         return self.of.words.format(side="left or the right", other="right or the left")
 
     def draw(self, random: np.random.Generator) -> dict[str, float]:
-        """Values of the quantities that are drawn, evenly from their ranges."""
+        """Values of the drawn quantities, uniformly distributed over their ranges."""
         return {name: float(random.uniform(low, high)) for name, (low, high) in self.ranges.items()}
 
     def event(self, side: AnySide, values: Mapping[str, float]) -> Event:
-        """The event on that side with these values of the quantities that are drawn."""
+        """The event on that side, with these `values` of the drawn quantities."""
         return self.of.on(side, replace(self.p, **values))
 
     def hardest(self) -> list[Event]:
-        """The event on each side that it may come on, with every drawn quantity at the end of its range."""
+        """The event on each possible side, with every drawn quantity at the upper end of its range."""
         sides = (self.side,) if self.side or not self.of.has_side else SIDES
         return [self.event(side, {name: high for name, (_, high) in self.ranges.items()}) for side in sides]
 
     def as_dict(self) -> dict[str, Any]:
-        """All that a drawn event depends on, ready for JSON."""
+        """All values on which a drawn event depends, ready for JSON."""
         fixed = Layout(type(self.p)).by_name(self.p)
         return {"type": self.of.kind, "side": self.side, "p": fixed, "ranges": dict(self.ranges)}
 
 
 PLACED = ("crank_angle", "turns")
-"""Quantities that an event at random does not have."""
+"""Quantities that a random event does not have."""
 
 
 def read_random_event(table: Mapping[str, Any], where: str) -> RandomEvent:
-    """The event of random overloads, a jam where the table does not say. Which quantities are drawn is by the
-    declaration of the event, where the table gives neither a range nor a number.
+    """The event of random overloads; by default a jam. A quantity for which the table gives neither a range
+    nor a number is drawn if the declaration of the event says so.
 
     Raises
     ------
@@ -158,7 +159,7 @@ def _type(table: Any, where: str, place: str) -> type[Event]:
 
 
 def _side(of: type[Event], table: Mapping[str, Any], where: str, place: str, faults: Faults) -> AnySide:
-    """The side that the table names, none where it names a wrong one: that goes to the `faults`."""
+    """The side that the table names; empty for a wrong one, whose refusal goes to the `faults`."""
     if "side" not in table:
         return ""
     for side in SIDES if of.has_side else ():
@@ -173,7 +174,7 @@ def _side(of: type[Event], table: Mapping[str, Any], where: str, place: str, fau
 def _name(
     table: Mapping[str, Any], usual: str, others: Mapping[str, Event], where: str, place: str, faults: Faults
 ) -> str:
-    """The name of the run; the usual one in place of a wrong name, which goes to the `faults`."""
+    """The name of the run; the usual name in place of a wrong one, whose refusal goes to the `faults`."""
     if "name" in table:
         name = table["name"]
         if not isinstance(name, str) or not _NAME.fullmatch(name) or name.endswith("_coasting"):
@@ -188,8 +189,8 @@ def _name(
 
 
 def _parameters(of: type[Event], table: Mapping[str, Any], prefix: str, place: str = "") -> Any:
-    """The quantities of an event; a refusal begins with `prefix`, and its key with `place`, by default with that,
-    too."""
+    """The quantities of an event. A refusal begins with `prefix`, and its key with `place` or, without it,
+    with `prefix`."""
     texts: dict[str, Any] = dict.fromkeys(("type", "side", "name"), (str, ""))
     form = schema(of.Parameters, "event", prefix, **texts)
     with each_refusal(

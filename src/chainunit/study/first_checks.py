@@ -1,4 +1,4 @@
-"""The faults of a study file that are found value by value, before its values are put together."""
+"""The checks of the single values of a study file, before the values are checked together."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ from .event_table import read_events, read_random_event
 from .parts import Parts, beside, is_designation, named_table, parts_of
 
 _OF_MACHINE = ("machine", "ratios", "feed", "motor", "system")
-"""Tables that nothing is known of without machine and motor."""
+"""Tables that cannot be checked without machine and motor."""
 
 
 def check_values(data: Mapping[str, Any], source: str) -> tuple[Parts | None, list[InputError]]:
-    """The machine and motor of a file, None where it names wrong ones, and all faults of its single values."""
+    """The machine and motor of a file, or None if it names wrong ones; and all faults of its single
+    values."""
     faults = Faults()
     parts = None
     with faults.collected():
@@ -50,12 +51,12 @@ def check_values(data: Mapping[str, Any], source: str) -> tuple[Parts | None, li
 
 
 def _without_repeated(faults: Sequence[InputError]) -> list[InputError]:
-    """The faults, of which those of the same key and the same words stand once."""
+    """The faults without repetitions of the same key and words."""
     return list({(fault.key, str(fault)): fault for fault in faults}.values())
 
 
 def _check_catalogue(data: Mapping[str, Any], source: str) -> None:
-    """Refuse a catalogue that cannot be read, wrong values in one, and a motor that none has."""
+    """Refuse a catalogue that cannot be read or has wrong values, and a motor that no catalogue has."""
     name, file = data.get("catalogue"), None
     if isinstance(name, str) and name:
         with refusal_prefix("catalogue = ", "catalogue"):
@@ -81,7 +82,7 @@ def plate_of(designation: str, file: Path | None) -> CatalogueMotor | None:
 
 
 def without(data: Mapping[str, Any], faults: Collection[InputError]) -> dict[str, Any]:
-    """The tables of a file without the values that are refused; of its events there are none where one is."""
+    """The tables of a file without the refused values; without any event if one of them is refused."""
     rest = copy.deepcopy(dict(data))
     for key in map(_key, faults):
         names = key.split(".")
@@ -95,21 +96,21 @@ def without(data: Mapping[str, Any], faults: Collection[InputError]) -> dict[str
 
 
 def _key(fault: InputError) -> str:
-    """The key that a fault concerns; those in another file concern the catalogue."""
+    """The key that a fault concerns; a fault in another file concerns the catalogue."""
     return "catalogue" if fault.placed else fault.key
 
 
 def independent(
     further: Collection[InputError], faults: Collection[InputError], parts: Parts
 ) -> list[InputError]:
-    """Of the refusals of values that do not fit together, those that do not hang on a refused value: they concern
-    other tables, or a count, or two limits that are both right."""
+    """The refusals of values that do not fit together, without those that depend on a refused value. The
+    remaining ones concern other tables, a count, or two limits that are both right."""
     wrong = set(map(_key, faults))
     tables = {key.partition(".")[0] for key in wrong}
     if tables & {"system", ""}:
         return []
     if "catalogue" in wrong:
-        # whether it has the motor is not known
+        # it is not known whether the catalogue has the motor
         tables.add("system")
     counts = {f"{name}.{key}" for name, section in parts.sections.items() for key in section.whole}
     return [

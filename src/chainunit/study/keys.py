@@ -1,5 +1,5 @@
-"""Every key that a study file or a catalogue may have, from the declarations: the source of the reference, of the
-commented example, and of the schema for editors."""
+"""All keys that a study file or a catalogue may have, made from the declarations. The reference, the
+commented example and the schema for editors are made from them."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _FOLLOWS = {
     "driveline.d2": "from damping_ratio",
     "driveline.d3": "from damping_ratio",
 }
-"""Keys whose value, where a file leaves them out, follows from others."""
+"""By key, the source of its value if the file leaves the key out."""
 
 
 @dataclass(frozen=True)
@@ -46,24 +46,24 @@ class Key:
     name: str
     description: str
     variable: Variable | None = None
-    """its quantity; None for a word, a switch or a list"""
+    """the quantity of the key; None for a word, a switch or a list"""
     words: tuple[str, ...] = ()
-    """the values that it may have, as a file states them; none where any text will do"""
+    """the allowed values, as a file writes them; empty where any text is allowed"""
     sort: typing.Literal["number", "text", "switch", "list", "table"] = "number"
     left_out: str = ""
-    """the value, as a file states it, that it has where a file leaves it out; empty where there is none"""
+    """the value of a key that a file leaves out, as a file would write it; empty where there is none"""
     whole: bool = False
-    """whether the number must be a whole one"""
+    """whether the number must be a whole number"""
     items: Variable | None = None
-    """of a list: the quantity of its entries"""
+    """the quantity of the entries of a list"""
     most: int = 0
-    """of a list: its greatest length; 0 where there is none"""
+    """the largest length of a list; 0 where it has no limit"""
     follows: str = ""
-    """from what its value follows, where a file leaves it out"""
+    """the source of the value of a key that a file leaves out"""
 
     @property
     def unit(self) -> str:
-        """The declared unit, empty of a pure number, a text and a switch."""
+        """The declared unit; empty for a pure number, a text and a switch."""
         return "" if self.variable is None or self.variable.unit == "1" else self.variable.unit
 
     @property
@@ -81,15 +81,15 @@ class KeyTable:
     """A table of a study file, or the columns of a catalogue."""
 
     name: str
-    """as in the file, empty for what stands before all tables"""
+    """name of the table in the file; empty for the keys before all tables"""
     title: str
     keys: tuple[Key, ...]
     of: str = ""
-    """the machine, the motor or the type of event whose table it is, where others have another"""
+    """the machine, the motor or the type of event to which the table belongs, if others have another table"""
 
     @property
     def heading(self) -> str:
-        """As a heading: ``[motor] of DcMotor``."""
+        """The heading of the table: ``[motor] of DcMotor``."""
         name = f"[[{self.name}]]" if self.name == "event" else f"[{self.name}]"
         return " ".join(
             filter(None, (name if self.name else "before all tables", self.of and f"of {self.of}"))
@@ -128,7 +128,7 @@ def catalogue_columns() -> KeyTable:
 
 @cache
 def _study(machine: str = "ChamberForces", motor: str = "") -> Config:
-    """The study of a file that names machine and motor alone: what it leaves out."""
+    """The study of a file that names only machine and motor; it has the default values of all other keys."""
     names = [f'machine = "{machine}"'] + ([f'motor = "{motor}"'] if motor else [])
     return parse("\n".join(["[system]", *names]))
 
@@ -136,8 +136,8 @@ def _study(machine: str = "ChamberForces", motor: str = "") -> Config:
 def _numbers(
     declared: type, values: Any = None, prefix: str = "", table: str = "", whole: Collection[str] = ()
 ) -> Iterator[Key]:
-    """Keys of declared quantities; `values` are those of a file that leaves them out, `whole` the names of those
-    that are whole numbers."""
+    """Keys of declared quantities. `values` are the values of a file that leaves them out; `whole` has the
+    names of whole numbers."""
     known = Layout(declared).by_name(values) if values is not None else {}
     for v in variables(declared):
         value = known.get(v.name, v.quantity.start)

@@ -1,8 +1,8 @@
-"""The JSON Schema of study files, by which editors complete and check them. It is made of the keys (`keys`); which of
-them go together, `schema_rules` says.
+"""The JSON Schema of study files, by which editors complete and check them. It is made from the keys
+(`keys`); the rules of their combinations are in `schema_rules`.
 
-An editor sees a date of TOML as a text. A schema cannot see what depends on the sizes of two values, such as lengths
-with which no crank turns, nor what another file has: that is left to the reader of study files.
+An editor sees a date of TOML as a text. A schema can neither compare the sizes of two values, such as lengths
+with which the crank cannot turn, nor read another file: the reader of study files checks these.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _FORMS: dict[str, dict[str, Any]] = {
     "system.machine": {"minLength": 1, "maxLength": LONGEST_FILE},
     "system.motor": {"minLength": 1, "maxLength": LONGEST_FILE},
 }
-"""What is known of texts beside their words, by the name of the key."""
+"""By the name of a key, further conditions on its text."""
 
 
 def json_schema() -> dict[str, Any]:
@@ -42,7 +42,8 @@ def json_schema() -> dict[str, Any]:
 
 
 class _Schema:
-    """A schema while it is made: texts of quantities and tables of machines and motors are its `definitions`."""
+    """A schema in the making. Its `definitions` are the texts of quantities, and the tables of machines and
+    motors."""
 
     def __init__(self) -> None:
         self.definitions: dict[str, Any] = {}
@@ -68,7 +69,7 @@ class _Schema:
                     self._add(inside, key, table)
                 self.definitions[f"{table.name}.{table.of}"] = own[table.name]
         for name in OF_PARTS:
-            # which keys there are depends on the machine and the motor: `rules` say it
+            # the keys depend on the machine and the motor: the `rules` give them
             del properties[name]["additionalProperties"]
         properties["event"] = {
             "type": "array",
@@ -96,7 +97,7 @@ class _Schema:
         }
 
     def _add(self, place: dict[str, Any], key: Key, table: KeyTable) -> None:
-        """Add a key to the properties of a table; one that has it already takes the values of both."""
+        """Add a key to the properties of a table; a key that is there already takes the values of both."""
         *tables, name = key.name.split(".")
         for each in tables:
             place = _object(place, each)["properties"]
@@ -147,7 +148,7 @@ class _Schema:
         choices = [word.strip('"') for word in key.words if word.startswith('"')]
         if choices and len(choices) == len(key.words):
             return {"type": "string", "enum": choices} | description
-        # beside the known names there may be a file or a designation
+        # a file or a designation is allowed beside the known names
         name = f"{table.name}.{key.name}".lstrip(".")
         form: dict[str, Any] = {"type": "string"} | _FORMS.get(
             name, {"minLength": 1} if "_names." in name else {}

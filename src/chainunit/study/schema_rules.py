@@ -1,4 +1,5 @@
-"""Which keys of a study file go together, as conditions of its JSON Schema: `checks` and `parts` in other words."""
+"""The rules of the combinations of keys of a study file, as conditions of its JSON Schema. `checks` and
+`parts` have the same rules for the reader."""
 
 from __future__ import annotations
 
@@ -77,13 +78,13 @@ def _machine_name() -> Rule:
 
 
 def _machine(name: str) -> Rule:
-    """Whether that is the machine of a file."""
+    """Whether the file has the machine `name`."""
     names = _equal("system.machine", {"const": name})
     return names if name != _default().machine.name else _any(names, _without("system.machine"))
 
 
 def _default(machine: str = "") -> Parts:
-    """Machine and motor of a file that names no motor, and that machine."""
+    """Machine and motor of a file that names that machine and no motor."""
     return parts_of({"system": {"machine": machine}} if machine else {}, "")
 
 
@@ -133,7 +134,7 @@ def _of_motors() -> Iterator[Rule]:
 
 
 def _of_foreign_parts() -> Iterator[Rule]:
-    """Keys of FMUs of somebody else, and those that need a model of the machine."""
+    """Keys of foreign FMUs, and keys that need a model of the machine."""
     for part in ("machine", "motor"):
         yield _where(_given(f"system.{part}_names"), _equal(f"system.{part}", _FMU))
     needs_model = [
