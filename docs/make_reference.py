@@ -36,7 +36,7 @@ def text() -> str:
     head = (
         "# Reference\n\nMade by `python docs/make_reference.py` from the declarations. A number is in the declared "
         'SI unit; a text may carry\nany unit of the same kind: `"150 mm"`, `"4 kNm"`, `"30 rev/min"`, `"8 %"`. '
-        "`chainunit keys TABLE` shows the same on the terminal;\n`chainunit schema` writes a JSON Schema by which "
+        "`chainunit keys [TABLE]` shows the same on the terminal;\n`chainunit schema` writes a JSON Schema by which "
         "editors complete and check a study file.\n"
     )
     return head + markdown(reference(commands()), ()).removeprefix("# Reference\n")

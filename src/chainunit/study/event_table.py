@@ -16,9 +16,11 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
+from pydantic import BaseModel
 
 from ..errors import Faults, InputError, each_refusal, near_name, shown
 from ..machines.chain_unit import SIDES
@@ -188,19 +190,28 @@ def _name(
     return next(name for name in numbers if name not in others)
 
 
+_TEXTS = ("type", "side", "name")
+"""Keys of an event that are no quantities."""
+
+
+@cache
+def _form(declared: type) -> type[BaseModel]:
+    """The form of an event with these quantities."""
+    texts: dict[str, Any] = dict.fromkeys(_TEXTS, (str, ""))
+    return schema(declared, "event", "", **texts)
+
+
 def _parameters(of: type[Event], table: Mapping[str, Any], prefix: str, place: str = "") -> Any:
     """The quantities of an event. A refusal begins with `prefix`, and its key with `place` or, without it,
     with `prefix`."""
-    texts: dict[str, Any] = dict.fromkeys(("type", "side", "name"), (str, ""))
-    form = schema(of.Parameters, "event", prefix, **texts)
-    with each_refusal(
-        lambda fault: InputError(str(fault), (place or prefix) + fault.key.removeprefix(prefix))
-    ):
-        given = given_values(read_table(form, table, prefix))
-    values = {name: x for name, x in given.items() if name not in texts}
-    p = instance(of.Parameters, values)
-    for name in of.counts:
-        if getattr(p, name) != int(getattr(p, name)):
-            line = f"{prefix}{name} = {getattr(p, name):g}: must be a whole number"
-            raise InputError(line, (place or prefix) + name)
+    own = {name: x for name, x in table.items() if name not in _TEXTS}
+    with each_refusal(lambda fault: InputError(f"{prefix}{fault}", (place or prefix) + fault.key)):
+        values = given_values(read_table(_form(of.Parameters), own))
+        p = instance(of.Parameters, values)
+        broken = [name for name in of.counts if getattr(p, name) != int(getattr(p, name))]
+        lines = [
+            InputError(f"{name} = {getattr(p, name):g}: must be a whole number", name) for name in broken
+        ]
+        if lines:
+            raise InputError.of(lines)
     return p
