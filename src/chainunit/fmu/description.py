@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from functools import cached_property
+from functools import cached_property, lru_cache
 from importlib import metadata
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
@@ -77,10 +77,21 @@ class Interface:
         """Signals of one causality, in order."""
         return [s for s in self.signals if s.causality == causality]
 
-    @cached_property
+    @property
     def trace(self) -> tuple[list[Any], Any, Any, Any, list[Any], list[Any]]:
         """The model in symbols: the casadi vectors (p, u, x, derived values); p, u and x as instances of their
         declarations; the outputs part by part in declared order; and the derivatives of the states."""
+        return _shared(self.model)._trace
+
+    @property
+    def dependencies(self) -> list[tuple[list[int], list[int]]]:
+        """The true dependencies of each output, then of each state's derivative: value references in a run (inputs
+        and states) and at the start (parameters and inputs). They come from the sparsity of the traced equations. In
+        a run a state depends only on itself."""
+        return _shared(self.model)._dependencies
+
+    @cached_property
+    def _trace(self) -> tuple[list[Any], Any, Any, Any, list[Any], list[Any]]:
         import casadi
 
         model = self.model
@@ -103,10 +114,7 @@ class Interface:
         return [v for part, out in zip(self.model.parts, parts, strict=True) for v in part.layout.values(out)]
 
     @cached_property
-    def dependencies(self) -> list[tuple[list[int], list[int]]]:
-        """The true dependencies of each output, then of each state's derivative: value references in a run (inputs
-        and states) and at the start (parameters and inputs). They come from the sparsity of the traced equations. In
-        a run a state depends only on itself."""
+    def _dependencies(self) -> list[tuple[list[int], list[int]]]:
         model = self.model
         symbols, p, u, x, outputs, derivatives = self.trace
         states, start = [], []
@@ -169,6 +177,13 @@ class Interface:
                 places[row].append(offset + column)
             offset += symbol.shape[0]
         return places
+
+
+@lru_cache(maxsize=8)
+def _shared(model: type[Model]) -> Interface:
+    """The interface that keeps the equations of a model: its start values, and the version of FMI, do not change
+    them."""
+    return Interface(model, {}, Script)
 
 
 def model_description(
