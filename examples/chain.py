@@ -1,8 +1,8 @@
 # %% [markdown]
 # # The organ as a chain
 #
-# Export `ChainUnitFlexible`, here with 4 rods a side, drive it with fmpy at a speed at which the chains snatch, and
-# set the machine with two bars beside it.
+# The script exports `ChainUnitFlexible` with 4 rods on each side, drives it with fmpy at a speed at which the chains
+# snatch, and compares it with the machine with two bars.
 
 # %%
 import tempfile
@@ -21,7 +21,7 @@ file = Path(folder.name) / "ChainUnitFlexible.fmu"
 print(export(flexible(walls=3, webs=1), file))
 
 # %% [markdown]
-# fmpy warns of an input that it is not given: each has a column, at its start value where nothing else is said.
+# fmpy warns of an input without a column. So each input has a column, by default with its start value.
 
 # %%
 # in co-simulation phi runs along w inside each step

@@ -1,8 +1,8 @@
 # %% [markdown]
 # # Machine and motor
 #
-# Two FMUs on one shaft: the machine shows its load port, the motor solves for the motion. All feed
-# moves to the left side after half a second. The run carries its own certificate.
+# Two FMUs share a shaft: the machine gives its load port, the motor solves for the motion. All feed moves to the left
+# side after half a second. The energy balance of the run is its certificate.
 
 # %%
 import tempfile

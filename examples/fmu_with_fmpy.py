@@ -1,7 +1,7 @@
 # %% [markdown]
 # # The FMU in fmpy
 #
-# Export `ChamberForces` and let fmpy drive it through a crank turn.
+# The script exports `ChamberForces`; fmpy drives it through a crank turn.
 
 # %%
 import tempfile
@@ -17,7 +17,7 @@ folder = tempfile.TemporaryDirectory()
 file = export(ChamberForces, Path(folder.name) / "ChamberForces.fmu", {"ratio": 50.0})
 
 # %% [markdown]
-# fmpy warns of an input that it is not given: each has a column, at its start value where nothing else is said.
+# fmpy warns of an input without a column. So each input has a column, by default with its start value.
 
 # %%
 speed = 150.0  # rad/s of the motor

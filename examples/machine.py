@@ -1,8 +1,8 @@
 # %% [markdown]
 # # The machine in Python
 #
-# Arrays in, arrays out: the papers' statics, a crank turn at several speeds, and the limit at which the
-# chain goes slack.
+# Arrays are inputs and outputs. The script computes the papers' statics, a crank turn at several speeds, and the
+# speed from which a web goes slack.
 
 # %%
 import numpy as np

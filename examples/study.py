@@ -1,8 +1,8 @@
 # %% [markdown]
 # # A study from Python
 #
-# The same as ``chainunit study FILE``: tables with the keys of a study file, units in texts. Two crank lengths, one
-# jam; what the drive has to give in both.
+# `Study` does the same as ``chainunit study FILE``. It takes tables with the keys of a study file; texts may have
+# units. The example compares the demands on the drive for two crank lengths, with a jam.
 
 # %%
 import pandas as pd

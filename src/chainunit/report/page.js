@@ -6,9 +6,9 @@
   /* plots */
   const figures = read("figures");
   const config = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["lasso2d", "select2d"] };
-  const drawn = [];
-  // the library is packed into the page: unpacked it would be most of it
-  const unpacked = async () => {
+  const plots = [];
+  // the page holds the library compressed: it would otherwise be most of the page
+  const loadPlotly = async () => {
     const packed = Uint8Array.from(atob(byId("plotly").textContent), (letter) => letter.charCodeAt(0));
     const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
     const script = document.createElement("script");
@@ -19,13 +19,13 @@
     for (const box of document.querySelectorAll(".plot")) {
       const figure = figures[box.dataset.figure];
       Plotly.newPlot(box, figure.data, figure.layout, config);
-      drawn.push([box, figure.layout.height]);
+      plots.push([box, figure.layout.height]);
     }
-    document.documentElement.dataset.plots = drawn.length;
+    document.documentElement.dataset.plots = plots.length;
   };
   const boxes = document.querySelectorAll(".plot");
   if (boxes.length)
-    unpacked().then(drawPlots, () => {
+    loadPlotly().then(drawPlots, () => {
       for (const box of boxes) box.textContent = "This browser cannot unpack the plots; open the page in one of 2023 or later.";
     });
   // paper is narrower than a screen: a plot is laid out anew for it, so that its letters keep their size
@@ -39,13 +39,13 @@
     Plotly.relayout(box, layout);
   };
   window.addEventListener("beforeprint", () => {
-    for (const [box, height] of drawn) {
+    for (const [box, height] of plots) {
       // two on a page; what is tall for its many rows stays so
       resize(box, PAPER.width, height > 1.6 * PAPER.height ? Math.min(height, 900) : PAPER.height, PAPER.letters);
     }
   });
   window.addEventListener("afterprint", () => {
-    for (const [box, height] of drawn) resize(box, null, height, 13);
+    for (const [box, height] of plots) resize(box, null, height, 13);
   });
 
   /* tables and drawings that are wider than the screen say that they scroll */
@@ -77,15 +77,15 @@
   const of = (list, i) => list[Math.min(i, list.length - 1)];
 
   const colour = (group) => "group-" + (motion.groups.indexOf(group) + 1);
-  const called = (joint) => (joint in motion.names ? motion.names[joint] : joint);
-  // joints that a joint is linked with: its name stands on the other side
+  const labelOf = (joint) => (joint in motion.names ? motion.names[joint] : joint);
+  // the joints at the other ends of the links of a joint: its name stands on the opposite side
   const beside = {};
   for (const link of motion.links)
     link.joints.forEach((joint, i) => {
       const next = [link.joints[i - 1], link.joints[i + 1]].filter((other) => other !== undefined);
       (beside[joint] = beside[joint] || []).push(...next);
     });
-  let run, frame, played, playing = false, last = null, parts, scale, origin, perNewton, height;
+  let run, frame, playTime, playing = false, last = null, parts, scale, origin, perNewton, height;
   const select = byId("run"), factor = byId("factor"), arrows = byId("arrows"), slider = byId("slider");
   motion.runs.forEach((r, i) => select.add(new Option(r.title, i)));
   const factors = [0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1, 2];
@@ -97,7 +97,7 @@
     const j = run.joints[joint];
     return [origin[0] + scale * of(j.x, frame), origin[1] - scale * of(j.y, frame)];
   };
-  const pointed = (x) => {
+  const roundForce = (x) => {
     const power = 10 ** Math.floor(Math.log10(x));
     return [5, 2, 1].map((m) => m * power).find((y) => y <= x * 1.0001) || power;
   };
@@ -132,7 +132,7 @@
     frame = 0;
     for (const name of motion.grounds) {
       const [px, py] = at(name);
-      // what hangs has its support above, what stands below
+      // a joint from which links hang has its support above it, another one below
       const up = motion.hanging.includes(name) ? -1 : 1;
       add(ground, "path", { class: "ground", d: `M${px} ${py} l-14 ${22 * up} h28 z` });
       add(ground, "path", {
@@ -156,8 +156,8 @@
     parts.joints = {};
     for (const name of Object.keys(run.joints)) {
       parts.joints[name] = [
-        add(stage, "circle", { class: "joint", r: called(name) ? 5 : 3 }),
-        add(stage, "text", { "text-anchor": "middle" }, called(name)),
+        add(stage, "circle", { class: "joint", r: labelOf(name) ? 5 : 3 }),
+        add(stage, "text", { "text-anchor": "middle" }, labelOf(name)),
       ];
     }
     parts.forces = run.forces.map((force) => {
@@ -253,11 +253,11 @@
     perNewton = run.largest > 0 ? (parts.arrow * Number(arrows.value)) / run.largest : 0;
     run.forces.forEach((force, i) => {
       const [x, y] = at(force.at), fx = of(force.x, frame), fy = of(force.y, frame);
-      arrow(parts.forces[i], x, y, perNewton * fx, -perNewton * fy, force.short || called(force.at));
+      arrow(parts.forces[i], x, y, perNewton * fx, -perNewton * fy, force.short || labelOf(force.at));
       parts.rows[i].textContent = Math.hypot(fx, fy).toFixed(0) + " N";
     });
     if (perNewton) {
-      const newton = pointed((0.75 * parts.arrow) / perNewton), x = 20, y = height - 18;
+      const newton = roundForce((0.75 * parts.arrow) / perNewton), x = 20, y = height - 18;
       const [bx, by, d] = head(x, y, newton * perNewton, 0);
       parts.legendLine.setAttribute("d", `M${x} ${y} L${bx} ${by} M${x} ${y - 6} v12`);
       parts.legendHead.setAttribute("d", d);
@@ -281,7 +281,7 @@
 
   function show(i) {
     frame = Math.max(0, Math.min(run.time.length - 1, i));
-    played = run.time[frame];
+    playTime = run.time[frame];
     draw();
   }
 
@@ -308,11 +308,11 @@
 
   function advance(now) {
     if (!playing) return;
-    // after a pause, or a while in another tab, it goes on from where it was
-    if (last !== null) played += (Math.min(now - last, 250) / 1000) * Number(factor.value);
+    // after a pause, or a while in another tab, the motion goes on from the same picture
+    if (last !== null) playTime += (Math.min(now - last, 250) / 1000) * Number(factor.value);
     last = now;
-    if (played > run.time[run.time.length - 1]) played = run.time[0];
-    const next = frameAt(played);
+    if (playTime > run.time[run.time.length - 1]) playTime = run.time[0];
+    const next = frameAt(playTime);
     if (next !== frame) {
       frame = next;
       draw();
@@ -337,15 +337,15 @@
   slider.addEventListener("input", () => show(Number(slider.value)));
   choose(0);
   // report.html#play=jam_left plays that run by itself, report.html#at=jam_left,0.2 shows it at that time
-  const wanted = /^#(play|at)(?:=([^,]*)(?:,(.*))?)?$/.exec(location.hash);
-  if (wanted) {
-    const found = motion.runs.findIndex((r) => r.name === wanted[2]);
-    if (found >= 0) {
-      select.value = found;
-      choose(found);
+  const request = /^#(play|at)(?:=([^,]*)(?:,(.*))?)?$/.exec(location.hash);
+  if (request) {
+    const index = motion.runs.findIndex((r) => r.name === request[2]);
+    if (index >= 0) {
+      select.value = index;
+      choose(index);
     }
-    if (wanted[3]) show(frameAt(Number(wanted[3])));
+    if (request[3]) show(frameAt(Number(request[3])));
     byId("machine").scrollIntoView({ behavior: "instant" });
-    play(wanted[1] === "play");
+    play(request[1] === "play");
   }
 })();
