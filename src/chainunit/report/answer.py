@@ -7,8 +7,7 @@ from collections.abc import Iterator
 from ..study.measures import MEASURES
 from ..study.record import StudyRecord
 from . import blocks as b
-from . import chains, sizing
-from . import run_names as read
+from . import chains, run_names, sizing
 from .lines import Line, Strong, join, line
 from .runs import number
 
@@ -35,7 +34,7 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         reference = "steady" if "steady" in answers else next(iter(answers))
         worst = " Below them: the overload with the largest value." if study.overloads else ""
         speed = _speed(s, study, reference)
-        lead = line(f"Large numbers: {read.title(study, reference)}, the crank at ", speed, f".{worst}")
+        lead = line(f"Large numbers: {run_names.title(study, reference)}, the crank at ", speed, f".{worst}")
         yield b.Text(lead, "lead", "long")
         yield b.Cards(tuple(_cards(s, study, reference)))
     else:
@@ -98,4 +97,4 @@ def _worst(s: b.Source, study: StudyRecord, name: str) -> Iterator[Line]:
     if magnitudes:
         run = max(magnitudes, key=lambda run: magnitudes[run])
         peak = Strong(number(s, study, run, name))
-        yield line(f"overload: {MEASURES[name].words} ", peak, f", {read.title(study, run)}")
+        yield line(f"overload: {MEASURES[name].words} ", peak, f", {run_names.title(study, run)}")

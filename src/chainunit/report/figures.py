@@ -16,7 +16,7 @@ from ..study.record import StudyRecord
 from ..text import forms, number
 from . import blocks as b
 from . import figure as fig
-from . import run_names as read
+from . import run_names
 from .pictures import Pictures
 from .shaft import TORQUE, shaft_torque
 from .turn import ANGLE
@@ -28,16 +28,23 @@ _SPEED = fig.Axis("crank speed", "rad/s")
 _CURRENT = fig.Axis("motor current", "A")
 
 
-@PICTURES.declare(lambda study: read.motor_runs(study) and study.drive.foreign is None, "torque_speed.png")
+@PICTURES.declare(
+    lambda study: run_names.motor_runs(study) and study.drive.foreign is None, "torque_speed.png"
+)
 def _torque_speed(s: b.Source, study: StudyRecord) -> fig.Figure:
     """Torque over speed in a panel for the start and one for the overloads of each side, at scales of their own."""
-    names, panels = read.motor_runs(study), []
-    for group in [[name for name in names if not read.is_event(study, name)], *read.groups(study, names)]:
+    names, panels = run_names.motor_runs(study), []
+    for group in [
+        [name for name in names if not run_names.is_event(study, name)],
+        *run_names.groups(study, names),
+    ]:
         # an overload is drawn from its event on: before, it is the steady running of the first panel
-        runs = {name: study.runs[name].sel(time=slice(read.event_time(study, name), None)) for name in group}
+        runs = {
+            name: study.runs[name].sel(time=slice(run_names.event_time(study, name), None)) for name in group
+        }
         curves = [
             fig.Curve(
-                read.title(study, name),
+                run_names.title(study, name),
                 run["motor.w"].values,
                 run["motor.air_gap_tau"].values,
                 names.index(name),
@@ -78,7 +85,7 @@ def _duty(s: b.Source, study: StudyRecord) -> Iterator[fig.Item]:
 
 def _group_title(study: StudyRecord, runs: list[str]) -> str:
     """The title of a panel with these runs."""
-    sides = [study.config.events[run].loaded_side for run in runs if read.is_event(study, run)]
+    sides = [study.config.events[run].loaded_side for run in runs if run_names.is_event(study, run)]
     if not sides:
         return "Start-up and steady running"
     return f"Overloads of the {sides[0]} side" if sides[0] else "Overloads"
@@ -158,15 +165,17 @@ def _start_up(s: b.Source, study: StudyRecord) -> fig.Figure:
     return _transient(s, study, "start_up")
 
 
-@PICTURES.declare(read.motor_runs)
+@PICTURES.declare(run_names.motor_runs)
 def _others(s: b.Source, study: StudyRecord) -> Iterator[fig.Figure]:
-    return (_transient(s, study, name) for name in read.motor_runs(study) if name != "start_up")
+    return (_transient(s, study, name) for name in run_names.motor_runs(study) if name != "start_up")
 
 
-@PICTURES.declare(lambda study: read.groups(study, study.overloads), "overload_time.png")
+@PICTURES.declare(lambda study: run_names.groups(study, study.overloads), "overload_time.png")
 def _overloads(s: b.Source, study: StudyRecord) -> fig.Figure:
     """The overloads beside each other, for print: a band of rows for each side, and the same scales in all panels."""
-    groups = [[_transient(s, study, name) for name in group] for group in read.groups(study, study.overloads)]
+    groups = [
+        [_transient(s, study, name) for name in group] for group in run_names.groups(study, study.overloads)
+    ]
     rows: list[list[fig.Panel | None]] = []
     for group in groups:
         for k in range(min(3, *(len(each.panels) for each in group))):
@@ -185,7 +194,7 @@ def _overloads(s: b.Source, study: StudyRecord) -> fig.Figure:
 
 def _transient(s: b.Source, study: StudyRecord, name: str) -> fig.Figure:
     """Torque, speed and current of a run over time."""
-    run, drive, event = study.runs[name], study.drive, read.event_time(study, name)
+    run, drive, event = study.runs[name], study.drive, run_names.event_time(study, name)
     time = run["time"].values - (event or 0.0)
     low, high = float(time[0]), float(time[-1])
     speed: list[fig.Item] = [fig.Curve(_SPEED.label, time, drive.crank_motion(run)[1], in_legend=False)]
@@ -198,7 +207,7 @@ def _transient(s: b.Source, study: StudyRecord, name: str) -> fig.Figure:
         items[TORQUE] = shaft_torque(run, time)
     if event is None and drive.follows:
         speed.append(fig.Curve("speed asked for", time, run["motor.w_ref"].values / drive.ratio, 1))
-    coasting = study.runs.get(name + read.COASTING)
+    coasting = study.runs.get(name + run_names.COASTING)
     if coasting is not None:
         after = coasting["time"].values - (event or 0.0)
         speed.append(fig.Curve("crank behind the open coupling", after, drive.crank_motion(coasting)[1], 1))
@@ -206,7 +215,7 @@ def _transient(s: b.Source, study: StudyRecord, name: str) -> fig.Figure:
     if event is not None:
         # a quarter turn before the event shows enough of steady running
         low = max(low, -0.5 * math.pi / study.config.run.crank_speed)
-    marks, words = _marks(study, name, event), read.title(study, name)
+    marks, words = _marks(study, name, event), run_names.title(study, name)
     return fig.Figure(
         f"time-{name.replace('_', '-')}",
         words,

@@ -11,7 +11,7 @@ from ..study.monte_carlo import Sample
 from ..study.record import StudyRecord
 from ..study.window import Phase
 from . import blocks as b
-from . import run_names as read
+from . import run_names
 from .lines import Line, Number, capital, join, line, spoken
 from .terminal import plain_line
 
@@ -60,7 +60,7 @@ def matrix(s: b.Source, path: str, rows: Mapping[str, str], title: str, first: s
 def by_side(study: StudyRecord, runs: Iterable[str]) -> list[str]:
     """The runs in an order in which the overloads of each side are neighbours."""
     runs = list(runs)
-    sided_runs = [run for group in read.groups(study, runs) for run in group]
+    sided_runs = [run for group in run_names.groups(study, runs) for run in group]
     return [*(run for run in runs if run not in sided_runs), *sided_runs]
 
 
@@ -68,8 +68,8 @@ def over_runs(
     study: StudyRecord, runs: list[str], rows: Iterable[b.TableRow], title: str, first: str = ""
 ) -> b.Table:
     """A table with a column for each run; the columns of the overloads of a side form a group."""
-    columns = (b.Column(study.title_of(run), read.short(study, run)) for run in runs)
-    groups = (tuple(runs.index(run) + 1 for run in group) for group in read.groups(study, runs))
+    columns = (b.Column(study.title_of(run), run_names.short(study, run)) for run in runs)
+    groups = (tuple(runs.index(run) + 1 for run in group) for group in run_names.groups(study, runs))
     return b.Table(tuple(rows), (b.Column("", first), *columns), title=title, groups=tuple(groups))
 
 
@@ -104,11 +104,17 @@ def _pins(s: b.Source, study: StudyRecord) -> b.Table:
         worst = max(tables, key=lambda run: tables[run][pin]["peak"]["value"])
         own = (s.number(f"pins.{reference}.{pin}.{size}") for size in sizes)
         return b.TableRow(
-            (pin, *own, s.number(f"pins.{worst}.{pin}.peak"), study.title_of(worst), read.short(study, worst))
+            (
+                pin,
+                *own,
+                s.number(f"pins.{worst}.{pin}.peak"),
+                study.title_of(worst),
+                run_names.short(study, worst),
+            )
         )
 
     columns = (
-        b.Column(f"{read.title(study, reference)}, {spoken(size)}", f"{reference}, {spoken(size)}")
+        b.Column(f"{run_names.title(study, reference)}, {spoken(size)}", f"{reference}, {spoken(size)}")
         for size in sizes
     )
     return b.Table(

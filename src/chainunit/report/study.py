@@ -13,9 +13,8 @@ from ..study.record import StudyRecord
 from ..study.result import as_dict
 from ..study.rig import DIFFERENCE
 from ..text import shown_in
-from . import answer, chains, figures, runs, shaft, sizing, wording
+from . import answer, chains, figures, run_names, runs, shaft, sizing, wording
 from . import blocks as b
-from . import run_names as read
 from .analyses import ANALYSES, Contents
 from .drawing import drawing
 from .lines import Line, capital, join, line, spoken
@@ -101,7 +100,7 @@ def _opening(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
             turns="turn" if study.config.run.turns == 1.0 else "turns",
         )
     if names := study.overloads:
-        words = "; ".join(read.title(study, name) for name in names)
+        words = "; ".join(run_names.title(study, name) for name in names)
         question += line(f" Then come overloads, each by itself: {words}.")
     if study.monte_carlo is not None:
         question += s.line(
@@ -192,14 +191,14 @@ def _certificate(
     titles = {run: study.title_of(run) for run in certificate}
     yield runs.matrix(s, "certificate", titles, "Energy certificate", "run", form="long")
     for name in dict.fromkeys(name for shares in certificate.values() for name in shares):
-        run_names = [run for run, shares in certificate.items() if name in shares]
-        run = max(run_names, key=lambda run: s.value(f"certificate.{run}.{name}") or 0.0)
+        compared_runs = [run for run, shares in certificate.items() if name in shares]
+        run = max(compared_runs, key=lambda run: s.value(f"certificate.{run}.{name}") or 0.0)
         most = f"{{certificate.{run}.{name}}}"
         text = f"{spoken(name.removesuffix('_share')).capitalize()}: at most {most} of the energy moved."
         if name.endswith(DIFFERENCE):
             text = (
                 f"Difference of {name.removesuffix(DIFFERENCE)} to the monolithic solution, in parts of its "
-                f"peak: at most {most} ({titles[run]}), {len(run_names)} runs compared."
+                f"peak: at most {most} ({titles[run]}), {len(compared_runs)} runs compared."
             )
         yield b.Text(s.line(text), form="short")
 

@@ -11,8 +11,7 @@ import numpy as np
 
 from ..mechanism.models import CrankMotion, names_of
 from ..study.record import StudyRecord
-from . import linkage
-from . import run_names as read
+from . import linkage, run_names
 from .edge_motion import EdgeMotion
 from .lines import capital
 from .motion import Animation, Clip, DrawnLink, Reading
@@ -42,7 +41,7 @@ def motion(study: StudyRecord) -> Animation:
     return Animation(
         tuple(_links(whole, supplement)),
         tuple(whole.linkage.ground),
-        tuple(_run(study, name, interval, supplement) for name in read.in_order(study)),
+        tuple(_run(study, name, interval, supplement) for name in run_names.in_order(study)),
         turn,
         supplement.caption or _CAPTION.format(thin),
         hanging=linkage.hanging(whole),
@@ -83,7 +82,7 @@ def _run(study: StudyRecord, name: str, interval: float, supplement: Supplement)
         lambda output: (part[f"machine.{output}.fx"].values, part[f"machine.{output}.fy"].values),
         supplement.groups,
     )
-    has_motor = name in read.motor_runs(study)
+    has_motor = name in run_names.motor_runs(study)
     readings = (
         Reading("Crank angle", angle % (2.0 * math.pi), "rad"),
         Reading("Crank speed", speed, "rad/s"),
@@ -94,10 +93,10 @@ def _run(study: StudyRecord, name: str, interval: float, supplement: Supplement)
             if v.name in loads
         ),
     )
-    event = read.event_time(study, name)
+    event = run_names.event_time(study, name)
     return Clip(
         name,
-        read.title(study, name),
+        run_names.title(study, name),
         part["time"].values - (event or 0.0),
         {**linkage.places(state.m), **details.joints},
         readings,
