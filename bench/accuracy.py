@@ -60,8 +60,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         models = {"machine": ChamberForces, "motor": DcMotor}
         components = {name: ModelComponent(model, model.Parameters()) for name, model in models.items()}
-        packaged, made = export(System(components, shaft_joints("motor", "machine")), Path(folder))
-        console.print(*(f"{name}: {how}" for name, how in made.items()), sep="\n")
+        packaged, origin = export(System(components, shaft_joints("motor", "machine")), Path(folder))
+        console.print(*(f"{name}: {how}" for name, how in origin.items()), sep="\n")
         for force in (0.0, 100.0):
             for title, (ratio, motor) in motors().items():
                 table = Table(title=f"{title}; processing force {force:g} N a side", title_justify="left")

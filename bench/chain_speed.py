@@ -50,7 +50,8 @@ COUNTED = {
 
 
 def from_c(file: Path, folder: Path, seconds: float = 10.0):
-    """By communication step: times real time, evaluations and projections a simulated second; cost of each [s]."""
+    """For each communication step: times real time, evaluations and projections per simulated second; then
+    their costs [s]."""
     sources = folder / "sources"
     with zipfile.ZipFile(file) as archive:
         for name in archive.namelist():
@@ -75,13 +76,13 @@ def from_c(file: Path, folder: Path, seconds: float = 10.0):
     fmu = Fmu(file)
     references = [str(fmu.variables[n].valueReference) for n in ("phi", "w")]
     fmu.close()
-    said = subprocess.run(
+    output = subprocess.run(
         [str(program), *references, str(seconds), *map(str, STEPS)],
         check=True,
         capture_output=True,
         text=True,
     ).stdout
-    *rows, costs = ([float(x) for x in line.split()] for line in said.splitlines())
+    *rows, costs = ([float(x) for x in line.split()] for line in output.splitlines())
     return dict(zip(STEPS, rows, strict=True)), [1e-9 * x for x in costs]
 
 
@@ -96,7 +97,7 @@ class Ours:
         self.before = 4.0 * math.pi / W
 
     def run(self, tolerance: float, steps: int, at: int = 1):
-        """Forces at every `at`-th of so many steps, the states at the begin, and the time the steps took."""
+        """Forces at every `at`-th of `steps` steps, the states at the beginning, and the time of all steps [s]."""
         unit = Instance(self.fmu, "unit", [])
         # to the begin exactly alike for any tolerance: it is tunable
         unit.initialize(self.start | {"tolerance": 1e-12}, 0.0)
@@ -109,9 +110,9 @@ class Ours:
             unit.step(self.before + k * h, h)
             if (k + 1) % at == 0:
                 rows.append(list(unit.read(handle)))
-        spent = time.perf_counter() - began
+        duration = time.perf_counter() - began
         unit.close()
-        return np.array(rows), states, spent
+        return np.array(rows), states, duration
 
 
 def against_exudyn(console: Console, file: Path) -> None:
@@ -205,7 +206,7 @@ def main() -> None:
     console = Console(width=110)
     with tempfile.TemporaryDirectory() as folder:
         file = export(flexible(WALLS, WEBS), Path(folder) / "machine.fmu")
-        found, (one, other) = from_c(file, Path(folder))
+        result, (one, other) = from_c(file, Path(folder))
         table = Table(
             title=f"{WALLS + WEBS} rods a side, {W:g} rad/s; demanded: {DEMANDED:g} times real time",
             title_justify="left",
@@ -219,7 +220,7 @@ def main() -> None:
             "projections",
         ):
             table.add_column(column, justify="right")
-        for step, (fast, evaluations, projections) in found.items():
+        for step, (fast, evaluations, projections) in result.items():
             limit = 1.0 / (evaluations * one + projections * other)
             table.add_row(
                 f"{1e3 * step:g} ms", f"{fast:.0f}", f"{limit:.0f}", f"{fast / limit:.2f}", f"{evaluations:.0f}",

@@ -43,8 +43,8 @@ def one(way: str, folder: Path, seconds: float) -> None:
     rows, variables = run.sizes["time"], len(run.data_vars)
     run.close()
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-    spent = time.perf_counter() - began
-    print(f"{way:22} {rows:7} rows of {variables:3} variables, {peak:5.0f} MB, {spent:4.0f} s", flush=True)
+    duration = time.perf_counter() - began
+    print(f"{way:22} {rows:7} rows of {variables:3} variables, {peak:5.0f} MB, {duration:4.0f} s", flush=True)
 
 
 def main() -> None:
@@ -52,16 +52,16 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=600.0)
     parser.add_argument("--way", choices=list(WAYS))
     parser.add_argument("--folder", type=Path)
-    given = parser.parse_args()
-    if given.way:
-        one(given.way, given.folder, given.seconds)
+    values = parser.parse_args()
+    if values.way:
+        one(values.way, values.folder, values.seconds)
         return
     with tempfile.TemporaryDirectory() as folder:
         config = load()
         choose(config, Path(folder), lambda *_: None).drive.export(Path(folder))
         for way in WAYS:
             command = [sys.executable, __file__, "--way", way, "--folder", folder]
-            subprocess.run([*command, "--seconds", str(given.seconds)], check=True)
+            subprocess.run([*command, "--seconds", str(values.seconds)], check=True)
 
 
 if __name__ == "__main__":

@@ -36,10 +36,10 @@ def importer(files) -> float:
             unit.write(into, values)
             unit.step(1e-3 * k, 1e-3)
             unit.read(out)
-    spent = time.perf_counter() - began
+    duration = time.perf_counter() - began
     for unit, *_ in units:
         unit.close()
-    return spent
+    return duration
 
 
 def main() -> None:
@@ -50,10 +50,10 @@ def main() -> None:
         task = monte_carlo.Task(config, drive, files, 6.7)
         began = time.perf_counter()
         result = monte_carlo.run(task, Path(folder), lambda *said: None, workers=2)
-        spent = time.perf_counter() - began
+        duration = time.perf_counter() - began
         floor = 1000 * importer(files) / 2
-    print(f"{len(result.rows)} runs of 2 s in {spent:.0f} s on two processes (limit 120 s);")
-    print(f"{spent / floor:.1f} times the time of fmpy alone for the same calls ({floor:.0f} s).")
+    print(f"{len(result.rows)} runs of 2 s in {duration:.0f} s on two processes (limit 120 s);")
+    print(f"{duration / floor:.1f} times the time of fmpy alone for the same calls ({floor:.0f} s).")
 
 
 if __name__ == "__main__":

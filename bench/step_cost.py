@@ -93,10 +93,10 @@ def from_c(folder: Path) -> list[tuple[str, float]]:
     names = ["phi", "w", "a", "tau_bias", "J", "dJ_dphi", "phi0", "w0", "tau_bias_dphi", "tau_bias_dw"]
     references = [str(fmu.variables[n].valueReference) for n in names]
     fmu.close()
-    said = subprocess.run(
+    output = subprocess.run(
         [str(folder / "loop"), *references], check=True, capture_output=True, text=True
     ).stdout
-    bare, plain, port, everything = (1e-3 * float(x) for x in said.split())
+    bare, plain, port, everything = (1e-3 * float(x) for x in output.split())
     print(
         f"From C, set + step + get all outputs costs {everything / bare:.2f} times the bare kernel (limit: 1.5)."
     )

@@ -1,4 +1,4 @@
-"""What the tests share, and how they run: in parallel, a file at a time, when no file is named.
+"""Fixtures that the tests share. A run without named files is parallel, a file at a time for each worker.
 
 An FMU costs a test little: what exports compile is kept in a folder of the session, whichever worker, test or
 process asks (see `chainunit.fmu.native.cache`). Beyond that,
@@ -39,7 +39,7 @@ def pytest_cmdline_main(config):
 
 
 def pytest_configure(config):
-    """Where compiled code is kept, for this process and all that it starts, the workers too."""
+    """The folder of compiled code for this process and all processes that it starts, workers included."""
     if not hasattr(config, "workerinput"):
         store = tempfile.mkdtemp(prefix="chainunit_tests_")
         os.environ[VARIABLE] = store

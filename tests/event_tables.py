@@ -10,7 +10,7 @@ STANDARD = ("right_empties", "left_empties", "feed_left", "feed_right", "jam_lef
 
 
 def event_line(*runs: str, **quantities: float) -> str:
-    """The line ``event = [...]`` with the events of these names; each has those of the quantities that its type has.
+    """The line ``event = [...]`` with the events of these names, each with the `quantities` that its type declares.
     It stands before the tables of a file."""
     return f"event = [{', '.join(_table(run, quantities) for run in runs)}]\n"
 

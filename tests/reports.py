@@ -1,4 +1,4 @@
-"""What a study leaves: its page, its text on a terminal, its files."""
+"""The report of a study: its page, its text on a terminal, its files."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ def page_of(study, result=None):
 
 
 def said_of(study, width=200):
-    told = io.StringIO()
-    console = Console(file=told, markup=False, highlight=False, width=width)
+    out = io.StringIO()
+    console = Console(file=out, markup=False, highlight=False, width=width)
     terminal.show(study_report.report(study), console)
-    return told.getvalue()
+    return out.getvalue()
 
 
 def write(study, folder):

@@ -7,7 +7,8 @@ from chainunit.system import ModelComponent, System, shaft_joints
 
 
 def component(model, file=None, values=None):
-    """A model, by its name or itself, with its start values but for those given, and its FMU where there is one."""
+    """The component of a model (a class or a name) with start values, except the given ones, and its FMU if
+    there is one."""
     model = MODELS.get(model, model)
     return ModelComponent(model, model.parameter_layout.from_names(values or {}), file)
 

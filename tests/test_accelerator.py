@@ -53,17 +53,17 @@ def test_closed_forms(seed):
     held = -m * p.g * e * math.sin(q)
     pressed = math.hypot(m * e * w * w * math.sin(q), m * (p.g - e * w * w * math.cos(q)))
     rubbed = 0.5 * p.pin.friction * p.pin.diameter * pressed
-    lost = (
+    losses = (
         u.load / math.hypot(w, p.brake.w_smooth) + rubbed / math.hypot(w, p.pin.w_smooth) + p.joint_damping
     ) * w
-    assert out.tau * p.ratio == pytest.approx(J * a + held + lost, rel=1e-11)
-    assert out.dissipated_power == pytest.approx(lost * w) and out.power == pytest.approx(out.tau * u.w)
+    assert out.tau * p.ratio == pytest.approx(J * a + held + losses, rel=1e-11)
+    assert out.dissipated_power == pytest.approx(losses * w) and out.power == pytest.approx(out.tau * u.w)
     by_work = s.torque(a) - s.effects["pins"].dissipative
     assert s.torque_by_reactions(a) == pytest.approx(by_work, rel=1e-11)
     for got, by in ((slopes.tau_bias_dphi, "phi"), (slopes.tau_bias_dw, "w")):
         moved = MODEL.input_layout.from_names({by: getattr(u, by) + 1e-30j}, u)
-        wanted = (MODEL.shared(numpy_(), p, moved, None).bias / p.ratio).imag / 1e-30
-        assert got == pytest.approx(float(wanted), rel=1e-10, abs=1e-12)
+        reference = (MODEL.shared(numpy_(), p, moved, None).bias / p.ratio).imag / 1e-30
+        assert got == pytest.approx(float(reference), rel=1e-10, abs=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -72,8 +72,8 @@ def test_power_is_what_is_stored_and_lost(seed):
     out = MODEL.evaluate(MATH, p, u)[0]
     moving = MODEL.input_layout.from_names({"phi": Dual(u.phi, u.w), "w": Dual(u.w, u.a)}, u)
     engine = dual(MATH)
-    stored = MODEL.parts[0].equations(engine, p, moving, None, MODEL.shared(engine, p, moving, None))
-    grows = slope(stored.kinetic_energy) + slope(stored.potential_energy)
+    stored_energy = MODEL.parts[0].equations(engine, p, moving, None, MODEL.shared(engine, p, moving, None))
+    grows = slope(stored_energy.kinetic_energy) + slope(stored_energy.potential_energy)
     size = abs(out.power) + abs(grows) + abs(out.dissipated_power)
     assert abs(out.power - grows - out.dissipated_power) < 1e-12 * size
 

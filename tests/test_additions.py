@@ -1,5 +1,5 @@
-"""How far a change reaches: each kind of addition is made to a copy of the package, in as many files as the table of
-docs/architecture.md says, and used there by the program."""
+"""The reach of a change: each kind of addition is made in a copy of the package, in the number of files that
+the table of docs/architecture.md says, and used there by the program."""
 
 from __future__ import annotations
 
@@ -103,9 +103,9 @@ class House:
     def run(self, *command: str) -> str:
         env = os.environ | {"PYTHONPATH": str(self.package.parent)}
         call = [sys.executable, "-c", "from chainunit.cli import main; main()", *command]
-        done = subprocess.run(call, cwd=self.folder, env=env, capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr
-        return done.stdout
+        process = subprocess.run(call, cwd=self.folder, env=env, capture_output=True, text=True)
+        assert process.returncode == 0, process.stderr
+        return process.stdout
 
 
 @pytest.fixture(scope="module")
@@ -142,18 +142,18 @@ def result(house):
 
 
 def test_a_machine_is_a_file_and_has_fmu_and_study(house, result):
-    said = house.run("export", "SixBar", "-o", "SixBar.fmu", "--config", "mine.toml")
-    assert said.startswith("SixBar.fmu: SixBar")
+    output = house.run("export", "SixBar", "-o", "SixBar.fmu", "--config", "mine.toml")
+    assert output.startswith("SixBar.fmu: SixBar")
     assert result["machine"]["crank_length"]["value"] == 0.1 and result["status"] == "complete"
     assert list(result["pins"]["steady"]) == ["O1 crank", "A coupler", "O3 output"]
     assert result["certificate"]["start_up"]["energy_residual_share"]["value"] < 1e-4
     # the torque of normal running, by virtual work of another route: the power that is lost over the speed
     steady = result["answers"]["steady"]
     with xr.open_dataset(house.folder / "mine" / "result.nc", group="start_up") as run:
-        time, lost = run["time"].values, run["machine.dissipated_power"].values
+        time, losses = run["time"].values, run["machine.dissipated_power"].values
         angle = run["machine.phi0"].values / 10.0
         turn = angle >= angle[-1] - 2.0 * np.pi
-        mean = np.trapezoid(lost[turn], time[turn]) / np.ptp(time[turn])
+        mean = np.trapezoid(losses[turn], time[turn]) / np.ptp(time[turn])
     assert steady["crank_torque_mean"]["value"] * steady["speed_mean"]["value"] == pytest.approx(
         mean, rel=0.02
     )

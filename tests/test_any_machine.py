@@ -1,4 +1,4 @@
-"""A study of a machine that is no chain unit has all that a study has: here sizing and random overloads."""
+"""A study of another machine than the chain unit has sizing and random overloads, too."""
 
 from __future__ import annotations
 

@@ -76,12 +76,12 @@ def test_every_peak_of_the_run_is_in_a_table(done):
     with xr.open_dataset(folder / "result.nc", group="start_up") as run:
         time, torque = run["time"].values, np.abs(run["machine.tau"].values)
     rows = [result["start_up"], result["settling"], result["answers"]["steady"]]
-    told = [row["crank_torque_peak"]["value"] for row in rows]
-    assert max(told) == pytest.approx(np.max(torque), rel=1e-9)
+    values = [row["crank_torque_peak"]["value"] for row in rows]
+    assert max(values) == pytest.approx(np.max(torque), rel=1e-9)
     # the largest comes with the feed: neither in the start nor in the steady turns
-    assert told[1] > 1.005 * max(told[0], told[2])
+    assert values[1] > 1.005 * max(values[0], values[2])
     fed = time > study.start.start_time
-    assert told[0] == pytest.approx(np.max(torque[~fed]), rel=1e-9)
+    assert values[0] == pytest.approx(np.max(torque[~fed]), rel=1e-9)
     words = said_of(study)
     assert "Settling under the feed: crank torque, peak" in words
     assert "Demands of the settling under the feed on the drive" in (folder / "result.md").read_text()
@@ -101,18 +101,19 @@ def test_the_driveline_has_its_start(done):
 
 
 def test_a_ripple_that_the_line_makes_is_not_the_flywheels(done):
-    """The motor runs evenly, the crank behind the joints does not: no flywheel is asked for, the joints are named."""
+    """The motor runs evenly, the crank behind the joints does not: the study names the joints and asks for no
+    flywheel."""
     study, _, _ = done
-    found = study.findings["flywheels"]
-    own, heavy = (wheel.answers for wheel in found.wheels)
+    findings = study.findings["flywheels"]
+    own, heavy = (wheel.answers for wheel in findings.wheels)
     w, crank = (study.steady[name].values for name in ("motor.w", "machine.w0"))
     assert own.motor_ripple == pytest.approx(np.ptp(w) / np.mean(w), rel=1e-12) and own.motor_ripple < 0.01
     assert own.speed_ripple == pytest.approx(np.ptp(crank) / np.mean(crank), rel=1e-2)
-    assert own.speed_ripple > found.permitted_fluctuation > own.motor_ripple and found.least is None
-    said = {warning.kind: warning.text for warning in study.warnings}
-    assert "make the bends equal" in said["ripple behind flywheel"]
+    assert own.speed_ripple > findings.permitted_fluctuation > own.motor_ripple and findings.least is None
+    messages = {warning.kind: warning.text for warning in study.warnings}
+    assert "make the bends equal" in messages["ripple behind flywheel"]
     # nor is a heavier one praised with which the drive swings
-    assert heavy.speed_ripple > 2.0 * own.speed_ripple and "0.100 kg m" in said["heavier flywheel worse"]
+    assert heavy.speed_ripple > 2.0 * own.speed_ripple and "0.100 kg m" in messages["heavier flywheel worse"]
     assert " at motor " in said_of(study)
 
 
@@ -188,7 +189,7 @@ def test_a_heavy_machine_is_waited_for_until_it_has_its_speed(tmp_path):
 def test_a_feed_that_comes_before_the_speed_is_told(tmp_path):
     """A machine that would take minutes to speed up is fed, and the study says with which speed."""
     study = _heavy(400.0, tmp_path)
-    (told,) = [each for each in study.warnings if each.kind == "fed before speed"]
-    assert told.quantities["fed"][0] == study.fed_from and study.start.start_time is None
-    assert told.quantities["speed"][0] < 0.5 * study.config.run.crank_speed
-    assert "larger motor" in told.text
+    (remarks,) = [each for each in study.warnings if each.kind == "fed before speed"]
+    assert remarks.quantities["fed"][0] == study.fed_from and study.start.start_time is None
+    assert remarks.quantities["speed"][0] < 0.5 * study.config.run.crank_speed
+    assert "larger motor" in remarks.text

@@ -60,10 +60,10 @@ def test_the_same_is_compiled_once_and_nothing_else(counting, monkeypatch):
     compile_code(compiler, ARGUMENTS, FILES | {"b.h": b""}, "a.o")
     assert calls() == 4
     # another version of the compiler
-    changed = Compiler(compiler.command, zig=False)
+    variant = Compiler(compiler.command, zig=False)
     with Path(compiler.command[0]).open("a") as file:
         file.write("\n")
-    compile_code(changed, ARGUMENTS, FILES, "a.o")
+    compile_code(variant, ARGUMENTS, FILES, "a.o")
     assert calls() == 5
     # where headers are looked for
     monkeypatch.setenv("CPATH", "/nowhere")
@@ -81,7 +81,7 @@ def test_a_failure_is_not_entry(counting, store):
 
 
 def test_a_second_export_compiles_nothing(counting, tmp_path, monkeypatch):
-    """Nor does one with other start values compile the kernels again."""
+    """An FMU with other start values does not compile the kernels again, either."""
     compiler, calls = counting
     monkeypatch.setattr(platforms, "compiler", lambda: compiler)
     first, again, other = (tmp_path / f"{n}.fmu" for n in range(3))
@@ -167,7 +167,7 @@ def test_it_is_bounded_and_keeps_what_was_used_last(store, monkeypatch):
 
 
 def test_files_of_others_stay(store, monkeypatch):
-    """A user may name a folder in which other files lie; nothing but entries counts or goes."""
+    """A user may name a folder with other files: only entries of the cache count and are deleted."""
     monkeypatch.setattr(cache, "_MOST", 1000)
     store.mkdir(parents=True)
     others = [folder / name for folder in (store, store.parent) for name in ("study.toml", "data.part", "x")]

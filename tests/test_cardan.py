@@ -20,9 +20,9 @@ POINTS = json.loads((Path(__file__).parent / "data" / "cardan.json").read_text()
 
 
 def case(point):
-    given = dict(point["inputs"])
-    phi2 = given.pop("phi2")
-    return Cardan(**given), phi2
+    values = dict(point["inputs"])
+    phi2 = values.pop("phi2")
+    return Cardan(**values), phi2
 
 
 @pytest.mark.parametrize("point", POINTS, ids=lambda p: str(p["id"]))
@@ -32,8 +32,8 @@ def test_reference_points(point):
     assert i == pytest.approx(point["i23"], rel=1e-12)
     # an angle of a yoke is the same after half a turn
     assert math.sin(gamma2 - point["gamma2"]) == pytest.approx(0.0, abs=1e-12)
-    printed = cardan.ratio_of_paper(MATH, p, point["gamma1"], point["gamma2"])
-    assert printed == pytest.approx(point["i23_printed_formula"], rel=1e-12)
+    printout = cardan.ratio_of_paper(MATH, p, point["gamma1"], point["gamma2"])
+    assert printout == pytest.approx(point["i23_printed_formula"], rel=1e-12)
     assert cardan.frozen_frequency(MATH, p, i) == pytest.approx(point["k_eig"], rel=1e-12)
 
 
@@ -137,15 +137,15 @@ def test_the_range_has_a_condition(J1):
 
 def test_a_bend_near_a_right_angle_makes_it_low_or_high():
     """Item 4: 89/10 deg at gamma = 60 deg gives 3.94 rad/s, 10/89 deg 99.97; at gamma = 0 the other way round."""
-    found = {}
+    results = {}
     for a1, a2 in ((89.0, 10.0), (10.0, 89.0)):
         for gamma in (0.0, 60.0):
             p = Cardan(alpha1=math.radians(a1), alpha2=math.radians(a2), J1=1.0, J4=1000.0, c2=1e4, c3=1e4)
             g = math.radians(gamma)
             i = cardan.ratio_of_paper(MATH, p, g, g)
-            found[a1, gamma] = cardan.frozen_frequency(MATH, p, i)
-    assert found[89.0, 60.0] < 5.0 and found[10.0, 60.0] > 99.9
-    assert found[89.0, 0.0] > 99.9 and found[10.0, 0.0] < 5.0
+            results[a1, gamma] = cardan.frozen_frequency(MATH, p, i)
+    assert results[89.0, 60.0] < 5.0 and results[10.0, 60.0] > 99.9
+    assert results[89.0, 0.0] > 99.9 and results[10.0, 0.0] < 5.0
 
 
 def test_what_raises_the_frequency():
@@ -192,8 +192,8 @@ def test_free_vibration_with_the_true_joint(point):
         return x[1]
 
     passes.direction = -1.0
-    solved = free(p, start, (turns + 0.5) * 2.0 * math.pi / k, 1e-10, events=passes)
-    times = solved.t_events[0]
+    solution = free(p, start, (turns + 0.5) * 2.0 * math.pi / k, 1e-10, events=passes)
+    times = solution.t_events[0]
     # the start is such a pass
     times = times[times > 0.5 * math.pi / k]
     period = (times[-1] - times[0]) / (len(times) - 1)
@@ -208,9 +208,9 @@ def test_energy_over_a_thousand_periods(speed):
     phi3, i, _ = cardan.two_joints(MATH, p, 0.0)
     k = cardan.frozen_frequency(MATH, p, i)
     start = [2e-3, speed, phi3, speed * i]
-    solved = free(p, start, 1000 * 2.0 * math.pi / k, 1e-11)
-    assert solved.success
-    phi1, w1, phi4, w4 = solved.y[:, :: max(1, solved.y.shape[1] // 2000)]
+    solution = free(p, start, 1000 * 2.0 * math.pi / k, 1e-11)
+    assert solution.success
+    phi1, w1, phi4, w4 = solution.y[:, :: max(1, solution.y.shape[1] // 2000)]
     springs = Twist(numpy_(), p, phi1, w1, phi4, w4).energy
     kinetic = 0.5 * (p.J1 * w1**2 + p.J4 * w4**2)
     energy = kinetic + springs
@@ -234,9 +234,9 @@ def test_energy_over_a_thousand_periods(speed):
     ],
 )
 def test_bad_cases_are_refused_in_one_line(values, named):
-    with pytest.raises(InputError) as refused:
+    with pytest.raises(InputError) as refusal:
         cardan.check(Cardan(**values))
-    assert named in str(refused.value) and "\n" not in str(refused.value)
+    assert named in str(refusal.value) and "\n" not in str(refusal.value)
 
 
 def test_torsion_constants():

@@ -59,8 +59,8 @@ def test_table_is_whole():
 
 def test_headings_are_the_declarations():
     text = (resources.files("chainunit") / "data" / "motors.csv").read_text("utf-8")
-    declared = {heading(v) for v in LAYOUT.variables}
-    assert set(next(csv.reader(io.StringIO(text)))) - {"designation", "source"} <= declared
+    declarations = {heading(v) for v in LAYOUT.variables}
+    assert set(next(csv.reader(io.StringIO(text)))) - {"designation", "source"} <= declarations
     assert heading(LAYOUT.variables[LAYOUT.names.index("speed")]) == "speed [rev/min]"
 
 
@@ -93,11 +93,11 @@ def test_values_vary_smoothly_with_size():
 
 def test_a_motor_is_found_by_its_designation():
     wanted = MOTORS[22]
-    found = motor_of_catalogue(wanted.designation)
-    assert found == wanted
-    model, parameters = found.model()
+    result = motor_of_catalogue(wanted.designation)
+    assert result == wanted
+    model, parameters = result.model()
     assert model is InductionMotor
-    assert parameters == found.identify().parameters and not model.follows(parameters)
+    assert parameters == result.identify().parameters and not model.follows(parameters)
     with pytest.raises(InputError, match=r'"IE3 4-pole 2 kW": not in the catalogue.*"IE3 4-pole 22 kW, '):
         motor_of_catalogue("IE3 4-pole 2 kW")
 
@@ -108,16 +108,16 @@ def test_a_motor_is_found_by_its_designation():
 @pytest.mark.parametrize("motor", MOTORS, ids=lambda m: m.designation)
 def test_every_motor_has_its_circuit(motor):
     """Residuals are rounding, below 1e-9; the parameters are those of a motor and no artefact of a bound."""
-    found = motor.identify()
-    assert abs(found.worst[1]) < 1e-9, found.worst
-    p, n = found.parameters, motor.nameplate
+    result = motor.identify()
+    assert abs(result.worst[1]) < 1e-9, result.worst
+    p, n = result.parameters, motor.nameplate
     InductionMotor.check(p)
     base = n.voltage**2 / n.apparent_power
     X_l, X_m = (100.0 * math.pi * L / base for L in (p.cage.L, p.main.L))
     assert 0.015 < p.stator.R / base < 0.11 and 0.005 < p.cage.R / base < 0.08
     assert 0.08 < X_l < 0.3 and 1.2 < X_m < 3.5
     assert 0.0 < p.cage.skin_R < 4.0 and 0.0 < p.cage.skin_L < 0.35
-    assert 0.05 < found.breakdown.slip < 0.5
+    assert 0.05 < result.breakdown.slip < 0.5
     # what was fitted is what the model does, by functions of their own
     warm = p.ambient.T + TYPICAL.rise
     assert breakdown(p, T=warm).tau == pytest.approx(n.breakdown_ratio * n.torque, rel=1e-8)
@@ -160,18 +160,18 @@ def test_fit_is_deterministic_and_kept():
 def test_given_current_is_met():
     derived = plate().rated_current
     assert derived == pytest.approx(2200.0 / (0.867 * 0.80 * math.sqrt(3.0) * 400.0))
-    found = identify(plate(current=1.02 * derived))
-    assert found.rated.i == pytest.approx(1.02 * derived, rel=1e-9)
+    result = identify(plate(current=1.02 * derived))
+    assert result.rated.i == pytest.approx(1.02 * derived, rel=1e-9)
     # the supply power follows the current; the efficiency on the nameplate is off by as much
-    assert found.worst == ("efficiency", pytest.approx(1.0 / 1.02 - 1.0, rel=1e-6))
+    assert result.worst == ("efficiency", pytest.approx(1.0 / 1.02 - 1.0, rel=1e-6))
 
 
 def test_other_supply_and_assumptions():
     american = plate(voltage=460.0, frequency=60.0, speed=1755.0 * RPM)
     assumed = Assumptions(friction=0.02, rise=60.0, time_constant=1800.0, growth=0.0)
-    found = identify(american, assumed)
-    p = found.parameters
-    assert abs(found.worst[1]) < 1e-9 and (p.supply.V, p.supply.f) == (460.0, 60.0)
+    result = identify(american, assumed)
+    p = result.parameters
+    assert abs(result.worst[1]) < 1e-9 and (p.supply.V, p.supply.f) == (460.0, 60.0)
     assert p.rotor.d * american.speed**2 == pytest.approx(0.02 * 2200.0)
     assert p.stator.R_th * p.stator.C == pytest.approx(1800.0)
 
@@ -188,11 +188,11 @@ def test_what_small_motors_lose_in_iron_shows_as_a_residual():
         locked_torque_ratio=2.7,
         locked_current_ratio=6.6,
     )
-    found = identify(small)
-    assert found.worst[0] == "efficiency" and 0.03 < found.worst[1] < 0.07
-    assert abs(found.residuals["power_factor"]) < 0.06
-    rest = set(found.residuals) - {"efficiency", "power_factor"}
-    assert max(abs(found.residuals[name]) for name in rest) < 0.02
+    result = identify(small)
+    assert result.worst[0] == "efficiency" and 0.03 < result.worst[1] < 0.07
+    assert abs(result.residuals["power_factor"]) < 0.06
+    rest = set(result.residuals) - {"efficiency", "power_factor"}
+    assert max(abs(result.residuals[name]) for name in rest) < 0.02
 
 
 @pytest.mark.parametrize(
@@ -221,9 +221,9 @@ def test_what_small_motors_lose_in_iron_shows_as_a_residual():
     ],
 )
 def test_contradictory_nameplates_are_refused(given, said):
-    with pytest.raises(InputError, match=said) as refused:
+    with pytest.raises(InputError, match=said) as refusal:
         identify(plate(**given))
-    assert "\n" not in str(refused.value)
+    assert "\n" not in str(refusal.value)
 
 
 def test_assumptions_out_of_bounds_are_refused():
@@ -278,14 +278,14 @@ def test_own_motors_stand_behind_the_packaged(tmp_path):
 
 
 def test_columns_may_have_any_unit_of_their_kind(tmp_path):
-    given = {name: value for name, value in ROW.items() if "[" not in name}
-    given |= {
+    values = {name: value for name, value in ROW.items() if "[" not in name}
+    values |= {
         "power [W]": "2200",
         "speed [rad/s]": str(PLATE["speed"]),
         "J [g.m2]": "8.6",
         "locked_time [min]": "0.2",
     }
-    (own,) = catalogue(csv_file(tmp_path, given))[54:]
+    (own,) = catalogue(csv_file(tmp_path, values))[54:]
     for name, value in PLATE.items():
         assert getattr(own.nameplate, name) == pytest.approx(value, rel=1e-9)
 
@@ -308,9 +308,9 @@ def test_columns_may_have_any_unit_of_their_kind(tmp_path):
 )
 def test_bad_rows_are_refused(tmp_path, column, cell, said):
     file = csv_file(tmp_path, ROW, ROW | {"designation": "fan"} | {column: cell})
-    with pytest.raises(InputError, match=said) as refused:
+    with pytest.raises(InputError, match=said) as refusal:
         catalogue(file)
-    assert str(refused.value).startswith(f"{file}:") and "\n" not in str(refused.value)
+    assert str(refusal.value).startswith(f"{file}:") and "\n" not in str(refusal.value)
 
 
 def test_all_wrong_cells_are_told_at_once(tmp_path):
@@ -322,9 +322,9 @@ def test_all_wrong_cells_are_told_at_once(tmp_path):
     file = csv_file(tmp_path, *rows)
     with file.open("a", encoding="utf-8") as stream:
         stream.write("a,b\n")
-    with pytest.raises(InputError) as refused:
+    with pytest.raises(InputError) as refusal:
         catalogue(file)
-    said = [line.removeprefix(f"{file}:") for line in str(refused.value).splitlines()]
+    messages = [line.removeprefix(f"{file}:") for line in str(refusal.value).splitlines()]
     begins = [
         "2: column power = -1000 W: must be > 0 W",
         '2: column poles = "four": must be a pure number',
@@ -334,20 +334,20 @@ def test_all_wrong_cells_are_told_at_once(tmp_path):
         '4: column designation = "fan": stands in the catalogue already',
         "5: has 2 cells; must have",
     ]
-    assert len(said) == len(begins)
-    for line, begin in zip(said, begins, strict=True):
+    assert len(messages) == len(begins)
+    for line, begin in zip(messages, begins, strict=True):
         assert line.startswith(begin), line
-    assert 'was "4.9" meant?' in said[2]
+    assert 'was "4.9" meant?' in messages[2]
 
 
 def test_all_wrong_headings_are_told_at_once(tmp_path):
     file = tmp_path / "own.csv"
     file.write_text("designation,pwer [kW],speed [kg],source [m],poles,poles\n")
-    with pytest.raises(InputError) as refused:
+    with pytest.raises(InputError) as refusal:
         catalogue(file)
-    said = [line.removeprefix(f"{file}:1: ") for line in str(refused.value).splitlines()]
-    assert said[0].startswith('heading "pwer [kW]": unknown; was "power" meant?')
-    assert said[1:] == [
+    messages = [line.removeprefix(f"{file}:1: ") for line in str(refusal.value).splitlines()]
+    assert messages[0].startswith('heading "pwer [kW]": unknown; was "power" meant?')
+    assert messages[1:] == [
         'heading "speed [kg]": must have a unit such as speed [rev/min]',
         'heading "source [m]": has no unit',
         "column poles: stands twice",
@@ -359,14 +359,14 @@ def test_missing_columns_are_told_once_beside_wrong_cells(tmp_path):
     columns = {name: cell for name, cell in ROW.items() if name not in ("poles", "J [kg.m2]")}
     rows = [columns | {"power [kW]": "-1"}, columns | {"designation": "fan", "efficiency": "x"}]
     file = csv_file(tmp_path, *rows)
-    with pytest.raises(InputError) as refused:
+    with pytest.raises(InputError) as refusal:
         catalogue(file)
-    said = [line.removeprefix(f"{file}:") for line in str(refused.value).splitlines()]
-    assert said[:2] == [
+    messages = [line.removeprefix(f"{file}:") for line in str(refusal.value).splitlines()]
+    assert messages[:2] == [
         '1: column poles: is missing; add the heading "poles"',
         '1: column J: is missing; add the heading "J [kg.m2]"',
     ]
-    assert [line.partition(" = ")[0] for line in said[2:]] == ["2: column power", "3: column efficiency"]
+    assert [line.partition(" = ")[0] for line in messages[2:]] == ["2: column power", "3: column efficiency"]
 
 
 def test_thousands_with_blanks_have_the_unit_of_their_column(tmp_path):
@@ -380,10 +380,10 @@ def test_wrong_values_of_a_toml_catalogue_have_their_own_lines(tmp_path):
     file.write_text(
         f"# own\n\n{TOML}\n{TOML}".replace("2200.0", '"2 m"', 1).replace("poles = 4.0", "poles = []", 1)
     )
-    with pytest.raises(InputError) as refused:
+    with pytest.raises(InputError) as refusal:
         catalogue(file)
-    said = [line.removeprefix(f"{file}:") for line in str(refused.value).splitlines()]
-    assert [line.partition(" = ")[0] for line in said] == [
+    messages = [line.removeprefix(f"{file}:") for line in str(refusal.value).splitlines()]
+    assert [line.partition(" = ")[0] for line in messages] == [
         "5: motor 1: power", "6: motor 1: poles", "16: motor 2: designation",
     ]  # fmt: skip
 
@@ -419,10 +419,10 @@ def test_wrong_values_of_a_toml_catalogue_have_their_own_lines(tmp_path):
 def test_bad_files_are_refused(tmp_path, name, text, said):
     file = tmp_path / name
     file.write_text(text)
-    with pytest.raises(InputError) as refused:
+    with pytest.raises(InputError) as refusal:
         catalogue(file)
-    assert str(refused.value).startswith(f"{file}:") and said in str(refused.value)
-    assert "\n" not in str(refused.value)
+    assert str(refusal.value).startswith(f"{file}:") and said in str(refusal.value)
+    assert "\n" not in str(refusal.value)
 
 
 def test_unreadable_files_are_refused(tmp_path):
@@ -442,9 +442,9 @@ def test_transmission_loses_power_whichever_way_it_flows():
     t = Transmission(ratio=12.0, efficiency=0.9, d=0.002)
     for torque in (-50.0, 0.0, 80.0):
         for w in (-100.0, -1.0, 1.0, 100.0):
-            lost = motor_side(xp, t, torque, w) * w - torque * w / t.ratio
+            losses = motor_side(xp, t, torque, w) * w - torque * w / t.ratio
             by_torque = (1.0 / 0.9 - 1.0) * abs(torque * w) / t.ratio
-            assert lost == pytest.approx(by_torque + 0.002 * w * w, rel=1e-9)
+            assert losses == pytest.approx(by_torque + 0.002 * w * w, rel=1e-9)
     forward = motor_side(xp, t, 80.0, 100.0) - t.d * 100.0
     assert forward == pytest.approx(80.0 / (12.0 * 0.9))
     assert motor_side(xp, t, -80.0, 100.0) - t.d * 100.0 == pytest.approx(-80.0 * (2.0 - 1.0 / 0.9) / 12.0)

@@ -50,14 +50,14 @@ def test_the_split_is_the_references():
 def test_static_reference(case):
     psi = math.radians(case["psi_deg"])
     if case["N"] == "catenary":
-        found = hanging.catenary([M["l1"], M["l2"]], [M["m1"] * G, M["m2"] * G], reach(psi))
+        result = hanging.catenary([M["l1"], M["l2"]], [M["m1"] * G, M["m2"] * G], reach(psi))
     else:
         lengths, masses = organ(case["N"])
-        found = hanging.rods(lengths, masses * G, reach(psi))
-        assert np.min(found.pull) == pytest.approx(case["min_mean_axial_pull"], rel=1e-8)
+        result = hanging.rods(lengths, masses * G, reach(psi))
+        assert np.min(result.pull) == pytest.approx(case["min_mean_axial_pull"], rel=1e-8)
         if "theta" in case:
-            np.testing.assert_allclose(found.theta, case["theta"], atol=1e-8)
-    assert loads(found, psi) == pytest.approx((case["Rt"], case["Rn"]), rel=1e-8)
+            np.testing.assert_allclose(result.theta, case["theta"], atol=1e-8)
+    assert loads(result, psi) == pytest.approx((case["Rt"], case["Rn"]), rel=1e-8)
 
 
 def test_rods_tend_to_the_catenary_with_the_second_order():
@@ -82,8 +82,8 @@ def test_a_catenary_is_the_textbooks():
 
     for distance in (0.2, 0.8, 0.99):
         H = brentq(lambda H, d=distance: 2.0 * H / 9.0 * math.sinh(9.0 * d / (2.0 * H)) - 1.0, 0.05, 1e3)
-        found = hanging.catenary([0.4, 0.6], [3.6, 5.4], [distance, 0.0])
-        assert found.first == pytest.approx([-H, 4.5], rel=1e-9)
+        result = hanging.catenary([0.4, 0.6], [3.6, 5.4], [distance, 0.0])
+        assert result.first == pytest.approx([-H, 4.5], rel=1e-9)
 
 
 def test_two_bars_are_the_machines_statics():
@@ -92,9 +92,9 @@ def test_two_bars_are_the_machines_statics():
     for psi in np.radians([-12.0, 0.0, 7.0]):
         chamber = machine.chamber(psi, left=feed, right=feed)
         for side, hand in (("left", 1.0), ("right", -1.0)):
-            found = machine.hanging(side, float(psi), feed, 2)
+            result = machine.hanging(side, float(psi), feed, 2)
             expected = getattr(chamber, side).rocker_joint
-            assert found.last == pytest.approx([hand * float(expected.fx), float(expected.fy)], rel=1e-9)
+            assert result.last == pytest.approx([hand * float(expected.fx), float(expected.fy)], rel=1e-9)
 
 
 def test_random_chains_hang_or_are_refused():
@@ -109,15 +109,15 @@ def test_random_chains_hang_or_are_refused():
         angle = rng.uniform(-np.pi, np.pi)
         to = lengths.sum() * rng.uniform(0.02, 0.999) * np.array([np.cos(angle), np.sin(angle)])
         try:
-            found = hanging.rods(lengths, weights, to)
+            result = hanging.rods(lengths, weights, to)
         except GeometryError as refused:
             assert "would lie across between two parts that hang straight" in str(refused)
             assert abs(to[0]) <= np.max(lengths)
             continue
         hung += 1
-        at = np.array([np.sin(found.theta), -np.cos(found.theta)]) @ lengths
+        at = np.array([np.sin(result.theta), -np.cos(result.theta)]) @ lengths
         np.testing.assert_allclose(at, to, atol=1e-10 * lengths.sum())
-        assert found.first + found.last == pytest.approx([0.0, weights.sum()], rel=1e-12, abs=1e-9)
+        assert result.first + result.last == pytest.approx([0.0, weights.sum()], rel=1e-12, abs=1e-9)
     assert hung > 1500
     with pytest.raises(GeometryError, match=r"length of the chain = 2 m: must be > 2.5 m"):
         hanging.rods([1.0, 1.0], [1.0, 1.0], [1.5, 2.0])
@@ -130,9 +130,9 @@ def test_modes_of_a_taut_chain_are_a_strings():
     lengths, weights = np.full(N, length / N), np.full(N, G / N)
     rest = hanging.rods(lengths, weights, [1.0, 0.0])
     per_length = math.sqrt(abs(rest.first[0]) / 1.0)
-    found = hanging.modes(lengths, weights, rest, G).frequency[:4] / per_length
+    result = hanging.modes(lengths, weights, rest, G).frequency[:4] / per_length
     symmetric = [2.0 * x for x in (4.493409457909064, 7.725251836937707)]
-    assert found == pytest.approx([2 * math.pi, symmetric[0], 4 * math.pi, symmetric[1]], rel=2e-3)
+    assert result == pytest.approx([2 * math.pi, symmetric[0], 4 * math.pi, symmetric[1]], rel=2e-3)
 
 
 def test_modes_are_those_of_the_recursion():
@@ -176,14 +176,14 @@ def test_recursion_is_the_dense_solution():
         right += moments[1:] - moments[:-1]
         along = n * l
         system = np.block([[mass, -along.T], [along, np.zeros((2, 2))]])
-        solved = np.linalg.solve(system, [*right, *(np.array([end.x, end.y]) + (u * l) @ omega**2)])
-        np.testing.assert_allclose(chain.rates, solved[:N], rtol=1e-9, atol=1e-9)
+        solution = np.linalg.solve(system, [*right, *(np.array([end.x, end.y]) + (u * l) @ omega**2)])
+        np.testing.assert_allclose(chain.rates, solution[:N], rtol=1e-9, atol=1e-9)
         last = chain.forces[-1]
-        np.testing.assert_allclose([last.x, last.y], solved[N:], rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose([last.x, last.y], solution[N:], rtol=1e-9, atol=1e-9)
 
 
 def test_projection_closes_and_is_nearest():
-    """The end is where it is wanted; the change is the smallest in the metric of the masses: a second projection
+    """The end comes to the given place; the change is the smallest in the metric of the masses: a second projection
     from a point moved along the constraint comes back to no nearer one."""
     rng = np.random.default_rng(13)
     lengths, masses = organ(8)
@@ -192,12 +192,12 @@ def test_projection_closes_and_is_nearest():
     omega = list(rng.uniform(-1.0, 1.0, 8))
     to = Motion(Vec2(*reach(0.1)), Vec2(0.3, -0.2))
     off = [a + 1e-3 * x for a, x in zip(theta, rng.uniform(-1.0, 1.0, 8), strict=True)]
-    found, speeds = close(MATH, rods, off, omega, to)
-    end = end_motion(rods, found, speeds, MATH)
+    result, speeds = close(MATH, rods, off, omega, to)
+    end = end_motion(rods, result, speeds, MATH)
     assert math.hypot(end.p.x - to.p.x, end.p.y - to.p.y) < 1e-12
     assert math.hypot(end.p1.x - to.p1.x, end.p1.y - to.p1.y) < 1e-12
-    again, _ = close(MATH, rods, found, speeds, to)
-    np.testing.assert_allclose(again, found, atol=1e-13)
+    again, _ = close(MATH, rods, result, speeds, to)
+    np.testing.assert_allclose(again, result, atol=1e-13)
 
 
 def rocker(phi, w):
@@ -242,10 +242,12 @@ def test_dynamic_reference(case, hand):
 
     times = np.array(data["t"]) - data["t"][0]
     start = [*data["theta"][0], *data["omega"][0]]
-    solved = solve_ivp(rates, (0.0, times[-1]), start, method="DOP853", rtol=1e-9, atol=1e-9, t_eval=times).y
+    solution = solve_ivp(
+        rates, (0.0, times[-1]), start, method="DOP853", rtol=1e-9, atol=1e-9, t_eval=times
+    ).y
     for k in range(0, 20, 4):
         psi, speed, rate = (hand * x for x in rocker(data["phi"][k], w))
-        state = list(solved[:N, k]), list(solved[N:, k])
+        state = list(solution[:N, k]), list(solution[N:, k])
         f = Chain(MATH, rods, *state, G, speed, acceleration(psi, speed, rate)).forces
         np.testing.assert_allclose([f[-1].x, -f[-1].y], data["A2"][k], atol=1e-6 * peak)
 
@@ -276,6 +278,6 @@ def test_two_rods_in_motion_are_the_two_bar_machine():
             (chain.forces[0], left.support, -1.0), (chain.forces[1], left.hinge, 1.0), (chain.forces[2],
             left.rocker_joint, 1.0)
         ):  # fmt: skip
-            wanted = [float(expected.fx), float(expected.fy)]
-            assert [sign * force.x, sign * force.y] == pytest.approx(wanted, rel=1e-9, abs=1e-8)
+            reference = [float(expected.fx), float(expected.fy)]
+            assert [sign * force.x, sign * force.y] == pytest.approx(reference, rel=1e-9, abs=1e-8)
         assert chain.rates[0] == pytest.approx(wall.t1 * rate + wall.t2 * speed * speed, rel=1e-9, abs=1e-9)

@@ -33,13 +33,13 @@ crank_angle = "180 deg"
 
 
 def test_a_lump_that_the_web_folds_before_is_told(tmp_path):
-    """On one stroke the web is pulled and the drive feels it; on the other it folds."""
+    """On one stroke the lump pulls the web and loads the drive; on the other stroke the web folds."""
     study = run_study(parse(SHORT + LUMPS), tmp_path)
     peaks = {run: study.answers[run].crank_torque_peak for run in ("steady", "jam_right", "pulled")}
     assert peaks["pulled"] > 2.0 * peaks["jam_right"] and peaks["jam_right"] < 1.1 * peaks["steady"], peaks
-    told = [remark for remark in study.warnings if remark.kind == "lump not felt"]
-    assert [remark.runs for remark in told] == [("jam_right",)]
-    assert 'crank_angle = "180 deg"' in told[0].text
+    remarks = [remark for remark in study.warnings if remark.kind == "lump not felt"]
+    assert [remark.runs for remark in remarks] == [("jam_right",)]
+    assert 'crank_angle = "180 deg"' in remarks[0].text
 
 
 def test_random_overloads_of_chains(tmp_path):

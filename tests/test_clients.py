@@ -66,7 +66,7 @@ SIMULATE = """
 
 @pytest.fixture(scope="module", params=ALONE)
 def alone(request, tmp_path_factory):
-    """A model by itself, by version of FMI, and what is read of it."""
+    """Single FMUs by version of FMI, and the variables that are read from them."""
     folder, (start, names) = tmp_path_factory.mktemp("clients"), ALONE[request.param]
     model = MODELS[request.param]
     return {fmi: export(model, folder / f"{request.param}{fmi}.fmu", start, fmi=fmi) for fmi in (2, 3)}, names
@@ -143,11 +143,11 @@ def here(package):
 
 
 def values(script, *arguments, **environment):
-    """What a script prints as JSON after the word "values"."""
+    """The JSON that a script prints after the word "values"."""
     command = [sys.executable, "-c", textwrap.dedent(script), *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, env=os.environ | environment)
-    assert done.returncode == 0, (done.stdout + done.stderr)[-2000:]
-    (line,) = [line for line in done.stdout.splitlines() if line.startswith("values ")]
+    process = subprocess.run(command, capture_output=True, text=True, env=os.environ | environment)
+    assert process.returncode == 0, (process.stdout + process.stderr)[-2000:]
+    (line,) = [line for line in process.stdout.splitlines() if line.startswith("values ")]
     return json.loads(line.removeprefix("values "))
 
 
@@ -160,7 +160,7 @@ def simulated(file, names, **more):
 
 
 def by_fmpy(file, names):
-    """What is read after 0.5 s."""
+    """The values of the variables after 0.5 s."""
     run = fmpy.simulate_fmu(
         str(file), fmi_type="CoSimulation", stop_time=0.5, output_interval=1e-3, output=names
     )
@@ -239,8 +239,8 @@ def test_ecos_connects(pair, jacobi, outputs, fmi):
                 print("values", json.dumps([simulation.get_real(full(name)) for name in names]))
     """
     files = {name: str(file) for name, file in pair[fmi].items()}
-    given = (files, CONNECTIONS, PARAMETERS | INPUTS, STEP, STEPS, outputs)
-    assert in_ecos(script, *map(json.dumps, given)) == pytest.approx(jacobi[1], rel=1e-12)
+    inputs = (files, CONNECTIONS, PARAMETERS | INPUTS, STEP, STEPS, outputs)
+    assert in_ecos(script, *map(json.dumps, inputs)) == pytest.approx(jacobi[1], rel=1e-12)
 
 
 @here("fmu_manipulation_toolbox")
@@ -255,11 +255,11 @@ def test_fmu_manipulation_toolbox(alone, fmi, tmp_path):
         str(files[fmi]),
         "-check",
     ]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
-    said = done.stdout + done.stderr
-    assert done.returncode == 0 and "No semantic error" in said and f"compliant with FMI-{fmi}.0" in said, (
-        said
-    )
+    process = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
+    output = process.stdout + process.stderr
+    assert (
+        process.returncode == 0 and "No semantic error" in output and f"compliant with FMI-{fmi}.0" in output
+    ), output
 
 
 def fmucontainer(files, outputs, fmi, sequential, folder):
@@ -293,8 +293,8 @@ def fmucontainer(files, outputs, fmi, sequential, folder):
         str(folder),
     ]
     command += ["-container", "container.json", "-fmi", str(fmi)]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout + done.stderr
+    process = subprocess.run(command, capture_output=True, text=True)
+    assert process.returncode == 0, process.stdout + process.stderr
     return folder / "container.fmu"
 
 
@@ -395,8 +395,8 @@ def test_fmpy_compile(kind, pair, fmi, tmp_path):
                 sources.writestr(name, original.read(name))
     command = [sys.executable, "-m", "fmpy", "compile", str(rebuilt)]
     environment = os.environ | {"PATH": SCRIPTS}
-    done = subprocess.run(command, capture_output=True, text=True, env=environment)
-    assert done.returncode == 0, done.stdout + done.stderr
+    process = subprocess.run(command, capture_output=True, text=True, env=environment)
+    assert process.returncode == 0, process.stdout + process.stderr
     names = "phi w armature.i armature.T load_energy a tau v supply_power heat".split()
     start = {"start_values": {"w_ref": 100.0, "load.tau_bias": 1.0, "load.J": 0.002}}
     one, two = (simulated(file, names, **start) for file in (pair[fmi]["motor"], rebuilt))

@@ -37,7 +37,8 @@ LINE = '[driveline]\nJ4 = 2\nc2 = 6000\nc3 = 6000\nd2 = 15\nd3 = 15\nalpha1 = "5
     ("organ", "more", "trip"), [("chain", CHAIN, 250), ("two-bar", "", 250), ("chain", CHAIN + LINE, 250)]
 )
 def test_it_goes_on_as_the_same_machine(organ, more, trip, tmp_path, monkeypatch):
-    """Positions, speeds and energy do not jump as the coupling opens; what it loses from then on it dissipates."""
+    """Positions, speeds and energy do not jump as the coupling opens; from then on the loss of energy is its
+    dissipation."""
     monkeypatch.setattr("chainunit.study.run._chains", lambda *_: None)
     text = STUDY.format(organ=organ, more=more, trip=trip)
     study = run_study(config.parse(text), tmp_path)
@@ -53,11 +54,11 @@ def test_it_goes_on_as_the_same_machine(organ, more, trip, tmp_path, monkeypatch
         size = max(0.3, abs(float(run[name][-1])))
         assert float(coasting[name][0]) == pytest.approx(float(run[name][-1]) + added, abs=1e-3 * size), name
     held = coasting["machine.kinetic_energy"] + coasting["machine.potential_energy"]
-    lost = cumulative_simpson(
+    losses = cumulative_simpson(
         coasting["machine.dissipated_power"].values, x=coasting["time"].values, initial=0
     )
-    gap = held.values - held.values[0] + lost
-    assert np.max(np.abs(gap)) < 5e-3 * np.max(lost)
+    gap = held.values - held.values[0] + losses
+    assert np.max(np.abs(gap)) < 5e-3 * np.max(losses)
     assert not [remark for remark in study.notes if "two bars" in remark.text]
     answers = study.answers["jam_left"]
     assert answers.energy_behind == pytest.approx(float(coasting["machine.kinetic_energy"][0]))

@@ -1,4 +1,5 @@
-"""Generated C: each operation once, the results of CasADi's own evaluation to the last bit, only what is wanted."""
+"""Generated C has each operation once, gives the results of CasADi to the last bit, and computes only requested
+outputs."""
 
 from __future__ import annotations
 
@@ -66,14 +67,14 @@ def test_only_what_is_wanted_is_written_and_right(called, longest, monkeypatch):
     program = code.Program("some", arguments, groups, offsets, "OFTEN")
     exact = casadi.Function("f", arguments, [casadi.vertcat(*groups)])
     rng = np.random.default_rng(1)
-    for wanted in (1, 2, 4, 5, 7):
-        given = [rng.uniform(-2.0, 2.0, 3), rng.uniform(-2.0, 2.0, 2)]
-        rows = np.split(np.array(exact(*given)).ravel(), np.cumsum([g.numel() for g in groups])[:-1])
+    for reference in (1, 2, 4, 5, 7):
+        values = [rng.uniform(-2.0, 2.0, 3), rng.uniform(-2.0, 2.0, 2)]
+        rows = np.split(np.array(exact(*values)).ravel(), np.cumsum([g.numel() for g in groups])[:-1])
         want = np.full(50, np.nan)
         for bit, (offset, row) in enumerate(zip(offsets, rows, strict=True)):
-            if wanted >> bit & 1:
+            if reference >> bit & 1:
                 want[offset : offset + len(row)] = row
-        np.testing.assert_array_equal(called(program, given, wanted), want)
+        np.testing.assert_array_equal(called(program, values, reference), want)
 
 
 def test_each_operation_stands_once():

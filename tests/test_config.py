@@ -1,4 +1,4 @@
-"""Study files: one line that names the field, its value and what is allowed."""
+"""Study files: a refusal is one line with the field, its value and the allowed range."""
 
 from __future__ import annotations
 
@@ -203,11 +203,11 @@ def test_a_refused_geometry_names_the_lengths_that_are_the_examples():
     twice = {"r": 0.3, "l": 3.0, "h": 2.0, "l1": 2.7, "l2": 1.08, "e": 1.62, "z": 1.70763}
     text = "[machine]\n" + "\n".join(f"{name} = {value}" for name, value in twice.items())
     taken = "; not in the file, so at the declared start value: c = 1.49248, hy = 1"
-    with pytest.raises(InputError) as refused:
+    with pytest.raises(InputError) as refusal:
         parse(text)
-    assert str(refused.value).endswith(taken)
+    assert str(refusal.value).endswith(taken)
     # with all given, nothing is taken over
     parse(f"{text}\nc = 2.98496\nhy = 2.0")
-    with pytest.raises(InputError) as refused:
+    with pytest.raises(InputError) as refusal:
         parse(f"{text}\nc = 1.49248\nhy = 1.0")
-    assert "no value fits" in str(refused.value) and "packaged" not in str(refused.value)
+    assert "no value fits" in str(refusal.value) and "packaged" not in str(refusal.value)

@@ -69,8 +69,8 @@ def test_a_reference_goes_on_from_another(reference):
     signals = {"motor.w_ref": Profile(RATIO * SPEED / 2.0, ((0.41, 0.01, RATIO * SPEED / 2.0),))}
     again = monolithic(joined(values=STANDING), signals, times, start=start)
     for name in ("motor.w", "motor.phi", "machine.tau"):
-        wanted = float(reference[name].sel(time=0.6, method="nearest"))
-        assert float(again[name][-1]) == pytest.approx(wanted, rel=1e-8)
+        target = float(reference[name].sel(time=0.6, method="nearest"))
+        assert float(again[name][-1]) == pytest.approx(target, rel=1e-8)
 
 
 def test_second_order_with_slopes_first_without(fmus, reference):
@@ -359,7 +359,7 @@ def test_a_file_has_what_memory_has(fmus, tmp_path, monkeypatch):
 
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
 def test_memory_does_not_grow_with_a_run_that_is_written_to_a_file(tmp_path):
-    """By what Python allocates: 48,000 steps of a motor against 24,000."""
+    """Measured by the allocations of Python: 48,000 steps of a motor against 24,000."""
     import tracemalloc
 
     motor = export_native(MODELS["DcMotor"], tmp_path / "motor.fmu")
@@ -379,12 +379,12 @@ def test_memory_does_not_grow_with_a_run_that_is_written_to_a_file(tmp_path):
     short, long = (peak(steps, file=tmp_path / "run.nc") for steps in (24_000, 48_000))
     # xarray holds the time, as an index, and some objects
     assert long - short < 24_000 * 2 * 8 + 8_000
-    in_memory, tenth, chosen = peak(24_000), peak(24_000, every=10), peak(24_000, names=["motor.w"])
+    in_memory, tenth, choice = peak(24_000), peak(24_000, every=10), peak(24_000, names=["motor.w"])
     row = 8 * (len(kept_names(motor)) + 1)
     assert row > 5 * 2 * 8
     # each row once, not twice
     assert 24_000 * row < in_memory < 24_000 * row + long
-    assert tenth < 2_400 * row + long and chosen < 24_000 * 2 * 8 + long
+    assert tenth < 2_400 * row + long and choice < 24_000 * 2 * 8 + long
 
 
 def kept_names(file):
@@ -397,7 +397,7 @@ def kept_names(file):
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError])
 def test_unpacking_that_ends_early_leaves_no_folder(error, fmus, tmp_path, monkeypatch):
-    """Neither where it is interrupted."""
+    """An interrupted run leaves no file behind, either."""
 
     def extract(file, unzipdir):
         (tmp_path / "was here").touch()
@@ -443,7 +443,7 @@ def test_an_interrupt_after_the_last_step_keeps_the_rows(fmus):
 
 @pytest.mark.parametrize("name", ["DcMotor", "InductionMotor", "CardanDriveline"])
 def test_a_load_of_negative_inertia_is_refused(name, fmus):
-    """No machine has one: the reflected inertia is a sum of squares."""
+    """No machine has a negative inertia: the reflected inertia is a sum of squares."""
     with pytest.raises(RunError, match=r"load\.J = -0\.01 kg m2: must be >= 0 kg m2"):
         with CoSimulation(
             System({"unit": component(name, fmus[name])}), {"unit.load.J": -0.01}

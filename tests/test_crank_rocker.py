@@ -30,13 +30,13 @@ def brute_force(m: CrankRocker, n: int = 200_001):
 
 def random_mechanisms(count: int):
     rng = np.random.default_rng(3)
-    found = []
-    while len(found) < count:
+    results = []
+    while len(results) < count:
         try:
-            found.append(CrankRocker(*rng.uniform([0.05, 0.5, 0.3, 0.4], [0.6, 1.5, 2.0, 2.0])))
+            results.append(CrankRocker(*rng.uniform([0.05, 0.5, 0.3, 0.4], [0.6, 1.5, 2.0, 2.0])))
         except GeometryError:
             continue
-    return found
+    return results
 
 
 @pytest.mark.parametrize("m", random_mechanisms(12), ids=str)

@@ -19,12 +19,12 @@ NAMES = Path(__file__).parent / "data" / "variables.json"
 def variables_of(model):
     """The variables of the model's FMU by causality, in their order, each with its unit."""
     root = model_description(Interface(model, {}), "", {"ModelExchange": {}}, "0")
-    found: dict[str, list[str]] = {}
+    results: dict[str, list[str]] = {}
     for variable in root.iter("ScalarVariable"):
         unit = variable.find("Real").get("unit")
         words = variable.get("name") if unit is None else f"{variable.get('name')} [{unit}]"
-        found.setdefault(variable.get("causality"), []).append(words)
-    return found
+        results.setdefault(variable.get("causality"), []).append(words)
+    return results
 
 
 def test_units_are_parsed():

@@ -1,5 +1,5 @@
 """The pages of docs/: their commands run and print what stands there, their drawings are current, and the site builds
-without a broken link and without anything from elsewhere.
+without a broken link and without files from other servers.
 
 A page is a walk: its blocks run in their order in one folder. A block that is fenced as ``sh`` runs in a shell,
 ``python`` in one process for the whole page; one with a ``title`` is written to the file of that name. A ``text``
@@ -52,11 +52,11 @@ class Block(NamedTuple):
 def blocks(page: Path) -> list[Block]:
     """The fenced blocks of a page, in order, with the files that it includes."""
     text = INCLUDE.sub(lambda line: (ROOT / line[1]).read_text("utf-8"), page.read_text("utf-8"))
-    found = []
+    results = []
     for indent, kind, file, body in FENCE.findall(text):
         body = re.sub(rf"^{indent}", "", body, flags=re.MULTILINE) if indent else body
-        found.append(Block(kind, file, body))
-    return found
+        results.append(Block(kind, file, body))
+    return results
 
 
 def _walks() -> list:
@@ -81,10 +81,10 @@ def missing(excerpt: str, printed: str) -> str | None:
     for line in map(_collapsed, excerpt.splitlines()):
         if line in ("", "..."):
             continue
-        found = whole.find(line, at)
-        if found < 0:
+        result = whole.find(line, at)
+        if result < 0:
             return line
-        at = found + len(line)
+        at = result + len(line)
     return None
 
 
@@ -103,40 +103,40 @@ class Walk:
         (folder / "examples").symlink_to(ROOT / "examples")
 
     def shell(self, text: str) -> str:
-        """What the commands print, both on their output and as errors."""
-        done = subprocess.run(
+        """The output and the errors of the commands."""
+        process = subprocess.run(
             ["bash", "-c", text], cwd=self.folder, env=self.environment, capture_output=True, text=True
         )
-        assert done.returncode in (0, 2), done.stdout[-2000:] + done.stderr[-2000:]
-        assert done.returncode == 0 or done.stderr, text
-        return done.stdout + done.stderr
+        assert process.returncode in (0, 2), process.stdout[-2000:] + process.stderr[-2000:]
+        assert process.returncode == 0 or process.stderr, text
+        return process.stdout + process.stderr
 
     def python(self, text: str) -> str:
-        """What the code prints; its names stay for the next block."""
-        printed = io.StringIO()
-        with contextlib.redirect_stdout(printed), contextlib.chdir(self.folder):
+        """The output of the code; its names stay for the next block."""
+        printout = io.StringIO()
+        with contextlib.redirect_stdout(printout), contextlib.chdir(self.folder):
             exec(compile(text, "page", "exec"), self.names)
-        return printed.getvalue()
+        return printout.getvalue()
 
 
 @pytest.mark.parametrize("page", _walks())
 def test_a_page_prints_what_stands_there(page, tmp_path):
-    walk, printed = Walk(tmp_path), None
+    walk, printout = Walk(tmp_path), None
     for block in blocks(ROOT / page):
         if block.file:
             (tmp_path / block.file).write_text(block.text, "utf-8")
         elif block.kind == "sh" and not any(word in block.text for word in INSTALLS):
-            printed = walk.shell(block.text)
+            printout = walk.shell(block.text)
         elif block.kind == "sh" and "/chainunit study" in block.text:
             # the command behind the installation
-            printed = walk.shell(block.text.rpartition("/bin/")[2])
+            printout = walk.shell(block.text.rpartition("/bin/")[2])
         elif block.kind == "python":
-            printed = walk.python(block.text)
-        elif block.kind == "text" and printed is not None:
+            printout = walk.python(block.text)
+        elif block.kind == "text" and printout is not None:
             assert block.text.strip(), f"{page}: an empty excerpt"
-            assert missing(block.text, printed) is None, printed[-4000:]
+            assert missing(block.text, printout) is None, printout[-4000:]
         else:
-            printed = None
+            printout = None
     # a drawing that the page makes is the one that it shows
     for shown in re.findall(r"\]\(([^)]*[.]svg)\)", (ROOT / page).read_text("utf-8")):
         made = tmp_path / Path(shown).name
@@ -145,21 +145,21 @@ def test_a_page_prints_what_stands_there(page, tmp_path):
 
 def test_the_tables_of_keys_that_pages_name_are_there():
     texts = [page.read_text("utf-8") for page in PAGES]
-    named = sorted({name for text in texts for name in KEYS_OF.findall(text)} - {"TABLE"})
-    assert len(named) > 5
-    for name in named:
-        done = subprocess.run(
+    names = sorted({name for text in texts for name in KEYS_OF.findall(text)} - {"TABLE"})
+    assert len(names) > 5
+    for name in names:
+        process = subprocess.run(
             [sys.executable, "-m", "chainunit", "keys", name], capture_output=True, text=True
         )
-        assert done.returncode == 0, done.stderr
+        assert process.returncode == 0, process.stderr
 
 
 def test_an_excerpt_is_compared_line_by_line():
-    printed = "a b\n c   d\ne"
-    assert missing("a b\nc d", printed) is None
-    assert missing("a\n...\ne\n", printed) is None
-    assert missing("c d\na b", printed) == "a b"
-    assert missing("a b\nx", printed) == "x"
+    printout = "a b\n c   d\ne"
+    assert missing("a b\nc d", printout) is None
+    assert missing("a\n...\ne\n", printout) is None
+    assert missing("c d\na b", printout) == "a b"
+    assert missing("a b\nx", printout) == "x"
 
 
 def test_the_drawings_are_those_of_the_machines():
@@ -191,8 +191,8 @@ def test_the_site_builds_without_a_broken_link_and_fetches_nothing(tmp_path):
     pytest.importorskip("material")
     pytest.importorskip("mkdocstrings")
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-d", str(tmp_path / "site")]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    process = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert process.returncode == 0, process.stderr
     pages = list((tmp_path / "site").rglob("*.html"))
     assert len(pages) > 20
     for page in pages:
@@ -209,14 +209,14 @@ def test_the_readme_is_short_and_what_it_claims_is_computed(tmp_path):
     assert len(text.splitlines()) <= 150
     study = run_study(load(), tmp_path)
     turn = 2.0 * np.pi / study.config.run.crank_speed
-    found = {}
+    results = {}
     for run in ("start_up", "feed_left"):
         last = study.runs[run].isel(time=study.runs[run]["time"] > study.runs[run]["time"][-1] - turn)
         time = last["time"].values
         rocker = np.trapezoid(last["machine.rocker.tau"].values, time) / np.ptp(time)
         current = np.trapezoid(last["motor.armature.i"].values ** 2, time) / np.ptp(time)
-        found[run] = rocker, np.sqrt(current)
-    (rocker, current), (of_one_side, more) = found.values()
+        results[run] = rocker, np.sqrt(current)
+    (rocker, current), (of_one_side, more) = results.values()
     share, times = re.search(r"rises by (\d+) %.*?grows to (\d+) times", text, re.DOTALL).groups()
     assert round(100.0 * (more / current - 1.0)) == int(share)
     assert of_one_side / rocker == pytest.approx(int(times), rel=0.03)

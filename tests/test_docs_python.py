@@ -12,7 +12,7 @@ BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
 def sessions(text):
-    """Pairs of a block of Python and what is shown below it, empty where nothing is."""
+    """Pairs of a block of Python and the text below it, which is empty where there is none."""
     blocks = BLOCK.findall(text)
     for k, (language, code) in enumerate(blocks):
         shown = blocks[k + 1] if k + 1 < len(blocks) else ("", "")
@@ -21,7 +21,7 @@ def sessions(text):
 
 
 def outputs(text):
-    """What each block of Python prints."""
+    """The output of each block of Python."""
     names: dict[str, object] = {}
     for code, _ in sessions(text):
         out = io.StringIO()
@@ -33,7 +33,7 @@ def outputs(text):
 def test_the_page_shows_what_its_lines_print(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     text = PAGE.read_text("utf-8")
-    shown = [said for _, said in sessions(text)]
+    shown = [message for _, message in sessions(text)]
     assert len(shown) >= 8 and sum(map(bool, shown)) >= 8
     assert list(outputs(text)) == shown
 

@@ -20,7 +20,7 @@ def _labels(picture):
 
 
 def test_the_dimensions_of_the_chain_unit():
-    """Which parameter is which length, by hand from the definition of the machine."""
+    """The parameter of each length, by hand from the definition of the machine."""
     names = {key: size.name for key, size in dimensions(Machine(MACHINES["ChamberForces"])).items()}
     assert names == {
         ("link", "crank"): "r",

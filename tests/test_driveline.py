@@ -65,7 +65,8 @@ def random_case(rng):
 
 
 def test_power_in_is_power_out_and_stored_and_lost():
-    """At random points, to rounding; the storage's growth by a complex step along the motion."""
+    """The balance of power holds to rounding at random points; the growth of the stored energy is by a complex
+    step."""
     rng = np.random.default_rng(6)
     for _ in range(300):
         p, u, x = random_case(rng)
@@ -80,16 +81,17 @@ def test_power_in_is_power_out_and_stored_and_lost():
         )
         moving = CardanDriveline.parts[0].equations(*along, CardanDriveline.shared(*along))
         grows = engines.slope(moving.kinetic_energy) + engines.slope(moving.potential_energy)
-        given = out.driven.tau * x[2]
-        terms = (out.power, given, grows, out.dissipated_power)
-        assert out.power - given - grows - out.dissipated_power == pytest.approx(
+        values = out.driven.tau * x[2]
+        terms = (out.power, values, grows, out.dissipated_power)
+        assert out.power - values - grows - out.dissipated_power == pytest.approx(
             0.0, abs=1e-9 * sum(map(abs, terms))
         )
-        assert rates[0] == given
+        assert rates[0] == values
 
 
 def test_slopes_of_the_port():
-    """By the speed the plain derivative, by the angle the one along the motion, against central differences."""
+    """The slope by the speed is the partial derivative, that by the angle the one along the motion; against
+    differences."""
     rng = np.random.default_rng(7)
     for _ in range(50):
         p, u, x = random_case(rng)
@@ -148,9 +150,9 @@ def test_damping_is_that_of_a_cardan_without_mass():
         phi3, i, _ = cardan.two_joints(engines.MATH, p, 0.2)
         start = [0.2 + 1e-3, 20.0, phi3, 20.0 * i]
         phi2 = cardan.middle_angle(engines.MATH, p, start[0], phi3)
-        found = ours(p, J1, J4, start, 0.2)
-        wanted = exact(p, J1, J4, [*start, phi2], 0.2)[:4]
-        differences.append(float(np.max(np.abs(found - wanted) / [1e-3, 0.2, 1e-3, 0.2])))
+        result = ours(p, J1, J4, start, 0.2)
+        reference = exact(p, J1, J4, [*start, phi2], 0.2)[:4]
+        differences.append(float(np.max(np.abs(result - reference) / [1e-3, 0.2, 1e-3, 0.2])))
     same, alike, other, half = differences
     assert same < 1e-8 and 1e-6 < alike < 1e-5, differences
     assert 1e-4 < other < 1e-2 and 3.0 < other / half < 5.0, differences
@@ -251,9 +253,9 @@ def test_both_backends_agree_also_in_a_turning_step(tmp_path):
             simulation.signals = {}
             runs.append(simulation.run(0.2, 0.002))
     for name in runs[0].data_vars:
-        wanted = runs[0][name].values
+        reference = runs[0][name].values
         np.testing.assert_allclose(
-            runs[1][name].values, wanted, rtol=1e-9, atol=1e-9 * np.max(np.abs(wanted)) + 1e-12
+            runs[1][name].values, reference, rtol=1e-9, atol=1e-9 * np.max(np.abs(reference)) + 1e-12
         )
     out = runs[0]
     t = float(out["time"][-1]) - float(out["time"][0])
@@ -280,7 +282,7 @@ def test_both_backends_agree_also_in_a_turning_step(tmp_path):
 def test_bad_parameters_are_refused_in_one_line(values, named, tmp_path):
     from chainunit.fmu.native.export import export
 
-    with pytest.raises((InputError, GeometryError)) as refused:
+    with pytest.raises((InputError, GeometryError)) as refusal:
         export(CardanDriveline, tmp_path / "x.fmu", values)
-    assert named in str(refused.value) and "\n" not in str(refused.value)
+    assert named in str(refusal.value) and "\n" not in str(refusal.value)
     assert not (tmp_path / "x.fmu").exists()

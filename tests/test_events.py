@@ -1,4 +1,4 @@
-"""Events of a study file: what they declare, what they do over time, and that a new type is one class."""
+"""Events of a study file: their declarations, their signals over time, and a new type, which is one class."""
 
 from __future__ import annotations
 
@@ -80,8 +80,8 @@ def test_refusals(text, line):
 
 
 def rig_of(text=""):
-    given = config.parse(text)
-    return Rig(given, Drive(DcMotor, given.motor, given.machine), {})
+    values = config.parse(text)
+    return Rig(values, Drive(DcMotor, values.motor, values.machine), {})
 
 
 def at(signal, t):
@@ -247,13 +247,13 @@ def surge():
 
         @declaration
         class Parameters(Timing):
-            """Of the surge."""
+            """Quantities of the surge."""
 
             added: Value = quantity("kg", "material that comes", default=20.0, min=0.0)
             time: Value = quantity("s", "time in which it comes", default=0.5, above=0.0)
 
         def signals(self, normal, at, state):
-            """It comes and stays."""
+            """The signal of the mass: it rises and stays."""
             (name,) = self.inputs(self.side)
             return {name: Profile(normal[name], ((at, self.p.time, normal[name] + self.p.added),))}
 
@@ -267,14 +267,14 @@ def test_a_new_type_of_event_is_one_class(surge, tmp_path):
 
     text = '[[event]]\ntype = "surge"\nside = "right"\nadded = "45 kg"\nturns = 1\n'
     (tmp_path / "surge.toml").write_text(f"{QUICK}{text}")
-    done = chainunit("study", "surge.toml", "-o", "out", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    process = chainunit("study", "surge.toml", "-o", "out", cwd=tmp_path)
+    assert process.returncode == 0, process.stderr
     numbers = json.loads((tmp_path / "out" / "result.json").read_text())
     assert numbers["event"]["surge_right"]["added"] == {"value": 45.0, "unit": "kg"}
     steady, surged = (numbers["answers"][name] for name in ("steady", "surge_right"))
     assert surged["crank_torque_peak"]["value"] > 1.02 * steady["crank_torque_peak"]["value"]
     assert numbers["certificate"]["surge_right"]["energy_residual_share"]["value"] < 2e-3
-    assert "surge right" in done.stdout
+    assert "surge right" in process.stdout
     assert "more material comes to the right" in (tmp_path / "out" / "report.html").read_text().lower()
     random = config.parse('[monte_carlo]\nevent = { type = "surge", added = ["1 kg", "9 kg"] }').random
     event = random.event("left", random.draw(np.random.default_rng(1)))

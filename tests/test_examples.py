@@ -22,23 +22,27 @@ def result(tmp_path_factory):
     def run(name):
         if name not in RUNS:
             folder = tmp_path_factory.mktemp(name)
-            done = chainunit("study", EXAMPLES / f"{name}.toml", "-o", "out", cwd=folder)
+            process = chainunit("study", EXAMPLES / f"{name}.toml", "-o", "out", cwd=folder)
             # a motor that is insufficient is a run that failed
-            assert done.returncode == (1 if name == "motor_rejected" else 0), done.stderr
-            RUNS[name] = json.loads((folder / "out" / "result.json").read_text()), done.stdout, folder / "out"
+            assert process.returncode == (1 if name == "motor_rejected" else 0), process.stderr
+            RUNS[name] = (
+                json.loads((folder / "out" / "result.json").read_text()),
+                process.stdout,
+                folder / "out",
+            )
         return RUNS[name]
 
     return run
 
 
 def test_a_motor_is_picked(result):
-    numbers, said, folder = result("motor_from_catalogue")
+    numbers, message, folder = result("motor_from_catalogue")
     sizing = numbers["sizing"]
-    chosen = sizing["candidates"][sizing["chosen"]]
-    assert chosen["verdict"] == "chosen" and f"Motor: {chosen['motor']}" in said
-    assert all(check["utilisation"]["value"] <= 1.0 for check in chosen["checks"].values())
+    choice = sizing["candidates"][sizing["chosen"]]
+    assert choice["verdict"] == "chosen" and f"Motor: {choice['motor']}" in message
+    assert all(check["utilisation"]["value"] <= 1.0 for check in choice["checks"].values())
     rejected = [c for c in sizing["candidates"] if c["verdict"] == "rejected"]
-    assert rejected and all(c["motor"] in said and c["reason"] for c in rejected)
+    assert rejected and all(c["motor"] in message and c["reason"] for c in rejected)
     assert numbers["motor"]["kind"] == "InductionMotor"
     # the study goes on with it, at the speed that was asked
     steady = numbers["answers"]["steady"]
@@ -50,22 +54,24 @@ def test_a_motor_is_picked(result):
 
 
 def test_none_fits_and_the_reason_is_told(result):
-    numbers, said, _ = result("motor_rejected")
+    numbers, message, _ = result("motor_rejected")
     sizing = numbers["sizing"]
-    assert sizing["chosen"] is None and "No motor of the catalogue fits (18 of 18 were tried)" in said
+    assert sizing["chosen"] is None and "No motor of the catalogue fits (18 of 18 were tried)" in message
     for i, c in enumerate(sizing["candidates"]):
         assert c["verdict"] == ("rejected" if i else "insufficient") and "torque of the gear" in c["reason"]
         assert c["checks"]["gear"]["utilisation"]["value"] > 1.0
     # all that was asked is run with the nearest
-    assert {"steady", "jam_left", "jam_right"} <= set(numbers["answers"]) and "insufficient" in said
+    assert {"steady", "jam_left", "jam_right"} <= set(numbers["answers"]) and "insufficient" in message
 
 
 def test_the_jam_trips_the_coupling(result):
-    numbers, said, folder = result("jam_trips_coupling")
+    numbers, message, folder = result("jam_trips_coupling")
     jam, feed = numbers["answers"]["jam_left"], numbers["answers"]["feed_left"]
     assert 0.0 < jam["coupling_trip_time"]["value"] < 0.1 and jam["energy_after_trip"]["value"] > 0.0
     assert jam["standstill_time"]["value"] > jam["coupling_trip_time"]["value"]
-    assert feed["coupling_trip_time"]["value"] is None and "The safety coupling opens after the event" in said
+    assert (
+        feed["coupling_trip_time"]["value"] is None and "The safety coupling opens after the event" in message
+    )
     assert jam["crank_torque_peak"]["value"] > 350.0
     random = numbers["monte_carlo"]
     assert random["runs"]["value"] == 50 and 0.0 < random["quantiles"]["trips"]["share"]["value"] < 1.0
@@ -76,10 +82,10 @@ def test_the_jam_trips_the_coupling(result):
 
 
 def test_a_lump_swings_the_cardan_shaft(result):
-    numbers, said, folder = result("jam_with_driveline")
+    numbers, message, folder = result("jam_with_driveline")
     jam = numbers["shaft"]["jam_left"]
     assert jam["amplification"]["value"] == pytest.approx(1.5, abs=0.1)
-    assert "the line's torque peaks at" in said and (folder / "driveline.png").exists()
+    assert "the line's torque peaks at" in message and (folder / "driveline.png").exists()
 
 
 def test_chains_run_near_their_resonance():
@@ -96,8 +102,8 @@ def test_chains_run_near_their_resonance():
 @pytest.mark.parametrize("script", sorted(EXAMPLES.glob("*.py")), ids=lambda script: script.stem)
 def test_the_scripts_run_without_a_warning(script, tmp_path):
     command = [sys.executable, "-W", "error", script]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    process = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert process.returncode == 0, process.stderr
     # fmpy prints its warnings
-    said = done.stdout + done.stderr
-    assert done.stdout and "warning" not in said.lower() and not list(tmp_path.iterdir())
+    output = process.stdout + process.stderr
+    assert process.stdout and "warning" not in output.lower() and not list(tmp_path.iterdir())

@@ -125,14 +125,14 @@ def by_us(case, times):
     # without projection: 3e-11 m measured
     last = end_motion(case.rods, list(solved[:N, -1]), list(solved[N:, -1]), MATH).p
     assert [last.x, last.y] == pytest.approx(reach(case.rocker(case.end)[0]), rel=0.0, abs=1e-9)
-    found = {f"theta.{k}": solved[k] for k in range(N)}
+    results = {f"theta.{k}": solved[k] for k in range(N)}
     at = [chain(case, t, y) for t, y in zip(times, solved.T, strict=True)]
     for k in range(N + 1):
-        found |= {f"pin.{k}.{x}": np.array([getattr(c.forces[k], x) for c in at]) for x in "xy"}
+        results |= {f"pin.{k}.{x}": np.array([getattr(c.forces[k], x) for c in at]) for x in "xy"}
     psi = np.array([case.rocker(t)[0] for t in times])
-    along = found[f"pin.{N}.x"] * np.cos(psi) + found[f"pin.{N}.y"] * np.sin(psi)
-    found["drive"] = M["e"] * along + np.array([c.moment_at_end for c in at])
-    return found
+    along = results[f"pin.{N}.x"] * np.cos(psi) + results[f"pin.{N}.y"] * np.sin(psi)
+    results["drive"] = M["e"] * along + np.array([c.moment_at_end for c in at])
+    return results
 
 
 def by_exudyn(case, steps, newton=(1e-12, 1e-14)):
@@ -214,10 +214,10 @@ def by_exudyn(case, steps, newton=(1e-12, 1e-14)):
 
     rows = {name: mbs.GetSensorStoredData(number) for name, number in sensors.items()}
     assert all(len(r) == steps + 1 for r in rows.values())
-    found = {"drive": -rows.pop("drive")[:, 1]}
+    results = {"drive": -rows.pop("drive")[:, 1]}
     for name, r in rows.items():
-        found |= {name: r[:, 1]} if "theta" in name else {f"{name}.x": r[:, 1], f"{name}.y": r[:, 2]}
-    return found
+        results |= {name: r[:, 1]} if "theta" in name else {f"{name}.x": r[:, 1], f"{name}.y": r[:, 2]}
+    return results
 
 
 def compared(case, instants, steps):
@@ -226,12 +226,12 @@ def compared(case, instants, steps):
     ours = by_us(case, case.times(instants))
     coarse, fine = by_exudyn(case, steps * instants), by_exudyn(case, 2 * steps * instants)
     assert set(ours) == set(coarse)
-    found = {}
-    for name, wanted in ours.items():
-        size = min(np.max(np.abs(wanted)), np.ptp(wanted))
-        one, two = (coarse[name][::steps] - wanted) / size, (fine[name][:: 2 * steps] - wanted) / size
-        found[name] = [float(np.max(np.abs(x[1:]))) for x in (one, two, (4.0 * two - one) / 3.0)]
-    return ours, found
+    results = {}
+    for name, reference in ours.items():
+        size = min(np.max(np.abs(reference)), np.ptp(reference))
+        one, two = (coarse[name][::steps] - reference) / size, (fine[name][:: 2 * steps] - reference) / size
+        results[name] = [float(np.max(np.abs(x[1:]))) for x in (one, two, (4.0 * two - one) / 3.0)]
+    return ours, results
 
 
 @pytest.mark.parametrize("case", [(4, 3.0, [1.0] * 5), (8, 10.0, [10.0] * 9)], ids=["smooth-4", "fast-8"])
@@ -239,8 +239,8 @@ def test_start_and_one_turn(case, tmp_path, monkeypatch):
     """The reference's "smooth" and "above slack speed, strong damping"."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(exudyn.config, "printToConsole", False)
-    _, found = compared(Case(*case), STEPS, 1)
-    for name, (one, two, none) in found.items():
+    _, result = compared(Case(*case), STEPS, 1)
+    for name, (one, two, none) in result.items():
         assert two < 5e-6, name
         assert 3.9 < one / two < 4.1, name
         assert none < (1e-8 if "theta" in name else 1e-7), name
@@ -268,11 +268,11 @@ def test_two_turns_of_a_snatching_chain(part, turns, push, times, tmp_path, monk
     lengths, _ = organ(8)
     damping = part * np.array([1.0, *0.24 / (0.5 * (lengths[:-1] + lengths[1:])), 1.0])
     case = Case(8, 10.0, damping).later(turns)
-    ours, found = compared(case, STEPS // 2, 2)
+    ours, result = compared(case, STEPS // 2, 2)
     pull, peak = least_pull(case, ours), np.max(np.hypot(ours["pin.8.x"], ours["pin.8.y"]))
     assert np.min(case.rest.pull) > 100.0 and np.min(pull) < -push
     assert np.mean(pull < 0.0) > 0.05 and peak > times * np.hypot(*case.rest.last)
-    for name, (one, two, none) in found.items():
+    for name, (one, two, none) in result.items():
         assert two < 1e-4, name
         assert 3.9 < one / two < 4.1, name
         assert none < (1e-8 if "theta" in name else 1e-7), name

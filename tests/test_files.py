@@ -153,13 +153,13 @@ def test_a_full_disk_is_named_and_costs_no_more_than_the_file(tmp_path):
         """,
         tmp_path,
     )
-    said, errors = command.communicate()
+    message, errors = command.communicate()
     assert command.returncode == 1, errors
     assert "out/result.nc: cannot be written" in errors and "Traceback" not in errors
     there = names(tmp_path / "out")
     assert {"result.json", "load_cycle.csv", "start_up.png", "fmu"} <= set(there)
     assert not {n for n in there if "part" in n or n in ("result.nc", "report.html", LOCK)}
-    assert "crank torque, peak" in said
+    assert "crank torque, peak" in message
 
 
 @posix

@@ -58,17 +58,17 @@ native = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
     """By rods of wall and web, a native FMU, compiled once and unpacked; `archive` is its file."""
-    folder, found = tmp_path_factory.mktemp("chains"), {}
+    folder, result = tmp_path_factory.mktemp("chains"), {}
 
     def made(walls, webs):
-        if (walls, webs) not in found:
+        if (walls, webs) not in result:
             file = export_native(flexible(walls, webs), folder / f"{walls}{webs}.fmu")
-            found[walls, webs] = Fmu(file)
-            found[walls, webs].archive = file
-        return found[walls, webs]
+            result[walls, webs] = Fmu(file)
+            result[walls, webs].archive = file
+        return result[walls, webs]
 
     yield made
-    for fmu in found.values():
+    for fmu in result.values():
         fmu.close()
 
 
@@ -106,10 +106,10 @@ def chains(model, p, **over):
 
 
 def named(model, p, u, x=None):
-    found = {}
+    results = {}
     for part, values in zip(model.parts, model.evaluate(MATH, p, u, x), strict=True):
-        found |= part.layout.by_name(values)
-    return found
+        results |= part.layout.by_name(values)
+    return results
 
 
 def crank_rocker(p, q):
@@ -141,15 +141,15 @@ def test_two_rods_are_the_two_bar_machine():
             right=random_loads(rng),
             stop=Stop(stiffness=rng.choice([0.0, 1e4]), damping=rng.choice([0.0, 10.0]), psi=0.1),
         )
-        got, wanted = named(model, p, u, model.start(MATH, p, u)), named(ChamberForces, q, u)
+        got, reference = named(model, p, u, model.start(MATH, p, u)), named(ChamberForces, q, u)
         floor = {}
-        for name, value in wanted.items():
+        for name, value in reference.items():
             floor[UNITS[name]] = max(floor.get(UNITS[name], 1e-12), 1e-3 * abs(value))
         # a small rest of parts of this size, alone of its unit
-        floor[UNITS["tau_bias_dw"]] = (abs(wanted["tau_bias"]) + wanted["dissipated_power"] / abs(u.w)) / abs(
-            u.w
-        )
-        for name, value in wanted.items():
+        floor[UNITS["tau_bias_dw"]] = (
+            abs(reference["tau_bias"]) + reference["dissipated_power"] / abs(u.w)
+        ) / abs(u.w)
+        for name, value in reference.items():
             assert abs(got[name] - value) <= 1e-8 * max(abs(value), floor[UNITS[name]]), name
 
 
@@ -166,8 +166,8 @@ def test_two_rods_run_as_the_two_bar_machine(files):
     inputs = {n: v for n, v in start.items() if n in ChamberForces.input_layout.names}
     exact = ChainUnitMachine().evaluate({"phi": W * h * np.arange(121), "w": W} | inputs)
     for name, column in zip(names, got.T, strict=True):
-        wanted = np.broadcast_to(exact[name], 121)
-        assert np.max(np.abs(column - wanted)) < 1e-8 * np.max(np.abs(wanted)), name
+        reference = np.broadcast_to(exact[name], 121)
+        assert np.max(np.abs(column - reference)) < 1e-8 * np.max(np.abs(reference)), name
 
 
 @pytest.mark.parametrize(
@@ -188,13 +188,13 @@ def test_dynamic_reference(case):
         state = []
         for side, hand in (("L", 1.0), ("R", -1.0)):
             state += [*(hand * np.array([*case[side]["theta"][k], *case[side]["omega"][k]])), 0.0]
-        found = named(
+        result = named(
             model, p, Inputs(phi=phi, w=w, left=empty, right=empty), model.state_layout.instance(state)
         )
-        for side, stored, hand in (("left", "L", 1.0), ("right", "R", -1.0)):
+        for side, stored_energy, hand in (("left", "L", 1.0), ("right", "R", -1.0)):
             for pin, name in (("support", "A1"), ("hinge", "B"), ("rocker_joint", "A2")):
-                force = [hand * found[f"{side}.{pin}.fx"], -found[f"{side}.{pin}.fy"]]
-                np.testing.assert_allclose(force, case[stored][name][k], atol=1e-10 * peak)
+                force = [hand * result[f"{side}.{pin}.fx"], -result[f"{side}.{pin}.fy"]]
+                np.testing.assert_allclose(force, case[stored_energy][name][k], atol=1e-10 * peak)
 
 
 # -- direct
@@ -217,16 +217,16 @@ def test_the_direct_model_with_chains_is_the_inverse_of_the_inverse_one():
     """The torque that the inverse model needs for the acceleration found is the torque given, rods move alike."""
     rng = np.random.default_rng(35)
     for _ in range(20):
-        (model, p, u, x), direct, q, given, y = direct_case(rng)
-        rates = direct.derivatives(MATH, q, given, direct.state_layout.instance(y))
+        (model, p, u, x), direct, q, values, y = direct_case(rng)
+        rates = direct.derivatives(MATH, q, values, direct.state_layout.instance(y))
         moved = dataclasses.replace(u, a=rates[1])
         state = model.state_layout.instance(x)
         need = named(model, p, moved, state)
-        size = abs(given.tau) + abs(q.J_added * rates[1])
-        assert need["tau"] + q.J_added * rates[1] == pytest.approx(given.tau, abs=1e-9 * size)
-        wanted = model.derivatives(MATH, p, moved, state)
-        np.testing.assert_allclose(rates[2:], wanted, rtol=1e-9, atol=1e-9 * np.max(np.abs(wanted)))
-        out = named(direct, q, given, direct.state_layout.instance(y))
+        size = abs(values.tau) + abs(q.J_added * rates[1])
+        assert need["tau"] + q.J_added * rates[1] == pytest.approx(values.tau, abs=1e-9 * size)
+        reference = model.derivatives(MATH, p, moved, state)
+        np.testing.assert_allclose(rates[2:], reference, rtol=1e-9, atol=1e-9 * np.max(np.abs(reference)))
+        out = named(direct, q, values, direct.state_layout.instance(y))
         for name in ("left.support.fx", "right.hinge.fy", "frame.moment", "crank_bearing.fx"):
             assert out[name] == pytest.approx(
                 need[name], rel=1e-9, abs=1e-9 * (1.0 + abs(need["crank_bearing.fx"]))
@@ -262,8 +262,8 @@ def test_a_machine_with_chains_that_turns_by_itself_keeps_its_energy():
 
 
 def test_the_direct_model_goes_on_from_where_the_inverse_one_is():
-    """From angles and speeds of the rods, folded beyond a stop or not; the energy that is due is that which is
-    there."""
+    """From given angles and speeds of the rods, folded beyond a stop or not: the energy agrees with its
+    balance."""
     rng = np.random.default_rng(36)
     for _ in range(20):
         model, p, u, x = moving(rng)
@@ -274,14 +274,14 @@ def test_the_direct_model_goes_on_from_where_the_inverse_one_is():
         p = dataclasses.replace(p, organ=dataclasses.replace(p.organ, fold_limit=0.01))
         q = direct.check(direct.parameter_layout.from_names(model.parameter_layout.by_name(p) | start))
         begun = direct.begin(q, direct.Inputs(left=u.left, right=u.right))
-        wanted = dict(zip(model.state_layout.names, x, strict=True))
+        reference = dict(zip(model.state_layout.names, x, strict=True))
         for side in SIDES:
             bent = named(direct, q, direct.Inputs(left=u.left, right=u.right), begun)
             kinetic, potential = (bent[f"{side}.{kind}_energy"] for kind in ("kinetic", "potential"))
-            wanted[f"{side}.energy_due"] = kinetic + potential
+            reference[f"{side}.energy_due"] = kinetic + potential
         got = direct.state_layout.by_name(begun)
         assert (got.pop("phi"), got.pop("w")) == (u.phi, u.w)
-        for name, value in wanted.items():
+        for name, value in reference.items():
             assert got[name] == pytest.approx(value, rel=1e-9, abs=1e-9), name
 
 
@@ -329,8 +329,8 @@ def test_the_direct_fmu_runs_as_its_equations(kind, tmp_path):
         str(file), fmi_type=kind, stop_time=0.5, output_interval=0.01, relative_tolerance=1e-9,
         start_values=values, output=names,
     )[-1]  # fmt: skip
-    wanted = [run.y[layout.names.index(name), -1] for name in names]
-    np.testing.assert_allclose(list(end)[1:], wanted, rtol=1e-4, atol=1e-4)
+    reference = [run.y[layout.names.index(name), -1] for name in names]
+    np.testing.assert_allclose(list(end)[1:], reference, rtol=1e-4, atol=1e-4)
 
 
 # -- start
@@ -539,8 +539,8 @@ def test_the_frame_carries_what_changes_the_momentum():
     and processing."""
     counts = 3, 2
     model = flexible(*counts)
-    given = {"pin.friction": 0.0, "organ.end_damping": 7.0, "organ.eta": 2.0, "web_share": 0.7}
-    p = model.check(model.parameter_layout.from_names(given))
+    values = {"pin.friction": 0.0, "organ.end_damping": 7.0, "organ.eta": 2.0, "web_share": 0.7}
+    p = model.check(model.parameter_layout.from_names(values))
     loads = {"left.material_mass": 20.0, "left.processing_force": 50.0, "right.material_mass": 40.0}
 
     def inputs(t):
@@ -559,9 +559,9 @@ def test_the_frame_carries_what_changes_the_momentum():
     for t in (0.1, 0.3, 0.45):
         moved = [momentum(p, inputs(s), at(run(s)), counts)[0] for s in (t - 2 * h, t - h, t + h, t + 2 * h)]
         rate = (moved[0] - 8.0 * moved[1] + 8.0 * moved[2] - moved[3]) / (12.0 * h)
-        wanted = momentum(p, inputs(t), at(run(t)), counts)[1] - rate
+        reference = momentum(p, inputs(t), at(run(t)), counts)[1] - rate
         frame = model.evaluate(MATH, p, inputs(t), at(run(t)))[0].frame
-        np.testing.assert_allclose([frame.fx, frame.fy, frame.moment], wanted, rtol=1e-8)
+        np.testing.assert_allclose([frame.fx, frame.fy, frame.moment], reference, rtol=1e-8)
 
 
 def test_port_is_that_of_dense_equations():
@@ -592,8 +592,8 @@ def test_port_is_that_of_dense_equations():
             J += first @ (one - even)
             bias += first @ even + rocker.t1 * moment
             size += abs(first @ even)
-            found = [now[f"{side}.rocker_joint.{axis}"] for axis in ("fx", "fy")]
-            np.testing.assert_allclose(found, true, rtol=1e-8, atol=1e-8 * np.max(np.abs(true)))
+            results = [now[f"{side}.rocker_joint.{axis}"] for axis in ("fx", "fy")]
+            np.testing.assert_allclose(results, true, rtol=1e-8, atol=1e-8 * np.max(np.abs(true)))
         assert now["J"] * p.ratio**2 == pytest.approx(J, rel=1e-8)
         assert now["tau_bias"] * p.ratio == pytest.approx(bias, rel=1e-8, abs=1e-8 * size)
 
@@ -614,25 +614,25 @@ def test_coupling_is_of_second_order_with_slopes_of_first_without(files, tmp_pat
     linear = pair(model, "DcMotor", fmus, values)
     times = np.arange(0.0, stop + 1e-9, 0.004)
     exact = monolithic(linear, speed, times, rtol=1e-9)
-    found = {}
+    results = {}
     for slopes in (True, False):
         for step in (0.004, 0.002, 0.001):
             with CoSimulation(linear if slopes else hold_loads(linear), speed) as simulation:
                 run = simulation.run(stop, step)
             for name in ("machine.tau", "machine.left.tangential_load", "motor.w"):
-                wanted = exact[name].values
-                wrong = np.abs(run[name].values[:: round(0.004 / step)] - wanted)
-                found[slopes, step, name] = float(np.max(wrong) / np.max(np.abs(wanted)))
-            put = np.trapezoid(np.abs(run["machine.power"].values), dx=step)
+                reference = exact[name].values
+                wrong = np.abs(run[name].values[:: round(0.004 / step)] - reference)
+                results[slopes, step, name] = float(np.max(wrong) / np.max(np.abs(reference)))
+            supplied_energy = np.trapezoid(np.abs(run["machine.power"].values), dx=step)
             missing = run["machine.left.energy_residual"].values
-            found[slopes, step, "energy"] = float(np.max(np.abs(missing)) / put)
+            results[slopes, step, "energy"] = float(np.max(np.abs(missing)) / supplied_energy)
     for name, most in (("machine.tau", 2e-5), ("machine.left.tangential_load", 5e-5), ("motor.w", 2e-6)):
-        errors = {s: [found[s, step, name] for step in (0.004, 0.002, 0.001)] for s in (True, False)}
+        errors = {s: [results[s, step, name] for step in (0.004, 0.002, 0.001)] for s in (True, False)}
         orders = {s: np.log2(np.array(e[:-1]) / e[1:]) for s, e in errors.items()}
         assert np.all(np.abs(orders[True] - 2.0) < 0.3), (name, errors)
         assert np.all(np.abs(orders[False] - 1.0) < 0.25), (name, errors)
         assert errors[True][2] < most and errors[False][2] > 5.0 * errors[True][2], (name, errors)
-    energy = [found[True, step, "energy"] for step in (0.004, 0.002, 0.001)]
+    energy = [results[True, step, "energy"] for step in (0.004, 0.002, 0.001)]
     orders = np.log2(np.array(energy[:-1]) / energy[1:])
     assert np.all(np.abs(orders - 2.0) < 0.3) and energy[2] < 1e-5, energy
 
@@ -649,14 +649,14 @@ def test_energy_over_twenty_turns(files, law):
     start = law | {"left.material_mass": 45.0, "right.material_mass": 20.0, "left.processing_force": 300.0}
     names = ["power", "dissipated_power", "kinetic_energy", "potential_energy"]
     with Run(files(6, 2), start) as run:
-        found = run.over(20.0, h, [*names, *(f"{s}.energy_residual" for s in SIDES), "left.slack_share"])
-    power, lost, kinetic, potential = found.T[:4]
-    put = np.trapezoid(np.abs(power), dx=h)
-    stored = kinetic + potential
-    whole = cumulative_simpson(power - lost, dx=h, initial=0.0) - (stored - stored[0])
-    assert np.max(np.abs(found[:, 4:6])) < 1e-6 * put
-    assert np.max(np.abs(whole)) < 1e-6 * put
-    assert np.any(found[:, 6] > 0.0)
+        result = run.over(20.0, h, [*names, *(f"{s}.energy_residual" for s in SIDES), "left.slack_share"])
+    power, losses, kinetic, potential = result.T[:4]
+    supplied_energy = np.trapezoid(np.abs(power), dx=h)
+    stored_energy = kinetic + potential
+    whole = cumulative_simpson(power - losses, dx=h, initial=0.0) - (stored_energy - stored_energy[0])
+    assert np.max(np.abs(result[:, 4:6])) < 1e-6 * supplied_energy
+    assert np.max(np.abs(whole)) < 1e-6 * supplied_energy
+    assert np.any(result[:, 6] > 0.0)
 
 
 SAMPLED = {
@@ -712,11 +712,11 @@ def test_random_machines_run(files):
     for _ in range(100):
         start, w = sampled(rng)
         with Run(fmu, start) as run:
-            found = run.over(20.0, 0.02, names, 2.0 * math.pi / w)
+            result = run.over(20.0, 0.02, names, 2.0 * math.pi / w)
             assert np.all(np.isfinite(run.unit.get(fmu.outputs())))
-        put = np.trapezoid(np.abs(found[:, 0]), dx=0.02)
-        assert np.max(np.abs(found[:, 1:3])) < 1e-6 * put, start
-        slack += bool(np.any(found[:, 3] > 0.0))
+        supplied_energy = np.trapezoid(np.abs(result[:, 0]), dx=0.02)
+        assert np.max(np.abs(result[:, 1:3])) < 1e-6 * supplied_energy, start
+        slack += bool(np.any(result[:, 3] > 0.0))
     assert 30 < slack < 100
 
 
@@ -730,11 +730,11 @@ def test_native_and_python_fmus_agree_where_it_snatches(files, tmp_path):
     python = Fmu(export_python(flexible(3, 1), tmp_path / "python.fmu"))
     names = [n for n in files(3, 1).outputs() if not n.startswith("tau_bias_d")]
     with Run(files(3, 1), LOOSE) as one, Run(python, LOOSE) as two:
-        got, wanted = (run.over(1.0, TURN / 32.0, names) for run in (one, two))
+        got, reference = (run.over(1.0, TURN / 32.0, names) for run in (one, two))
     python.close()
     assert np.min(got[:, [k for k, n in enumerate(names) if ".pull_" in n]]) < -50.0
-    size = np.maximum(np.max(np.abs(wanted), axis=0), 1e-3)
-    assert np.max(np.abs(got - wanted) / size) < 1e-9
+    size = np.maximum(np.max(np.abs(reference), axis=0), 1e-3)
+    assert np.max(np.abs(got - reference) / size) < 1e-9
 
 
 @native
@@ -789,12 +789,12 @@ def test_steps_far_too_long_and_senseless_ones(files):
     with Run(files(6, 2), LOOSE | {"tolerance": 1e-9}) as run:
         many = run.over(1.0, 0.01, names, 1.0)[-1]
         np.testing.assert_allclose(once, many, atol=1e-5)
-        for h, said in (
+        for h, messages in (
             (-0.01, "must be finite and not negative"),
             (math.nan, "must be finite and not negative"),
             (1e9, r"takes more than solver\.max_steps = 100000 steps of its own"),
         ):
-            with pytest.raises(RunError, match=said):
+            with pytest.raises(RunError, match=messages):
                 run.unit.step(run.time, h)
         np.testing.assert_array_equal(run.unit.get(names), many)
         run.step(0.01)
@@ -839,21 +839,23 @@ def test_model_exchange(files):
     rng, p = np.random.default_rng(36), model.Parameters()
     for _ in range(20):
         y, (phi, w, a) = start + rng.uniform(-0.3, 0.3, n), rng.uniform(-10.0, 10.0, 3)
-        wanted = model.derivatives(MATH, p, Inputs(phi=phi, w=w, a=a), model.state_layout.instance(list(y)))
-        np.testing.assert_allclose(rates(0.0, y, [phi, w, a]), wanted, rtol=1e-12, atol=1e-10)
+        reference = model.derivatives(
+            MATH, p, Inputs(phi=phi, w=w, a=a), model.state_layout.instance(list(y))
+        )
+        np.testing.assert_allclose(rates(0.0, y, [phi, w, a]), reference, rtol=1e-12, atol=1e-10)
     times = np.linspace(0.0, 2.0 * TURN, 127)
     whole = (0.0, times[-1])
-    found = solve_ivp(rates, whole, start, method="DOP853", rtol=1e-8, atol=1e-8, t_eval=times).y.T
-    assert max(map(drift, times, found)) < 1e-7
+    result = solve_ivp(rates, whole, start, method="DOP853", rtol=1e-8, atol=1e-8, t_eval=times).y.T
+    assert max(map(drift, times, result)) < 1e-7
     theta = [k for k, name in enumerate(model.state_layout.names) if "theta" in name]
     with Run(fmu, {"tolerance": 1e-9}) as run:
         other = run.over(2.0, times[1], [model.state_layout.names[k] for k in theta])
-    np.testing.assert_allclose(found[:, theta], other, atol=1e-6)
+    np.testing.assert_allclose(result[:, theta], other, atol=1e-6)
     off = start.copy()
     off[theta] += 0.01
     assert drift(0.0, off) > 1e-3
-    found = solve_ivp(rates, whole, off, method="DOP853", rtol=1e-8, atol=1e-8).y.T
-    assert drift(times[-1], found[-1]) < 1e-7
+    result = solve_ivp(rates, whole, off, method="DOP853", rtol=1e-8, atol=1e-8).y.T
+    assert drift(times[-1], result[-1]) < 1e-7
     unit.terminate()
     unit.freeInstance()
 
@@ -868,11 +870,11 @@ def test_events_of_model_exchange_put_the_chain_back_to_its_end(files, tmp_path,
     folder = fmpy.extract(str(file), unzipdir=str(tmp_path / "fmu"))
     description = fmpy.read_model_description(folder)
     t = np.linspace(0.0, 1.0, 1001)
-    given = np.rec.fromarrays([t, W * t, W + 0.0 * t, 0.0 * t], names="time,phi,w,a")
+    values = np.rec.fromarrays([t, W * t, W + 0.0 * t, 0.0 * t], names="time,phi,w,a")
     got = fmpy.simulate_fmu(
         folder,
         fmi_type="ModelExchange",
-        input=given,
+        input=values,
         stop_time=1.0,
         output_interval=0.01,
         output=[f"{side}.drift" for side in SIDES],
@@ -942,18 +944,18 @@ def test_the_stop_between_rods_holds_and_its_energy_counts(files):
     folds = []
     for stiffness in (5e4, 0.0):
         with Run(files(6, 2), LOOSE | {"w": 30.0, "organ.fold_stiffness": stiffness}) as run:
-            found = run.over(20.0, 0.005, [*names, "power"], 2.0 * math.pi / 30.0)
-        put = np.trapezoid(np.abs(found[:, 4]), dx=0.005)
-        assert np.max(np.abs(found[:, [1, 3]])) < 1e-6 * put
-        folds.append(np.max(found[:, [0, 2]]))
+            result = run.over(20.0, 0.005, [*names, "power"], 2.0 * math.pi / 30.0)
+        supplied_energy = np.trapezoid(np.abs(result[:, 4]), dx=0.005)
+        assert np.max(np.abs(result[:, [1, 3]])) < 1e-6 * supplied_energy
+        folds.append(np.max(result[:, [0, 2]]))
     assert 2.8 < folds[0] < math.pi + 0.5 and folds[1] > 2.0 * math.pi
 
 
 def test_numbers_of_rods_that_make_no_model():
     for walls, webs in ((30, 2), (0, 3), (3, 0)):
-        with pytest.raises(InputError, match=f"{walls + webs} rods an organ.* at most 24 in all") as refused:
+        with pytest.raises(InputError, match=f"{walls + webs} rods an organ.* at most 24 in all") as refusal:
             flexible(walls, webs)
-        assert "\n" not in str(refused.value)
+        assert "\n" not in str(refusal.value)
     assert flexible(3, 1) is flexible(3, 1) and flexible(3, 1).built_by == "flexible(3, 1)"
     assert flexible(3, 1).direct().built_by == "flexible(3, 1).direct()"
 
@@ -973,10 +975,12 @@ def test_two_rods_stand_where_a_hanging_chain_would_not():
     for phi in np.linspace(0.0, 6.0, 13):
         empty = {f"{side}.material_mass": 0.0 for side in SIDES}
         u = model.input_layout.from_names({"phi": float(phi), "w": 2.0} | empty)
-        found = model.evaluate(MATH, p, u, model.begin(p, u))[0]
-        wanted = machine.replace({"pin.friction": 0.0}).forces(float(phi), 2.0)
-        assert found.rocker.tau == pytest.approx(float(wanted.rocker.tau), rel=1e-9, abs=1e-9)
-        assert found.right.drift < 1e-12 and found.margin == pytest.approx(float(wanted.margin), rel=1e-9)
+        result = model.evaluate(MATH, p, u, model.begin(p, u))[0]
+        reference = machine.replace({"pin.friction": 0.0}).forces(float(phi), 2.0)
+        assert result.rocker.tau == pytest.approx(float(reference.rocker.tau), rel=1e-9, abs=1e-9)
+        assert result.right.drift < 1e-12 and result.margin == pytest.approx(
+            float(reference.margin), rel=1e-9
+        )
     model = flexible(2, 1)
     p = model.check(model.parameter_layout.from_names({"organ.fold_limit": 1.0}))
     with pytest.raises(
@@ -1034,8 +1038,8 @@ def test_a_chain_without_mass_is_refused():
     for side in SIDES:
         for part in ("wall", "web"):
             none = {f"{side}.{part}_mass": 0.0}
-            said = f"{side}.{part}_mass = 0 kg: a chain without mass .*take ChamberForces; must be > 0 kg"
-            with pytest.raises(GeometryError, match=said):
+            message = f"{side}.{part}_mass = 0 kg: a chain without mass .*take ChamberForces; must be > 0 kg"
+            with pytest.raises(GeometryError, match=message):
                 model.check(model.parameter_layout.from_names(none))
 
 
@@ -1058,16 +1062,16 @@ def undamped(files):
 
 @native
 def test_numbers_of_two_rods_are_those_of_two_bars(undamped):
-    """Slack, snatch and torques mean the same of chains and of two bars."""
+    """Slack, snatch and torques have the same definition for chains and for two bars."""
     fmu, study, drive = undamped
-    found, by_rod = numbers_at(fmu, drive, study, 8.0)
-    assert 0.05 < found.slack_time == pytest.approx(found.two_bar_slack_time, abs=0.005)
-    assert found.snatch_median == pytest.approx(found.two_bar_snatch, rel=1e-3)
-    assert found.rocker_torque_median == pytest.approx(found.two_bar_rocker_torque, rel=1e-3)
-    assert found.crank_torque_rms == pytest.approx(
-        found.two_bar_crank_torque_rms, rel=0.05
+    result, by_rod = numbers_at(fmu, drive, study, 8.0)
+    assert 0.05 < result.slack_time == pytest.approx(result.two_bar_slack_time, abs=0.005)
+    assert result.snatch_median == pytest.approx(result.two_bar_snatch, rel=1e-3)
+    assert result.rocker_torque_median == pytest.approx(result.two_bar_rocker_torque, rel=1e-3)
+    assert result.crank_torque_rms == pytest.approx(
+        result.two_bar_crank_torque_rms, rel=0.05
     )  # its pins' friction
-    assert found.energy_residual < 1e-6 and found.snatch_spread == pytest.approx(1.0, abs=1e-3)
+    assert result.energy_residual < 1e-6 and result.snatch_spread == pytest.approx(1.0, abs=1e-3)
     assert all(share.shape == (2,) for share in by_rod.values())
 
 
@@ -1075,11 +1079,11 @@ def test_numbers_of_two_rods_are_those_of_two_bars(undamped):
 def test_an_interrupted_sweep_keeps_what_it_has(undamped):
     """Ctrl-C at the third speed: the study's own and the first of the sweep stay."""
     fmu, study, drive = undamped
-    told = []
+    reports = []
 
     def report(what, done, todo):
-        told.append(what)
-        if len(set(told)) == 3:
+        reports.append(what)
+        if len(set(reports)) == 3:
             signal.raise_signal(signal.SIGINT)
 
     result, ended = study_chain(study, drive, fmu.archive, report)

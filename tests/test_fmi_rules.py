@@ -29,8 +29,8 @@ both = pytest.mark.parametrize("fmi", [2, 3])
 
 def allowed(model, name):
     """The end of a line that refuses a value."""
-    declared = (*MODELS[model].parameter_layout.variables, *MODELS[model].input_layout.variables)
-    return next("must be " + v.quantity.allowed_range for v in declared if v.name == name)
+    declarations = (*MODELS[model].parameter_layout.variables, *MODELS[model].input_layout.variables)
+    return next("must be " + v.quantity.allowed_range for v in declarations if v.name == name)
 
 
 class Unit:
@@ -233,11 +233,11 @@ def test_the_order_of_an_input_and_its_derivative_does_not_matter(unit):
     one.api.setRealInputDerivatives([w_ref], [1], [500.0])
     raw = one.serialized()
     one.step(0.1, 0.01)
-    spent = one.serialized()
+    duration = one.serialized()
     one.restore(raw)
     one.step(0.1, 0.01)
     assert one.get("w_ref") == [32.0]
-    one.restore(spent)
+    one.restore(duration)
     one.step(0.11, 0.01)
     assert one.get("w_ref") == [32.0]
 
@@ -302,10 +302,10 @@ def test_a_step_beyond_the_budget_is_discarded_and_leaves_all_as_it_was(unit, na
     one.step(0.0, 1e-3)
     before = one.get(*states)
     line = one.refused(one.step, 1e-3, 10.0)
-    wanted = (
+    reference = (
         "takes more than solver.max_steps = 20 steps of its own; shorten the step, or raise solver.max_steps"
     )
-    assert line == f"step of 10 s from t = 0.001 s: {wanted}" and one.status == 2
+    assert line == f"step of 10 s from t = 0.001 s: {reference}" and one.status == 2
     assert one.get(*states) == before
     if fmi == 2:
         time = ctypes.c_double()
@@ -386,9 +386,9 @@ def test_every_declared_initial_dependency_has_a_derivative(unit, native_fmus, n
     else:
         one.api.enterInitializationMode(startTime=0.0)
     by = {}
-    for declared in description.initialUnknowns:
-        for known in declared.dependencies:
-            by.setdefault(known.valueReference, []).append(declared.variable.valueReference)
+    for declarations in description.initialUnknowns:
+        for known in declarations.dependencies:
+            by.setdefault(known.valueReference, []).append(declarations.variable.valueReference)
     parameters = {v.valueReference for v in description.modelVariables if v.causality == "parameter"}
     assert parameters & by.keys()
     set_values, read = (
@@ -397,8 +397,8 @@ def test_every_declared_initial_dependency_has_a_derivative(unit, native_fmus, n
     slopes = one.api.getDirectionalDerivative
     moved = 0
     for known, unknown in by.items():
-        found = np.array(slopes(unknown, [known], [1.0]))
-        assert np.isfinite(found).all()
+        result = np.array(slopes(unknown, [known], [1.0]))
+        assert np.isfinite(result).all()
         (at,) = read([known])
         # another step than the FMU's own
         h = 1e-4 * (abs(at) if at and known in parameters else max(1.0, abs(at)))
@@ -412,9 +412,9 @@ def test_every_declared_initial_dependency_has_a_derivative(unit, native_fmus, n
         finally:
             set_values([known], [at])
         # what a kink, or the rounding of the states at the start, gives both
-        size = np.maximum(np.abs(found), np.abs(sides[0]) / max(1.0, abs(at))) + 1.0
-        np.testing.assert_allclose(found / size, (sides[0] - sides[1]) / (2.0 * h) / size, atol=1e-3)
-        moved += known in parameters and bool(found.any())
+        size = np.maximum(np.abs(result), np.abs(sides[0]) / max(1.0, abs(at))) + 1.0
+        np.testing.assert_allclose(result / size, (sides[0] - sides[1]) / (2.0 * h) / size, atol=1e-3)
+        moved += known in parameters and bool(result.any())
     assert moved >= 3
     # two at once, and none in a run
     first, second = [k for k in by if k in parameters][:2]
@@ -430,7 +430,7 @@ def test_every_declared_initial_dependency_has_a_derivative(unit, native_fmus, n
 
 @both
 def test_a_number_out_of_reach_is_discarded(unit, fmi):
-    """The host may try a smaller step or another input; by the standard nothing is lost."""
+    """The host may try a smaller step or another input: by the standard the state is that before the step."""
     one = unit("ChamberForces", fmi).start()
     one.set({"w": 1e200})
     assert "is not a finite number" in one.refused(one.get, "tau") and one.status == 2
@@ -485,12 +485,12 @@ def test_messages_do_not_follow_the_hosts_locale(native_fmus, german, fmi):
         """
     )
     folder = native_fmus["DcMotor", fmi][1]
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", script, str(HERE), folder, str(fmi)],
         capture_output=True, text=True, env=os.environ | {"LOCPATH": str(german)},
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.strip() == "[ERROR] rotor.J = -1.5 kg m2: " + allowed("DcMotor", "rotor.J")
+    assert process.returncode == 0, process.stderr
+    assert process.stdout.strip() == "[ERROR] rotor.J = -1.5 kg m2: " + allowed("DcMotor", "rotor.J")
 
 
 @pytest.mark.skipif(sys.platform != "linux" or shutil.which("objdump") is None, reason="no objdump")
@@ -523,10 +523,10 @@ def test_several_fmus_are_linked_into_one_program(native_fmus, tmp_path):
                 subprocess.run([cc, *flags, "-c", file, "-o", made], check=True)
                 objects.append(made)
                 if file.stem != "host":
-                    said = subprocess.run(
+                    output = subprocess.run(
                         ["nm", "-g", "--defined-only", made], capture_output=True, text=True
                     ).stdout
-                    defined += [line.split()[-1] for line in said.splitlines()]
+                    defined += [line.split()[-1] for line in output.splitlines()]
             description = fmpy.read_model_description(folder)
             reference = {v.name: str(v.valueReference) for v in description.modelVariables}
             token = description.guid or description.instantiationToken
@@ -571,6 +571,6 @@ def test_sources_are_of_one_version(native_fmus, tmp_path):
         "-fsyntax-only",
         str(sources / "model.c"),
     ]
-    done = subprocess.run([shutil.which("cc"), *flags], capture_output=True, text=True)
-    assert done.returncode and "define the one of this FMU's version of FMI" in done.stderr
+    process = subprocess.run([shutil.which("cc"), *flags], capture_output=True, text=True)
+    assert process.returncode and "define the one of this FMU's version of FMI" in process.stderr
     assert not subprocess.run([shutil.which("cc"), flags[0], *flags[2:]]).returncode

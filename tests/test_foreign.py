@@ -1,4 +1,4 @@
-"""Texts and FMUs from outside: nothing of them is obeyed, nothing of them fills a screen."""
+"""Texts and FMUs from outside: the program obeys no control character in them and shortens long ones."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ EVIL = f"a{ESCAPE}b{RIGHT_TO_LEFT}c{ISOLATE}d\x07\u2028<script>alert(1)</script>
 
 
 def harmless(text):
-    """Whether a terminal or a page shows every character and obeys none."""
+    """Whether a terminal or a page shows every character as a character."""
     return all(x.isprintable() or x in "\n\u200c\u200d\u00a0\u202f" for x in text)
 
 
@@ -86,8 +86,8 @@ def test_refusals_are_short_and_harmless(text):
     with pytest.raises(InputError) as caught:
         config.parse(text)
     for fault in caught.value.faults:
-        said = str(fault)
-        assert harmless(said) and "\n" not in said and len(said) < 900
+        message = str(fault)
+        assert harmless(message) and "\n" not in message and len(message) < 900
 
 
 def test_a_foreign_catalogue_is_cited_in_short(tmp_path):
@@ -112,11 +112,11 @@ def test_titles_are_harmless_wherever_they_go():
     from chainunit.study.record import StudyRecord
     from chainunit.study.statics import statics
 
-    given = config.parse(f"title = {toml_text(EVIL)}")
-    assert harmless(given.title) and "\n" not in given.title
-    assert not re.search(r"(?<!\\)[<>\[\]|`*_]", markdown_text(given.title))
-    drive = Drive(DcMotor, given.motor, given.machine)
-    assert harmless(said_of(StudyRecord(given, drive, statics(given, drive))))
+    values = config.parse(f"title = {toml_text(EVIL)}")
+    assert harmless(values.title) and "\n" not in values.title
+    assert not re.search(r"(?<!\\)[<>\[\]|`*_]", markdown_text(values.title))
+    drive = Drive(DcMotor, values.motor, values.machine)
+    assert harmless(said_of(StudyRecord(values, drive, statics(values, drive))))
     assert "\\<script\\>" in markdown_text(EVIL)
 
 
@@ -155,7 +155,7 @@ def test_an_identifier_that_leads_out_of_the_folder_is_refused(name, motor, tmp_
 
 def test_a_library_that_is_not_there_or_none_is_told(motor, tmp_path):
     here = Path.cwd()
-    for file, told in (
+    for file, values in (
         (
             changed(motor, tmp_path / "none.fmu", keep=lambda name: not name.startswith("binaries")),
             r"none\.fmu: has no library for this machine, binaries/.*; it has none",
@@ -171,7 +171,7 @@ def test_a_library_that_is_not_there_or_none_is_told(motor, tmp_path):
         ),
     ):
         fmu = Fmu(file)
-        with pytest.raises(InputError, match=told):
+        with pytest.raises(InputError, match=values):
             Instance(fmu, "motor")
         fmu.close()
     with zipfile.ZipFile(motor) as archive:
@@ -212,9 +212,9 @@ def test_what_an_fmu_says_is_harmless(motor):
 @pytest.mark.skipif(compiler() is None, reason="no C compiler")
 def test_an_fmu_that_cannot_be_instantiated_is_told(tmp_path):
     """A GUID that is not the library's."""
-    made = export(MODELS["DcMotor"], tmp_path / "motor.fmu")
+    origin = export(MODELS["DcMotor"], tmp_path / "motor.fmu")
     file = changed(
-        made, tmp_path / "x.fmu", description=lambda text: re.sub(r'guid="[^"]*"', 'guid="{other}"', text)
+        origin, tmp_path / "x.fmu", description=lambda text: re.sub(r'guid="[^"]*"', 'guid="{other}"', text)
     )
     fmu = Fmu(file)
     with pytest.raises(RunError, match="motor: cannot be instantiated"):

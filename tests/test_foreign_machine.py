@@ -67,7 +67,7 @@ def burst():
     """A type of event for the pump's own input: the pressure rises for a while."""
 
     class Burst(Event):
-        """The back pressure rises."""
+        """The event of a rising back pressure."""
 
         kind, run, words, heading = "burst", "burst", "the back pressure rises", "burst"
         role, has_side = Role.SHOCK, False
@@ -75,7 +75,7 @@ def burst():
 
         @declaration
         class Parameters(Timing):
-            """Of the pressure."""
+            """Quantities of the pressure."""
 
             pressure: Value = quantity("1", "back pressure at its height", default=BURST, min=0.0)
 
@@ -136,7 +136,7 @@ def test_what_a_file_sets_is_declared_by_the_fmu(folder):
     assert study.machine.by_name == {"ratio": RATIO, "piston.mass": MASS, "throw": 0.15}
     assert study.machine.component.start == {"piston.mass": MASS, "throw": 0.15}
     assert study.feed.back_pressure == PRESSURE
-    for change, said in (
+    for change, messages in (
         (
             ("piston =", "pistn ="),
             r'machine\.pistn: unknown key; was "piston" meant\? known here: ratio, piston, throw',
@@ -154,7 +154,7 @@ def test_what_a_file_sets_is_declared_by_the_fmu(folder):
         ((MACHINE, MACHINE + "machine_names = { w = 'x' }"), r"no variable x, which was given for w"),
         ((STUDY + MACHINE, "[system]\nmachine_names = { w = 'x' }"), r"system\.machine_names: are of an FMU"),
     ):
-        with pytest.raises(InputError, match=said):
+        with pytest.raises(InputError, match=messages):
             parse(folder, (STUDY + MACHINE).replace(*change))
 
 
@@ -237,11 +237,11 @@ def test_the_step_is_of_second_order(folder):
 
 
 def test_a_study_file_with_our_motor(folder):
-    """By the command, with a coupling that opens in a blocked pump: the machine behind it is not followed."""
+    """By the command, with a coupling that opens in a blocked pump: there is no run of the machine behind it."""
     text = f"{STUDY}{MACHINE}[coupling]\ntrip_torque = 500\n"
     (folder / "pump.toml").write_text(text)
-    done = chainunit("study", "pump.toml", "-o", "out", cwd=folder)
-    assert done.returncode == 0, done.stderr
+    process = chainunit("study", "pump.toml", "-o", "out", cwd=folder)
+    assert process.returncode == 0, process.stderr
     result = json.loads((folder / "out" / "result.json").read_text())
     assert result["status"] == "complete" and result["machine"]["piston.mass"]["value"] == MASS
     assert result["answers"]["steady"]["speed_mean"]["value"] == pytest.approx(SPEED, rel=1e-2)
@@ -251,12 +251,12 @@ def test_a_study_file_with_our_motor(folder):
     assert loop == pytest.approx(float(np.mean(turn.outputs.J)) + 0.0035, rel=1e-9)
     page = (folder / "out" / "report.html").read_text()
     assert "An eccentric pump" in page and "piston" in page
-    for command, said in (
+    for command, messages in (
         (("study", "--check", "pump.toml"), r"--check: the equations of ForeignMachine\.fmu are not known"),
         (("export", "ChamberForces", "--config", "pump.toml"), r"the study's machine is ForeignMachine\.fmu"),
     ):
-        done = chainunit(*command, cwd=folder)
-        assert done.returncode == 2 and re.search(said, done.stderr), done.stderr
+        process = chainunit(*command, cwd=folder)
+        assert process.returncode == 2 and re.search(messages, process.stderr), process.stderr
 
 
 SIZED = STUDY.replace(f"ratio = {RATIO}\n", "") + MACHINE + "[sizing]\ncandidates = 1\ninertia_ratio = 1000\n"
@@ -281,8 +281,8 @@ def test_sizing_finds_a_motor_for_it(folder):
 
 def test_sizing_does_without_its_torque(tmp_path):
     build(tmp_path, left_out=("tau",), script=SCRIPT)
-    found = size(parse(tmp_path, SIZED), tmp_path, lambda *said: None)
-    compare_with_pump(found.best)
+    result = size(parse(tmp_path, SIZED), tmp_path, lambda *said: None)
+    compare_with_pump(result.best)
 
 
 def test_behind_an_open_coupling_it_is_not_followed(folder, burst):
@@ -331,16 +331,16 @@ def test_a_cardan_line_before_it(place, folder):
 def test_a_package_holds_their_files_as_they_are(tool, folder, tmp_path):
     """In other tools the system runs as in the own master: names, values and connections are those of the FMUs."""
     (folder / "both.toml").write_text(f"{STUDY}{MACHINE}motor = 'ForeignMotor.fmu'\n{OTHER_NAMES}")
-    done = chainunit("export-ssp", "both.toml", "-o", str(tmp_path / "both.ssp"), cwd=folder)
-    assert done.returncode == 0, done.stderr
-    assert "machine (ForeignMachine), gear (Gear), motor (ForeignMotor)" in done.stdout
-    assert "ForeignMachine.fmu as it is" in done.stdout
+    process = chainunit("export-ssp", "both.toml", "-o", str(tmp_path / "both.ssp"), cwd=folder)
+    assert process.returncode == 0, process.stderr
+    assert "machine (ForeignMachine), gear (Gear), motor (ForeignMotor)" in process.stdout
+    assert "ForeignMachine.fmu as it is" in process.stdout
     with zipfile.ZipFile(tmp_path / "both.ssp") as archive:
         for name in ("ForeignMachine", "ForeignMotor"):
             assert archive.read(f"resources/{name}.fmu") == (folder / f"{name}.fmu").read_bytes()
     system = read_ssd(str(tmp_path / "both.ssp")).system
-    given = {e.name: e.parameterBindings[0].parameterValues[0].parameters for e in system.elements}
-    values = {f"{name}.{p.name}": float(p.value) for name, each in given.items() for p in each}
+    inputs = {e.name: e.parameterBindings[0].parameterValues[0].parameters for e in system.elements}
+    values = {f"{name}.{p.name}": float(p.value) for name, each in inputs.items() for p in each}
     assert values == {
         "machine.piston.mass": MASS,
         "machine.throw": 0.15,
@@ -359,8 +359,8 @@ def test_a_package_holds_their_files_as_they_are(tool, folder, tmp_path):
     drive = choose(study, tmp_path, None).drive
     files, _ = drive.export(tmp_path)
     with CoSimulation(replace(drive.system(files), start=study_system(study, drive).start)) as simulation:
-        wanted = simulation.run(0.3, 1e-3)["motor.w"].values[1:]
-    assert np.max(np.abs(got[:, 0] - wanted)) < 2e-4 * np.max(wanted)
+        reference = simulation.run(0.3, 1e-3)["motor.w"].values[1:]
+    assert np.max(np.abs(got[:, 0] - reference)) < 2e-4 * np.max(reference)
 
 
 def test_python_runs_and_shows_it_too(folder):

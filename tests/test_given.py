@@ -1,4 +1,4 @@
-"""What a study was given, and where it is from."""
+"""The given values of a study, and their origins."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ KNIFE = example("knife")
 
 
 def study_of(config, folder):
-    """The study before anything of it is run."""
-    chosen = choose(config, folder, lambda *_: None)
-    study = StudyRecord(config, chosen.drive, statics(config, chosen.drive), chosen.tuning, chosen.sizing)
+    """The study before its first run."""
+    choice = choose(config, folder, lambda *_: None)
+    study = StudyRecord(config, choice.drive, statics(config, choice.drive), choice.tuning, choice.sizing)
     conclude(study)
     return study
 

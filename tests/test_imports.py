@@ -1,4 +1,4 @@
-"""What takes long to import is not imported before it is needed."""
+"""Libraries that take long to import are imported only where they are needed."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ DEPENDENCIES = {
 def test_imports_no_more_than_is_needed(code, needed):
     assert {"numpy", "scipy", "xarray", "casadi", "fmpy", "matplotlib", "typer", "rich"} <= DEPENDENCIES
     after = f"import sys\n{code}\nprint('loaded', *{{m.split('.')[0].lower() for m in sys.modules}})"
-    done = subprocess.run([sys.executable, "-c", after], capture_output=True, text=True, check=True)
-    loaded = set(done.stdout.splitlines()[-1].split())
+    process = subprocess.run([sys.executable, "-c", after], capture_output=True, text=True, check=True)
+    loaded = set(process.stdout.splitlines()[-1].split())
     assert loaded & DEPENDENCIES == needed
 
 
@@ -52,5 +52,5 @@ def test_the_package_runs_as_a_module_and_names_all_models():
         return subprocess.run(command, capture_output=True, text=True, check=True).stdout
 
     assert printed("--version").startswith("chainunit ")
-    said = " ".join(printed("export", "--help").split())
-    assert ", ".join(MODELS) in said and "Accelerator" in said
+    message = " ".join(printed("export", "--help").split())
+    assert ", ".join(MODELS) in message and "Accelerator" in message

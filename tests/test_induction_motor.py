@@ -52,7 +52,7 @@ def run(p, u, stop, start=None, step=None):
 def standing(p, w, share=1.0, f=None):
     """The states of steady running, as `steady` has them."""
     s = steady(engines.MATH, p, w, share, f)
-    given = {
+    values = {
         "phi": 0.0,
         "w": w,
         "stator.psi.d": s.psi.d,
@@ -64,7 +64,7 @@ def standing(p, w, share=1.0, f=None):
         "supply.ramp": share,
         "load_energy": 0.0,
     }
-    return s, [given[name] for name in LAYOUT.names]
+    return s, [values[name] for name in LAYOUT.names]
 
 
 # --- motulator ---
@@ -126,11 +126,13 @@ def test_start_is_motulators(beta):
     coarse, step = [start], InductionMotor.internal_step(engines.MATH, p)
     for h in np.diff(TIMES):
         coarse.append(advanced(p, u, coarse[-1], h, step))
-    wanted = motulator_start(p, u)
-    assert wanted[2][-1] > 145.0 and max(wanted[1]) > 4.0 * wanted[1][-1]
+    reference = motulator_start(p, u)
+    assert reference[2][-1] > 145.0 and max(reference[1]) > 4.0 * reference[1][-1]
     for states, allowed in ((tight.y, 1e-6), (np.array(coarse).T, 1e-5)):
         out = outputs(p, u, states, engines.numpy_())
-        for got, there in zip((out.air_gap_tau, out.i, states[LAYOUT.names.index("w")]), wanted, strict=True):
+        for got, there in zip(
+            (out.air_gap_tau, out.i, states[LAYOUT.names.index("w")]), reference, strict=True
+        ):
             assert np.max(np.abs(got - there)) < allowed * np.max(np.abs(there))
 
 
@@ -138,7 +140,7 @@ def test_start_is_motulators(beta):
 
 
 def random_states(rng):
-    given = {
+    values = {
         "phi": 0.3,
         "w": rng.uniform(-200.0, 200.0),
         "stator.T": rng.uniform(250.0, 450.0),
@@ -147,7 +149,7 @@ def random_states(rng):
         "load_energy": 0.0,
         **{f"{side}.psi.{axis}": rng.uniform(-1.2, 1.2) for side in ("stator", "cage") for axis in "dq"},
     }
-    return [given[name] for name in LAYOUT.names]
+    return [values[name] for name in LAYOUT.names]
 
 
 def test_supply_power_is_losses_field_and_shaft():
@@ -215,9 +217,9 @@ def test_steady_running_is_the_equivalent_circuit(given):
         out = outputs(p, u, flux_rates(np.linalg.solve(matrix, -free).tolist())[1])
         s = steady(engines.MATH, p, w)
         power_factor = out.supply_power / (math.sqrt(3.0) * out.v * out.i)
-        wanted = circuit(p, slip)
+        reference = circuit(p, slip)
         for got in ((out.air_gap_tau, out.i, power_factor), (s.air_gap_tau, s.i, s.power_factor)):
-            assert got == pytest.approx(wanted, rel=1e-9, abs=1e-9)
+            assert got == pytest.approx(reference, rel=1e-9, abs=1e-9)
         assert (s.slip, s.supply_power, s.heat) == pytest.approx(
             (out.slip, out.supply_power, out.heat), rel=1e-9
         )
@@ -228,12 +230,12 @@ def test_steady_running_stands_still_with_saturation():
     """Also where the main path is so saturated that the flux falls to a third, as at low frequency."""
     rng, least = np.random.default_rng(5), 1.0
     for k in range(60):
-        given = {**SKIN, **COLD, "main.beta": rng.uniform(0.0, 3.0), "stator.R": rng.uniform(0.1, 20.0)}
-        p = parameters(given)
+        values = {**SKIN, **COLD, "main.beta": rng.uniform(0.0, 3.0), "stator.R": rng.uniform(0.1, 20.0)}
+        p = parameters(values)
         f, share = (50.0, 1.0) if k % 2 else (rng.uniform(2.0, 60.0), rng.uniform(0.1, 1.0))
         w = (1.0 - rng.uniform(-0.2, 1.2)) * 2.0 * math.pi * f / p.pole_pairs
         s, x = standing(p, w, share, f)
-        linear, _ = standing(parameters(given | {"main.beta": 0.0}), w, share, f)
+        linear, _ = standing(parameters(values | {"main.beta": 0.0}), w, share, f)
         fall = math.hypot(s.psi.d, s.psi.q) / math.hypot(linear.psi.d, linear.psi.q)
         least = min(least, fall)
         out, d = outputs(p, inputs(), x), dict(zip(LAYOUT.names, rates(p, inputs())(x), strict=True))

@@ -103,23 +103,23 @@ def test_a_key_at_its_value_changes_nothing(table, key):
     own = (f"{key.name} =", f"system.{key.name} =")
     without = "\n".join(line for line in lines if not line.startswith(own) or key.name == "type")
     try:
-        given, left_out = parse(text), parse(without)
+        values, left_out = parse(text), parse(without)
     except InputError as error:
         # a start or a catalogue is of a motor of the catalogue alone
         assert "is of" in str(error) and not table.name
         return
     for part in ("machine", "feed", "motor", "run", "coupling", "monte_carlo", "sizing", "flywheel", "gear"):
-        assert _values(getattr(given, part)) == pytest.approx(_values(getattr(left_out, part)), rel=1e-11)
-    for one, other in zip(given.events.values(), left_out.events.values(), strict=True):
+        assert _values(getattr(values, part)) == pytest.approx(_values(getattr(left_out, part)), rel=1e-11)
+    for one, other in zip(values.events.values(), left_out.events.values(), strict=True):
         assert _values(one) == pytest.approx(_values(other), rel=1e-11) and one.name == other.name
     for part in ("starter", "driveline", "torsion", "chain", "simulation", "damping_ratios", "place"):
-        assert getattr(given, part) == getattr(left_out, part)
+        assert getattr(values, part) == getattr(left_out, part)
 
 
 def _values(part):
     """The numbers of a part of a study, by name."""
-    declared = getattr(part, "p", part)
-    return Layout(type(declared)).by_name(declared) if declared is not None else {}
+    declarations = getattr(part, "p", part)
+    return Layout(type(declarations)).by_name(declarations) if declarations is not None else {}
 
 
 def test_the_full_example_names_every_key_once():
@@ -138,8 +138,8 @@ def test_the_full_example_names_every_key_once():
             here = set_here.get(first)
             for name in below:
                 here = here.get(name) if isinstance(here, dict) else None
-            said = re.findall(rf"^# {re.escape(key.name)} =", own, re.MULTILINE)
-            assert len(said) == (here is None), (table.name, key.name)
+            message = re.findall(rf"^# {re.escape(key.name)} =", own, re.MULTILINE)
+            assert len(message) == (here is None), (table.name, key.name)
 
 
 def test_each_line_of_the_full_example_has_a_comment():
@@ -149,16 +149,16 @@ def test_each_line_of_the_full_example_has_a_comment():
 
 
 def test_the_commands(tmp_path):
-    said = chainunit("keys", "jam", cwd=tmp_path).stdout
-    assert "processing force of the lump" in said and '"2 kN"' in said
+    output = chainunit("keys", "jam", cwd=tmp_path).stdout
+    assert "processing force of the lump" in output and '"2 kN"' in output
     assert "[[event]] of jam" in chainunit("keys", cwd=tmp_path).stdout
     assert "rated power at the shaft" in chainunit("keys", "catalogue", cwd=tmp_path).stdout
     # each machine has other keys: the command lists the machines, and how to ask for one
     machines = chainunit("keys", "machine", cwd=tmp_path).stdout
     assert re.findall(r"chainunit keys (\w+)", machines) == list(MACHINES) and "web_share" not in machines
     assert "web_share" in chainunit("keys", "ChamberForces", cwd=tmp_path).stdout
-    refused = chainunit("keys", "jams", cwd=tmp_path)
-    assert refused.returncode == 2 and "there are system, machine" in refused.stderr
+    refusal = chainunit("keys", "jams", cwd=tmp_path)
+    assert refusal.returncode == 2 and "there are system, machine" in refusal.stderr
     assert chainunit("schema", cwd=tmp_path).returncode == 0
     assert json.loads((tmp_path / "chainunit.schema.json").read_text("utf-8")) == json_schema()
     first, *_ = chainunit("study", "--example", "knife", cwd=tmp_path).stdout.splitlines()

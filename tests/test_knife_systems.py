@@ -119,8 +119,8 @@ def test_a_coupling_opens_in_a_hard_cut_and_the_machine_comes_to_rest(tmp_path):
     time, w = coasting["time"].values, coasting["machine.w"].values
     assert coasting["machine.kinetic_energy"].values[0] == pytest.approx(answers.energy_behind)
     assert w[0] > 50.0 and np.all((w[1:] > 0.0) & (w[1:] < 0.01 * w[0]))
-    lost = cumulative_trapezoid(coasting["machine.dissipated_power"].values[1:], time[1:], initial=0.0)
-    assert np.max(np.abs(energy[1:] + lost - energy[1])) < 1e-3
+    losses = cumulative_trapezoid(coasting["machine.dissipated_power"].values[1:], time[1:], initial=0.0)
+    assert np.max(np.abs(energy[1:] + losses - energy[1])) < 1e-3
     # the same by another integrator, from where the coupling let go
     model = study.drive.coasting_model
     p = model.prepared(MATH, model.parameter_layout.from_names(study.drive.coasting_parameters()))

@@ -39,9 +39,9 @@ def test_no_renderer_names_a_study_or_a_machine():
         "blocks figure files html lines markdown motion page_figures print_figures style terminal".split()
     )
     assert {f"report.{name}" for name in renderers} <= {a for a, _ in HOUSE.imports()} | {"report.lines"}
-    found = {(a, b) for a, b in HOUSE.imports() if a.startswith("report.") and a.split(".")[1] in renderers}
-    assert {HOUSE.layer(b) for _, b in found} == {"core", "report"}
-    assert {b.split(".")[1] for _, b in found if HOUSE.layer(b) == "report"} <= set(renderers)
+    results = {(a, b) for a, b in HOUSE.imports() if a.startswith("report.") and a.split(".")[1] in renderers}
+    assert {HOUSE.layer(b) for _, b in results} == {"core", "report"}
+    assert {b.split(".")[1] for _, b in results if HOUSE.layer(b) == "report"} <= set(renderers)
 
 
 def test_no_modules_import_each_other_in_a_circle():
@@ -56,7 +56,7 @@ def test_no_modules_import_each_other_in_a_circle():
 
 
 def test_no_two_classes_share_a_name():
-    """A model's own parameters, inputs, states and outputs apart."""
+    """No two classes share a name, apart from a model's own parameters, inputs, states and outputs."""
     places: dict[str, list[str]] = {}
     for file in sorted(HOUSE.PACKAGE.rglob("*.py")):
         for node in ast.walk(ast.parse(file.read_text("utf-8"))):

@@ -34,8 +34,8 @@ def test_a_machine_follows_from_its_model(model):
     phi = np.linspace(0.0, 2.0 * np.pi * 3.0, 5)
     out = machine.outputs(phi, 9.0, 4.0, model.Feed())
     assert isinstance(out, model.Outputs) and out.tau.shape == phi.shape
-    named = machine.evaluate({"phi": phi, "w": 9.0, "a": 4.0, **feed.by_name(model.Feed())})
-    np.testing.assert_array_equal(named["tau"], out.tau)
+    names = machine.evaluate({"phi": phi, "w": 9.0, "a": 4.0, **feed.by_name(model.Feed())})
+    np.testing.assert_array_equal(names["tau"], out.tau)
     with pytest.raises(InputError, match="w = nan"):
         machine.outputs(0.0, float("nan"))
 
@@ -67,13 +67,13 @@ def test_the_direct_model_follows_from_the_inverse_one(model):
 
 
 def test_a_machine_of_that_name_is_one_class():
-    """Machines with chains, as many as there are numbers of rods, are none of them."""
+    """Machines with chains are not among the machines by name: there is one for each number of rods."""
     assert all(model.name == name and not model.built_by for name, model in MACHINES.items())
     assert {"ChamberForces", "KnifeDrive", "Accelerator"} <= set(MACHINES)
 
 
 def test_names_of_direct_models():
-    """As their FMUs are called."""
+    """The models have the names of their FMUs."""
     names = {name: model.direct().name for name, model in MODELS.items()}
     assert names.pop("ChamberForces") == "ChainUnit"
     assert names == {name: f"{name}Direct" for name in names} and len(names) > 2
@@ -116,11 +116,11 @@ def test_what_a_chain_unit_has_beside_others():
     assert machine.loaded_sides(feed) == ("left", "right")
     energy = machine.stored_per_unit["left.material_mass"]({"phi0": 0.4, "w0": 3.0})
     more = machine.model.Feed(left=type(feed.left)(material_mass=32.0))
-    stored = [
+    stored_energy = [
         out.kinetic_energy + out.potential_energy
         for out in (machine.outputs(0.4, 3.0, feed=f) for f in (feed, more))
     ]
-    assert 2.0 * energy == pytest.approx(float(stored[1] - stored[0]), rel=1e-9)
+    assert 2.0 * energy == pytest.approx(float(stored_energy[1] - stored_energy[0]), rel=1e-9)
 
 
 def test_a_machine_derived_from_the_chain_unit_is_one(monkeypatch):

@@ -1,4 +1,4 @@
-"""Measures by hand: what is read from a made-up run, and in which runs a measure means something."""
+"""Measures by hand: their values in a run that is made up, and the runs in which each has a meaning."""
 
 from __future__ import annotations
 
@@ -78,11 +78,11 @@ def test_each_measure_has_its_reader_and_its_runs():
     steady = window()
     for phase in Phase:
         answers = read_answers(window(phase, steady=steady, begin=1.0 if phase is Phase.EVENT else 0.0))
-        told = {n for n, x in Layout(Answers).by_name(answers).items() if x is not None}
-        assert told <= {v.name for v in measures_of(phase)}
+        values = {n for n, x in Layout(Answers).by_name(answers).items() if x is not None}
+        assert values <= {v.name for v in measures_of(phase)}
         if phase is Phase.START_UP:
             # two bars have no slack rod and no fold
-            assert told == {v.name for v in measures_of(phase)} - {"slack_time", "fold_largest"}
+            assert values == {v.name for v in measures_of(phase)} - {"slack_time", "fold_largest"}
     assert read_measure("crank_torque_mean", steady) == pytest.approx(5.0)
 
 

@@ -31,7 +31,7 @@ def draw(seed: int, lossless: bool = False):
 
 
 def scale_of(machine, phi, w, a, left, right, stop=FREE) -> float:
-    """What the torque's terms add up to before they cancel: rounding is relative to this."""
+    """The sum of the sizes of the torque's terms, before they cancel: rounding is relative to it."""
     out = machine.forces(phi, w, a, left, right, stop)
     forces = [out.crank_pin, out.coupler_pin, out.pivot, out.left.rocker_joint, out.right.rocker_joint]
     size = max(max(abs(float(f.fx)), abs(float(f.fy))) for f in forces)
@@ -257,9 +257,9 @@ def test_a_machine_that_is_narrower_than_its_swing_turns(l1, l2, z):
 
 
 def test_a_gap_of_half_widths_is_refused_with_its_limits():
-    with pytest.raises(GeometryError, match=r"z = 0\.1 m: .* must be > 0 and < (\S+) m") as refused:
+    with pytest.raises(GeometryError, match=r"z = 0\.1 m: .* must be > 0 and < (\S+) m") as refusal:
         ChainUnitMachine(l1=1.35, l2=0.545, z=0.1)
-    limit = float(re.search(r"< (\S+) m$", str(refused.value))[1])
+    limit = float(re.search(r"< (\S+) m$", str(refusal.value))[1])
     assert ChainUnitMachine(l1=1.35, l2=0.545, z=limit - 1e-5).p.z > 0.0
     with pytest.raises(GeometryError, match=r"z = 0\.2 m: .* must be > (\S+) and < (\S+) m"):
         ChainUnitMachine(l1=1.35, l2=0.545, z=0.2)

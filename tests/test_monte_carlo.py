@@ -1,4 +1,4 @@
-"""Random overloads: the same numbers whoever computes them, and nothing lost to a kill."""
+"""Random overloads: every process computes the same numbers, and a kill loses no finished run."""
 
 from __future__ import annotations
 
@@ -86,14 +86,14 @@ def killed(tmp_path_factory):
         out.write('{"run": 99999, "crank_a')
     before, _ = monte_carlo.read(file)
     second = start(folder, len(before) + 10)
-    said, errors = second.communicate()
+    message, errors = second.communicate()
     assert second.returncode == 0, errors
-    return file, before, said
+    return file, before, message
 
 
 def test_a_killed_study_goes_on_from_what_it_saved(killed):
-    file, before, said = killed
-    assert before and f"resumed {len(before)}" in said
+    file, before, message = killed
+    assert before and f"resumed {len(before)}" in message
     rows = [json.loads(line) for line in file.read_text().splitlines()]
     assert sorted(row["run"] for row in rows) == list(range(len(before) + 10))
     for row in rows:
@@ -128,28 +128,28 @@ def test_answers_hang_together(killed):
     result = monte_carlo.MonteCarloResult(rows, killed[0], 0)
     sides = {side: runs["value"] for side, runs in result.as_dict()["sides"].items()}
     assert sides == {side: sum(row["side"] == side for row in rows) for side in ("left", "right")}
-    found = result.as_dict()["quantiles"]
-    share = found["trips"]["share"]
+    outcome = result.as_dict()["quantiles"]
+    share = outcome["trips"]["share"]
     assert share["unit"] == "1" and share["low"]["value"] < share["value"] < share["high"]["value"]
 
 
 def test_quantiles_have_intervals_or_are_left_out(killed):
     """Of the few runs the median is told, of 100 like them the 5 % and 95 % quantiles, too, of 400 all."""
     few = list(killed[1].values())
-    for number, told in ((30, ["q50"]), (100, ["q5", "q50", "q95"]), (400, ["q5", "q50", "q95", "q99"])):
+    for number, entries in ((30, ["q50"]), (100, ["q5", "q50", "q95"]), (400, ["q5", "q50", "q95", "q99"])):
         rows = [
             {**few[k % len(few)], "run": k, "crank_torque_peak": 100.0 + k % 97 + 1e-3 * k}
             for k in range(number)
         ]
         result = monte_carlo.MonteCarloResult(rows, killed[0], 0)
         sizes = result.quantiles()["crank_torque_peak"]
-        assert list(sizes) == told
+        assert list(sizes) == entries
         values = [row["crank_torque_peak"] for row in rows]
         for name, each in sizes.items():
             assert each == quantiles.quantile(values, float(name[1:]) / 100.0)
             assert each.low < each.value < each.high
-        entry = result.as_dict()["quantiles"]["crank_torque_peak"][told[-1]]
-        assert entry["low"] == {"value": sizes[told[-1]].low, "unit": "N.m"}
+        entry = result.as_dict()["quantiles"]["crank_torque_peak"][entries[-1]]
+        assert entry["low"] == {"value": sizes[entries[-1]].low, "unit": "N.m"}
         assert bool(result.remark) == (number < 368)
     assert (
         "30 runs are too few" in (monte_carlo.MonteCarloResult(few[:25] + few[:5], killed[0], 0).remark)
@@ -158,7 +158,7 @@ def test_quantiles_have_intervals_or_are_left_out(killed):
 
 
 class Still:
-    """Stands for a simulation; remembers what it is given and ends."""
+    """A stand-in for a simulation: it records its arguments and ends."""
 
     time = 1.0
 
@@ -312,19 +312,19 @@ def test_what_is_left_out_is_computed_anew_and_told(killed, tmp_path):
     task = monte_carlo.Task(config, drive, files, 1.0)
     lines = [json.dumps(before[k]) for k in (0, 1, 2)]
     (tmp_path / file.name).write_text("\n".join([*lines, lines[0].replace(":", ";"), "5"]) + "\n")
-    told = []
-    result = monte_carlo.run(task, tmp_path, lambda *said: told.append(said[1:]), workers=1)
+    reports = []
+    result = monte_carlo.run(task, tmp_path, lambda *said: reports.append(said[1:]), workers=1)
     assert (result.resumed, result.left_out) == (3, 2)
     assert result.rows == [before[k] for k in range(5)]
     assert result.as_dict()["left_out"]["value"] == 2
     # one at a time
-    assert told == [(3, 5), (4, 5), (5, 5)]
+    assert reports == [(3, 5), (4, 5), (5, 5)]
     assert monte_carlo.read(tmp_path / file.name) == ({k: before[k] for k in range(5)}, 0)
 
 
 @pytest.mark.parametrize("end", [None, signal.SIGTERM])
 def test_processes_leave_nothing_behind(end, tmp_path):
-    """Neither when they end, nor after SIGTERM to all of them."""
+    """No folder stays behind when the processes end, nor after SIGTERM to all of them."""
     scratch = tmp_path / "scratch"
     scratch.mkdir()
     running = start(tmp_path, 4 if end is None else 10_000, env=os.environ | {"TMPDIR": str(scratch)})
@@ -364,10 +364,10 @@ def test_an_error_in_a_process_is_not_the_files(tmp_path, monkeypatch):
 
 
 def test_question_and_answer_tell_of_random_overloads(tmp_path):
-    """A coupling that opens in most runs must not stand in a table alone."""
+    """A coupling that opens in most runs is a warning, not a number in a table alone."""
     (tmp_path / "study.toml").write_text("event = []\n" + STUDY.format(runs=6))
-    done = chainunit("study", "study.toml", "-o", "out", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    process = chainunit("study", "study.toml", "-o", "out", cwd=tmp_path)
+    assert process.returncode == 0, process.stderr
     result = json.loads((tmp_path / "out" / "result.json").read_text())
     quantiles_of = result["monte_carlo"]["quantiles"]
     opens = shown(quantiles_of["trips"]["share"]["value"], "1", "percent")
@@ -382,4 +382,4 @@ def test_question_and_answer_tell_of_random_overloads(tmp_path):
     assert f"the safety coupling opens in {opens} (" in answer.partition("##")[0]
     peak = shown(quantiles_of["crank_torque_peak"]["q50"]["value"], "N.m")
     assert f"Of 6 overloads at random: 50 % stay below a crank torque of {peak} (" in answer
-    assert f"the safety coupling opens in {opens} (" in " ".join(done.stdout.split())
+    assert f"the safety coupling opens in {opens} (" in " ".join(process.stdout.split())

@@ -103,12 +103,12 @@ def test_declared_gains_are_the_tuned_ones_of_the_packaged_drive():
     config = load()
     drive, tuning = tune_motor(config, Drive(DcMotor, config.motor, config.machine))
     tuned = drive.parameters
-    declared = DcMotor.Parameters()
+    declarations = DcMotor.Parameters()
     for name in ("kp", "ki"):
-        assert getattr(declared.speed_control, name) == pytest.approx(
+        assert getattr(declarations.speed_control, name) == pytest.approx(
             getattr(tuned.speed_control, name), rel=1e-3
         )
-        assert getattr(declared.current_control, name) == pytest.approx(
+        assert getattr(declarations.current_control, name) == pytest.approx(
             getattr(tuned.current_control, name), rel=1e-3
         )
     assert tuning.phase_margin > 60.0
@@ -129,25 +129,25 @@ def test_the_loop_is_that_of_the_tuning_and_of_the_motor():
     inertia = 0.006
     tuned = tune(p.armature, inertia)
     p = DcMotor.parameter_layout.from_names({**tuned.parameters, "rotor.d": 0.0, "armature.alpha": 0.0}, p)
-    found = loop(p, inertia)
-    assert found.phase_margin == pytest.approx(tuned.phase_margin, rel=1e-6)
-    assert found.crossover == pytest.approx(tuned.crossover, rel=1e-6)
+    result = loop(p, inertia)
+    assert result.phase_margin == pytest.approx(tuned.phase_margin, rel=1e-6)
+    assert result.crossover == pytest.approx(tuned.crossover, rel=1e-6)
     # gain 1 at the crossover, phase there is the margin above -180 deg
-    assert np.interp(found.crossover, found.frequency, found.gain) == pytest.approx(1.0, rel=1e-3)
-    phase = np.interp(found.crossover, found.frequency, found.phase)
-    assert phase + 180.0 == pytest.approx(found.phase_margin, abs=0.1)
+    assert np.interp(result.crossover, result.frequency, result.gain) == pytest.approx(1.0, rel=1e-3)
+    phase = np.interp(result.crossover, result.frequency, result.phase)
+    assert phase + 180.0 == pytest.approx(result.phase_margin, abs=0.1)
     u = inputs(load__tau_bias=0.5, load__J=inertia - p.rotor.J)
-    solved = solve_ivp(
+    solution = solve_ivp(
         lambda t, x: DcMotor.derivatives(engines.MATH, p, u, LAYOUT.instance(x)),
-        (0.0, found.time[-1]),
+        (0.0, result.time[-1]),
         LAYOUT.values(DcMotor.initial_states(engines.MATH, p)),
-        t_eval=found.time,
+        t_eval=result.time,
         rtol=1e-9,
         atol=1e-12,
     )
-    speed = solved.y[LAYOUT.names.index("w")]
-    np.testing.assert_allclose(speed, 0.5 * found.deviation, atol=1e-6 * np.max(np.abs(speed)))
-    assert found.largest_deviation == pytest.approx(np.max(np.abs(speed)) / 0.5, rel=1e-4)
+    speed = solution.y[LAYOUT.names.index("w")]
+    np.testing.assert_allclose(speed, 0.5 * result.deviation, atol=1e-6 * np.max(np.abs(speed)))
+    assert result.largest_deviation == pytest.approx(np.max(np.abs(speed)) / 0.5, rel=1e-4)
 
 
 def test_feed_forward_of_the_whole_torque_leaves_no_dip():

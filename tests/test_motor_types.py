@@ -38,19 +38,19 @@ def test_it_runs_as_an_fmu(tmp_path):
     signals = {"motor.w_ref": Profile(0.0, ((0.0, 0.2, 150.0),))}
     with CoSimulation(system, signals) as simulation:
         seen = simulation.run(0.5, 5e-4)
-    wanted = monolithic(system, signals, seen["time"].values)
+    reference = monolithic(system, signals, seen["time"].values)
     for name in ("motor.w", "motor.T"):
-        np.testing.assert_allclose(seen[name], wanted[name], rtol=1e-4, atol=1e-3)
-    np.testing.assert_allclose(seen["motor.tau"].values[-1], wanted["motor.tau"].values[-1], rtol=1e-2)
+        np.testing.assert_allclose(seen[name], reference[name], rtol=1e-4, atol=1e-3)
+    np.testing.assert_allclose(seen["motor.tau"].values[-1], reference["motor.tau"].values[-1], rtol=1e-2)
 
 
 def test_a_study_names_it(registered, tmp_path):
-    chosen = config.parse(STUDY)
-    study = run.run_study(chosen, tmp_path)
+    choice = config.parse(STUDY)
+    study = run.run_study(choice, tmp_path)
     assert study.failure is None and study.drive.motor is ServoMotor
     steady, p = study.answers["steady"], study.motor
     assert p.coil.R == 1.5 and p.control.ki == pytest.approx(4.0 * p.control.kp)
-    assert steady.speed_mean == pytest.approx(chosen.run.crank_speed, rel=1e-6)
+    assert steady.speed_mean == pytest.approx(choice.run.crank_speed, rel=1e-6)
     # torque of the shaft: the current's, less that of the rotor
     turns = study.steady
     driving = p.coil.k * turns["motor.i"] - p.rotor.d * turns["motor.w"] - p.rotor.J * turns["motor.a"]

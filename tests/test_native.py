@@ -1,4 +1,4 @@
-"""Native FMUs: the same numbers as Python, exact derivatives, and no way to bring a host down."""
+"""Native FMUs give the numbers of Python and exact derivatives, and never crash a host."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 
 
 def host_arguments(folder, library):
-    """What host.c is called with: library, identifier, value references."""
+    """The arguments of host.c: library, identifier, value references."""
     description = fmpy.read_model_description(str(folder))
     reference = {v.name: v.valueReference for v in description.modelVariables}
     identifier = description.guid or description.instantiationToken
@@ -94,7 +94,9 @@ def test_reference_points(native, fmi, kind):
             start_values=point["parameters"] | inputs | point["inputs"],
             output=list(point["outputs"]),
         )[0]
-        worst = max(worst, *(deviation(float(row[n]), wanted) for n, wanted in point["outputs"].items()))
+        worst = max(
+            worst, *(deviation(float(row[n]), reference) for n, reference in point["outputs"].items())
+        )
     assert worst < 1e-9
     assert validate_fmu(str(file)) == []
 
@@ -299,15 +301,15 @@ def test_derivatives_are_finite_wherever_a_model_may_be(native, name):
         # a chain at rest along one line is no state that it may be in
         still = x if name == "ChainUnitFlexible" else 0.0 * x
         zero = np.zeros(len(given))
-        tried = [(given, x), (zero, x), (given, still), (zero, still)]
-        tried += [(np.where(np.arange(len(given)) == k, 0.0, given), x) for k in range(len(given))]
-        tried += [(given, np.where(np.arange(unit.n) == k, still, x)) for k in range(unit.n)]
+        trials = [(given, x), (zero, x), (given, still), (zero, still)]
+        trials += [(np.where(np.arange(len(given)) == k, 0.0, given), x) for k in range(len(given))]
+        trials += [(given, np.where(np.arange(unit.n) == k, still, x)) for k in range(unit.n)]
         for _ in range(20):
             values = [rng.uniform(max(q.low, -3.0), min(q.high, 3.0)) for q in inputs]
             kept, off = rng.random((2, 1)) < 0.5
-            tried.append((np.where(kept, values, zero), x + off * rng.uniform(-0.1, 0.1, unit.n)))
+            trials.append((np.where(kept, values, zero), x + off * rng.uniform(-0.1, 0.1, unit.n)))
         known = [*unit.states, *unit.inputs]
-        for u, at in tried:
+        for u, at in trials:
             unit.unit.setReal(unit.inputs, list(u))
             unit.move_to(at)
             assert np.isfinite(unit.jacobian(known)).all()
@@ -375,28 +377,28 @@ def test_states_are_saved_and_serialised(native):
 
 
 def test_a_geometry_that_cannot_turn_fails_the_initialisation_in_the_same_words(native):
-    with pytest.raises(GeometryError) as refused:
+    with pytest.raises(GeometryError) as refusal:
         ChainUnitMachine(r=0.9)
     with pytest.raises(RunError) as failed:
         with running(native, "ChamberForces", {"r": 0.9}):
             pass
-    assert str(refused.value) in str(failed.value)
-    with pytest.raises(GeometryError) as refused:
+    assert str(refusal.value) in str(failed.value)
+    with pytest.raises(GeometryError) as refusal:
         ChainUnitMachine(z=0.1)
     with pytest.raises(RunError) as failed:
         with running(native, "ChamberForces", {"z": 0.1}):
             pass
-    assert str(refused.value) in str(failed.value)
+    assert str(refusal.value) in str(failed.value)
     with pytest.raises(RunError, match=r"rotor\.J = -1 kg m2: must be > 0 kg m2"):
         with running(native, "DcMotor", {"rotor.J": -1.0}):
             pass
 
 
 def test_python_and_native_code_refuse_in_the_same_words(native, fmus):
-    """A Python FMU adds what it did, and what the variable is."""
+    """A Python FMU adds its call and the description of the variable."""
     lines = []
     for file in (native["DcMotor", 2][0], fmus["DcMotor"]):
-        fmu, said = Fmu(file), []
+        fmu, messages = Fmu(file), []
         with Running(fmu, {"solver.max_steps": 20.0}) as unit:
             for call, *arguments in (
                 (unit.step, 0.5, 0.1),
@@ -408,18 +410,18 @@ def test_python_and_native_code_refuse_in_the_same_words(native, fmus):
             ):
                 with suppress(RunError):
                     call(*arguments)
-                said.append(unit.messages[-1])
+                messages.append(unit.messages[-1])
         fmu.close()
-        lines.append(said)
+        lines.append(messages)
     assert len(set(lines[0])) == 6
     for of_native, of_python in zip(*lines, strict=True):
         assert of_native in of_python
     parameters = {"r": 1.0}
-    with pytest.raises(GeometryError) as refused:
+    with pytest.raises(GeometryError) as refusal:
         ChainUnitMachine(parameters)
     with pytest.raises(RunError) as failed, running(native, "ChamberForces", parameters):
         pass
-    assert str(refused.value) in str(failed.value)
+    assert str(refusal.value) in str(failed.value)
 
 
 def test_every_word_of_python_is_in_native_code():
@@ -447,10 +449,10 @@ def test_bad_calls_end_in_an_error_and_one_line(native):
     unit.finish_initialization()
     good = unit.get(["tau"])
     for name, value in (("w", math.nan), ("phi", math.inf), ("tau", 1.0), ("r", 0.1), ("crank.m", -1.0)):
-        said = len(unit.messages)
+        message = len(unit.messages)
         with pytest.raises(RunError, match=rf"{name}|value reference"):
             unit.set([name], [value])
-        assert len(unit.messages) == said + 1
+        assert len(unit.messages) == message + 1
         assert unit.get(["tau"]) == good  # the last good state stays readable
     unit.set(["w"], [1e200])
     with pytest.raises(RunError, match="not a finite number"):
@@ -503,9 +505,9 @@ def test_a_plain_c_host(native, fmi, tmp_path):
     command = [shutil.which("cc"), "-Wall", f"-DFMI={fmi}", "-o", str(host), str(HERE / "host.c")]
     subprocess.run([*command, "-I", f"{folder}/sources", "-ldl"], check=True)
     (library,) = Path(folder, "binaries").glob("*/*.so")
-    done = subprocess.run([host, *host_arguments(folder, library)], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    np.testing.assert_allclose([float(x) for x in done.stdout.split()], host_torque(), rtol=1e-12)
+    process = subprocess.run([host, *host_arguments(folder, library)], capture_output=True, text=True)
+    assert process.returncode == 0, process.stderr
+    np.testing.assert_allclose([float(x) for x in process.stdout.split()], host_torque(), rtol=1e-12)
     needs = subprocess.run(["ldd", library], capture_output=True, text=True).stdout
     assert {line.split()[0].split(".")[0] for line in needs.splitlines()} <= {
         "linux-vdso", "libm", "libc", "/lib64/ld-linux-x86-64",
@@ -533,8 +535,8 @@ def test_random_calls_under_sanitizers(native, name, fmi, share, tmp_path):
     subprocess.run([*command, str(tmp_path / "kernels.o")], check=True)
     # whose steps take steps of their own
     calls = 200_000 if name == "ChainUnitFlexible" else 1_000_000
-    done = subprocess.run([fuzz, str(int(share * calls))], capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout + done.stderr[-3000:]
+    process = subprocess.run([fuzz, str(int(share * calls))], capture_output=True, text=True)
+    assert process.returncode == 0, process.stdout + process.stderr[-3000:]
 
 
 def test_threads_do_not_see_each_other(native):
@@ -602,9 +604,9 @@ def test_a_master_meets_both_reference_results(native, fmus, tmp_path, name):
                 rows[-1].append(unit.get(outputs))
                 if k + 1 < len(given):
                     unit.step(row["time"], given["time"][k + 1] - row["time"])
-        for at, wanted in enumerate((stepped, read)):
+        for at, reference in enumerate((stepped, read)):
             got = np.rec.fromarrays(np.array([row[at] for row in rows]).T, names=outputs)
-            assert_met(name, got, wanted)
+            assert_met(name, got, reference)
         fmu.close()
 
 
@@ -624,23 +626,23 @@ def test_fmpy_meets_the_reference_results(native, name, fmi, kind):
     time, which is an event."""
     folder = native[name, fmi][1]
     given, stepped, read = reference_results(folder, name)
-    wanted = stepped
+    reference = stepped
     if kind == "ModelExchange":
         times, given = given["time"], np.repeat(given, 2)[:-1]
         given["time"][1::2] = times[1:]
-        wanted = read
+        reference = read
     got = fmpy.simulate_fmu(
         str(folder),
         fmi_type=kind,
         input=given,
-        stop_time=wanted["time"][-1],
-        output_interval=wanted["time"][1],
+        stop_time=reference["time"][-1],
+        output_interval=reference["time"][1],
         relative_tolerance=1e-10,
-        output=list(wanted.dtype.names[1:]),
+        output=list(reference.dtype.names[1:]),
         record_events=False,
     )
-    assert len(got) == len(wanted)
-    assert_met(name, got, wanted)
+    assert len(got) == len(reference)
+    assert_met(name, got, reference)
 
 
 class Equations:
@@ -720,7 +722,7 @@ def test_inputs_that_run_meet_the_reference_results_in_model_exchange(native, na
     """Set at each evaluation: fmpy's own solver holds them over its steps. Outputs are read before the event, which
     brings a chain back to where a jump of the inputs took its end."""
     model = MODELS[name]
-    given, _, wanted = reference_results(native[name, fmi][1], name)
+    given, _, reference = reference_results(native[name, fmi][1], name)
     rows = [list(row)[1:] for row in given]
     with Equations(native, name, fmi, rows[0]) as unit:
         x, got = unit.x(), []
@@ -739,21 +741,21 @@ def test_inputs_that_run_meet_the_reference_results_in_model_exchange(native, na
                 return unit.rates(time, u, states)
 
             span = (t, given["time"][k + 1])
-            solved = solve_ivp(rates, span, x, method="LSODA", rtol=1e-10, atol=1e-10 * unit.nominal)
-            assert solved.success, solved.message
-            x = solved.y[:, -1]
-        assert_met(name, np.rec.fromarrays(np.array(got).T, names=unit.outputs), wanted)
+            solution = solve_ivp(rates, span, x, method="LSODA", rtol=1e-10, atol=1e-10 * unit.nominal)
+            assert solution.success, solution.message
+            x = solution.y[:, -1]
+        assert_met(name, np.rec.fromarrays(np.array(got).T, names=unit.outputs), reference)
 
 
 @pytest.mark.parametrize("name", [name for name, model in MODELS.items() if model.state_layout])
 def test_euler_keeps_near_at_the_declared_step(native, name):
     """In a second of the reference inputs it errs by less than a fifth of a state's size; at 100 times the step by
     more than half of one: the models need a step, and the declared one is short enough."""
-    model, wanted = MODELS[name], Experiment(**script_of(MODELS[name]).experiment)
+    model, reference = MODELS[name], Experiment(**script_of(MODELS[name]).experiment)
     for fmi in (2, 3):
         default = fmpy.read_model_description(str(native[name, fmi][0])).defaultExperiment
         given = (default.stepSize, default.stopTime, default.tolerance)
-        assert [float(x) for x in given] == [wanted.step, wanted.stop, wanted.tolerance]
+        assert [float(x) for x in given] == [reference.step, reference.stop, reference.tolerance]
     moving = excitation(Interface(model, {}))
     marks = np.linspace(0.0, 1.0, 11)
 
@@ -782,8 +784,8 @@ def test_euler_keeps_near_at_the_declared_step(native, name):
                     most = max(most, np.abs((x - exact.y[:, (k + 1) // every]) / size).max())
             return most
 
-        assert error(wanted.step) < 0.2
-        assert error(100.0 * wanted.step) > 0.5
+        assert error(reference.step) < 0.2
+        assert error(100.0 * reference.step) > 0.5
 
 
 def test_descriptions_say_who_and_when(native, fmus, tmp_path, monkeypatch):
@@ -847,12 +849,12 @@ def test_a_machine_that_turns_by_itself_has_reference_results(ratio):
 
 
 def test_the_command_says_where_an_fmu_comes_without_reference_results(tmp_path):
-    """With a budget that nothing meets, as states without end would take minutes."""
+    """With a budget that no model meets, as a model with very many states would take minutes."""
     small = "import chainunit.fmu.reference as a, chainunit.cli as c; a._MOST_STEPS = 1; c.main()"
     command = [sys.executable, "-c", small, "export", "DcMotor", "--backend", "python"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    (line,) = done.stderr.splitlines()
+    process = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert process.returncode == 0, process.stderr
+    (line,) = process.stderr.splitlines()
     assert line.startswith(
         "The FMU DcMotor: no reference results inside: the states are too fast to be followed from t = 0 s"
     )
@@ -890,7 +892,7 @@ def test_what_an_fmu_carries(native, fmus):
         kinds = {t.get("name"): t.get("terminalKind") for t in root.iter("Terminal")}
         assert kinds.pop("flange_a") == "Modelica.Mechanics.Rotational.Interfaces.Flange_a"
         assert all(kind.startswith("org.chainunit.") for kind in kinds.values())
-        assert all(set(found.values()) <= known for found in members.values())
+        assert all(set(result.values()) <= known for result in members.values())
         if model.name != "ChainUnit":
             assert len(members["load"]) == 7
         for fmi in (2, 3):

@@ -36,11 +36,11 @@ EXPORTED = {
 @here
 def test_backends_say_what_they_took(tmp_path, monkeypatch):
     motor = MODELS["DcMotor"]
-    made = export_any(motor, tmp_path / "a.fmu")
-    said = str(made)
-    assert made.backend == "native" and "native code by" in said and "found here" in said
-    made = export_any(motor, tmp_path / "b.fmu", backend="python")
-    assert made.backend == "python" and "pythonfmu" in str(made)
+    origin = export_any(motor, tmp_path / "a.fmu")
+    message = str(origin)
+    assert origin.backend == "native" and "native code by" in message and "found here" in message
+    origin = export_any(motor, tmp_path / "b.fmu", backend="python")
+    assert origin.backend == "python" and "pythonfmu" in str(origin)
     with pytest.raises(InputError, match="--platforms needs the native backend"):
         export_any(motor, tmp_path / "d.fmu", backend="python", platforms=["linux64"])
     with pytest.raises(InputError, match="must be 2 or 3"):
@@ -77,8 +77,8 @@ def test_backends_say_what_they_took(tmp_path, monkeypatch):
 @here
 def test_zig_serves_where_the_system_has_no_compiler(tmp_path, monkeypatch):
     monkeypatch.setattr(shutil, "which", lambda name: None)
-    said = str(export_any(MODELS["DcMotor"], tmp_path / "a.fmu"))
-    assert "native code by zig, the C compiler found here" in said
+    message = str(export_any(MODELS["DcMotor"], tmp_path / "a.fmu"))
+    assert "native code by zig, the C compiler found here" in message
     end = fmpy.simulate_fmu(str(tmp_path / "a.fmu"), start_values={"w_ref": 50.0}, stop_time=0.05)[-1]
     assert end["w"] > 1.0
 
@@ -90,24 +90,24 @@ def needed_glibc(library: bytes) -> tuple[int, int]:
 def slices(library: bytes) -> list[bytes]:
     magic, count = struct.unpack(">II", library[:8])
     assert magic == 0xCAFEBABE
-    found = []
+    results = []
     for k in range(count):
         processor, _, at, size, align = struct.unpack(">IIIII", library[8 + 20 * k : 28 + 20 * k])
         assert at % (1 << align) == 0 and at + size <= len(library)
         assert struct.unpack("<I", library[at + 4 : at + 8])[0] == processor
-        found.append(library[at : at + size])
-    return found
+        results.append(library[at : at + size])
+    return results
 
 
 def mach_commands(code: bytes) -> dict[int, bytes]:
     """Load commands of a Mach-O library by their number."""
     count = struct.unpack("<I", code[16:20])[0]
-    at, found = 32, {}
+    at, result = 32, {}
     for _ in range(count):
         number, size = struct.unpack("<II", code[at : at + 8])
-        found[number] = code[at : at + size]
+        result[number] = code[at : at + size]
         at += size
-    return found
+    return result
 
 
 def oldest_mac(code: bytes) -> tuple[int, int]:
@@ -133,11 +133,11 @@ def test_other_platforms_are_built_alike_each_time(fmi, tmp_path):
         libraries = {
             n.split("/")[1]: archive.read(n) for n in archive.namelist() if n.startswith("binaries/")
         }
-    wanted = {
+    reference = {
         2: {"linux64", "darwin64"},
         3: {"x86_64-linux", "aarch64-linux", "x86_64-darwin", "aarch64-darwin"},
     }
-    assert set(libraries) == wanted[fmi]
+    assert set(libraries) == reference[fmi]
     for folder, library in libraries.items():
         assert len(library) < (600_000 if folder == "darwin64" else 300_000)
         for function in EXPORTED[fmi]:
@@ -168,11 +168,11 @@ def run_foreign(tmp_path, name, fmi, target, library_folder, runner):
     command = [*ZIG, "-target", target, "-O1", f"-DFMI={fmi}", str(HERE / "host.c"), "-o", str(host)]
     subprocess.run([*command, "-I", f"{folder}/sources"], check=True, capture_output=True)
     (library,) = Path(folder, "binaries", library_folder).iterdir()
-    done = subprocess.run(
+    process = subprocess.run(
         [*runner, str(host), *host_arguments(folder, library)], capture_output=True, text=True
     )
-    assert done.returncode == 0, done.stderr[-2000:]
-    np.testing.assert_allclose([float(x) for x in done.stdout.split()], host_torque(), rtol=1e-12)
+    assert process.returncode == 0, process.stderr[-2000:]
+    np.testing.assert_allclose([float(x) for x in process.stdout.split()], host_torque(), rtol=1e-12)
 
 
 @zig

@@ -1,4 +1,4 @@
-"""Bounds that no machine reaches, and what looks like a slip of the unit."""
+"""Bounds that no machine reaches, and values that look like a slip of the unit."""
 
 from __future__ import annotations
 
@@ -71,9 +71,9 @@ def test_what_has_a_lower_bound_has_an_upper_one(name):
     ],
 )
 def test_what_no_machine_reaches_is_refused(text, told):
-    with pytest.raises(InputError) as refused:
+    with pytest.raises(InputError) as refusal:
         config.parse(text)
-    assert str(refused.value).startswith(told)
+    assert str(refusal.value).startswith(told)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -98,16 +98,16 @@ def test_the_example_and_random_machines_give_no_remark():
     assert config.load().slips == ()
     rng = np.random.default_rng(5)
     for _ in range(20):
-        named = ChamberForces.parameter_layout.by_name(random_machine(rng).p)
+        names = ChamberForces.parameter_layout.by_name(random_machine(rng).p)
         table: dict = {}
-        for name, x in named.items():
+        for name, x in names.items():
             *groups, last = name.split(".")
             inner = table
             for each in groups:
                 inner = inner.setdefault(each, {})
             inner[last] = float(x)
-        found = list(slips({"machine": ChamberForces.Parameters}, {"machine": table}))
-        assert found == []
+        result = list(slips({"machine": ChamberForces.Parameters}, {"machine": table}))
+        assert result == []
 
 
 @pytest.mark.parametrize(
@@ -171,29 +171,29 @@ def test_the_remark_stands_on_terminal_page_and_in_json():
     from chainunit.study.result import as_dict
     from chainunit.study.statics import statics
 
-    given = config.parse("[machine]\npin = { diameter = 60 }")
-    drive = Drive(DcMotor, given.motor, given.machine)
-    study = StudyRecord(given, drive, statics(given, drive))
+    values = config.parse("[machine]\npin = { diameter = 60 }")
+    drive = Drive(DcMotor, values.motor, values.machine)
+    study = StudyRecord(values, drive, statics(values, drive))
     result = as_dict(study)
-    said = str(given.slips[0])
+    message = str(values.slips[0])
     assert result["slips"] == [
         {
             "name": "machine.pin.diameter",
             "given": {"value": 60.0, "unit": "m"},
             "meant": "60 mm",
-            "said": said,
+            "said": message,
         }
     ]
     json.dumps(result, allow_nan=False)
-    told = said_of(study)
-    assert told.count(f"Remark: {said}\n") == 1 and "?." not in told
+    text = said_of(study)
+    assert text.count(f"Remark: {message}\n") == 1 and "?." not in text
     html = page_of(study, result)
     assert 'data-path="slips.0.said"' in html and "Is this what was meant?" in html
 
 
 def test_a_gear_ratio_that_no_drive_has_is_remarked():
-    (told,) = map(str, config.parse("[machine]\nratio = 5000").slips)
-    assert told.startswith("machine.ratio = 5000: is unusual") and "usual: 1 to 500" in told
+    (values,) = map(str, config.parse("[machine]\nratio = 5000").slips)
+    assert values.startswith("machine.ratio = 5000: is unusual") and "usual: 1 to 500" in values
 
 
 def test_the_usual_speed_is_that_of_the_machine():

@@ -1,4 +1,4 @@
-"""A study says what it does, from the first second on."""
+"""A study reports its progress from the first second on."""
 
 from chainunit.fmu import backends
 from chainunit.study.config import parse
@@ -8,18 +8,20 @@ SHORT = "event = []\n[run]\ncrank_speed = 3\nramp = 0.3\nsettle_turns = 0\nstep 
 
 
 def _said(folder, **more):
-    said = []
-    study = run_study(parse(SHORT), folder, lambda what, done, todo: said.append((what, done, todo)), **more)
-    return study, said
+    messages = []
+    study = run_study(
+        parse(SHORT), folder, lambda what, done, todo: messages.append((what, done, todo)), **more
+    )
+    return study, messages
 
 
 def test_the_export_of_each_fmu_is_told(tmp_path):
-    study, said = _said(tmp_path)
-    words = [what for what, *_ in said]
+    study, message = _said(tmp_path)
+    words = [what for what, *_ in message]
     for name in ("ChamberForces", "DcMotor"):
         assert f"{name}: exporting" in words
     assert words.index("DcMotor: exporting") < words.index("start-up and steady running")
-    assert all(0.0 <= done <= todo for _, done, todo in said)
+    assert all(0.0 <= done <= todo for _, done, todo in message)
     assert not [note for note in study.notes if note.kind == "no compiler"]
 
 

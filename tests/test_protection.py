@@ -1,4 +1,4 @@
-"""Protection and mean loads against what can be worked out by hand."""
+"""Protection and mean loads against computations by hand."""
 
 from __future__ import annotations
 
@@ -61,8 +61,8 @@ def test_mean_load_by_hand():
 
 def test_a_setting_lies_between_normal_duty_and_what_opens_it():
     jam, blocked = {"jam_left": 400.0}, {"blocked": 900.0}
-    found = Setting(normal=200.0, motor=600.0, gear=1000.0, overloads=jam | blocked | {"lumps": 230.0})
-    assert found.torque == 250.0 and found.obstacle is None and found.opens == jam | blocked
+    result = Setting(normal=200.0, motor=600.0, gear=1000.0, overloads=jam | blocked | {"lumps": 230.0})
+    assert result.torque == 250.0 and result.obstacle is None and result.opens == jam | blocked
     # what the motor cannot give, what the gear may not carry, and what no overload reaches
     for least, obstacle in (
         (Setting(500.0, 600.0, 1000.0, jam), Obstacle.MOTOR),
@@ -73,7 +73,7 @@ def test_a_setting_lies_between_normal_duty_and_what_opens_it():
         assert least.torque is None and least.obstacle is obstacle
     # with the inertia of rotor and flywheel a shock reaches more than the motor gives
     flywheel = Setting(500.0, 600.0, 1000.0, jam | blocked)
-    assert flywheel.torque == 625.0 and flywheel.opens == blocked and flywheel.stalls and not found.stalls
+    assert flywheel.torque == 625.0 and flywheel.opens == blocked and flywheel.stalls and not result.stalls
     # a dip of the voltage that opens it is no protection
     dip = Setting(200.0, 600.0, 1000.0, {"jam_left": 240.0}, {"dip": 300.0})
     assert dip.obstacle is Obstacle.OVERLOADS and dip.opens == {} and dip.nuisances == {"dip": 300.0}
@@ -103,45 +103,45 @@ def ran(text, folder, monkeypatch):
 def test_the_recommended_coupling_is_tried_in_its_own_study(tmp_path, monkeypatch):
     """With it, the study opens it in just those overloads that the recommendation names."""
     study = ran(heavy(*SIX), tmp_path, monkeypatch)
-    found = study.setting
-    assert found.torque is not None and not study.insufficient
+    result = study.setting
+    assert result.torque is not None and not study.insufficient
     steady = study.answers["steady"].crank_torque_peak
-    assert 1.2 * steady < found.torque < found.motor < study.start_torque
-    said = coupling_sentence(study)
-    assert "held shut in the start (coupling.held_in_start = true)" in said
-    assert "softly" not in said
+    assert 1.2 * steady < result.torque < result.motor < study.start_torque
+    message = coupling_sentence(study)
+    assert "held shut in the start (coupling.held_in_start = true)" in message
+    assert "softly" not in message
     # all feed on the right is normal duty, and its torque the larger
-    assert found.normal > 1.15 * max(study.sizing.duty.numbers.torque_peak, 208.0)
+    assert result.normal > 1.15 * max(study.sizing.duty.numbers.torque_peak, 208.0)
     monkeypatch.undo()
-    coupling = f"[coupling]\ntrip_torque = {found.torque}\n"
+    coupling = f"[coupling]\ntrip_torque = {result.torque}\n"
     open_start = ran(heavy(*SIX) + coupling, tmp_path, monkeypatch)
     monkeypatch.undo()
     assert "opens in the start-up" in str(open_start.failure)
     assert "coupling.held_in_start = true" in str(open_start.failure)
     coupling += "held_in_start = true\n"
-    tried = ran(heavy(*SIX) + coupling, tmp_path, monkeypatch)
-    assert tried.failure is None
-    opened = {n for n, a in tried.answers.items() if a.coupling_trip_time is not None}
-    assert set(found.opens) == {"jam_left", "jam_right", "blocked"} and set(found.nuisances) == {"dip"}
-    assert opened == {*found.opens, *found.nuisances}
-    assert "nuisance trip, which protects nothing: it opens, too, where the voltage" in said
-    (nuisance,) = [warning for warning in tried.warnings if warning.kind == "nuisance trip"]
+    trials = ran(heavy(*SIX) + coupling, tmp_path, monkeypatch)
+    assert trials.failure is None
+    opened = {n for n, a in trials.answers.items() if a.coupling_trip_time is not None}
+    assert set(result.opens) == {"jam_left", "jam_right", "blocked"} and set(result.nuisances) == {"dip"}
+    assert opened == {*result.opens, *result.nuisances}
+    assert "nuisance trip, which protects nothing: it opens, too, where the voltage" in message
+    (nuisance,) = [warning for warning in trials.warnings if warning.kind == "nuisance trip"]
     assert "nuisance trip that protects nothing: the voltage dips." in nuisance.text and nuisance.runs == (
         "dip",
     )
     # it cuts off the peaks that would set it: no advice, and the stiffer stops without it
-    assert tried.setting is None and set(as_dict(tried)["sizing"]["protection"]) == {"relay_current"}
+    assert trials.setting is None and set(as_dict(trials)["sizing"]["protection"]) == {"relay_current"}
     for name, peaks in study.spreads["blocked"].peaks.items():
-        assert tried.spreads["blocked"].peaks[name] == pytest.approx(peaks, rel=1e-6), name
-    (note,) = [note.text for note in tried.notes if note.kind == "assumption"]
+        assert trials.spreads["blocked"].peaks[name] == pytest.approx(peaks, rel=1e-6), name
+    (note,) = [note.text for note in trials.notes if note.kind == "assumption"]
     assert "These peaks are without the safety coupling" in note
-    (warning,) = [warning.text for warning in tried.warnings if warning.kind == "coupling held shut"]
+    (warning,) = [warning.text for warning in trials.warnings if warning.kind == "coupling held shut"]
     assert "held shut in the start (coupling.held_in_start)." in warning
     # the same motor, named by the file, with the same coupling
-    named = heavy(*SIX).partition("[sizing]")[0] + f'[system]\nmotor = "{MOTOR}"\n' + coupling
-    given = run_study(config.parse(named), tmp_path)
-    assert given.failure is None and {w.kind for w in given.warnings} >= {"coupling held shut"}
-    assert {n for n, a in given.answers.items() if a.coupling_trip_time is not None} == opened
+    names = heavy(*SIX).partition("[sizing]")[0] + f'[system]\nmotor = "{MOTOR}"\n' + coupling
+    values = run_study(config.parse(names), tmp_path)
+    assert values.failure is None and {w.kind for w in values.warnings} >= {"coupling held shut"}
+    assert {n for n, a in values.answers.items() if a.coupling_trip_time is not None} == opened
 
 
 def test_without_a_shock_no_coupling_is_recommended(tmp_path, monkeypatch):
@@ -157,10 +157,10 @@ def test_one_sided_feed_and_a_loaded_soft_start_are_normal_duty(tmp_path, monkey
     text = 'start = "soft"\n' + heavy("feed_right", "start_loaded_left", "jam_right")
     study = ran(text + "[gear]\ntorque_limit = 450\n", tmp_path, monkeypatch)
     assert study.failure is None and not study.insufficient
-    found = study.setting
-    assert set(found.overloads) == {"jam_right"} and not found.disturbances
+    result = study.setting
+    assert set(result.overloads) == {"jam_right"} and not result.disturbances
     start = float(abs(study.runs["start_loaded_left"]["motor.tau"]).max()) * study.drive.ratio
-    assert found.normal == pytest.approx(max(start, study.sizing.best.peak_torque), rel=1e-3)
+    assert result.normal == pytest.approx(max(start, study.sizing.best.peak_torque), rel=1e-3)
     fed = float(abs(study.runs["feed_right"]["motor.tau"]).max()) * study.drive.ratio
     assert study.sizing.best.duty_torque == pytest.approx(fed, rel=0.01)
     (warning,) = [warning for warning in study.warnings if warning.kind == "gear passed"]
@@ -177,7 +177,7 @@ def test_one_sided_feed_and_a_loaded_soft_start_are_normal_duty(tmp_path, monkey
     ],
 )
 def test_the_protection_of_a_chosen_motor_is_told_once(protection, ending):
-    """Neither a trip torque of none, nor the relay twice where a coupling is given."""
+    """Where the file gives a coupling, there is no empty trip torque, and the relay stands once."""
     relay = {"relay_current": entry(2.45, "A") | {"title": "thermal relay, setting"}}
     source = blocks.Source(
         {
@@ -202,8 +202,8 @@ def test_an_insufficient_motor_gets_no_advice(tmp_path, monkeypatch):
     study = ran(heavy("jam_left") + "[gear]\ntorque_limit = 250\n", tmp_path, monkeypatch)
     assert study.insufficient and study.setting is None
     assert as_dict(study)["sizing"]["protection"] == {}
-    told = said_of(study)
-    assert "Insufficient motor:" in told and "relay at" not in told
+    text = said_of(study)
+    assert "Insufficient motor:" in text and "relay at" not in text
 
 
 def test_a_coupling_that_never_opens_gets_a_remark(tmp_path):
@@ -227,16 +227,16 @@ def test_a_motor_at_its_voltage_limit_has_no_reserve(tmp_path):
     """Asked for 30 rad/s, the DC motor turns the crank at an eighth of it: the voltage leaves no more torque."""
     text = "event = []\n[run]\ncrank_speed = 30\nstep = 0.002\nsettle_turns = 3\n"
     study = run_study(config.parse(text), tmp_path)
-    found, p = study.answers["steady"], study.motor
-    assert found.speed_mean < 5.0 and found.torque_reserve == 0.0
+    result, p = study.answers["steady"], study.motor
+    assert result.speed_mean < 5.0 and result.torque_reserve == 0.0
     verdict = motor_verdict(study)
     assert verdict["holds"] == "false" and "least reserve of torque 0 %" in verdict["text"]
     run = study.steady
-    warm = p.armature.R * (1.0 + p.armature.alpha * (found.winding_temperature - T_RATED))
+    warm = p.armature.R * (1.0 + p.armature.alpha * (result.winding_temperature - T_RATED))
     left = p.armature.k * (p.limit.v - p.armature.k * run["motor.w"].values) / warm
     limit = np.minimum(left, p.armature.k * p.limit.i)
     driving = run["motor.air_gap_tau"].values * run["motor.w"].values > 0.0
-    limits = study.drive.largest_torque(run, found.winding_temperature)
+    limits = study.drive.largest_torque(run, result.winding_temperature)
     assert limits[driving] == pytest.approx(limit[driving], rel=1e-6, abs=1e-6)
     assert np.min(limits) < 0.5 * p.armature.k * p.limit.i
 
@@ -255,15 +255,15 @@ def test_the_largest_torque_is_that_of_voltage_frequency_and_a_warm_winding():
         {"time": np.arange(4.0)},
     )
     drive = Drive(InductionMotor, p, config.load().machine)
-    found = drive.largest_torque(run, T)
+    result = drive.largest_torque(run, T)
     for k in range(3):
         w = 2.0 * math.pi * hertz[k] / p.pole_pairs * np.linspace(0.0, 1.0, 1001)
         torques = [steady(MATH, p, float(x), volts[k] / 400.0, float(hertz[k]), T).air_gap_tau for x in w]
-        assert found[k] == pytest.approx(max(torques), rel=3e-3)
-    assert found[3] == 0.0 and found[1] < 0.3 * found[0] and found[2] < 0.5 * found[0]
+        assert result[k] == pytest.approx(max(torques), rel=3e-3)
+    assert result[3] == 0.0 and result[1] < 0.3 * result[0] and result[2] < 0.5 * result[0]
     # warm less than cold, and behind friction less than at the air gap
-    assert found[0] < drive.largest_torque(run, T_RATED)[0]
-    assert drive.pull_out(run.isel(time=[0]), T) < found[0] * drive.ratio
+    assert result[0] < drive.largest_torque(run, T_RATED)[0]
+    assert drive.pull_out(run.isel(time=[0]), T) < result[0] * drive.ratio
 
 
 def test_behind_an_open_coupling_the_machine_has_its_chains(tmp_path):
@@ -289,8 +289,8 @@ sweep_points = 0
     energy = coasting["machine.kinetic_energy"] + coasting["machine.potential_energy"]
     assert float(energy[-1]) < float(energy[0]) - 1.0
     # what is in the machine is what was there less what was lost
-    lost = np.trapezoid(coasting["machine.dissipated_power"], coasting["time"])
-    assert float(energy[0] - energy[-1]) == pytest.approx(lost, rel=0.02)
+    losses = np.trapezoid(coasting["machine.dissipated_power"], coasting["time"])
+    assert float(energy[0] - energy[-1]) == pytest.approx(losses, rel=0.02)
     for side in SIDES:
         assert float(np.max(coasting[f"machine.{side}.drift"])) < 1e-6
         assert {f"A2 {side} web at rocker", f"B {side} hinge"} <= set(study.pins["jam_left"])
@@ -300,11 +300,11 @@ HELD = '[coupling]\ntrip_torque = "{trip} N m"\nheld_in_start = true\n[run]\ntur
 
 
 def held_shut(text, folder):
-    """The study of a coupling that is held shut in the start, and what is said of it."""
+    """The study of a coupling that is held shut in the start, and its sentences on the coupling."""
     study = run_study(config.parse(text), folder)
     assert study.failure is None
-    (said,) = [remark for remark in study.remarks if remark.kind == "coupling held shut"]
-    return study, said
+    (messages,) = [remark for remark in study.remarks if remark.kind == "coupling held shut"]
+    return study, messages
 
 
 def largest(study, run, begin=0.0, end=None):
@@ -315,29 +315,29 @@ def largest(study, run, begin=0.0, end=None):
 def test_a_coupling_is_needless_to_hold_only_where_no_start_would_open_it(tmp_path):
     """Also the starts under load run with it held shut."""
     starts = event_line("start_loaded_left", "start_loaded_right")
-    study, said = held_shut(starts + HELD.format(trip=46), tmp_path)
+    study, message = held_shut(starts + HELD.format(trip=46), tmp_path)
     hardest = largest(study, "start_loaded_right")
     assert max(largest(study, "start_up"), largest(study, "start_loaded_left")) < 46.0 < hardest
-    assert said.severity == "warning" and said.runs == ("start_loaded_right",)
-    assert said.quantities["start"][0] == pytest.approx(hardest)
-    assert f"start with all feed on the right ({hardest:.1f} N m)" in said.text
-    assert "not needed" not in said.text and "all feed on the left" not in said.text
-    study, said = held_shut(starts + HELD.format(trip=60), tmp_path / "needless")
-    assert said.severity == "note" and "which is not needed" in said.text
-    assert said.runs == ("start_loaded_right",) and "start with all feed on the right" in said.text
+    assert message.severity == "warning" and message.runs == ("start_loaded_right",)
+    assert message.quantities["start"][0] == pytest.approx(hardest)
+    assert f"start with all feed on the right ({hardest:.1f} N m)" in message.text
+    assert "not needed" not in message.text and "all feed on the left" not in message.text
+    study, message = held_shut(starts + HELD.format(trip=60), tmp_path / "needless")
+    assert message.severity == "note" and "which is not needed" in message.text
+    assert message.runs == ("start_loaded_right",) and "start with all feed on the right" in message.text
 
 
 def test_the_coming_of_the_feed_belongs_to_the_start_of_a_coupling(tmp_path, monkeypatch):
     """It puts more on the coupling than a recommended setting, and than one that is given."""
     empty = "empty_start = true\n" + event_line("jam_left", force=2000.0, turns=1)
     motor = '[system]\nmotor = "IE3 4-pole 0.55 kW, 80M"\n'
-    study, said = held_shut(empty + motor + HELD.format(trip=60), tmp_path)
+    study, message = held_shut(empty + motor + HELD.format(trip=60), tmp_path)
     first = largest(study, "start_up", end=study.fed_from)
     fed = largest(study, "start_up", study.fed_from, study.steady_begin)
     assert first > fed > 60.0
     assert study.start_torques == pytest.approx({"start_up": first, "settling": fed})
-    assert said.severity == "warning" and said.runs == ("start_up", "settling")
-    assert f"settling under the feed ({fed:.0f} N m)" in said.text
+    assert message.severity == "warning" and message.runs == ("start_up", "settling")
+    assert f"settling under the feed ({fed:.0f} N m)" in message.text
     one = [m for m in sizing.catalogue(None) if (m.nameplate.power, m.nameplate.poles) == (550.0, 4.0)]
     monkeypatch.setattr(sizing, "catalogue", lambda extra: one)
     sized = run_study(
@@ -345,5 +345,5 @@ def test_the_coming_of_the_feed_belongs_to_the_start_of_a_coupling(tmp_path, mon
     )
     assert sized.failure is None and sized.setting.torque < min(sized.start_torques.values())
     assert set(sized.start_torques) == {"start_up", "settling"}
-    said = coupling_sentence(sized)
-    assert "settling under the feed" in said and "start-up" in said
+    message = coupling_sentence(sized)
+    assert "settling under the feed" in message and "start-up" in message

@@ -16,12 +16,14 @@ def test_the_interval_is_scipys(q):
     rng = np.random.default_rng(3)
     for n in (runs_needed(q), 100, 400, 2000):
         values = rng.normal(size=n)
-        wanted = quantile_test(values, p=q).confidence_interval(0.95)
+        reference = quantile_test(values, p=q).confidence_interval(0.95)
         got = quantile(values, q)
-        if math.isnan(wanted.low) or math.isnan(wanted.high):
+        if math.isnan(reference.low) or math.isnan(reference.high):
             assert got is None
         else:
-            assert (got.low, got.high) == (wanted.low, wanted.high) and got.value == np.quantile(values, q)
+            assert (got.low, got.high) == (reference.low, reference.high) and got.value == np.quantile(
+                values, q
+            )
 
 
 def test_what_the_number_of_runs_cannot_tell_is_left_out():
@@ -38,8 +40,8 @@ def test_the_interval_holds_the_quantile_as_often_as_it_says():
     rng = np.random.default_rng(5)
     for q, n in ((0.5, 20), (0.95, 150), (0.99, 400)):
         true = -math.log(1.0 - q)
-        found = [quantile(rng.exponential(size=n), q) for _ in range(400)]
-        assert np.mean([e.low <= true <= e.high for e in found]) > 0.94
+        results = [quantile(rng.exponential(size=n), q) for _ in range(400)]
+        assert np.mean([e.low <= true <= e.high for e in results]) > 0.94
 
 
 def test_values_of_one_run_count_together():
@@ -67,8 +69,8 @@ def test_what_few_starts_tell_is_so(common, q):
     rng = np.random.default_rng(23)
     levels, turns = rng.normal(size=(300, 10, 1)), rng.normal(size=(300, 10, 30))
     true = norm.ppf(q)
-    found = [quantile(x, q) for x in math.sqrt(common) * levels + math.sqrt(1.0 - common) * turns]
-    held = [e.low <= true <= e.high for e in found if e is not None]
+    results = [quantile(x, q) for x in math.sqrt(common) * levels + math.sqrt(1.0 - common) * turns]
+    held = [e.low <= true <= e.high for e in results if e is not None]
     assert sum(held) >= 0.93 * len(held)
     if q == 0.5 or common == 0.0:
         assert len(held) >= 270

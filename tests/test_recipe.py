@@ -1,4 +1,4 @@
-"""What only an FMU needs of a model follows from its declarations and terminals."""
+"""Values that only an FMU needs of a model follow from its declarations and terminals."""
 
 from __future__ import annotations
 
@@ -90,11 +90,11 @@ def test_icons_follow_from_the_terminals():
     def shown(model):
         return {kind: icon(model, kind).name for kind in ("svg", "png")}
 
-    for name, wanted in {
+    for name, reference in {
         "ChamberForces": "machine", "ChainUnit": "machine", "ChainUnitFlexible": "machine",
         "DcMotor": "motor", "InductionMotor": "motor", "CardanDriveline": "line", "KnifeDrive": "KnifeDrive",
     }.items():  # fmt: skip
-        assert shown(MODELS[name]) == {"svg": f"{wanted}.svg", "png": f"{wanted}.png"}
+        assert shown(MODELS[name]) == {"svg": f"{reference}.svg", "png": f"{reference}.png"}
         assert all(icon(MODELS[name], kind).is_file() for kind in ("svg", "png"))
     assert shown(Gear)["svg"] == "line.svg"
     other = type(

@@ -23,7 +23,7 @@ def test_python_api(point):
     machine = ChainUnitMachine(point["parameters"])
     outputs = machine.evaluate(point["inputs"])
     assert set(outputs) == set(point["outputs"])
-    worst = {name: deviation(float(outputs[name]), wanted) for name, wanted in point["outputs"].items()}
+    worst = {name: deviation(float(outputs[name]), reference) for name, reference in point["outputs"].items()}
     assert max(worst.values()) < 1e-9, max(worst.items(), key=lambda kv: kv[1])
 
 
@@ -39,8 +39,8 @@ def test_papers_statics():
         "R_n": (left.normal_load, [0.3615, 0.3240, 0.2824]),
         "R_t": (left.tangential_load, [0.0281, 0.1360, 0.2381]),
     }
-    for name, (got, wanted) in table.items():
-        np.testing.assert_allclose(got / weight, wanted, atol=6e-5, err_msg=name)
+    for name, (got, reference) in table.items():
+        np.testing.assert_allclose(got / weight, reference, atol=6e-5, err_msg=name)
 
 
 def test_papers_extremes():
@@ -56,18 +56,18 @@ def test_overload_factor_is_the_erratas():
     machine = ChainUnitMachine.from_ratios(0.1, 2 / 3, 0.6, 0.5)
     chamber = machine.chamber(np.radians([0.5, 1.0, 3.0, 6.0, 9.0, 12.0]))
     factor = chamber.left.tangential_load / chamber.rocker.tangential_load
-    printed = ["16.3", "8.4", "3.1", "1.81", "1.36", "1.134"]
-    assert [f"{x:.{len(text.split('.')[1])}f}" for x, text in zip(factor, printed, strict=True)] == printed
+    printout = ["16.3", "8.4", "3.1", "1.81", "1.36", "1.134"]
+    assert [f"{x:.{len(text.split('.')[1])}f}" for x, text in zip(factor, printout, strict=True)] == printout
 
 
 def test_papers_dynamics():
     """Errata, the table under paper 000: R_t of the left organ at the extremes, 10 and 50 rad/s."""
-    for inertia, wanted in ((0.0, [0.28, 5.50, -0.28, -12.12]), (1.0, [0.31, 6.16, -0.34, -13.63])):
+    for inertia, reference in ((0.0, [0.28, 5.50, -0.28, -12.12]), (1.0, [0.31, 6.16, -0.34, -13.63])):
         machine = ChainUnitMachine.from_ratios(0.1, 2 / 3, 0.6, 0.5, {"rod_inertia": inertia})
         weight = (machine.p.left.wall_mass + machine.p.left.web_mass) * machine.p.g
         (_, at_right), (_, at_left) = machine.rocker_extremes()
         out = machine.forces([at_left, at_left, at_right, at_right], [10.0, 50.0, 10.0, 50.0])
-        np.testing.assert_allclose(out.left.tangential_load / weight, wanted, atol=6e-3)
+        np.testing.assert_allclose(out.left.tangential_load / weight, reference, atol=6e-3)
 
 
 def test_slack_speed_of_the_papers_machine():

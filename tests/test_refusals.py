@@ -24,11 +24,11 @@ def test_the_list_is_long_enough():
 @pytest.mark.parametrize(("text", "faults"), FILES, ids=[str(k) for k in range(len(FILES))])
 def test_every_fault_has_its_line_key_and_remedy(text, faults, tmp_path):
     (tmp_path / "mine.toml").write_text(text, "utf-8")
-    done = chainunit("study", "mine.toml", "-o", "out", cwd=tmp_path)
-    assert done.returncode == 2 and not done.stdout and not (tmp_path / "out").exists()
-    said = [line for line in done.stderr.splitlines() if not line.startswith("Remark")]
-    assert len(said) == len(faults), said
-    for line, (number, key, remedy) in zip(said, faults, strict=True):
+    process = chainunit("study", "mine.toml", "-o", "out", cwd=tmp_path)
+    assert process.returncode == 2 and not process.stdout and not (tmp_path / "out").exists()
+    output = [line for line in process.stderr.splitlines() if not line.startswith("Remark")]
+    assert len(output) == len(faults), output
+    for line, (number, key, remedy) in zip(output, faults, strict=True):
         place = f"mine.toml:{number}: " if number else "mine.toml: "
         assert re.match(rf"chainunit: {re.escape(place)}{re.escape(key)}", line), line
         assert remedy in line, line
@@ -49,10 +49,12 @@ def test_every_fault_has_its_line_key_and_remedy(text, faults, tmp_path):
 )
 def test_files_of_other_kinds_are_told(data, place, remedy, tmp_path):
     (tmp_path / "mine.toml").write_bytes(data)
-    done = chainunit("study", "mine.toml", "-o", "out", cwd=tmp_path)
-    assert done.returncode == 2 and not done.stdout and [*tmp_path.iterdir()] == [tmp_path / "mine.toml"]
-    assert done.stderr.startswith(f"chainunit: mine.toml:{place}") and remedy in done.stderr
-    assert len(done.stderr.splitlines()) == 1
+    process = chainunit("study", "mine.toml", "-o", "out", cwd=tmp_path)
+    assert (
+        process.returncode == 2 and not process.stdout and [*tmp_path.iterdir()] == [tmp_path / "mine.toml"]
+    )
+    assert process.stderr.startswith(f"chainunit: mine.toml:{place}") and remedy in process.stderr
+    assert len(process.stderr.splitlines()) == 1
 
 
 def test_wrong_cells_of_a_catalogue_stand_behind_the_faults_of_the_file(tmp_path):
@@ -60,11 +62,11 @@ def test_wrong_cells_of_a_catalogue_stand_behind_the_faults_of_the_file(tmp_path
     (tmp_path / "mine.toml").write_text(
         "catalogue = 'cat.csv'\n[sizing]\n[run]\nstep = 1\n[ratios]\nmu = 1\n"
     )
-    said = chainunit("study", "mine.toml", cwd=tmp_path).stderr.splitlines()
+    output = chainunit("study", "mine.toml", cwd=tmp_path).stderr.splitlines()
     begins = ["mine.toml:4: run.step", "mine.toml:5: ratios", *(8 * ["cat.csv:1: column"])]
     begins += ["cat.csv:2: column power", "cat.csv:3: column power"]
-    assert len(said) >= len(begins) and said[-1].startswith("chainunit: cat.csv:3: column power")
-    for line, begin in zip(said[:10], begins, strict=False):
+    assert len(output) >= len(begins) and output[-1].startswith("chainunit: cat.csv:3: column power")
+    for line, begin in zip(output[:10], begins, strict=False):
         assert line.startswith(f"chainunit: {begin}"), line
 
 
@@ -86,8 +88,8 @@ def _head(table):
 def test_each_key_of_a_table_is_refused_in_toml_forms(table, shift):
     """All keys of a table at once, each with a value of another type."""
     above = {key.name.rpartition(".")[0] for key in table.keys}
-    named = {("event", "type"), ("system", "machine"), ("system", "motor")}
-    keys = [key for key in table.keys if key.name not in above and (table.name, key.name) not in named]
+    names = {("event", "type"), ("system", "machine"), ("system", "motor")}
+    keys = [key for key in table.keys if key.name not in above and (table.name, key.name) not in names]
     wrong = [WRONG[(k + 3 * shift) % len(WRONG)] for k, _ in enumerate(keys)]
     right = {"switch": "true", "table": WRONG[0]}
     lines = [
@@ -96,11 +98,11 @@ def test_each_key_of_a_table_is_refused_in_toml_forms(table, shift):
     ]
     text = _head(table) + "\n".join(lines)
     first = _head(table).count("\n") + 1
-    with pytest.raises(InputError) as refused, in_file("mine.toml", lambda: lines_of(text)):
+    with pytest.raises(InputError) as refusal, in_file("mine.toml", lambda: lines_of(text)):
         parse(text)
-    said = str(refused.value).splitlines()
-    assert {int(line.split(":")[1]) for line in said} >= {first + k for k, _ in enumerate(keys)}
-    for line in said:
+    message = str(refusal.value).splitlines()
+    assert {int(line.split(":")[1]) for line in message} >= {first + k for k, _ in enumerate(keys)}
+    for line in message:
         assert len(line) < 2000 and not PYTHON.search(line), line
 
 

@@ -1,5 +1,5 @@
 """A report as blocks: every renderer shows the same numbers, a figure is drawn for page and print from one
-description, and nothing that renders knows a study."""
+description, and no renderer knows a study."""
 
 from __future__ import annotations
 
@@ -96,12 +96,17 @@ def test_every_renderer_shows_the_same_numbers():
         ("131 %", False),
     ):
         assert each in plain and each in document and (each in text) == short, each
-    for said in (text, plain, document.replace("\\", "")):
-        assert "too hot" in said and "too slow" in said and "assumed" in said and "because" in said
+    for messages in (text, plain, document.replace("\\", "")):
         assert (
-            "2.00" in said
-            and "1.00 to 3.00" in said
-            and "the *motor* <b>" in said.replace("&lt;b&gt;", "<b>")
+            "too hot" in messages
+            and "too slow" in messages
+            and "assumed" in messages
+            and "because" in messages
+        )
+        assert (
+            "2.00" in messages
+            and "1.00 to 3.00" in messages
+            and "the *motor* <b>" in messages.replace("&lt;b&gt;", "<b>")
         )
     assert "second" in plain and "second" not in text and "a long head" in plain and "short" in text
     assert "![One figure](one.png)" in document and "](one.png)" not in markdown(a_report(), [])
@@ -121,8 +126,8 @@ def test_each_number_of_a_page_names_its_place():
 
 
 def test_what_the_file_does_not_give_is_marked():
-    given = list(S.given_values(Run, "run"))
-    assert [(value.name, value.origin) for value in given] == [
+    values = list(S.given_values(Run, "run"))
+    assert [(value.name, value.origin) for value in values] == [
         ("run.crank_speed", "file"),
         ("run.turns", "declared"),
     ]
@@ -142,8 +147,8 @@ def test_the_chosen_units_are_everywhere():
     units = chosen_units({"speed": "rev/min", "power": "W", "torque": "kN.m"})
     report = a_report(units)
     text, page, document = told(report), html.render(report), markdown(report, [])
-    for said in (text, page.replace("\u00a0", " ").replace("</span>", ""), document):
-        assert "rad/s" not in re.sub(r'title="[^"]*"', "", said.partition("<script")[0])
+    for messages in (text, page.replace("\u00a0", " ").replace("</span>", ""), document):
+        assert "rad/s" not in re.sub(r'title="[^"]*"', "", messages.partition("<script")[0])
     assert "3000 rev/min" in text and "1.46 kN m" in text and "2200 W" in document
     axes = page_figures.figure(a_figure(), units).layout
     assert axes.xaxis.title.text == "speed [rev/min]" and axes.yaxis.title.text == "torque [kN m]"
@@ -177,7 +182,7 @@ def test_a_figure_is_drawn_for_page_and_print_from_one_description(tmp_path, mon
     figure = fig.Figure("many", "Many", "Everything.", panels, file="many.png")
     drawn = page_figures.figure(figure, DEFAULT_UNITS)
     names = [trace.name for trace in drawn.data if trace.showlegend]
-    wanted = {
+    reference = {
         "a line",
         "points",
         "between",
@@ -190,7 +195,7 @@ def test_a_figure_is_drawn_for_page_and_print_from_one_description(tmp_path, mon
         "bars",
     }
     # each name once, though two panels have the line
-    assert sorted(names) == sorted(wanted)
+    assert sorted(names) == sorted(reference)
     assert {"here", "a label", "<b>all</b>"} <= {each.text for each in drawn.layout.annotations}
     # the panels of a column that share an axis have one cursor
     assert {trace.xaxis for trace in drawn.data if trace.name == "a line"} == {"x"}
@@ -209,7 +214,7 @@ def test_a_figure_is_drawn_for_page_and_print_from_one_description(tmp_path, mon
     monkeypatch.setattr(print_figures, "_legend", keep)
     (file,) = print_figures.write([figure, fig.Figure("page", "", "", panels)], tmp_path, DEFAULT_UNITS)
     assert file.name == "many.png" and file.read_bytes().startswith(b"\x89PNG")
-    assert legends == [wanted]
+    assert legends == [reference]
 
 
 def test_a_scale_that_panels_share_holds_all_of_them(tmp_path, monkeypatch):

@@ -108,7 +108,7 @@ def test_known_numbers(paper, item, quantity, text):
 
 
 def test_a_table_has_only_keys_that_are_read():
-    """A slip in a key would change a verdict without a word."""
+    """A slip in a key would change a verdict without a message."""
     for paper in PAPERS:
         for item in toml(packaged(f"papers/{paper}.toml"))["item"]:
             assert set(item) == {"number", "where", "why", "rows"}
@@ -187,8 +187,8 @@ def test_hinge_loading_is_the_limit_of_the_model():
 
 
 def test_command_line(tmp_path):
-    done = chainunit("reproduce", "-o", "out", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    process = chainunit("reproduce", "-o", "out", cwd=tmp_path)
+    assert process.returncode == 0, process.stderr
     rows = json.loads((tmp_path / "out" / "reproduction.json").read_text())["rows"]
     assert len(rows) == len(ROWS)
     assert {r["verdict"] for r in rows} == {"agrees", "corrected", "not stated"}
@@ -201,7 +201,7 @@ def test_command_line(tmp_path):
     for r in rows:
         assert r["shown"] in page and r["shown"] in text
     assert all(f"({figure.name})" in text for figure in (tmp_path / "out").glob("*.png"))
-    assert "20 agree, 41 corrected, 78 that the papers should state." in done.stdout
+    assert "20 agree, 41 corrected, 78 that the papers should state." in process.stdout
 
 
 def test_the_documentation_shows_these_rows():
@@ -209,8 +209,8 @@ def test_the_documentation_shows_these_rows():
     for paper in PAPERS:
         (block,) = re.findall(rf"<!-- rows of paper {paper} -->\n(.*?)<!-- end -->", text, re.S)
         # the last digit of a rounding error is the machine's own
-        wanted = markdown([r for r in ROWS if r.paper == paper])
-        assert re.sub(r"\d\.\de-\d\d", "tiny", block) == re.sub(r"\d\.\de-\d\d", "tiny", wanted)
+        reference = markdown([r for r in ROWS if r.paper == paper])
+        assert re.sub(r"\d\.\de-\d\d", "tiny", block) == re.sub(r"\d\.\de-\d\d", "tiny", reference)
 
 
 def test_the_scheme_of_paper_003_is_the_model_once_corrected():
@@ -219,23 +219,23 @@ def test_the_scheme_of_paper_003_is_the_model_once_corrected():
     p = paper003.machine()
     for angle in np.radians(np.arange(0.0, 360.0, 15.0)):
         s = paper003.state(p, float(angle), cut=paper003.CUT)
-        wanted = paper003.ours(s)
-        size = np.max(np.abs(wanted))
-        np.testing.assert_allclose(paper003.as_the_paper(s, 0.0), wanted, atol=1e-12 * size)
-        metres, millimetres = (paper003.as_the_paper(s, line) - wanted for line in (1.0, 1000.0))
+        reference = paper003.ours(s)
+        size = np.max(np.abs(reference))
+        np.testing.assert_allclose(paper003.as_the_paper(s, 0.0), reference, atol=1e-12 * size)
+        metres, millimetres = (paper003.as_the_paper(s, line) - reference for line in (1.0, 1000.0))
         np.testing.assert_allclose(millimetres, 1000.0 * metres, atol=1e-8 * size)
         assert np.max(np.abs(metres)) > 1e-4 * size
 
 
 def test_paper_003_shows_what_each_slip_does():
-    found = {r.quantity: r for r in ROWS if r.paper == "003"}
-    metres = found["largest error of R_C, R_D, R_E in a turn, lengths in m"].computed
+    results = {r.quantity: r for r in ROWS if r.paper == "003"}
+    metres = results["largest error of R_C, R_D, R_E in a turn, lengths in m"].computed
     assert metres == pytest.approx(0.4386, abs=1e-4)
-    assert found["largest error in a turn, lengths in mm"].computed == pytest.approx(
+    assert results["largest error in a turn, lengths in mm"].computed == pytest.approx(
         1000.0 * metres, rel=1e-9
     )
-    assert found["largest error in a turn without the constant"].computed < 1e-10
-    arm = found["force across O4E at E, crank angle 0"]
+    assert results["largest error in a turn without the constant"].computed < 1e-10
+    arm = results["force across O4E at E, crank angle 0"]
     assert float(arm.printed) > 4.0 * arm.computed > 0.0
-    assert found["rank of the three moments with C, D, E on one line"].computed == 2.0
-    assert found["margin of the same triad, two forces and one moment"].computed > 0.1
+    assert results["rank of the three moments with C, D, E on one line"].computed == 2.0
+    assert results["margin of the same triad, two forces and one moment"].computed > 0.1

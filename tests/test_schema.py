@@ -58,8 +58,8 @@ def _is_toml(text):
 
 def test_it_is_a_schema():
     jsonschema.Draft7Validator.check_schema(SCHEMA)
-    named = re.findall(r"'#/definitions/(.*?)'", str(SCHEMA))
-    assert {name.replace("%20", " ") for name in named} == set(SCHEMA["definitions"])
+    names = re.findall(r"'#/definitions/(.*?)'", str(SCHEMA))
+    assert {name.replace("%20", " ") for name in names} == set(SCHEMA["definitions"])
 
 
 BLOCKS = [

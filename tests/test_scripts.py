@@ -58,8 +58,8 @@ def build(script, folder, *options):
         str(folder),
         *options,
     ]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=folder)
-    assert done.returncode == 0, done.stderr
+    process = subprocess.run(command, capture_output=True, text=True, cwd=folder)
+    assert process.returncode == 0, process.stderr
     return folder / f"{script.stem}.fmu"
 
 
@@ -96,17 +96,17 @@ def test_pythonfmu_builds_it_as_the_exporter_does(name, fmus, tmp_path):
     exported = tmp_path / f"exported {name}.fmu"
     shutil.copy(fmus[name], exported)
     assert validate_fmu(str(file)) == []
-    built, wanted = simulated(file, exported)
-    assert built.dtype == wanted.dtype and built.tolist() == wanted.tolist()
-    (code, described), (wanted_code, wanted) = carried(file), carried(exported)
+    built, reference = simulated(file, exported)
+    assert built.dtype == reference.dtype and built.tolist() == reference.tolist()
+    (code, described), (wanted_code, reference) = carried(file), carried(exported)
     assert code == wanted_code
     # pythonfmu's own options win over the description: without them it says that the FMU cannot save its state
     without = {"canGetAndSetFMUstate", "canSerializeFMUstate"}
-    assert described != wanted and described == [
-        (tag, {k: v for k, v in attributes.items() if k not in without}) for tag, attributes in wanted
+    assert described != reference and described == [
+        (tag, {k: v for k, v in attributes.items() if k not in without}) for tag, attributes in reference
     ]
     with_options = build(FOLDER / f"{name}.py", tmp_path, *OPTIONS)
-    assert carried(with_options) == (code, wanted)
+    assert carried(with_options) == (code, reference)
 
 
 @pytest.mark.parametrize("name", OTHER_START)
@@ -128,7 +128,7 @@ def test_start_values_of_a_script(name, tmp_path):
 
 
 def test_a_script_with_a_class_and_imports_of_its_own(tmp_path):
-    """Both were built without a word, and no host could instantiate the FMU."""
+    """Both were built without an error, and no host could instantiate the FMU."""
     text = (FOLDER / "ChamberForces.py").read_text()
     script = tmp_path / "MyChamber.py"
     script.write_text(
@@ -175,7 +175,7 @@ def test_an_import_that_no_fmu_can_carry_is_refused(line, tmp_path):
 
 @pytest.mark.skipif(host() != "linux64" or shutil.which("cc") is None, reason="a C compiler on 64-bit Linux")
 def test_the_commands_of_the_readme(native_fmus, tmp_path):
-    """What the README prints compiles a native FMU from its own sources, with the same results."""
+    """The command in the README compiles a native FMU from its own sources, with the same results."""
     commands = [
         c for c in re.findall(r"```sh\n(.*?)```", (FOLDER / "README.md").read_text(), re.DOTALL) if "cc " in c
     ]
@@ -193,6 +193,6 @@ def test_the_commands_of_the_readme(native_fmus, tmp_path):
     assert validate_fmu(str(copy)) == []
     original = tmp_path / "original.fmu"
     shutil.copy(file, original)
-    built, wanted = simulated(copy, original)
-    for name in wanted.dtype.names:
-        np.testing.assert_allclose(built[name], wanted[name], rtol=1e-12, atol=1e-12)
+    built, reference = simulated(copy, original)
+    for name in reference.dtype.names:
+        np.testing.assert_allclose(built[name], reference[name], rtol=1e-12, atol=1e-12)

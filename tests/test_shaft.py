@@ -1,4 +1,4 @@
-"""A study with a driveline: where it stands, what it carries, and what the report says of it."""
+"""A study with a driveline: its place, its torques, and its section of the report."""
 
 from __future__ import annotations
 
@@ -90,13 +90,13 @@ def test_a_rigid_drive_carries_what_the_machine_and_the_inertia_take(study, tmp_
     )
     plain = run_study(config.parse(f"{heavier}\n{motor}"), tmp_path)
     for name in ("start_up", "jam_left"):
-        wanted = plain.drive.crank_torque(plain.runs[name])
+        reference = plain.drive.crank_torque(plain.runs[name])
         # the crank without the line is heavier by J4, so that this torque holds that of J4, too
-        found = study.runs[name][RIGID].values
+        result = study.runs[name][RIGID].values
         if name == "start_up":
-            np.testing.assert_allclose(found, wanted, atol=2e-4 * np.max(np.abs(wanted)))
+            np.testing.assert_allclose(result, reference, atol=2e-4 * np.max(np.abs(reference)))
         else:  # its event comes at the same crank angle, a little later than in the elastic drive
-            assert np.max(np.abs(found)) == pytest.approx(np.max(np.abs(wanted)), rel=0.02)
+            assert np.max(np.abs(result)) == pytest.approx(np.max(np.abs(reference)), rel=0.02)
 
 
 def test_before_or_behind_the_gear(tmp_path):
@@ -126,8 +126,8 @@ def test_before_or_behind_the_gear(tmp_path):
 def test_the_frequency_is_that_of_rotor_gear_shafts_and_machine(study):
     """The eigenproblem in the angles of rotor (behind the gear) and driven shaft, the straight cardan condensed."""
     drive = study.drive
-    line, rotor, found = drive.line, drive.fmu_parameters.rotor.J, torsion(drive, [2e-3, 9e-3])
-    for J, expected in zip((2e-3, 9e-3), (found.k_largest, found.k_least), strict=True):
+    line, rotor, result = drive.line, drive.fmu_parameters.rotor.J, torsion(drive, [2e-3, 9e-3])
+    for J, expected in zip((2e-3, 9e-3), (result.k_largest, result.k_least), strict=True):
         c = 1.0 / (1.0 / line.c2 + 1.0 / line.c3)
         # twist = phi_motor/ratio - phi_driven; both inertias where they turn
         stiffness = c * np.array([[1.0 / line.ratio**2, -1.0 / line.ratio], [-1.0 / line.ratio, 1.0]])
@@ -137,13 +137,13 @@ def test_the_frequency_is_that_of_rotor_gear_shafts_and_machine(study):
 
 def test_rainflow_is_that_of_the_standard():
     """The example of ASTM E1049-85, 5.4.4.2: ranges and counts as the standard prints them."""
-    found = rainflow([-2, 1, -3, 5, -1, 3, -4, 4, -2])
+    result = rainflow([-2, 1, -3, 5, -1, 3, -4, 4, -2])
     counted = {}
-    for size, count in zip(found.range, found.count, strict=True):
+    for size, count in zip(result.range, result.count, strict=True):
         counted[float(size)] = counted.get(float(size), 0.0) + float(count)
     assert counted == {3.0: 0.5, 4.0: 1.5, 6.0: 0.5, 8.0: 1.0, 9.0: 0.5}
-    assert found.damage(2.0) == 0.5 * 9 + 1.5 * 16 + 0.5 * 36 + 64 + 0.5 * 81
-    rows = found.classes(9.0)
+    assert result.damage(2.0) == 0.5 * 9 + 1.5 * 16 + 0.5 * 36 + 64 + 0.5 * 81
+    rows = result.classes(9.0)
     assert sum(row["count"] for row in rows) == 4.0 and rows[0]["to"] == 9.0
     assert rainflow([1.0, 1.0]).damage(5.0) == 0.0
 
@@ -297,9 +297,9 @@ def test_the_speed_loop_is_tuned_and_shown_with_the_line(tmp_path):
     ],
 )  # fmt: skip
 def test_bad_tables_are_refused(text, line):
-    with pytest.raises(InputError) as refused:
+    with pytest.raises(InputError) as refusal:
         config.parse(text)
-    assert str(refused.value).startswith(line) and "\n" not in str(refused.value)
+    assert str(refusal.value).startswith(line) and "\n" not in str(refusal.value)
 
 
 def test_stiffness_from_geometry_and_damping_from_a_ratio(tmp_path):
@@ -339,8 +339,8 @@ def test_export_of_the_studys_line(tmp_path):
     )
     with pytest.raises(InputError, match=r"the study has no \[driveline\]"):
         start_of(config.parse(SHORT), MODELS["CardanDriveline"])
-    said = export_study(loaded, tmp_path / "x.ssp", backend="python")
-    assert "driveline (CardanDriveline)" in said
+    message = export_study(loaded, tmp_path / "x.ssp", backend="python")
+    assert "driveline (CardanDriveline)" in message
     drive = choose(loaded, tmp_path, lambda *_: None).drive
     assert ("driveline.driven.w", "machine.w") in drive.graph.connections
     assert ("driveline.tau_bias", "motor.load.tau_bias") in drive.graph.connections

@@ -1,4 +1,4 @@
-"""Sizing: what can be worked out by hand, and what the catalogue's motors then do."""
+"""Sizing: computations by hand, and the catalogue's motors in co-simulation."""
 
 from __future__ import annotations
 
@@ -153,12 +153,12 @@ class Wheeled:
 
 
 def wheel_of(monkeypatch, wanted, inertia, sizes):
-    """What the search for a flywheel comes to, and the flywheels tried, where the checks use so much of their limits
-    with a flywheel; there are 0.25 kg m2 on the shaft, and `inertia` at the crank."""
-    tried = []
+    """The result of the search for a flywheel, and the flywheels tried, where the checks use these shares of
+    their limits with a flywheel; there are 0.25 kg m2 on the shaft, and `inertia` at the crank."""
+    trials = []
 
     def judge(config, candidate, duty, files):
-        tried.append(candidate.drive.flywheel)
+        trials.append(candidate.drive.flywheel)
         candidate.checks = {
             name: Check(name, used, 1.0, "1") for name, used in sizes(candidate.drive.flywheel).items()
         }
@@ -172,7 +172,7 @@ def wheel_of(monkeypatch, wanted, inertia, sizes):
     plate = SimpleNamespace(torque=10.0, synchronous=105.0, speed=100.0)
     bare = sizing.Candidate(SimpleNamespace(nameplate=plate), Wheeled(), {})
     config = SimpleNamespace(run=SimpleNamespace(crank_speed=2.0))
-    return sizing.with_flywheel(config, bare, SimpleNamespace(numbers=numbers), {}), tried
+    return sizing.with_flywheel(config, bare, SimpleNamespace(numbers=numbers), {}), trials
 
 
 def test_the_inertia_that_evens_the_torque():
@@ -196,25 +196,25 @@ def test_the_inertia_that_evens_the_torque():
 
 def test_the_flywheels_tried_go_as_far_as_the_hand_formula_with_the_machine(monkeypatch):
     """200 kg m2 are wanted at the crank, and 25 + 75 are there: 1 kg m2 on the shaft."""
-    best, tried = wheel_of(monkeypatch, 200.0, 75.0, lambda J: {"speed": 1.5})
-    assert tried == [0.0, *(pytest.approx(share) for share in (0.03, 0.1, 0.3, 1.0))]
+    best, trials = wheel_of(monkeypatch, 200.0, 75.0, lambda J: {"speed": 1.5})
+    assert trials == [0.0, *(pytest.approx(share) for share in (0.03, 0.1, 0.3, 1.0))]
     best, _ = wheel_of(monkeypatch, 200.0, 75.0, lambda J: {"rms_torque": 1.5 - J})
     assert best.drive.flywheel == pytest.approx(0.5, abs=0.1) and best.fits
 
 
 def test_no_flywheel_is_tried_that_is_small_beside_what_is_there(monkeypatch):
-    best, tried = wheel_of(monkeypatch, 105.0, 75.0, lambda J: {"rms_torque": 1.2})
-    assert tried == [best.drive.flywheel] == [0.0]
+    best, trials = wheel_of(monkeypatch, 105.0, 75.0, lambda J: {"rms_torque": 1.2})
+    assert trials == [best.drive.flywheel] == [0.0]
 
 
 def test_of_flywheels_that_are_too_heavy_the_nearest_is_kept(monkeypatch):
     """None evens the speed before it passes the inertia that is permitted."""
-    best, tried = wheel_of(
+    best, trials = wheel_of(
         monkeypatch, 200.0, 75.0, lambda J: {"speed": 3.0 - J, "inertia": 0.5 + 1000.0 * J}
     )
-    assert len(tried) == 5 and best.drive.flywheel == 0.0
-    best, tried = wheel_of(monkeypatch, 200.0, 75.0, lambda J: {"speed": 3.0 - J, "inertia": 0.5 + 3.0 * J})
-    assert best.violation == pytest.approx(2.7) and best.drive.flywheel == max(tried)
+    assert len(trials) == 5 and best.drive.flywheel == 0.0
+    best, trials = wheel_of(monkeypatch, 200.0, 75.0, lambda J: {"speed": 3.0 - J, "inertia": 0.5 + 3.0 * J})
+    assert best.violation == pytest.approx(2.7) and best.drive.flywheel == max(trials)
 
 
 def ranked(*candidates):
@@ -241,7 +241,7 @@ def test_the_noise_of_the_search_chooses_no_motor(noise):
 
 
 def test_motors_of_equal_power_rank_by_flywheel_then_by_margin():
-    told = ranked(
+    ranking = ranked(
         ("a, larger", 3000.0, 0.0, 50.0, 0.3),
         ("b, much flywheel", 2200.0, 1.0, 50.0, 0.5),
         ("c, used", 2200.0, 0.0, 50.0, 0.95),
@@ -249,12 +249,12 @@ def test_motors_of_equal_power_rank_by_flywheel_then_by_margin():
         ("e, misses", 2200.0, 0.0, 50.0, 1.2),
         ("f, small, with a flywheel", 1500.0, 2.0, 50.0, 0.99),
     )
-    assert [name[0] for name in told] == ["f", "d", "c", "b", "a", "e"]
-    told = ranked(*[("b, much flywheel", 2200.0, 1.0, 50.0, 0.5), ("c", 2200.0, 0.0, 50.0, 0.95)])
-    assert told["b, much flywheel"].startswith("takes more flywheel at the crank than the chosen one")
-    assert "with a flywheel of 1.00 kg m" in told["b, much flywheel"]
-    told = ranked(("c", 2200.0, 0.0, 50.0, 0.95), ("d", 2200.0, 0.0, 50.0, 0.6))
-    assert told["c"].startswith("more used than the chosen one")
+    assert [name[0] for name in ranking] == ["f", "d", "c", "b", "a", "e"]
+    ranking = ranked(*[("b, much flywheel", 2200.0, 1.0, 50.0, 0.5), ("c", 2200.0, 0.0, 50.0, 0.95)])
+    assert ranking["b, much flywheel"].startswith("takes more flywheel at the crank than the chosen one")
+    assert "with a flywheel of 1.00 kg m" in ranking["b, much flywheel"]
+    ranking = ranked(("c", 2200.0, 0.0, 50.0, 0.95), ("d", 2200.0, 0.0, 50.0, 0.6))
+    assert ranking["c"].startswith("more used than the chosen one")
 
 
 def test_a_check_is_what_is_used_of_what_is_permitted():
@@ -275,15 +275,15 @@ def sized(tmp_path_factory):
 
 
 def test_the_smallest_that_fits_is_chosen_and_the_others_are_told_why(sized):
-    chosen = sized.chosen_candidate
-    assert chosen is not None and sized.candidates[0] is chosen
+    choice = sized.chosen_candidate
+    assert choice is not None and sized.candidates[0] is choice
     for c in sized.candidates:
         assert c.reason
         used = [check.utilisation for check in c.checks.values()]
         fits = all(u is not None and u <= 1.0 for u in used)
         assert fits == c.fits == (c.verdict is not Standing.REJECTED)
         if c.verdict is Standing.FITS:
-            assert c.motor.nameplate.power >= chosen.motor.nameplate.power
+            assert c.motor.nameplate.power >= choice.motor.nameplate.power
     assert {c.verdict for c in sized.candidates} >= {Standing.CHOSEN, Standing.FITS}
 
 
@@ -334,9 +334,9 @@ def one_candidate(more, **asked):
 def test_a_fixed_ratio_is_kept_and_must_give_the_speed(tmp_path, monkeypatch):
     """With 62 in place of 52 the crank turns a sixth too slowly."""
     monkeypatch.setattr(sizing, "catalogue", lambda extra: small(1))
-    found = sizing.size(one_candidate("[gear]\nratio = 62\n", fluctuation=0.5), tmp_path, lambda *said: None)
-    (c,) = found.candidates
-    assert c.drive.ratio == 62.0 and c.verdict is Standing.INSUFFICIENT and found.chosen_candidate is None
+    result = sizing.size(one_candidate("[gear]\nratio = 62\n", fluctuation=0.5), tmp_path, lambda *said: None)
+    (c,) = result.candidates
+    assert c.drive.ratio == 62.0 and c.verdict is Standing.INSUFFICIENT and result.chosen_candidate is None
     assert c.checks["crank_speed"].value == pytest.approx(1.0 - 52.0 / 62.0, abs=0.02)
 
 
@@ -348,16 +348,16 @@ def small(number, skipped=0):
 
 def test_without_a_fit_the_whole_catalogue_is_tried_and_the_nearest_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr(sizing, "catalogue", lambda extra: small(4))
-    found = sizing.size(
+    outcome = sizing.size(
         one_candidate("[gear]\ntorque_limit = 150\n", fluctuation=0.5), tmp_path, lambda *said: None
     )
-    assert found.chosen_candidate is None and len(found.candidates) == found.motors == 4
-    violations = [c.checks["gear"].utilisation for c in found.candidates]
+    assert outcome.chosen_candidate is None and len(outcome.candidates) == outcome.motors == 4
+    violations = [c.checks["gear"].utilisation for c in outcome.candidates]
     assert violations == sorted(violations) and violations[0] > 1.0
-    assert [c.verdict for c in found.candidates] == [Standing.INSUFFICIENT] + 3 * [Standing.REJECTED]
-    assert found.best is found.candidates[0] and "torque of the gear" in found.answer
-    assert "4 of 4 were tried" in found.answer
-    result = found.as_dict()
+    assert [c.verdict for c in outcome.candidates] == [Standing.INSUFFICIENT] + 3 * [Standing.REJECTED]
+    assert outcome.best is outcome.candidates[0] and "torque of the gear" in outcome.answer
+    assert "4 of 4 were tried" in outcome.answer
+    result = outcome.as_dict()
     assert (result["chosen"], result["nearest"]) == (None, 0)
     assert result["tried"]["value"] == result["motors"]["value"] == 4
 
@@ -370,10 +370,10 @@ def test_motors_that_are_too_weak_by_the_nameplate_are_counted(tmp_path, monkeyp
         for power in (20.0, 40.0)
     ]
     monkeypatch.setattr(sizing, "catalogue", lambda extra: [*weak, *small(3)])
-    found = sizing.size(one_candidate("[gear]\ntorque_limit = 150\n"), tmp_path, lambda *said: None)
-    assert (len(found.candidates), found.motors, found.weak) == (3, 5, 2)
-    assert "3 of 5 were tried, 2 are too weak by the nameplate" in found.answer
-    assert found.as_dict()["weak"]["value"] == 2
+    result = sizing.size(one_candidate("[gear]\ntorque_limit = 150\n"), tmp_path, lambda *said: None)
+    assert (len(result.candidates), result.motors, result.weak) == (3, 5, 2)
+    assert "3 of 5 were tried, 2 are too weak by the nameplate" in result.answer
+    assert result.as_dict()["weak"]["value"] == 2
 
 
 def test_the_remedy_of_the_rejected_example_works(tmp_path):
@@ -381,20 +381,20 @@ def test_the_remedy_of_the_rejected_example_works(tmp_path):
     text = (Path(__file__).parents[1] / "examples/motor_rejected.toml").read_text("utf-8")
     assert 'start = "direct"' in text and 'with start = "soft" a motor of 0.55 kW fits' in text
     soft = parse(text.replace('start = "direct"', 'start = "soft"'))
-    found = sizing.size(soft, tmp_path, lambda *said: None)
-    assert found.chosen_candidate is not None and found.chosen_candidate.motor.nameplate.power == 550.0
-    assert all(u <= 1.0 for u in found.chosen_candidate.sizes.values())
+    result = sizing.size(soft, tmp_path, lambda *said: None)
+    assert result.chosen_candidate is not None and result.chosen_candidate.motor.nameplate.power == 550.0
+    assert all(u <= 1.0 for u in result.chosen_candidate.sizes.values())
 
 
 def test_sizing_climbs_until_one_fits(tmp_path, monkeypatch):
     """One is asked for; the smaller ones get too hot with so many starts, and the largest are spared."""
     monkeypatch.setattr(sizing, "catalogue", lambda extra: small(8))
     config = one_candidate("", starts_per_hour=700.0, fluctuation=0.9)
-    found = sizing.size(config, tmp_path, lambda *said: None)
-    assert found.chosen_candidate is not None and 1 < len(found.candidates) < found.motors
-    others = [c for c in found.candidates if c is not found.chosen_candidate]
+    result = sizing.size(config, tmp_path, lambda *said: None)
+    assert result.chosen_candidate is not None and 1 < len(result.candidates) < result.motors
+    others = [c for c in result.candidates if c is not result.chosen_candidate]
     assert all(c.verdict is Standing.REJECTED for c in others)
-    assert all(c.motor.nameplate.power < found.chosen_candidate.motor.nameplate.power for c in others)
+    assert all(c.motor.nameplate.power < result.chosen_candidate.motor.nameplate.power for c in others)
 
 
 def test_a_limit_of_the_inertia_ratio_is_for_inverters_or_who_asks_for_it(tmp_path, monkeypatch):
@@ -424,10 +424,10 @@ def test_without_a_fit_the_study_goes_on_with_the_nearest(tmp_path, monkeypatch)
     (tmp_path / "weak.toml").write_text(
         event_line("feed_right") + HEAVY + "fluctuation = 0.5\n[gear]\ntorque_limit = 150\n"
     )
-    said = CliRunner().invoke(cli.app, ["study", str(tmp_path / "weak.toml"), "-o", str(tmp_path / "out")])
-    assert said.exit_code == 1, said.output
-    assert "No motor of the catalogue fits (2 of 2 were tried)" in said.output
-    assert "the motor is insufficient" in said.output
+    message = CliRunner().invoke(cli.app, ["study", str(tmp_path / "weak.toml"), "-o", str(tmp_path / "out")])
+    assert message.exit_code == 1, message.output
+    assert "No motor of the catalogue fits (2 of 2 were tried)" in message.output
+    assert "the motor is insufficient" in message.output
     numbers = json.loads((tmp_path / "out" / "result.json").read_text())
     assert set(numbers["answers"]) == {"steady", "feed_right"} and numbers["status"] == "complete"
     nearest = numbers["sizing"]["candidates"][numbers["sizing"]["nearest"]]

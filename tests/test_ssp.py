@@ -56,11 +56,11 @@ def package(tmp_path_factory):
     """A package by the command line, in a folder whose name has spaces."""
     folder = tmp_path_factory.mktemp("ssp")
     (folder / "mine.toml").write_text(MINE)
-    done = chainunit("export-ssp", "mine.toml", "-o", "out dir/mine.ssp", cwd=folder)
-    assert (done.returncode, done.stderr) == (0, "")
+    process = chainunit("export-ssp", "mine.toml", "-o", "out dir/mine.ssp", cwd=folder)
+    assert (process.returncode, process.stderr) == (0, "")
     assert re.fullmatch(
         r"out dir/mine\.ssp: SSP 1\.0, machine \(ChamberForces\), motor \(DcMotor\), 10 connections; FMI 2\.0.*\n",
-        done.stdout,
+        process.stdout,
     )
     return folder / "out dir" / "mine.ssp"
 
@@ -89,16 +89,16 @@ def test_pyssp_finds_nothing(package):
                 for c in e.connectors
                 if c.kind == "parameter"
             }
-            told = ssd.check_connections(unconnected_inputs=True)
+            entries = ssd.check_connections(unconnected_inputs=True)
             assert len(ssd.connections()) == 10
-        given = set()
+        values = set()
         for ssv in opened.ssv:
             ssv.__check_compliance__()
-            given |= {f"{ssv.file_path.stem}.{p['name']}" for p in ssv.parameters}
+            values |= {f"{ssv.file_path.stem}.{p['name']}" for p in ssv.parameters}
     # an input without a source has its value in a parameter set, and no other has
-    assert {line.rsplit(" ", 1)[1] for line in told} == given > parameters
+    assert {line.rsplit(" ", 1)[1] for line in entries} == values > parameters
     loads = {f"machine.{s}.{x}" for s in ("left", "right") for x in ("material_mass", "processing_force")}
-    assert given - parameters >= {"motor.w_ref", *loads}
+    assert values - parameters >= {"motor.w_ref", *loads}
 
 
 def connections(file):
@@ -151,8 +151,8 @@ def test_parameter_sets_and_fmus_hold_the_studys_values(package, tmp_path):
         archive.extractall(tmp_path)
     for name, model in (("machine", "ChamberForces"), ("motor", "DcMotor")):
         values = {p.name: float(p.value) for p in read_ssv(str(package), f"resources/{name}.ssv").parameters}
-        wanted = start[name]
-        assert {n: wanted.get(n, v) for n, v in values.items()} == values
+        reference = start[name]
+        assert {n: reference.get(n, v) for n, v in values.items()} == values
         described = fmpy.read_model_description(str(tmp_path / "resources" / f"{model}.fmu"))
         burnt = {v.name: float(v.start) for v in described.modelVariables if v.name in values}
         assert burnt == values
@@ -209,9 +209,9 @@ def run(tool, file, names, stop, step=0.0):
     # ecos needs libtbb, which pip puts there
     libraries = f"{sys.prefix}/lib:{os.environ.get('LD_LIBRARY_PATH', '')}".rstrip(":")
     environment = os.environ | {"LD_LIBRARY_PATH": libraries}
-    done = subprocess.run(command, capture_output=True, text=True, env=environment)
-    assert done.returncode == 0, done.stdout[-1000:] + done.stderr[-1000:]
-    (line,) = [line for line in done.stdout.splitlines() if line.startswith("values ")]
+    process = subprocess.run(command, capture_output=True, text=True, env=environment)
+    assert process.returncode == 0, process.stdout[-1000:] + process.stderr[-1000:]
+    (line,) = [line for line in process.stdout.splitlines() if line.startswith("values ")]
     return np.array(json.loads(line.removeprefix("values ")))
 
 
@@ -234,15 +234,15 @@ def own(file, folder, names, stop, step):
 def rewritten(package, file):
     """The package with the values OTHERS in its parameter sets, and nothing else changed."""
     left = dict(OTHERS)
-    with zipfile.ZipFile(package) as given, zipfile.ZipFile(file, "w") as changed:
-        for name in given.namelist():
-            content = given.read(name)
+    with zipfile.ZipFile(package) as values, zipfile.ZipFile(file, "w") as variant:
+        for name in values.namelist():
+            content = values.read(name)
             for full in [n for n in left if name == f"resources/{n.partition('.')[0]}.ssv"]:
                 pattern = rf'(name="{re.escape(full.partition(".")[2])}"[^>]*>\s*<ssv:Real value=")[^"]*'
                 text, n = re.subn(pattern, rf"\g<1>{left.pop(full)}", content.decode())
                 assert n == 1, full
                 content = text.encode()
-            changed.writestr(name, content)
+            variant.writestr(name, content)
     assert not left
     return file
 
@@ -256,8 +256,8 @@ def test_runs_near_the_own_master_with_the_values_of_the_parameter_sets(tool, pa
     errors = []
     for step in (1e-3, 5e-4):
         got = run(tool, other, names, 1.0, step)
-        wanted = own(other, tmp_path / "out", names, 1.0, step)
-        errors.append(np.max(np.abs(got - wanted), axis=0) / np.max(np.abs(wanted), axis=0))
+        reference = own(other, tmp_path / "out", names, 1.0, step)
+        errors.append(np.max(np.abs(got - reference), axis=0) / np.max(np.abs(reference), axis=0))
     assert np.all(errors[0] < 1e-4), errors
     assert np.all(errors[1] < errors[0] / 3.0), errors
     before = own(package, tmp_path / "as it was", names, 1.0, 1e-3)
@@ -269,8 +269,8 @@ def test_runs_as_it_is(tool, package, tmp_path):
     """libcosim with the package's step; ecos with the FMUs' start values alone."""
     names = ["motor.w", "machine.ratio", "machine.left.material_mass", "motor.w_ref", "motor.limit.i"]
     got = run(tool, package, names, 0.5)
-    wanted = own(package, tmp_path, names[:1], 0.5, 1e-3)
-    assert np.max(np.abs(got[:, :1] - wanted)) < 1e-4 * np.max(np.abs(wanted))
+    reference = own(package, tmp_path, names[:1], 0.5, 1e-3)
+    assert np.max(np.abs(got[:, :1] - reference)) < 1e-4 * np.max(np.abs(reference))
     np.testing.assert_array_equal(got[-1, 1:], [50.0, 45.0, 120.0, 3.9])
 
 
@@ -301,9 +301,9 @@ def test_another_system_by_pythonfmu(tool, another, tmp_path):
     assert fmus == {f"resources/{name}.fmu" for name in ("ChamberForces", "DcMotor", "DcMotor_second")}
     names = ["motor.w", "second.w"]
     got = run(tool, another, names, 0.3, 1e-3)
-    wanted = own(another, tmp_path / "out", names, 0.3, 1e-3)
+    reference = own(another, tmp_path / "out", names, 0.3, 1e-3)
     # what the second motor follows is one step old: first order
-    assert np.max(np.abs(got - wanted)) < 1e-3 * np.max(wanted)
+    assert np.max(np.abs(got - reference)) < 1e-3 * np.max(reference)
 
 
 @pytest.mark.parametrize("tool", TOOLS)
@@ -316,8 +316,8 @@ def test_a_driveline_between_runs_near_the_own_master(tool, tmp_path):
     errors = []
     for step in (1e-3, 5e-4):
         got = run(tool, package, names, 0.5, step)
-        wanted = own(package, tmp_path / "out", names, 0.5, step)
-        errors.append(np.max(np.abs(got - wanted), axis=0) / np.max(np.abs(wanted), axis=0))
+        reference = own(package, tmp_path / "out", names, 0.5, step)
+        errors.append(np.max(np.abs(got - reference), axis=0) / np.max(np.abs(reference), axis=0))
     assert np.all(errors[0] < 2e-2) and np.all(errors[1] < 0.6 * errors[0]), errors
 
 
@@ -347,8 +347,8 @@ def test_feed_forward_and_sizing(tmp_path, monkeypatch):
 
 def test_the_motor_that_sizing_chooses_is_packaged(tmp_path):
     sizing = "[run]\nstep = 0.002\n[sizing]\ncandidates = 1\npoles_least = 4\npoles_most = 4"
-    said = export_study(config.parse(sizing), tmp_path / "z.ssp")
-    assert "motor (InductionMotor)" in said
+    message = export_study(config.parse(sizing), tmp_path / "z.ssp")
+    assert "motor (InductionMotor)" in message
     elements = read_ssd(str(tmp_path / "z.ssp")).system.elements
     assert [e.source for e in elements] == ["resources/ChamberForces.fmu", "resources/InductionMotor.fmu"]
     assert ("machine.J", "motor.load.J") in connections(tmp_path / "z.ssp")
@@ -356,8 +356,8 @@ def test_the_motor_that_sizing_chooses_is_packaged(tmp_path):
 
 def test_two_alike_share_their_fmu(tmp_path):
     system = System({"a": component("DcMotor"), "b": component("DcMotor")})
-    said = ssp.export(system, tmp_path / "two.ssp", backend="python")
-    assert said.startswith(
+    message = ssp.export(system, tmp_path / "two.ssp", backend="python")
+    assert message.startswith(
         "SSP 1.0, a (DcMotor), b (DcMotor), 0 connections; FMI 2.0 Co-Simulation, by pythonfmu;"
     )
     elements = read_ssd(str(tmp_path / "two.ssp")).system.elements
@@ -397,7 +397,7 @@ def test_default_name_and_what_the_command_refuses(tmp_path, monkeypatch, capsys
     assert not status and out.startswith("ChainUnitDrive.ssp: SSP 1.0, ") and out.count("\n") == 1
     before = Path("ChainUnitDrive.ssp").read_bytes()
     Path("wrong.toml").write_text("[machine]\nr = 0.9")
-    for arguments, said in (
+    for arguments, messages in (
         (["-o", "x.fmu"], "-o x.fmu: must be a file name that ends in .ssp"),
         (["none.toml"], "none.toml: cannot be read"),
         (["wrong.toml"], "wrong.toml:2: machine: r = 0.9 m: the crank cannot turn"),
@@ -405,7 +405,7 @@ def test_default_name_and_what_the_command_refuses(tmp_path, monkeypatch, capsys
         (["--backend", "python", "-o", "wrong.toml/x.ssp"], "wrong.toml: cannot be written to"),
     ):
         status, out, error = command(*arguments)
-        assert (status, out, error.count("\n")) == (2, "", 1) and said in error
+        assert (status, out, error.count("\n")) == (2, "", 1) and messages in error
     assert {p.name for p in tmp_path.iterdir()} == {"ChainUnitDrive.ssp", "wrong.toml"}
     assert Path("ChainUnitDrive.ssp").read_bytes() == before
 

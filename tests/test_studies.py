@@ -1,4 +1,4 @@
-"""`Study`: what Python gives is what the command gives."""
+"""`Study` gives the results of the command."""
 
 from __future__ import annotations
 
@@ -51,8 +51,8 @@ def command(tmp_path_factory):
     """The folder of the same study by the command."""
     folder = tmp_path_factory.mktemp("command")
     (folder / "short.toml").write_text(FILE)
-    done = chainunit("study", "short.toml", "-o", "out", cwd=folder)
-    assert done.returncode == 0, done.stderr
+    process = chainunit("study", "short.toml", "-o", "out", cwd=folder)
+    assert process.returncode == 0, process.stderr
     return folder / "out"
 
 
@@ -212,13 +212,13 @@ def test_what_a_run_refuses_names_file_and_line(tmp_path):
     study = Study.from_file(tmp_path / "mine.toml")
     # beside the study file, as for the command
     assert study.config.catalogue == tmp_path / "own.toml"
-    changed = study.with_values({"sizing.temperature": 400.0})
+    variant = study.with_values({"sizing.temperature": 400.0})
     (tmp_path / "own.toml").unlink()
     with pytest.raises(InputError, match=r"mine.toml:1: catalogue = .*own.toml: cannot be read"):
         study.run()
-    assert changed.config.catalogue == tmp_path / "own.toml"
+    assert variant.config.catalogue == tmp_path / "own.toml"
     with pytest.raises(InputError, match=r"^catalogue = .*own.toml: cannot be read"):
-        changed.run(tmp_path / "out")
+        variant.run(tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
@@ -276,8 +276,8 @@ def test_a_study_says_what_it_is():
 
 
 def test_the_lines_in_the_docstring_are_right():
-    tried = doctest.testmod(studies)
-    assert tried.attempted >= 3 and not tried.failed
+    trials = doctest.testmod(studies)
+    assert trials.attempted >= 3 and not trials.failed
 
 
 @pytest.mark.parametrize(
@@ -290,6 +290,6 @@ def test_the_lines_in_the_docstring_are_right():
 )
 def test_values_at_no_place_are_refused(values, said):
     study = Study(flywheel={"compare": [0.1]}, event=[{"type": "jam", "side": "left"}])
-    with pytest.raises(InputError) as refused:
+    with pytest.raises(InputError) as refusal:
         study.with_values(values)
-    assert str(refused.value).startswith(said)
+    assert str(refusal.value).startswith(said)

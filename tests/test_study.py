@@ -104,13 +104,13 @@ def test_study_numbers_are_those_of_the_series(done):
         # the start-up, to the begin of steady running
         run = tree["start_up"].to_dataset()
         steady = run["time"].values[np.searchsorted(run["time"].values, 0.3 + 2.0 * math.pi / 6.0 - 1e-9)]
-        start, found = run.sel(time=slice(None, steady)), numbers["start_up"]
-        assert found["crank_torque_peak"]["value"] == pytest.approx(
+        start, result = run.sel(time=slice(None, steady)), numbers["start_up"]
+        assert result["crank_torque_peak"]["value"] == pytest.approx(
             25.0 * float(np.abs(start["machine.tau"]).max())
         )
         for rod in ("web", "wall"):
             least = min(float(start[f"machine.{side}.{rod}_pull"].min()) for side in ("left", "right"))
-            assert found[f"{rod}_pull_least"]["value"] == pytest.approx(least)
+            assert result[f"{rod}_pull_least"]["value"] == pytest.approx(least)
         bearing = np.hypot(start["machine.crank_bearing.fx"], start["machine.crank_bearing.fy"])
         assert numbers["pins"]["start_up"]["O1 crank bearing"]["peak"]["value"] == pytest.approx(
             float(bearing.max())
@@ -151,18 +151,18 @@ def test_what_blocks_the_rocker_decides_the_peak(tmp_path):
 
     study = run_study(config.parse(event_line("blocked", turns=1) + BLOCKED), tmp_path, check=True)
     assert study.failure is None
-    found, stop = study.spreads["blocked"], study.config.events["blocked"].p
-    soft, stiff = found.ranges["stiffness"]
+    result, stop = study.spreads["blocked"], study.config.events["blocked"].p
+    soft, stiff = result.ranges["stiffness"]
     assert stiff == pytest.approx(10.0 * soft) and soft < stop.stiffness < stiff
-    low, high = found.peaks["crank_torque"]
+    low, high = result.peaks["crank_torque"]
     assert low < study.answers["blocked"].crank_torque_peak < high
     damping = stop.damping * (stiff / stop.stiffness) ** 0.5
-    assert found.ranges["damping"][1] == pytest.approx(damping)
+    assert result.ranges["damping"][1] == pytest.approx(damping)
     line = event_line("blocked", turns=1, stiffness=stiff, damping=damping)
     other = run_study(config.parse(line + BLOCKED), tmp_path)
     for name in ("crank_torque", "motor_torque", "rocker_torque"):
         peak = getattr(other.answers["blocked"], f"{name}_peak")
-        assert peak == pytest.approx(found.peaks[name][1], rel=1e-6)
+        assert peak == pytest.approx(result.peaks[name][1], rel=1e-6)
     (note,) = (note for note in study.notes if note.kind == "assumption")
     assert note.runs == ("blocked",)
     assert "are assumed and decide the peak" in note.text and "distance from the pivot C" in note.text
@@ -289,8 +289,8 @@ def test_an_old_result_does_not_survive_a_new_run(tmp_path):
     out.mkdir()
     (out / "reactions.png").write_text("old")
     (out / "result.nc").mkdir()
-    refused = chainunit("study", "-o", "out", cwd=tmp_path)
-    assert refused.returncode == 2 and "is not a regular file" in refused.stderr
+    refusal = chainunit("study", "-o", "out", cwd=tmp_path)
+    assert refusal.returncode == 2 and "is not a regular file" in refusal.stderr
     (out / "result.nc").rmdir()
     (tmp_path / "short.toml").write_text(SHORT + "[motor]\nlimit = { v = 1.0 }")
     assert chainunit("study", "short.toml", "-o", "out", cwd=tmp_path).returncode == 0
@@ -320,9 +320,9 @@ left = { material_mass = 0, processing_force = 0 }
 right = { material_mass = 0, processing_force = 0 }
 """
     (tmp_path / "empty.toml").write_text('title = "[/foo] mill"\n' + SHORT + empty)
-    done = chainunit("study", "empty.toml", "-o", "[red]out", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert "[/foo] mill" in done.stdout and "[red]out/result.json" in done.stdout
+    process = chainunit("study", "empty.toml", "-o", "[red]out", cwd=tmp_path)
+    assert process.returncode == 0, process.stderr
+    assert "[/foo] mill" in process.stdout and "[red]out/result.json" in process.stdout
     numbers = json.loads((tmp_path / "[red]out" / "result.json").read_text())
     for side in ("left", "right"):
         assert numbers["organs"]["overload_factors"][side]["rocker_torque"]["value"] is None
@@ -347,8 +347,8 @@ def test_gains_that_are_not_given_are_tuned(tmp_path):
     from chainunit.study import config
     from chainunit.study.choice import choose
 
-    given = config.parse("[motor]\nspeed_control = { kp = 0.2 }\narmature = { L = 0.22 }")
-    motor = choose(given, tmp_path, lambda *_: None).drive.parameters
+    values = config.parse("[motor]\nspeed_control = { kp = 0.2 }\narmature = { L = 0.22 }")
+    motor = choose(values, tmp_path, lambda *_: None).drive.parameters
     assert motor.speed_control.kp == 0.2
     assert motor.current_control.kp == pytest.approx(0.22 * 300.0)
 
@@ -380,8 +380,8 @@ def test_export_with_a_config_has_the_motor_of_the_study(tmp_path):
             )
         else:
             assert float(start[parameter]) == 2.0
-    refused = chainunit("export", "DcMotor", "--config", "mine.toml", "-o", "x.fmu", cwd=tmp_path)
-    assert refused.returncode == 2 and "the study's motor is InductionMotor, not DcMotor" in refused.stderr
+    refusal = chainunit("export", "DcMotor", "--config", "mine.toml", "-o", "x.fmu", cwd=tmp_path)
+    assert refusal.returncode == 2 and "the study's motor is InductionMotor, not DcMotor" in refusal.stderr
 
 
 def test_overload_factors_are_the_erratas():
@@ -392,8 +392,14 @@ def test_overload_factors_are_the_erratas():
     for speed in (1e-6, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 20.0, 50.0):
         factors = overload_factors(machine, speed, NONE)
         rocker[speed], crank[speed] = factors.rocker_torque, factors.crank_torque
-    wanted = {1e-6: (1.36, 1.9), 5.0: (3.1, 5.3), 10.0: (0.50, 0.80), 20.0: (0.63, 0.53), 50.0: (0.66, 0.57)}
-    for speed, (on_rocker, on_crank) in wanted.items():
+    reference = {
+        1e-6: (1.36, 1.9),
+        5.0: (3.1, 5.3),
+        10.0: (0.50, 0.80),
+        20.0: (0.63, 0.53),
+        50.0: (0.66, 0.57),
+    }
+    for speed, (on_rocker, on_crank) in reference.items():
         assert rocker[speed] == pytest.approx(on_rocker, abs=0.055 if on_rocker > 2 else 0.006)
         assert crank[speed] == pytest.approx(on_crank, abs=0.055 if on_crank > 1.5 else 0.006)
     assert rocker[6.0] > 1.0 > rocker[7.0]
@@ -432,14 +438,14 @@ def test_each_side_alone_has_its_overload_factors():
     """Against the machine without the masses and the load of the other side."""
     machine = ChainUnitMachine(ratio=7.0)
     both = peaks(machine, 4.0, *FED, 720)
-    found = {side: overload_factors(machine, 4.0, FEED, side) for side in ("left", "right")}
+    results = {side: overload_factors(machine, 4.0, FEED, side) for side in ("left", "right")}
     for side, gone, loads in (("left", "right", (FED[0], EMPTY)), ("right", "left", (EMPTY, FED[1]))):
         bare = machine.replace({f"{gone}.wall_mass": 0.0, f"{gone}.web_mass": 0.0})
         one = peaks(bare, 4.0, *loads, 720)
-        assert found[side].crank_torque == pytest.approx(one["crank"] / both["crank"], rel=1e-12)
-        assert found[side].rocker_torque == pytest.approx(one["rocker"] / both["rocker"], rel=1e-12)
-    assert found["left"] == overload_factors(machine, 4.0, FEED)
-    assert abs(found["left"].rocker_torque / found["right"].rocker_torque - 1.0) > 0.05
+        assert results[side].crank_torque == pytest.approx(one["crank"] / both["crank"], rel=1e-12)
+        assert results[side].rocker_torque == pytest.approx(one["rocker"] / both["rocker"], rel=1e-12)
+    assert results["left"] == overload_factors(machine, 4.0, FEED)
+    assert abs(results["left"].rocker_torque / results["right"].rocker_torque - 1.0) > 0.05
 
 
 def test_what_sizes_the_drive_is_the_feed_on_one_side_with_both_organs():
@@ -457,13 +463,13 @@ def test_what_sizes_the_drive_is_the_feed_on_one_side_with_both_organs():
         turning = (phi, speed * machine.p.ratio)
         free = machine.torque_by_reactions(*turning, 0.0, *of)
         crank[name] = np.max(np.abs(free + machine.friction_torque(*turning, *of)))
-    found = {side: overload_factors(machine, speed, FEED, side) for side in ("left", "right")}
-    for side, of in found.items():
+    results = {side: overload_factors(machine, speed, FEED, side) for side in ("left", "right")}
+    for side, of in results.items():
         assert of.feed_crank_torque == pytest.approx(crank[side] / crank["both"], rel=1e-9)
         assert of.feed_rocker_torque == pytest.approx(rocker[side] / rocker["both"], rel=1e-12)
-    larger = max(found, key=lambda side: found[side].feed_crank_torque)
-    assert factors_for(found)["feed_crank_torque"].startswith(f"feed all on the {larger} sizes the drive")
-    none = {side: overload_factors(machine, speed, NONE, side) for side in found}
+    larger = max(results, key=lambda side: results[side].feed_crank_torque)
+    assert factors_for(results)["feed_crank_torque"].startswith(f"feed all on the {larger} sizes the drive")
+    none = {side: overload_factors(machine, speed, NONE, side) for side in results}
     assert [f.feed_crank_torque for f in none.values()] == [1.0, 1.0]
     assert factors_for(none)["feed_crank_torque"].startswith("feed on both sides sizes the drive")
 
@@ -475,12 +481,12 @@ def test_the_static_factor_of_the_right_organ_belongs_to_the_left_extreme():
     assert abs(left) < 0.95 * right
     for extreme, side, loads in ((right, "left", FED), (-left, "right", FED[::-1])):
         mirrored = machine.chamber(extreme, 0.0, 0.0, *loads)
-        wanted = mirrored.left.tangential_load / (
+        reference = mirrored.left.tangential_load / (
             mirrored.left.tangential_load - mirrored.right.tangential_load
         )
-        found = overload_factors(machine, 1.0, FEED, side).static_at_extreme
-        assert found == pytest.approx(float(wanted), rel=1e-12)
-        assert found > 1.0
+        result = overload_factors(machine, 1.0, FEED, side).static_at_extreme
+        assert result == pytest.approx(float(reference), rel=1e-12)
+        assert result > 1.0
 
 
 def test_each_side_alone_over_the_speed():
@@ -491,17 +497,17 @@ def test_each_side_alone_over_the_speed():
         bare = machine.replace({f"{gone}.wall_mass": 0.0, f"{gone}.web_mass": 0.0})
         one = [peaks(bare, w, *loads, 360) for w in sides.speed]
         for torque in ("rocker", "crank"):
-            wanted = np.array([p[torque] for p in one])
-            assert sides.peaks[f"{torque}_{side}"] == pytest.approx(wanted, rel=1e-12)
-            excess = wanted - [p[torque] for p in both]
+            reference = np.array([p[torque] for p in one])
+            assert sides.peaks[f"{torque}_{side}"] == pytest.approx(reference, rel=1e-12)
+            excess = reference - [p[torque] for p in both]
             before = np.flatnonzero(excess[1:] * excess[:-1] < 0.0)
             at = sides.crossings()[torque][side]
             crossed += len(at)
             assert len(at) == len(before)
             assert np.all(sides.speed[before] < at) and np.all(at < sides.speed[before + 1])
             assert np.interp(at, sides.speed, excess) == pytest.approx(0.0, abs=1e-9)
-            told = sides.as_dict()["crossings"][torque][side]
-            assert told == [{"value": speed, "unit": "rad/s", "kind": "speed"} for speed in at]
+            values = sides.as_dict()["crossings"][torque][side]
+            assert values == [{"value": speed, "unit": "rad/s", "kind": "speed"} for speed in at]
     assert crossed
 
 
@@ -631,7 +637,7 @@ def test_the_winding_temperature_is_that_of_the_duty_for_ever(tmp_path):
 
 
 def test_each_overload_has_its_mirror_on_the_other_side():
-    """What happens to the left of a feed happens to the right of the mirrored feed."""
+    """The left side with a feed behaves as the right side with the mirrored feed."""
     from chainunit.drives.dc_motor import DcMotor
     from chainunit.study import config
     from chainunit.study.drive import Drive
@@ -700,10 +706,10 @@ def test_the_overloads_of_both_sides_are_readable(columns, tables):
     groups = tuple(tuple(runs.index(run) + 1 for run in group) for group in in_groups(events, runs))
     heads = (Column(events[run].short if run in events else run) for run in runs)
     row = TableRow(("", *("10.0 N m" for _ in runs)))
-    said = io.StringIO()
+    stream = io.StringIO()
     table = Table((row,), (Column("crank torque, peak, here"), *heads), groups=groups)
-    terminal._show_table(table, Console(file=said, width=columns), {})
-    heads = [line for line in said.getvalue().splitlines() if "steady" in line]
+    terminal._show_table(table, Console(file=stream, width=columns), {})
+    heads = [line for line in stream.getvalue().splitlines() if "steady" in line]
     assert len(heads) == tables and all("jam left" in heads[0] for _ in heads)
     assert "jam right" in heads[-1] and all(len(line) <= columns for line in heads)
 

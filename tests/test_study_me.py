@@ -35,8 +35,8 @@ def studies(tmp_path_factory):
     """The packaged chain unit: by Model Exchange, and by co-simulation with two steps."""
     studies = {}
     for name, (simulation, step) in WAYS.items():
-        given = config.parse(TEXT.format(simulation=simulation, step=step, trip=TRIP))
-        studies[name] = run_study(given, tmp_path_factory.mktemp(name), check=True)
+        values = config.parse(TEXT.format(simulation=simulation, step=step, trip=TRIP))
+        studies[name] = run_study(values, tmp_path_factory.mktemp(name), check=True)
         assert studies[name].failure is None
     return studies
 
@@ -53,7 +53,7 @@ def test_me_is_near_the_equations_and_cs_comes_nearer_as_the_step_shrinks(of, ru
 
 
 def test_answers_agree(studies):
-    """Of events that open no coupling: each branches from the state that was saved."""
+    """Events that open no coupling: each run starts from the saved state."""
     for run in ("steady", "jam_left"):
         for name in ("crank_torque_peak", "crank_torque_rms", "speed_mean", "speed_least", "current_rms"):
             me, fine = (getattr(studies[way].answers[run], name) for way in ("me", "fine"))
@@ -61,7 +61,7 @@ def test_answers_agree(studies):
 
 
 def test_the_coupling_opens_at_the_instant_at_which_its_torque_is_reached(studies):
-    """By co-simulation at the end of the step in which it is."""
+    """In co-simulation the coupling opens at the end of the step in which the torque is reached."""
     limit = TRIP / studies["me"].drive.ratio
     times = {}
     for name, study in studies.items():
@@ -114,8 +114,8 @@ turns = 1
 
 
 def test_what_is_not_for_model_exchange_is_refused(tmp_path):
-    given = config.parse(TEXT.format(simulation="me", step=0.004, trip=TRIP))
+    values = config.parse(TEXT.format(simulation="me", step=0.004, trip=TRIP))
     with pytest.raises(InputError, match=r'simulation = "me": .*must be FMI 2\.0 for Model Exchange'):
-        run_study(given, tmp_path, backend="python")
+        run_study(values, tmp_path, backend="python")
     with pytest.raises(InputError, match=r'simulation = "mee": must be "cs" or "me"'):
         config.parse('simulation = "mee"')

@@ -1,4 +1,4 @@
-"""The graph of a system: what follows from joints, the order of values, and twins with a part left out."""
+"""The graph of a system: connections by joints, the order of values, and twins with a part left out."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from chainunit.system.signals import at_time, corners
 
 
 def with_line():
-    given = config.load()
+    values = config.load()
     line = CardanDriveline.parameter_layout.from_names({"ratio": 25.0, "J4": 2.0})
-    return Drive(DcMotor, given.motor, given.machine, feed_forward=True, line=line)
+    return Drive(DcMotor, values.motor, values.machine, feed_forward=True, line=line)
 
 
 def test_connections_follow_from_the_joints():
@@ -62,8 +62,8 @@ def test_twins_are_systems():
     )
     assert stiff.values["machine.ratio"] == drive.ratio == 25.0 * graph.values["machine.ratio"]
     slopes = Layout(PortSlopes).names
-    lost = set(graph.connections) - set(hold_loads(graph).connections)
-    assert len(lost) == 2 * len(slopes) and all(source.endswith(slopes) for source, _ in lost)
+    losses = set(graph.connections) - set(hold_loads(graph).connections)
+    assert len(losses) == 2 * len(slopes) and all(source.endswith(slopes) for source, _ in losses)
     with pytest.raises(InputError, match=r'gear: there is no component "gear"'):
         without(graph, ("gear",))
 
@@ -79,16 +79,16 @@ def test_values_are_set_where_they_belong():
 
 
 def test_models_share_an_fmu_and_files_stay(tmp_path):
-    given = {
+    values = {
         "a": component("DcMotor"),
         "b": component("DcMotor", values={"rotor.J": 0.1}),
         "c": component("ChamberForces"),
     }
-    system, made = export(System(given), tmp_path, "python")
+    system, origin = export(System(values), tmp_path, "python")
     files = {name: part.file for name, part in system.components.items()}
-    assert files["a"] == files["b"] != files["c"] and set(made) == {"a", "c"}
-    again, made = export(system, tmp_path / "none", "python")
-    assert again == system and not made and not (tmp_path / "none").exists()
+    assert files["a"] == files["b"] != files["c"] and set(origin) == {"a", "c"}
+    again, origin = export(system, tmp_path / "none", "python")
+    assert again == system and not origin and not (tmp_path / "none").exists()
 
 
 def test_values_are_known_in_the_order_of_their_true_dependencies():

@@ -66,13 +66,13 @@ def test_the_engineer_chooses_units():
         number(5.0, "rad/s", units=units) == "5.00 rad/s"
         and number(0.5, "1", "percent", units=units) == "50.0 %"
     )
-    for given, words in (
+    for values, words in (
         ({"mass": "t"}, "report.units.mass: unknown kind; must be one of speed, power, torque, force"),
         ({"speed": "rpm"}, 'report.units.speed = "rpm": must be "rad/s" or "rev/min"'),
     ):
-        with pytest.raises(InputError) as refused:
-            chosen_units(given)
-        assert str(refused.value) == words
+        with pytest.raises(InputError) as refusal:
+            chosen_units(values)
+        assert str(refusal.value) == words
 
 
 def test_what_is_not_there():

@@ -50,7 +50,7 @@ def scanned(pins, lengths, arms, points=400_000):
         at_c = d + Vec2(c.x * cos - c.y * sin, c.x * sin + c.y * cos)
         return np.sqrt((at_c - p1).squared()) - l1, theta
 
-    found = []
+    results = []
     grid = np.linspace(0.0, 2.0 * math.pi, points + 1)
     # near the ends of a branch, where the four-bar is stretched, the angle goes with the root of the distance
     closes = np.isfinite(excess(grid, 1.0)[0])
@@ -66,8 +66,8 @@ def scanned(pins, lengths, arms, points=400_000):
         values, _ = excess(grid, sign)
         for k in np.flatnonzero(values[:-1] * values[1:] < 0.0):
             t = brentq(lambda t, sign=sign: float(excess(t, sign)[0]), grid[k], grid[k + 1], xtol=1e-14)
-            found.append(float(excess(t, sign)[1]))
-    return sorted(math.remainder(theta, 2.0 * math.pi) for theta in found)
+            results.append(float(excess(t, sign)[1]))
+    return sorted(math.remainder(theta, 2.0 * math.pi) for theta in results)
 
 
 def still(pins, lengths, arms):
@@ -104,7 +104,7 @@ def test_many_triads_find_the_mode_they_were_built_in():
 
 def searched(pins, lengths, arms, tries=600):
     """All poses that Newton's method finds from as many random starts."""
-    rng, found = np.random.default_rng(31), []
+    rng, result = np.random.default_rng(31), []
     for _ in range(tries):
         try:
             start = Pose(*rng.uniform(-2.0, 3.0, 2), rng.uniform(-math.pi, math.pi))
@@ -114,12 +114,12 @@ def searched(pins, lengths, arms, tries=600):
             continue
         gaps = [math.sqrt((k.p - p).squared()) - l for k, p, l in zip(triad.pins, pins, lengths, strict=True)]
         same = [
-            p for p in found
+            p for p in result
             if abs(math.remainder(p.theta - pose.theta, 2.0 * math.pi)) + abs(p.x - pose.x) + abs(p.y - pose.y) < 1e-6
         ]  # fmt: skip
         if max(map(abs, gaps)) < 1e-9 and not same:
-            found.append(pose)
-    return found
+            result.append(pose)
+    return result
 
 
 ARMS = (Vec2(-0.06, -0.14), Vec2(0.0, 0.0), Vec2(0.8, 0.0))
@@ -135,11 +135,11 @@ SPECIAL = {
 
 @pytest.mark.parametrize("name", SPECIAL)
 def test_modes_of_special_triads(name):
-    """Where two of the three equations say the same of D, as of parallel hangers: against a search."""
-    modes, wanted = assembly_modes(*SPECIAL[name]), searched(*SPECIAL[name])
-    assert len(modes) == len(wanted) and len(modes) % 2 == 0
+    """Where two of the three equations for D are dependent, as with parallel hangers: against a search."""
+    modes, reference = assembly_modes(*SPECIAL[name]), searched(*SPECIAL[name])
+    assert len(modes) == len(reference) and len(modes) % 2 == 0
     for mode in modes:
-        assert min(math.hypot(mode.x - p.x, mode.y - p.y) for p in wanted) < 1e-6
+        assert min(math.hypot(mode.x - p.x, mode.y - p.y) for p in reference) < 1e-6
 
 
 def test_a_triad_that_cannot_close_has_no_mode():
@@ -210,12 +210,12 @@ def test_forces_keep_every_link_in_balance(collinear):
             matrix[3, 2 * i], matrix[4, 2 * i + 1] = 1.0, 1.0
             matrix[5, 2 * i : 2 * i + 2] = -a.y, a.x
         right[3:] = knife[0].x, knife[0].y, knife[1]
-        wanted = np.linalg.solve(matrix, right).reshape(3, 2)
-        found = np.array([[f.x, f.y] for f in inner])
-        np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-9 * np.max(np.abs(wanted)))
+        reference = np.linalg.solve(matrix, right).reshape(3, 2)
+        result = np.array([[f.x, f.y] for f in inner])
+        np.testing.assert_allclose(result, reference, rtol=1e-9, atol=1e-9 * np.max(np.abs(reference)))
         for (force, _), at_outer, at_inner in zip(legs, outer, inner, strict=True):
             rest = force + at_outer + at_inner
-            assert abs(rest.x) + abs(rest.y) < 1e-10 * np.max(np.abs(wanted))
+            assert abs(rest.x) + abs(rest.y) < 1e-10 * np.max(np.abs(reference))
 
 
 def test_three_moments_are_singular_on_a_line_and_this_is_not():

@@ -1,4 +1,4 @@
-"""The error of two bars at rest, and where they are good enough."""
+"""The error of two bars at rest, and the range in which they are good enough."""
 
 from __future__ import annotations
 
@@ -71,16 +71,16 @@ def test_the_range_of_zeta_has_both_its_ends(comparison):
 
 
 def test_command(tmp_path):
-    done = chainunit("two-bar-error", "-o", "out", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    process = chainunit("two-bar-error", "-o", "out", cwd=tmp_path)
+    assert process.returncode == 0, process.stderr
     assert {f.name for f in (tmp_path / "out").iterdir()} == {
         "two_bar_error.json", "two_bar_error.md", "two_bar_error.png", "report.html"
     }  # fmt: skip
     numbers = json.loads((tmp_path / "out" / "two_bar_error.json").read_text())
     assert numbers["error_t"]["unit"] == "1" and numbers["psi"]["unit"] == "rad"
     (low, high), *_ = numbers["good_zeta"]["10 %"]["mu = 0.70"]["value"]
-    assert high < 0.85 and "│ 0.70 │" in done.stdout and f"{low:.2f} to {high:.2f}" in done.stdout
-    assert all(line in " ".join(done.stdout.split()) for line in numbers["statement"])
+    assert high < 0.85 and "│ 0.70 │" in process.stdout and f"{low:.2f} to {high:.2f}" in process.stdout
+    assert all(line in " ".join(process.stdout.split()) for line in numbers["statement"])
     (tmp_path / "file").write_text("")
     wrong = chainunit("two-bar-error", "-o", "file", cwd=tmp_path)
     assert wrong.returncode == 2 and len(wrong.stderr.strip().splitlines()) == 1

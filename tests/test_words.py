@@ -1,4 +1,4 @@
-"""The words of a study: in the units of its reader, and of what it has."""
+"""The words of a study: in the units of its reader, and about the parts that the study has."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def sentences(study):
 
 
 def test_sentences_are_in_the_units_of_the_reader(tmp_path):
-    """Verdicts, remarks, the coupling: as the tables beside them."""
+    """Verdicts, remarks and the sentences on the coupling have the units of the tables beside them."""
     text = (
         event_line("jam_left", turns=1, force=6000.0)
         + f"""
@@ -53,9 +53,11 @@ trip_torque = 300
     )
     study = run_study(parse(text.replace("\n    ", "\n")), tmp_path)
     assert study.failure is None
-    said = list(sentences(study))
-    assert any("44.9 rev/min" in words for words in said[:2]) and any("0.300 kN m" in each for each in said)
-    for words in said:
+    message = list(sentences(study))
+    assert any("44.9 rev/min" in words for words in message[:2]) and any(
+        "0.300 kN m" in each for each in message
+    )
+    for words in message:
         assert not re.search(r"\d (rad/s|N m|N|kW)(?![\w/]| m)", words), words
     # and not those of another study
     other = run_study(parse(event_line("jam_left", turns=1) + SHORT), tmp_path)
@@ -106,9 +108,9 @@ def test_what_the_machine_does_not_have_is_not_spoken_of(friction, tmp_path):
     kinds = {note.kind for note in study.notes}
     assert ("smoothed friction" in kinds) is (friction > 0.0)
     # nor has it a crank
-    shown = said_of(study) + markdown(report(study), [])
-    assert not re.search(r"\bcrank\b", shown, re.I)
-    assert "accelerator torque, peak" in shown
+    text = said_of(study) + markdown(report(study), [])
+    assert not re.search(r"\bcrank\b", text, re.I)
+    assert "accelerator torque, peak" in text
     assert "the accelerator at " in study_words(study)
     # its inertia is constant: one row of the speed loop
     loops = json.loads(json.dumps(as_dict(study)["speed_loop"]))

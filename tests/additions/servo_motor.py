@@ -63,9 +63,9 @@ class Outputs(MotorOutputs):
 class ServoPoint(MotorPoint):
     def __init__(self, xp, p, u, x):
         self.error = u.w_ref - x.w
-        wanted = p.control.kp * self.error + x.integral
-        self.i = xp.maximum(xp.minimum(wanted, p.control.i), -p.control.i)
-        self.cut = self.i - wanted
+        reference = p.control.kp * self.error + x.integral
+        self.i = xp.maximum(xp.minimum(reference, p.control.i), -p.control.i)
+        self.cut = self.i - reference
         self.heat = p.coil.R * (1.0 + p.coil.alpha * (x.T - T_RATED)) * self.i * self.i
         self.air_gap = p.coil.k * self.i
         self.turn(p, u, x)
