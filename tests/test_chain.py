@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -266,8 +267,8 @@ def test_two_rods_in_motion_are_the_two_bar_machine():
     for _ in range(50):
         psi, speed, rate = rng.uniform(-0.15, 0.15), rng.uniform(-3.0, 3.0), rng.uniform(-20.0, 20.0)
         link = Link(Motion(ZERO), Vec2(math.sin(psi), -math.cos(psi)), 1.0, 0.0)
-        pins = {"A1 left": Motion(Vec2(-p.z, 0.0)), "A2": link.at(p.e)}
-        wall, web = organ(p, Inputs(left=feed, right=feed), "left").solve(MATH, 0.0, pins, ()).links
+        at = SimpleNamespace(pins={"A1 left": Motion(Vec2(-p.z, 0.0)), "A2": link.at(p.e)}, links={})
+        wall, web = organ(p, Inputs(left=feed, right=feed), "left").solve(MATH, 0.0, at, ()).links
         theta = [math.atan2(wall.u.x, -wall.u.y), math.atan2(-web.u.x, web.u.y)]
         omega = [wall.t1 * speed, web.t1 * speed]
         s, c = math.sin(psi), math.cos(psi)
