@@ -1,12 +1,12 @@
-"""Standard motors: the packaged table, and rows of the user's own.
+"""Standard motors: the packaged table, and the rows of the user's file.
 
-The packaged table holds cage motors for 400 V, 50 Hz, 0.55 to 75 kW, with 2, 4 and 6 poles, in the frames of
-EN 50347. Their efficiencies are the limits of class IE3 in IEC 60034-30-1. Everything else is typical of such motors
-and of no maker's: it varies smoothly with size, and stands in for the catalogue of the supplier.
+The packaged table has cage motors for 400 V, 50 Hz, 0.55 to 75 kW, with 2, 4 and 6 poles, in the frames of
+EN 50347. Their efficiencies are the limits of class IE3 in IEC 60034-30-1. All other values are typical of such
+motors but belong to no maker: they vary smoothly with size, and take the place of a supplier's catalogue.
 
 A user's file has the same columns. In CSV a heading is the name of a value, with its unit in brackets where it
 has one ("power [kW]", "speed [rev/min]"); in TOML each motor is a table ``[[motor]]``, a number is in the
-declared SI unit, and a text may carry a unit ("1455 rev/min"). Columns that have a start value may be left out.
+declared SI unit, and a text may have a unit ("1455 rev/min"). Columns with a start value are optional.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class CatalogueData(Nameplate):
 LAYOUT = Layout(CatalogueData)
 _VARIABLES = {v.name: v for v in LAYOUT.variables}
 TEXTS = {"designation": "name of the motor, as [system] names it", "source": "where its values are from"}
-"""Columns of words, with their descriptions."""
+"""Columns of texts, with their descriptions."""
 REQUIRED = ("designation", *(v.name for v in LAYOUT.variables if v.quantity.start is None))
 """Columns that each file has."""
 _LONGEST = 200
@@ -56,7 +56,7 @@ _HEADING = re.compile(r"\s*(\w+)\s*(?:\[\s*(.*?)\s*\])?\s*")
 
 @dataclass(frozen=True)
 class CatalogueMotor:
-    """A motor of the catalogue; `origin` is the file and row it comes from, `source` that of its values."""
+    """A motor of the catalogue; `origin` is its file and row, `source` the source of its values."""
 
     designation: str
     nameplate: CatalogueData
@@ -64,12 +64,12 @@ class CatalogueMotor:
     origin: str
 
     def identify(self) -> Identification:
-        """Its equivalent circuit; see `chainunit.drives.nameplate.identify`.
+        """The equivalent circuit of the motor; see `chainunit.drives.nameplate.identify`.
 
         Raises
         ------
         InputError
-            in one line, where no circuit meets its nameplate.
+            in one line, where no circuit meets the nameplate.
         """
         with each_refusal(
             lambda fault: InputError(f"{self.origin}: {self.designation}: {fault}", placed=True)
@@ -94,7 +94,7 @@ def heading(variable: Variable) -> str:
 
 
 def catalogue(extra: Path | None = None) -> list[CatalogueMotor]:
-    """The packaged motors, and behind them those of the file `extra` (CSV; TOML where its name ends in .toml).
+    """The packaged motors, followed by those of the file `extra` (CSV, or TOML if its name ends in .toml).
 
     Raises
     ------
@@ -111,13 +111,13 @@ def catalogue(extra: Path | None = None) -> list[CatalogueMotor]:
 def motor_of_catalogue(
     designation: str, extra: Path | None = None, others: Collection[str] = ()
 ) -> CatalogueMotor:
-    """The motor with this `designation`, of the packaged ones and those of the file `extra`; `others` are names that
-    may have been meant.
+    """The motor with this `designation`, among the packaged motors and those of the file `extra`; `others` are
+    further names to suggest for a misspelled one.
 
     Raises
     ------
     InputError
-        in one line, with the nearest designations, where there is none; and see `catalogue`.
+        for an unknown designation, in one line with the nearest ones; and see `catalogue`.
     """
     motors = {m.designation: m for m in catalogue(extra)}
     if designation not in motors:
@@ -154,16 +154,16 @@ def _packaged() -> tuple[CatalogueMotor, ...]:
 
 @dataclass(frozen=True)
 class _Row:
-    """A motor as a file gives it."""
+    """A row of a file with one motor."""
 
     file: str
     line: int
     values: Mapping[str, Any]
-    """by the names of their columns"""
+    """values by the names of their columns"""
     prefix: str
-    """what stands before the name of a column in a refusal"""
+    """text before the name of a column in a refusal"""
     lines: Mapping[str, int] = field(default_factory=dict)
-    """of the values, where they stand in lines of their own"""
+    """line of each value, where the values stand on separate lines"""
     absent: Collection[str] = ()
     """columns that the whole file lacks, which is a fault of its headings"""
 
@@ -289,7 +289,7 @@ def _columns(headings: Sequence[str], file: str, line: int) -> list[tuple[str, s
 
 
 def _fits(unit: str, variable: Variable) -> bool:
-    """Whether a value in that unit is one of the quantity."""
+    """Whether a value in this unit can be converted to the unit of the variable."""
     try:
         units.convert(1.0, unit, variable.unit, variable.kind)
     except ValueError:
@@ -298,7 +298,7 @@ def _fits(unit: str, variable: Variable) -> bool:
 
 
 def _with_unit(cell: str, unit: str) -> str:
-    """A cell with the unit of its column, where it is a number that has none of its own."""
+    """A cell with the unit of its column; a cell with its own unit, or without a number, is unchanged."""
     parts = units.split(cell)
     return f"{cell} {unit}" if unit and parts is not None and not parts[1] else cell
 

@@ -7,11 +7,11 @@ and `L` armature resistance and inductance, `w` rotor speed, `T` winding tempera
     (J_rotor + J_load) a = k i - d w - tau_load
     C dT/dt = R(T) i^2 - (T - T_ambient)/R_th
 
-`tau_ff` is a torque that is known beforehand, such as that of the machine's angle from a model in the controller.
+`tau_ff` is a feed-forward torque, such as the load at the machine's angle from a model in the controller.
 
-The load is the port's linearised one (see `chainunit.ports`): the motor solves for the acceleration. The
-speed controller asks for a current, cut at the current limit; the current controller asks for a voltage,
-cut at the supply. A cut-off integrator is led back (back-calculation), so that it does not wind up.
+The load is the linearised load of the port (see `chainunit.ports`): the motor solves for the acceleration. The speed
+controller gives a current reference, limited to the current limit. The current controller gives a voltage, limited to
+that of the supply. Back-calculation keeps the integrators from winding up at a limit.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class SpeedControl:
 
 @declaration
 class CurrentControl:
-    """Current to voltage, beside the feed-forward of the back-EMF."""
+    """Current to voltage, in addition to the feed-forward of the back-EMF."""
 
     kp: Value = quantity("Ohm", "proportional gain", default=33.0, above=0.0, tunable=True)
     ki: Value = quantity("Ohm/s", "integral gain", default=2850.0, min=0.0, tunable=True)
@@ -87,7 +87,7 @@ class Inputs(LoadInput):
     """The load and the references of the motor."""
 
     w_ref: Value = quantity("rad/s", "speed reference", default=0.0)
-    tau_ff: Value = quantity("N.m", "torque that the speed control is told of beforehand", default=0.0)
+    tau_ff: Value = quantity("N.m", "feed-forward torque of the speed control", default=0.0)
 
 
 @declaration
@@ -123,7 +123,7 @@ class Outputs(MotorOutputs):
 
 
 class DcMotorPoint(MotorPoint):
-    """Everything at one state: control, electric circuit, shaft."""
+    """The motor at one state: control, electric circuit, shaft."""
 
     __slots__ = ("R", "cut_i", "cut_v", "di", "error_i", "error_w", "heat", "i_ref", "v")
 
@@ -144,7 +144,7 @@ class DcMotorPoint(MotorPoint):
         self.turn(p, u, x)
 
     def rates(self, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
-        """Time derivatives of the states behind those of the shaft."""
+        """Time derivatives of the states after those of the shaft."""
         speed, current = p.speed_control, p.current_control
         return [
             self.di,
@@ -184,7 +184,7 @@ class DcMotor(Motor):
 
     @staticmethod
     def current_limit(p: Any) -> float | None:
-        """Of the converter."""
+        """The current limit of the converter."""
         return float(p.limit.i)
 
     @classmethod
@@ -205,38 +205,38 @@ class DcMotor(Motor):
 
     @staticmethod
     def limit(xp: Any, p: Any, w: Any, T: float = T_RATED) -> Any:
-        """By the current limit, or by the voltage with the winding at `T` [K], cold where left out."""
+        """The torque at the current limit, or at the voltage limit with the winding at `T` [K], by default cold."""
         arm = p.armature
         R = arm.R * (1.0 + arm.alpha * (T - T_RATED))
         return arm.k * xp.minimum(p.limit.i, (p.limit.v - arm.k * w) / R)
 
     @staticmethod
     def largest_torque(p: Any, T: float, *at: float) -> float:
-        """By the current limit, or by the voltage at this speed."""
+        """The torque at the current limit, or at the voltage limit at this speed."""
         (w,) = at
         return float(DcMotor.limit(MATH, p, w, T))
 
     @staticmethod
     def pull_out(p: Any, T: float, *at: float) -> float:
-        """At standstill, where no friction takes a part and the voltage leaves most."""
+        """The torque at standstill, without friction and back-EMF."""
         return float(DcMotor.limit(MATH, p, 0.0, T))
 
     @staticmethod
     def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """The armature is not faster than 1 MHz."""
+        """The limit of the inductance: no time constant of the armature below 1 microsecond."""
         yield p.armature.L, 1e-6 * (p.armature.R + p.current_control.kp), math.inf
 
     @staticmethod
     def internal_step(xp: Any, p: Any) -> Any:
-        """A quarter of the time constant of the closed current loop, as a rule its fastest part, that of the rotor
-        alone that friction brakes, and at most 0.25 ms: the Runge-Kutta method is stable up to 2.8 of a time
-        constant, which leaves room for a winding that heats up."""
+        """The least of a quarter of the time constant of the closed current loop, which is usually the fastest part,
+        the time constant of the rotor with its friction alone, and 0.25 ms. The Runge-Kutta method is stable up to
+        2.8 time constants, which leaves a reserve for a winding that heats up."""
         by_current = 0.25 * p.armature.L / (p.armature.R + p.current_control.kp)
         return xp.minimum(xp.minimum(2.5e-4, by_current), friction_time(xp, p.rotor))
 
     @staticmethod
     def initial_states(xp: Any, p: Any) -> Any:
-        """At rest electrically, at the start angle and speed, winding at ambient temperature."""
+        """The states without current, at the start angle and speed, with the winding at ambient temperature."""
         return States(
             phi=p.phi_start,
             w=p.w_start,

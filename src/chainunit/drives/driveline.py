@@ -1,16 +1,18 @@
-"""A cardan driveline between motor and machine: paper 002's shaft line with the driven inertia, a model with states.
+"""A cardan driveline between motor and machine: the shaft line of paper 002 with the driven inertia, a model with
+states.
 
-It takes the machine's load port and shows one to the motor. Symbols as in `chainunit.drives.cardan`: 1 the motor's
-end of shaft 2, 4 the driven end of shaft 3. `phi w a tau` and the port are the motor's, `ratio` a gear between it and
-shaft 2; `driven.*` is the shaft of the machine, whose angle is 0 where the untwisted line has phi = 0.
+It takes the load port of the machine and gives one to the motor. Symbols are those of `chainunit.drives.cardan`: 1 is
+the motor's end of shaft 2, 4 the driven end of shaft 3. `phi w a tau` and the port belong to the motor's shaft;
+`ratio` is a gear between it and shaft 2. `driven.*` is the shaft of the machine, whose angle is 0 where the untwisted
+line has phi = 0.
 
-The port has no inertia: tau depends on angle and speed alone. Its slope by the speed is the plain derivative. Its
+The port has no inertia: tau depends only on angle and speed. The slope by the speed is the plain derivative. The
 slope by the angle is taken along the motion: while the motor turns by w dt, the driven side turns, too, so that
 
     tau_bias_dphi = d tau/d phi + (rate of tau with the motor held) w^3/(w^4 + W_SMALL^4)
 
-which is the plain derivative where the driven side stands, and (d tau/dt)/w where both turn. With the plain one, a
-driver would feel the whole stiffness of a shaft whose other end runs away at the same speed.
+This is the plain derivative where the driven side is at rest, and (d tau/dt)/w where both sides turn. With the plain
+derivative a driver would feel the full stiffness of the shaft even though its other end moves at the same speed.
 """
 
 from __future__ import annotations
@@ -42,20 +44,20 @@ W_SMALL = 0.1
 
 @declaration
 class Mounted(ShaftLine):
-    """A line with the inertia on its driven side, as it is mounted."""
+    """A shaft line with the inertia on its driven side and the angle at which it is mounted."""
 
-    J4: Value = quantity("kg.m2", "inertia on shaft 3, beside the machine's", default=0.5, above=0.0)
+    J4: Value = quantity("kg.m2", "inertia on shaft 3, in addition to the machine's", default=0.5, above=0.0)
     gamma1: Value = quantity(
         "rad",
-        "angle of the yoke of shaft 2 from the plane of its joint, untwisted and with the motor at 0",
+        "angle of the yoke of shaft 2 from the plane of its joint, without twist and with the motor at 0",
         default=0.0,
     )
 
 
 @declaration
 class Parameters(Start, Mounted):
-    """Parameters of the driveline, which starts untwisted. The start values are ours: the paper prints no
-    dimensions."""
+    """Parameters of the driveline, which starts untwisted. The start values are assumptions of this package: the
+    paper prints no dimensions."""
 
     ratio: Value = quantity(
         "1", "gear ratio, motor turns per turn of shaft 2", default=1.0, above=0.0, max=1e6
@@ -154,7 +156,7 @@ def _slopes(xp: Any, p: Any, u: Any, x: Any, s: _Point) -> PortSlopes:
     engine = dual(xp)
 
     def tau1(phi1: Any, w1: Any, phi4: Any, w4: Any) -> Any:
-        # one more Newton step from the balance that is known carries the exact derivative
+        # from the known balance, one more Newton step in dual numbers gives the exact derivative
         return slope(Twist(engine, p, phi1, w1, phi4, w4, near=s.twist.phi2, steps=1).tau1)
 
     by_phi = tau1(Dual(phi1, 1.0), w1, phi4, w4)
@@ -170,10 +172,10 @@ class CardanDriveline(Model):
     """A cardan shaft with two Hooke joints and two elastic shafts between a motor and a machine, with the inertia on
     the driven side.
 
-    Connect the motor's phi, w, a to the inputs of these names and the port tau_bias ... w0 to the motor's load;
-    driven.phi, driven.w, driven.a to the machine's phi, w, a and the machine's port to load. In a co-simulation the
-    inputs phi and w run along w and a inside a step. The communication step must be well below the period of the
-    torsional vibration: 0.3/k at most, k the natural frequency in rad/s.
+    Connect the motor's phi, w, a to the inputs of these names, and the port tau_bias ... w0 to the motor's load.
+    Connect driven.phi, driven.w, driven.a to the machine's phi, w, a, and the machine's port to load. In a
+    co-simulation phi follows w, and w follows a, inside a step. The communication step must be well below the period
+    of the torsional vibration: at most 0.3/k, with the natural frequency k in rad/s.
     """
 
     name = "CardanDriveline"
@@ -197,22 +199,22 @@ class CardanDriveline(Model):
 
     @staticmethod
     def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """Both bends are below a right angle."""
+        """The limits of both bends: a right angle."""
         for name in BENDS:
             yield getattr(p, name), -math.inf, RIGHT
 
     @staticmethod
     def internal_step(xp: Any, p: Any) -> Any:
-        """A tenth of the time in which the driven inertia alone swings by a radian on shaft 3, half of that in which
-        it decays at any i23, and at most 0.25 ms."""
+        """Longest internal step: a tenth of the time in which the driven inertia swings on shaft 3 by one radian,
+        half of the time in which its speed decays at any i23, and at most 0.25 ms."""
         slowest = xp.minimum(2.5e-4, 0.1 * xp.sqrt(p.J4 / p.c3))
-        # of d2 the share (d phi2/d phi4)^2 = (i c3/(c2 + i^2 c3))^2 acts, at most c3/(4 c2)
+        # the share (d phi2/d phi4)^2 = (i c3/(c2 + i^2 c3))^2 of d2 acts, at most c3/(4 c2)
         damping = p.d3 + p.d2 * xp.maximum(1.0, p.c3 / (4.0 * p.c2))
         return 1.0 / (1.0 / slowest + 2.0 * damping / p.J4)
 
     @staticmethod
     def initial_states(xp: Any, p: Any) -> Any:
-        """Untwisted, both ends in the same motion."""
+        """The states without twist, with both ends in the same motion."""
         angle, i, _ = two_joints(xp, p, p.gamma1 + p.phi_start / p.ratio)
         return States(
             driven=DrivenState(phi=angle - _assembled(xp, p), w=i * p.w_start / p.ratio), load_energy=0.0

@@ -1,4 +1,4 @@
-"""A rigid gear between a driver and a machine, for a machine whose own shaft is the slow one: no states, no loss."""
+"""A rigid gear between a driver and a machine with a slow shaft of its own, without states and loss."""
 
 from __future__ import annotations
 
@@ -65,7 +65,8 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, s: None) -> GearOutputs:
 
 
 class Gear(Model):
-    """A rigid gear without mass and loss: it divides angle and speed, and shows the machine's load to the motor."""
+    """A rigid gear without mass and loss: it divides angle and speed, and gives the load of the machine to the
+    motor."""
 
     name = "Gear"
     description = (

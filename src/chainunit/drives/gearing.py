@@ -40,16 +40,16 @@ KINDS: Mapping[str, Transmission] = MappingProxyType(
 
 
 def motor_side(xp: Any, t: Transmission, torque: Any, w: Any) -> Any:
-    """Torque at the motor's shaft [N m] for the torque `torque` that the machine takes at the output, at the
-    speed `w` of the motor [rad/s], without the torque that speeds up `t.J`.
+    """Torque at the motor's shaft [N m] for the `torque` that the machine takes at the output [N m], at the speed `w`
+    of the motor [rad/s], without the torque that accelerates `t.J`.
 
     The teeth or the belt lose a share of the torque, in either direction of the power:
 
         tau = (torque + (1/efficiency - 1) |torque| sign(w))/ratio + d w
 
-    Where the motor drives (torque w > 0) that is torque/(ratio efficiency). Where the machine drives it is
-    torque (2 - 1/efficiency)/ratio: the same loss, which now relieves the motor. Below an efficiency of 1/2 this
-    changes sign, and the transmission locks itself: the motor must help to turn it. At rest there is no loss.
+    Where the motor drives (torque w > 0), the first part is torque/(ratio efficiency). Where the machine drives, it
+    is torque (2 - 1/efficiency)/ratio: the same loss relieves the motor. Below an efficiency of 1/2 this part changes
+    its sign, and the transmission is self-locking: the motor must help to turn it. At rest there is no loss.
     """
     direction = w / xp.maximum(xp.abs(w), W_REST)
     loss = (1.0 / t.efficiency - 1.0) * xp.abs(torque) * direction

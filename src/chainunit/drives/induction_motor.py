@@ -1,8 +1,9 @@
 """A three-phase squirrel-cage induction motor: on the line, with a soft starter, or on an inverter with V/f control.
 
-The Gamma equivalent circuit in a dq frame that turns with the supply (so that in steady running every state stands
-still). Flux linkages `psi` and currents `i` are space vectors of peak phase quantities; `s` means the stator, `r` the
-rotor seen from it, `m` magnetising, `l` leakage; `p` is the number of pole pairs, `f` the supply's frequency.
+The model is the Gamma equivalent circuit in a dq frame that turns with the supply, so that in steady running every
+state is constant. Flux linkages `psi` and currents `i` are space vectors of peak phase quantities; `s` means the
+stator, `r` the rotor referred to it, `m` magnetising, `l` leakage; `p` is the number of pole pairs, `f` the frequency
+of the supply.
 
     d psi_s/dt = u_s - R_s i_s - j 2 pi f psi_s               i_m = psi_s/L_m
     d psi_r/dt =     - R_r i_r - j (2 pi f - p w) psi_r       i_r = (psi_r - psi_s)/L_l
@@ -10,10 +11,10 @@ rotor seen from it, `m` magnetising, `l` leakage; `p` is the number of pole pair
     (J_rotor + J_load) a = tau_air - d w - tau_load
     C dT/dt = losses - cooling(w) (T - T_ambient)/R_th
 
-All leakage stands on the rotor side, so that saturation of the main path follows from |psi_s| alone: 1/L_m grows by
-(beta |psi_s|)^6. The skin effect of a deep bar raises R_r and lowers L_l with the slip frequency, quasi-steady, by
-2 s^2/(1 + s^2), s = 1 at standstill on the line. Sources: H. R. Slemon, "Modelling of induction machines for electric
-drives", 1989; the saturation curve of the package motulator, which the tests compare with.
+All leakage is on the rotor side, so that saturation of the main path follows from |psi_s| alone: 1/L_m grows by
+(beta |psi_s|)^6. The skin effect of a deep bar raises R_r and lowers L_l with the slip frequency, quasi-steadily, by
+2 s^2/(1 + s^2), with s = 1 at standstill on the line. Sources: H. R. Slemon, "Modelling of induction machines for
+electric drives", 1989; the saturation curve of the package motulator, with which the tests compare.
 """
 
 from __future__ import annotations
@@ -75,7 +76,7 @@ class Main:
 
 @declaration
 class Cage:
-    """The rotor's cage, seen from the stator."""
+    """The cage of the rotor, referred to the stator."""
 
     R: Value = quantity("Ohm", "resistance at 20 degC", default=2.1, above=0.0, tunable=True)
     L: Value = quantity("H", "leakage inductance", default=0.023, above=0.0)
@@ -88,7 +89,7 @@ class SoftStart:
     """A ramp of the voltage from switching on; with `voltage` = 1 the motor starts direct on line."""
 
     voltage: Value = quantity("1", "share of the voltage at the start", default=1.0, above=0.0, max=1.0)
-    time: Value = quantity("s", "time in which the voltage rises to the whole", default=1.0, above=0.0)
+    time: Value = quantity("s", "time in which the voltage rises to its full value", default=1.0, above=0.0)
 
 
 @declaration
@@ -96,7 +97,7 @@ class InverterControl:
     """V/f control with slip compensation."""
 
     ramp: Value = quantity("Hz/s", "fastest change of frequency", default=50.0, above=0.0, tunable=True)
-    lag: Value = quantity("s", "lag of the frequency behind what is asked", default=0.02, above=0.0)
+    lag: Value = quantity("s", "lag of the frequency behind its reference", default=0.02, above=0.0)
     boost: Value = quantity(
         "1", "share of the voltage at frequency zero", default=0.05, min=0.0, max=0.5, tunable=True
     )
@@ -145,7 +146,7 @@ class Parameters(MotorParameters):
 
 @declaration
 class Inputs(LoadInput):
-    """The load, the supply and what is asked of the inverter."""
+    """The load, the voltage of the supply and the speed demand of the inverter."""
 
     voltage: Value = quantity(
         "1",
@@ -208,35 +209,35 @@ class Outputs(MotorOutputs):
 
 
 def skin(s: Any) -> Any:
-    """How far the skin effect has developed at the slip frequency `s`, in parts of the supply's: 0 at 0, 1 at 1."""
+    """The share of the skin effect at the slip frequency `s`, in parts of the supply's frequency: 0 at 0, 1 at 1."""
     return 2.0 * s * s / (1.0 + s * s)
 
 
 def _circuit(p: Any, slip_speed: Any, T: Any) -> tuple[Any, Any, Any]:
     """Resistances of stator and cage [Ohm] and the leakage inductance [H] at this slip [rad/s, electrical] and
     temperature [K]."""
-    developed = skin(slip_speed * (1.0 / (_TURN * p.supply.f)))
+    share = skin(slip_speed * (1.0 / (_TURN * p.supply.f)))
     warm = 1.0 + p.stator.alpha * (T - T_RATED)
     return (
         p.stator.R * warm,
-        p.cage.R * warm * (1.0 + p.cage.skin_R * developed),
-        p.cage.L * (1.0 - p.cage.skin_L * developed),
+        p.cage.R * warm * (1.0 + p.cage.skin_R * share),
+        p.cage.L * (1.0 - p.cage.skin_L * share),
     )
 
 
 def volts_per_hertz(xp: Any, p: Any, f: Any) -> Any:
-    """Share of the voltage that the inverter gives at the frequency `f` [Hz]: V/f with a boost at low frequency;
-    above the corner the voltage is all there is."""
+    """Share of the voltage that the inverter gives at the frequency `f` [Hz]: V/f with a boost at low frequency, and
+    the full voltage above the corner frequency."""
     return xp.minimum(p.inverter.boost + (1.0 - p.inverter.boost) * f / p.supply.f, 1.0)
 
 
 class Steady(NamedTuple):
-    """Steady running at one speed. A value that is also an output of the model has its name and unit; `psi` and
+    """Steady running at one speed. Values that are also outputs of the model have the same names and units; `psi` and
     `psi_r` are the states."""
 
     air_gap_tau: Any
     tau: Any
-    """torque that is left for a load, behind friction and windage"""
+    """torque for a load, after friction and windage"""
     i: Any
     power_factor: Any
     supply_power: Any
@@ -250,17 +251,17 @@ _ITERATIONS = 20
 
 
 def steady(xp: Any, p: Any, w: Any, voltage_share: Any = 1.0, f: Any = None, T: Any = T_RATED) -> Steady:
-    """The state in which every flux stands still, at the rotor speed `w` [rad/s].
+    """The state in which every flux is constant, at the rotor speed `w` [rad/s].
 
-    `voltage_share` is the share of the supply's voltage, `f` the frequency [Hz] (the supply's where left out), `T`
+    `voltage_share` is the share of the supply's voltage, `f` the frequency [Hz] (by default that of the supply), `T`
     the temperature of the windings [K]. With all derivatives 0 the model's equations are the Gamma circuit,
 
         i_r = -(g + j b) psi_s        g + j b = j w_r/(R_r + j w_r L_l)        w_r = 2 pi f - p w
         u_s = (R_s (1/L_m + g) + j (2 pi f + R_s b)) psi_s
 
-    and |psi_s|^2, which L_m depends on, follows by Newton's method: from the flux without saturation it falls to the
-    root steadily, because |u_s|^2 grows with it and ever faster. It is exact where saturation lowers the flux at this
-    voltage to not less than a third.
+    and |psi_s|^2, on which L_m depends, follows by Newton's method. From the flux without saturation it falls
+    monotonically to the root, because |u_s|^2 is a growing and convex function of it. The result is exact where
+    saturation lowers the flux at this voltage to no less than a third.
     """
     w_s = _TURN * (p.supply.f if f is None else f)
     slip_speed = w_s - p.pole_pairs * w
@@ -305,10 +306,11 @@ _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 
 def breakdown(p: Any, voltage_share: float = 1.0, f: float | None = None, T: float = T_RATED) -> Steady:
-    """Where the torque at the shaft is largest, between standstill and synchronous speed; arguments as in `steady`.
+    """Steady running at the largest torque of the shaft, between standstill and synchronous speed; arguments as in
+    `steady`.
 
-    The first maximum from synchronous speed on: with much skin effect the torque rises again towards standstill. The
-    slip is found to 1e-5 of itself, the torque therefore to about 1e-10.
+    It is the first maximum below synchronous speed: with a strong skin effect the torque rises again towards
+    standstill. The slip has a relative accuracy of 1e-5, the torque therefore one of about 1e-10.
     """
     synchronous = _TURN * (p.supply.f if f is None else f) / p.pole_pairs
 
@@ -334,7 +336,7 @@ def breakdown(p: Any, voltage_share: float = 1.0, f: float | None = None, T: flo
 
 
 class InductionMotorPoint(MotorPoint):
-    """Everything at one state: supply, circuit, shaft."""
+    """The motor at one state: supply, circuit, shaft."""
 
     __slots__ = (
         "R_r", "R_s", "cooling", "df", "heat", "i_d", "i_q", "ir_d", "ir_q", "leak", "main", "slip_speed", "u", "w_s",
@@ -364,11 +366,11 @@ class InductionMotorPoint(MotorPoint):
         self.turn(p, u, x)
 
     def rates(self, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
-        """Time derivatives of the states behind those of the shaft."""
+        """Time derivatives of the states after those of the shaft."""
         psi, psi_r = x.stator.psi, x.cage.psi
-        # the soft starter runs once the supply is on, and holds at the whole voltage
-        left = (1.0 - x.supply.ramp) / 2e-3
-        rise = xp.minimum((1.0 - p.soft_start.voltage) / p.soft_start.time, left)
+        # the soft starter runs while the supply is on, up to the full voltage
+        limit = (1.0 - x.supply.ramp) / 2e-3
+        rise = xp.minimum((1.0 - p.soft_start.voltage) / p.soft_start.time, limit)
         return [
             self.u - self.R_s * self.i_d + self.w_s * psi.q,
             -self.R_s * self.i_q - self.w_s * psi.d,
@@ -384,7 +386,7 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, s: InductionMotorPoint) -> Outputs
     psi = x.stator.psi
     squared = psi.d * psi.d + psi.q * psi.q
     b = p.main.beta * p.main.beta * squared
-    # of the main field: the integral of i_m d psi; of the leakage: L i^2/2
+    # energy of the main field: the integral of i_m d psi; of the leakage field: L i^2/2
     main = 0.5 * squared * (1.0 + 0.25 * b * b * b) / p.main.L
     leakage = 0.5 * s.leak * (s.ir_d * s.ir_d + s.ir_q * s.ir_q)
     return Outputs(
@@ -401,10 +403,10 @@ def _outputs(xp: Any, p: Any, u: Any, x: Any, s: InductionMotorPoint) -> Outputs
 class InductionMotor(Motor):
     """A squirrel-cage induction motor, on the line or on an inverter, that owns the shaft and takes a load port.
 
-    Direct on line: the start values. Soft start: `soft_start.voltage` below 1. On an inverter: `inverter.on` = 1; the
-    motor then follows `w_ref`. The input `voltage` makes dips. At 0 it short-circuits the terminals: as long as the
-    field lasts, currents as large as at the start flow and brake the shaft. A motor that a contactor cuts off, with
-    open terminals, coasts instead; that is not in this model.
+    With the start values the motor starts direct on line. With `soft_start.voltage` below 1 it has a soft starter.
+    With `inverter.on` = 1 it runs on an inverter and follows `w_ref`. The input `voltage` makes dips. At 0 the
+    terminals are short-circuited: as long as the field lasts, currents as large as at the start flow and brake the
+    shaft. A motor that a contactor cuts off, with open terminals, would coast; this is not in the model.
     """
 
     name = "InductionMotor"
@@ -431,13 +433,13 @@ class InductionMotor(Motor):
 
     @staticmethod
     def follows(p: Any) -> bool:
-        """On an inverter."""
+        """Whether the motor runs on an inverter."""
         return bool(p.inverter.on)
 
     @staticmethod
     def limit(xp: Any, p: Any, w: Any) -> Any:
-        """On the line the torque of a cold motor at this speed; on an inverter the largest at any frequency, to
-        about 1 % (the inverter's own current limit is not in the model)."""
+        """On the line the torque of a cold motor at this speed; on an inverter the largest torque at any frequency,
+        with an error of about 1 % (the current limit of the inverter is not in the model)."""
         on_line = steady(xp, p, w).air_gap_tau
         most = on_line * 0.0
         for slip in _SLIPS:
@@ -447,43 +449,44 @@ class InductionMotor(Motor):
 
     @staticmethod
     def cooling(xp: Any, p: Any, w: Any) -> Any:
-        """The fan turns with the shaft: least at rest, whole at synchronous speed and above."""
+        """Cooling by the fan on the shaft: least at rest, full at synchronous speed and above."""
         turning = xp.minimum(xp.abs(w) * p.pole_pairs / (_TURN * p.supply.f), 1.0)
         return p.cooling.still + (1.0 - p.cooling.still) * turning
 
     @staticmethod
     def largest_torque(p: Any, T: float, *at: float) -> float:
-        """The breakdown torque at the voltage [V] and the frequency [Hz] that the motor has."""
+        """The breakdown torque at the present voltage [V] and frequency [Hz] of the motor."""
         return float(breakdown(p, at[0] / p.supply.V, at[1], T).air_gap_tau) if min(at) > 0.0 else 0.0
 
     @staticmethod
     def pull_out(p: Any, T: float, *at: float) -> float:
-        """The breakdown torque behind friction and windage."""
+        """The breakdown torque after friction and windage."""
         return float(breakdown(p, at[0] / p.supply.V, at[1], T).tau) if min(at) > 0.0 else 0.0
 
     @staticmethod
     def breakdown_speed(p: Any, T: float, *at: float) -> float:
-        """Of the breakdown torque behind friction and windage."""
+        """The speed of the breakdown torque after friction and windage."""
         V, f = at
         slip = float(breakdown(p, V / p.supply.V, f, T).slip) if min(V, f) > 0.0 else 1.0
         return (1.0 - slip) * _TURN * f / p.pole_pairs
 
     @staticmethod
     def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """The fluxes are not faster than 1 MHz."""
+        """The limit of the leakage: no time constant of the fluxes below 1 microsecond."""
         yield p.cage.L, 1e-6 * _resistance(p) / (1.0 - p.cage.skin_L), math.inf
 
     @staticmethod
     def internal_step(xp: Any, p: Any) -> Any:
         """The least of a quarter of the fluxes' time constant, a twelfth of a radian of the supply, the time constant
-        of the rotor alone that friction brakes, and 0.25 ms."""
+        of the rotor with its friction alone, and 0.25 ms."""
         by_flux = 0.25 * p.cage.L * (1.0 - p.cage.skin_L) / _resistance(p)
         longest = xp.minimum(xp.minimum(2.5e-4, 1.0 / (12.0 * _TURN * p.supply.f)), by_flux)
         return xp.minimum(longest, friction_time(xp, p.rotor))
 
     @staticmethod
     def initial_states(xp: Any, p: Any) -> Any:
-        """Without flux, at the start angle and speed, at ambient temperature; an inverter starts at frequency 0."""
+        """The states without flux, at the start angle and speed, at ambient temperature; an inverter starts at
+        frequency 0."""
         return States(
             phi=p.phi_start,
             w=p.w_start,

@@ -1,6 +1,6 @@
-"""The TOML table of a shaft line: bends, and stiffness and damping either as such or from the shafts' geometry.
+"""The TOML table of a shaft line: bends, stiffness and damping; stiffness is a number or follows from the geometry.
 
-`form` is its pydantic model, `line_values` gives its numbers::
+`form` gives the pydantic model of the table, `line_values` its numbers::
 
     [driveline]
     alpha1 = "12 deg"
@@ -30,7 +30,7 @@ CORNER = Variable("outline", "coordinate of a corner", Quantity("m", "", None, -
 
 @declaration
 class Damping:
-    """Damping of both shafts by one number."""
+    """The damping of both shafts as one number."""
 
     damping_ratio: Value = quantity(
         "1",
@@ -41,8 +41,8 @@ class Damping:
     )
 
 
-def form(declared: type[ShaftLine], title: str, prefix: str, **others: Any) -> type[BaseModel]:
-    """The pydantic model of the table: the fields of `declared`, tables `shaft2`, `shaft3`, `damping_ratio`,
+def form(of: type[ShaftLine], title: str, prefix: str, **others: Any) -> type[BaseModel]:
+    """The pydantic model of the table: the fields of `of`, tables `shaft2`, `shaft3`, `damping_ratio`,
     `others`.
 
     `prefix` stands before a name in messages, such as "driveline.".
@@ -53,7 +53,7 @@ def form(declared: type[ShaftLine], title: str, prefix: str, **others: Any) -> t
     for name in SHAFTS:
         inner = _shaft(name, prefix + name + ".")
         more[name] = (inner, Field(default_factory=inner))
-    return schema(declared, title, prefix, **more)
+    return schema(of, title, prefix, **more)
 
 
 def _shaft(title: str, prefix: str) -> type[BaseModel]:
@@ -71,8 +71,8 @@ def _shaft(title: str, prefix: str) -> type[BaseModel]:
 
 
 def line_values(table: BaseModel, prefix: str) -> dict[str, Any]:
-    """The values of the table by name, with the stiffness of its shafts worked out; a `damping_ratio` as it is, as it
-    goes with inertias that the table may not have.
+    """The values of the table by name, with the stiffness computed from the geometry of the shafts. A `damping_ratio`
+    is returned unchanged, since it refers to inertias that the table may not have.
 
     Raises
     ------
@@ -87,9 +87,9 @@ def line_values(table: BaseModel, prefix: str) -> dict[str, Any]:
             words = f"given beside {prefix}{other}, which sets it; leave out one of the two"
             faults.add([InputError(f"{prefix}{name}: {words}", prefix + name)])
     for shaft, stiffness in SHAFTS.items():
-        described = numbers.pop(shaft, None)
-        if described is not None:
-            keys = {name: getattr(described, name) for name in described.model_fields_set}
+        shaft_table = numbers.pop(shaft, None)
+        if shaft_table is not None:
+            keys = {name: getattr(shaft_table, name) for name in shaft_table.model_fields_set}
             with faults.collected(), refusal_prefix(f"{prefix}{shaft}.", prefix + shaft):
                 numbers[stiffness] = stiffness_of(keys)
     faults.refuse()

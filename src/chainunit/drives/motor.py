@@ -53,7 +53,7 @@ class ShaftStates(LoadState):
 
 @declaration
 class MotorOutputs:
-    """The common outputs of motors beside their states."""
+    """The common outputs of motors besides their states."""
 
     a: Value = quantity("rad/s2", "rotor acceleration", nominal=100.0)
     tau: Value = quantity("N.m", "torque given to the load at the shaft")
@@ -63,14 +63,14 @@ class MotorOutputs:
 
 
 class MotorPoint:
-    """A motor at one state: each kind finds the air-gap torque, and the shaft moves by it."""
+    """A motor at one state: each kind of motor computes the air-gap torque, which moves the shaft."""
 
     __slots__ = ("a", "air_gap", "tau")
     air_gap: Any
     heat: Any
 
     def turn(self, p: Any, u: Any, x: Any) -> None:
-        """Acceleration, and torque given to the load."""
+        """Compute the acceleration, and the torque given to the load."""
         driving = self.air_gap - p.rotor.d * x.w
         self.a, self.tau = shaft_motion(u.load, x.phi, x.w, p.rotor.J, driving)
 
@@ -80,20 +80,20 @@ class MotorPoint:
         return (self.heat - cooling * (T - p.ambient.T) / winding.R_th) / winding.C
 
     def outputs(self) -> dict[str, Any]:
-        """The fields of `MotorOutputs` that follow from it."""
+        """The fields of `MotorOutputs` that follow from the motion of the shaft."""
         return {"a": self.a, "tau": self.tau, "air_gap_tau": self.air_gap}
 
     def rates(self, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
-        """Time derivatives of the states behind those of the shaft."""
+        """Time derivatives of the states after those of the shaft."""
         raise NotImplementedError
 
 
 class Motor(Model):
-    """A motor that owns the shaft: states and outputs as in `ShaftStates` and `MotorOutputs`, and the two that each
-    kind calls its own.
+    """A motor that owns the shaft: it has the states of `ShaftStates`, the outputs of `MotorOutputs`, and further
+    ones of each kind of motor.
 
-    The base itself stands for an FMU of somebody else, of which no more is known than its terminals: its parameters
-    are None, and it has neither a speed loop nor limits that could be told.
+    The base class itself stands for a foreign FMU, of which only the terminals are known: its parameters are None,
+    and it has neither a speed loop nor known limits.
     """
 
     terminals = (*flanges("outflow"), load_terminal("load."))
@@ -120,15 +120,15 @@ class Motor(Model):
 
     @staticmethod
     def cooling(xp: Any, p: Any, w: Any) -> Any:
-        """Cooling at the speed `w` [rad/s], in parts of that for which `R_th` holds."""
+        """Cooling at the speed `w` [rad/s], as a share of the cooling for which `R_th` holds."""
         return 1.0
 
     @classmethod
     def settled_temperature(cls, p: Any, heat: float, ran_at: float, w: float) -> float:
-        """Temperature [K] at which the winding comes to rest where a duty heats it for ever.
+        """Steady temperature of the winding under a permanent duty [K].
 
         `heat` [W] is the mean loss of the duty in a run with the winding at `ran_at` [K], `w` [rad/s] its mean speed.
-        The currents stay as they are and the loss grows with the resistance,
+        The currents stay the same, and the loss grows with the resistance,
 
             T = T_a + R_th/cooling heat (1 + alpha (T - T_0))/(1 + alpha (ran_at - T_0)).
 
@@ -147,23 +147,22 @@ class Motor(Model):
         raise NotImplementedError
 
     control: ClassVar[str] = "its own, which follows the speed asked for"
-    """How its speed is controlled, in words, where it `follows`."""
+    """A text on how the speed of the motor is controlled, for one that `follows` the reference."""
 
     @staticmethod
     def follows(p: Any) -> bool:
-        """Whether it follows the speed reference `w_ref`; else it takes the speed that its supply and the load
-        give."""
+        """Whether the motor follows the speed reference `w_ref`; else its speed follows from supply and load."""
         return True
 
     @staticmethod
     def current_limit(p: Any) -> float | None:
-        """Largest current that its converter gives [A], None where it has no such limit."""
+        """Largest current of the converter [A]; None without such a limit."""
         return None
 
     @classmethod
     def tune(cls, p: Any, inertia: float, fixed: Container[str] = ()) -> tuple[Any, Tuning | None]:
-        """The parameters with the gains of the speed control tuned to the total `inertia` at the shaft [kg m2], but
-        for those whose names are `fixed`; and the tuning, None where no gain was left to it.
+        """The parameters with the gains of the speed control tuned to the total `inertia` at the shaft [kg m2],
+        except the gains with names in `fixed`; and the tuning, None if all gains are fixed.
 
         Raises
         ------
@@ -174,32 +173,33 @@ class Motor(Model):
 
     @staticmethod
     def speed_loop(p: Any, inertia: float) -> Loop | None:
-        """The linearised speed loop at the total `inertia` at the shaft [kg m2]; None where the motor has none."""
+        """The linearised speed loop at the total `inertia` at the shaft [kg m2]; None for a motor without one."""
         return None
 
     limited_by: ClassVar[Mapping[str, float]]
-    """Outputs that set the largest torque at an instant, each with its resolution in parts of its largest value."""
+    """Outputs on which the largest torque at an instant depends, each with its resolution as a share of its largest
+    value."""
 
     @staticmethod
     def largest_torque(p: Any, T: float, *at: float) -> float:
         """Largest air-gap torque [N m] that the motor can give at an instant with the winding at `T` [K]; `at` are
-        the values of `limited_by`. A speed among them is positive along the torque, negative where the torque brakes.
-        Not positive where it can give none."""
+        the values of `limited_by`. A speed among them is positive in the direction of the torque, negative where the
+        torque brakes. The result is zero or negative where the motor can give no torque."""
         raise NotImplementedError
 
     @staticmethod
     def pull_out(p: Any, T: float, *at: float) -> float:
-        """Largest torque at the shaft [N m] that a load meets which slows the motor down from there until it stalls;
+        """Largest torque at the shaft [N m] while a load slows the motor down, from this point until it stalls;
         arguments as in `largest_torque`."""
         raise NotImplementedError
 
     @staticmethod
     def breakdown_speed(p: Any, T: float, *at: float) -> float:
-        """Speed of the shaft [rad/s] below which the motor gives the less, the slower it turns: a load that brings it
-        there stalls it. 0 where it has no such speed; arguments as in `largest_torque`."""
+        """Speed of the shaft [rad/s] below which the torque falls with the speed: a load that slows the motor down to
+        it stalls the motor. 0 for a motor without such a speed; arguments as in `largest_torque`."""
         return 0.0
 
 
 def friction_time(xp: Any, rotor: Any) -> Any:
-    """The time constant of the rotor that its own friction `d` brakes, without any load [s]; at most a second."""
+    """The time constant of the rotor with its own friction `d`, without load [s]; at most one second."""
     return 1.0 / xp.maximum(rotor.d / rotor.J, 1.0)

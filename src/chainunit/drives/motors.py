@@ -1,4 +1,4 @@
-"""The types of motor that a study may name: a new one is a module with its `Motor` class, and a line here."""
+"""The types of motor that a study may name. A new type is a module with its `Motor` class, and a line here."""
 
 from __future__ import annotations
 

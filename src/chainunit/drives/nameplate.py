@@ -1,18 +1,18 @@
 """The equivalent circuit of an induction motor from its nameplate and catalogue data.
 
 Six values of the catalogue - torque, current and power factor in rated running, breakdown torque, torque and
-current with the rotor locked - give six parameters: resistances, leakage, magnetising inductance, and how much the
-skin effect changes resistance and leakage at standstill. A value that no catalogue tells is assumed, and declared in
+current with the rotor locked - give six parameters: two resistances, leakage, magnetising inductance, and the changes
+of resistance and leakage at standstill by the skin effect. Values that no catalogue has are declared in
 `Assumptions`.
 
-The model has no iron and stray losses: `stator.R` is fitted so that the copper losses make up for them in rated
-running, and is therefore larger than the resistance that an ohmmeter shows. In small motors, where that much
-resistance would not leave the breakdown torque, the fit gives up power factor and efficiency first (`_WEIGHTS`).
-Saturation (`main.beta`) stays 0, because no value of a catalogue tells it; the fall of the leakage by saturation of
-the teeth in the locked motor is contained in `cage.skin_L`.
+The model has no iron and stray losses. `stator.R` is fitted so that the copper losses include them in rated running;
+it is therefore larger than the resistance by an ohmmeter. In small motors the breakdown torque would be too small
+with that resistance; there the fit departs from power factor and efficiency first (`_WEIGHTS`). Saturation
+(`main.beta`) stays 0, because it follows from no value of a catalogue; `cage.skin_L` includes the fall of the leakage
+by saturation of the teeth in the locked motor.
 
-Rated running and breakdown hold for the warm motor, `Assumptions.rise` above the model's ambient temperature; the
-locked rotor for the cold one. A motor in rated running therefore comes to rest thermally at its rated values.
+Rated running and breakdown refer to the warm motor, `Assumptions.rise` above the model's ambient temperature, the
+locked rotor to the cold motor. The steady temperature in rated running is therefore the rated one.
 """
 
 from __future__ import annotations
@@ -78,12 +78,12 @@ class Nameplate:
 
     @property
     def rated_current(self) -> float:
-        """Rated current [A], as it is given, or as it follows from the other values."""
+        """Rated current [A] of the nameplate, or else the one that follows from its other values."""
         return float(self.current or self.implied_current)
 
     @property
     def implied_current(self) -> float:
-        """Rated current [A] as it follows from the other values."""
+        """Rated current [A] that follows from power, efficiency, power factor and voltage."""
         apparent = self.power / (self.efficiency * self.power_factor)
         return float(apparent / (math.sqrt(3.0) * self.voltage))
 
@@ -124,13 +124,13 @@ TYPICAL = Assumptions()
 
 LAYOUT = Layout(Nameplate)
 LARGEST_RESIDUAL = 0.1
-"""A nameplate that no circuit meets better than this is refused."""
+"""Relative deviation above which a nameplate is refused, if no circuit meets it better."""
 
 LARGEST_SLIP = 0.2
-"""Rated slip above which the speed belongs to another number of poles."""
+"""Largest rated slip; above it the speed belongs to another number of poles."""
 
 
-# IEC 60034-1 grants breakdown and locked rotor 10 to 25 %; the power factor takes the rest, which iron losses leave
+# IEC 60034-1 allows 10 to 25 % for breakdown and locked rotor; the power factor takes the error from the iron losses
 _WEIGHTS = {
     "power": 3.0,
     "current": 3.0,
@@ -140,7 +140,7 @@ _WEIGHTS = {
     "locked_current_ratio": 1.0,
 }
 
-# where the torque hardly falls behind breakdown there are several minima: shifts of the logarithms in `_Fit`
+# shifts of the logarithms in `_Fit`: where the torque hardly falls below breakdown speed there are several minima
 _STARTS = (
     (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     (-0.5, 0.0, 0.3, 0.0, 0.0, -0.3),
@@ -152,8 +152,8 @@ _STARTS = (
 class Identification:
     """A motor with the parameters that meet its nameplate best.
 
-    `residuals` gives by name of the nameplate's value how far the circuit is off, as a share of the value; `power`
-    and `efficiency` are those at rated speed. `rated`, `breakdown` and `locked` are the circuit at its three points.
+    `residuals` has the relative deviation of the circuit from each value of the nameplate, by name; `power` and
+    `efficiency` are those at rated speed. `rated`, `breakdown` and `locked` are the circuit at its three points.
     """
 
     nameplate: Nameplate
@@ -165,7 +165,7 @@ class Identification:
 
     @property
     def worst(self) -> tuple[str, float]:
-        """The largest residual, with its name."""
+        """The name and the value of the largest residual."""
         return max(self.residuals.items(), key=lambda item: abs(item[1]))
 
 
@@ -186,12 +186,12 @@ def check(nameplate: Nameplate, assumptions: Assumptions = TYPICAL) -> None:
 
 
 def _of_column(line: str) -> InputError:
-    """The refusal of a value, with the name of which its line begins as its key."""
+    """The refusal of a value; its key is the name at the begin of the line."""
     return InputError(line, re.split("[ :]", line)[0])
 
 
 def _contradictions(n: Nameplate, assumptions: Assumptions) -> Iterator[str]:
-    """Values that contradict others, each in a line that begins with its name."""
+    """A line for each value that contradicts others; it begins with the name of the value."""
     low, high = ((1.0 + sign * LARGEST_RESIDUAL) * n.implied_current for sign in (-1.0, 1.0))
     if n.current and not low < n.current < high:
         yield (
@@ -209,7 +209,7 @@ def _contradictions(n: Nameplate, assumptions: Assumptions) -> Iterator[str]:
             f"must be > {low:g} and < {high:g} rad/s, the synchronous speed ({rev[1]:g} and {rev[2]:g} rev/min)"
         )
         return
-    # slip and friction alone would leave that much
+    # the efficiency with no losses but slip and friction
     most = (1.0 - n.slip) / (1.0 + assumptions.friction)
     real = n.power / (n.apparent_power * n.power_factor)
     if not max(real, n.efficiency) < most:
@@ -229,18 +229,17 @@ def _contradictions(n: Nameplate, assumptions: Assumptions) -> Iterator[str]:
 def identify(
     nameplate: Nameplate, assumptions: Assumptions = TYPICAL, tolerance: float = LARGEST_RESIDUAL
 ) -> Identification:
-    """The parameters whose circuit meets the nameplate best, and how well it does.
+    """The parameters whose circuit meets the nameplate best, and the residuals.
 
-    A least-squares fit with bounds of the relative deviations, in the logarithms of the parameters; it is
-    deterministic, starts from the circuit that the closed form gives, and takes exact derivatives. Residuals are left
-    only where a parameter stands at its bound: mostly where a motor has no skin effect that would explain its
-    locked-rotor values.
+    It is a least-squares fit of the relative deviations with bounds, in the logarithms of the parameters. The fit is
+    deterministic, starts from the circuit in closed form, and uses exact derivatives. Residuals remain only where a
+    parameter is at its bound: mostly for a motor whose locked-rotor values no skin effect can explain.
 
     Raises
     ------
     InputError
-        in one line, for a nameplate that contradicts itself (see `check`), or that no circuit meets within
-        `tolerance`, as a share.
+        in one line, for a nameplate that contradicts itself (see `check`), or that no circuit meets within the
+        relative `tolerance`.
     """
     from scipy.optimize import least_squares
 
@@ -251,11 +250,11 @@ def identify(
     best: Any = None
     for shift in _STARTS:
         start = np.clip(fit.start() + np.array(shift), low + margin, high - margin)
-        fitted = least_squares(
+        solution = least_squares(
             fit.deviations, start, fit.jacobian, (low, high), xtol=1e-12, ftol=1e-15, gtol=1e-14, max_nfev=100
         )
-        if best is None or fitted.cost < best.cost:
-            best = fitted
+        if best is None or solution.cost < best.cost:
+            best = solution
         if best.cost < 1e-18:
             break
     identification = fit.identification(best.x)
@@ -279,7 +278,7 @@ class _Fit:
         n = nameplate
         self.base = n.voltage * n.voltage / n.apparent_power
         layout, w_s = InductionMotor.parameter_layout, _TURN * n.frequency
-        self.fixed = layout.by_name(Parameters()) | {
+        self.constants = layout.by_name(Parameters()) | {
             "pole_pairs": 0.5 * n.poles,
             "supply.V": n.voltage,
             "supply.f": n.frequency,
@@ -287,7 +286,7 @@ class _Fit:
             "rotor.J": n.J,
             "rotor.d": assumptions.friction * n.power / (n.speed * n.speed),
         }
-        # in parts of the rated impedance
+        # limits in parts of the rated impedance
         resistance, leakage, main = (1e-4, 1.0), (0.02, 1.0), (0.1, 100.0)
         most = {v.name: v.quantity.high for v in layout.variables}
         limits = [
@@ -302,7 +301,7 @@ class _Fit:
     def parameters(self, six: Any) -> Parameters:
         """The motor with these six values."""
         R_s, R_r, L_l, L_m, skin_R, skin_L = six
-        fitted = {
+        values = {
             "stator.R": R_s,
             "cage.R": R_r,
             "cage.L": L_l,
@@ -310,10 +309,10 @@ class _Fit:
             "cage.skin_R": skin_R - 1.0,
             "cage.skin_L": 1.0 - skin_L,
         }
-        return InductionMotor.parameter_layout.instance([*(self.fixed | fitted).values()])
+        return InductionMotor.parameter_layout.instance([*(self.constants | values).values()])
 
     def start(self) -> Any:
-        """The circuit in closed form, without skin effect in rated running and at breakdown."""
+        """The logarithms of the circuit in closed form, without skin effect in rated running and at breakdown."""
         n = self.n
         w_s, phase_v, phase_i = _TURN * n.frequency, n.voltage / math.sqrt(3.0), n.rated_current
         air_gap = n.power * (1.0 + self.assumptions.friction) / (1.0 - n.slip)
@@ -343,7 +342,8 @@ class _Fit:
         return np.log([R_s / hot, R_r / hot, L_l, 1.0 / main, hot * locked_R / R_r, locked_X / (w_s * L_l)])
 
     def points(self, xp: Any, p: Any, at_breakdown: float) -> tuple[Steady, Steady, Steady]:
-        """Rated running, breakdown at this speed, locked rotor."""
+        """The circuit in rated running, at breakdown at the speed `at_breakdown` [rad/s], and with the rotor
+        locked."""
         return (
             steady(xp, p, self.n.speed, T=self.warm),
             steady(xp, p, at_breakdown, T=self.warm),
@@ -351,7 +351,7 @@ class _Fit:
         )
 
     def relative(self, points: tuple[Steady, Steady, Steady]) -> dict[str, Any]:
-        """Deviations of the circuit from the nameplate, as shares."""
+        """Relative deviations of the circuit from the nameplate."""
         n, (rated, most, locked) = self.n, points
         current, torque = n.rated_current, n.torque
         return {
@@ -367,7 +367,8 @@ class _Fit:
         return (1.0 - float(breakdown(p, T=self.warm).slip)) * self.n.synchronous
 
     def _at(self, x: Any) -> Any:
-        """Weighted deviations with their slopes; the speed at breakdown may stand still: the torque is flat there."""
+        """Weighted deviations with their slopes. The slopes leave the speed at breakdown constant: the torque is flat
+        there."""
         if self._last is None or self._last[0] != x.tobytes():
             six = [math.exp(v) for v in x]
             seeds = [Dual(v, v * row) for v, row in zip(six, np.eye(6), strict=True)]
@@ -377,7 +378,7 @@ class _Fit:
         return self._last[1]
 
     def deviations(self, x: Any) -> Any:
-        """The weighted deviations, which the fit makes small."""
+        """The weighted deviations, whose squares the fit minimises."""
         return np.array([value(r) for r in self._at(x)])
 
     def jacobian(self, x: Any) -> Any:
@@ -385,7 +386,7 @@ class _Fit:
         return np.array([slope(r) for r in self._at(x)])
 
     def identification(self, x: Any) -> Identification:
-        """The motor with these logarithms, its temperature rise met as well."""
+        """The motor with these logarithms, and with the thermal resistance for its temperature rise."""
         n, bare = self.n, self.parameters([math.exp(v) for v in x])
         rated, most, locked = points = self.points(MATH, bare, self._speed_at_breakdown(bare))
         residuals = self.relative(points)

@@ -17,14 +17,14 @@ STEEL = 8.0e10
 
 @declaration
 class Shaft:
-    """A shaft of one section over its whole length; `SECTIONS` says which dimensions it takes."""
+    """A shaft of one section over its whole length; `SECTIONS` lists the dimensions of each section."""
 
     outer: Value = quantity("m", "outer diameter", default=0.06, above=0.0, max=10.0)
     inner: Value = quantity("m", "inner diameter", default=0.0, min=0.0, max=10.0)
     a: Value = quantity("m", "outer width", default=0.06, above=0.0, max=10.0)
     b: Value = quantity("m", "outer height", default=0.06, above=0.0, max=10.0)
     wall: Value = quantity("m", "thickness of the wall", default=0.005, above=0.0, max=1.0)
-    length: Value = quantity("m", "length that is twisted", default=1.0, above=0.0, max=1000.0)
+    length: Value = quantity("m", "twisted length", default=1.0, above=0.0, max=1000.0)
     shear_modulus: Value = quantity(
         "N/m2", "shear modulus; that of steel by default", default=STEEL, above=0.0, max=1e13
     )
@@ -36,7 +36,7 @@ def stiffness(torsion_constant: float, length: float, shear_modulus: float = STE
 
 
 def hollow(outer: float, inner: float = 0.0) -> float:
-    """Torsion constant of a round shaft with diameters `outer` and `inner` [m]; solid without the latter.
+    """Torsion constant of a round shaft with diameters `outer` and `inner` [m]; solid by default.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def box(a: float, b: float, wall: float) -> float:
 
 
 _ELEMENTS = 1000
-"""of the mesh: the torsion constants of rectangles and rings come out within 1e-3"""
+"""Number of elements of the mesh: the error of the torsion constants of rectangles and rings is below 1e-3."""
 
 
 def polygon(outline: Sequence[Point], holes: Sequence[Sequence[Point]] = ()) -> float:
@@ -90,7 +90,7 @@ def polygon(outline: Sequence[Point], holes: Sequence[Sequence[Point]] = ()) -> 
     Raises
     ------
     InputError
-        without the extra, and for lines that bound no one piece.
+        without the extra, and for corners that do not bound one connected area.
     """
     if importlib.util.find_spec("sectionproperties") is None:
         raise InputError('section: "polygon" needs the extra sections: pip install "chainunit[sections]"')
@@ -118,7 +118,7 @@ class CrossSection(NamedTuple):
     takes: tuple[str, ...]
     constant: Callable[..., float]
     also: tuple[str, ...] = ()
-    """dimensions that may be left out"""
+    """optional dimensions"""
 
 
 SECTIONS = {
@@ -137,7 +137,7 @@ def stiffness_of(keys: Mapping[str, Any]) -> float:
     Raises
     ------
     InputError
-        in one line, for a value that is missing, belongs to another section, or is impossible.
+        in one line, for a missing value, a value of another section, or an impossible value.
     """
     name = keys.get("section")
     if name is None:

@@ -1,7 +1,8 @@
 """Tuning of a cascaded speed control, checked with python-control.
 
-Current loop: PI whose zero cancels the armature pole R/L, so that its open loop is w_c/s. Speed loop: PI on
-the integrator k/(J s) behind the closed current loop; crossover a tenth of w_c, zero at a fifth of that.
+The zero of the PI control of the current cancels the armature pole R/L, so that the open loop is w_c/s. The PI
+control of the speed acts on the integrator k/(J s) behind the closed current loop; its crossover is a tenth of w_c,
+its zero lies at a fifth of the crossover.
 """
 
 from __future__ import annotations
@@ -21,9 +22,9 @@ class Tuning:
     phase_margin: float
     """[deg]"""
     crossover: float
-    """of the speed loop [rad/s]"""
+    """crossover of the speed loop [rad/s]"""
     current_crossover: float | None = None
-    """of a current loop below it [rad/s]"""
+    """crossover of an inner current loop [rad/s]"""
 
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON."""
@@ -38,9 +39,8 @@ class Tuning:
 def tune(armature: Any, inertia: float, bandwidth: float = 300.0, crossover_share: float = 0.1) -> Tuning:
     """Gains for a motor with this `armature` (R, L, k) on a total `inertia` at its shaft [kg m2].
 
-    `bandwidth` is the crossover of the current loop [rad/s], `crossover_share` that of the speed loop in
-    relation to it. The phase margin is that of the whole speed
-    loop, the current loop included.
+    `bandwidth` is the crossover of the current loop [rad/s], `crossover_share` the ratio of the crossover of the
+    speed loop to it. The phase margin belongs to the whole speed loop, including the current loop.
 
     Raises
     ------
@@ -60,7 +60,8 @@ def tune(armature: Any, inertia: float, bandwidth: float = 300.0, crossover_shar
 
 
 def _current_loop(armature: Any, current: tuple[float, float]) -> Any:
-    """Current over its reference; the feed-forward of the back-EMF leaves the armature circuit alone as plant."""
+    """The transfer function from the current reference to the current; with the feed-forward of the back-EMF the
+    plant is only the armature circuit."""
     import control
 
     s = control.tf("s")
@@ -71,7 +72,7 @@ def _current_loop(armature: Any, current: tuple[float, float]) -> Any:
 def _open_loop(
     armature: Any, speed: tuple[float, float], current: tuple[float, float], inertia: float
 ) -> Any:
-    """The speed loop opened at the measured speed."""
+    """The open speed loop, cut at the measured speed."""
     import control
 
     s = control.tf("s")
@@ -92,40 +93,40 @@ class Loop:
     largest_deviation: float
     """largest deviation of the motor speed after a step of the load torque [(rad/s)/(N m)]"""
     settling: float
-    """time until the deviation stays below a twentieth of that [s]"""
+    """time until the deviation stays below a twentieth of the largest one [s]"""
     frequency: Any
     """[rad/s], shape (n,)"""
     gain: Any
-    """of the open loop, shape (n,)"""
+    """gain of the open loop, shape (n,)"""
     phase: Any
-    """of the open loop [deg], shape (n,)"""
+    """phase of the open loop [deg], shape (n,)"""
     time: Any
     """[s], shape (m,)"""
     deviation: Any
-    """of the motor speed after a step of the load torque [(rad/s)/(N m)], shape (m,)"""
+    """deviation of the motor speed after a step of the load torque [(rad/s)/(N m)], shape (m,)"""
 
 
 def loop(motor: Any, inertia: float) -> Loop:
-    """The speed loop of a DC motor with the parameters `motor`, limits and friction left out, at a total `inertia`
+    """The speed loop of a DC motor with the parameters `motor`, without limits and friction, at a total `inertia`
     [kg m2]."""
     import control
     import numpy as np
 
     speed = (motor.speed_control.kp, motor.speed_control.ki)
     current = (motor.current_control.kp, motor.current_control.ki)
-    opened = control.minreal(_open_loop(motor.armature, speed, current, inertia), verbose=False)
-    _, phase, _, at = control.margin(opened)
+    open_loop = control.minreal(_open_loop(motor.armature, speed, current, inertia), verbose=False)
+    _, phase, _, at = control.margin(open_loop)
     s = control.tf("s")
     kp, ki = speed
     torque = (kp + ki / s) * _current_loop(motor.armature, current) * motor.armature.k
-    disturbed = control.minreal(control.feedback(-1.0 / (inertia * s), -torque), verbose=False)
+    by_load = control.minreal(control.feedback(-1.0 / (inertia * s), -torque), verbose=False)
     time = np.linspace(0.0, 40.0 / at, 2001)
-    response = control.step_response(disturbed, time)
+    response = control.step_response(by_load, time)
     deviation = np.asarray(response.outputs)
     dip = float(np.max(np.abs(deviation)))
     outside = np.flatnonzero(np.abs(deviation) > 0.05 * dip)
     frequency = np.logspace(-2.0, 1.5, 200) * at
-    answer = opened(1j * frequency)
+    answer = open_loop(1j * frequency)
     return Loop(
         inertia,
         float(phase),

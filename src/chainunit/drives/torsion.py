@@ -1,18 +1,18 @@
 """A driveline with a cardan shaft in rotation: its steady motion, Floquet stability, and time simulation.
 
-Two inertias and the line between them (`cardan.Twist`), a constant torque on either: J1 w1' = M1 - tau1,
-J4 w4' = tau4 - M4, states phi1, w1, phi4, w4. The ratio i23 varies twice a turn. That shakes the line (orders 2, 4,
-... of the speed), and it changes its stiffness in step with the motion: parametric excitation. Both are in the exact
-equations; Hill's equation with the frozen frequency k(t) alone would be wrong, since a disturbance of phi1 also moves
-the kinematic excitation.
+There are two inertias with the line between them (`cardan.Twist`) and a constant torque on each: J1 w1' = M1 - tau1,
+J4 w4' = tau4 - M4, with the states phi1, w1, phi4, w4. The ratio i23 varies twice a turn. It excites the line (orders
+2, 4, ... of the speed), and it changes the stiffness of the line in step with the motion: parametric excitation. The
+exact equations contain both. Hill's equation with the frozen frequency k(t) alone would be wrong, since a disturbance
+of phi1 also shifts the kinematic excitation.
 
-A steady motion repeats itself after half a turn. It is found by shooting: Newton's method with the exact variational
-equations (dual numbers), which also give the Floquet multipliers, in two ways. Free, with constant torques: four, of
-which one is 1, the shift along the orbit. Held: the common speed of both inertias, (J1 w1 + J4 w4)/(J1 + J4), follows
-the steady motion, as under a good speed control; two are left, and they are torsional. The difference is the drive's
-matter: above a resonance faster running takes less torque, so that a constant one does not hold the speed
-(Sommerfeld's effect). Everything is vectorised: speeds, bends, dampings
-and loads may be arrays of one shape (n,).
+A steady motion repeats itself after half a turn. Shooting finds it: Newton's method with the exact variational
+equations (dual numbers). These also give the Floquet multipliers, in two ways. The *free* line has constant torques
+and four multipliers, one of which is 1: the shift along the orbit. In the *held* line the common speed of both
+inertias, (J1 w1 + J4 w4)/(J1 + J4), follows the steady motion, as under a good speed control; its two multipliers are
+torsional. The difference comes from the drive: above a resonance faster running takes less torque, so that a constant
+torque does not hold the speed (Sommerfeld's effect). All functions are vectorised: speeds, bends, dampings and loads
+may be arrays of one shape (n,).
 """
 
 from __future__ import annotations
@@ -32,17 +32,17 @@ from .cardan import Cardan, Twist, frozen_frequency, middle_angle, two_joints
 
 HALF_TURN = np.array([math.pi, 0.0, math.pi, 0.0])
 STEPS_PER_PERIOD = 32
-"""of the natural vibration"""
+"""Steps per period of the natural vibration."""
 STEPS_PER_HARMONIC = 12
-"""of the ratio i23"""
+"""Steps per period of each harmonic of the ratio i23."""
 
 _ITERATIONS = 12
-_AGAIN = 8  # from a neighbour, which is near
+_AGAIN = 8  # iterations from a neighbour, which is near
 _WALKS = (1, 1, 6)
 _CLOSED = 1e-9
-_NOISE = 1e-5  # of a multiplier: that of an undamped line is 1 but for the steps
-_LARGEST_STEP = 0.3  # of the unknowns of shooting, in rad and shares of the speed
-_NEWTON = 2  # from the twist of the stage before, 1e-3 away: to 1e-12
+_NOISE = 1e-5  # error of a multiplier by the steps: without it that of an undamped line is 1
+_LARGEST_STEP = 0.3  # largest change of the unknowns of shooting, in rad and shares of the speed
+_NEWTON = 2  # steps from the twist of the stage before, 1e-3 away: the error is then 1e-12
 
 
 def _nothing(_: float) -> None:
@@ -56,21 +56,21 @@ def expand(p: Cardan, n: int) -> Cardan:
     )
 
 
-def _pick(p: Cardan, chosen: Any) -> Cardan:
-    return dataclasses.replace(p, **{f.name: getattr(p, f.name)[chosen] for f in dataclasses.fields(p)})
+def _pick(p: Cardan, places: Any) -> Cardan:
+    return dataclasses.replace(p, **{f.name: getattr(p, f.name)[places] for f in dataclasses.fields(p)})
 
 
 def largest_frequency(p: Cardan) -> Any:
-    """An upper bound of the natural frequency over the turn [rad/s]: the extremes of i23 that the bends allow."""
+    """An upper bound of the natural frequency over the turn [rad/s], from the bounds of i23 by the bends."""
     xp = numpy_()
     least = np.cos(p.alpha1) * np.cos(p.alpha2)
     return np.maximum(frozen_frequency(xp, p, least), frozen_frequency(xp, p, 1.0 / least))
 
 
 def half_turn_steps(p: Cardan, speed: Any) -> Any:
-    """Steps of a half turn that resolve the vibration and the ratio, shape of `speed`.
+    """Number of steps of a half turn that resolves the vibration and the ratio, with the shape of `speed`.
 
-    Harmonic n of i23 of a joint goes with tan(bend/2)^(2n); those down to 1e-4 are counted.
+    Harmonic n of i23 of a joint is proportional to tan(bend/2)^(2n); harmonics down to 1e-4 count.
     """
     steep = np.maximum(np.tan(0.5 * np.maximum(p.alpha1, p.alpha2)), 0.05)
     harmonics = 1.0 + 0.5 * math.log(1e-4) / np.log(steep)
@@ -79,9 +79,9 @@ def half_turn_steps(p: Cardan, speed: Any) -> Any:
 
 
 class _LineRates:
-    """Right-hand sides over `duration` as the unit of time; keeps the twist of shaft 2, from which the balance of the
-    cardan is sought next, and both torques at the start of each step. `held`: 1 for the slopes of dual numbers that
-    leave the common speed alone, else 0, (slopes, 1)."""
+    """Right-hand sides with `duration` as the unit of time. The object keeps the twist of shaft 2, from which the
+    next search for the balance of the cardan starts, and both torques at the start of each step. `held`, shape
+    (slopes, 1), is 1 for the slopes of dual numbers with the common speed held, else 0."""
 
     def __init__(self, p: Cardan, load: Any, duration: Any, drive: Any, held: Any = None) -> None:
         self.p, self.load, self.duration, self.drive, self.held = p, load, duration, drive, held
@@ -93,10 +93,10 @@ class _LineRates:
 
     def __call__(self, time: float, x: Sequence[Any]) -> list[Any]:
         phi1, w1, phi4, w4 = x
-        lifted = isinstance(phi1, Dual)
+        is_dual = isinstance(phi1, Dual)
         near = value(phi1) - self.twist
-        if lifted:
-            # at the root one more step of Newton carries the exact slopes
+        if is_dual:
+            # at the root one more Newton step in dual numbers gives the exact slopes
             near = middle_angle(self.plain, self.p, phi1.v, phi4.v, near, _NEWTON)
             line = Twist(self.dual, self.p, phi1, w1, phi4, w4, near, 1)
         else:
@@ -109,16 +109,16 @@ class _LineRates:
             ):
                 record.append(value(torque))
         a1, a4 = (self.drive - line.tau1) / self.p.J1, (line.tau4 - self.load) / self.p.J4
-        if lifted and self.held is not None:
+        if is_dual and self.held is not None:
             # the control of the common speed pulls both inertias in proportion to themselves
             common = (self.p.J1 * a1.d + self.p.J4 * a4.d) / (self.p.J1 + self.p.J4) * self.held
             a1, a4 = Dual(a1.v, a1.d - common), Dual(a4.v, a4.d - common)
         return [rate * self.duration for rate in (w1, a1, w4, a4)]
 
-    def steps(self, x: list[Any], count: int, size: float, done: Progress = _nothing) -> list[Any]:
+    def steps(self, x: list[Any], count: int, size: float, progress: Progress = _nothing) -> list[Any]:
         for i in range(count):
             x = rk4(self, x, size, size)
-            done((i + 1) / count)
+            progress((i + 1) / count)
         return x
 
 
@@ -132,20 +132,20 @@ class SteadyMotion(NamedTuple):
     drive: Any
     """torque on J1 that keeps the mean speed [N.m], (n,)"""
     largest2: Any
-    """of the elastic torque c2 (phi1 - phi2) of shaft 2 over the turn [N.m], (n,)"""
+    """largest elastic torque c2 (phi1 - phi2) of shaft 2 over the turn [N.m], (n,)"""
     least2: Any
     largest3: Any
     least3: Any
     multiplier: Any
-    """larger size of the two torsional Floquet multipliers of half a turn, common speed held [1], (n,)"""
+    """larger absolute value of the two torsional Floquet multipliers of half a turn, common speed held [1], (n,)"""
     growth: Any
-    """rate at which a small torsional disturbance grows [1/s], negative where it dies, (n,)"""
+    """rate of growth of a small torsional disturbance [1/s], negative where it decays, (n,)"""
     frequency: Any
-    """of the damped torsional vibration [rad/s], (n,): the branch next to k at i23 = 1"""
+    """frequency of the damped torsional vibration [rad/s], (n,): the branch next to k at i23 = 1"""
     free_growth: Any
-    """the same with constant torques, of the fastest growth but the shift along the orbit [1/s], (n,)"""
+    """rate of growth with constant torques, the fastest one without the shift along the orbit [1/s], (n,)"""
     monodromy: Any
-    """of phi1, w1, phi4, w4 over half a turn, free, (4, 4, n)"""
+    """monodromy matrix of phi1, w1, phi4, w4 over half a turn with constant torques, (4, 4, n)"""
 
     @property
     def unstable(self) -> Any:
@@ -169,9 +169,9 @@ def steady(
     """The motion that repeats itself after half a turn at the mean `speed` [rad/s], with the torque `load` [N.m] on
     J4, and its stability.
 
-    Values of `p` may be numbers or arrays of the shape (n,) of `speed`. Points that need alike numbers of steps are
-    computed together, at most `chunk` at a time. A point without a result is tried again from its
-    neighbours: give speeds in order.
+    Values of `p` may be numbers or arrays of the shape (n,) of `speed`. Points with similar numbers of steps are
+    computed together, at most `chunk` at a time. A point without a result is tried again from its neighbours: give
+    the speeds in order.
     """
     speed = np.atleast_1d(np.asarray(speed, dtype=float))
     n = len(speed)
@@ -179,7 +179,7 @@ def steady(
     phi3, ratio, _ = two_joints(numpy_(), p, np.zeros(n))
     guess = np.stack([np.zeros(n), speed, phi3 - load / p.c3, speed * np.sqrt(ratio), load])
     motion = _all(p, speed, load, guess, chunk, _ITERATIONS, lambda x: progress(0.8 * x))
-    # near a resonance Newton's method needs a neighbour to start from, and steps of the speed from there
+    # near a resonance Newton's method has to start from a neighbour and go to the speed in steps
     for walk in _WALKS:
         for side in (-1, 1):
             gaps = np.flatnonzero(~motion.exists)
@@ -223,10 +223,10 @@ def _shoot(
     n = len(speed)
     period = math.pi / speed
     scale = np.stack([np.ones(n), speed, np.ones(n), speed])
-    # phi1 = 0 is the phase; unknown are the rest and the torque on J1
+    # phi1 = 0 fixes the phase; the unknowns are the other states and the torque on J1
     x, drive = guess[:4].copy(), guess[4].copy()
     reference = np.maximum(np.abs(load), p.J1 * speed**2)
-    closed = np.zeros(n, dtype=bool)
+    exists = np.zeros(n, dtype=bool)
     active = np.arange(n)
     extremes = {name: np.full(n, np.nan) for name in ("largest2", "least2", "largest3", "least3")}
     monodromy, held = np.full((4, 4, n), np.nan), np.full((2, 2, n), np.nan)
@@ -239,7 +239,7 @@ def _shoot(
             error = (end - x[:, active] - HALF_TURN[:, None]) / scale[:, active]
             at_goal = np.max(np.abs(error), axis=0) < _CLOSED
             new = active[at_goal]
-            closed[new] = True
+            exists[new] = True
             for number in ("2", "3"):
                 torque = np.array(getattr(equations, f"torque{number}"))[:, at_goal]
                 extremes[f"largest{number}"][new] = torque.max(0)
@@ -247,7 +247,7 @@ def _shoot(
             monodromy[:, :, new] = by[:, :4, at_goal]
             held[:, :, new] = (by[:2, 5:] - by[2:, 5:])[:, :, at_goal]
             progress((iteration + 1) / iterations)
-            # a point that has run away does not come back
+            # points with infinite values are given up
             rest = ~at_goal & np.all(np.isfinite(error), axis=0) & np.all(np.isfinite(by), axis=(0, 1))
             if not np.any(rest):
                 break
@@ -260,17 +260,17 @@ def _shoot(
             x[1:, active] += change[:3] * weights[:3]
             drive[active] += change[3] * weights[3]
     progress(1.0)
-    x[:, ~closed], drive[~closed] = np.nan, np.nan
+    x[:, ~exists], drive[~exists] = np.nan, np.nan
     multiplier, angle, free = np.full((3, n), np.nan)
-    if np.any(closed):
-        torsional = np.linalg.eigvals(np.moveaxis(held[:, :, closed], 2, 0))
-        multiplier[closed] = np.max(np.abs(torsional), axis=1)
-        angle[closed] = np.abs(np.angle(torsional[:, 0]))
-        q = _pick(p, closed)
-        free[closed] = _free(q, x[:, closed], drive[closed], load[closed], monodromy[:, :, closed])
+    if np.any(exists):
+        torsional = np.linalg.eigvals(np.moveaxis(held[:, :, exists], 2, 0))
+        multiplier[exists] = np.max(np.abs(torsional), axis=1)
+        angle[exists] = np.abs(np.angle(torsional[:, 0]))
+        q = _pick(p, exists)
+        free[exists] = _free(q, x[:, exists], drive[exists], load[exists], monodromy[:, :, exists])
     k = frozen_frequency(numpy_(), p, 1.0)
     return SteadyMotion(
-        exists=closed,
+        exists=exists,
         start=x,
         drive=drive,
         **extremes,
@@ -283,7 +283,7 @@ def _shoot(
 
 
 def _branch(angle: Any, near: Any) -> Any:
-    """Of all angles with this cosine the one next to `near`."""
+    """The angle next to `near` among all angles with the cosine of `angle`."""
     turn = 2.0 * math.pi
     first = angle + turn * np.round((near - angle) / turn)
     second = -angle + turn * np.round((near + angle) / turn)
@@ -293,8 +293,8 @@ def _branch(angle: Any, near: Any) -> Any:
 def _half_turn(
     p: Cardan, x: Any, drive: Any, load: Any, period: Any, count: int
 ) -> tuple[Any, Any, _LineRates]:
-    """States (4, n) after half a turn and their slopes (4, 7, n): by the states at its start and the drive, then by
-    the twist phi1 - phi4 and its speed with the common speed held."""
+    """States (4, n) after half a turn and their slopes (4, 7, n): by the four states at its start, by the drive, and
+    by the twist phi1 - phi4 and its speed with the common speed held."""
     seeds = np.zeros((5, 7, x.shape[1]))
     seeds[range(5), range(5)] = 1.0
     share = p.J1 / (p.J1 + p.J4)
@@ -308,10 +308,10 @@ def _half_turn(
 
 
 def _free(p: Cardan, x: Any, drive: Any, load: Any, monodromy: Any) -> Any:
-    """Largest size of the multipliers of the line with constant torques, but for the shift along the orbit, (n,).
+    """Largest absolute multiplier of the line with constant torques, without the shift along the orbit, (n,).
 
-    That one, x' itself, has the multiplier 1. It is taken out exactly: the mean speed lies so near that roundoff
-    would mix the two.
+    The shift x' has the multiplier 1. It is removed exactly, since the multiplier of the mean speed is so near to it
+    that rounding would mix the two.
     """
     k = np.sqrt(p.c2 / p.J1)
     scale = np.stack([np.ones_like(k), k, np.ones_like(k), k])
@@ -319,14 +319,14 @@ def _free(p: Cardan, x: Any, drive: Any, load: Any, monodromy: Any) -> Any:
     basis = np.repeat(np.eye(4)[None], len(k), axis=0)
     basis[:, :, 0] = along.T
     rotation, _ = np.linalg.qr(basis)
-    scaled = np.moveaxis(monodromy * scale[None] / scale[:, None], 2, 0)
-    rest = np.linalg.eigvals((np.swapaxes(rotation, 1, 2) @ scaled @ rotation)[:, 1:, 1:])
+    matrix = np.moveaxis(monodromy * scale[None] / scale[:, None], 2, 0)
+    rest = np.linalg.eigvals((np.swapaxes(rotation, 1, 2) @ matrix @ rotation)[:, 1:, 1:])
     return np.max(np.abs(rest), axis=1)
 
 
 def with_damping_ratio(p: Cardan, ratio: float) -> Cardan:
-    """The line with both shafts damped in proportion to their stiffness, so that the torsional vibration at i23 = 1
-    has the damping `ratio`: it keeps its shape, and 2 ratio k = (d/c) k^2."""
+    """The line with damping of both shafts in proportion to their stiffness, so that the torsional vibration at i23 =
+    1 has the damping `ratio`. The shape of the vibration stays the same, and 2 ratio k = (d/c) k^2."""
     k = float(frozen_frequency(numpy_(), p, 1.0))
     return dataclasses.replace(p, d2=2.0 * ratio * p.c2 / k, d3=2.0 * ratio * p.c3 / k)
 
@@ -335,54 +335,56 @@ class SimulatedPeaks(NamedTuple):
     """Peaks of the last half turns of a time simulation at n speeds."""
 
     speed: Any
-    """the mean speed that was reached [rad/s], (n,)"""
+    """mean speed over these half turns [rad/s], (n,)"""
     peak2: Any
     """largest elastic torque of shaft 2, either way [N.m], (n,)"""
     peak3: Any
 
 
 def settling_time(p: Cardan, share: float = 1e-3) -> float:
-    """Time [s] in which a torsional disturbance falls to `share` by the shafts' own damping; inf without any."""
+    """Time [s] in which a torsional disturbance falls to `share` by the damping of the shafts; inf without
+    damping."""
     rate = damping_ratio(p) * float(frozen_frequency(numpy_(), p, 1.0))
     return -math.log(share) / rate if rate > 0.0 else math.inf
 
 
 def damping_ratio(p: Cardan) -> float:
-    """Of the torsional vibration at i23 = 1, to first order in the damping: twist shares of both shafts, weighted."""
+    """Damping ratio of the torsional vibration at i23 = 1, to first order in the damping: both shafts are weighted by
+    their shares of the twist."""
     k = float(frozen_frequency(numpy_(), p, 1.0))
     soft2, soft3 = 1.0 / p.c2, 1.0 / p.c3
     return 0.5 * k * (p.d2 * soft2**2 + p.d3 * soft3**2) / (soft2 + soft3)
 
 
 def simulation_steps(p: Cardan, speed: Any, settle: float) -> float:
-    """Steps that `simulate` takes until all speeds have settled."""
+    """Number of steps of `simulate` until all speeds have settled."""
     speed = np.atleast_1d(np.asarray(speed, dtype=float))
-    counts, settled = half_turn_steps(expand(p, len(speed)), speed), _settled(speed, settle)
-    return float(np.max(np.ceil(settled * speed / math.pi) * counts))
+    counts, wait = half_turn_steps(expand(p, len(speed)), speed), _wait(speed, settle)
+    return float(np.max(np.ceil(wait * speed / math.pi) * counts))
 
 
-def _settled(speed: Any, settle: float) -> Any:
+def _wait(speed: Any, settle: float) -> Any:
     return np.maximum(settle, 50.0 * math.pi / speed)
 
 
 def simulate(
     p: Cardan, speed: Any, load: float, settle: float, half_turns: int = 2, progress: Progress = _nothing
 ) -> SimulatedPeaks:
-    """Time simulation at each mean `speed` [rad/s] from an untwisted start; peaks of the last `half_turns`, after
-    the time `settle` [s], or 50 half turns where that is longer.
+    """Time simulation at each mean `speed` [rad/s] from a start without twist; peaks of the last `half_turns`, after
+    the time `settle` [s], or 50 half turns if this is longer.
 
-    A soft PI control of the torque on J1 holds the mean speed. It sees the common speed of both inertias through a
-    low pass of two half turns, so that neither vibration nor ripple passes it.
+    A slow PI control of the torque on J1 holds the mean speed. It gets the common speed of both inertias through a
+    low pass of two half turns, which neither vibration nor ripple passes.
     """
     speed = np.atleast_1d(np.asarray(speed, dtype=float))
     n = len(speed)
     q = expand(p, n)
     period = math.pi / speed
     counts = half_turn_steps(q, speed)
-    settled = _settled(speed, settle)
+    wait = _wait(speed, settle)
     steps = int(simulation_steps(p, speed, settle))
     window = half_turns * counts
-    gain, slow = 10.0 / settled, 2.0 * period
+    gain, slow = 10.0 / wait, 2.0 * period
     h = period / counts
     inertia = p.J1 + p.J4
     equations = _LineRates(q, load, h, load)
@@ -415,20 +417,20 @@ def simulate(
 
 
 class RigidPeaks(NamedTuple):
-    """Largest torques of shafts 2 and 3 of the line without its elasticity [N.m], each (n,)."""
+    """Largest torques of shafts 2 and 3 of the line with rigid shafts [N.m], each (n,)."""
 
     peak2: Any
     peak3: Any
 
 
 def rigid(p: Cardan, speed: Any, load: float, points: int = 720) -> RigidPeaks:
-    """The same line with rigid shafts, by its energy: (J1 + i23^2 J4) w1^2/2 = E + M4 (phi1 - phi3)."""
+    """Peaks of the line with rigid shafts, by its energy: (J1 + i23^2 J4) w1^2/2 = E + M4 (phi1 - phi3)."""
     speed = np.atleast_1d(np.asarray(speed, dtype=float))[:, None]
     phi = np.linspace(0.0, math.pi, points, endpoint=False)
     phi3, i, slope = two_joints(numpy_(), p, phi)
     inertia = p.J1 + i * i * p.J4
     work = load * (phi - phi3)
-    # Newton for the time of half a turn, which falls with E and is convex: from below it never oversteps
+    # Newton's method for the time of half a turn, a falling and convex function of E: from below it never oversteps
     excess = np.full_like(speed, 0.5 * np.min(inertia)) * speed**2
     work = work - np.min(work)
     for _ in range(60):

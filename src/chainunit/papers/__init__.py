@@ -1,7 +1,7 @@
 """The papers, reproduced and corrected: a row for each printed number, and the curves of each figure.
 
 The tables are in ``data/papers``, one for each paper; the functions that compute their values are in the module of
-the paper. An error of a paper stands here and nowhere else, for comparison; the model has the corrected physics.
+the paper. The errors of the papers stand only here, for comparison; the models have the corrected physics.
 """
 
 from . import paper000, paper001, paper002, paper003

@@ -25,7 +25,7 @@ COLUMNS = (
 
 
 def table(rows: Sequence[PaperNumber], title: str = "") -> Table:
-    """The table of a paper's rows; in short those that the paper prints."""
+    """The table of a paper's rows; its short form has only the rows that the paper prints."""
     return Table(tuple(_cells(row) for row in rows), COLUMNS, (title,) if title else (), numeric=False)
 
 

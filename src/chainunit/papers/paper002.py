@@ -1,7 +1,7 @@
 """Paper 002: the cardan drive of a crusher's accelerator as a system of two masses.
 
-The paper prints formulas and conclusions, no numbers but the special case; the numbers here follow from its
-conclusions with J4 = 1000 J1, its own "several orders", and equal shafts.
+The paper prints formulas and conclusions, and no numbers except the special case. The numbers here follow from its
+conclusions with equal shafts and J4 = 1000 J1, its own "several orders".
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ def bent(alpha1: float, alpha2: float, gamma: float) -> float:
 
 def gain(name: str, value: float) -> float:
     """Item 5: the rise of the natural frequency with this value [%]."""
-    changed = dataclasses.replace(HEAVY, **{name: value})
-    return 100.0 * float(frozen_frequency(MATH, changed, 1.0) / frozen_frequency(MATH, HEAVY, 1.0) - 1.0)
+    line = dataclasses.replace(HEAVY, **{name: value})
+    return 100.0 * float(frozen_frequency(MATH, line, 1.0) / frozen_frequency(MATH, HEAVY, 1.0) - 1.0)
 
 
 def ratio_in_turn(pick: str) -> float:

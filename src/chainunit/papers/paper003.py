@@ -1,7 +1,7 @@
 """Paper 003: the forces in the class III group of the knife drive, as the paper solves it and as it must be.
 
-The paper prints equations, no dimensions and no results; the numbers here are those of its equations on the packaged
-machine, whose dimensions are ours.
+The paper prints equations, but no dimensions and no results. The numbers here follow from its equations on the
+packaged machine, whose dimensions are assumptions of this package.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def state(p: Any, angle: float, cut: float = 0.0) -> MachineState:
 
 
 def _acting(s: MachineState, *names: str) -> dict[str, Any]:
-    """What acts on each link at constant speed, of inertia and of the loads with these names."""
+    """The action on each link at constant speed, from its inertia and from the loads with these names."""
     w2, field = s.w * s.w, sum(s.effects[name].field for name in names)
     wrenches = (wrench for name in names for wrench in s.effects[name].wrenches)
     return add_wrenches({name: body.centrifugal(w2, field) for name, body in s.m.bodies.items()}, wrenches)
@@ -50,7 +50,7 @@ def as_the_paper(s: MachineState, line: float, *, cut: bool = True) -> Any:
     The part across each leg comes from the moment about its outer pin, the parts along the legs from three moments
     about C, D and E on the ternary link and a line equation for each direction. The constant of that equation is
     multiplied by `line`: 0 as it must be, 1 as printed with lengths in m, 1000 as printed with lengths in mm. Without
-    `cut` the force of the stack is left out, as in the print.
+    `cut` there is no force of the stack, as in the print.
     """
     m, acting = s.m, _acting(s, "weight", *(("cut",) if cut else ()))
     legs = [acting[leg] for leg in _LEGS]
@@ -77,7 +77,7 @@ def as_the_paper(s: MachineState, line: float, *, cut: bool = True) -> Any:
 
 
 def ours(s: MachineState) -> Any:
-    """The same forces as the model has them."""
+    """The same forces by the model."""
     reactions = s.steady.reactions
     return np.array([[reactions[joint].x, reactions[joint].y] for joint in zip(_PINS, _LEGS, strict=True)])
 
@@ -108,7 +108,7 @@ def across_at_e(arm_from: str) -> float:
     leg, body = s.m.links["leg_4"], s.m.bodies["leg_4"]
     force, moment = _acting(s, "weight")["leg_4"]
     if arm_from == "O3":
-        # of the length the paper names, along the leg
+        # an arm along the leg, of the length in the paper
         length = math.sqrt((body.c.p - s.m.links["leg_3"].pin.p).squared())
         moment += (leg.u * length - (body.c.p - leg.pin.p)).cross(force)
     return float(-moment / p.o4e)

@@ -12,7 +12,7 @@ import numpy as np
 from ..reading import packaged, toml
 
 PICK: dict[str, Callable[[Any], Any]] = {"least": np.min, "largest": np.max, "mean": np.mean}
-"""How a function takes one number of many, by the word in the table."""
+"""By the word in the table, the function that takes one number of many."""
 
 
 @dataclass(frozen=True)
@@ -20,8 +20,8 @@ class PaperNumber:
     """A number of a paper.
 
     `printed` is the paper's text, with its digits, or the value of its formula as printed (None: the paper does not
-    state it). `rebuilt` is the value by the paper's own scheme once its slips are put back, where that explains the
-    print. `digits` are decimals; -1 shows the order of magnitude alone.
+    state it). `rebuilt` is the value by the paper's own scheme with its slips, where these explain the printed
+    number. `digits` are decimals; -1 shows only the order of magnitude.
     """
 
     paper: str
@@ -39,7 +39,7 @@ class PaperNumber:
 
     @property
     def text(self) -> str:
-        """The computed value with as many decimals as are worth comparing."""
+        """The computed value with `digits` decimals."""
         return _text(self.computed, self.digits)
 
     @property
@@ -56,16 +56,16 @@ class PaperNumber:
 def rows(paper: str, functions: ModuleType) -> list[PaperNumber]:
     """The rows of a paper, in the order of its items.
 
-    The table has an ``[[item]]`` for each finding: its `number` in the list of errata, `where` in the paper it is,
-    `why` the verdict is given, and its `rows`. A row has
+    The table has an ``[[item]]`` for each finding: its `number` in the list of errata, the place in the paper
+    (`where`), the reason of the verdict (`why`), and its `rows`. A row has
 
-    ``quantity``, ``unit`` (``"1"`` where it is left out) and ``digits``;
+    ``quantity``, ``unit`` (by default ``"1"``) and ``digits``;
     ``computed``  name of a function of the paper's module, and its arguments;
-    ``printed``   the paper's text; or a function, for a formula that gives this value as it is printed;
+    ``printed``   the paper's text; or a function, for the value of a printed formula;
     ``rebuilt``   a function for the value by the paper's own scheme;
     ``below``, ``above``  the bound that a printed word such as "very small" stands for;
-    ``agrees``    where neither rounding nor a bound decides;
-    ``why``       in place of the item's.
+    ``agrees``    the verdict, where neither rounding nor a bound decides;
+    ``why``       a reason in place of the item's.
     """
     return [
         _row(paper, item, entry, functions)

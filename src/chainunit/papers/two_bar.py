@@ -1,7 +1,8 @@
 """The error of two rigid bars in place of a hanging chain: the loads at the rocker against the catenary, at rest.
 
-An organ of one mass per length, the wall as long as web and rocker arm together (l2 = l1 - e, as in the papers): its
-shape depends on mu = e/l1, zeta = z/z_max and the rocker angle psi alone, its loads on its weight.
+The organ has uniform mass per length, and its wall is as long as web and rocker arm together (l2 = l1 - e, as in the
+papers). So its shape depends only on mu = e/l1, zeta = z/z_max and the rocker angle psi, and its loads are
+proportional to its weight.
 """
 
 from __future__ import annotations
@@ -29,18 +30,17 @@ MU = tuple(np.round(np.arange(0.30, 0.801, 0.05), 2))
 ZETA = tuple(np.round(np.arange(0.15, 0.951, 0.05), 2))
 PSI = tuple(math.radians(x) for x in (-12.0, -6.0, 0.0, 6.0, 12.0))
 LIMITS = (0.02, 0.05, 0.10)
-"""Errors in parts of the weight up to which two bars are said to be good."""
+"""Largest errors in parts of the weight with which two bars count as good."""
 _LEVELS = (0.0, 2.0, 5.0, 10.0, 1000.0)
 _CLASSES = ("below 2 % of the weight", "2 to 5 %", "5 to 10 %", "above 10 %")
-_SHOWN = 2
-"""every so many values of mu and zeta are in the tables"""
+_STRIDE = 2
+"""The tables have every second value of mu and zeta."""
 
 
 @dataclass(frozen=True)
 class TwoBarError:
-    """Errors of the loads R_t and R_n by two bars, less those of the catenary, in parts of the organ's weight [1]:
-    shape (mu, zeta, psi); NaN where one of the two does not hang. `load_t` is the catenary's R_t in the same
-    parts."""
+    """The loads R_t and R_n by two bars less those of the catenary, in parts of the organ's weight [1], shape
+    (mu, zeta, psi); NaN where one of the two does not hang. `load_t` is R_t of the catenary in the same parts."""
 
     mu: Any
     zeta: Any
@@ -56,7 +56,7 @@ class TwoBarError:
         return np.max(np.maximum(np.abs(self.error_t), np.abs(self.error_n)), axis=2)
 
     def good(self, limit: float) -> Any:
-        """Where the error stays below the limit at every rocker angle, shape (mu, zeta)."""
+        """Whether the error stays below the limit at every rocker angle, shape (mu, zeta)."""
         return self.largest < limit
 
     def good_zeta(self, limit: float) -> list[list[tuple[float, float]]]:
@@ -72,7 +72,7 @@ def loads(mu: float, zeta: float, psi: float, counts: tuple[int, int] | None) ->
     Raises
     ------
     GeometryError
-        where it does not hang.
+        where the organ does not hang.
     """
     wall, web = 1.0, 1.0 - mu
     reach = (zeta * 2.0 * math.sqrt(1.0 - mu) + mu * math.sin(psi), -mu * math.cos(psi))
@@ -91,20 +91,20 @@ def two_bar_error(
     zeta: tuple[float, ...] = ZETA,
     psi: tuple[float, ...] = PSI,
 ) -> TwoBarError:
-    """Compare over the grid; `progress` gets the share that is done."""
-    found = np.full((3, len(mu), len(zeta), len(psi)), np.nan)
+    """Compare bars and catenary over the grid; `progress` is called with the completed share of the grid."""
+    errors = np.full((3, len(mu), len(zeta), len(psi)), np.nan)
     for i, m in enumerate(mu):
         progress(i / len(mu))
         for (j, z), (k, angle) in itertools.product(enumerate(zeta), enumerate(psi)):
             with contextlib.suppress(GeometryError):
                 bars, chain = loads(m, z, angle, (1, 1)), loads(m, z, angle, None)
-                found[:, i, j, k] = bars[0] - chain[0], bars[1] - chain[1], chain[0]
+                errors[:, i, j, k] = bars[0] - chain[0], bars[1] - chain[1], chain[0]
     progress(1.0)
-    return TwoBarError(np.array(mu), np.array(zeta), np.array(psi), *found)
+    return TwoBarError(np.array(mu), np.array(zeta), np.array(psi), *errors)
 
 
 def statement(comparison: TwoBarError) -> list[str]:
-    """Where two bars are good enough, in words."""
+    """Sentences on the range in which two bars are good enough."""
     lines = []
     both_hang = np.isfinite(comparison.largest)
     for limit in LIMITS:
@@ -170,11 +170,11 @@ def report(comparison: TwoBarError) -> Report:
 
 def _table(comparison: TwoBarError) -> Table:
     """The larger error over the rocker angles."""
-    columns = [Column(("mu \\ zeta",)), *(Column((f"{z:.2f}",)) for z in comparison.zeta[::_SHOWN])]
-    errors = comparison.largest[::_SHOWN, ::_SHOWN]
+    columns = [Column(("mu \\ zeta",)), *(Column((f"{z:.2f}",)) for z in comparison.zeta[::_STRIDE])]
+    errors = comparison.largest[::_STRIDE, ::_STRIDE]
     rows = [
         TableRow(((f"{m:.2f}",), *((f"{100.0 * x:.1f}" if np.isfinite(x) else "-",) for x in row)))
-        for m, row in zip(comparison.mu[::_SHOWN], errors, strict=True)
+        for m, row in zip(comparison.mu[::_STRIDE], errors, strict=True)
     ]
     title = (
         "Largest error of R_t and R_n by two bars, % of the organ's weight, rocker within "
