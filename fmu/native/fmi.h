@@ -1,5 +1,6 @@
-/* What FMI 2.0 and 3.0 have in common, over runtime.c. The file that includes it gives FMI(), the name of a function by
- * its name in FMI 3.0, and the types Result, Handle, Boolean, Memory, Byte and Text of its version. Names no model. */
+/* The common functions of FMI 2.0 and 3.0, on top of runtime.c. The including file defines FMI(), the name of a
+ * function by its name in FMI 3.0, and the types Result, Handle, Boolean, Memory, Byte and Text of its version. This file names
+ * no model. */
 
 #define INSTANCE ((Instance *)c)
 #define NEED(modes) \
@@ -8,8 +9,8 @@
     if (!(condition)) return (Result)complain(INSTANCE, ERROR, "%s: %s", __func__, what)
 #define NOT_NULL(pointer) CHECK(pointer, "null argument")
 
-/* A new instance, or NULL where the host has another FMU in mind: `identifier` is what the host calls it, `own` what it
- * is, by the word for it. */
+/* A new instance, or NULL where the host means another FMU: `identifier` is the host's identifier, `own` that of this
+ * FMU, and `word` the name of this identifier in messages. */
 static Instance *instantiate(const char *name, const char *word, const char *identifier, const char *own,
                              int model_exchange, void *environment, void (*log)(void)) {
     Instance *c = instance_new(name && *name ? name : model.name, report);

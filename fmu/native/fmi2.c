@@ -1,8 +1,8 @@
-/* FMI 2.0, Co-Simulation and Model Exchange, over runtime.c. Names no model. */
+/* FMI 2.0, Co-Simulation and Model Exchange, on top of runtime.c. This file names no model. */
 #include "fmi2Functions.h"
 #include "runtime.c"
 
-/* there are headers about that leave the prefix out */
+/* some headers omit the prefix */
 #ifdef FMI2_FUNCTION_PREFIX
 #undef fmi2FullName
 #define fmi2FullName(name) CHAINUNIT_JOIN(FMI2_FUNCTION_PREFIX, name)
@@ -11,7 +11,7 @@
 static void report(const Instance *c, Status status, const char *message) {
     const fmi2CallbackLogger log = (fmi2CallbackLogger)c->log;
     if (!log) return;
-    /* the message is a format to the host, but not every host takes it as one: no arguments, and no stray % */
+    /* the message is a format, but not every host treats it as one: it has no arguments and no single % */
     char format[1400];
     size_t n = 0;
     for (; *message && n + 3 < sizeof format; ++message) {
@@ -49,7 +49,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     (void)visible;
     (void)logging;
     if (!functions) return NULL;
-    /* the host may give up the structure after this call */
+    /* the host may free the structure after this call */
     return instantiate(name, "GUID", guid, model.guid, type == fmi2ModelExchange, functions->componentEnvironment,
                        (void (*)(void))functions->logger);
 }
@@ -149,7 +149,7 @@ fmi2Status fmi2CancelStep(fmi2Component c) {
     return (fmi2Status)complain(INSTANCE, ERROR, "%s: steps are not asynchronous", __func__);
 }
 
-/* What a host may ask of a step: `known` is what there is. */
+/* The functions for the status of a step: `known` is the only kind of status that this FMU has. */
 #define GET_STATUS(name, type, known, answer)                                                                     \
     fmi2Status name(fmi2Component c, const fmi2StatusKind kind, type *value) {                                    \
         NEED(ANY);                                                                                                \

@@ -1,4 +1,4 @@
-/* FMI 3.0, Co-Simulation and Model Exchange, over runtime.c. Names no model. */
+/* FMI 3.0, Co-Simulation and Model Exchange, on top of runtime.c. This file names no model. */
 #include "fmi3Functions.h"
 #include "runtime.c"
 

@@ -1,15 +1,15 @@
 /* The seam between the generated model and the FMI layers.
  *
- * A model fills one `Model`; it names no FMI function. The FMI files see nothing but this header and
- * runtime.h; they name no model. Values are doubles throughout, in the order parameters, inputs, states,
- * outputs, derivatives of the states, time; a value reference is the place in that order.
+ * A model fills one `Model`; it names no FMI function. The FMI files include only this header and runtime.c; they name
+ * no model. All values are doubles, in the order parameters, inputs, states, outputs, derivatives of the states, time;
+ * a value reference is the place in that order.
  */
 #ifndef CHAINUNIT_MODEL_H
 #define CHAINUNIT_MODEL_H
 
-/* What several files of an FMU know by name. Where the FMI functions have a prefix, so that one program can hold
- * several FMUs, the names have it, too, and the version of FMI: a program may hold a model in both. All else is
- * static. */
+/* The names that several files of an FMU share. The FMI functions may have a prefix, so that one program can hold
+ * several FMUs. Then these names have the prefix, too, and the version of FMI, as a program may hold a model in both
+ * versions. All other names are static. */
 #define CHAINUNIT_PASTE(a, b) a##b
 #define CHAINUNIT_JOIN(a, b) CHAINUNIT_PASTE(a, b)
 #if defined FMI2_FUNCTION_PREFIX && defined FMI3_FUNCTION_PREFIX
@@ -24,7 +24,7 @@
 #define model CHAINUNIT_NAME(model)
 #define kernels CHAINUNIT_NAME(kernels)
 
-/* For a library that runs with glibc 2.17: a newer one links these in versions of its own. */
+/* For a library that runs with glibc 2.17: a newer glibc would link newer versions of these functions. */
 #if defined CHAINUNIT_OLD_GLIBC && defined __GNUC__ && defined __linux__
 #include <math.h>
 #if defined __GLIBC__ && defined __x86_64__
@@ -43,13 +43,14 @@ CHAINUNIT_OLD(log2);
 CHAINUNIT_OLD(pow);
 #endif
 
-/* A host that compiles the sources shows every name by default; ours must not meet those of libc or of another FMU. */
+/* In a host that compiles the sources every name is visible by default; these names must not meet those of libc or of
+ * another FMU. */
 #if defined __GNUC__ && !defined _WIN32
 #pragma GCC visibility push(hidden)
 #endif
 
-/* A function on (p, u, x, k) or other arguments; k is what `derive` found. It has memory `w` for `n_w` numbers, and a bit
- * for each group of results that is wanted: only these are computed and written. */
+/* A function of (p, u, x, k) or other arguments; k are the results of `derive`. It has memory `w` for `n_w` numbers,
+ * and computes and writes only the groups of results whose bits are set in `wanted`. */
 typedef void (*Kernel)(const double *const *arg, double *res, double *w, unsigned wanted);
 
 typedef struct {
@@ -57,17 +58,17 @@ typedef struct {
     const char *unit;
     const char *allowed; /* the bounds in words */
     double low, high;
-    double slack; /* a value that is beyond a bound by no more counts as the bound */
+    double slack; /* a value that exceeds a bound by no more than this counts as the bound */
     int open_low; /* low itself is forbidden */
     int tunable;  /* may change in a run */
 } Quantity;
 
-/* Outputs that are evaluated together, once per state, when one of them is asked for. */
+/* Outputs that are evaluated together, once per state, when one of them is read. */
 typedef struct {
     int first, count; /* places among the outputs as they are stored */
 } Group;
 
-/* What parameters must meet beyond their own bounds: value between two limits. */
+/* A condition on the parameters beyond their own bounds: a value between two limits. */
 typedef struct {
     const char *subject, *unit, *why, *remedy;
     int n_given;
@@ -80,14 +81,14 @@ typedef struct {
     Kernel forward;             /* (p, u, x, du, dx, k) -> directional derivatives of outputs, by groups, and of `derivatives` */
     Kernel requirements;        /* (p, k) -> value, low, high of each */
     Kernel start_limits;        /* (p, u, x, k) -> value, low, high of each, at the start */
-    Kernel derive;              /* (p) -> what follows from fixed parameters and is computed once */
-    Kernel guess;               /* (p, u) -> first guess z of what the start is found from */
+    Kernel derive;              /* (p) -> values that follow from fixed parameters, computed once */
+    Kernel guess;               /* (p, u) -> first guess z of the unknowns of the start */
     Kernel improved;            /* (p, u, z) -> z after one more round */
     Kernel initial;             /* (p, u, z) -> states at the start */
     Kernel derivatives;         /* (p, u, x, k) */
     Kernel internal_step;       /* (p) -> longest step of the internal integrator [s] */
-    Kernel tolerance;           /* (p) -> its relative tolerance, where it controls its error */
-    Kernel closed;              /* (p, u, x, k) -> states that meet the constraints; after each of its steps */
+    Kernel tolerance;           /* (p) -> relative tolerance of an integrator with error control */
+    Kernel closed;              /* (p, u, x, k) -> states that meet the constraints; called after each step of it */
 } Kernels;
 
 typedef struct {

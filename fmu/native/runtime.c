@@ -1,4 +1,4 @@
-/* An instance of the model, for any FMI version, which includes this file. Names neither. */
+/* An instance of the model. The file of an FMI version includes this file, which names no model and no FMI version. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdint.h>
@@ -28,25 +28,25 @@ typedef void (*Report)(const Instance *instance, Status status, const char *mess
 struct Instance {
     Mode mode;
     int model_exchange;
-    double time, stop; /* the last that is allowed, with what rounding adds to it */
-    /* one block: parameters, inputs, their derivatives, states, derived from parameters, derivatives, outputs, work */
-    double *block, *p, *u, *du, *x, *k, *dx, *y, *work, *w; /* w: of the kernels */
+    double time, stop; /* stop: the last admissible time, with an allowance for rounding */
+    /* one block: parameters, inputs, their derivatives, states, derived values, derivatives, outputs, work */
+    double *block, *p, *u, *du, *x, *k, *dx, *y, *work, *w; /* w: memory of the kernels */
     size_t block_size;
     unsigned n_references;
-    unsigned *slot, *needs; /* of each value reference: place in the block, and what must be evaluated for it */
-    unsigned fresh;         /* a bit per group of outputs; the highest for the derivatives */
-    int changed;    /* parameters or inputs set since the states were started */
+    unsigned *slot, *needs; /* by value reference: place in the block, and the groups to evaluate for it */
+    unsigned fresh;         /* a bit per group of outputs; the highest bit for the derivatives */
+    int changed;    /* parameters or inputs were set after the start of the states */
     int doubtful;   /* an input was set to a value out of its bounds */
-    int closed;     /* the states meet the constraints at the present inputs, as the last step left them */
-    int spent;      /* the derivatives of the inputs were those of the last step: the next one has its own */
-    double pace;    /* what the integrator that controls its error would step next [s]; 0 not known */
+    int closed;     /* the states meet the constraints at the present inputs: the last step closed them */
+    int spent;      /* the derivatives of the inputs belong to the last step, and the next step needs new ones */
+    double pace;    /* next step of the integrator with error control [s]; 0: unknown */
     char *name;
     Report report;
-    void (*log)(void); /* the host's, and what it wants to be told with it */
+    void (*log)(void); /* the logger of the host, and the argument that it gets */
     void *environment;
 };
 
-/* bits of `needs` and `fresh` beside those of the groups */
+/* bits of `needs` and `fresh` in addition to those of the groups */
 enum { STARTED_BIT = 30, DERIVATIVES_BIT = 31 };
 
 static void instance_free(Instance *c) {
@@ -119,7 +119,7 @@ static Instance *instance_new(const char *name, Report report) {
 
 /* -- messages */
 
-/* Add to a text, as printf's %s, %d, %u and %g do, but with a decimal point in any locale of the host. */
+/* Append to a text like printf with %s, %d, %u and %g, but with a decimal point in any locale of the host. */
 static void append_list(char *text, size_t room, const char *format, va_list list) {
     size_t at = strlen(text);
     for (; *format && at + 1 < room; ++format) {
@@ -156,7 +156,7 @@ static void append(char *text, size_t room, const char *format, ...) {
     va_end(list);
 }
 
-/* Say what is wrong, in one line, and hand the status on. */
+/* Report a fault in one line, and return the status. */
 static Status complain(Instance *c, Status status, const char *format, ...) {
     char message[640] = "";
     va_list list;
@@ -167,7 +167,7 @@ static Status complain(Instance *c, Status status, const char *format, ...) {
     return status;
 }
 
-/* Whether there is an instance, in one of the modes; else ERROR, with the name of the call. */
+/* OK for an instance in one of the modes; else ERROR, reported with the name of the call. */
 static Status expect(Instance *c, int modes, const char *call) {
     if (!c) return ERROR;
     if (c->mode & modes) return OK;
@@ -188,7 +188,7 @@ static Status set_time(Instance *c, const char *which, double time) {
     return OK;
 }
 
-/* Integrators look beyond the stop time before they interpolate; a step that they take must not end there. */
+/* Integrators evaluate beyond the stop time before they interpolate, but a complete step must not end there. */
 static Status step_taken(Instance *c) {
     if (c->time <= c->stop) return OK;
     return complain(c, ERROR, "time = %g s: must be <= %g s, the stop time", c->time, c->stop);
@@ -202,7 +202,7 @@ static Status set_experiment(Instance *c, double time, int has_stop, double stop
 }
 
 static int all_finite(const double *v, int n) {
-    /* an infinite or undefined value makes its sum undefined; four sums, so that none waits for another */
+    /* an infinite or undefined value makes its sum undefined; four sums run in parallel */
     double sum[4] = {0.0, 0.0, 0.0, 0.0};
     int i = 0;
     for (; i + 4 <= n; i += 4)
@@ -211,7 +211,7 @@ static int all_finite(const double *v, int n) {
     return sum[0] + sum[1] + sum[2] + sum[3] == 0.0;
 }
 
-/* -- bounds; the rule is that of quantities.py */
+/* -- bounds, by the same rule as in quantities.py */
 
 static int admitted(const Quantity *q, double v) {
     return isfinite(v) && (q->open_low ? v > q->low : v >= q->low - q->slack) && v <= q->high + q->slack;
@@ -226,7 +226,7 @@ static Status refuse(Instance *c, Status status, const char *where, int i, doubl
     return complain(c, status, "%s" VALUE, where, q->name, v, q->unit, isfinite(v) ? q->allowed : finite);
 }
 
-/* Inputs may be set one by one: they are judged by the first call that computes with them. */
+/* Inputs may be set one by one: the first call that computes with them checks them. */
 static Status judge_inputs(Instance *c) {
     if (!c->doubtful) return OK;
     for (int i = model.n_p; i < model.n_p + model.n_u; ++i)
@@ -237,7 +237,7 @@ static Status judge_inputs(Instance *c) {
 
 /* -- start */
 
-/* Whether each value lies between its limits; refuses the first that does not, in one line. */
+/* Check that each value lies between its limits; the first that does not is refused, in one line. */
 static Status meets(Instance *c, const Requirement *required, int n, const double *found) {
     for (int i = 0; i < n; ++i) {
         const Requirement *r = &required[i];
@@ -267,11 +267,11 @@ static Status check(Instance *c) {
     if (!model.n_required) return OK;
     kernels.requirements(arg, c->work, c->w, 1u);
     Status status = meets(c, model.required, model.n_required, c->work);
-    if (status) memset(c->k, 0, (size_t)model.n_k * sizeof(double)); /* nothing that is not finite stays behind */
+    if (status) memset(c->k, 0, (size_t)model.n_k * sizeof(double)); /* so that no infinite value remains */
     return status;
 }
 
-/* The states at the start with the parameters `p` and inputs `u`; `work` has room for twice what they are found from. */
+/* The states at the start with the parameters `p` and inputs `u`; `work` has room for twice the unknowns of the start. */
 static void solve_start(const Instance *c, const double *p, const double *u, double *work, double *x) {
     double *z = work, *next = z + model.n_z;
     const double *arg[3] = {p, u, z};
@@ -313,7 +313,7 @@ static Status unknown_reference(Instance *c, unsigned reference) {
     return complain(c, ERROR, NO_REFERENCE, reference);
 }
 
-/* Evaluate the groups in the set `wanted`, a bit each, where they are not fresh. */
+/* Evaluate the groups of the bits in `wanted` that are not fresh. */
 static Status evaluate(Instance *c, unsigned wanted) {
     wanted &= ~c->fresh;
     if (!wanted) return OK;
@@ -328,7 +328,7 @@ static Status evaluate(Instance *c, unsigned wanted) {
 }
 
 static Status derivatives(Instance *c) {
-    /* what was set since decides where the states start */
+    /* values that were set in the meantime change the start of the states */
     Status status = c->mode == INITIALIZATION ? start(c) : OK;
     if (!status) status = judge_inputs(c);
     if (status || !model.n_x || (c->fresh >> DERIVATIVES_BIT)) return status;
@@ -347,7 +347,7 @@ static Status get(Instance *c, const unsigned *reference, size_t n, double *valu
         needs |= c->needs[reference[k]];
     }
     if (needs) {
-        /* before the states are started there is nothing to show but parameters and inputs */
+        /* before the start of the states only parameters and inputs have values */
         if (c->mode == INSTANTIATED) return complain(c, ERROR, "outputs cannot be read before initialization");
         Status status = c->mode == INITIALIZATION ? start(c) : OK;
         if (!status) status = evaluate(c, needs & ((1u << STARTED_BIT) - 1u));
@@ -359,7 +359,7 @@ static Status get(Instance *c, const unsigned *reference, size_t n, double *valu
     return OK;
 }
 
-/* Outputs at the end of a step go on along its inputs; what is set after it begins the next step, in any order. */
+/* After a step the outputs continue along its inputs. The first input that is set after it begins the next step. */
 static void begin_inputs(Instance *c) {
     if (c->spent) memset(c->du, 0, (size_t)model.n_u * sizeof(double));
     c->spent = 0;
@@ -417,7 +417,7 @@ static Status states_get(Instance *c, const double *from, double *to, size_t n, 
 
 /* -- derivatives of outputs */
 
-/* How far to go along a direction for a difference: little against inputs and states of the size of 1 and more. */
+/* The distance along a direction for a difference: small against inputs and states of the size of 1 and more. */
 static double reach(const Instance *c, const double *du, const double *dx) {
     double steepest = 0.0;
     for (int i = 0; i < model.n_u + model.n_x; ++i) {
@@ -428,7 +428,7 @@ static double reach(const Instance *c, const double *du, const double *dx) {
     return steepest > 0.0 ? 1e-5 / steepest : 1.0;
 }
 
-/* The directional derivative of a group without a kernel for it, of relative error 1e-9 or so: outputs on both sides. */
+/* The directional derivative of a group without a kernel for it, by central differences, relative error about 1e-9. */
 static void differences(Instance *c, int group, const double *du, const double *dx, double *dy) {
     const int n_u = model.n_u, n_x = model.n_x;
     const Group *g = &model.groups[group];
@@ -443,7 +443,7 @@ static void differences(Instance *c, int group, const double *du, const double *
     for (int i = g->first; i < g->first + g->count; ++i) dy[i] = (dy[i] - other[i]) / (2.0 * distance);
 }
 
-/* In initialization the states move with the inputs: what they move by, added to the seeds `dx` of their own. */
+/* In initialization the states depend on the inputs: add their derivatives along `du` to their own seeds `dx`. */
 static void start_moves(const Instance *c, const double *du, double *dx, double *work) {
     const int n_u = model.n_u, n_x = model.n_x;
     double *u = work, *far = u + n_u, *near = far + n_x, *more = near + n_x, distance;
@@ -464,14 +464,14 @@ static Status no_derivative(Instance *c) {
     return complain(c, ERROR, "directional derivative is not a finite number at t = %g s", c->time);
 }
 
-/* In initialization all follows from the parameters, too: the derivatives of unknowns along the directions of
- * parameters, inputs and states at the begin of `work`, by differences of the whole model. */
+/* In initialization all unknowns depend on the parameters, too: their derivatives along the directions of parameters,
+ * inputs and states at the begin of `work`, by differences of the whole model. */
 static Status along_start(Instance *c, const unsigned *unknown, size_t n_unknown, double *sensitivity) {
     const int n_p = model.n_p, n = n_p + model.n_u, n_x = model.n_x, n_y = model.n_y;
     const double *dp = c->work, *du = dp + n_p, *dx = du + model.n_u;
     double *p = c->work + n + n_x, *u = p + n_p, *k = p + n, *far = k + model.n_k, *near = far + 2 * n_x + n_y;
     double *more = near + 2 * n_x + n_y, distance = reach(c, du, dx);
-    /* parameters are of any size */
+    /* parameters may have any size */
     for (int i = 0; i < n_p; ++i) {
         const double most = 1e-5 * (c->p[i] == 0.0 ? 1.0 : fabs(c->p[i]));
         if (fabs(dp[i]) * distance > most) distance = most / fabs(dp[i]);
@@ -504,7 +504,7 @@ static Status along(Instance *c, const unsigned *unknown, size_t n_unknown, doub
     const double *arg[6] = {c->p, c->u, c->x, du, dx, c->k};
     unsigned wanted = 0;
     for (size_t k = 0; k < n_unknown; ++k) {
-        /* below the first, the difference of the unsigned numbers is a large one */
+        /* for a reference below the first one the unsigned difference is a large number */
         const unsigned place = unknown[k] - (unsigned)(model.n_p + model.n_u);
         if (place >= (unsigned)(2 * model.n_x + model.n_y)) return no_output(c, unknown[k]);
         const int i = (int)place - model.n_x;
@@ -515,7 +515,7 @@ static Status along(Instance *c, const unsigned *unknown, size_t n_unknown, doub
         if (wanted & model.differenced & 1u << g) differences(c, g, du, dx, dy);
     for (size_t k = 0; k < n_unknown; ++k) {
         const int place = (int)(unknown[k] - (unsigned)(model.n_p + model.n_u)), i = place - model.n_x;
-        /* the derivatives of the states stand behind the outputs */
+        /* the derivatives of the states follow the outputs */
         sensitivity[k] = i < 0 ? dx[place] : dy[i < model.n_y ? model.place[i] : i];
         if (!isfinite(sensitivity[k])) return no_derivative(c);
     }
@@ -544,7 +544,7 @@ static Status forward(Instance *c, const unsigned *unknown, size_t n_unknown, co
     return along(c, unknown, n_unknown, sensitivity);
 }
 
-/* The time derivative of an input: as the host gave it, else the input that the model declares to be it. */
+/* The time derivative of an input: the one of the host, or else the input that the model declares as its derivative. */
 static double input_rate(const Instance *c, int i) {
     if (c->du[i] != 0.0) return c->du[i];
     return model.rate_of[i] < 0 ? 0.0 : c->u[model.rate_of[i]];
@@ -562,9 +562,9 @@ static Status output_derivatives(Instance *c, const unsigned *reference, size_t 
     return along(c, reference, n, value);
 }
 
-/* -- co-simulation; inputs run along their derivatives, to the end of the step */
+/* -- co-simulation; inputs follow their derivatives to the end of the step */
 
-/* Inputs on their way through a step: `at` are those of the moment. */
+/* The course of the inputs in a step: `at` are their values at the present moment. */
 typedef struct {
     double *at;
     const double *rate, *half; /* first derivative, and half of the second */
@@ -599,7 +599,7 @@ static Status over_budget(Instance *c, double time, double size) {
     return complain(c, DISCARD, OVER_BUDGET, size, time, name, most_steps(c), name);
 }
 
-/* The classical Runge-Kutta method with equal steps, its cost known beforehand. */
+/* The classical Runge-Kutta method with equal steps, whose number is known in advance. */
 static Status even_steps(Instance *c, double time, double size, const Course *u, double *work) {
     const int n_x = model.n_x;
     double *x = work, *k = x + n_x, *later = k + n_x, *at = later + n_x;
@@ -622,7 +622,7 @@ static Status even_steps(Instance *c, double time, double size, const Course *u,
     return OK;
 }
 
-/* Put the states, in `x`, where the constraints are met at `since`. */
+/* Change the states `x` so that they meet the constraints at the time `since`. */
 static int close_states(Instance *c, const Course *u, double since, double *x, double *spare) {
     run_to(c, u, since);
     const double *arg[4] = {c->p, u->at, x, c->k};
@@ -632,7 +632,7 @@ static int close_states(Instance *c, const Course *u, double since, double *x, d
     return 1;
 }
 
-/* The pair of Dormand and Prince of orders 5 and 4, its error controlled to the model's tolerance, the constraints
+/* The pair of Dormand and Prince of orders 5 and 4, with error control to the model's tolerance; the constraints are
  * closed after each step. */
 static Status controlled_steps(Instance *c, double time, double size, const Course *u, double *work) {
     const int n_x = model.n_x;
@@ -646,7 +646,7 @@ static Status controlled_steps(Instance *c, double time, double size, const Cour
     while (since < size) {
         if ((double)++taken > most_steps(c)) return over_budget(c, time, size);
         const double left = size - since;
-        /* no tiny rest: what is left is taken in one step or in two alike */
+        /* the rest of the interval takes one step or two equal ones, so that no tiny step remains */
         const double h = pace >= left ? left : pace > 0.5 * left ? 0.5 * left : pace;
         int usable = 1;
         for (int s = 0; s < 7 && usable; ++s) {
@@ -674,7 +674,7 @@ static Status controlled_steps(Instance *c, double time, double size, const Cour
         }
         const double growth = !usable ? LEAST_GROWTH : error < NO_ERROR ? MOST_GROWTH : SAFETY * pow(error, ERROR_POWER);
         double next = h * (growth < LEAST_GROWTH ? LEAST_GROWTH : growth > MOST_GROWTH ? MOST_GROWTH : growth);
-        /* a step that was cut short by the end says nothing against a longer one */
+        /* a step that the end of the interval shortened does not shorten the next one */
         if (usable && error <= 1.0 && h < pace && next < pace) next = pace;
         pace = next > longest ? longest : next < SHORTEST * longest ? SHORTEST * longest : next;
     }
@@ -725,12 +725,12 @@ static Status step(Instance *c, double time, double size) {
 
 /* -- model exchange */
 
-/* What a state may lie off the constraints, in parts of the integrator's tolerance, before an event corrects it: much,
- * as an importer's solver begins anew after each event, and errs more by that than by a small drift. */
+/* Largest distance of a state from the constraints, in parts of the integrator's tolerance, before an event corrects
+ * it. It is large, since an importer's solver starts anew after each event, with a larger error than a small drift. */
 #define OFF_MOST 1e3
 
-/* The states that meet the constraints, in `work`; the largest correction in parts of `tolerance` and the size of the
- * state, or NaN where there are none. */
+/* Write the states that meet the constraints to `work`; returns the largest correction in parts of `tolerance` and the
+ * size of the state, or NaN where there are no such states. */
 static double off(Instance *c) {
     const double tolerance = number(kernels.tolerance, c), *arg[4] = {c->p, c->u, c->x, c->k};
     double most = 0.0;
@@ -744,7 +744,7 @@ static double off(Instance *c) {
     return most;
 }
 
-/* Whether the states have drifted off the constraints, and an event is to correct them. */
+/* Whether the states have drifted off the constraints so far that an event has to correct them. */
 static int drifted(Instance *c) { return kernels.closed && off(c) > OFF_MOST; }
 
 /* At the end of a step of the importer's integrator. */
@@ -755,7 +755,7 @@ static Status completed(Instance *c, int *enter_event) {
     return OK;
 }
 
-/* Correct them, and say whether that moved a state. */
+/* Correct the states; `moved` tells whether a state changed. */
 static Status project(Instance *c, int *moved) {
     *moved = 0;
     if (step_taken(c)) return ERROR;
@@ -764,7 +764,7 @@ static Status project(Instance *c, int *moved) {
     for (int round = 0; round < 4; ++round) {
         const double share = off(c);
         if (isnan(share)) return complain(c, ERROR, "no states near these meet the constraints at t = %g s", c->time);
-        /* below it the correction would cost the importer a new start and gain nothing */
+        /* a correction below the tolerance would only cost the importer a new start */
         if (share <= 1.0) break;
         memcpy(c->x, c->work, (size_t)model.n_x * sizeof(double));
         c->fresh = 0;
@@ -776,8 +776,8 @@ static Status project(Instance *c, int *moved) {
 /* -- saved states */
 
 typedef struct {
-    uint64_t sum;   /* of all that follows: any flipped bit changes it */
-    uint64_t guard; /* of the model in its version: a state of another one is refused */
+    uint64_t sum;   /* checksum of all that follows: any flipped bit changes it */
+    uint64_t guard; /* checksum of the model and its version: a state of another one is refused */
     int mode, model_exchange, closed, spent;
     double time, stop, pace;
 } Saved;
@@ -788,7 +788,7 @@ static uint64_t guard(void) {
     return h;
 }
 
-/* FNV-1a by words of 8 bytes: each step maps different sums to different ones, so that a change in one word shows. */
+/* FNV-1a by words of 8 bytes: each step maps different sums to different sums, so that a change of one word is seen. */
 static uint64_t sum_of(const void *memory, size_t size) {
     uint64_t h = 14695981039346656037u, word;
     for (size_t at = sizeof word; at < size; at += sizeof word) {
@@ -798,7 +798,7 @@ static uint64_t sum_of(const void *memory, size_t size) {
     return h;
 }
 
-/* parameters, inputs and their derivatives, states and what is derived: what follows from them is evaluated anew */
+/* size of the saved values: parameters, inputs and their derivatives, states, derived values; others are recomputed */
 static size_t kept(const Instance *c) { return (size_t)(c->dx - c->block); }
 
 static size_t state_size(const Instance *c) { return sizeof(Saved) + kept(c) * sizeof(double); }
@@ -809,7 +809,7 @@ static Status state_check(Instance *c, const void *memory) {
     if (saved.guard != guard() || saved.model_exchange != c->model_exchange)
         return complain(c, ERROR, STATE, STATE_OF_ANOTHER);
     if (saved.sum != sum_of(memory, state_size(c))) return complain(c, ERROR, STATE, STATE_DAMAGED);
-    /* what a host wrote itself */
+    /* a host may have written the state itself */
     double *values = c->work;
     memcpy(values, (const char *)memory + sizeof saved, kept(c) * sizeof(double));
     const int mode = saved.mode;
@@ -817,7 +817,7 @@ static Status state_check(Instance *c, const void *memory) {
         return complain(c, ERROR, "saved state: the mode in it, %d, does not exist", mode);
     if (!isfinite(saved.time) || isnan(saved.stop) || !(saved.pace >= 0.0) || !all_finite(values, (int)kept(c)))
         return complain(c, ERROR, "saved state: a number in it is not finite, or its internal step is negative");
-    /* before the run, `start` judges them */
+    /* before the run, `start` checks the parameters */
     for (int i = 0; i < model.n_p && mode > INITIALIZATION; ++i)
         if (!admitted(&model.declared[i], values[i])) return refuse(c, ERROR, "saved state: ", i, values[i]);
     return OK;
