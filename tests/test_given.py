@@ -18,7 +18,7 @@ from chainunit.report.study import report
 from chainunit.study import remarks
 from chainunit.study.choice import choose
 from chainunit.study.config import load, parse
-from chainunit.study.given import given
+from chainunit.study.given import given_sections
 from chainunit.study.measures import Answers
 from chainunit.study.parts import example
 from chainunit.study.record import StudyRecord
@@ -76,7 +76,7 @@ def test_the_ratio_is_shown_that_is_used(tmp_path):
     """Without one of its own, the gear has the ratio at which the crank has its speed: no start value beside it."""
 
     def shown(text):
-        return {name for section in given(study_of(parse(text), tmp_path)) for name in section.names}
+        return {name for section in given_sections(study_of(parse(text), tmp_path)) for name in section.names}
 
     assert "gear.ratio" not in shown(KNIFE) and {"machine.ratio", "gear.efficiency"} <= shown(KNIFE)
     result = as_dict(study_of(parse(KNIFE), tmp_path))
@@ -202,10 +202,10 @@ def test_the_page_shows_all_that_was_given_and_used(tmp_path):
     assert rows["gear.J"].origin == "file" and rows["system.machine"].origin == "declared"
     assert rows["motor.rotor.J"].origin == "catalogue"
     assert not [name for name in rows if name.startswith(("chain.", "sizing.", "ratios."))]
-    names = [name for each in given(study) for name in each.names]
+    names = [name for each in given_sections(study) for name in each.names]
     assert len(names) == len(set(names))
     # what a DC motor of the file's own does not use
-    plain = {name for each in given(study_of(parse(""), tmp_path)) for name in each.names}
+    plain = {name for each in given_sections(study_of(parse(""), tmp_path)) for name in each.names}
     assert not [name for name in plain if name.startswith(("gear.", "starter.", "monte_carlo.", "start"))]
 
 

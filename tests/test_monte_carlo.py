@@ -53,7 +53,7 @@ SCRIPT = """
         files, _ = drive.export(Path("."))
         task = monte_carlo.Task(config, drive, files, 1.0)
         result = monte_carlo.run(task, Path("."), lambda what, done, todo: print(done, todo, flush=True), workers=2)
-        print("resumed", result.resumed, flush=True)
+        print("resumed", result.earlier_runs, flush=True)
 """
 
 
@@ -84,7 +84,7 @@ def killed(tmp_path_factory):
     (file,) = folder.glob("*.jsonl")
     with file.open("a") as out:
         out.write('{"run": 99999, "crank_a')
-    before, _ = monte_carlo.read(file)
+    before, _ = monte_carlo.read_rows(file)
     second = start(folder, len(before) + 10)
     message, errors = second.communicate()
     assert second.returncode == 0, errors
@@ -288,7 +288,7 @@ BAD = {
 def test_a_line_that_is_no_row_is_left_out_and_counted(what, tmp_path):
     file = tmp_path / "rows.jsonl"
     file.write_bytes(b"\n".join([line(1), BAD[what], line(2, trip_torque=None), b""]))
-    rows, left_out = monte_carlo.read(file)
+    rows, left_out = monte_carlo.read_rows(file)
     assert sorted(rows) == [1, 2] and left_out == 1
     assert monte_carlo.MonteCarloResult(list(rows.values()), file, 2).quantiles()
 
@@ -299,7 +299,7 @@ def test_rows_of_one_number(tmp_path):
     file.write_bytes(
         b"\n".join([line(1), line(1), line(2), line(2, event=7.0), line(3), b'{"run": 4, "crank'])
     )
-    rows, left_out = monte_carlo.read(file)
+    rows, left_out = monte_carlo.read_rows(file)
     assert sorted(rows) == [1, 3] and left_out == 3
 
 
@@ -314,12 +314,12 @@ def test_what_is_left_out_is_computed_anew_and_told(killed, tmp_path):
     (tmp_path / file.name).write_text("\n".join([*lines, lines[0].replace(":", ";"), "5"]) + "\n")
     reports = []
     result = monte_carlo.run(task, tmp_path, lambda *said: reports.append(said[1:]), workers=1)
-    assert (result.resumed, result.left_out) == (3, 2)
+    assert (result.earlier_runs, result.left_out) == (3, 2)
     assert result.rows == [before[k] for k in range(5)]
     assert result.as_dict()["left_out"]["value"] == 2
     # one at a time
     assert reports == [(3, 5), (4, 5), (5, 5)]
-    assert monte_carlo.read(tmp_path / file.name) == ({k: before[k] for k in range(5)}, 0)
+    assert monte_carlo.read_rows(tmp_path / file.name) == ({k: before[k] for k in range(5)}, 0)
 
 
 @pytest.mark.parametrize("end", [None, signal.SIGTERM])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import beta, norm, quantile_test
 
-from chainunit.study.quantiles import Estimate, counted, quantile, runs_needed, share
+from chainunit.study.quantiles import Estimate, independent_count, quantile, runs_needed, share
 
 
 @pytest.mark.parametrize("q", [0.05, 0.5, 0.95, 0.99])
@@ -49,9 +49,9 @@ def test_values_of_one_run_count_together():
     and so an interval as if all were independent misses the quantile more often than not."""
     rng = np.random.default_rng(11)
     free = rng.exponential(size=(20, 50))
-    assert counted(free, 0.5) > 500 and quantile(free, 0.95) is not None
+    assert independent_count(free, 0.5) > 500 and quantile(free, 0.95) is not None
     tied = rng.normal(10.0, 3.0, size=(10, 1)) + 0.1 * rng.normal(size=(10, 30))
-    assert counted(tied, 0.95) < 30 and quantile(tied, 0.95) is None
+    assert independent_count(tied, 0.95) < 30 and quantile(tied, 0.95) is None
     hits, plain = [], []
     for _ in range(200):
         runs = rng.normal(10.0, 1.0, size=(60, 1)) + 0.3 * rng.normal(size=(60, 30))
@@ -80,7 +80,7 @@ def test_what_few_starts_tell_is_so(common, q):
 
 def test_one_run_is_one():
     values = np.random.default_rng(2).normal(size=(1, 300))
-    assert counted(values, 0.5) == 1 and counted(values.T, 0.5) == 300
+    assert independent_count(values, 0.5) == 1 and independent_count(values.T, 0.5) == 300
 
 
 def test_a_motion_that_repeats_itself_needs_no_number_of_runs():

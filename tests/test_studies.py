@@ -188,7 +188,7 @@ def test_a_text_and_a_file_tell_the_line(tmp_path):
         Study.from_file(tmp_path / "mine.toml")
     with pytest.raises(InputError, match=r"other.toml: cannot be read"):
         Study.from_file(str(tmp_path / "other.toml"))
-    assert Study.from_file().config.packaged and not Study().config.packaged
+    assert Study.from_file().config.is_packaged and not Study().config.is_packaged
 
 
 OWN_MOTOR = """[[motor]]

@@ -156,7 +156,7 @@ def single_names() -> tuple[str, ...]:
 @cache
 def dimension(unit_text: str) -> Any:
     """The dimension of a unit, as pint has it: angles have none, and "C" is a charge."""
-    return _registry().parse_units(_joined(_factors(_ascii(unit_text)))).dimensionality
+    return _registry().parse_units(_pint_text(_factors(_ascii(unit_text)))).dimensionality
 
 
 def _is_name(name: str) -> bool:
@@ -188,7 +188,7 @@ def convert(number: float, unit_text: str, unit: str, kind: str = "") -> float:
     factors = _of_temperature(_of_angle(_factors(_ascii(unit_text)), base), base, kind)
     try:
         return float(
-            _registry().Quantity(number, _joined(factors)).to(_joined(_factors(_ascii(unit)))).magnitude
+            _registry().Quantity(number, _pint_text(factors)).to(_pint_text(_factors(_ascii(unit)))).magnitude
         )
     except (pint.PintError, TypeError, AttributeError, AssertionError) as error:
         raise ValueError(f"{unit_text}: is no unit of {unit}") from error
@@ -228,7 +228,7 @@ def _reads(text: str, unit: str, kind: str) -> bool:
         return False
 
 
-def _joined(factors: list[tuple[str, int]]) -> str:
+def _pint_text(factors: list[tuple[str, int]]) -> str:
     """The factors as a text that pint reads."""
     return "*".join(f"{name}**({power})" for name, power in factors) or "dimensionless"
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from importlib import metadata
 from typing import Any
 
-from ..study.given import GivenSection, description, given
+from ..study.given import GivenSection, description, given_sections
 from ..study.record import StudyRecord
 from ..study.result import as_dict
 from ..study.rig import DIFFERENCE
@@ -128,7 +128,7 @@ def _given(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     unused_names = [] if study.drive.follows else ["run.ramp"]
     unused_names += [] if study.config.machine.model.sides else ["sizing.one_sided_share"]
     yield b.Given(
-        tuple((section.title, tuple(_values(s, section, unused_names))) for section in given(study))
+        tuple((section.title, tuple(_values(s, section, unused_names))) for section in given_sections(study))
     )
 
 

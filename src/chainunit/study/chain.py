@@ -34,7 +34,7 @@ from .arrays import peak
 from .config import Config
 from .cycle import Cycle, cycle
 from .drive import Drive
-from .quantiles import CONFIDENCE, counted, quantile
+from .quantiles import CONFIDENCE, independent_count, quantile
 
 SETTLE = 5
 """Number of turns at the begin of each start that are not evaluated."""
@@ -365,7 +365,7 @@ def numbers_at(
             two_bar_snatch=float(max(two_bar_snatch)),
             two_bar_slack_time=float(np.mean(np.any(is_pushed, axis=0))),
             energy_residual=gap / max(energy, 1e-300),
-            independent_turns=float(min(counted(sizes, HIGH) for sizes in of_turns.values())),
+            independent_turns=float(min(independent_count(sizes, HIGH) for sizes in of_turns.values())),
             **of_peaks,
         ),
         {side: np.mean(slack[side], axis=(0, 1, 2)) for side in SIDES},

@@ -42,12 +42,12 @@ def choose(config: Config, folder: Path, report: Report, backend: Backend | None
     if config.foreign is not None:
         return _with_foreign(config)
     if config.sizing is None:
-        return Choice(*tune(config, with_line(config, _given(config))))
+        return Choice(*tune(config, with_line(config, _drive_of_file(config))))
     sizing = size(config, folder, report, backend)
     return Choice(with_line(config, sizing.best.drive), sizing=sizing)
 
 
-def _given(config: Config) -> Drive:
+def _drive_of_file(config: Config) -> Drive:
     """The drive with the motor whose parameters the file gives, or with the motor of the catalogue that the
     file names."""
     if config.plate is not None:

@@ -105,7 +105,7 @@ class Config:
     values"""
     choices: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     """by name, all values that are no quantities, such as "start" or "driveline.place", given or not"""
-    packaged: bool = False
+    is_packaged: bool = False
     """whether the file is the packaged example"""
     slips: tuple[Slip, ...] = ()
     """values that look like a slip of the unit"""
@@ -124,7 +124,7 @@ class Config:
         return float(2.0 * math.pi / self.run.crank_speed)
 
     @property
-    def started(self) -> float:
+    def ramp_end(self) -> float:
         """Time at which the ramp of the reference or of the soft starter ends [s]."""
         soft = self.starter.soft_start.time if self.start == "soft" else 0.0
         return float(max(self.run.ramp, soft))
@@ -133,7 +133,7 @@ class Config:
     def steady_begin(self) -> float:
         """Time from which running counts as steady [s]: `run.settle_turns` after the start, or later, after
         an empty machine is fed."""
-        return float(self.started + self.run.settle_turns * self.turn)
+        return float(self.ramp_end + self.run.settle_turns * self.turn)
 
     @property
     def stop(self) -> float:
@@ -175,7 +175,7 @@ def load(file: Path | None = None) -> Config:
     InputError
         with a line for each fault: the file, the key, its value and the allowed range.
     """
-    return dataclasses.replace(read(file, example, parse), packaged=file is None)
+    return dataclasses.replace(read(file, example, parse), is_packaged=file is None)
 
 
 def parse(text: str, source: str = "config") -> Config:

@@ -34,7 +34,7 @@ def peaks_on_coupling(study: StudyRecord, *roles: Role) -> dict[str, float]:
     }
 
 
-def recommended(study: StudyRecord) -> Setting | None:
+def recommended_setting(study: StudyRecord) -> Setting | None:
     """The recommended safety coupling of a sized drive, judged by the events of the study. None where no
     motor was chosen, where the file gives a coupling, or where the study ended before steady running."""
     if not study.sizing or study.insufficient or study.config.coupling or "steady" not in study.answers:
@@ -62,7 +62,7 @@ def _torque(value: float) -> str:
     return number(value, "N.m")
 
 
-def _listed(study: StudyRecord, peaks: Mapping[str, float]) -> str:
+def _list_of(study: StudyRecord, peaks: Mapping[str, float]) -> str:
     """A list of runs with their peaks on the coupling [N m], in words."""
     return ", ".join(f"{study.title_of(name)} ({_torque(peak)})" for name, peak in peaks.items())
 
@@ -101,18 +101,19 @@ def coupling_sentence(study: StudyRecord) -> str:
     shut = {name: peak for name, peak in setting.overloads.items() if name not in setting.opens}
     text = (
         f"Recommended safety coupling{caveat}: {above}, {'above' if setting.stalls else 'below'} the "
-        f"{_torque(setting.motor)} that the motor gives at the crank. It opens where {_listed(study, setting.opens)}"
+        f"{_torque(setting.motor)} that the motor gives at the crank. It opens where {_list_of(study, setting.opens)}"
     )
-    text += f"; it stays shut where {_listed(study, shut)}." if shut else "."
+    text += f"; it stays shut where {_list_of(study, shut)}." if shut else "."
     if setting.stalls:
         text += (
             " A load that rises slowly stalls the motor and does not open it: the relay has to trip there."
         )
     if setting.nuisances:
-        text += f" A nuisance trip, which protects nothing: it opens, too, where {_listed(study, setting.nuisances)}."
+        nuisances = _list_of(study, setting.nuisances)
+        text += f" A nuisance trip, which protects nothing: it opens, too, where {nuisances}."
     if starts := _starts_above(study, setting.least):
         text += (
-            f" A start direct on line puts more on it: {_listed(study, starts)}; it has to be held shut in the "
+            f" A start direct on line puts more on it: {_list_of(study, starts)}; it has to be held shut in the "
             "start (coupling.held_in_start = true)."
         )
     return text
@@ -139,7 +140,7 @@ def remark_on_coupling(study: StudyRecord, trip: float) -> None:
             "coupling held shut",
             text,
             *(above or [hardest]),
-            where=_listed(study, above) if above else study.title_of(hardest),
+            where=_list_of(study, above) if above else study.title_of(hardest),
             start=(starts[hardest], "N.m"),
             **amounts,
         )

@@ -61,7 +61,7 @@ def _choice(value: Any) -> Any:
     return list(value) if isinstance(value, tuple) else value
 
 
-def given(study: StudyRecord) -> list[GivenSection]:
+def given_sections(study: StudyRecord) -> list[GivenSection]:
     """All given values of a study; with them the study can be repeated."""
     config = study.config
     sections = [

@@ -75,7 +75,7 @@ def motor_limits(study: StudyRecord) -> dict[str, Check]:
     )
 
 
-_PASSED = {
+_EXCESSES = {
     "temperature": "its winding becomes too hot in steady running",
     "current": "its RMS current in steady running passes the rated one",
     "start": "its start takes too long",
@@ -133,7 +133,7 @@ def motor_verdict(study: StudyRecord) -> dict[str, Any] | None:
     ]
     if excesses:
         link = ", but" if keeps_speed and not study.insufficient else ";"
-        text += f"{link} {', '.join(_PASSED[name] for name in excesses)}"
+        text += f"{link} {', '.join(_EXCESSES[name] for name in excesses)}"
     if run is None:
         text += "; its reserve of torque is not known"
     elif reserve is not None and reserve >= 0.0:

@@ -145,7 +145,7 @@ def _begin() -> None:
     atexit.register(_close)
 
 
-def _prepared(task: Task, digest: str) -> Simulation:
+def _saved_simulation(task: Task, digest: str) -> Simulation:
     """The co-simulation of this process, after the start-up, with its steady state saved."""
     if digest not in _worker:
         _close()
@@ -212,7 +212,7 @@ def one(task: Task, number: int, simulation: Simulation) -> Sample:
 
 def row_of(task: Task, digest: str, number: int) -> dict[str, Any]:
     """The result of the run with that number, as a row of the file."""
-    simulation = _prepared(task, digest)
+    simulation = _saved_simulation(task, digest)
     layout = Layout(Sample)
     chance = draw(task.config, number)
     head = {"run": number, "side": chance.event.side or None, "drawn": chance.values}
@@ -225,7 +225,7 @@ def row_of(task: Task, digest: str, number: int) -> dict[str, Any]:
         return {**head, "failed": str(error), **dict.fromkeys(layout.names)}
 
 
-def read(file: Path, absent: frozenset[str] = frozenset()) -> tuple[dict[int, dict[str, Any]], int]:
+def read_rows(file: Path, absent: frozenset[str] = frozenset()) -> tuple[dict[int, dict[str, Any]], int]:
     """The rows of a results file by their number, and the number of lines that were left out.
 
     A line counts as a row if it has the complete form: every number is present and finite, except those of
@@ -239,7 +239,7 @@ def read(file: Path, absent: frozenset[str] = frozenset()) -> tuple[dict[int, di
         return rows, left_out
     with file.open("rb") as lines:
         for line in lines:
-            row = _checked(line, absent)
+            row = _row_in(line, absent)
             if row is None:
                 left_out += line.endswith(b"\n")
             elif rows.setdefault(row["run"], row) is not row:
@@ -249,7 +249,7 @@ def read(file: Path, absent: frozenset[str] = frozenset()) -> tuple[dict[int, di
     return {number: row for number, row in rows.items() if number not in twice}, left_out + len(twice)
 
 
-def _checked(line: bytes, absent: frozenset[str]) -> dict[str, Any] | None:
+def _row_in(line: bytes, absent: frozenset[str]) -> dict[str, Any] | None:
     """The row in a line; None where the line is no row."""
     try:
         row = _Row.model_validate_json(line).model_dump()
@@ -268,7 +268,7 @@ class MonteCarloResult:
 
     rows: list[dict[str, Any]]
     file: Path
-    resumed: int
+    earlier_runs: int
     """number of runs that the file had before"""
     left_out: int = 0
     """number of lines that were no rows, or were differing rows of the same run; these runs were computed
@@ -340,7 +340,7 @@ def run(task: Task, folder: Path, report: Report, workers: int | None = None) ->
     """
     digest = task.digest()
     file = folder / f"monte_carlo_{digest}.jsonl"
-    rows, left_out = read(file, task.absent)
+    rows, left_out = read_rows(file, task.absent)
     earlier_runs = len(rows)
     count = int(task.config.monte_carlo.runs)
     open_runs = [k for k in range(count) if k not in rows]

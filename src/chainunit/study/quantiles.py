@@ -54,7 +54,7 @@ def quantile(values: Any, q: float) -> Estimate | None:
     value = float(np.quantile(ranking, q))
     if _alike(values):
         return Estimate(value, float(ranking[0]), float(ranking[-1]))
-    runs = counted(values, q)
+    runs = independent_count(values, q)
     if runs < runs_needed(q):
         return None
     least, most = binom.ppf((0.5 * (1.0 - CONFIDENCE), 0.5 * (1.0 + CONFIDENCE)), runs, q)
@@ -67,7 +67,7 @@ def quantile(values: Any, q: float) -> Estimate | None:
     )
 
 
-def counted(values: Any, q: float) -> int:
+def independent_count(values: Any, q: float) -> int:
     """The number of independent values as which the `values` count at the quantile `q`. All values count if
     they are of shape (n,), or of several runs, shape (runs, n), that are alike. Otherwise their number is
     divided by the larger of two design effects: the estimate from the shares of each run above the quantile,

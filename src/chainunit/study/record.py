@@ -184,7 +184,7 @@ class StudyRecord:
         if section == "machine" and parameter in LENGTHS and "ratios.rho" in self.config.of_example:
             return "example"
         if self.config.of_catalogue and (name == "machine.ratio" or section == "motor"):
-            name_in_file = self._told(parameter)
+            name_in_file = self._name_in_file(parameter)
             if not name_in_file:
                 return "catalogue" if self.sizing is None else "sizing"
             name = name_in_file
@@ -196,7 +196,7 @@ class StudyRecord:
             return "file"
         return "example" if name in self.config.of_example else "declared"
 
-    def _told(self, parameter: str) -> str:
+    def _name_in_file(self, parameter: str) -> str:
         """The name in a study file of a motor's `parameter`; empty for one that the catalogue sets."""
         config = self.config
         if parameter == "ratio":

@@ -26,7 +26,7 @@ def conclude(study: StudyRecord) -> None:
     """Judge the model, and add every remark to the study."""
     config, note = study.config, study.note
     own = "Values that the study file does not name are the declared start values, which are assumed."
-    if config.packaged:
+    if config.is_packaged:
         own = "Masses, pins, feed and drive are assumed; the papers print none."
     elif config.of_example:
         own = (
@@ -87,7 +87,7 @@ _RATING = ("limit.i", "limit.v", "armature.k")
 def _left_out(study: StudyRecord) -> Iterator[str]:
     """Values that decide the result, but that the file leaves out, so that the packaged values are used."""
     config, coupling = study.config, study.config.coupling
-    if config.packaged:
+    if config.is_packaged:
         return
     if coupling is not None and "coupling.trip_torque" not in config.given:
         yield f"coupling.trip_torque ({number(coupling.trip_torque, 'N.m', full=False)})"
@@ -159,7 +159,7 @@ def _on_limits(study: StudyRecord) -> None:
             key=key,
         )
     if steady.torque_reserve is not None and steady.torque_reserve < 0.0:
-        turns = _stalled(study, steady) is None
+        turns = _stall_speed(study, steady) is None
         stalls = ": a heavier load or a dip of the voltage stalls it" if turns else ""
         warn(
             "no reserve",
@@ -171,7 +171,7 @@ def _on_limits(study: StudyRecord) -> None:
         )
 
 
-def _stalled(study: StudyRecord, steady: Answers) -> float | None:
+def _stall_speed(study: StudyRecord, steady: Answers) -> float | None:
     """The crank speed [rad/s] below which a load stalls the motor, if this motor is stalled; else None. It is
     not known for a foreign motor."""
     if study.reaches or study.drive.foreign is not None:
@@ -182,7 +182,7 @@ def _stalled(study: StudyRecord, steady: Answers) -> float | None:
 
 def _why_missed(study: StudyRecord, steady: Answers) -> str:
     """The reason why the crank does not turn at the requested speed."""
-    if (breakdown := _stalled(study, steady)) is not None:
+    if (breakdown := _stall_speed(study, steady)) is not None:
         below = number(breakdown, "rad/s", "speed", beside=False)
         return (
             f"the motor stalls under the load: below {below}, the speed of its breakdown torque, its torque falls "
@@ -251,7 +251,7 @@ def _on_steady_running(study: StudyRecord, steady: Answers) -> None:
         )
 
 
-_HAPPENED = {
+_HAPPENINGS = {
     "rod end pushed": "An end of a rod is pushed, though the rod is pulled in the mean; more rods are nearer to a "
     "chain",
     "current limit": "The motor runs into its current limit of {limit}",
@@ -275,7 +275,7 @@ def _on_runs(study: StudyRecord) -> None:
         limit = {"passed": limits[kind]} if kind in limits else {}
         study.warn(
             kind,
-            f"{_HAPPENED[kind]}: {{where}}.",
+            f"{_HAPPENINGS[kind]}: {{where}}.",
             *runs,
             where="; ".join(where),
             limit=number(*limits[kind], full=False) if limit else "",
@@ -345,7 +345,7 @@ def _on_inverter(study: StudyRecord) -> None:
         )
 
 
-_SPOILED = {
+_OUTCOMES = {
     "trips": "in {share} of them the safety coupling opens",
     "stalls": "in {share} of them the crank stands at the end",
 }
@@ -355,7 +355,7 @@ _SPOILED = {
 def _on_random_overloads(study: StudyRecord) -> None:
     random, note = study.monte_carlo, study.note
     shares = random.quantiles() if random else {}
-    for name, words in _SPOILED.items():
+    for name, words in _OUTCOMES.items():
         share = shares.get(name, {}).get("share")
         if share is not None and share.value > 0.0:
             study.warn(

@@ -9,7 +9,7 @@ from ..drives.catalogue import CatalogueMotor
 from ..quantities import variables
 from ..text import entries, entry, shown_in, turning
 from .coupling import coupling_sentence
-from .given import given
+from .given import given_sections
 from .judgement import motor_verdict
 from .measures import measures_of
 from .record import StudyRecord
@@ -56,7 +56,7 @@ def _as_dict(study: StudyRecord) -> dict[str, Any]:
         "warnings": [remark.as_dict() for remark in study.warnings],
         "notes": [remark.as_dict() for remark in study.notes],
         "slips": [slip.as_dict() for slip in config.slips],
-        **(given := _given(study)),
+        **(given := _given_values(study)),
         **_statics(study),
         **_runs(study),
         **{name: given.get(name, {}) | part for name, part in _parts(study).items()},
@@ -71,10 +71,10 @@ def _on_model(study: StudyRecord) -> dict[str, Any] | None:
     return verdict | {"text": turning(verdict["text"], study.turning)}
 
 
-def _given(study: StudyRecord) -> dict[str, Any]:
+def _given_values(study: StudyRecord) -> dict[str, Any]:
     """The given values of the study; `origins` gives the origin of each value that is not its declared start
     value."""
-    sections = given(study)
+    sections = given_sections(study)
     names = [name for section in sections for name in section.names]
     values: dict[str, Any] = {"event": {}, "motor": _motor(study)}
     for section in sections:

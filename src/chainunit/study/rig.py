@@ -204,8 +204,8 @@ class Rig:
         name, ratio = self.drive.crank_speed
         goal = STARTED * self.config.run.crank_speed * ratio
         speed_limit = {**guards, name: goal}
-        longest, piece = self.config.started + _LONGEST_RISE, max(self.config.turn, 1.0)
-        stop = self.config.started + _LONGEST_START
+        longest, piece = self.config.ramp_end + _LONGEST_RISE, max(self.config.turn, 1.0)
+        stop = self.config.ramp_end + _LONGEST_START
         run = simulation.run(stop, self.step, progress, guards=speed_limit)
         while stop - 0.5 * self.step <= simulation.time < longest:
             speed = float(run[name][-1])
@@ -213,7 +213,7 @@ class Rig:
             if goal - speed > (speed - before) / piece * (longest - stop):
                 break
             stop = min(stop + piece, longest)
-            run = joined([run, simulation.run(stop, self.step, progress, guards=speed_limit)])
+            run = join([run, simulation.run(stop, self.step, progress, guards=speed_limit)])
         rig = replace(self, fed_from=simulation.time)
         simulation.signals = rig.signals(ramp=True)
         return run, rig
@@ -228,20 +228,20 @@ class Rig:
             run, rig = self.start_empty(simulation, progress, guards)
             pieces = [run]
             # a motor that follows a ramp is not steady before its end
-            feed_time = max(simulation.time, self.config.started) if self.drive.follows else simulation.time
-            later = feed_time - self.config.started
+            feed_time = max(simulation.time, self.config.ramp_end) if self.drive.follows else simulation.time
+            later = feed_time - self.config.ramp_end
             stop, steady_from = stop + later, steady_from + later
             if any(abs(float(run[name][-1])) >= limit for name, limit in guards.items()):
                 return StartUp(run, steady_from, stop, rig)
         longest = stop + max(PATIENCE * self.config.turn, _SETTLES)
-        run = joined([*pieces, simulation.run(stop, self.step, progress, guards=guards)])
+        run = join([*pieces, simulation.run(stop, self.step, progress, guards=guards)])
         while stop - 0.5 * self.step <= simulation.time < longest:
             lack, steady_from = self._missing(run, steady_from)
             if lack is None:
                 break
             # at most at the requested speed; the next round finds the turns that are still missing then
             stop = min(longest, stop + max(lack * self.config.turn, self.step))
-            run = joined([run, simulation.run(stop, self.step, progress, guards=guards)])
+            run = join([run, simulation.run(stop, self.step, progress, guards=guards)])
         return StartUp(run, steady_from, stop, rig)
 
     def _missing(self, run: xr.Dataset, steady_from: float) -> tuple[float | None, float]:
@@ -286,7 +286,7 @@ class Rig:
             for full, value in before.items()
             if not isinstance(after := signals[full], Profile)
         }
-        return Transient(event, begin, joined(pieces), signals, jumps, pieces[0] if jumps else None)
+        return Transient(event, begin, join(pieces), signals, jumps, pieces[0] if jumps else None)
 
     def coast(self, transient: Transient, run: xr.Dataset, stop: float, file: Path) -> xr.Dataset:
         """The run of the machine (FMU `file`) behind the coupling that opened at the end of `run`, with the
@@ -343,7 +343,7 @@ class Rig:
         release = simulation.run(simulation.time + time, min(self.step, time))
         torque, speed = (release[name] for name in (self.drive.motor_torque, self.drive.motor_speed))
         energy = float(np.trapezoid(torque * speed, release["time"]))
-        return joined([run, release]), energy
+        return join([run, release]), energy
 
 
 _SHARE = "energy_residual_share"
@@ -359,7 +359,7 @@ DIFFERENCE = "_difference_to_monolithic"
 """Suffix of the name of a variable for its largest difference to the monolithic solution, over its peak."""
 
 
-def joined(pieces: list[xr.Dataset]) -> xr.Dataset:
+def join(pieces: list[xr.Dataset]) -> xr.Dataset:
     """One run from pieces that follow each other; at an instant that two pieces share, the later piece
     counts."""
     parts = [piece.isel(time=slice(None, -1)) for piece in pieces[:-1]]

@@ -23,7 +23,7 @@ from .bearings import pin_loads
 from .chain import study_chain
 from .choice import choose
 from .config import Config
-from .coupling import on_coupling, recommended
+from .coupling import on_coupling, recommended_setting
 from .event import Event
 from .measures import read_answers, read_measure
 from .monte_carlo import Task
@@ -97,7 +97,7 @@ def _run_study(
     except KeyboardInterrupt:
         # Ctrl-C came between two runs, or in a run that is not a co-simulation
         study.failure = InterruptedRunError("interrupted")
-    study.setting = recommended(study)
+    study.setting = recommended_setting(study)
     if drive.chain is not None and not isinstance(study.failure, InterruptedRunError):
         _chains(study, files["machine"], report)
     conclude(study)

@@ -225,7 +225,7 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
         if len(candidates) >= limits.candidates and any(c.fits for c in candidates):
             break
         report(f"co-simulating {motor.designation}", float(k), float(len(strong)))
-        candidate = proposed(config, motor, duty)
+        candidate = proposal(config, motor, duty)
         if not files:
             files, _ = candidate.drive.export(folder, backend, partial(_exporting, report))
         candidates.append(with_flywheel(config, candidate, duty, files))
@@ -256,7 +256,7 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
         return candidate
 
     def heavy_enough(candidate: Candidate) -> bool:
-        return too_heavy(candidate) or evened(candidate)
+        return too_heavy(candidate) or is_even(candidate)
 
     first = trial_with(0.0)
     mean = duty.numbers.torque_mean / bare.drive.ratio
@@ -279,7 +279,7 @@ def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[st
             share = middle
         else:
             below = middle
-    solutions = [c for c in trials if evened(c) and not too_heavy(c)]
+    solutions = [c for c in trials if is_even(c) and not too_heavy(c)]
     return (
         min(solutions, key=lambda c: c.drive.flywheel)
         if solutions
@@ -311,7 +311,7 @@ def torque_evening_inertia(c: Candidate, numbers: CycleNumbers, crank_speed: flo
     return float(slope / crank_speed * math.sqrt(max(0.0, square - 1.0)))
 
 
-def evened(c: Candidate) -> bool:
+def is_even(c: Candidate) -> bool:
     """Whether the candidate keeps every limit that a flywheel improves."""
     return not any(1.0 < c.sizes.get(name, 0.0) < math.inf for name in _EVENED)
 
@@ -327,7 +327,7 @@ def too_heavy(c: Candidate) -> bool:
     )
 
 
-def proposed(config: Config, motor: CatalogueMotor, duty: Duty) -> Candidate:
+def proposal(config: Config, motor: CatalogueMotor, duty: Duty) -> Candidate:
     """A candidate without a flywheel, with the gear ratio at which the crank has its speed."""
     assert config.sizing is not None
     drive = catalogue_drive(config, motor, duty.normal.crank_torque, config.sizing.ambient)

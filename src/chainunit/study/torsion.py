@@ -198,7 +198,7 @@ def _peaks(curve: Any) -> Any:
     return [int(j) for j in places if is_known[j]]
 
 
-def _refined(line: Cardan, load: float, speed: Any, curve: SteadyMotion) -> tuple[Any, SteadyMotion]:
+def _refine(line: Cardan, load: float, speed: Any, curve: SteadyMotion) -> tuple[Any, SteadyMotion]:
     """The resonance curve with more points around each of its peaks, as a coarse grid misses their height."""
     near = [np.linspace(speed[j - 1], speed[j + 1], 2 * PEAK + 1)[1:-1] for j in _peaks(curve.peak2)]
     if not near:
@@ -236,7 +236,7 @@ def analyse(
     ends = table.slowest * rotation.speed, table.fastest * rotation.speed
     speed = speeds(*ends, k, int(table.points))
     curve = steady(line, speed, rotation.load, lambda done: report("torsion: steady motion", done, 1.0))
-    speed, curve = _refined(line, rotation.load, speed, curve)
+    speed, curve = _refine(line, rotation.load, speed, curve)
     operating = steady(line, rotation.speed, rotation.load)
     simulation = _time_simulation(
         line, speed[::SIMULATED], rotation.load, lambda done: report("torsion: time simulation", done, 1.0)

@@ -100,8 +100,8 @@ class TurnAnalysis(Analysis):
                 torque_peak=peak(loaded.crank_torque),
                 torque_peak_free=peak(free.crank_torque),
                 torque_mean=float(np.mean(loaded.crank_torque)),
-                lost=_lost(loaded, config.turn),
-                lost_free=_lost(free, config.turn),
+                lost=_lost_energy(loaded, config.turn),
+                lost_free=_lost_energy(free, config.turn),
                 energy_swing=energy_swing(loaded.crank_torque),
                 inertia_least=float(np.min(inertia)),
                 inertia_largest=float(np.max(inertia)),
@@ -112,7 +112,7 @@ class TurnAnalysis(Analysis):
         )
 
 
-def _lost(cycle: Cycle, turn: float) -> float:
+def _lost_energy(cycle: Cycle, turn: float) -> float:
     """The energy that is dissipated in a turn [J]; for an FMU without that output, the energy that the shaft
     brings in."""
     if hasattr(cycle.outputs, "dissipated_power"):

@@ -141,7 +141,7 @@ class Verdict:
         return "false" if any(reason.grave for reason in self.reasons) else "in part"
 
     @property
-    def _judged(self) -> str:
+    def _judged_speed(self) -> str:
         return _speed(self.speed)
 
     @property
@@ -149,9 +149,9 @@ class Verdict:
         return _speed(self.speed if self.actual is None else self.actual)
 
     @property
-    def _asked(self) -> bool:
+    def _is_at_requested_speed(self) -> bool:
         """Whether the model is judged at a speed that the crank does not have."""
-        return self._turns != self._judged
+        return self._turns != self._judged_speed
 
     @property
     def caveat(self) -> str:
@@ -170,7 +170,11 @@ class Verdict:
         holds = {"true": "holds", "in part": "holds in part", "false": "does not hold"}[self.holds]
         model = f"{self.model}, " if self.model else ""
         line = f"{_SUBJECTS[self.subject]} {holds}: {model}the crank at "
-        line += f"{self._turns}, judged at the {self._judged} asked for" if self._asked else self._judged
+        line += (
+            f"{self._turns}, judged at the {self._judged_speed} asked for"
+            if self._is_at_requested_speed
+            else self._judged_speed
+        )
         why, remedies = [], []
         for topic, (short, _, remedy) in _TOPICS.items():
             runs = {reason.run for reason in self.reasons if reason.topic == topic}
@@ -194,7 +198,7 @@ class Verdict:
             ]
             if (
                 each
-                and self._asked
+                and self._is_at_requested_speed
                 and any(r.quantity == "crank_speed" for r in self.reasons if r.topic == topic)
             ):
                 begin = f"{begin}, judged at the requested speed; the crank turns at {self._turns}"
@@ -284,7 +288,7 @@ def two_bars(
         limit = ROCKER_GOOD_EMPTY * mode
         runs = [""] if "" in empty else sorted(empty)
         reasons += [_at_speed("rocker torque", speed, limit, run) for run in runs]
-    return Verdict("organs", "two bars", speed, (*reasons, *_unbalanced(residuals)), actual)
+    return Verdict("organs", "two bars", speed, (*reasons, *_balance_faults(residuals)), actual)
 
 
 def rigid_links(speed: float, residuals: Mapping[str, float], *, actual: float | None = None) -> Verdict:
@@ -295,7 +299,7 @@ def rigid_links(speed: float, residuals: Mapping[str, float], *, actual: float |
     speed, actual : crank speed at which the model is judged, and crank speed in the runs, if that is another [rad/s]
     residuals : by run, the energy residual over the energy moved
     """
-    return Verdict("machine", "rigid links", speed, tuple(_unbalanced(residuals)), actual)
+    return Verdict("machine", "rigid links", speed, tuple(_balance_faults(residuals)), actual)
 
 
 def outsider(speed: float, residuals: Mapping[str, float], *, actual: float | None = None) -> Verdict:
@@ -305,7 +309,7 @@ def outsider(speed: float, residuals: Mapping[str, float], *, actual: float | No
     ----------
     speed, actual, residuals : see `rigid_links`
     """
-    return Verdict("energy balance", "", speed, tuple(_unbalanced(residuals)), actual)
+    return Verdict("energy balance", "", speed, tuple(_balance_faults(residuals)), actual)
 
 
 def chains(
@@ -344,10 +348,10 @@ def chains(
             reasons.append(Reason("slack", "slack_time", share, 0.0, "1", run, "percent"))
     if independent < least_turns:
         reasons.append(Reason("starts", "independent_turns", independent, least_turns, "1"))
-    return Verdict("organs", "chains", speed, (*reasons, *_unbalanced(residuals)), actual)
+    return Verdict("organs", "chains", speed, (*reasons, *_balance_faults(residuals)), actual)
 
 
-def _unbalanced(residuals: Mapping[str, float]) -> list[Reason]:
+def _balance_faults(residuals: Mapping[str, float]) -> list[Reason]:
     return [
         Reason("energy", "energy_residual", share, RESIDUAL, "1", run, grave=run == STEADY)
         for run, share in residuals.items()
