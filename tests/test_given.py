@@ -93,7 +93,7 @@ def test_what_no_example_gives_is_at_its_declared_start_value(tmp_path):
     )
     assert study.origin("motor.speed_control.kp") == "tuned"
     (note,) = (str(each) for each in study.notes if each.kind == "assumed")
-    assert "the packaged example's" in note
+    assert "those of the packaged example" in note
     (packaged,) = (str(each) for each in study_of(load(), tmp_path).notes if each.kind == "assumed")
     assert "the papers print none" in packaged
     # of a machine of somebody else there is no example
