@@ -82,7 +82,7 @@ class Jaw(InverseMachine):
     joints: ClassVar = {"crank_bearing": ("O1", "crank"), "jaw_bearing": ("O2", "rocker")}  # pin and link
 
     @staticmethod
-    def linkage(p, u):
+    def linkage(xp, p, u):
         return Linkage(
             ground={"O1": Vec2(0.0, 0.0), "O2": Vec2(p.x, p.y)},
             driver=Crank(Bar("crank", "O1", p.r, p.crank), "A"),

@@ -78,7 +78,7 @@ def turned_by_exudyn(steps, fx, fy):
     """Every compared output over one turn from crank angle 0, at the start and after each step."""
     mbs = exudyn.SystemContainer().AddSystem()
     found = {"frame": mbs.AddObject(item.ObjectGround())}
-    linkage = KnifeDrive.linkage(P, KnifeDrive.Inputs())
+    linkage = KnifeDrive.linkage(MATH, P, KnifeDrive.Inputs())
     start = Mechanism(MATH, linkage, 0.0, KnifeDrive.derive(MATH, P))
     assert set(start.bodies) == set(BODIES)
     for name, body in start.bodies.items():

@@ -92,7 +92,7 @@ def test_reference_points_by_the_native_fmu(fmi, tmp_path):
 
 def moved(xp, p, q, before=2):
     """The mechanism at the crank angle `q`; with the dyad alone before the triad."""
-    linkage = KnifeDrive.linkage(p, KnifeDrive.Inputs())
+    linkage = KnifeDrive.linkage(MATH, p, KnifeDrive.Inputs())
     return Mechanism(xp, linkage.before(before), q, getattr(p, "derived", ()))
 
 

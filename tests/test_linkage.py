@@ -92,7 +92,7 @@ class SixBar(InverseMachine):
     joints = MappingProxyType({"output_bearing": ("O3", "output")})
 
     @staticmethod
-    def linkage(p, u):
+    def linkage(xp, p, u):
         """Crank, dyad, dyad."""
         return Linkage(
             GROUND,
@@ -236,9 +236,9 @@ class LightSixBar(SixBar):
     """Whose crank is given no body at all."""
 
     @staticmethod
-    def linkage(p, u):
+    def linkage(xp, p, u):
         """The same but for the crank."""
-        bars = SixBar.linkage(p, u)
+        bars = SixBar.linkage(xp, p, u)
         return replace(bars, driver=Crank(bars.driver.bar._replace(mass=None), "A"))
 
 
@@ -278,7 +278,7 @@ def test_numbers_derived_once_follow_from_the_groups():
 def hanging(p, u, state):
     """The six-bar with four rods from a ground pin to a point of the output link."""
     rods = Rods([0.2, 0.15, 0.2, 0.15], [2.0, 1.0, 1.5, 3.0], [0.3, 0.1, 0.2, 0.1, 0.4])
-    bars = SixBar.linkage(p, u)
+    bars = SixBar.linkage(MATH, p, u)
     chain = HangingChain("wall", "W", rods, state, p.g, Resistance("", 12.0, p.processing), 2)
     ground = {**bars.ground, "wall": Vec2(-0.6, 0.7)}
     return replace(bars, ground=ground, loads={**bars.loads, "chain": chain})

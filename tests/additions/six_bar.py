@@ -81,7 +81,7 @@ class SixBar(InverseMachine):
     )
 
     @staticmethod
-    def linkage(p: Any, u: Any) -> Linkage:
+    def linkage(xp: Any, p: Any, u: Any) -> Linkage:
         """Crank, dyad, dyad."""
         coupler = Bar("coupler", "A", p.coupler_length, _mass(p.coupler), {"P": (0.25, 0.2)})
         return Linkage(

@@ -21,6 +21,10 @@ class Moving(Protocol):
     """A linkage in motion, as loads see it."""
 
     @property
+    def q(self) -> Any:
+        """The coordinate [rad, m]."""
+
+    @property
     def links(self) -> Mapping[str, Link]:
         """Links by name."""
 

@@ -93,7 +93,7 @@ class Accelerator(InverseMachine):
     usual_speed = (10.0, 1000.0)
 
     @staticmethod
-    def linkage(p: Any, u: Any) -> Linkage:
+    def linkage(xp: Any, p: Any, u: Any) -> Linkage:
         """A crank alone."""
         return Linkage(
             ground={"O": ZERO},

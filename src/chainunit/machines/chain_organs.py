@@ -321,7 +321,7 @@ class Organs:
         """States of both sides: hanging at rest, or as in `rods_start`; then changed so that they end at A2 and move
         with it."""
         states: list[Any] = []
-        bars = None if self.unknowns else Mechanism(xp, ChamberForces.linkage(p, u), q).links
+        bars = None if self.unknowns else Mechanism(xp, ChamberForces.linkage(xp, p, u), q).links
         for k, (rods, names) in enumerate(zip(self.rods(p, u), NAMES.values(), strict=True)):
             if bars is not None:
                 theta = hanging_chain.two_rods(xp, bars[names.wall], bars[names.web])

@@ -461,6 +461,6 @@ class ChamberForces(InverseMachine):
         yield p.z, low, high
 
     @staticmethod
-    def linkage(p: Any, u: Any) -> Linkage:
+    def linkage(xp: Any, p: Any, u: Any) -> Linkage:
         """Crank, dyad, and an organ on each side."""
         return drive(p, u, tuple(organ(p, u, side) for side in SIDES), resistances(p, u))

@@ -75,7 +75,7 @@ class ChainedModel(LinkageModel):
         super().__init_subclass__()
 
     @staticmethod
-    def linkage(p: Any, u: Any) -> Linkage:
+    def linkage(xp: Any, p: Any, u: Any) -> Linkage:
         """The drive without the chains: their places follow from their states."""
         return drive(p, u, (), {})
 

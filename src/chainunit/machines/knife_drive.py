@@ -250,7 +250,7 @@ class KnifeDrive(InverseMachine):
     )
 
     @staticmethod
-    def linkage(p: Any, u: Any) -> Linkage:
+    def linkage(xp: Any, p: Any, u: Any) -> Linkage:
         """Crank, dyad and triad, with the weight, the cut, the further force on the blade and the pin losses."""
         knife = p.knife
         return Linkage(
@@ -289,7 +289,7 @@ class KnifeDrive(InverseMachine):
 
 def modes(p: Any, q: float = 0.0) -> list[Pose]:
     """All poses in which the triad can be assembled at crank angle `q` [rad]; one of them, at 0, is `assembly`."""
-    linkage = KnifeDrive.linkage(p, Inputs())
+    linkage = KnifeDrive.linkage(MATH, p, Inputs())
     _, group = linkage.groups
     assert isinstance(group, Triad)
     return group.modes(Mechanism(MATH, linkage.before(1), q).pins)

@@ -164,7 +164,7 @@ class Machine:
     def drive(self, phi: Any) -> Mechanism:
         """The linkage at motor angles `phi` [rad]; for a machine with chains, its drive only."""
         u = self.inputs({"phi": phi})
-        linkage = self.model.linkage(self.p, u)
+        linkage = self.model.linkage(_XP, self.p, u)
         return Mechanism(_XP, linkage, u.phi / self.p.ratio, getattr(self.p, "derived", ()))
 
     @property

@@ -36,6 +36,17 @@ class Pin:
 
 
 @declaration
+class GuideLaw:
+    """The guides, all alike."""
+
+    friction: Value = quantity("1", "coefficient of friction", default=0.0, min=0.0, max=100.0, tunable=True)
+    v_smooth: Value = quantity(
+        "m/s", "relative speed below which friction is smoothed", default=0.02, min=1e-9, tunable=True
+    )
+    damping: Value = quantity("N.s/m", "viscous damping of each", default=0.0, min=0.0, tunable=True)
+
+
+@declaration
 class Processing:
     """The law of the processing force."""
 

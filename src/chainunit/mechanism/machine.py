@@ -180,7 +180,7 @@ class _OnDemand(dict[str, Any]):
 class LiftedMechanism:
     """A mechanism in the form that loads take (`Moving`), with its derivatives by q as dual parts."""
 
-    __slots__ = ("_of", "bodies", "links", "pins", "slides", "turns")
+    __slots__ = ("_of", "bodies", "links", "pins", "q", "slides", "turns")
 
     def __init__(self, m: Mechanism, links: Mapping[str, Third], pins: Mapping[str, Vec2]) -> None:
         """
@@ -188,7 +188,7 @@ class LiftedMechanism:
         ----------
         links, pins : third derivatives of the links and pins, see `Mechanism.third`
         """
-        self._of = m
+        self._of, self.q = m, Dual(m.q, 1.0)
         self.links: Mapping[str, Link] = _OnDemand(lambda name: m.links[name].lifted(*links[name]))
         self.pins: Mapping[str, Motion] = _OnDemand(lambda name: m.pins[name].lifted(pins.get(name, ZERO)))
         self.bodies: Mapping[str, Body] = {}

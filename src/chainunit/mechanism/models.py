@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from typing import Any, ClassVar
 
+from ..engines import MATH
 from ..groups.group import Joint
 from ..model import Model, Part, Requirement
 from ..ports import PortSlopes, PortValues, ShaftMotion, Start, flanges, load_terminal
@@ -60,29 +61,30 @@ class LinkageModel(Model):
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
         if hasattr(cls, "Parameters"):
-            cls.derived = cls.linkage(cls.Parameters(), cls.Inputs()).derived
+            cls.derived = cls.linkage(MATH, cls.Parameters(), cls.Inputs()).derived
 
     @staticmethod
-    def linkage(p: Any, u: Any) -> Linkage:
-        """The linkage with these parameters and inputs; places and lengths do not depend on the inputs."""
+    def linkage(xp: Any, p: Any, u: Any) -> Linkage:
+        """The linkage with these parameters and inputs, whose values are those of the engine `xp`; places and
+        lengths do not depend on the inputs."""
         raise NotImplementedError
 
     @classmethod
     def derive(cls, xp: Any, p: Any) -> list[Any]:
         """Values that the groups derive from the lengths."""
-        return derived_numbers(xp, cls.linkage(p, cls.Inputs()))
+        return derived_numbers(xp, cls.linkage(xp, p, cls.Inputs()))
 
     @classmethod
     def state(cls, xp: Any, p: Any, u: Any, q: Any, w: Any) -> MachineState:
         """The machine at crank angle `q` [rad] and speed `w` [rad/s]."""
         derived = p.derived if cls.derived else ()
-        return MachineState(xp, Mechanism(xp, cls.linkage(p, u), q, derived, cls.topology()), w)
+        return MachineState(xp, Mechanism(xp, cls.linkage(xp, p, u), q, derived, cls.topology()), w)
 
     @classmethod
     @cache
     def topology(cls) -> Topology:
         """The names of the linkage."""
-        return cls.linkage(cls.Parameters(), cls.Inputs()).topology
+        return cls.linkage(MATH, cls.Parameters(), cls.Inputs()).topology
 
 
 class MachineModel(Model):
@@ -292,15 +294,15 @@ class DirectMachine(LinkageModel):
         super().__init_subclass__()
 
     @classmethod
-    def linkage(cls, p: Any, u: Any) -> Linkage:
+    def linkage(cls, xp: Any, p: Any, u: Any) -> Linkage:
         """The linkage of the inverse model."""
-        return cls.inverse.linkage(p, u)
+        return cls.inverse.linkage(xp, p, u)
 
     @classmethod
     def requirements(cls, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
         """The limits of the inverse model, and those of an inertia that never vanishes."""
         yield from cls.inverse.requirements(xp, p)
-        yield p.J_added * p.ratio * p.ratio + cls.linkage(p, cls.Inputs()).driver.inertia, 0.0, math.inf
+        yield p.J_added * p.ratio * p.ratio + cls.linkage(xp, p, cls.Inputs()).driver.inertia, 0.0, math.inf
 
     @classmethod
     def start_from(cls, outputs: Mapping[str, float]) -> dict[str, float]:

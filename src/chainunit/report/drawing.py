@@ -16,6 +16,7 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
+from ..engines import MATH
 from ..machines.machine import Machine
 from ..mechanism.machine import Mechanism
 from ..quantities import Layout
@@ -107,7 +108,7 @@ def dimensions(machine: Machine) -> dict[tuple[str, ...], Dimension]:
     marks = {v.name: 1.0 + k / 7919.0 for k, v in enumerate(layout.variables)}
     of = {value: name for name, value in marks.items()}
     variables = {v.name: v for v in layout.variables}
-    marked_linkage = model.linkage(layout.from_names(dict(marks)), Layout(model.Inputs).from_names({}))
+    marked_linkage = model.linkage(MATH, layout.from_names(dict(marks)), Layout(model.Inputs).from_names({}))
     values = layout.by_name(machine.p)
 
     def dimension_of(x: Any) -> Dimension | None:

@@ -1,0 +1,539 @@
+"""A machine from the description of its linkage: the model of a file, without a line of code of its own.
+
+The description is a text in JSON, which a checked file gives (`chainunit.linkages`). It is the whole definition: by
+it another process, or an FMU, builds the same model. Standard library only.
+
+x points right, y up, angles count counter-clockwise from the x axis. The coordinate q is that of the driver.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache, cached_property
+from typing import Any
+
+from ..engines import MATH
+from ..errors import InputError
+from ..groups.group import GuideForce
+from ..groups.loads import GuideLosses, PinLosses, Weight
+from ..mechanism.assur import GROUND, PRISMATIC
+from ..mechanism.linkage import Linkage
+from ..mechanism.machine import MachineState, Mechanism, derived_numbers
+from ..mechanism.models import InverseMachine, declared_class
+from ..model import Requirement
+from ..planar import Motion, Vec2
+from ..ports import PortValues, ShaftMotion
+from ..quantities import Layout, Value, declaration, group, quantity
+from .linkage_loads import CoordinateTable, ForceLaw, SpringDamper, TorqueLaw
+from .linkage_parts import DriverEntry, Frame, JointEntry, LinkageParts, LinkEntry, Structure
+from .parts import Force, GuideLaw, Pin, force
+
+ANGLES = 48
+"""Places of the driver at which a linkage is checked to close."""
+LEAST_MARGIN = 1e-3
+"""Least margin of a group: closer to a dead position its forces have no limit."""
+
+
+@declaration
+class CommonParameters:
+    """Parameters that every linkage has."""
+
+    g: Value = quantity("m/s2", "gravity, against y", default=9.81, min=0.0, tunable=True)
+    ratio: Value = quantity("1", "gear ratio, motor turns per driver turn", default=1.0, above=0.0, max=1e6)
+    pin: Pin = group(Pin, "pins", default=Pin(friction=0.0, diameter=0.05))
+    joint_damping: Value = quantity(
+        "N.m.s/rad", "viscous damping of each pin", default=0.0, min=0.0, tunable=True
+    )
+    guide: GuideLaw = group(GuideLaw, "guides", default=GuideLaw())
+
+
+@declaration
+class LinkBody:
+    """A link as a body."""
+
+    mass: Value = quantity("kg", "mass", default=0.0, min=0.0, tunable=True)
+    inertia: Value = quantity(
+        "kg.m2", "moment of inertia about the centroid", default=0.0, min=0.0, tunable=True
+    )
+
+
+@declaration
+class GuideReaction(Force):
+    """The reaction of a sliding joint, and the motion in it."""
+
+    normal: Value = quantity("N", "force across the line, positive to the left of its direction", nominal=1e3)
+    moment: Value = quantity("N.m", "moment about the point of the block, counter-clockwise", nominal=100.0)
+    s: Value = quantity("m", "way of the block along the line")
+    v: Value = quantity("m/s", "speed along the line")
+    a: Value = quantity("m/s2", "acceleration along the line")
+
+
+@declaration
+class PointMotion:
+    """A point in the frame."""
+
+    x: Value = quantity("m", "position x")
+    y: Value = quantity("m", "position y")
+    vx: Value = quantity("m/s", "velocity along x")
+    vy: Value = quantity("m/s", "velocity along y")
+    ax: Value = quantity("m/s2", "acceleration along x")
+    ay: Value = quantity("m/s2", "acceleration along y")
+
+
+@declaration
+class LinkTurning:
+    """The rotation of a link."""
+
+    angle: Value = quantity("rad", "angle of its x axis, counter-clockwise")
+    w: Value = quantity("rad/s", "angular velocity")
+    a: Value = quantity("rad/s2", "angular acceleration")
+
+
+@declaration
+class LinkageMotion(ShaftMotion):
+    """Motion of the motor shaft that turns the driver."""
+
+    phi: Value = quantity("rad", "motor angle; the driver has turned by phi/ratio", default=0.0)
+
+
+@declaration
+class Running:
+    """Outputs that every machine has."""
+
+    tau: Value = quantity("N.m", "torque needed at the motor shaft, J a + tau_bias", nominal=100.0)
+    power: Value = quantity("W", "power that the motor shaft takes, tau w", nominal=100.0)
+    kinetic_energy: Value = quantity("J", "kinetic energy")
+    potential_energy: Value = quantity("J", "potential energy of weights and springs", nominal=1000.0)
+    dissipated_power: Value = quantity("W", "power that friction, dampers and loads take", nominal=100.0)
+    margin: Value = quantity("1", "least margin of the groups; 0 is a dead position")
+
+
+def machine_of(text: str) -> type[InverseMachine]:
+    """The model of a description.
+
+    Raises
+    ------
+    InputError
+        where the linkage is not determined, has a group that is not covered, or does not close.
+    """
+    return _machine_of(text)
+
+
+@cache
+def _machine_of(text: str) -> type[InverseMachine]:
+    return LinkageDescription(json.loads(text), text).model()
+
+
+class LinkageDescription:
+    """The description of a linkage with its structure: what all values of its parameters share."""
+
+    def __init__(self, data: Mapping[str, Any], text: str) -> None:
+        self.data, self.text = data, text
+        links = [
+            LinkEntry(
+                each["name"],
+                {name: (x, y) for name, (x, y) in each["points"].items()},
+                each.get("mass", 0.0),
+                each.get("inertia", 0.0),
+                tuple(each.get("centroid", (0.0, 0.0))),
+                each.get("masses", {}),
+            )
+            for each in data["links"]
+        ]
+        joints = [
+            JointEntry(
+                each["name"], each["type"], tuple(each["on"]), tuple(each["by"]),
+                each.get("toward", ""), each.get("angle", 0.0),
+            )
+            for each in data["joints"]
+        ]  # fmt: skip
+        driver = DriverEntry(**data["driver"])
+        start = data["start"]
+        ends = [tuple(load[key]) for load in data["loads"] for key in ("on", "by") if key in load]
+        self.structure = Structure.of(
+            {name: (x, y) for name, (x, y) in data["ground"].items()},
+            links,
+            joints,
+            driver,
+            start["value"],
+            {name: tuple(pose) for name, pose in start["poses"].items()},
+            [end for end in ends if len(end) == 2],
+        )
+        self.tables = {
+            name: CoordinateTable(each["places"], each["values"], not driver.linear)
+            for name, each in data.get("tables", {}).items()
+        }
+        self.Parameters = self._parameters()
+        self.Inputs = declared_class(
+            "Inputs", (LinkageMotion,), [_field(each) for each in data.get("inputs", ())]
+        )
+        p, u = self.Parameters(), self.Inputs()
+        self.sides = dict(LinkageParts(MATH, self.structure, self.values(p, u)).sides)
+        self.turning = self._followed(p, u)
+
+    # declarations
+
+    def _parameters(self) -> Any:
+        fields = [_field(each) for each in self.data.get("parameters", ())]
+        for link in self.data["links"]:
+            own = link.get("own", {})
+            if own:
+                name = link["name"]
+                default = LinkBody(**own)
+                fields.append((name, LinkBody, group(LinkBody, f"link {name}", default=default)))
+        return declared_class("Parameters", (_with_starts(CommonParameters, self.data["common"]),), fields)
+
+    def values(self, p: Any, u: Any) -> dict[str, Any]:
+        """The quantities that expressions may name."""
+        values = {each["name"]: getattr(p, each["name"]) for each in self.data.get("parameters", ())}
+        values |= {each["name"]: getattr(u, each["name"]) for each in self.data.get("inputs", ())}
+        for link in self.data["links"]:
+            for quantity_name in link.get("own", {}):
+                own = getattr(p, link["name"])
+                values[f"{quantity_name}_of_{link['name']}"] = getattr(own, quantity_name)
+        return values | {"g": p.g, "ratio": p.ratio}
+
+    # the linkage
+
+    def parts(self, xp: Any, p: Any, u: Any) -> LinkageParts:
+        """The groups with the values of parameters and inputs."""
+        return LinkageParts(xp, self.structure, self.values(p, u), self.sides)
+
+    def linkage(self, xp: Any, p: Any, u: Any) -> tuple[Linkage, LinkageParts]:
+        """The linkage with the values of parameters and inputs, and its parts."""
+        parts = self.parts(xp, p, u)
+        loads: dict[str, Any] = {"weight": Weight(p.g)}
+        for load in self.data["loads"]:
+            loads[load["name"]] = self._load(load, parts)
+        loads["pins"] = PinLosses(p.pin, p.joint_damping)
+        if any(j.kind == PRISMATIC for j in self.structure.joints.values()):
+            lengths = {
+                parts.receivers[each["name"]][0]: parts.number(each["length"])
+                for each in self.data["joints"]
+                if "length" in each
+            }
+            loads["guides"] = GuideLosses(p.guide, p.guide.damping, lengths)
+        return Linkage(parts.ground, parts.driver, parts.groups, loads), parts
+
+    def _load(self, load: Mapping[str, Any], parts: LinkageParts) -> Any:
+        kind = load["type"]
+        if kind == "torque":
+            return TorqueLaw(load["on"][0], load["torque"], parts.values, self.tables)
+        if kind == "spring":
+            ends = [
+                (None if link == GROUND else link, parts.pin_on(link, point))
+                for link, point in (load["on"], load["by"])
+            ]
+            stiffness, length, damping = (
+                parts.number(load[key]) for key in ("stiffness", "length", "damping")
+            )
+            return SpringDamper((ends[0], ends[1]), stiffness, length, damping)
+        link, point = load["on"]
+        axis = parts.frames[link].axis if kind == "follower" else None
+        fx, fy = load["force"]
+        return ForceLaw(link, parts.pin_on(link, point), (fx, fy), axis, parts.values, self.tables)
+
+    # the rotation of links over the turn
+
+    def places(self) -> list[float]:
+        """Places of the driver from the start on, around or over its range."""
+        driver = self.data["driver"]
+        start = self.structure.start
+        if driver["linear"]:
+            low, high = self.data["range"]
+            return [low + (high - low) * k / ANGLES for k in range(ANGLES + 1)]
+        return [start + 2.0 * math.pi * k / ANGLES for k in range(ANGLES)]
+
+    def _followed(self, p: Any, u: Any) -> dict[str, tuple[float, float]]:
+        """For each link its turns per turn of the driver, and the middle of the rest of its angle [rad].
+
+        Raises
+        ------
+        InputError
+            where the linkage does not close, or passes a dead position, with the place of the driver.
+        """
+        linkage, parts = self.linkage(MATH, p, u)
+        try:
+            derived = derived_numbers(MATH, linkage)
+        except (ArithmeticError, ValueError):
+            raise InputError(f"{self._closing(linkage, ())}") from None
+        places = self.places()
+        around = [*places, places[0] + 2.0 * math.pi] if not self.data["driver"]["linear"] else places
+        angles: dict[str, list[float]] = {}
+        signs: list[float] = []
+        for q in around:
+            try:
+                m = Mechanism(MATH, linkage, q, derived)
+            except (ArithmeticError, ValueError):
+                raise InputError(self._closing(linkage, derived)) from None
+            margins = m.margins()
+            signs = signs or [math.copysign(1.0, margin) for margin in margins]
+            for each, margin, sign in zip(self.structure.groups, margins, signs, strict=True):
+                if not margin * sign > LEAST_MARGIN:
+                    raise InputError(self._dead(each.links, q))
+            for name in self.structure.links:
+                axis = _own_axis(m.links[name].u, parts.frames[name])
+                angle = math.atan2(axis.y, axis.x)
+                before = angles.setdefault(name, [self.structure.poses[name][2]])
+                before.append(before[-1] + math.remainder(angle - before[-1], 2.0 * math.pi))
+        turning = {}
+        for name, course in angles.items():
+            course = course[1:]
+            rate = 0.0 if self.data["driver"]["linear"] else round((course[-1] - course[0]) / (2.0 * math.pi))
+            rest = [angle - rate * (q - around[0]) for angle, q in zip(course, around, strict=True)]
+            turning[name] = rate, 0.5 * (min(rest) + max(rest)) - rate * around[0]
+        return turning
+
+    def _dead(self, links: Sequence[str], q: float) -> str:
+        return (
+            f"the group of {', '.join(links)} comes to a dead position at {self._at(q)}: there its forces have no "
+            "limit; change its lengths"
+        )
+
+    def _at(self, q: float) -> str:
+        if self.data["driver"]["linear"]:
+            return f"{self.data['driver']['joint']} = {q:.6g} m"
+        return f"{math.degrees(q) % 360.0:.4g} deg of {self.data['driver']['link']}"
+
+    def _closing(self, linkage: Linkage, derived: Sequence[Any]) -> str:
+        """The sentence on the first place at which the linkage does not close, and the group that does not."""
+        for q in self.places():
+            for k in range(len(linkage.groups)):
+                numbers = derived[: sum(each.derived for each in linkage.groups[: k + 1])]
+                try:
+                    if k + 1 < len(linkage.groups):
+                        Mechanism(MATH, linkage.before(k + 1), q, numbers)
+                    else:
+                        Mechanism(MATH, linkage, q, derived)
+                except (ArithmeticError, ValueError, IndexError):
+                    links = self.structure.groups[k].links
+                    return (
+                        f"the group of {', '.join(links)} cannot close at {self._at(q)}: change its lengths"
+                    )
+        return "the linkage does not close"
+
+    # the model
+
+    def model(self) -> type[InverseMachine]:
+        """The model."""
+        data, described = self.data, self
+        parts = self.parts(MATH, self.Parameters(), self.Inputs())
+        turns = {
+            name: parts.receivers[name][0] for name, j in self.structure.joints.items() if j.kind != PRISMATIC
+        }
+        required = tuple(
+            Requirement(
+                f"least margin of the group of {', '.join(each.links)} over the way of the driver",
+                "1",
+                "the linkage does not close all the way, or comes to a dead position",
+                tuple(each["name"] for each in data.get("parameters", ())),
+            )
+            for each in self.structure.groups
+        )
+
+        class FileMachine(InverseMachine):
+            """A machine whose linkage a file describes."""
+
+            name = data["name"]
+            noun = data["title"] or data["name"]
+            turning = data["driver"]["link"]
+            description = data["title"] or f"linkage {data['name']}"
+            built_by = f"machine_of({described.text!r})"
+            maker = (machine_of, (described.text,))
+            Parameters = described.Parameters
+            Inputs = described.Inputs
+            Outputs = described.outputs
+            joints = turns
+            usual_speed = (0.05, 200.0)
+            described_by = described
+
+            @staticmethod
+            def linkage(xp: Any, p: Any, u: Any) -> Linkage:
+                """See `LinkageDescription.linkage`."""
+                return described.linkage(xp, p, u)[0]
+
+            @staticmethod
+            def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
+                """Each group closes, clear of its dead positions."""
+                yield from described.limits(xp, p)
+
+            @staticmethod
+            def probes(xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
+                """See `LinkageDescription.probes`."""
+                return described.probes(xp, p, u, s, a)
+
+        FileMachine.required = required
+        FileMachine.__name__ = FileMachine.__qualname__ = data["name"]
+        return FileMachine
+
+    def limits(self, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
+        """The least margin of each group over the way of the driver, and its limit."""
+        u = self.Inputs()
+        linkage, _ = self.linkage(xp, p, u)
+        derived = getattr(p, "derived", ())
+        least: list[Any] = []
+        for q in self.places():
+            try:
+                margins = Mechanism(xp, linkage, q, derived).margins()
+            except (ArithmeticError, ValueError):
+                margins = [math.nan] * len(linkage.groups)
+            signed = [margin * sign for margin, sign in zip(margins, self._signs, strict=True)]
+            least = signed if not least else [_least(xp, *pair) for pair in zip(least, signed, strict=True)]
+        for margin in least:
+            yield margin, LEAST_MARGIN, math.inf
+
+    @cached_property
+    def _signs(self) -> list[float]:
+        """The signs of the margins with the start values."""
+        linkage, _ = self.linkage(MATH, self.Parameters(), self.Inputs())
+        m = Mechanism(MATH, linkage, self.places()[0], derived_numbers(MATH, linkage))
+        return [math.copysign(1.0, margin) for margin in m.margins()]
+
+    @cached_property
+    def outputs(self) -> type:
+        """The declaration of the outputs."""
+        fields: list[tuple[str, Any, Any]] = []
+        for name, joint in self.structure.joints.items():
+            of: type = GuideReaction if joint.kind == PRISMATIC else Force
+            words = f"joint {name}: on {joint.on[0]} from {joint.by[0]}"
+            fields.append((name, of, group(of, words)))
+        for name, of in self.link_outputs.items():
+            fields.append((name, of, group(of, f"link {name}")))
+        return declared_class("Outputs", (PortValues, Running), fields)
+
+    @cached_property
+    def link_outputs(self) -> Mapping[str, Any]:
+        """The declaration of the outputs of each link."""
+        declared = {}
+        for name, link in self.structure.links.items():
+            points = [(point, PointMotion, group(PointMotion, f"point {point}")) for point in link.points]
+            if link.heavy:
+                points.append(("centroid", PointMotion, group(PointMotion, "centroid")))
+            declared[name] = declared_class(f"Link_{name}", (LinkTurning,), points)
+        return declared
+
+    def probes(self, xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
+        """Reactions, rotation of links and motion of points at acceleration `a` of the driver."""
+        parts = self.parts(xp, p, u)
+        reactions, m, w = s.reactions(a), s.m, s.w
+        values: dict[str, Any] = {}
+        for name, joint in self.structure.joints.items():
+            key, sign = parts.receivers[name]
+            if joint.kind == PRISMATIC:
+                values[name] = _guide(m, joint, key, sign, reactions[key], parts, w, a)
+            else:
+                f = reactions[key]
+                values[name] = force(f if sign > 0.0 else -f)
+        for name, link in self.structure.links.items():
+            moving, frame = m.links[name], parts.frames[name]
+            fields = {
+                "angle": self._angle(xp, name, _own_axis(moving.u, frame), m.q),
+                "w": moving.t1 * w,
+                "a": moving.t2 * (w * w) + moving.t1 * a,
+            }
+            for point in link.points:
+                at = frame.of(parts.point(name, point))
+                fields[point] = _moved(moving.beside(at.x, at.y), w, a)
+            if link.heavy:
+                at = frame.of(parts.vector(link.centroid))
+                fields["centroid"] = _moved(moving.beside(at.x, at.y), w, a)
+            values[name] = self.link_outputs[name](**fields)
+        return values
+
+    def _angle(self, xp: Any, name: str, axis: Vec2, q: Any) -> Any:
+        """The angle of a link without jumps: the middle of its course, which may turn with the driver, and the
+        rest."""
+        rate, middle = self.turning[name]
+        about = middle + rate * q if rate else middle
+        c, s = (xp.cos(about), xp.sin(about)) if rate else (math.cos(about), math.sin(about))
+        return about + xp.atan2(c * axis.y - s * axis.x, c * axis.x + s * axis.y)
+
+
+def _own_axis(u: Vec2, frame: Frame) -> Vec2:
+    """The x axis of a link's description, from the direction of its frame in the group."""
+    e = frame.axis
+    return Vec2(u.x * e.x + u.y * e.y, u.y * e.x - u.x * e.y)
+
+
+def _moved(k: Motion, w: Any, a: Any) -> PointMotion:
+    w2 = w * w
+    return PointMotion(
+        x=k.p.x,
+        y=k.p.y,
+        vx=k.p1.x * w,
+        vy=k.p1.y * w,
+        ax=k.p1.x * a + k.p2.x * w2,
+        ay=k.p1.y * a + k.p2.y * w2,
+    )
+
+
+def _least(xp: Any, a: Any, b: Any) -> Any:
+    """The lesser of two numbers; NaN where either is."""
+    if isinstance(a, float) and math.isnan(a):
+        return a
+    return b if isinstance(b, float) and math.isnan(b) else xp.minimum(a, b)
+
+
+def _guide(
+    m: Mechanism,
+    joint: JointEntry,
+    key: tuple[str, str],
+    sign: float,
+    reaction: Vec2,
+    parts: LinkageParts,
+    w: Any,
+    a: Any,
+) -> GuideReaction:
+    """The reaction of a sliding joint on the link that is named first, about its point, and the motion in it."""
+    assert isinstance(reaction, GuideForce)
+    slide, block = m.slides[key], m.pins[key[0]]
+    # the line of the driver has the direction in which the driver moves
+    along = sign if joint.name == parts.structure.driver.joint else 1.0
+    d = slide.d * along
+    n = d.turned()
+    moment = reaction.moment - (block.p - m.links[key[1]].pin.p).cross(reaction)
+    start = m.pins[parts.pin_on(*joint.by)]
+    s1, s2 = slide.s1 * sign * along, slide.s2 * sign * along
+    return GuideReaction(
+        fx=reaction.x * sign,
+        fy=reaction.y * sign,
+        normal=reaction.dot(n) * sign,
+        moment=moment * sign,
+        s=(block.p - start.p).dot(d),
+        v=s1 * w,
+        a=s1 * a + s2 * (w * w),
+    )
+
+
+def _field(entry: Mapping[str, Any]) -> tuple[str, Any, Any]:
+    """A quantity of the user's as a field of a declaration."""
+    bounds = {key: entry[key] for key in ("min", "max") if entry.get(key) is not None}
+    words = entry.get("description") or entry["name"]
+    return (
+        entry["name"],
+        Value,
+        quantity(entry["unit"], words, default=entry["value"], tunable=entry.get("tunable", False), **bounds),
+    )
+
+
+def _with_starts(of: type, starts: Mapping[str, float]) -> type:
+    """A declaration with other start values, by name."""
+    flat = Layout(of).from_names(dict(starts))
+    fields = [
+        (f.name, f.type, group(f.metadata["of"], f.metadata["group"], default=getattr(flat, f.name)))
+        if "of" in f.metadata
+        else (
+            f.name,
+            f.type,
+            dataclasses.field(
+                default=getattr(flat, f.name),
+                metadata=f.metadata
+                | {"quantity": dataclasses.replace(f.metadata["quantity"], start=getattr(flat, f.name))},
+            ),
+        )
+        for f in dataclasses.fields(of)
+    ]
+    return declared_class(of.__name__, (), fields)

@@ -1,0 +1,235 @@
+"""The decomposition of a planar linkage into Assur groups, from its links and joints alone.
+
+Each joint of two links, revolute or prismatic, gives two equations, each link three unknowns. Equations are matched
+with unknowns (a maximum flow of joints into links). What an equation cannot find is over-determined, what no equation
+takes is free. In a full matching each link depends on the other links of its equations; the links that depend on each
+other, directly or by a circle, form a group, which no smaller part of it determines. The groups come in the order in
+which they can be solved. This is the fine Dulmage-Mendelsohn decomposition of the equations; where all their ranks
+are full, it is that into Assur groups.
+
+Standard library only: FMUs carry this file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+from ..errors import InputError
+
+GROUND = "ground"
+REVOLUTE, PRISMATIC = "revolute", "prismatic"
+
+
+class JointOf(NamedTuple):
+    """A joint as the decomposition sees it: its name, its kind, and the two links."""
+
+    name: str
+    kind: str
+    on: str
+    by: str
+
+    def other(self, link: str) -> str:
+        """The link on its other side."""
+        return self.by if link == self.on else self.on
+
+
+class AssurGroup(NamedTuple):
+    """A group: its kind (RRR, RRP, RPR, PRP, RPP, or triad), its links, and its joints in the order of their roles.
+
+    Of a dyad the links are `first` and `second`, the joints those of the first link with what stands before, between
+    both, and of the second link. Of a triad the ternary link stands first, then its legs; the joints are the outer
+    ones of the legs, then their inner ones.
+    """
+
+    kind: str
+    links: tuple[str, ...]
+    joints: tuple[JointOf, ...]
+
+
+def decompose(links: Sequence[str], joints: Sequence[JointOf], driver: str) -> list[AssurGroup]:
+    """The groups of the links that hang on the ground and on the `driver`, in an order in which they can be solved.
+
+    `joints` are all but that of the driver with the ground.
+
+    Raises
+    ------
+    InputError
+        for a linkage with too many or too few degrees of freedom, or with a group of a class that is not covered, in
+        one line that names the links and the joints.
+    """
+    unknown = [link for link in links if link != driver]
+    matched = _matching(unknown, joints)
+    free = {link: 3 - sum(1 for each in matched.values() if each == link) for link in unknown}
+    if any(free.values()):
+        raise InputError(_freedoms(unknown, joints, matched, free))
+    depends: dict[str, dict[str, None]] = {link: {} for link in unknown}
+    for (k, _), link in matched.items():
+        other = joints[k].other(link)
+        if other in depends:
+            depends[link][other] = None
+    groups, placed = [], {GROUND, driver}
+    for part in _strong_parts(depends):
+        groups.append(_classified(tuple(part), joints, placed))
+        placed |= {*part}
+    return groups
+
+
+def _matching(unknown: Sequence[str], joints: Sequence[JointOf]) -> dict[tuple[int, int], str]:
+    """Each equation, by joint and number, with the link that it determines.
+
+    Raises
+    ------
+    InputError
+        where an equation finds none.
+    """
+    matched: dict[tuple[int, int], str] = {}
+    owners: dict[str, list[tuple[int, int]]] = {link: [] for link in unknown}
+
+    def augment(equation: tuple[int, int], seen: set[str]) -> bool:
+        joint = joints[equation[0]]
+        for link in (joint.on, joint.by):
+            if link in owners and link not in seen:
+                seen.add(link)
+                if len(owners[link]) < 3:
+                    owners[link].append(equation)
+                    matched[equation] = link
+                    return True
+                for held in list(owners[link]):
+                    if augment(held, seen):
+                        owners[link].remove(held)
+                        owners[link].append(equation)
+                        matched[equation] = link
+                        return True
+        return False
+
+    for k in range(len(joints)):
+        for number in range(2):
+            seen: set[str] = set()
+            if not augment((k, number), seen):
+                involved = sorted(seen) or [joints[k].on]
+                own = [j.name for j in joints if {j.on, j.by} & set(involved)]
+                raise InputError(
+                    f"too few degrees of freedom: the joints {', '.join(own)} fix the link"
+                    f"{'s' * (len(involved) > 1)} {', '.join(involved)} more than once; take out a joint, such as "
+                    f"{joints[k].name}, or add a link between"
+                )
+    return matched
+
+
+def _freedoms(
+    unknown: Sequence[str],
+    joints: Sequence[JointOf],
+    matched: Mapping[tuple[int, int], str],
+    free: Mapping[str, int],
+) -> str:
+    """The refusal of a linkage in which links can move by themselves."""
+    number = sum(free.values())
+    # all that a free link carries along: equations can be handed on to it
+    loose = {link for link, count in free.items() if count}
+    while True:
+        more = {
+            link
+            for (k, _), link in matched.items()
+            if link not in loose and {joints[k].on, joints[k].by} & loose
+        }
+        if not more:
+            break
+        loose |= more
+    names = [link for link in unknown if link in loose]
+    lone = [link for link in names if sum(link in (j.on, j.by) for j in joints) < 2]
+    hint = ""
+    if lone:
+        joined = any(lone[0] in (j.on, j.by) for j in joints)
+        hint = f"; {lone[0]} has {'one joint' if joined else 'no joint'}"
+    return (
+        f"too many degrees of freedom: {number + 1} where the driver gives one; the links {', '.join(names)} are "
+        f"free to move{hint}; add a joint, or take out a link"
+    )
+
+
+def _strong_parts(depends: Mapping[str, Mapping[str, None]]) -> Iterator[list[str]]:
+    """The strongly connected parts, each behind all that it depends on (Tarjan)."""
+    order: dict[str, int] = {}
+    low: dict[str, int] = {}
+    stack: list[str] = []
+    held: set[str] = set()
+
+    def visit(link: str) -> Iterator[list[str]]:
+        order[link] = low[link] = len(order)
+        stack.append(link)
+        held.add(link)
+        for other in depends[link]:
+            if other not in order:
+                yield from visit(other)
+                low[link] = min(low[link], low[other])
+            elif other in held:
+                low[link] = min(low[link], order[other])
+        if low[link] == order[link]:
+            part = []
+            while True:
+                part.append(stack.pop())
+                held.discard(part[-1])
+                if part[-1] == link:
+                    break
+            yield sorted(part, key=list(depends).index)
+
+    for link in depends:
+        if link not in order:
+            yield from visit(link)
+
+
+def _classified(part: tuple[str, ...], joints: Sequence[JointOf], placed: set[str]) -> AssurGroup:
+    """A group on links that are `placed`, with its links and joints in their roles.
+
+    Raises
+    ------
+    InputError
+        for one that is not covered.
+    """
+    inner = [j for j in joints if j.on in part and j.by in part]
+    outer = {link: [j for j in joints if link in (j.on, j.by) and j.other(link) in placed] for link in part}
+    if len(part) == 2 and len(inner) == 1 and all(len(each) == 1 for each in outer.values()):
+        return _dyad(part, inner[0], {link: each[0] for link, each in outer.items()})
+    if len(part) == 4:
+        for ternary in part:
+            legs = [link for link in part if link != ternary]
+            own = [[j for j in inner if {j.on, j.by} == {ternary, leg}] for leg in legs]
+            if not outer[ternary] and all(len(each) == 1 for each in (*own, *(outer[leg] for leg in legs))):
+                return _triad(ternary, legs, [outer[leg][0] for leg in legs], [each[0] for each in own])
+    raise InputError(
+        f"the links {', '.join(part)} form one group with {len(part)} links and "
+        f"{len(inner) + sum(map(len, outer.values()))} joints: a class that is not covered; covered are dyads "
+        "(class II) and triads (class III, a ternary link on three legs); drive another link, or add a link that "
+        "splits the group"
+    )
+
+
+_LETTERS = {REVOLUTE: "R", PRISMATIC: "P"}
+DYADS = ("RRR", "RRP", "RPR", "PRP", "RPP")
+
+
+def _dyad(part: tuple[str, ...], inner: JointOf, outer: Mapping[str, JointOf]) -> AssurGroup:
+    first, second = part
+    kind = "".join(_LETTERS[j.kind] for j in (outer[first], inner, outer[second]))
+    # a revolute outer joint comes first; of an oscillating slide the block, which the guide acts on
+    if kind in ("PRR", "PPR") or (kind == "RPR" and inner.on != first):
+        first, second, kind = second, first, kind[::-1]
+    if kind not in DYADS:
+        raise InputError(
+            f"the links {first}, {second} have three sliding joints, {outer[first].name}, {inner.name} and "
+            f"{outer[second].name}: nothing holds their angles; make one of them a revolute joint"
+        )
+    return AssurGroup(kind, (first, second), (outer[first], inner, outer[second]))
+
+
+def _triad(
+    ternary: str, legs: Sequence[str], outer: Sequence[JointOf], inner: Sequence[JointOf]
+) -> AssurGroup:
+    for leg, a, b in zip(legs, outer, inner, strict=True):
+        if a.kind == b.kind == PRISMATIC:
+            raise InputError(
+                f"the link {leg} slides in both of its joints, {a.name} and {b.name}: such a leg of a triad is not "
+                "covered; make one of them a revolute joint"
+            )
+    return AssurGroup("triad", (ternary, *legs), (*outer, *inner))
