@@ -1,7 +1,7 @@
 """A machine from the description of its linkage: the model of a file, without a line of code of its own.
 
-The description is a text in JSON, which a checked file gives (`chainunit.linkages`). It is the whole definition: by
-it another process, or an FMU, builds the same model. Standard library only.
+The description is a text in JSON, which a checked file gives (`chainunit.machines.linkages.file`). It is the
+whole definition: by it another process, or an FMU, builds the same model. Standard library only.
 
 x points right, y up, angles count counter-clockwise from the x axis. The coordinate q is that of the driver.
 """
@@ -15,21 +15,31 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import cache, cached_property
 from typing import Any
 
-from ..engines import MATH
-from ..errors import InputError
-from ..groups.group import GuideForce
-from ..groups.loads import GuideLosses, PinLosses, Weight
-from ..mechanism.assur import GROUND, PRISMATIC
-from ..mechanism.linkage import Linkage
-from ..mechanism.machine import MachineState, Mechanism, derived_numbers
-from ..mechanism.models import InverseMachine, declared_class
-from ..model import Requirement
-from ..planar import Motion, Vec2
-from ..ports import PortValues, ShaftMotion
-from ..quantities import Layout, Value, declaration, group, quantity
-from .linkage_loads import CoordinateTable, ForceLaw, SpringDamper, TorqueLaw
-from .linkage_parts import DriverEntry, Frame, JointEntry, LinkageParts, LinkEntry, Structure
-from .parts import Force, GuideLaw, Pin, force
+from ...engines import MATH
+from ...errors import InputError
+from ...groups.group import GuideForce
+from ...groups.loads import GuideLosses, PinLosses, Weight
+from ...mechanism.assur import GROUND, PRISMATIC
+from ...mechanism.linkage import Linkage
+from ...mechanism.machine import MachineState, Mechanism, derived_numbers
+from ...mechanism.models import AddedInertia, InverseMachine, declared_class, names_of
+from ...model import Requirement
+from ...planar import Motion, Vec2
+from ...ports import LoadInput, PortSlopes, PortValues, Start
+from ...quantities import Layout, Value, group, quantity
+from ..parts import Force, force
+from .declarations import (
+    CommonParameters,
+    GuideReaction,
+    LinkageMotion,
+    LinkBody,
+    LinkTurning,
+    PointMotion,
+    Running,
+)
+from .loads import CoordinateTable, ForceLaw, SpringDamper, TorqueLaw
+from .parts import Frame, LinkageParts
+from .structure import DriverEntry, JointEntry, LinkEntry, Structure
 
 ANGLES = 48
 """Places of the driver at which a linkage is checked to close."""
@@ -37,78 +47,21 @@ LEAST_MARGIN = 1e-3
 """Least margin of a group: closer to a dead position its forces have no limit."""
 
 
-@declaration
-class CommonParameters:
-    """Parameters that every linkage has."""
-
-    g: Value = quantity("m/s2", "gravity, against y", default=9.81, min=0.0, tunable=True)
-    ratio: Value = quantity("1", "gear ratio, motor turns per driver turn", default=1.0, above=0.0, max=1e6)
-    pin: Pin = group(Pin, "pins", default=Pin(friction=0.0, diameter=0.05))
-    joint_damping: Value = quantity(
-        "N.m.s/rad", "viscous damping of each pin", default=0.0, min=0.0, tunable=True
+RESERVED = frozenset(
+    name
+    for of in (
+        CommonParameters,
+        LinkageMotion,
+        PortValues,
+        PortSlopes,
+        Running,
+        Start,
+        AddedInertia,
+        LoadInput,
     )
-    guide: GuideLaw = group(GuideLaw, "guides", default=GuideLaw())
-
-
-@declaration
-class LinkBody:
-    """A link as a body."""
-
-    mass: Value = quantity("kg", "mass", default=0.0, min=0.0, tunable=True)
-    inertia: Value = quantity(
-        "kg.m2", "moment of inertia about the centroid", default=0.0, min=0.0, tunable=True
-    )
-
-
-@declaration
-class GuideReaction(Force):
-    """The reaction of a sliding joint, and the motion in it."""
-
-    normal: Value = quantity("N", "force across the line, positive to the left of its direction", nominal=1e3)
-    moment: Value = quantity("N.m", "moment about the point of the block, counter-clockwise", nominal=100.0)
-    s: Value = quantity("m", "way of the block along the line")
-    v: Value = quantity("m/s", "speed along the line")
-    a: Value = quantity("m/s2", "acceleration along the line")
-
-
-@declaration
-class PointMotion:
-    """A point in the frame."""
-
-    x: Value = quantity("m", "position x")
-    y: Value = quantity("m", "position y")
-    vx: Value = quantity("m/s", "velocity along x")
-    vy: Value = quantity("m/s", "velocity along y")
-    ax: Value = quantity("m/s2", "acceleration along x")
-    ay: Value = quantity("m/s2", "acceleration along y")
-
-
-@declaration
-class LinkTurning:
-    """The rotation of a link."""
-
-    angle: Value = quantity("rad", "angle of its x axis, counter-clockwise")
-    w: Value = quantity("rad/s", "angular velocity")
-    a: Value = quantity("rad/s2", "angular acceleration")
-
-
-@declaration
-class LinkageMotion(ShaftMotion):
-    """Motion of the motor shaft that turns the driver."""
-
-    phi: Value = quantity("rad", "motor angle; the driver has turned by phi/ratio", default=0.0)
-
-
-@declaration
-class Running:
-    """Outputs that every machine has."""
-
-    tau: Value = quantity("N.m", "torque needed at the motor shaft, J a + tau_bias", nominal=100.0)
-    power: Value = quantity("W", "power that the motor shaft takes, tau w", nominal=100.0)
-    kinetic_energy: Value = quantity("J", "kinetic energy")
-    potential_energy: Value = quantity("J", "potential energy of weights and springs", nominal=1000.0)
-    dissipated_power: Value = quantity("W", "power that friction, dampers and loads take", nominal=100.0)
-    margin: Value = quantity("1", "least margin of the groups; 0 is a dead position")
+    for name in names_of(of)
+)
+"""Names of variables that every machine has."""
 
 
 def machine_of(text: str) -> type[InverseMachine]:
@@ -181,10 +134,15 @@ class LinkageDescription:
         for link in self.data["links"]:
             own = link.get("own", {})
             if own:
-                name = link["name"]
-                default = LinkBody(**own)
-                fields.append((name, LinkBody, group(LinkBody, f"link {name}", default=default)))
+                name, words = self.variable("link", link["name"]), f"link {link['name']}"
+                fields.append((name, LinkBody, group(LinkBody, words, default=LinkBody(**own))))
         return declared_class("Parameters", (_with_starts(CommonParameters, self.data["common"]),), fields)
+
+    def variable(self, kind: str, name: str) -> str:
+        """The name under which the variables of a link or a joint stand: with its kind where the name has another
+        meaning already."""
+        shared = kind == "joint" and name in self.structure.links
+        return f"{name}_{kind}" if shared or name in RESERVED else name
 
     def values(self, p: Any, u: Any) -> dict[str, Any]:
         """The quantities that expressions may name."""
@@ -192,7 +150,7 @@ class LinkageDescription:
         values |= {each["name"]: getattr(u, each["name"]) for each in self.data.get("inputs", ())}
         for link in self.data["links"]:
             for quantity_name in link.get("own", {}):
-                own = getattr(p, link["name"])
+                own = getattr(p, self.variable("link", link["name"]))
                 values[f"{quantity_name}_of_{link['name']}"] = getattr(own, quantity_name)
         return values | {"g": p.g, "ratio": p.ratio}
 
@@ -208,14 +166,14 @@ class LinkageDescription:
         loads: dict[str, Any] = {"weight": Weight(p.g)}
         for load in self.data["loads"]:
             loads[load["name"]] = self._load(load, parts)
-        loads["pins"] = PinLosses(p.pin, p.joint_damping)
+        loads["pins"] = PinLosses(p.pins, p.pins.damping)
         if any(j.kind == PRISMATIC for j in self.structure.joints.values()):
             lengths = {
                 parts.receivers[each["name"]][0]: parts.number(each["length"])
                 for each in self.data["joints"]
                 if "length" in each
             }
-            loads["guides"] = GuideLosses(p.guide, p.guide.damping, lengths)
+            loads["guides"] = GuideLosses(p.guides, p.guides.damping, lengths)
         return Linkage(parts.ground, parts.driver, parts.groups, loads), parts
 
     def _load(self, load: Mapping[str, Any], parts: LinkageParts) -> Any:
@@ -322,7 +280,9 @@ class LinkageDescription:
         data, described = self.data, self
         parts = self.parts(MATH, self.Parameters(), self.Inputs())
         turns = {
-            name: parts.receivers[name][0] for name, j in self.structure.joints.items() if j.kind != PRISMATIC
+            self.variable("joint", name): parts.receivers[name][0]
+            for name, j in self.structure.joints.items()
+            if j.kind != PRISMATIC
         }
         required = tuple(
             Requirement(
@@ -399,9 +359,9 @@ class LinkageDescription:
         for name, joint in self.structure.joints.items():
             of: type = GuideReaction if joint.kind == PRISMATIC else Force
             words = f"joint {name}: on {joint.on[0]} from {joint.by[0]}"
-            fields.append((name, of, group(of, words)))
+            fields.append((self.variable("joint", name), of, group(of, words)))
         for name, of in self.link_outputs.items():
-            fields.append((name, of, group(of, f"link {name}")))
+            fields.append((self.variable("link", name), of, group(of, f"link {name}")))
         return declared_class("Outputs", (PortValues, Running), fields)
 
     @cached_property
@@ -419,14 +379,18 @@ class LinkageDescription:
         """Reactions, rotation of links and motion of points at acceleration `a` of the driver."""
         parts = self.parts(xp, p, u)
         reactions, m, w = s.reactions(a), s.m, s.w
-        values: dict[str, Any] = {}
+        given = sum(
+            s.effects[each["name"]].dissipative for each in self.data["loads"] if each["type"] != "spring"
+        )
+        values: dict[str, Any] = {"load_power": -(given * w)}
         for name, joint in self.structure.joints.items():
             key, sign = parts.receivers[name]
             if joint.kind == PRISMATIC:
-                values[name] = _guide(m, joint, key, sign, reactions[key], parts, w, a)
+                value: Any = _guide(m, joint, key, sign, reactions[key], parts, w, a)
             else:
                 f = reactions[key]
-                values[name] = force(f if sign > 0.0 else -f)
+                value = force(f if sign > 0.0 else -f)
+            values[self.variable("joint", name)] = value
         for name, link in self.structure.links.items():
             moving, frame = m.links[name], parts.frames[name]
             fields = {
@@ -440,7 +404,7 @@ class LinkageDescription:
             if link.heavy:
                 at = frame.of(parts.vector(link.centroid))
                 fields["centroid"] = _moved(moving.beside(at.x, at.y), w, a)
-            values[name] = self.link_outputs[name](**fields)
+            values[self.variable("link", name)] = self.link_outputs[name](**fields)
         return values
 
     def _angle(self, xp: Any, name: str, axis: Vec2, q: Any) -> Any:

@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
-from ..groups.loads import Effect, Moving, Wrench
-from ..mechanism.expressions import value_of
-from ..planar import ZERO, Vec2
+from ...groups.loads import Effect, Moving, Wrench
+from ...mechanism.expressions import value_of
+from ...planar import ZERO, Vec2
 
 Entry = float | str
 MOTION = ("phi", "w", "x", "y", "vx", "vy", "angle_rate")

@@ -1,0 +1,1 @@
+"""Machines whose linkage a file describes."""

@@ -1,0 +1,90 @@
+"""The declarations that every linkage from a file has: parameters, inputs and outputs. Standard library only."""
+
+from __future__ import annotations
+
+from ...ports import ShaftMotion
+from ...quantities import Value, declaration, group, quantity
+from ..parts import Force, GuideLaw, Pin
+
+
+@declaration
+class PinLaw(Pin):
+    """The pins with their damping."""
+
+    damping: Value = quantity("N.m.s/rad", "viscous damping of each", default=0.0, min=0.0, tunable=True)
+
+
+@declaration
+class CommonParameters:
+    """Parameters that every linkage has."""
+
+    g: Value = quantity("m/s2", "gravity, against y", default=9.81, min=0.0, tunable=True)
+    ratio: Value = quantity("1", "gear ratio, motor turns per driver turn", default=1.0, above=0.0, max=1e6)
+    pins: PinLaw = group(PinLaw, "pins", default=PinLaw(friction=0.0, diameter=0.05))
+    guides: GuideLaw = group(GuideLaw, "guides", default=GuideLaw())
+
+
+@declaration
+class LinkBody:
+    """A link as a body."""
+
+    mass: Value = quantity("kg", "mass", default=0.0, min=0.0, tunable=True)
+    inertia: Value = quantity(
+        "kg.m2", "moment of inertia about the centroid", default=0.0, min=0.0, tunable=True
+    )
+
+
+@declaration
+class GuideReaction(Force):
+    """The reaction of a sliding joint, and the motion in it."""
+
+    normal: Value = quantity("N", "force across the line, positive to the left of its direction", nominal=1e3)
+    moment: Value = quantity("N.m", "moment about the point of the block, counter-clockwise", nominal=100.0)
+    s: Value = quantity("m", "way of the block along the line")
+    v: Value = quantity("m/s", "speed along the line")
+    a: Value = quantity("m/s2", "acceleration along the line")
+
+
+@declaration
+class PointMotion:
+    """A point in the frame."""
+
+    x: Value = quantity("m", "position x")
+    y: Value = quantity("m", "position y")
+    vx: Value = quantity("m/s", "velocity along x")
+    vy: Value = quantity("m/s", "velocity along y")
+    ax: Value = quantity("m/s2", "acceleration along x")
+    ay: Value = quantity("m/s2", "acceleration along y")
+
+
+@declaration
+class LinkTurning:
+    """The rotation of a link."""
+
+    angle: Value = quantity("rad", "angle of its x axis, counter-clockwise")
+    w: Value = quantity("rad/s", "angular velocity")
+    a: Value = quantity("rad/s2", "angular acceleration")
+
+
+@declaration
+class LinkageMotion(ShaftMotion):
+    """Motion of the motor shaft that turns the driver."""
+
+    phi: Value = quantity("rad", "motor angle; the driver has turned by phi/ratio", default=0.0)
+
+
+@declaration
+class Running:
+    """Outputs that every machine has."""
+
+    tau: Value = quantity("N.m", "torque needed at the motor shaft, J a + tau_bias", nominal=100.0)
+    power: Value = quantity("W", "power that the motor shaft takes, tau w", nominal=100.0)
+    kinetic_energy: Value = quantity("J", "kinetic energy")
+    potential_energy: Value = quantity("J", "potential energy of weights and springs", nominal=1000.0)
+    dissipated_power: Value = quantity("W", "power that friction, dampers and loads take", nominal=100.0)
+    load_power: Value = quantity(
+        "W",
+        "power that forces and torques give the machine; dissipated_power contains minus it",
+        nominal=100.0,
+    )
+    margin: Value = quantity("1", "least margin of the groups; 0 is a dead position")

@@ -1,0 +1,253 @@
+"""The entries of a linkage file: numbers with units, expressions, points, parameters, inputs and tables, each read by
+its key, with all faults collected."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from itertools import pairwise
+from typing import Any
+
+from ... import units
+from ...errors import Faults, InputError, near_name, refusal_prefix, shown
+from ...mechanism.expressions import CONSTANTS, FUNCTIONS, expression
+from ...quantities import Layout, base_units
+from .declarations import CommonParameters
+from .dimensions import checked_dimension
+from .loads import MOTION
+
+UNITS = (
+    "1", "m", "rad", "kg", "kg.m2", "N", "N.m", "N/m", "N.s/m", "N.m/rad", "N.m.s/rad", "m2", "m3", "kg/m", "kg/m3",
+    "N/m2", "m/s", "m/s2", "rad/s", "s", "W", "J",
+)  # fmt: skip
+"""Units of parameters and inputs, in the order in which they are tried on a text."""
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_MOTION_UNITS: dict[str, str | None] = {
+    "phi": "rad", "w": "rad/s", "x": "m", "y": "m", "vx": "m/s", "vy": "m/s", "angle_rate": "rad/s",
+}  # fmt: skip
+
+
+class EntryReader:
+    """The reader of the entries of one file."""
+
+    def __init__(self, data: Mapping[str, Any], name: str) -> None:
+        self.data, self.faults = data, Faults()
+        self.name = name
+        self.inputs = self.table("inputs")
+        self.table_units: dict[str, str | None] = {}
+        self.units: dict[str, str | None] = {}
+        self.used: set[str] = set()
+        self.points: dict[str, dict[str, list[Any]]] = {}
+
+    @contextmanager
+    def at(self, key: str) -> Iterator[None]:
+        """Collect the faults of a key."""
+        with self.faults.collected(), refusal_prefix(f"{key}: ", key):
+            yield
+
+    def fault(self, key: str, message: str) -> None:
+        """Collect a fault."""
+        with self.at(key):
+            raise InputError(message)
+
+    def table(self, key: str, of: Mapping[str, Any] | None = None, default: Any = None) -> Mapping[str, Any]:
+        """A table; faults where it is none."""
+        name = key.rpartition(".")[2]
+        given = (self.data if of is None else of).get(name, {} if default is None else default)
+        if not isinstance(given, Mapping):
+            self.fault(key, f"is {shown(given)}; must be a table")
+            return {}
+        return given
+
+    def keys(self, key: str, table: Mapping[str, Any], known: tuple[str, ...]) -> None:
+        """Fault the keys of a table that are not known."""
+        for each in table:
+            if each not in known:
+                hint = near_name(each, known)
+                where = f"{key}.{each}" if key else each
+                self.fault(where, f"unknown key{hint or ';'} known here: {', '.join(known)}")
+
+    def named(self, key: str, names: Mapping[str, Any]) -> None:
+        """Fault names that no variable can have."""
+        for each in names:
+            if not _NAME.fullmatch(each):
+                self.fault(f"{key}.{each}", "a name has letters, digits and _, and begins with a letter")
+
+    def number(self, key: str, given: Any, unit: str) -> float:
+        """A number, or a text with a unit."""
+        if isinstance(given, bool) or not isinstance(given, int | float | str):
+            raise InputError(
+                f"is {shown(given)}; must be a number or a text with a unit, such as {_like(unit)}"
+            )
+        if isinstance(given, str):
+            parts = units.split(given)
+            if parts is None:
+                raise InputError(
+                    f"is {shown(given)}; must be a number or a text with a unit, such as {_like(unit)}"
+                )
+            try:
+                value = units.convert(*parts, unit) if parts[1] else parts[0]
+            except ValueError:
+                raise InputError(
+                    f"is {shown(given)}; the unit does not fit, write it as {_like(unit)}"
+                ) from None
+        else:
+            value = float(given)
+        if not math.isfinite(value):
+            raise InputError(f"is {shown(given)}; must be finite")
+        return value
+
+    def entry(self, key: str, given: Any, unit: str, motion: bool = False, inputs: bool = False) -> Any:
+        """A number in SI units, or the text of an expression, with its unit checked; 0 where it is wrong."""
+        with self.at(key):
+            if not isinstance(given, str) or units.split(given) is not None:
+                return self.number(key, given, unit)
+            known = {**self.units, **(_MOTION_UNITS | self.table_units if motion else {})}
+            each = expression(given)
+            for name in each.names:
+                if name not in known:
+                    where = " a load" if name in MOTION else ""
+                    note = f"; {name} is known in{where} alone" if where else near_name(name, known)
+                    raise InputError(f"is {shown(given)}; {name} is no parameter{note}")
+                if name in self.inputs and not inputs:
+                    raise InputError(
+                        f"is {shown(given)}; {name} is an input, and lengths cannot change in a run; use a parameter"
+                    )
+            self.used |= {*each.names}
+            if each.names == (given.strip(),) and self.units.get(given.strip(), "") is None:
+                self.units[given.strip()] = unit
+            checked_dimension(each.text, known, unit)
+            return given
+        return 0.0
+
+    def vector(
+        self, key: str, given: Any, unit: str, motion: bool = False, inputs: bool = False
+    ) -> list[Any]:
+        """Two entries."""
+        if not isinstance(given, list) or len(given) != 2:
+            self.fault(key, f"is {shown(given)}; must be a list of two, along x and y")
+            return [0.0, 0.0]
+        return [self.entry(key, each, unit, motion, inputs) for each in given]
+
+    def place(self, key: str, given: Mapping[str, Any]) -> dict[str, list[Any]]:
+        """Points by name."""
+        self.named(key, given)
+        return {name: self.vector(f"{key}.{name}", at, "m") for name, at in given.items()}
+
+    def common(self) -> dict[str, float]:
+        """Start values of the parameters that every linkage has."""
+        common = {}
+        keys = {"gravity": "g", "ratio": "ratio"}
+        tables = {
+            "pins": ("friction", "diameter", "w_smooth", "damping"),
+            "guides": ("friction", "v_smooth", "damping"),
+        }
+        declared = {v.name: v for v in Layout(CommonParameters).variables}
+        entries = [(key, name, self.data.get(key)) for key, name in keys.items()]
+        for table, names in tables.items():
+            given = self.table(table)
+            self.keys(table, given, names)
+            entries += [(f"{table}.{key}", f"{table}.{key}", given.get(key)) for key in names]
+        for key, name, value in entries:
+            if value is not None:
+                with self.at(key):
+                    x = self.number(key, value, declared[name].unit)
+                    if not declared[name].quantity.admits(x):
+                        raise InputError(
+                            f"is {shown(value)}; must be {declared[name].quantity.allowed_range}"
+                        )
+                    common[name] = x
+        return common
+
+    def quantities(self, kind: str) -> list[dict[str, Any]]:
+        """Parameters or inputs."""
+        entries = []
+        table = self.table(kind)
+        self.named(kind, table)
+        for name, given in table.items():
+            key = f"{kind}.{name}"
+            if name in (*FUNCTIONS, *CONSTANTS, *MOTION):
+                self.fault(key, "the name has a meaning in expressions; choose another one")
+            whole = given if isinstance(given, Mapping) else {"value": given}
+            self.keys(key, whole, ("value", "unit", "min", "max", "description", "tunable"))
+            with self.at(key):
+                value, unit = self.with_unit(whole.get("value"), whole.get("unit"))
+                limits = {
+                    each: self.number(key, whole[each], unit or "1")
+                    for each in ("min", "max")
+                    if each in whole
+                }
+                if not limits.get("min", -math.inf) <= value <= limits.get("max", math.inf):
+                    raise InputError(f"is {value:g}; must be from min to max")
+                self.units[name] = unit
+                entries.append(
+                    {
+                        "name": name,
+                        "value": value,
+                        "unit": unit,
+                        "description": str(whole.get("description", "")),
+                        "tunable": bool(whole.get("tunable", False)),
+                        **limits,
+                    }
+                )
+            self.units.setdefault(name, None)
+        return entries
+
+    def with_unit(self, given: Any, unit: Any) -> tuple[float, str | None]:
+        """A value in SI units, and its unit; None where it is told by the first use."""
+        if unit is not None:
+            fits = [each for each in UNITS if _same_unit(str(unit), each)]
+            if not fits:
+                raise InputError(
+                    f"unit = {shown(unit)}: no unit that a linkage knows; known: {', '.join(UNITS)}"
+                )
+            return self.number("", given, fits[0]), fits[0]
+        if isinstance(given, str) and (parts := units.split(given)) and parts[1]:
+            for each in UNITS:
+                try:
+                    return units.convert(*parts, each), each
+                except ValueError:
+                    continue
+            raise InputError(f"is {shown(given)}; the unit is not known; write it as in {_like('m')}")
+        return self.number("", given, "1"), None
+
+    def curves(self) -> dict[str, Any]:
+        """Tables over the coordinate."""
+        curves = {}
+        given = self.table("tables")
+        self.named("tables", given)
+        linear = "joint" in self.table("driver")
+        for name in given:
+            key = f"tables.{name}"
+            table = self.table(key, given)
+            self.keys(key, table, ("phi", "value"))
+            with self.at(key):
+                phi, value = table.get("phi"), table.get("value")
+                if (
+                    not isinstance(phi, list)
+                    or not isinstance(value, list)
+                    or not 3 <= len(phi) == len(value)
+                ):
+                    raise InputError("must have phi and value, two lists of one length, of 3 or more")
+                at = [self.number(key, x, "m" if linear else "rad") for x in phi]
+                values = [self.with_unit(x, None) for x in value]
+                if any(b <= a for a, b in pairwise(at)) or (not linear and at[-1] - at[0] >= 2.0 * math.pi):
+                    raise InputError("phi must rise, within less than one turn: the table repeats itself")
+                curves[name] = {"places": at, "values": [x for x, _ in values]}
+                self.table_units[name] = values[0][1]
+        return curves
+
+
+def _like(unit: str) -> str:
+    """An example of a quantity of a unit."""
+    usual = units.fitting(unit)
+    return f'"2 {usual[0]}"' if usual else '"0.2"'
+
+
+def _same_unit(text: str, unit: str) -> bool:
+    try:
+        return units.convert(1.0, text, unit) == 1.0 if text != "1" else unit == "1"
+    except ValueError:
+        return text.replace(" ", ".") == unit and bool(base_units(unit) or unit == "1")

@@ -1,0 +1,476 @@
+"""The file of a linkage: TOML in, the description of a machine out (`chainunit.machines.linkages.model`).
+
+Each entry that is a quantity is a number in SI units, a text with a unit ("80 mm"), or an expression of parameters
+("2 * r + 10 mm" has no unit inside: write ``2 * r + 0.01``). All faults of a file come at once, each with its key.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from ... import places
+from ...engines import MATH
+from ...errors import InputError, near_name, shown
+from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE
+from ...mechanism.expressions import expression
+from ...mechanism.models import InverseMachine
+from ...reading import file_text, in_file, toml
+from .entries import EntryReader
+from .model import RESERVED, machine_of
+from .start import StartPose
+from .structure import JointEntry
+
+TABLES = (
+    "title", "name", "gravity", "ratio", "parameters", "inputs", "tables", "ground", "driver", "links", "joints",
+    "groups", "loads", "pins", "guides", "start",
+)  # fmt: skip
+_LINK_KEYS = ("points", "mass", "inertia", "centroid", "masses", "bar")
+_JOINT_KEYS = ("type", "on", "by", "toward", "angle", "length")
+_DRIVER_KEYS = ("link", "joint", "zero", "positive", "range")
+_LOADS = {
+    "force": ("type", "on", "force"),
+    "follower": ("type", "on", "force"),
+    "torque": ("type", "on", "torque"),
+    "spring": ("type", "on", "by", "stiffness", "length", "damping"),
+}
+
+
+def read_linkage(file: Path) -> type[InverseMachine]:
+    """The model of the machine in a linkage file.
+
+    Raises
+    ------
+    InputError
+        with a line for each fault, which names file, line and key.
+    """
+    text = file_text(file)
+    with in_file(str(file), lambda: places.lines_of(text)):
+        return machine_of(description_of(toml(text), file.stem))
+
+
+def description_of(data: Mapping[str, Any], name: str) -> str:
+    """The description of a machine from the tables of a file; `name` is that of the machine where the file has none.
+
+    Raises
+    ------
+    InputError
+        with a line for each fault, which names the key.
+    """
+    return _LinkageReader(data, name).description()
+
+
+class _LinkageReader(EntryReader):
+    """The reader of one file."""
+
+    def description(self) -> str:
+        """The description."""
+        data = self.data
+        self.keys("", data, TABLES)
+        parameters = self.quantities("parameters")
+        inputs = self.quantities("inputs")
+        tables = self.curves()
+        ground = self.place("ground", self.table("ground"))
+        self.points[GROUND] = ground
+        links = [self.link(name, table) for name, table in self.links().items()]
+        joints = self.joints()
+        driver, span = self.driver(joints)
+        loads = [self.load(name, given) for name, given in self.table("loads").items()]
+        common = self.common()
+        for kind, entries in (("parameters", parameters), ("inputs", inputs)):
+            for each in entries:
+                if each["name"] not in self.used:
+                    self.fault(f"{kind}.{each['name']}", "nothing uses it; use it, or take it out")
+                each["unit"] = each["unit"] or self.units[each["name"]] or "1"
+        self.names(parameters, inputs, links, joints)
+        self.faults.refuse()
+        start = self.start(parameters, joints, driver)
+        self.faults.refuse()
+        described = {
+            "name": data.get("name", re.sub(r"\W", "_", self.name)),
+            "title": data.get("title", ""),
+            "common": common,
+            "parameters": parameters,
+            "inputs": inputs,
+            "tables": tables,
+            "ground": ground,
+            "links": links,
+            "joints": joints,
+            "driver": driver,
+            "range": span,
+            "loads": loads,
+            "start": start,
+        }
+        return json.dumps(described, sort_keys=True)
+
+    def links(self) -> Mapping[str, Any]:
+        """The tables of the links."""
+        links = self.table("links")
+        self.named("links", links)
+        if not links:
+            self.fault(
+                "links", "there is none; give at least the link that the driver turns, as [links.crank]"
+            )
+        if GROUND in links:
+            self.fault("links.ground", "is no link; points of the ground stand in [ground]")
+        for name in links:
+            self.points[name] = {}
+        return links
+
+    def link(self, name: str, given: Any) -> dict[str, Any]:
+        """A link."""
+        key = f"links.{name}"
+        table = self.table(key, self.table("links"))
+        self.keys(key, table, _LINK_KEYS)
+        points = self.place(f"{key}.points", self.table(f"{key}.points", table))
+        if not points:
+            self.fault(key, "has no points; give points = { A = [0, 0], ... } in the frame of the link")
+        self.points[name] = points
+        link: dict[str, Any] = {"name": name, "points": points, "own": {}}
+        if "bar" in table:
+            link |= self.bar(key, table, points)
+        else:
+            for quantity_name, unit in (("mass", "kg"), ("inertia", "kg.m2")):
+                if quantity_name in table:
+                    value = self.entry(f"{key}.{quantity_name}", table[quantity_name], unit, inputs=True)
+                    link[quantity_name] = self.own(f"{key}.{quantity_name}", link, quantity_name, value)
+            if "centroid" in table:
+                link["centroid"] = self.vector(f"{key}.centroid", table["centroid"], "m")
+        masses = self.table(f"{key}.masses", table)
+        for point in masses:
+            if point not in points:
+                self.fault(f"{key}.masses.{point}", f"is no point of {name}{near_name(point, points)}")
+        link["masses"] = {
+            point: self.entry(f"{key}.masses.{point}", mass, "kg", inputs=True)
+            for point, mass in masses.items()
+        }
+        return link
+
+    def own(self, key: str, link: dict[str, Any], name: str, value: Any) -> Any:
+        """A plain number becomes a parameter of the link."""
+        if isinstance(value, str):
+            return value
+        if value < 0.0:
+            self.fault(key, f"is {value:g}; must be >= 0")
+        link["own"][name] = value
+        return f"{name}_of_{link['name']}"
+
+    def bar(self, key: str, table: Mapping[str, Any], points: Mapping[str, Any]) -> dict[str, Any]:
+        """A uniform bar between two points: its mass and inertia by section and density."""
+        bar = self.table(f"{key}.bar", table)
+        self.keys(f"{key}.bar", bar, ("from", "to", "area", "density"))
+        for each in ("mass", "inertia", "centroid"):
+            if each in table:
+                self.fault(f"{key}.{each}", "follows from bar; take one of both out")
+        ends = [bar.get(each) for each in ("from", "to")]
+        for end in ends:
+            if end not in points:
+                self.fault(f"{key}.bar", f"from and to must be two points of the link: {', '.join(points)}")
+                return {}
+        (ax, ay), (bx, by) = (points[str(end)] for end in ends)
+        area = self.entry(f"{key}.bar.area", bar.get("area"), "m2")
+        density = self.entry(f"{key}.bar.density", bar.get("density"), "kg/m3")
+        square = f"((({bx}) - ({ax}))**2 + (({by}) - ({ay}))**2)"
+        mass = f"({area}) * ({density}) * sqrt({square})"
+        middle = [f"0.5 * (({a}) + ({b}))" for a, b in ((ax, bx), (ay, by))]
+        return {"mass": mass, "inertia": f"{mass} * {square} / 12.0", "centroid": middle}
+
+    def end(self, key: str, given: Any) -> list[str]:
+        """A point of a link, as "link.point" or a list of two."""
+        parts = given.split(".") if isinstance(given, str) else given
+        if not isinstance(parts, list) or len(parts) != 2 or not all(isinstance(x, str) for x in parts):
+            raise InputError(f'is {shown(given)}; must be a link and its point, such as "rod.A"')
+        link, point = parts
+        if link not in self.points:
+            raise InputError(f"is {shown(given)}; {link} is no link{near_name(link, self.points)}")
+        if point not in self.points[link]:
+            known = ", ".join(self.points[link]) or "none"
+            raise InputError(
+                f"is {shown(given)}; {point} is no point of {link}{near_name(point, self.points[link])}; its points: "
+                f"{known}"
+            )
+        return [link, point]
+
+    def joints(self) -> list[dict[str, Any]]:
+        """The joints: those that are named, and a revolute one for each further link in a point of the same name."""
+        joints, joined = [], set()
+        table = self.table("joints")
+        self.named("joints", table)
+        for name in table:
+            key = f"joints.{name}"
+            given = self.table(key, table)
+            self.keys(key, given, _JOINT_KEYS)
+            kind = given.get("type", PRISMATIC if "toward" in given else REVOLUTE)
+            if kind not in (REVOLUTE, PRISMATIC):
+                self.fault(f"{key}.type", f'is {shown(kind)}; must be "revolute" or "prismatic"')
+                continue
+            ends = []
+            for each in ("on", "by"):
+                with self.at(f"{key}.{each}"):
+                    if each not in given:
+                        raise InputError('is missing; must be a link and its point, such as "rod.A"')
+                    ends.append(self.end(f"{key}.{each}", given[each]))
+            if len(ends) < 2:
+                continue
+            if ends[0][0] == ends[1][0]:
+                self.fault(key, f"joins the link {ends[0][0]} with itself")
+                continue
+            joint: dict[str, Any] = {"name": name, "type": kind, "on": ends[0], "by": ends[1]}
+            if kind == PRISMATIC:
+                joint |= self.sliding(key, given, ends[1])
+            else:
+                for each in ("toward", "angle", "length"):
+                    if each in given:
+                        self.fault(f"{key}.{each}", "belongs to a prismatic joint")
+                joined.add(frozenset(map(tuple, ends)))
+            joints.append(joint)
+        return joints + self.shared_pins(joined, {joint["name"] for joint in joints})
+
+    def sliding(self, key: str, given: Mapping[str, Any], by: list[str]) -> dict[str, Any]:
+        """The keys of a sliding joint."""
+        joint: dict[str, Any] = {}
+        toward = given.get("toward")
+        if isinstance(toward, str):
+            toward = toward.rpartition(".")[2]
+        if toward not in self.points[by[0]] or toward == by[1]:
+            others = [name for name in self.points[by[0]] if name != by[1]]
+            self.fault(
+                f"{key}.toward",
+                f"is {shown(toward)}; must be another point of {by[0]}, to which the line goes: "
+                f"{', '.join(others) or 'add one'}",
+            )
+        joint["toward"] = toward
+        joint["angle"] = self.entry(f"{key}.angle", given.get("angle", 0.0), "rad")
+        if "length" in given:
+            joint["length"] = self.entry(f"{key}.length", given["length"], "m")
+        return joint
+
+    def shared_pins(self, joined: set[Any], taken: set[str]) -> list[dict[str, Any]]:
+        """A revolute joint for each further link in a point of the same name, where none is named."""
+        joints: list[dict[str, Any]] = []
+        owners: dict[str, list[str]] = {}
+        for link, points in self.points.items():
+            for point in points:
+                owners.setdefault(point, []).append(link)
+        for point, those in owners.items():
+            for link in those[1:]:
+                if any(frozenset(((a, point), (link, point))) in joined for a in those if a != link):
+                    continue
+                name = point if len(those) == 2 else f"{point}_{link}"
+                if name in taken:
+                    self.fault(
+                        f"joints.{name}",
+                        f"does not join the points {point} of {', '.join(those)}; rename the point or the joint",
+                    )
+                    continue
+                joints.append({"name": name, "type": REVOLUTE, "on": [link, point], "by": [those[0], point]})
+        return joints
+
+    def driver(self, joints: list[dict[str, Any]]) -> tuple[dict[str, Any], list[float] | None]:
+        """The driver, and the range of one that slides."""
+        table = self.table("driver")
+        self.keys("driver", table, _DRIVER_KEYS)
+        if "joint" in table:
+            return self.slide(table, joints)
+        link = table.get("link")
+        if link not in self.points or link == GROUND:
+            known = [name for name in self.points if name != GROUND]
+            self.fault(
+                "driver.link" if "link" in table else "driver",
+                f"link = {shown(link)}; must be the link that the motor turns{near_name(str(link), known)}; links: "
+                f"{', '.join(known)}",
+            )
+            return {}, None
+        own = [j for j in joints if {j["on"][0], j["by"][0]} == {GROUND, link} and j["type"] == REVOLUTE]
+        if len(own) != 1:
+            self.fault(
+                "driver.link",
+                f"{link} must have one revolute joint with the ground; it has {len(own)}: give it a point with the "
+                "name of a point in [ground]",
+            )
+            return {}, None
+        positive = table.get("positive", "counter-clockwise")
+        if positive not in ("clockwise", "counter-clockwise"):
+            self.fault("driver.positive", f'is {shown(positive)}; must be "clockwise" or "counter-clockwise"')
+        zero = self.entry("driver.zero", table.get("zero", 0.0), "rad")
+        sense = -1.0 if positive == "clockwise" else 1.0
+        return {"joint": own[0]["name"], "link": link, "linear": False, "zero": zero, "sense": sense}, None
+
+    def slide(
+        self, table: Mapping[str, Any], joints: list[dict[str, Any]]
+    ) -> tuple[dict[str, Any], list[float] | None]:
+        """A driver that slides."""
+        for each in ("link", "zero", "positive"):
+            if each in table:
+                self.fault(
+                    f"driver.{each}", "belongs to a driver that turns; a driver with a joint slides in it"
+                )
+        sliding = {j["name"]: j for j in joints if j["type"] == PRISMATIC}
+        joint = sliding.get(table["joint"]) if isinstance(table["joint"], str) else None
+        if joint is None or GROUND not in (joint["on"][0], joint["by"][0]):
+            self.fault(
+                "driver.joint",
+                f"is {shown(table['joint'])}; must be a prismatic joint of a link with the ground: "
+                f"{', '.join(sliding) or 'there is none'}",
+            )
+            return {}, None
+        link = joint["on"][0] if joint["by"][0] == GROUND else joint["by"][0]
+        span = [0.0, 0.0]
+        with self.at("driver.range"):
+            given = table.get("range")
+            if not isinstance(given, list) or len(given) != 2:
+                raise InputError("must be the least and the most way of the driver, such as [0.2, 0.6]")
+            span = [self.number("driver.range", each, "m") for each in given]
+            if not span[0] < span[1]:
+                raise InputError("must rise")
+        return {"joint": joint["name"], "link": link, "linear": True}, span
+
+    def load(self, name: str, given: Any) -> dict[str, Any]:
+        """A load."""
+        key = f"loads.{name}"
+        table = self.table(key, self.table("loads"))
+        kind = table.get("type", "force")
+        if kind not in _LOADS:
+            self.fault(
+                f"{key}.type", f"is {shown(kind)}{near_name(str(kind), _LOADS)}; must be {', '.join(_LOADS)}"
+            )
+            return {}
+        self.keys(key, table, _LOADS[kind])
+        load: dict[str, Any] = {"name": name, "type": kind}
+        if kind == "torque":
+            on = table.get("on")
+            if on not in self.points or on == GROUND:
+                self.fault(f"{key}.on", f"is {shown(on)}; must be a link{near_name(str(on), self.points)}")
+            return load | {
+                "on": [on],
+                "torque": self.entry(f"{key}.torque", table.get("torque"), "N.m", True, True),
+            }
+        for each in ("on", "by") if kind == "spring" else ("on",):
+            with self.at(f"{key}.{each}"):
+                load[each] = self.end(f"{key}.{each}", table.get(each))
+                if kind != "spring" and load[each][0] == GROUND:
+                    raise InputError("acts on the ground; give a point of a link")
+        if kind == "spring":
+            for each, unit in (("stiffness", "N/m"), ("length", "m"), ("damping", "N.s/m")):
+                load[each] = self.entry(f"{key}.{each}", table.get(each, 0.0), unit, inputs=True)
+        else:
+            load["force"] = self.vector(f"{key}.force", table.get("force"), "N", True, True)
+        return load
+
+    def names(self, *tables: list[dict[str, Any]]) -> None:
+        """Fault names that two things share."""
+        parameters, inputs, links, joints = tables
+        owners: dict[str, str] = {}
+        for kind, entries in (("links", links), ("joints", joints)):
+            for each in entries:
+                name = each["name"]
+                if name in owners and kind == owners[name]:
+                    self.fault(f"{kind}.{name}", "is there twice")
+                owners[name] = kind
+        for kind, entries in (("parameters", parameters), ("inputs", inputs)):
+            for each in entries:
+                if each["name"] in owners or each["name"] in RESERVED:
+                    self.fault(
+                        f"{kind}.{each['name']}",
+                        "has the name of a link, a joint or a variable of every machine",
+                    )
+
+    # the start pose
+
+    def start(
+        self, parameters: list[dict[str, Any]], joints: list[dict[str, Any]], driver: dict[str, Any]
+    ) -> dict[str, Any]:
+        """The value of the driver at the start, and the poses of all links there."""
+        table = self.table("start")
+        self.keys("start", table, ("phi", "points", "angles", "poses"))
+        values = {each["name"]: each["value"] for each in parameters}
+        values |= dict.fromkeys(self.inputs, 0.0)
+
+        def number(entry: Any) -> float:
+            return float(expression(entry).value(MATH, values)) if isinstance(entry, str) else float(entry)
+
+        points = {
+            link: {name: (number(x), number(y)) for name, (x, y) in those.items()}
+            for link, those in self.points.items()
+        }
+        entries = [
+            (
+                JointEntry(j["name"], j["type"], tuple(j["on"]), tuple(j["by"]), j.get("toward", "")),
+                number(j.get("angle", 0.0)),
+            )
+            for j in joints
+        ]
+        pose = StartPose(points, entries)
+        value = 0.0
+        with self.at("start.phi"):
+            value = self.number("start.phi", table.get("phi", 0.0), "m" if driver["linear"] else "rad")
+        self.given_pose(table, pose)
+        if driver["linear"]:
+            self.placed_ram(driver, entries, pose, value)
+        else:
+            pose.angles[driver["link"]] = number(driver["zero"]) + driver["sense"] * value
+        self.faults.refuse()
+        with self.at("start"):
+            return {"value": value, "poses": pose.complete()}
+        return {}
+
+    def given_pose(self, table: Mapping[str, Any], pose: StartPose) -> None:
+        """Points, angles and poses that the file gives."""
+        for name, at in self.table("start.points", table).items():
+            key = f"start.points.{name}"
+            owners = [link for link, points in self.points.items() if name in points and link != GROUND]
+            for where in self.tables_of_point(key, name, at, owners):
+                pose.places[where[0], where[1]] = where[2]
+        for link, angle in self.table("start.angles", table).items():
+            with self.at(f"start.angles.{link}"):
+                self.known_link(link)
+                pose.angles[link] = self.number("", angle, "rad")
+        for link, given in self.table("start.poses", table).items():
+            with self.at(f"start.poses.{link}"):
+                self.known_link(link)
+                if not isinstance(given, list) or len(given) != 3:
+                    raise InputError("must be a list of three: x, y and angle of the frame of the link")
+                x, y, angle = (
+                    self.number("", v, unit) for v, unit in zip(given, ("m", "m", "rad"), strict=True)
+                )
+                pose.poses[link] = x, y, angle
+
+    def known_link(self, link: str) -> None:
+        """Refuse the name of no link."""
+        if link not in self.points or link == GROUND:
+            raise InputError(f"{link} is no link{near_name(link, self.points)}")
+
+    def tables_of_point(
+        self, key: str, name: str, at: Any, owners: list[str]
+    ) -> Iterator[tuple[str, str, tuple[float, float]]]:
+        """The places of a point; `at` is a place, or a table of points of the link `name`."""
+        entries = [(name, link, at) for link in owners]
+        if isinstance(at, Mapping):
+            entries = [(point, name, place) for point, place in at.items()]
+        elif not owners:
+            self.fault(key, f"{name} is no point of a link")
+        for point, link, place in entries:
+            with self.at(key):
+                if point not in self.points.get(link, {}):
+                    raise InputError(f"{point} is no point of {link}")
+                if not isinstance(place, list) or len(place) != 2:
+                    raise InputError(f"is {shown(place)}; must be a list of two, along x and y")
+                x, y = (self.number("", each, "m") for each in place)
+                yield link, point, (x, y)
+
+    @staticmethod
+    def placed_ram(
+        driver: dict[str, Any], joints: list[tuple[JointEntry, float]], pose: StartPose, value: float
+    ) -> None:
+        """The place of a link that slides in the ground."""
+        joint, _ = next(each for each in joints if each[0].name == driver["joint"])
+        ground, on = pose.points[GROUND], joint.on[0] == driver["link"]
+        if on:
+            (ax, ay), (bx, by) = ground[joint.by[1]], ground[joint.toward]
+            length = math.dist((ax, ay), (bx, by))
+            place = ax + (bx - ax) / length * value, ay + (by - ay) / length * value
+            pose.places[driver["link"], joint.on[1]] = place

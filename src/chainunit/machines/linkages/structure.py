@@ -1,0 +1,152 @@
+"""A linkage without numbers: its links and joints as entries, and the groups that follow from them. Standard library
+only: FMUs carry this file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE, AssurGroup, JointOf, decompose
+
+Entry = float | str
+"""A number, or the text of an expression."""
+
+
+class JointEntry(NamedTuple):
+    """A joint as described: `on` and `by` are a link and a point of it; of a prismatic one the point of `on` slides
+    along the line from the point of `by` to its point `toward`, and `angle` is that of `on` less that of `by`."""
+
+    name: str
+    kind: str
+    on: tuple[str, str]
+    by: tuple[str, str]
+    toward: str = ""
+    angle: Entry = 0.0
+
+    def at(self, link: str) -> str:
+        """Its point on one of its links."""
+        return self.on[1] if self.on[0] == link else self.by[1]
+
+    def other(self, link: str) -> str:
+        """The link on its other side."""
+        return self.by[0] if self.on[0] == link else self.on[0]
+
+
+@dataclass(frozen=True)
+class LinkEntry:
+    """A link as described: its points [m], mass [kg], inertia about the centroid [kg m2], centroid [m], and further
+    masses at points [kg]."""
+
+    name: str
+    points: Mapping[str, tuple[Entry, Entry]]
+    mass: Entry = 0.0
+    inertia: Entry = 0.0
+    centroid: tuple[Entry, Entry] = (0.0, 0.0)
+    masses: Mapping[str, Entry] = field(default_factory=dict)
+
+    @property
+    def heavy(self) -> bool:
+        """Whether it may have mass."""
+        return bool(self.mass != 0.0 or self.inertia != 0.0 or self.masses)
+
+
+@dataclass(frozen=True)
+class DriverEntry:
+    """The driver as described. A rotation: the link turns about its ground joint, at q = 0 its x axis has the angle
+    `zero` [rad], and q counts counter-clockwise where `sense` is +1. A slide: the joint is prismatic, and q is the
+    way in it."""
+
+    joint: str
+    link: str
+    linear: bool
+    zero: Entry = 0.0
+    sense: float = 1.0
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A linkage without numbers: entries by name, the groups in order, the names of pins, and the assembly.
+
+    `marked` are the points, by link and name, that joints or loads need on this very link; `poses` are rough poses
+    (x, y, angle) of all links at the driver's value `start`.
+    """
+
+    ground: Mapping[str, tuple[Entry, Entry]]
+    links: Mapping[str, LinkEntry]
+    joints: Mapping[str, JointEntry]
+    driver: DriverEntry
+    groups: tuple[AssurGroup, ...]
+    pins: Mapping[tuple[str, str], str]
+    marked: frozenset[tuple[str, str]]
+    start: float
+    poses: Mapping[str, tuple[float, float, float]]
+
+    @classmethod
+    def of(
+        cls,
+        ground: Mapping[str, tuple[Entry, Entry]],
+        links: Sequence[LinkEntry],
+        joints: Sequence[JointEntry],
+        driver: DriverEntry,
+        start: float,
+        poses: Mapping[str, tuple[float, float, float]],
+        loaded: Iterable[tuple[str, str]],
+    ) -> Structure:
+        """
+        Parameters
+        ----------
+        loaded : points on which loads act, by link and name
+
+        Raises
+        ------
+        InputError
+            where the linkage is not determined, or has a group that is not covered.
+        """
+        seen = [JointOf(j.name, j.kind, j.on[0], j.by[0]) for j in joints if j.name != driver.joint]
+        groups = decompose([link.name for link in links], seen, driver.link)
+        named = {joint.name: joint for joint in joints}
+        marked = {
+            end
+            for each in groups
+            for joint in (named[j.name] for j in each.joints)
+            for end in (joint.on, joint.by)
+            if joint.kind == PRISMATIC or end[0] not in each.links
+        }
+        return cls(
+            ground,
+            {link.name: link for link in links},
+            named,
+            driver,
+            tuple(groups),
+            pin_names(ground, links, joints),
+            frozenset((*loaded, *marked)),
+            start,
+            poses,
+        )
+
+
+def pin_names(
+    ground: Mapping[str, Any], links: Sequence[LinkEntry], joints: Sequence[JointEntry]
+) -> dict[tuple[str, str], str]:
+    """The name of each point by link and point: the point's own where all points of that name meet in revolute
+    joints, else with that of the link before it."""
+    owners: dict[str, list[str]] = {}
+    for link, points in ((GROUND, ground), *((each.name, each.points) for each in links)):
+        for point in points:
+            owners.setdefault(point, []).append(link)
+    joined = {frozenset((j.on, j.by)) for j in joints if j.kind == REVOLUTE}
+    names = {}
+    for point, those in owners.items():
+        met, grows = {those[0]}, True
+        while grows:
+            more = {
+                b
+                for a in met
+                for b in those
+                if b not in met and frozenset(((a, point), (b, point))) in joined
+            }
+            met, grows = met | more, bool(more)
+        for link in those:
+            names[link, point] = point if len(met) == len(those) else f"{link}.{point}"
+    return names

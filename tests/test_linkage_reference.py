@@ -1,0 +1,110 @@
+"""Linkage files against the reference points of an independent solution: every number, in Python and in FMUs."""
+
+from __future__ import annotations
+
+import pickle
+
+import fmpy
+import numpy as np
+import pytest
+from linkage_files import MACHINES, expected, model, tables
+from test_reference import deviation
+
+from chainunit.errors import InputError
+from chainunit.fmu.export import export as export_python
+from chainunit.fmu.native.export import export
+from chainunit.fmu.native.platforms import compiler
+from chainunit.machines.linkages.file import description_of
+from chainunit.machines.linkages.model import machine_of
+from chainunit.machines.machine import Machine
+
+STATES = [(name, state) for name, each in MACHINES.items() for state in each["states"]]
+KINDS = {
+    "slider_crank_press": ["RRP"],
+    "crank_shaper": ["RPR", "RRP"],
+    "blake_crusher": ["RRR", "RRR"],
+    "stephenson_iii": ["RRR", "RRR"],
+    "pump_jack": ["RRR"],
+    "triad_slider": ["triad"],
+}
+
+
+@pytest.mark.parametrize(("name", "state"), STATES, ids=[f"{name}-{s['id']}" for name, s in STATES])
+def test_python(name, state):
+    outputs = Machine(model(name)).evaluate({key: state[key] for key in ("phi", "w", "a")})
+    worst = {key: deviation(float(outputs[key]), value) for key, value in expected(state)}
+    assert len(worst) > 60
+    assert max(worst.values()) < 1e-9, max(worst.items(), key=lambda pair: pair[1])
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_groups_are_those_of_the_description(name):
+    groups = model(name).described_by.structure.groups
+    assert [group.kind for group in groups] == KINDS[name]
+    told = [(g["kind"], {*g["bodies"]}) for g in MACHINES[name]["description"]["groups"]]
+    assert [(group.kind, {*group.links}) for group in groups] == told
+
+
+@pytest.mark.parametrize("name", ["blake_crusher", "pump_jack"])
+def test_machines_without_reference_states_keep_their_energy(name):
+    """Both routes to the torque, and the power balance by differences of the energies."""
+    machine = Machine(model(name))
+    phi, w, a, h = np.linspace(0.0, 6.2, 40), 3.0, 5.0, 1e-5
+    u = machine.inputs({"phi": phi, "w": w, "a": a})
+    state = machine.state(u)
+    torque = state.torque(a)
+    assert np.max(np.abs(state.torque_by_reactions(a) - torque)) < 1e-11 * np.max(np.abs(torque))
+
+    def energy(t):
+        out = machine.outputs(phi + w * t + 0.5 * a * t * t, w + a * t, a)
+        return out.kinetic_energy + out.potential_energy
+
+    out = machine.outputs(phi, w, a)
+    rate = (energy(-2 * h) - 8 * energy(-h) + 8 * energy(h) - energy(2 * h)) / (12 * h)
+    assert np.max(np.abs(out.power - out.dissipated_power - rate)) < 1e-6 * np.max(np.abs(out.power))
+
+
+@pytest.mark.skipif(compiler() is None, reason="no C compiler")
+@pytest.mark.parametrize("name", ["crank_shaper", "triad_slider"])
+@pytest.mark.parametrize("make", [export, export_python], ids=["native", "python"])
+def test_fmu(name, make, tmp_path):
+    """The same numbers through the FMU, all outputs."""
+    file = make(model(name), tmp_path / f"{name}.fmu")
+    state = MACHINES[name]["states"][0]
+    wanted = dict(expected(state))
+    values = fmpy.simulate_fmu(
+        str(file), stop_time=0.01, step_size=0.01, output=list(wanted), fmi_type="CoSimulation",
+        start_values={key: state[key] for key in ("phi", "w", "a")},
+    )[0]  # fmt: skip
+    worst = {key: deviation(float(values[key]), value) for key, value in wanted.items()}
+    assert max(worst.values()) < 1e-9, max(worst.items(), key=lambda pair: pair[1])
+
+
+def test_a_model_survives_pickle_and_its_parameters_matter():
+    model_of_press = model("slider_crank_press")
+    assert pickle.loads(pickle.dumps(model_of_press)) is model_of_press
+    heavy = Machine(model_of_press, {"ram.mass": 64.0})
+    one, other = (m.outputs(0.7, 3.0, 1.0) for m in (Machine(model_of_press), heavy))
+    assert float(other.J) > float(one.J) and float(other.tau) != pytest.approx(float(one.tau))
+
+
+def test_shuffled_links_and_joints_give_the_same_machine():
+    rng = np.random.default_rng(5)
+    state = MACHINES["crank_shaper"]["states"][0]
+    inputs = {key: state[key] for key in ("phi", "w", "a")}
+    plain = Machine(model("crank_shaper")).evaluate(inputs)
+    for _ in range(5):
+        data = tables(MACHINES["crank_shaper"]["description"])
+        for key in ("links", "joints"):
+            names = [*data[key]]
+            data[key] = {name: data[key][name] for name in rng.permutation(names)}
+        outputs = Machine(machine_of(description_of(data, "shuffled"))).evaluate(inputs)
+        for name, value in plain.items():
+            assert float(outputs[name]) == pytest.approx(float(value), rel=1e-11, abs=1e-9), name
+
+
+def test_a_linkage_that_does_not_close_says_where():
+    data = tables(MACHINES["stephenson_iii"]["description"])
+    data["links"]["link"]["points"]["Q"] = [0.1, 0.0]
+    with pytest.raises(InputError, match=r"the group of link, output cannot close at .* deg of crank"):
+        machine_of(description_of(data, "short"))
