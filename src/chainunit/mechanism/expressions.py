@@ -13,7 +13,7 @@ from typing import Any
 
 from ..errors import InputError, near_name, shown
 
-Value = Callable[[Any, Mapping[str, Any]], Any]
+Evaluation = Callable[[Any, Mapping[str, Any]], Any]
 """The value of an expression: of the engine and the quantities by name."""
 
 _ONE = ("sin", "cos", "sqrt", "asin", "acos", "abs")
@@ -48,10 +48,10 @@ class Expression:
                 f"{shown(text)} is no number with a unit and no expression, such as 2 * r + 0.01"
             ) from None
         names: dict[str, None] = {}
-        self.value: Value = self._compiled(tree, names)
+        self.value: Evaluation = self._compiled(tree, names)
         self.names = tuple(names)
 
-    def _compiled(self, node: ast.AST, names: dict[str, None]) -> Value:
+    def _compiled(self, node: ast.AST, names: dict[str, None]) -> Evaluation:
         match node:
             case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
                 return lambda xp, of, x=float(number): x  # type: ignore[misc]
@@ -80,7 +80,7 @@ class Expression:
         )
 
     @staticmethod
-    def _power(base: Value, power: int) -> Value:
+    def _power(base: Evaluation, power: int) -> Evaluation:
         def value(xp: Any, of: Mapping[str, Any]) -> Any:
             x = result = base(xp, of)
             for _ in range(power - 1):
@@ -89,7 +89,7 @@ class Expression:
 
         return value
 
-    def _call(self, name: str, args: list[Value]) -> Value:
+    def _call(self, name: str, args: list[Evaluation]) -> Evaluation:
         wanted = 2 if name in _TWO else 1
         if name not in FUNCTIONS:
             raise InputError(

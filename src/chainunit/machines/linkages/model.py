@@ -38,7 +38,7 @@ from .declarations import (
     Running,
 )
 from .loads import CoordinateTable, ForceLaw, SpringDamper, TorqueLaw
-from .parts import Frame, LinkageParts
+from .parts import LinkageParts, LinkFrame
 from .structure import DriverEntry, JointEntry, LinkEntry, Structure
 
 ANGLES = 48
@@ -416,7 +416,7 @@ class LinkageDescription:
         return about + xp.atan2(c * axis.y - s * axis.x, c * axis.x + s * axis.y)
 
 
-def _own_axis(u: Vec2, frame: Frame) -> Vec2:
+def _own_axis(u: Vec2, frame: LinkFrame) -> Vec2:
     """The x axis of a link's description, from the direction of its frame in the group."""
     e = frame.axis
     return Vec2(u.x * e.x + u.y * e.y, u.y * e.x - u.x * e.y)

@@ -1,7 +1,7 @@
 """From the description of a linkage to its Assur groups: frames of links, rails, and assembly modes.
 
 A description places the points of a link in the link's own frame. A group has frames of its own for its links
-(`chainunit.groups`): a `Frame` is the place of such a frame in that of the description. Standard library only: FMUs
+(`chainunit.groups`): a `LinkFrame` is the place of such a frame in that of the description. Standard library only: FMUs
 carry this file.
 """
 
@@ -27,7 +27,7 @@ from .structure import Entry, JointEntry, LinkEntry, Structure
 ALONG_X = Vec2(1.0, 0.0)
 
 
-class Frame(NamedTuple):
+class LinkFrame(NamedTuple):
     """A frame of a group's link in that of the description: its origin [m] and its x axis, a unit vector."""
 
     origin: Vec2
@@ -42,7 +42,7 @@ class Frame(NamedTuple):
         return Vec2(self.axis.dot(v), self.axis.cross(v))
 
 
-OWN = Frame(ZERO, ALONG_X)
+OWN = LinkFrame(ZERO, ALONG_X)
 
 
 def rotated(v: Vec2, by: Vec2) -> Vec2:
@@ -77,7 +77,7 @@ class LinkageParts:
         self.xp, self.structure, self.values = xp, structure, values
         self.sides: dict[str, float] = dict(sides or {})
         self._known_sides = sides is not None
-        self.frames: dict[str, Frame] = {GROUND: OWN}
+        self.frames: dict[str, LinkFrame] = {GROUND: OWN}
         self.receivers: dict[str, tuple[tuple[str, str], float]] = {}
         self._points: dict[str, dict[str, Vec2]] = {}
         self._carriers = {self.pin(GROUND, name): GROUND for name in structure.ground}
@@ -116,7 +116,7 @@ class LinkageParts:
 
     # bars
 
-    def _bar(self, link: str, frame: Frame, start: str = "", length: Any = None) -> Bar:
+    def _bar(self, link: str, frame: LinkFrame, start: str = "", length: Any = None) -> Bar:
         """The bar of a link in a frame; it starts from the pin `start`."""
         entry = self.structure.links[link]
         self.frames[link] = frame
@@ -131,7 +131,7 @@ class LinkageParts:
             points[pin], self._carriers[pin] = (at.x, at.y), link
         return Bar(link, start, length, self._mass(entry, frame), points)
 
-    def _mass(self, entry: LinkEntry, frame: Frame) -> Mass | None:
+    def _mass(self, entry: LinkEntry, frame: LinkFrame) -> Mass | None:
         """The body of a link: further masses are parts of it."""
         if not entry.heavy:
             return None
@@ -147,11 +147,11 @@ class LinkageParts:
         at = frame.of(c)
         return Mass(m, at.x, inertia, at.y)
 
-    def _between(self, link: str, start: str, end: str) -> tuple[Frame, Any]:
+    def _between(self, link: str, start: str, end: str) -> tuple[LinkFrame, Any]:
         """The frame of a link from one of its points to another, and their distance."""
         a, b = self.point(link, start), self.point(link, end)
         length = self.xp.sqrt((b - a).squared())
-        return Frame(a, (b - a) * (1.0 / length)), length
+        return LinkFrame(a, (b - a) * (1.0 / length)), length
 
     # joints
 
@@ -211,7 +211,7 @@ class LinkageParts:
         entry, xp = self.structure.driver, self.xp
         joint, link = self.structure.joints[entry.joint], entry.link
         if not entry.linear:
-            frame = Frame(self.point(link, joint.at(link)), ALONG_X)
+            frame = LinkFrame(self.point(link, joint.at(link)), ALONG_X)
             zero = self.number(entry.zero)
             start = self._outer(joint, link)
             bar = self._bar(link, frame, start)
@@ -219,7 +219,7 @@ class LinkageParts:
             return Crank(bar, end, Vec2(xp.cos(zero), xp.sin(zero)), entry.sense)
         sign = 1.0 if joint.on[0] == link else -1.0
         along = self._direction(joint, link) * sign
-        frame = Frame(self.point(link, joint.at(link)), along)
+        frame = LinkFrame(self.point(link, joint.at(link)), along)
         rail = Rail(None, self.point(GROUND, joint.at(GROUND)), self._direction(joint, GROUND) * sign)
         bar = self._bar(link, frame)
         return Ram(bar, rail, self._guide(joint, link), self.pin_on(link, joint.at(link)))
@@ -271,7 +271,7 @@ class LinkageParts:
         """A block whose frame starts at the point `at` on its rail."""
         point = self.point(link, at)
         line = self._rail(rail, link, point)
-        bar = self._bar(link, Frame(point, self._direction(rail, link)))
+        bar = self._bar(link, LinkFrame(point, self._direction(rail, link)))
         return bar, line, self._guide(rail, link)
 
     def _rrp(self, first: str, slider: str, p: JointEntry, c: JointEntry, g: JointEntry) -> Group:
@@ -286,7 +286,7 @@ class LinkageParts:
 
     def _rpr(self, first: str, second: str, p: JointEntry, g: JointEntry, q: JointEntry) -> Group:
         frames = [
-            Frame(self.point(link, j.at(link)), self._direction(g, link))
+            LinkFrame(self.point(link, j.at(link)), self._direction(g, link))
             for link, j in ((first, p), (second, q))
         ]
         block, line = (
@@ -318,10 +318,10 @@ class LinkageParts:
         along = self._direction(g, yoke)
         origin = self._line_through(s, block, pin)
         rail = self._rail(g, yoke, origin)
-        own = Frame(origin, along)
+        own = LinkFrame(origin, along)
         slot = own.of_vector(self._direction(s, yoke))
         in_block = self._across(s, along, yoke)
-        bars = self._bar(block, Frame(pin, in_block), start), self._bar(yoke, own)
+        bars = self._bar(block, LinkFrame(pin, in_block), start), self._bar(yoke, own)
         return RPP(*bars, rail, slot, (self._guide(s, block), self._guide(g, yoke)))
 
     def _triad(
@@ -349,7 +349,7 @@ class LinkageParts:
         point = self.point(link, outer.at(link))
         start = self._outer(outer, link)
         at = self._line_through(inner, link, point)
-        bar = self._bar(link, Frame(point, self._direction(inner, link)), start)
+        bar = self._bar(link, LinkFrame(point, self._direction(inner, link)), start)
         return SlotLeg(bar, at, self._direction(inner, ternary), self._guide(inner, link))
 
     # the assembly, by rough poses
