@@ -1,8 +1,8 @@
 """From the description of a linkage to its Assur groups: frames of links, rails, and assembly modes.
 
 A description places the points of a link in the link's own frame. A group has frames of its own for its links
-(`chainunit.groups`): a `LinkFrame` is the place of such a frame in that of the description. Standard library only: FMUs
-carry this file.
+(`chainunit.groups`): a `LinkFrame` is the place of such a frame in that of the description. Standard library only:
+FMUs carry this file.
 """
 
 from __future__ import annotations
