@@ -12,7 +12,7 @@ from chainunit import InputError
 from chainunit.report.markdown import markdown
 from chainunit.report.study import report
 from chainunit.study.config import parse
-from chainunit.study.monte_carlo import read
+from chainunit.study.monte_carlo import read_rows
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
 
@@ -77,8 +77,8 @@ def test_random_overloads_of_a_machine_without_sides(sized):
         assert row["side"] is None and row["rocker_torque_peak"] is None
         assert 3e4 <= row["drawn"]["force"] <= 1e5 and np.isfinite(row["crank_torque_peak"])
     # read again they count, but not for a machine that has a rocker
-    assert len(read(study.monte_carlo.file, frozenset(study.absent))[0]) == 2
-    assert read(study.monte_carlo.file) == ({}, 2)
+    assert len(read_rows(study.monte_carlo.file, frozenset(study.absent))[0]) == 2
+    assert read_rows(study.monte_carlo.file) == ({}, 2)
     assert len(json.dumps(as_dict(study), allow_nan=False)) > 1000
 
 
