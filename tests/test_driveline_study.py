@@ -549,7 +549,7 @@ def test_ranges_of_the_natural_frequency_say_over_what_they_are():
     assert rows["natural frequency, over a turn of the shaft"] == pytest.approx([band.least, band.largest])
     over_both = "over the turns of shaft and machine"
     assert rows[f"natural frequency, {over_both}"] == pytest.approx([low[0], high[1]], rel=1e-6)
-    assert rows[f"speed at which order 2 meets it, {over_both}"] == pytest.approx(
+    assert rows[f"speed at which order 2 meets the natural frequency, {over_both}"] == pytest.approx(
         [low[0] / 2.0, high[1] / 2.0], rel=1e-6
     )
     campbell = next(each for each in shown if isinstance(each, figure.Figure) and each.name == "campbell")
