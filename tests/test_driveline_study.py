@@ -370,7 +370,8 @@ def test_a_damping_ratio_sets_both_dampings():
         ("[driveline]\ndamping = 1", "driveline.damping: unknown key; known here: alpha1"),
         ('[driveline]\nJ4 = "heavy"', 'driveline.J4 = "heavy": must be a number in kg m2'),
         ('[driveline]\nJ4 = "3 m"', 'driveline.J4 = "3 m": must be a number in kg m2'),
-        ("[driveline]\nc2 = 1\nshaft2 = { section = 'round' }", "driveline.c2: given beside driveline.shaft2"),
+        ("[driveline]\nc2 = 1\nshaft2 = { section = 'round', outer = 0.04, length = 1 }",
+         "driveline.c2: given beside driveline.shaft2"),
         ("[driveline]\nd3 = 1\ndamping_ratio = 0.1", "driveline.d3: given beside driveline.damping_ratio"),
         ("[driveline]\ndamping_ratio = -0.1", "driveline.damping_ratio = -0.1: must be >= 0 and <= 0.5"),
         ("[driveline]\nshaft2 = { section = 'tube' }", 'driveline.shaft2.section = "tube": must be "round"'),
@@ -396,7 +397,7 @@ def test_a_damping_ratio_sets_both_dampings():
         (f"{BARE}[torsion]\njoint = 'beta'", 'torsion.joint = "beta": must be "alpha1", "alpha2" or "both"'),
         (
             f"{BARE}[torsion]\ndamping_ratios = [1, 2, 3, 4, 5]",
-            "torsion.damping_ratios = [1, 2, 3, 4, 5]: list should have at most 4 items",
+            "torsion.damping_ratios = [1, 2, 3, 4, ...]: must be a list of at most 4, and has 5",
         ),
         (f"{BARE}[torsion]\ndamping_ratios = [0.9]", "torsion.damping_ratios = 0.9: must be >= 0 and <= 0.5"),
         (f"{BARE}[torsion]\nspeeds = 3.5", "torsion.speeds = 3.5: must be a whole number"),
