@@ -190,7 +190,7 @@ def _of_system() -> Iterator[Key]:
     machines = tuple(f'"{name}"' for name in MACHINES)
     motors = tuple(f'"{name}"' for name in MOTORS)
     words = {
-        "machine": (*machines, "an FMU (.fmu)"),
+        "machine": (*machines, "a linkage file (.toml)", "an FMU (.fmu)"),
         "motor": (*motors, "a designation of the catalogue", "an FMU (.fmu)"),
     }
     for name, field in SystemTable.model_fields.items():

@@ -16,6 +16,7 @@ from ..drives.line_table import SHAFTS
 from ..drives.motor import Motor
 from ..drives.motors import MOTORS
 from ..errors import Faults, InputError, near_name, refusal_prefix, shown
+from ..machines.linkages.file import read_linkage
 from ..mechanism.models import MachineModel
 from ..models import MACHINES
 from ..reading import Title, file_form, given_values, merged, packaged, read_table, toml
@@ -105,6 +106,10 @@ def _form(machine: type[MachineModel], motor: type[Motor]) -> type[BaseModel]:
     return file_form("Config", tables, **CHOICES, event=(list[Any], []))
 
 
+LINKAGE = ".toml"
+"""End of the name of a linkage file."""
+
+
 def _is_fmu(name: str) -> bool:
     return name.lower().endswith(".fmu")
 
@@ -146,11 +151,14 @@ def parts_of(data: Mapping[str, Any], source: str) -> Parts:
 
 def _machine_model(table: Any, source: str) -> type[MachineModel]:
     """The machine that the table [system] names."""
+    if table.machine.lower().endswith(LINKAGE):
+        with refusal_prefix("system.machine: ", "system.machine"):
+            return read_linkage(beside(table.machine, source))
     if not _is_fmu(table.machine):
         if table.machine in MACHINES:
             return MACHINES[table.machine]
         raise InputError(
-            f"system.machine = {shown(table.machine)}: must be one of {', '.join(MACHINES)}, or a file .fmu"
+            f"system.machine = {shown(table.machine)}: must be one of {', '.join(MACHINES)}, a linkage file .toml, or a file .fmu"
             + near_name(table.machine, MACHINES),
             key="system.machine",
         )

@@ -20,6 +20,7 @@ from .sections import Ratios
 OF_PARTS = ("machine", "feed", "motor")
 """Tables whose keys follow from the machine and the motor that the file names."""
 _FMU = {"type": "string", "pattern": r"\.[fF][mM][uU]$"}
+_LINKAGE = {"type": "string", "pattern": r"\.[tT][oO][mM][lL]$"}
 
 Rule = dict[str, Any]
 
@@ -74,7 +75,7 @@ def _all(*of: Rule) -> Rule:
 
 
 def _machine_name() -> Rule:
-    return {"anyOf": [{"enum": list(MACHINES)}, _FMU]}
+    return {"anyOf": [{"enum": list(MACHINES)}, _FMU, _LINKAGE]}
 
 
 def _machine(name: str) -> Rule:
