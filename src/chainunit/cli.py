@@ -18,7 +18,7 @@ import typer.core
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from .errors import InputError, InterruptedRunError, RunError, WriteError, printable
+from .errors import InputError, InterruptedRunError, RunError, WriteError, near_name, printable
 from .files import claim, clear, full, write_all
 
 if TYPE_CHECKING:
@@ -293,9 +293,41 @@ def two_bar_error(
         _finish(contents, output, two_bar.NAME)
 
 
+@app.command("linkage")
+def linkage_command(
+    file: Annotated[Path, typer.Argument(help="Linkage file (TOML).")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path("linkage"),
+    speed: Annotated[
+        str, typer.Option("--speed", help='Speed of the driver with its unit, such as "60 rpm".')
+    ] = "60 rpm",
+) -> None:
+    """Show a linkage: its groups, drawing, motion, torque, inertia and reactions over a turn.
+
+    Writes report.html, linkage.json, linkage.md and pictures into the output folder.
+    """
+    from .machines.linkages.file import read_linkage
+    from .machines.machine import Machine
+    from .quantities import Variable, quantity
+    from .reading import to_number
+
+    declared = quantity("rad/s", "speed of the driver", above=0.0).metadata["quantity"]
+    try:
+        rate = to_number(Variable("--speed", declared.description, declared), speed)
+    except ValueError as error:
+        raise InputError(str(error)) from None
+    machine = Machine(read_linkage(file))
+    with claim(output):
+        from .report import files, linkage_report
+        from .study.linkage_turn import linkage_findings
+
+        clear(output, *files.names(linkage_report.NAME, linkage_report.PICTURES))
+        contents = linkage_report.linkage_report(linkage_findings(machine, rate), str(file))
+        _finish(contents, output, linkage_report.NAME)
+
+
 @app.command(cls=_Export)
 def export(
-    name: Annotated[str, typer.Argument(help="The model.")],
+    name: Annotated[str, typer.Argument(help="The model, or a linkage file (.toml).")],
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="FMU file; NAME.fmu by default.")
     ] = None,
@@ -318,6 +350,9 @@ def export(
             "--rods", help="Rods of an organ of ChainUnitFlexible, 2 to 24; 8, or the study's, by default."
         ),
     ] = None,
+    direct: Annotated[
+        bool, typer.Option("--direct", help="Of a linkage file: torque in and motion out.")
+    ] = False,
 ) -> None:
     """Write a model as an FMU."""
     from .fmu.backends import export as write
@@ -325,9 +360,20 @@ def export(
     from .study.package import start_of, with_rods
     from .study.sections import ChainOrgans
 
-    if name not in MODELS:
-        raise InputError(f"{name}: no such model; there are {', '.join(MODELS)}")
-    file = output or Path(f"{name}.fmu")
+    model: Any = MODELS.get(name)
+    if name.lower().endswith(".toml"):
+        from .machines.linkages.file import read_linkage
+
+        model = read_linkage(Path(name))
+        model = model.direct() if direct else model
+    elif model is None:
+        there = f"there are {', '.join(MODELS)}, and linkage files (.toml)"
+        raise InputError(f"{name}: no such model{near_name(name, MODELS) or ';'} {there}")
+    elif direct:
+        raise InputError(
+            "--direct: is of linkage files; the direct model of a machine has a name, as ChainUnit"
+        )
+    file = output or Path(f"{model.name}.fmu")
     if file.suffix != ".fmu":
         raise InputError(f"-o {file}: must be a file name that ends in .fmu")
     if rods is not None and name != "ChainUnitFlexible":
@@ -335,7 +381,6 @@ def export(
     kind: Any = backend.value if backend else None
     with _console(stderr=True).status("exporting") as status:
         start = {}
-        model = MODELS[name]
         if config:
             loaded = _study_file(config)
             start = start_of(loaded, model, backend=kind, report=status.update)
@@ -352,7 +397,7 @@ def export(
             platforms=_platforms(platforms, fmi),
             report=status.update,
         )
-    print(f"{file}: {name}, {made}")
+    print(f"{file}: {model.name}, {made}")
 
 
 @app.command("export-ssp")

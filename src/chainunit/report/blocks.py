@@ -178,6 +178,7 @@ class Report:
     source: Line = ()
     failure: Line = ()
     units: Units = field(default_factory=lambda: DEFAULT_UNITS)
+    opening_title: str = "The question"
 
     def blocks(self, form: Form) -> list[Block]:
         """The blocks of one form, in order."""

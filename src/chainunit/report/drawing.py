@@ -17,6 +17,7 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from ..engines import MATH
+from ..groups.driver import Crank
 from ..machines.machine import Machine
 from ..mechanism.machine import Mechanism
 from ..quantities import Layout
@@ -137,18 +138,24 @@ def drawing(machine: Machine, phi: float = 1.0) -> str:
     orbit = machine.state(machine.inputs({"phi": turns * machine.ratio})).m
     places = {name: (float(x), float(y)) for name, (x, y) in linkage.places(whole).items()}
     crank, canvas = whole.linkage.driver, _Canvas()
-    to_page = _scale([*places.values(), *_curve(linkage.places(orbit)[crank.end])])
+    ways = linkage.rails(orbit)
+    ends = [end for way in ways.values() for end in way]
+    to_page = _scale([*places.values(), *_curve(linkage.places(orbit)[crank.end]), *ends])
     at = {name: to_page(place) for name, place in places.items()}
     links = [_straightened(link, at) for link in linkage.links(whole.linkage, {})]
     sizes = dimensions(machine)
     canvas.add("rect", width=WIDTH + COLUMN, height=HEIGHT, fill="#ffffff", rx=8)
-    # the circle of the crank pin
-    radius = math.dist(at[crank.bar.pin], at[crank.end])
-    x, y = at[crank.bar.pin]
-    canvas.add("circle", cx=x, cy=y, r=radius, fill="none", stroke="#999999", stroke_dasharray="4 4")
+    for way in ways.values():
+        _rail(canvas, *map(to_page, way))
+    if isinstance(crank, Crank):
+        # the circle of the crank pin
+        radius = math.dist(at[crank.bar.pin], at[crank.end])
+        x, y = at[crank.bar.pin]
+        canvas.add("circle", cx=x, cy=y, r=radius, fill="none", stroke="#999999", stroke_dasharray="4 4")
     hanging = linkage.hanging(orbit)
     for pin in whole.linkage.ground:
-        _support(canvas, at[pin], -1.0 if pin in hanging else 1.0)
+        if pin in at:
+            _support(canvas, at[pin], -1.0 if pin in hanging else 1.0)
     lines = [(at[a], at[b]) for link in links for a, b in _sides(link)]
     for link in links:
         colour, weight = _LOOKS[link.look]
@@ -162,17 +169,24 @@ def drawing(machine: Machine, phi: float = 1.0) -> str:
                 "circle", cx=place[0], cy=place[1], r=4.5, fill="#ffffff", stroke="#1b1b1b", stroke_width=2
             )
             canvas.label_boxes.append((place[0] - 6, place[1] - 6, place[0] + 6, place[1] + 6))
-    _angle(canvas, at[crank.bar.pin], phi, radius)
+    for (pin, _), slide in whole.slides.items():
+        _block(canvas, at[pin], math.atan2(-slide.d.y, slide.d.x))
+    if isinstance(crank, Crank):
+        _angle(canvas, at[crank.bar.pin], phi, radius, math.atan2(crank.start.y, crank.start.x), crank.sense)
     of = {link.name: link for link in links}
     for symbol, link_name in machine.model.angles.items():
         _swing(canvas, at, of[link_name], symbol)
     lines += _sizes(canvas, sizes, at, to_page((0.0, 0.0)), whole, hanging)
     for name, place in at.items():
+        if "." in name:  # another name stands at the same place
+            continue
         around = [
             (place[0] + 19 * math.cos(t), place[1] + 17 * math.sin(t)) for t in np.arange(-0.8, 5.5, 0.4)
         ]
         canvas.label(_short(name), around, lines, font_weight="bold", fill="#1b1b1b")
     for link in links:
+        if len(link.joints) < 2:
+            continue
         size = sizes.get(("link", link.name))
         words = f"{_short(link.name)} {size.name}" if size else _short(link.name)
         canvas.label(words, _beside(link, at), lines, fill=_LOOKS[link.look][0])
@@ -242,17 +256,48 @@ def _support(canvas: _Canvas, at: Point, down: float) -> None:
     canvas.label_boxes.append((x - 15, min(y, y + 23 * down), x + 15, max(y, y + 23 * down)))
 
 
-def _angle(canvas: _Canvas, at: Point, phi: float, radius: float) -> None:
-    """Draw the crank angle: an arc with an arrow, clockwise from the upward vertical."""
-    x, y = at
+def _angle(canvas: _Canvas, at: Point, phi: float, radius: float, zero: float, sense: float) -> None:
+    """Draw the crank angle: an arc with an arrow from the direction `zero` [rad], where it is 0; it counts
+    counter-clockwise where `sense` is +1."""
+
+    def on_arc(angle: float, r: float) -> Point:
+        return at[0] + r * math.cos(zero + sense * angle), at[1] - r * math.sin(zero + sense * angle)
+
     r = min(radius + 14.0, 70.0)
-    end = (x + r * math.sin(phi), y - r * math.cos(phi))
-    canvas.add("line", x1=x, y1=y, x2=x, y2=y - r - 8, stroke="#999999", stroke_dasharray="2 3")
-    canvas.add("path", d=f"M {x:.1f} {y - r:.1f} A {r:.1f} {r:.1f} 0 0 1 {end[0]:.1f} {end[1]:.1f}", fill="none",
-               stroke="#c1440e", stroke_width=1.5, marker_end="url(#drawing-tip)")  # fmt: skip
-    canvas.label_boxes.append((x - 3, y - r - 10, end[0] + 4, y - radius + 2))
-    middle = (x + (r + 12) * math.sin(0.5 * phi), y - (r + 12) * math.cos(0.5 * phi))
-    canvas.label("φ", [middle], [], fill="#c1440e", font_style="italic")
+    (x0, y0), (x1, y1), (x2, y2) = on_arc(0.0, r), on_arc(phi, r), on_arc(0.0, r + 8.0)
+    canvas.add("line", x1=at[0], y1=at[1], x2=x2, y2=y2, stroke="#999999", stroke_dasharray="2 3")
+    canvas.add("path", d=f"M {x0:.1f} {y0:.1f} A {r:.1f} {r:.1f} 0 0 {int(sense < 0.0)} {x1:.1f} {y1:.1f}",
+               fill="none", stroke="#c1440e", stroke_width=1.5, marker_end="url(#drawing-tip)")  # fmt: skip
+    for k in range(4):
+        x, y = on_arc(phi * k / 3.0, r)
+        canvas.label_boxes.append((x - 5, y - 5, x + 5, y + 5))
+    canvas.label("φ", [on_arc(0.5 * phi, r + 12.0)], [], fill="#c1440e", font_style="italic")
+
+
+def _rail(canvas: _Canvas, a: Point, b: Point) -> None:
+    """Draw a rail of the ground: two lines along the way of a block, hatched on the outside."""
+    length = math.dist(a, b) or 1.0
+    along = ((b[0] - a[0]) / length, (b[1] - a[1]) / length)
+    across = (-along[1], along[0])
+    for side in (9.0, -9.0):
+        ends = [(p[0] + side * across[0], p[1] + side * across[1]) for p in (a, b)]
+        (x1, y1), (x2, y2) = ends
+        canvas.add("line", x1=x1, y1=y1, x2=x2, y2=y2, stroke="#777777", stroke_width=1.5)
+        for k in range(6, int(length), 10):
+            x, y = x1 + k * along[0], y1 + k * along[1]
+            out = math.copysign(6.0, side)
+            canvas.add("line", x1=x, y1=y, x2=x + out * across[0] - 5 * along[0],
+                       y2=y + out * across[1] - 5 * along[1], stroke="#777777")  # fmt: skip
+
+
+def _block(canvas: _Canvas, at: Point, angle: float) -> None:
+    """Draw a sliding block with its line at this angle in the picture."""
+    c, s = math.cos(angle), math.sin(angle)
+    corners = [
+        (at[0] + c * x - s * y, at[1] + s * x + c * y) for x, y in ((-13, -7), (13, -7), (13, 7), (-13, 7))
+    ]
+    points = " ".join(f"{x:.2f},{y:.2f}" for x, y in corners)
+    canvas.add("polygon", points=points, fill="none", stroke="#1b1b1b", stroke_width=1.5)
 
 
 def _frame(canvas: _Canvas) -> None:
@@ -305,7 +350,7 @@ def _sizes(
     places of points along a link. Returns their lines."""
     lines: list[tuple[Point, Point]] = []
     for (kind, *of), size in sizes.items():
-        if "." in size.name or kind == "link":
+        if "." in size.name or kind == "link" or of[-1] not in at:
             continue
         if kind == "point":
             link, point = of

@@ -335,7 +335,11 @@ class _Page:
             f'<p class="from">{source}{" · " if source else ""}status: '
             f"{'stopped early' if status else 'complete'}</p>\n"
             f'{status}\n<nav aria-label="Sections">{links}</nav>\n'
-            + (f'<h2 id="asked">The question</h2>\n<div class="asked">{opening}</div>\n' if opening else "")
+            + (
+                f'<h2 id="asked">{report.opening_title}</h2>\n<div class="asked">{opening}</div>\n'
+                if opening
+                else ""
+            )
             + "</header>"
         )
 

@@ -15,15 +15,45 @@ from .motion import Arrow, DrawnLink
 def links(linkage: Linkage, looks: Mapping[str, str]) -> Iterator[DrawnLink]:
     """The links as they are drawn, the crank first. Links with a pin in the ground are heavier than the others; a
     link with more than two pins is an area. `looks` has the looks of links that differ from this rule."""
-    for name, pins in linkage.topology.links.items():
+    shown = shown_pins(linkage)
+    for name, carried in linkage.topology.links.items():
+        pins = tuple(pin for pin in carried if pin in shown)
         crank, grounded = name == linkage.driver.bar.name, any(pin in linkage.ground for pin in pins)
         usual = "crank" if crank else "heavy" if grounded else "light"
         yield DrawnLink(name, pins, looks.get(name, usual), closed=len(pins) > 2)
 
 
+def shown_pins(linkage: Linkage) -> set[str]:
+    """The pins and points that are drawn: not those of the ground that only say where a rail lies, and not further
+    points of a link that meet a pin."""
+    topology = linkage.topology
+    joined = {pin for pin, _ in topology.joints}
+    return {pin for pin in (*joined, *topology.carries) if "." not in pin or pin in joined}
+
+
 def places(mechanism: Mechanism) -> dict[str, tuple[Any, Any]]:
-    """The places x, y of the pins and points of a mechanism [m]."""
-    return {name: (pin.p.x, pin.p.y) for name, pin in mechanism.pins.items()}
+    """The places x, y of the pins and points of a mechanism that are drawn [m]."""
+    shown = shown_pins(mechanism.linkage)
+    return {name: (pin.p.x, pin.p.y) for name, pin in mechanism.pins.items() if name in shown}
+
+
+def rails(turn: Mechanism) -> dict[str, tuple[tuple[float, float], tuple[float, float]]]:
+    """The ends of the way of each block that slides in the ground, by its pin [m]; `turn` is the mechanism over a
+    whole turn."""
+    ways = {}
+    for connections in turn.topology.groups:
+        for joint, carrier, _ in connections.joints:
+            if joint in turn.slides and carrier is None:
+                at, d = turn.pins[joint[0]].p, turn.slides[joint].d
+                s = np.atleast_1d(turn.slides[joint].s)
+                x, y = (np.broadcast_to(v, s.shape) for v in (at.x, at.y))
+                low, high = int(np.argmin(s)), int(np.argmax(s))
+                margin = 0.25 * float(np.ptp(s)) + 1e-9
+                dx, dy = (float(np.atleast_1d(v)[0]) * margin for v in (d.x, d.y))
+                ways[joint[0]] = (
+                    (float(x[low]) - dx, float(y[low]) - dy), (float(x[high]) + dx, float(y[high]) + dy)
+                )  # fmt: skip
+    return ways
 
 
 def paths(turn: Mechanism) -> dict[str, tuple[Any, Any]]:

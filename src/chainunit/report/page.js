@@ -122,9 +122,11 @@
         }
     const [x0, x1] = [Math.min(...x), Math.max(...x)], [y0, y1] = [Math.min(...y), Math.max(...y)];
     const left = 0.1 * size, right = left, above = left, below = left;
-    scale = WIDTH / (x1 - x0 + left + right);
+    // an upright linkage is not higher than four fifths of the width
+    scale = Math.min(WIDTH / (x1 - x0 + left + right), (0.8 * WIDTH) / (y1 - y0 + above + below));
     height = Math.round(scale * (y1 - y0 + above + below));
-    origin = [scale * (left - x0), scale * (y1 + above)];
+    const beside = 0.5 * (WIDTH - scale * (x1 - x0 + left + right));
+    origin = [beside + scale * (left - x0), scale * (y1 + above)];
     stage.setAttribute("viewBox", `0 0 ${WIDTH} ${height}`);
     parts = { arrow: arrow * scale };
 

@@ -40,7 +40,7 @@ def motion(study: StudyRecord) -> Animation:
     thin = f"; a thin line is the {', the '.join(paths)}" if paths else ""
     return Animation(
         tuple(_links(whole, supplement)),
-        tuple(whole.linkage.ground),
+        tuple(pin for pin in whole.linkage.ground if pin in linkage.shown_pins(whole.linkage)),
         tuple(_run(study, name, interval, supplement) for name in run_names.in_order(study)),
         turn,
         supplement.caption or _CAPTION.format(thin),

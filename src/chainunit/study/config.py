@@ -30,7 +30,7 @@ from .event_table import RandomEvent, read_events, read_random_event
 from .events import OneSidedFeed
 from .first_checks import check_values, independent, plate_of, without
 from .foreign_machine import ForeignMachine, ForeignModel
-from .parts import Parts, beside, example, over_example
+from .parts import Parts, beside, example, over_example, with_linkage
 from .sections import (
     CHOICES,
     ChainOrgans,
@@ -202,6 +202,7 @@ def of_tables(data: Mapping[str, Any], source: str) -> Config:
         raise InputError(
             "motor: tables [[motor]] make a catalogue; name this file in a study file by catalogue", "motor"
         )
+    data = with_linkage(data)
     parts, faults = check_values(data, source)
     if parts is None:
         raise InputError.of(faults)

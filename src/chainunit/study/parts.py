@@ -158,12 +158,38 @@ def _machine_model(table: Any, source: str) -> type[MachineModel]:
         if table.machine in MACHINES:
             return MACHINES[table.machine]
         raise InputError(
-            f"system.machine = {shown(table.machine)}: must be one of {', '.join(MACHINES)}, a linkage file .toml, or a file .fmu"
-            + near_name(table.machine, MACHINES),
+            f"system.machine = {shown(table.machine)}: must be one of {', '.join(MACHINES)}, a linkage file "
+            ".toml, or a file .fmu" + near_name(table.machine, MACHINES),
             key="system.machine",
         )
     with refusal_prefix("system.machine: ", "system.machine"):
         return foreign_model(beside(table.machine, source), given_values(table.machine_names))
+
+
+def with_linkage(data: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The tables of a file; the machine that ``linkage`` in [machine] names stands in [system], as every machine.
+
+    Raises
+    ------
+    InputError
+        for a name that is none of a linkage file, or a second machine.
+    """
+    machine = data.get("machine")
+    if not isinstance(machine, Mapping) or "linkage" not in machine:
+        return data
+    system, name = named_table(data, "system"), machine["linkage"]
+    if not isinstance(name, str) or not name.lower().endswith(LINKAGE):
+        raise InputError(
+            f"machine.linkage = {shown(name)}: must be the name of a linkage file, which ends in {LINKAGE}",
+            key="machine.linkage",
+        )
+    if "machine" in system:
+        raise InputError(
+            f"machine.linkage = {shown(name)}: system.machine names a machine, too; take one of both out",
+            key="machine.linkage",
+        )
+    rest = {key: value for key, value in machine.items() if key != "linkage"}
+    return {**data, "system": {**system, "machine": name}, "machine": rest}
 
 
 def named_table(data: Mapping[str, Any], name: str) -> Mapping[str, Any]:

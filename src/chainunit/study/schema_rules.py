@@ -33,6 +33,8 @@ def rules() -> Iterator[Rule]:
     )
     for name in MACHINES:
         yield _where(_machine(name), _of_machine(name))
+    yield _where(_given("machine.linkage"), _without("system.machine"))
+    yield _where(_given("machine.linkage"), _equal("machine.linkage", _LINKAGE))
     yield from _of_motors()
     yield from _of_foreign_parts()
     yield from _of_sizing()
@@ -81,7 +83,11 @@ def _machine_name() -> Rule:
 def _machine(name: str) -> Rule:
     """Whether the file has the machine `name`."""
     names = _equal("system.machine", {"const": name})
-    return names if name != _default().machine.name else _any(names, _without("system.machine"))
+    return (
+        names
+        if name != _default().machine.name
+        else _any(names, _without("system.machine", "machine.linkage"))
+    )
 
 
 def _default(machine: str = "") -> Parts:

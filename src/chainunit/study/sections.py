@@ -318,7 +318,10 @@ _MachineNames = _names_form("machine_names", NAMES["machine"])
 SystemTable = create_model(
     "system",
     __config__=ConfigDict(extra="forbid"),
-    machine=(str, Field("ChamberForces", min_length=1, description="machine: a model, a linkage file, or an FMU")),
+    machine=(
+        str,
+        Field("ChamberForces", min_length=1, description="machine: a model, a linkage file, or an FMU"),
+    ),
     motor=(
         str,
         Field("", min_length=1, description="motor: a model, a designation of the catalogue, or an FMU"),

@@ -196,6 +196,14 @@ class LinkageDescription:
 
     # the rotation of links over the turn
 
+    @property
+    def span(self) -> tuple[float, float]:
+        """The least and the largest place of the driver: a turn from the start on [rad], or its range [m]."""
+        if self.data["driver"]["linear"]:
+            low, high = self.data["range"]
+            return float(low), float(high)
+        return self.structure.start, self.structure.start + 2.0 * math.pi
+
     def places(self) -> list[float]:
         """Places of the driver from the start on, around or over its range."""
         driver = self.data["driver"]

@@ -1,0 +1,133 @@
+"""A linkage file on the command line: shown, exported, and driven in a study."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from command import chainunit
+from linkage_files import MACHINES
+
+from chainunit.machines.linkages.file import read_linkage
+from chainunit.machines.machine import Machine
+from chainunit.study import config
+
+PRESS = Path(__file__).parents[1] / "examples" / "linkages" / "slider_crank_press.toml"
+
+
+def run(*arguments, cwd, status=0):
+    done = chainunit(*arguments, cwd=cwd)
+    assert done.returncode == status, done.stderr
+    return done
+
+
+def test_the_example_is_the_reference_machine():
+    machine = Machine(read_linkage(PRESS))
+    for state in MACHINES["slider_crank_press"]["states"]:
+        inputs = {key: state[key] for key in ("phi", "w", "a")}
+        outputs = machine.evaluate({**inputs, "press_force": 2500.0})
+        assert float(outputs["tau"]) == pytest.approx(state["tau"], rel=1e-11)
+        assert float(outputs["guide.moment"]) == pytest.approx(
+            state["reactions"]["guide"]["moment"], rel=1e-11
+        )
+
+
+def test_show(tmp_path):
+    """What is shown is computed anew here, from the textbook's slider-crank and the reactions of the machine."""
+    done = run("linkage", str(PRESS), "-o", "out", "--speed", "60 rpm", cwd=tmp_path)
+    assert "crank + RRP dyad (rod, ram)" in done.stdout
+    result = json.loads((tmp_path / "out" / "linkage.json").read_text("utf-8"))
+    q = np.linspace(0.0, 2.0 * math.pi, 361)
+    machine, w = Machine(read_linkage(PRESS)), 2.0 * math.pi
+    feed = machine.model.Feed()
+    out = machine.outputs(q, w, 0.0, feed)
+    assert result["turn"]["torque_peak"]["value"] == pytest.approx(float(np.max(np.abs(out.tau))), rel=1e-12)
+    assert result["turn"]["inertia_largest"]["value"] == pytest.approx(float(np.max(out.J)), rel=1e-12)
+    assert result["turn"]["energy_gap"]["value"] < 1e-13
+    # the height of C, by r, l and the offset
+    r, l, e = 0.08, 0.36, 0.025
+    y = r * np.sin(q) - np.sqrt(l * l - (e - r * np.cos(q)) ** 2)
+    assert result["points"]["ram.C"]["y"]["value"] == pytest.approx([np.min(y), np.max(y)], rel=1e-12)
+    transmission = np.sqrt(l * l - (e - r * np.cos(q)) ** 2) / l
+    assert result["groups"]["rod, ram"]["margin"]["value"] == pytest.approx(np.min(transmission), rel=1e-12)
+    force = np.hypot(out.C.fx, out.C.fy)
+    assert result["joints"]["C"]["peak"]["value"] == pytest.approx(float(np.max(force)), rel=1e-12)
+    assert result["joints"]["guide"]["moment"]["value"] == pytest.approx(
+        float(np.max(np.abs(out.guide.moment)))
+    )
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert "Play" in page and "The linkage" in page and "The question" not in page
+    assert {"linkage.svg", "linkage.png", "linkage_reactions.png", "linkage.md"} <= {
+        each.name for each in (tmp_path / "out").iterdir()
+    }
+
+
+@pytest.mark.parametrize("direct", [False, True])
+def test_export(tmp_path, direct):
+    run("export", str(PRESS), "-o", "press.fmu", *(["--direct"] if direct else []), cwd=tmp_path)
+    description = fmpy.read_model_description(str(tmp_path / "press.fmu"))
+    assert description.modelName == "slider_crank_press" + "Direct" * direct
+    names = {v.name for v in description.modelVariables}
+    assert {"r", "l", "offset", "ram.mass", "press_force", "guide.moment", "ram.T.y"} <= names
+    assert ("tau_bias_dphi" in names) is not direct
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("export", "nope.toml"), "nope.toml: cannot be read"),
+        (("export", "ChamberForce"), 'was "ChamberForces" meant?'),
+        (("export", "ChamberForces", "--direct"), "--direct: is of linkage files"),
+        (("linkage", "nope.toml"), "nope.toml: cannot be read"),
+        (("linkage", str(PRESS), "--speed", "60 kg"), "--speed"),
+        (("linkage", str(PRESS), "--speed", "0"), "must be > 0"),
+    ],
+)
+def test_wrong_input(tmp_path, arguments, words):
+    done = run(*arguments, cwd=tmp_path, status=2)
+    assert words in done.stderr and not list(tmp_path.iterdir())
+
+
+STUDY = """
+[machine]
+linkage = "slider_crank_press.toml"
+ratio = 20
+r = "75 mm"
+[run]
+crank_speed = "60 rpm"
+"""
+
+
+def test_a_study_takes_the_machine_both_ways(tmp_path):
+    shutil.copy(PRESS, tmp_path)
+    source = str(tmp_path / "mine.toml")
+    one = config.parse(STUDY, source)
+    other = config.parse(
+        STUDY.replace('linkage = "slider_crank_press.toml"\n', "")
+        + '[system]\nmachine = "slider_crank_press.toml"',
+        source,
+    )
+    assert one.machine.model is other.machine.model
+    assert one.machine.by_name == other.machine.by_name and one.machine.by_name["r"] == 0.075
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (('"slider_crank_press.toml"', '"press.txt"'), "must be the name of a linkage file"),
+        (('"slider_crank_press.toml"', '"other.toml"'), "other.toml: cannot be read"),
+        (('r = "75 mm"', "q = 1"), "machine.q: unknown key"),
+        (('r = "75 mm"', 'r = "1 m"'), "r = 1 m: must be"),
+        (("[run]", '[system]\nmachine = "KnifeDrive"\n[run]'), "take one of both out"),
+    ],
+)
+def test_wrong_machines_of_a_study(tmp_path, change, words):
+    shutil.copy(PRESS, tmp_path)
+    (tmp_path / "mine.toml").write_text(STUDY.replace(*change), "utf-8")
+    done = run("study", "mine.toml", cwd=tmp_path, status=2)
+    assert words in done.stderr, done.stderr
