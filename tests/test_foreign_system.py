@@ -448,7 +448,7 @@ def test_its_speeds_and_torques_are_those_of_ours(folder):
         ),
         (("load.J", "load.mass"), r"system\.motor_names\.load\.mass: unknown key; known here: tau_bias, J, "),
         (('"rotor_speed"', "3"), r"system\.motor_names\.w = 3: must be a text"),
-        (('"ForeignMotor.fmu"', '""'), r'system\.motor = "": string should have at least 1 character'),
+        (('"ForeignMotor.fmu"', '""'), r'system\.motor = "": must be a text that is not empty'),
         (('motor = "ForeignMotor.fmu"', ""), r"system.motor_names: are of an FMU of somebody else"),
         (
             ("[run]", "[motor]\nrotor.J = 0.01\n[run]"),

@@ -148,11 +148,14 @@ def shown(given: Any, depth: int = 0) -> str:
         return quoted if rest <= 0 else f"{quoted}... ({rest} more characters)"
     if isinstance(given, bool):
         return "true" if given else "false"
+    if given and depth > _DEPTH and isinstance(given, Mapping | list | tuple):
+        # before anything inside is written out: it may be nested without end
+        return "{ ... }" if isinstance(given, Mapping) else "[...]"
     if isinstance(given, Mapping):
         entries = [f"{_bare(str(name))} = {shown(x, depth + 1)}" for name, x in _first(given.items())]
-        return _bracketed("{ ", entries, len(given), " }", depth)
+        return _bracketed("{ ", entries, len(given), " }")
     if isinstance(given, list | tuple):
-        return _bracketed("[", [shown(x, depth + 1) for x in _first(given)], len(given), "]", depth)
+        return _bracketed("[", [shown(x, depth + 1) for x in _first(given)], len(given), "]")
     if isinstance(given, date | time):
         return given.isoformat()
     return printable(_brief(given), 100)
@@ -162,12 +165,12 @@ def _first(entries: Iterable[Any]) -> Iterator[Any]:
     return itertools.islice(entries, _ENTRIES)
 
 
-def _bracketed(begin: str, entries: Sequence[str], number: int, end: str, depth: int) -> str:
+def _bracketed(begin: str, entries: Sequence[str], number: int, end: str) -> str:
     """The text of a list or a table of `number` entries, of which the first are written out."""
     if not number:
         return begin.strip() + end.strip()
     more = ["..."] if number > len(entries) else []
-    return begin + ("..." if depth > _DEPTH else ", ".join([*entries, *more])) + end
+    return begin + ", ".join([*entries, *more]) + end
 
 
 def _bare(name: str) -> str:
