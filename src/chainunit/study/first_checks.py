@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -83,14 +82,17 @@ def plate_of(designation: str, file: Path | None) -> CatalogueMotor | None:
 
 def without(data: Mapping[str, Any], faults: Collection[InputError]) -> dict[str, Any]:
     """The tables of a file without the refused values; without any event if one of them is refused."""
-    rest = copy.deepcopy(dict(data))
+    # tables on the way to a refused value are copied one by one: a refused value may be nested without end
+    rest = dict(data)
     for key in map(_key, faults):
         names = key.split(".")
         if "event" in names:
             names = names[: names.index("event") + 1]
         inner: Any = rest
         while len(names) > 1 and isinstance(inner.get(names[0]), dict):
-            inner = inner[names.pop(0)]
+            name = names.pop(0)
+            inner[name] = dict(inner[name])
+            inner = inner[name]
         inner.pop(names[0], None)
     return rest
 
