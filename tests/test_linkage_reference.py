@@ -108,3 +108,17 @@ def test_a_linkage_that_does_not_close_says_where():
     data["links"]["link"]["points"]["Q"] = [0.1, 0.0]
     with pytest.raises(InputError, match=r"the group of link, output cannot close at .* deg of crank"):
         machine_of(description_of(data, "short"))
+
+
+def test_an_expression_may_begin_with_a_number():
+    """A number before an operator is no quantity with a unit; one with a unit stands alone."""
+    data = tables(MACHINES["slider_crank_press"]["description"])
+    data["parameters"] = {"half": "180 mm"}
+    data["links"]["rod"]["points"]["C"] = ["2 * half", 0]
+    machine = Machine(machine_of(description_of(data, "press")))
+    wanted = Machine(model("slider_crank_press")).outputs(0.7, 3.0, 1.0)
+    assert float(machine.outputs(0.7, 3.0, 1.0).tau) == float(wanted.tau)
+    for text in ("180 mm + half", "2 mm * half"):
+        data["links"]["rod"]["points"]["C"] = [text, 0]
+        with pytest.raises(InputError, match=r"links.rod.points.C: .* has no units inside: write"):
+            description_of(data, "press")

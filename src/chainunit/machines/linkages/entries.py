@@ -102,7 +102,7 @@ class EntryReader:
     def entry(self, key: str, given: Any, unit: str, motion: bool = False, inputs: bool = False) -> Any:
         """A number in SI units, or the text of an expression, with its unit checked; 0 where it is wrong."""
         with self.at(key):
-            if not isinstance(given, str) or units.split(given) is not None:
+            if not isinstance(given, str) or _is_quantity(given):
                 return self.number(key, given, unit)
             known = {**self.units, **(_MOTION_UNITS | self.table_units if motion else {})}
             each = expression(given)
@@ -238,6 +238,24 @@ class EntryReader:
                 curves[name] = {"places": at, "values": [x for x, _ in values]}
                 self.table_units[name] = values[0][1]
         return curves
+
+
+def _is_quantity(text: str) -> bool:
+    """Whether a text is a number with a unit, and no expression that begins with a number, such as ``0.5 * l``.
+
+    Raises
+    ------
+    InputError
+        for an expression that has a unit inside.
+    """
+    parts = units.split(text)
+    if parts is None or parts[1][:1] in ("+", "-", "*", "/"):
+        return False
+    if re.search(r"[+*()]|\s[-/]\s", parts[1]):
+        raise InputError(
+            f"is {shown(text)}; an expression has no units inside: write its numbers in SI units, such as 2 * r + 0.01"
+        )
+    return True
 
 
 def _like(unit: str) -> str:

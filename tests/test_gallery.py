@@ -1,0 +1,277 @@
+"""The gallery of linkage files: each closes, keeps its energy, and has one torque by two routes; chain unit and knife
+drive are the packaged machines; what the files say at their top is so."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chainunit.machines.chain_unit import ChamberForces
+from chainunit.machines.knife_drive import KnifeDrive
+from chainunit.machines.linkages.file import read_linkage
+from chainunit.machines.machine import Machine
+from chainunit.study.config import load
+from chainunit.study.run import run_study
+
+FOLDER = Path(__file__).parents[1] / "examples" / "linkages"
+FILES = sorted(FOLDER.glob("*.toml"))
+KINDS = {
+    "blake_jaw_crusher": ["RRR", "RRR"],
+    "chain_unit": ["RRR", "RRR", "RRR"],
+    "crank_shaper": ["RPR", "RRP"],
+    "dwell_six_bar": ["RRR", "RRR"],
+    "edge_trimmer": ["triad"],
+    "knife_drive": ["RRR", "triad"],
+    "pump_jack": ["RRR"],
+    "scotch_yoke_pump": ["RPP"],
+    "slider_crank_press": ["RRP"],
+    "stephenson_six_bar": ["RRR", "RRR"],
+    "watt_six_bar": ["RRR", "RRR"],
+    "whitworth_quick_return": ["RPR", "RRP"],
+}
+"""The groups of each machine."""
+TURN = np.arange(720) * np.pi / 360.0
+
+
+@cache
+def machine(name: str) -> Machine:
+    return Machine(read_linkage(FOLDER / f"{name}.toml"))
+
+
+def turn(name, speed=1.0, **values):
+    """The outputs over a turn in steps of half a degree."""
+    return machine(name).replace(values).outputs(TURN, w=speed)
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_each_file_says_what_to_see_and_has_its_groups(file):
+    first = file.read_text("utf-8").splitlines()[0]
+    assert re.match(r"# See [a-z]", first)
+    groups = machine(file.stem).model.described_by.structure.groups
+    assert [group.kind for group in groups] == KINDS[file.stem]
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_both_routes_to_the_torque_agree(name):
+    """Virtual work of all links, and the balance of the driver with its reactions; friction is in neither."""
+    m, a = machine(name), 7.0
+    state = m.state(m.inputs({"phi": TURN, "w": 4.0, "a": a}))
+    friction = sum(state.effects[each].dissipative for each in ("pins", "guides") if each in state.effects)
+    torque = state.torque(a) - friction
+    scale = np.max(np.abs(torque))
+    assert scale > 0.0
+    assert np.max(np.abs(state.torque_by_reactions(a) - torque)) < 1e-9 * scale
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_the_power_balance_holds(name):
+    """Exactly: tau w is J w a, the slope of J, and what weights, loads and friction take. And by differences of the
+    energies over time."""
+    m, w, a, h = machine(name), 3.0, 5.0, 1e-5
+    feed = m.model.feed_layout.by_name(m.model.Feed())
+    inputs = {"phi": TURN, "w": w, "a": a, **feed}
+    out, effects = m.evaluate(inputs), m.state(m.inputs(inputs)).effects
+    scale = np.max(np.abs(out["power"]))
+    height = sum(each.conservative for each in effects.values())
+    kinetic = out["J"] * w * a + 0.5 * out["dJ_dphi"] * w**3
+    balance = out["power"] - (kinetic + height * w + out["dissipated_power"])
+    assert np.max(np.abs(balance)) < 1e-9 * scale
+
+    def energy(t):
+        at = m.outputs(TURN + w * t + 0.5 * a * t * t, w + a * t, a)
+        return at.kinetic_energy + at.potential_energy
+
+    rate = (energy(-2 * h) - 8 * energy(-h) + 8 * energy(h) - energy(2 * h)) / (12 * h)
+    assert np.max(np.abs(out["power"] - out["dissipated_power"] - rate)) < 1e-6 * scale
+
+
+# what the files say at their top
+
+
+def said(name, pattern):
+    """Numbers of the comment at the top of a file."""
+    comment = (FOLDER / f"{name}.toml").read_text("utf-8").partition("title =")[0].replace("\n# ", " ")
+    return [float(each) for each in re.search(pattern, comment).groups()]
+
+
+def test_the_dwell_is_where_the_file_says():
+    start, end, moved, swing = said(
+        "dwell_six_bar", r"from (\d+) to (\d+) degrees it moves by (\S+) .* by (\S+) degrees"
+    )
+    angle = np.degrees(turn("dwell_six_bar").output.angle)
+    still = angle[int(2 * start) : int(2 * end) + 1]
+    assert np.ptp(still) == pytest.approx(moved, abs=5e-4) and np.ptp(angle) == pytest.approx(swing, abs=0.05)
+    # of no other link
+    others = [turn("dwell_six_bar").coupler, turn("dwell_six_bar").rocker, turn("dwell_six_bar").connector]
+    assert min(np.ptp(np.degrees(each.angle[336:537])) for each in others) > 10.0
+
+
+@pytest.mark.parametrize(
+    ("name", "pattern", "forward"),
+    [
+        ("whitworth_quick_return", r"over (\d+) degrees .* other (\d+)", lambda o: o.ram.C.vx > 0.0),
+        ("crank_shaper", r"over (\d+) degrees .* other (\d+)", lambda o: o.ram.C.vx < 0.0),
+        ("stephenson_six_bar", r"in (\d+) degrees .* in (\d+)", lambda o: o.output.w > 0.0),
+    ],
+)
+def test_the_ways_forth_and_back_last_as_the_file_says(name, pattern, forward):
+    forth, back = said(name, pattern)
+    assert 360.0 * np.mean(forward(turn(name))) == pytest.approx(forth, abs=0.6)
+    assert forth + back == 360.0
+
+
+def test_the_counterweight_halves_the_torque():
+    most, least, balanced = said("pump_jack", r"up to (\d+) kN m .* gives (\d+) kN m .* same, (\d+) kN m")
+    without = turn("pump_jack", 0.84, counterweight=0.0).tau
+    assert (np.max(without), -np.min(without)) == pytest.approx((1e3 * most, 1e3 * least), rel=0.05)
+    out = turn("pump_jack", 0.84)
+    up, down = (np.max(out.tau[sign * out.beam.H.vy > 0.0]) for sign in (1.0, -1.0))
+    assert up == pytest.approx(1e3 * balanced, rel=0.05) and down == pytest.approx(1e3 * balanced, rel=0.1)
+
+
+def test_the_toggles_multiply_the_force():
+    pitman, jaw, force, pin = said(
+        "blake_jaw_crusher", r"by (\d+) mm, .* by (\d+) mm, and (\d+) kN .* (\d+) kN"
+    )
+    out = turn("blake_jaw_crusher", 0.1)
+    assert np.ptp(out.pitman.T1.y) == pytest.approx(1e-3 * pitman, abs=5e-4)
+    assert np.ptp(out.jaw.K.x) == pytest.approx(1e-3 * jaw, abs=5e-4)
+    assert np.max(np.hypot(out.A.fx, out.A.fy)) == pytest.approx(1e3 * pin, rel=0.03)
+    assert machine("blake_jaw_crusher").model.Inputs().crushing_force == 1e3 * force
+    # the force resists: it acts while the jaw closes, and takes power over each part of the turn
+    assert np.max(out.load_power) < 1e-9 * -np.min(out.load_power) + 1e-9
+
+
+def test_the_blade_slices_and_the_plunger_follows_a_cosine():
+    along, down, turned = said("edge_trimmer", r"by (\d+) mm along and (\d+) mm down, .* by (\S+) degrees")
+    plate = turn("edge_trimmer").plate
+    assert (np.ptp(plate.K.x), np.ptp(plate.K.y)) == pytest.approx((1e-3 * along, 1e-3 * down), abs=5e-4)
+    assert np.degrees(np.ptp(plate.angle)) == pytest.approx(turned, abs=0.05)
+    assert turn("scotch_yoke_pump").yoke.S.x == pytest.approx(0.06 * np.cos(TURN), abs=1e-15)
+
+
+def test_the_foot_returns_higher():
+    (lift,) = said("watt_six_bar", r"returns (\d+) mm higher")
+    foot = turn("watt_six_bar").leg.F
+    assert np.ptp(foot.y) == pytest.approx(1e-3 * lift, abs=6e-4)
+    low = foot.y < np.min(foot.y) + 0.3 * np.ptp(foot.y)
+    assert np.ptp(foot.x[low & (foot.vx < 0.0)]) > 0.7 * np.ptp(foot.x)
+
+
+# the packaged machines as files
+
+SIDES = ("left", "right")
+CHAIN_PARAMETERS = (
+    {each: each for each in "r l h c hy e l1 l2 z g ratio web_share rod_inertia".split()}
+    | {f"{rod}.m": f"{rod}.mass" for rod in ("crank", "coupler", "rocker")}
+    | {f"{rod}.s": f"{rod}_centroid" for rod in ("crank", "coupler", "rocker")}
+    | {f"{rod}.I": f"{rod}.inertia" for rod in ("crank", "coupler", "rocker")}
+    | {f"{s}.{rod}_mass": f"{s}_{rod}_mass" for s in SIDES for rod in ("wall", "web")}
+    | {f"pin.{each}": f"pins.{each}" for each in ("friction", "diameter", "w_smooth")}
+    | {"joint_damping": "pins.damping", "processing.v_smooth": "v_smooth"}
+)
+"""The file's name of each parameter of `ChamberForces`."""
+CHAIN_INPUTS = {f"{s}.{each}": f"{s}_{each}" for s in SIDES for each in ("material_mass", "processing_force")}
+PORT = (
+    "tau tau_bias J phi0 w0 dJ_dphi tau_bias_dphi tau_bias_dw power kinetic_energy potential_energy "
+    "dissipated_power"
+).split()  # fmt: skip
+CHAIN_FORCES = {
+    "crank_bearing": ("O1", 1.0), "crank_pin": ("A", 1.0), "coupler_pin": ("Bd", -1.0), "pivot": ("C", 1.0),
+    **{f"{s}.support": (f"A1_{s}", 1.0) for s in SIDES},
+    **{f"{s}.rocker_joint": (f"A2_{s}_web", 1.0) for s in SIDES},
+    **{f"{s}.hinge": (f"B_{s}", -1.0) for s in SIDES},
+}  # fmt: skip
+"""Joint of each reaction, and its sign."""
+KNIFE_PARAMETERS = (
+    {each: each for each in "r ab bo2 bc o3d o4e g ratio".split()}
+    | {f"{rod}.m": f"{rod}.mass" for rod in "crank coupler rocker leg_b leg_3 leg_4 knife".split()}
+    | {f"{rod}.I": f"{rod}.inertia" for rod in "crank coupler rocker leg_b leg_3 leg_4 knife".split()}
+    | {f"pin.{each}": f"pins.{each}" for each in ("friction", "diameter", "w_smooth")}
+    | {"joint_damping": "pins.damping", "stack.v_smooth": "v_smooth", "stack.edge": "edge"}
+    | {"stack.top": "stack_top", "stack.table": "stack_table"}
+)
+KNIFE_INPUTS = {"cut_force": "cut_force", "blade.fx": "blade_fx", "blade.fy": "blade_fy"}
+KNIFE_FORCES = {
+    "crank_bearing": ("O1", 1.0), "crank_pin": ("A", 1.0), "coupler_pin": ("coupler_pin", 1.0),
+    "leg_pin": ("leg_pin", 1.0), "rocker_bearing": ("O2", 1.0), "c_pin": ("C", -1.0), "d_pin": ("D", -1.0),
+    "e_pin": ("E", -1.0), "o3_bearing": ("O3", 1.0), "o4_bearing": ("O4", 1.0),
+}  # fmt: skip
+
+
+def both(name, packaged, parameters, inputs, forces, rng):
+    """The outputs of the file and of the packaged machine that are the same, by the names of the latter, at random
+    parameters and a random state."""
+    of_packaged = Machine(packaged)
+    scale = {"pins.friction": (0.0, 0.3), "pins.damping": (0.0, 2.0)}
+    values = {}
+    for theirs, ours in parameters.items():
+        low, high = scale.get(ours, (0.97, 1.03))
+        value = of_packaged.by_name[theirs]
+        values[theirs] = rng.uniform(low, high) * (1.0 if ours in scale else value)
+    values["ratio"] = rng.uniform(1.0, 30.0)
+    if "web_share" in values:
+        values["web_share"] = rng.uniform(0.0, 1.0)
+    state = {"phi": rng.uniform(0.0, 200.0), "w": rng.uniform(-200.0, 200.0), "a": rng.uniform(-300.0, 300.0)}
+    load = {each: rng.uniform(0.0, 3000.0) for each in inputs}
+    theirs = of_packaged.replace(values).evaluate(state | load)
+    ours = machine(name).replace({parameters[key]: value for key, value in values.items()})
+    found = ours.evaluate(state | {inputs[key]: value for key, value in load.items()})
+    for each in PORT:
+        yield each, found[each], theirs[each]
+    for their, (our, sign) in forces.items():
+        for axis in ("fx", "fy"):
+            yield f"{their}.{axis}", sign * found[f"{our}.{axis}"], theirs[f"{their}.{axis}"]
+    if packaged is ChamberForces:
+        yield "rocker.psi", 0.5 * np.pi + found["rocker.angle"], theirs["rocker.psi"]
+        for each in ("w", "a"):
+            yield f"rocker.{each}", found[f"rocker.{each}"], theirs[f"rocker.{each}"]
+    else:
+        yield "blade.tilt", found["knife.angle"], theirs["blade.tilt"]
+        for each in ("x", "y", "vx", "vy"):
+            yield f"blade.{each}", found[f"knife.blade.{each}"], theirs[f"blade.{each}"]
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        ("chain_unit", ChamberForces, CHAIN_PARAMETERS, CHAIN_INPUTS, CHAIN_FORCES),
+        ("knife_drive", KnifeDrive, KNIFE_PARAMETERS, KNIFE_INPUTS, KNIFE_FORCES),
+    ],
+    ids=["chain_unit", "knife_drive"],
+)
+def test_a_packaged_machine_as_a_file_gives_its_numbers(case):
+    rng, rows = np.random.default_rng(17), {}
+    for _ in range(50):
+        for name, ours, theirs in both(*case, rng):
+            rows.setdefault(name, []).append((float(ours), float(theirs)))
+    worst = {}
+    for name, pairs in rows.items():
+        ours, theirs = np.array(pairs).T
+        # each number by its own size, and no nearer than the rounding of the sums that it is the difference of
+        worst[name] = np.max(
+            np.abs(ours - theirs) / np.maximum(np.abs(theirs), 1e-2 * np.max(np.abs(theirs)))
+        )
+    assert len(worst) > 30
+    assert max(worst.values()) < 1e-12, max(worst.items(), key=lambda pair: pair[1])
+
+
+@pytest.mark.parametrize(
+    ("name", "packaged", "parameters", "inputs"),
+    [
+        ("chain_unit", ChamberForces, CHAIN_PARAMETERS, CHAIN_INPUTS),
+        ("knife_drive", KnifeDrive, KNIFE_PARAMETERS, KNIFE_INPUTS),
+    ],
+)
+def test_a_packaged_machine_as_a_file_has_its_start_values(name, packaged, parameters, inputs):
+    theirs, ours = Machine(packaged).by_name, machine(name).by_name
+    assert {each: theirs[each] for each in parameters} == pytest.approx(
+        {their: ours[our] for their, our in parameters.items()}, rel=1e-15
+    )
+    feeds = packaged.input_layout.by_name(packaged.Inputs()), machine(name).model.input_layout
+    own = feeds[1].by_name(machine(name).model.Inputs())
+    assert {each: feeds[0][each] for each in inputs} == {their: own[our] for their, our in inputs.items()}
