@@ -19,7 +19,7 @@ def tables(d):
     """The file of a described machine, joints by name, all masses as numbers."""
     links = {
         b["name"]: {
-            "points": b["points"],
+            "points": {**b["points"]},
             "mass": b["mass"],
             "inertia": b["inertia"],
             "centroid": b["centroid"],

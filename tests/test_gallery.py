@@ -14,8 +14,6 @@ from chainunit.machines.chain_unit import ChamberForces
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
-from chainunit.study.config import load
-from chainunit.study.run import run_study
 
 FOLDER = Path(__file__).parents[1] / "examples" / "linkages"
 FILES = sorted(FOLDER.glob("*.toml"))
@@ -217,10 +215,10 @@ def both(name, packaged, parameters, inputs, forces, rng):
     if "web_share" in values:
         values["web_share"] = rng.uniform(0.0, 1.0)
     state = {"phi": rng.uniform(0.0, 200.0), "w": rng.uniform(-200.0, 200.0), "a": rng.uniform(-300.0, 300.0)}
-    load = {each: rng.uniform(0.0, 3000.0) for each in inputs}
-    theirs = of_packaged.replace(values).evaluate(state | load)
+    feed = {each: rng.uniform(0.0, 3000.0) for each in inputs}
+    theirs = of_packaged.replace(values).evaluate(state | feed)
     ours = machine(name).replace({parameters[key]: value for key, value in values.items()})
-    found = ours.evaluate(state | {inputs[key]: value for key, value in load.items()})
+    found = ours.evaluate(state | {inputs[key]: value for key, value in feed.items()})
     for each in PORT:
         yield each, found[each], theirs[each]
     for their, (our, sign) in forces.items():

@@ -253,7 +253,8 @@ def _is_quantity(text: str) -> bool:
         return False
     if re.search(r"[+*()]|\s[-/]\s", parts[1]):
         raise InputError(
-            f"is {shown(text)}; an expression has no units inside: write its numbers in SI units, such as 2 * r + 0.01"
+            f"is {shown(text)}; an expression has no units inside: write its numbers in SI units, such as "
+            "2 * r + 0.01"
         )
     return True
 
