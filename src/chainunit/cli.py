@@ -298,8 +298,9 @@ def linkage_command(
     file: Annotated[Path, typer.Argument(help="Linkage file (TOML).")],
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path("linkage"),
     speed: Annotated[
-        str, typer.Option("--speed", help='Speed of the driver with its unit, such as "60 rpm".')
-    ] = "60 rpm",
+        str | None,
+        typer.Option("--speed", help='Speed of the driver with its unit; "60 rpm" by default, or "0.1 m/s".'),
+    ] = None,
 ) -> None:
     """Show a linkage: its groups, drawing, motion, torque, inertia and reactions over a turn.
 
@@ -310,12 +311,15 @@ def linkage_command(
     from .quantities import Variable, quantity
     from .reading import to_number
 
-    declared = quantity("rad/s", "speed of the driver", above=0.0).metadata["quantity"]
+    machine = Machine(read_linkage(file))
+    turns = machine.model.turns
+    declared = quantity("rad/s" if turns else "m/s", "speed of the driver", above=0.0).metadata["quantity"]
     try:
-        rate = to_number(Variable("--speed", declared.description, declared), speed)
+        rate = to_number(
+            Variable("--speed", declared.description, declared), speed or ("60 rpm" if turns else 0.1)
+        )
     except ValueError as error:
         raise InputError(str(error)) from None
-    machine = Machine(read_linkage(file))
     with claim(output):
         from .report import files, linkage_report
         from .study.linkage_turn import linkage_findings

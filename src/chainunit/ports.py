@@ -121,6 +121,21 @@ def flanges(flow: str) -> tuple[Terminal, Terminal]:
     return own, Terminal("flange_a", modelica, f"{own.description}, as Modelica's", members, own.flows)
 
 
+def way_terminals(load: bool) -> tuple[Terminal, ...]:
+    """The terminals of a driver that slides: our own, the one that tools with Modelica's library know, and with
+    `load` its load port. None of them fits a shaft."""
+    members = {member: member for member in ("phi", "w", "a", "tau")}
+    words = "the driver and its force"
+    own = Terminal("flange", f"{OWN}.linear_flange", words, members, {"tau": "inflow"})
+    modelica = "Modelica.Mechanics.Translational.Interfaces.Flange_a"
+    outside = Terminal(
+        "flange_a", modelica, f"{words}, as Modelica's", {"s": "phi", "f": "tau"}, {"f": "inflow"}
+    )
+    port = {member: member for member in Layout(LoadPort).names}
+    words = "the load port: a load as the driver sees it"
+    return own, outside, *([Terminal("load", f"{OWN}.linear_load", words, port)] if load else [])
+
+
 def load_terminal(prefix: str = "", name: str = "load") -> Terminal:
     """The terminal, called `name`, of a load port whose variables carry `prefix`."""
     members = {member: prefix + member for member in Layout(LoadPort).names}

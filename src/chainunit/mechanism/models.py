@@ -15,9 +15,10 @@ from typing import Any, ClassVar
 
 from ..engines import MATH
 from ..groups.group import Joint
-from ..model import Model, Part, Requirement
-from ..ports import PortSlopes, PortValues, ShaftMotion, Start, flanges, load_terminal
+from ..model import Model, Part
+from ..ports import PortSlopes, ShaftMotion
 from ..quantities import Layout, Value, declaration, quantity
+from .driver_ports import ROTATING, DriverPort, TurningStates
 from .linkage import Linkage, Topology
 from .machine import MachineState, Mechanism, derived_numbers
 
@@ -130,7 +131,12 @@ class InverseMachine(LinkageModel, MachineModel):
     by_differences: ClassVar[frozenset[str]] = frozenset()
     """Outputs whose derivatives are taken by differences, see `chainunit.model.Part`."""
 
-    terminals = (*flanges("inflow"), load_terminal())
+    span: ClassVar[tuple[float, float]] = (0.0, 2.0 * math.pi)
+    """Places of the driver from which to which it goes: a whole turn [rad], or a way [m]."""
+    driver_port: ClassVar[DriverPort] = ROTATING
+    """The declarations of its driver, which turns or slides."""
+    turns: ClassVar[bool] = True
+    """Whether its driver turns."""
 
     def __init_subclass__(cls) -> None:
         own = vars(cls)
@@ -138,6 +144,8 @@ class InverseMachine(LinkageModel, MachineModel):
             cls.Feed = declared_class("Feed", (), fields_of(cls.Inputs, without=names_of(ShaftMotion)))
             # pickle finds the class by this name
             cls.Feed.__module__, cls.Feed.__qualname__ = cls.__module__, f"{cls.__qualname__}.Feed"
+        if "terminals" not in own:
+            cls.terminals = cls.driver_port.terminals
         if hasattr(cls, "Feed"):
             cls.feed_layout = Layout(cls.Feed)
         if "joints" in own and "pins" not in own:
@@ -151,7 +159,7 @@ class InverseMachine(LinkageModel, MachineModel):
             apart = cls.by_differences
             cls.parts = (
                 Part(cls.Outputs, cls._outputs, by_differences=apart & set(Layout(cls.Outputs).names)),
-                Part(PortSlopes, slopes, by_differences=apart & set(Layout(PortSlopes).names)),
+                Part(cls.driver_port.slopes, slopes, by_differences=apart & set(Layout(PortSlopes).names)),
             )
         super().__init_subclass__()
 
@@ -185,16 +193,17 @@ class InverseMachine(LinkageModel, MachineModel):
         """The direct model of the same machine: torque in, motion out.
 
         Its parameters are those of the machine, the inertia on its shaft and the start. Its inputs are the torque and
-        the loads. Its outputs are those of the machine without `tau` and load port, and those of `Turning`.
+        the loads. Its outputs are those of the machine without `tau` and load port, and those of `DriverPort.answer`.
         """
         return cls._turning(DirectMachine)
 
     @classmethod
     def _turning(cls, base: type[DirectMachine], parameters: Fields = (), **more: Any) -> type[DirectMachine]:
         """The direct model as a subclass of `base`, with more `parameters` and attributes."""
-        outputs = fields_of(cls.Outputs, without=("tau", *names_of(PortValues)))
+        outputs = fields_of(cls.Outputs, without=("tau", *names_of(cls.driver_port.values)))
         # where the start declares the same name, the machine's own declaration counts
-        own = [field for field in fields_of(cls.Parameters) if field[0] in names_of(Start)]
+        own = [field for field in fields_of(cls.Parameters) if field[0] in names_of(cls.driver_port.start)]
+        port = cls.driver_port
         members = {
             "__module__": cls.__module__,
             "__doc__": f"The direct model of {cls.__name__}: motor torque in, motion out.",
@@ -204,18 +213,19 @@ class InverseMachine(LinkageModel, MachineModel):
             "built_by": f"{cls.built_by or cls.__qualname__}.direct()",
             "maker": (direct_model, (cls,)),
             "inverse": cls,
+            "terminals": port.flanges,
             "Parameters": declared_class(
-                "DirectParameters", (Start, AddedInertia, cls.Parameters), [*own, *parameters]
+                "DirectParameters", (port.start, port.added, cls.Parameters), [*own, *parameters]
             ),
             **(
-                {"States": declared_class("States", (TurningStates,), fields_of(cls.States))}
+                {"States": declared_class("States", (port.states,), fields_of(cls.States))}
                 if cls.States
-                else {}
+                else {"States": port.states}
             ),
             "Inputs": declared_class(
-                "DirectInputs", (DrivingTorque,), fields_of(cls.Inputs, without=names_of(ShaftMotion))
+                "DirectInputs", (port.effort,), fields_of(cls.Inputs, without=names_of(ShaftMotion))
             ),
-            "Outputs": declared_class("DirectOutputs", (), [*outputs, *fields_of(Turning)]),
+            "Outputs": declared_class("DirectOutputs", (), [*outputs, *fields_of(port.answer)]),
             **more,
         }
         return type(f"Direct{cls.__name__}", (base,), members)
@@ -239,39 +249,6 @@ def slopes(xp: Any, p: Any, u: Any, x: Any, s: MachineState) -> PortSlopes:
     return PortSlopes(tau_bias_dphi=by_angle * per_turn, tau_bias_dw=by_speed * per_turn)
 
 
-@declaration
-class AddedInertia:
-    """The inertia on the shaft of a machine that turns by itself."""
-
-    J_added: Value = quantity(
-        "kg.m2", "inertia on the motor shaft beside the machine's", default=0.0, min=0.0, tunable=True
-    )
-
-
-@declaration
-class TurningStates:
-    """States of the direct machine; each is an output, too."""
-
-    phi: Value = quantity("rad", "motor angle; crank angle is phi/ratio, from the upward vertical, clockwise")
-    w: Value = quantity("rad/s", "motor speed")
-
-
-@declaration
-class DrivingTorque:
-    """Torque of the motor."""
-
-    tau: Value = quantity("N.m", "torque of the motor on the shaft", default=0.0, nominal=100.0)
-
-
-@declaration
-class Turning:
-    """Acceleration, and the torque on the shaft."""
-
-    a: Value = quantity("rad/s2", "motor acceleration", nominal=100.0)
-    tau_bias: Value = quantity("N.m", "torque needed at constant speed of the shaft", nominal=100.0)
-    J: Value = quantity("kg.m2", "inertia reflected to the shaft")
-
-
 class DirectMachine(LinkageModel):
     """Torque of the motor in, motion and every reaction out, see `InverseMachine.direct`. `inverse` is the inverse
     model of the same machine."""
@@ -279,17 +256,11 @@ class DirectMachine(LinkageModel):
     inverse: ClassVar[type[InverseMachine]]
     Outputs: ClassVar[type]
     States = TurningStates
-    terminals = flanges("inflow")
-    _some_inertia = Requirement(
-        "inertia of the crank and on its shaft",
-        "kg.m2",
-        "at the dead points of the rocker nothing else carries the torque; give crank.I, crank.m or J_added",
-    )
 
     def __init_subclass__(cls) -> None:
         if not hasattr(cls, "inverse"):  # a common base of several models
             return
-        cls.required = (*cls.inverse.required, cls._some_inertia)
+        cls.required = (*cls.inverse.required, cls.inverse.driver_port.inertia)
         cls.parts = (Part(cls.Outputs, cls._outputs),)
         super().__init_subclass__()
 

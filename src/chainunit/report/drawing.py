@@ -128,13 +128,16 @@ def dimensions(machine: Machine) -> dict[tuple[str, ...], Dimension]:
     return {key: each for key, each in matches.items() if each is not None}
 
 
-def drawing(machine: Machine, phi: float = 1.0) -> str:
-    """The machine at the crank angle `phi` [rad] as an SVG picture.
+def drawing(machine: Machine, phi: float | None = None) -> str:
+    """The machine as an SVG picture, with its driver at the angle `phi` [rad], or the way `phi` [m]; by default a
+    sixth of its span from the begin on.
 
     Where two mirrored organs share a name, such as A1, it stands at both.
     """
+    low, high = machine.model.span
+    phi = low + (high - low) / (2.0 * math.pi) if phi is None else phi
     whole = machine.state(machine.inputs({"phi": phi * machine.ratio})).m
-    turns = np.linspace(0.0, 2.0 * math.pi, 73)
+    turns = np.linspace(low, high, 73)
     orbit = machine.state(machine.inputs({"phi": turns * machine.ratio})).m
     places = {name: (float(x), float(y)) for name, (x, y) in linkage.places(whole).items()}
     crank, canvas = whole.linkage.driver, _Canvas()

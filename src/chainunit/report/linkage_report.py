@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from . import blocks as b
 from . import figure as fig
 from . import linkage
 from .drawing import drawing
-from .lines import Number
+from .lines import Number, capital
 from .motion import Animation, Clip, Reading
 
 NAME, PICTURES = "linkage", ("linkage.svg", "linkage.png", "linkage_reactions.png")
@@ -34,7 +34,7 @@ def linkage_report(findings: LinkageFindings, source: str) -> b.Report:
         tuple(_opening(s, findings)),
         (
             b.Section("motion", "Motion", tuple(_motion(s, findings))),
-            b.Section("forces", "Torque, inertia and reactions", tuple(_forces(s, findings))),
+            b.Section("forces", "Effort, inertia and reactions", tuple(_forces(s, findings))),
             b.Section("outputs", "Parameters, inputs and outputs", tuple(_variables(findings))),
         ),
         source=s.line("Linkage file: {source} · chainunit {chainunit}"),
@@ -46,13 +46,17 @@ def _entry(value: Any, unit: str) -> dict[str, Any]:
     return {"value": value, "unit": unit}
 
 
-def _of(instance: Any) -> dict[str, Any]:
-    layout = Layout(type(instance))
-    return {v.name: _entry(x, v.unit) for v, x in zip(layout.variables, layout.values(instance), strict=True)}
+def _of(f: LinkageFindings, instance: Any, at_driver: Collection[str]) -> dict[str, Any]:
+    """The values of an instance; those with a name in `at_driver` are in the units of the driver."""
+    layout, unit = Layout(type(instance)), f.machine.model.driver_port.unit
+    return {
+        v.name: _entry(x, unit(v.unit) if v.name in at_driver else v.unit)
+        for v, x in zip(layout.variables, layout.values(instance), strict=True)
+    }
 
 
 def _result(f: LinkageFindings, source: str) -> dict[str, Any]:
-    description = f.description
+    description, unit = f.description, f.machine.model.driver_port.unit
     points = {
         f"{link}.{point}": {
             axis: _entry([float(np.min(x)), float(np.max(x))], "m")
@@ -73,15 +77,15 @@ def _result(f: LinkageFindings, source: str) -> dict[str, Any]:
         "title": f.machine.model.description,
         "groups_in_words": f.sentence,
         "degrees_of_freedom": 1,
-        "speed": _entry(f.speed, "rad/s"),
-        "turn": _of(f.turn),
-        "groups": {name: _of(each) for name, each in f.groups.items()},
-        "joints": {name: _of(each) for name, each in f.joints.items()},
+        "speed": _entry(f.speed, unit("rad/s")),
+        "turn": _of(f, f.turn, Layout(type(f.turn)).names),
+        "groups": {name: _of(f, each, ("margin_at",)) for name, each in f.groups.items()},
+        "joints": {name: _of(f, each, ("peak_at",)) for name, each in f.joints.items()},
         "angles": angles,
         "points": points,
         "over_the_way": {
-            "driver": array_entry(f.q, "rad"),
-            **{name: array_entry(f.outputs[name], unit) for name, unit in (("tau", "N.m"), ("J", "kg.m2"))},
+            "driver": array_entry(f.q, unit("rad")),
+            **{name: array_entry(f.outputs[name], unit(of)) for name, of in (("tau", "N.m"), ("J", "kg.m2"))},
         },
     }
 
@@ -126,6 +130,7 @@ def _animation(f: LinkageFindings) -> Animation:
     feed = machine.model.feed_layout.by_name(machine.model.Feed())
     state = machine.state(machine.inputs({"phi": q * machine.ratio, "w": f.speed * machine.ratio, **feed}))
     step = (len(f.q) - 1) // _PICTURES_PER_TURN
+    effort, unit = ("Torque" if machine.model.turns else "Force"), machine.model.driver_port.unit
     time = (q - low) / f.speed
     description, driver = f.description, state.m.linkage.driver
     joints = {description.variable("joint", name): linkage_pin for name, linkage_pin in _pins(f).items()}
@@ -134,10 +139,10 @@ def _animation(f: LinkageFindings) -> Animation:
         titles, joints, lambda output: (f.outputs[f"{output}.fx"][::step], f.outputs[f"{output}.fy"][::step])
     )
     readings = (
-        Reading("Angle of the driver", q, "rad"),
-        Reading("Torque at the driver", f.outputs["tau"][::step] * machine.ratio, "N.m"),
+        Reading("Place of the driver", q, unit("rad")),
+        Reading(f"{effort} at the driver", f.outputs["tau"][::step] * machine.ratio, unit("N.m")),
     )
-    clip = Clip("turn", "A turn at constant speed", time, linkage.places(state.m), readings, tuple(arrows))
+    clip = Clip("turn", "At constant speed", time, linkage.places(state.m), readings, tuple(arrows))
     shown = linkage.shown_pins(state.m.linkage)
     return Animation(
         tuple(linkage.links(state.m.linkage, {})),
@@ -168,7 +173,11 @@ def _forces(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
     yield b.Text(
         s.line("Inverse dynamics at {=speed} of the driver, with the loads of normal running."), "lead"
     )
-    yield b.Table(s.rows(type(f.turn), "turn"), title="Torque, power and inertia at the driver")
+    turns, unit = f.machine.model.turns, f.machine.model.driver_port.unit
+    effort, inertia_word = ("torque", "inertia") if turns else ("force", "mass")
+    yield b.Table(
+        s.rows(type(f.turn), "turn"), title=f"{capital(effort)}, power and {inertia_word} at the driver"
+    )
     names = Layout(JointTurn).names
     rows = (
         b.TableRow((_title(f, name), *(s.number(f"joints.{name}.{each}") for each in names)))
@@ -177,22 +186,28 @@ def _forces(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
     yield b.Table(
         tuple(rows), b.heads("joint", "largest force", "at", "RMS", "largest moment"), title="Reactions"
     )
-    angle = fig.Axis("angle of the driver", "rad", step=45.0)
+    angle = fig.Axis(
+        "angle of the driver" if turns else "way of the driver", unit("rad"), step=45.0 if turns else None
+    )
     ratio = f.machine.ratio
     curves = (
         (
-            fig.Axis("torque at the driver", "N.m"),
+            fig.Axis(f"{effort} at the driver", unit("N.m")),
             (fig.Curve("torque", f.q, f.outputs["tau"] * ratio, in_legend=False),),
         ),
         (
-            fig.Axis("reflected inertia", "kg.m2", low=0.0),
+            fig.Axis(f"reflected {inertia_word}", unit("kg.m2"), low=0.0),
             (fig.Curve("inertia", f.q, f.outputs["J"] * ratio**2, in_legend=False),),
         ),
     )
+    title = f"{capital(effort)} and {inertia_word}"
     yield fig.Figure(
-        "linkage-turn", "Torque and inertia over the way of the driver",
-        "Torque and reflected inertia at the driver over its angle.", fig.stacked(angle, curves), file=PICTURES[1],
-    )  # fmt: skip
+        "linkage-turn",
+        f"{title} over the way of the driver",
+        f"{title} at the driver over its way.",
+        fig.stacked(angle, curves),
+        file=PICTURES[1],
+    )
     forces = tuple(
         fig.Curve(name, f.q, np.hypot(f.outputs[f"{v}.fx"], f.outputs[f"{v}.fy"]), look=k)
         for k, name in enumerate(f.joints)
@@ -200,7 +215,7 @@ def _forces(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
     )
     yield fig.Figure(
         "linkage-reactions", "Reactions over the way of the driver",
-        "The force in each joint over the angle of the driver.",
+        "The force in each joint over the way of the driver.",
         ((fig.Panel(angle, fig.Axis("force", "N", low=0.0), forces),),), file=PICTURES[2],
     )  # fmt: skip
 

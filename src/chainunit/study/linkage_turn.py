@@ -19,13 +19,13 @@ PLACES = 361
 class LinkageTurn:
     """A linkage over the way of its driver at constant speed."""
 
-    torque_peak: Value = quantity("N.m", "torque at the driver, largest in size")
-    torque_rms: Value = quantity("N.m", "torque at the driver, RMS")
-    torque_mean: Value = quantity("N.m", "torque at the driver, mean")
-    power_mean: Value = quantity("W", "power of the driver, mean")
+    torque_peak: Value = quantity("N.m", "largest in size")
+    torque_rms: Value = quantity("N.m", "RMS")
+    torque_mean: Value = quantity("N.m", "mean")
+    power_mean: Value = quantity("W", "mean power")
     inertia_least: Value = quantity("kg.m2", "reflected inertia, least")
     inertia_largest: Value = quantity("kg.m2", "reflected inertia, largest")
-    energy_gap: Value = quantity("1", "torque by reactions less torque by virtual work, share of the peak")
+    energy_gap: Value = quantity("1", "gap between reactions and virtual work, share of the peak")
 
 
 @declaration
@@ -53,7 +53,7 @@ class LinkageFindings:
 
     machine: Machine
     speed: float
-    """of the driver [rad/s]"""
+    """of the driver [rad/s, m/s]"""
     q: Any
     outputs: dict[str, Any]
     turn: LinkageTurn

@@ -153,7 +153,13 @@ def _machine_model(table: Any, source: str) -> type[MachineModel]:
     """The machine that the table [system] names."""
     if table.machine.lower().endswith(LINKAGE):
         with refusal_prefix("system.machine: ", "system.machine"):
-            return read_linkage(beside(table.machine, source))
+            model = read_linkage(beside(table.machine, source))
+            if not model.turns:
+                raise InputError(
+                    f"{table.machine} has a driver that slides, and a motor turns; export it as an FMU, or drive it "
+                    "by a crank"
+                )
+            return model
     if not _is_fmu(table.machine):
         if table.machine in MACHINES:
             return MACHINES[table.machine]

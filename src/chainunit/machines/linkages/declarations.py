@@ -74,11 +74,10 @@ class LinkageMotion(ShaftMotion):
 
 
 @declaration
-class Running:
-    """Outputs that every machine has."""
+class Energies:
+    """Power and energies of every machine."""
 
-    tau: Value = quantity("N.m", "torque needed at the motor shaft, J a + tau_bias", nominal=100.0)
-    power: Value = quantity("W", "power that the motor shaft takes, tau w", nominal=100.0)
+    power: Value = quantity("W", "power that the driver takes, tau w", nominal=100.0)
     kinetic_energy: Value = quantity("J", "kinetic energy")
     potential_energy: Value = quantity("J", "potential energy of weights and springs", nominal=1000.0)
     dissipated_power: Value = quantity("W", "power that friction, dampers and loads take", nominal=100.0)
@@ -88,3 +87,17 @@ class Running:
         nominal=100.0,
     )
     margin: Value = quantity("1", "least margin of the groups; 0 is a dead position")
+
+
+@declaration
+class Running(Energies):
+    """Outputs of every machine whose driver turns."""
+
+    tau: Value = quantity("N.m", "torque needed at the motor shaft, J a + tau_bias", nominal=100.0)
+
+
+@declaration
+class WayRunning(Energies):
+    """Outputs of every machine whose driver slides."""
+
+    tau: Value = quantity("N", "force needed at the driver, J a + tau_bias", nominal=1000.0)

@@ -13,16 +13,17 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache, cached_property
-from typing import Any
+from typing import Any, cast
 
 from ...engines import MATH
 from ...errors import InputError
 from ...groups.group import GuideForce
 from ...groups.loads import GuideLosses, PinLosses, Weight
 from ...mechanism.assur import GROUND, PRISMATIC
+from ...mechanism.driver_ports import ROTATING, SLIDING, AddedInertia
 from ...mechanism.linkage import Linkage
 from ...mechanism.machine import MachineState, Mechanism, derived_numbers
-from ...mechanism.models import AddedInertia, InverseMachine, declared_class, names_of
+from ...mechanism.models import InverseMachine, declared_class, names_of
 from ...model import Requirement
 from ...planar import Motion, Vec2
 from ...ports import LoadInput, PortSlopes, PortValues, Start
@@ -36,6 +37,7 @@ from .declarations import (
     LinkTurning,
     PointMotion,
     Running,
+    WayRunning,
 )
 from .loads import CoordinateTable, ForceLaw, SpringDamper, TorqueLaw
 from .parts import LinkageParts, LinkFrame
@@ -120,9 +122,19 @@ class LinkageDescription:
             for name, each in data.get("tables", {}).items()
         }
         self.Parameters = self._parameters()
-        self.Inputs = declared_class(
-            "Inputs", (LinkageMotion,), [_field(each) for each in data.get("inputs", ())]
-        )
+        inputs = [_field(each) for each in data.get("inputs", ())]
+        self.port, motion = ROTATING, cast("type", LinkageMotion)
+        if driver.linear:
+            low, high = data["range"]
+            middle = 0.5 * (low + high)
+            way = quantity("m", "way of the driver", default=middle, min=low, max=high)
+            start = quantity("m", "way of the driver at the start", default=middle, min=low, max=high)
+            inputs = [("phi", Value, way), *inputs]
+            motion = SLIDING.motion
+            self.port = SLIDING._replace(
+                start=declared_class("WayStart", (SLIDING.start,), [("phi_start", Value, start)])
+            )
+        self.Inputs = declared_class("Inputs", (motion,), inputs)
         p, u = self.Parameters(), self.Inputs()
         self.sides = dict(LinkageParts(MATH, self.structure, self.values(p, u)).sides)
         self.turning = self._followed(p, u)
@@ -287,7 +299,7 @@ class LinkageDescription:
         """The model."""
         data, described = self.data, self
         parts = self.parts(MATH, self.Parameters(), self.Inputs())
-        turns = {
+        bearings = {
             self.variable("joint", name): parts.receivers[name][0]
             for name, j in self.structure.joints.items()
             if j.kind != PRISMATIC
@@ -311,10 +323,13 @@ class LinkageDescription:
             description = data["title"] or f"linkage {data['name']}"
             built_by = f"machine_of({described.text!r})"
             maker = (machine_of, (described.text,))
+            driver_port = described.port
+            span = described.span
+            turns = not described.structure.driver.linear
             Parameters = described.Parameters
             Inputs = described.Inputs
             Outputs = described.outputs
-            joints = turns
+            joints = bearings
             usual_speed = (0.05, 200.0)
             described_by = described
 
@@ -370,7 +385,8 @@ class LinkageDescription:
             fields.append((self.variable("joint", name), of, group(of, words)))
         for name, of in self.link_outputs.items():
             fields.append((self.variable("link", name), of, group(of, f"link {name}")))
-        return declared_class("Outputs", (PortValues, Running), fields)
+        running = WayRunning if self.structure.driver.linear else Running
+        return declared_class("Outputs", (self.port.values, running), fields)
 
     @cached_property
     def link_outputs(self) -> Mapping[str, Any]:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from ...errors import InputError
 from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE, AssurGroup, JointOf, decompose
 
 Entry = float | str
@@ -105,6 +106,12 @@ class Structure:
         """
         seen = [JointOf(j.name, j.kind, j.on[0], j.by[0]) for j in joints if j.name != driver.joint]
         groups = decompose([link.name for link in links], seen, driver.link)
+        for group in groups:
+            if driver.linear and group.kind == "triad":
+                raise InputError(
+                    f"the links {', '.join(group.links)} form a triad, and the driver slides: a triad needs a driver "
+                    "that turns; drive another link"
+                )
         named = {joint.name: joint for joint in joints}
         marked = {
             end

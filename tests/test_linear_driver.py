@@ -1,0 +1,145 @@
+"""A driver that slides: against closed forms, in Python and as FMUs with their units."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from command import chainunit
+from fmpy.validation import validate_fmu
+
+from chainunit.errors import InputError
+from chainunit.fmu.native.export import export
+from chainunit.fmu.native.platforms import compiler
+from chainunit.machines.linkages.file import description_of, read_linkage
+from chainunit.machines.linkages.model import machine_of
+from chainunit.machines.machine import Machine
+from chainunit.study import config
+
+LIFT = Path(__file__).parents[1] / "examples" / "linkages" / "cylinder_lift.toml"
+TRAMMEL = {
+    "ground": {"O": [0, 0], "X": [1, 0], "Y": [0, 1]},
+    "driver": {"joint": "cylinder", "range": [0.1, 0.4]},
+    "links": {
+        "ram": {"points": {"P": [0, 0]}, "mass": 3.0},
+        "rod": {
+            "points": {"P": [0, 0], "C": [0.5, 0]}, "mass": 2.0, "inertia": 0.25 / 6.0, "centroid": [0.25, 0]
+        },
+        "top": {"points": {"C": [0, 0]}, "mass": 1.0},
+    },
+    "joints": {
+        "cylinder": {"on": "ram.P", "by": "ground.O", "toward": "X"},
+        "guide": {"on": "top.C", "by": "ground.O", "toward": "Y"},
+    },
+    "start": {"phi": 0.3, "points": {"C": [0, 0.4]}},
+}  # fmt: skip
+"""A rod between two rails at a right angle: an elliptic trammel."""
+
+
+def trammel():
+    return machine_of(description_of(TRAMMEL, "trammel"))
+
+
+def test_trammel_in_closed_form():
+    machine = Machine(trammel())
+    for q in (0.1, 0.25, 0.4):
+        w, a, height = 0.7, 1.3, math.sqrt(0.25 - q * q)
+        out = machine.outputs(q, w, a)
+        spin = 1.0 / height
+        J = 3.0 + (2.0 * 0.0625 + 0.25 / 6.0) * spin**2 + (q / height) ** 2
+        # kinetic energy by the way, and the weights of half the rod and the block above
+        dJ = 2.0 * q / height**4 * (2.0 * 0.0625 + 0.25 / 6.0) + 2.0 * q / height**2 + 2.0 * q**3 / height**4
+        tau = J * a + 0.5 * dJ * w * w - 2.0 * 9.81 * q / height
+        assert float(out.J) == pytest.approx(J, rel=1e-12)
+        assert float(out.dJ_dphi) == pytest.approx(dJ, rel=1e-12)
+        assert float(out.tau) == pytest.approx(tau, rel=1e-12)
+        assert float(out.cylinder.s) == pytest.approx(q, rel=1e-14)
+        assert (float(out.cylinder.v), float(out.cylinder.a)) == pytest.approx((w, a), rel=1e-13)
+
+
+@pytest.mark.parametrize("on_ground", [False, True])
+def test_the_joint_may_be_described_from_either_side(on_ground):
+    """The line in the ground, or in the link that is driven: the same machine."""
+    data = {**TRAMMEL, "joints": dict(TRAMMEL["joints"]), "links": dict(TRAMMEL["links"])}
+    if on_ground:
+        data["links"]["ram"] = {"points": {"P": [0, 0], "back": [-1, 0]}, "mass": 3.0}
+        data["joints"]["cylinder"] = {"on": "ground.O", "by": "ram.P", "toward": "back"}
+        data["start"] = {"phi": 0.3, "points": {"C": [0, 0.4], "P": [0.3, 0]}}
+    machine = Machine(machine_of(description_of(data, "trammel_again")))
+    plain = Machine(trammel())
+    for q in (0.12, 0.33):
+        one, other = (m.outputs(q, 0.7, 1.3) for m in (machine, plain))
+        assert float(one.tau) == pytest.approx(float(other.tau), rel=1e-12)
+        assert float(one.rod.angle) == pytest.approx(float(other.rod.angle), rel=1e-12)
+        assert float(one.cylinder.s) == pytest.approx(q, rel=1e-13)
+        sign = -1.0 if on_ground else 1.0
+        assert float(one.cylinder.fy) == pytest.approx(sign * float(other.cylinder.fy), rel=1e-12)
+
+
+@pytest.mark.skipif(compiler() is None, reason="no C compiler")
+def test_fmus_have_the_units_of_a_way(tmp_path):
+    model = trammel()
+    file = export(model, tmp_path / "trammel.fmu")
+    assert not validate_fmu(str(file))
+    units = {v.name: v.unit for v in fmpy.read_model_description(str(file)).modelVariables}
+    wanted = {
+        "phi": "m",
+        "w": "m/s",
+        "a": "m/s2",
+        "tau": "N",
+        "J": "kg",
+        "dJ_dphi": "kg/m",
+        "tau_bias_dw": "N.s/m",
+    }
+    assert {name: units[name] for name in wanted} == wanted
+    values = fmpy.simulate_fmu(
+        str(file), stop_time=0.01, step_size=0.01, output=["tau", "tau_bias_dphi"], fmi_type="CoSimulation",
+        start_values={"phi": 0.25, "w": 0.7, "a": 1.3},
+    )[0]  # fmt: skip
+    assert values["tau"] == pytest.approx(float(Machine(model).outputs(0.25, 0.7, 1.3).tau), rel=1e-12)
+    # by differences
+    h = 1e-6
+    near = [float(Machine(model).outputs(0.25 + k * h, 0.7, 0.0).tau) for k in (-1, 1)]
+    assert values["tau_bias_dphi"] == pytest.approx((near[1] - near[0]) / (2.0 * h), rel=1e-7)
+
+
+@pytest.mark.skipif(compiler() is None, reason="no C compiler")
+def test_the_direct_model_keeps_its_energy(tmp_path):
+    """A constant force: the work that it does is the energy that the machine gains."""
+    file = export(trammel().direct(), tmp_path / "direct.fmu")
+    rows = fmpy.simulate_fmu(
+        str(file), stop_time=0.1, output_interval=0.01, fmi_type="CoSimulation",
+        start_values={"phi_start": 0.2, "tau": -5.0}, output=["phi", "kinetic_energy", "potential_energy"],
+    )  # fmt: skip
+    energy = rows["kinetic_energy"] + rows["potential_energy"]
+    work = -5.0 * (rows["phi"] - rows["phi"][0])
+    assert np.max(np.abs(energy - energy[0] - work)) < 1e-6 * np.max(np.abs(work))
+
+
+def test_a_way_outside_the_range_is_refused():
+    with pytest.raises(InputError, match=r"phi = 0\.6 m: must be >= 0\.1 m and <= 0\.4 m"):
+        Machine(trammel()).outputs(0.6)
+
+
+def test_a_lever_that_a_cylinder_lifts(tmp_path):
+    """The example: the force by the weights alone, from the geometry of two circles."""
+    machine = Machine(read_linkage(LIFT))
+    q = np.linspace(0.35, 0.75, 9)
+    out = machine.outputs(q, 0.0, 0.0, machine.model.Feed(payload=6000.0))
+    height = lambda q: machine.outputs(q).lever.W.y * 6000.0 + 9.81 * (  # noqa: E731
+        18.0 * machine.outputs(q).rod.P.y + 60.0 * machine.outputs(q).lever.centroid.y
+        + 12e-4 * 7850.0 * 0.5 * machine.outputs(q).link.centroid.y
+    )  # fmt: skip
+    h = 1e-6
+    wanted = (height(q[1:-1] + h) - height(q[1:-1] - h)) / (2.0 * h)
+    assert np.asarray(out.tau)[1:-1] == pytest.approx(wanted, rel=1e-7)
+    done = chainunit("linkage", str(LIFT), "-o", "lift", cwd=tmp_path)
+    assert done.returncode == 0 and "rod + RRR dyad (link, lever)" in done.stdout and "m/s" in done.stdout
+
+
+def test_a_study_needs_a_driver_that_turns(tmp_path):
+    with pytest.raises(InputError, match="has a driver that slides, and a motor turns"):
+        config.parse(f'[machine]\nlinkage = "{LIFT.as_posix()}"', str(tmp_path / "mine.toml"))
