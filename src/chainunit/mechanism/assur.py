@@ -59,24 +59,58 @@ def decompose(links: Sequence[str], joints: Sequence[JointOf], driver: str) -> l
         one line that names the links and the joints.
     """
     unknown = [link for link in links if link != driver]
-    matched = _matching(unknown, joints)
+    matched = _matching(dict.fromkeys(unknown, 3), joints)
     free = {link: 3 - sum(1 for each in matched.values() if each == link) for link in unknown}
     if any(free.values()):
         raise InputError(_freedoms(unknown, joints, matched, free))
-    depends: dict[str, dict[str, None]] = {link: {} for link in unknown}
-    for (k, _), link in matched.items():
-        other = joints[k].other(link)
-        if other in depends:
-            depends[link][other] = None
     groups, placed = [], {GROUND, driver}
-    for part in _strong_parts(depends):
+    for part in _strong_parts(_dependences(unknown, joints, matched)):
         groups.append(_classified(tuple(part), joints, placed))
         placed |= {*part}
     return groups
 
 
-def _matching(unknown: Sequence[str], joints: Sequence[JointOf]) -> dict[tuple[int, int], str]:
-    """Each equation, by joint and number, with the link that it determines.
+def in_order_of_motion(
+    pins: Mapping[str, Sequence[str]], links: Sequence[str], joints: Sequence[JointOf], driver: str
+) -> dict[str, list[str]]:
+    """The links that meet in each of the `pins`, those first whose motion is known first: the others hang on the
+    first one.
+
+    Which of three links in a pin are said to be joined with each other is arbitrary, but the groups depend on it.
+    Here the pin is an unknown point of its own, which all links in it share.
+    """
+    known = {GROUND: -2, driver: -1}
+    room = {link: 3 for link in links if link not in known} | {f"{pin}.": 2 for pin in pins}
+    every = [joint for joint in joints if not {joint.on, joint.by} <= known.keys()]
+    for pin, those in pins.items():
+        # ground and driver both say where the pin of the driver is
+        placed = [link for link in those if link in known]
+        meeting = [link for link in those if link not in known] + placed[:1]
+        every += [JointOf(pin, REVOLUTE, link, f"{pin}.") for link in meeting]
+    try:
+        depends = _dependences([*room], every, _matching(room, every))
+    except InputError:  # the decomposition says why
+        return {pin: list(those) for pin, those in pins.items()}
+    rank = dict(known)
+    for k, part in enumerate(_strong_parts(depends)):
+        rank |= dict.fromkeys(part, k)
+    return {pin: sorted(those, key=rank.__getitem__) for pin, those in pins.items()}
+
+
+def _dependences(
+    unknown: Sequence[str], joints: Sequence[JointOf], matched: Mapping[tuple[int, int], str]
+) -> dict[str, dict[str, None]]:
+    """For each link the others on which its equations depend."""
+    depends: dict[str, dict[str, None]] = {link: {} for link in unknown}
+    for (k, _), link in matched.items():
+        other = joints[k].other(link)
+        if other in depends:
+            depends[link][other] = None
+    return depends
+
+
+def _matching(room: Mapping[str, int], joints: Sequence[JointOf]) -> dict[tuple[int, int], str]:
+    """Each equation, by joint and number, with the link that it determines; `room` are the unknowns of each link.
 
     Raises
     ------
@@ -84,14 +118,14 @@ def _matching(unknown: Sequence[str], joints: Sequence[JointOf]) -> dict[tuple[i
         where an equation finds none.
     """
     matched: dict[tuple[int, int], str] = {}
-    owners: dict[str, list[tuple[int, int]]] = {link: [] for link in unknown}
+    owners: dict[str, list[tuple[int, int]]] = {link: [] for link in room}
 
     def augment(equation: tuple[int, int], seen: set[str]) -> bool:
         joint = joints[equation[0]]
         for link in (joint.on, joint.by):
             if link in owners and link not in seen:
                 seen.add(link)
-                if len(owners[link]) < 3:
+                if len(owners[link]) < room[link]:
                     owners[link].append(equation)
                     matched[equation] = link
                     return True

@@ -22,6 +22,7 @@ from ...mechanism.models import InverseMachine
 from ...reading import file_text, in_file, toml
 from .entries import EntryReader
 from .model import RESERVED, machine_of
+from .shared_pins import shared_pins
 from .start import StartPose
 from .structure import JointEntry
 
@@ -80,6 +81,7 @@ class _LinkageReader(EntryReader):
         joints = self.joints()
         driver, span = self.driver(joints)
         loads = [self.load(name, given) for name, given in self.table("loads").items()]
+        self.springs(loads, joints)
         common = self.common()
         for kind, entries in (("parameters", parameters), ("inputs", inputs)):
             for each in entries:
@@ -197,7 +199,7 @@ class _LinkageReader(EntryReader):
 
     def joints(self) -> list[dict[str, Any]]:
         """The joints: those that are named, and a revolute one for each further link in a point of the same name."""
-        joints, joined = [], set()
+        joints = []
         table = self.table("joints")
         self.named("joints", table)
         for name in table:
@@ -226,9 +228,11 @@ class _LinkageReader(EntryReader):
                 for each in ("toward", "angle", "length"):
                     if each in given:
                         self.fault(f"{key}.{each}", "belongs to a prismatic joint")
-                joined.add(frozenset(map(tuple, ends)))
             joints.append(joint)
-        return joints + self.shared_pins(joined, {joint["name"] for joint in joints})
+        more, clashes = shared_pins(self.points, joints, self.table("driver"))
+        for name, message in clashes:
+            self.fault(f"joints.{name}", message)
+        return joints + more
 
     def sliding(self, key: str, given: Mapping[str, Any], by: list[str]) -> dict[str, Any]:
         """The keys of a sliding joint."""
@@ -248,27 +252,6 @@ class _LinkageReader(EntryReader):
         if "length" in given:
             joint["length"] = self.entry(f"{key}.length", given["length"], "m")
         return joint
-
-    def shared_pins(self, joined: set[Any], taken: set[str]) -> list[dict[str, Any]]:
-        """A revolute joint for each further link in a point of the same name, where none is named."""
-        joints: list[dict[str, Any]] = []
-        owners: dict[str, list[str]] = {}
-        for link, points in self.points.items():
-            for point in points:
-                owners.setdefault(point, []).append(link)
-        for point, those in owners.items():
-            for link in those[1:]:
-                if any(frozenset(((a, point), (link, point))) in joined for a in those if a != link):
-                    continue
-                name = point if len(those) == 2 else f"{point}_{link}"
-                if name in taken:
-                    self.fault(
-                        f"joints.{name}",
-                        f"does not join the points {point} of {', '.join(those)}; rename the point or the joint",
-                    )
-                    continue
-                joints.append({"name": name, "type": REVOLUTE, "on": [link, point], "by": [those[0], point]})
-        return joints
 
     def driver(self, joints: list[dict[str, Any]]) -> tuple[dict[str, Any], list[float] | None]:
         """The driver, and the range of one that slides."""
@@ -360,6 +343,23 @@ class _LinkageReader(EntryReader):
         else:
             load["force"] = self.vector(f"{key}.force", table.get("force"), "N", True, True)
         return load
+
+    def springs(self, loads: list[dict[str, Any]], joints: list[dict[str, Any]]) -> None:
+        """Fault springs without a length: between two points of a link, or in a pin."""
+        pins = {
+            frozenset((tuple(j["on"]), tuple(j["by"]))): j["name"] for j in joints if j["type"] == REVOLUTE
+        }
+        for load in loads:
+            if not load.get("by") or not load.get("on"):
+                continue
+            ends, key = frozenset((tuple(load["on"]), tuple(load["by"]))), f"loads.{load['name']}"
+            if load["on"][0] == load["by"][0]:
+                self.fault(
+                    key,
+                    f"both ends are on {load['on'][0]}; give points of two links, or of one and the ground",
+                )
+            elif ends in pins:
+                self.fault(key, f"both ends are in the joint {pins[ends]}; give points that move apart")
 
     def names(self, *tables: list[dict[str, Any]]) -> None:
         """Fault names that two things share."""

@@ -329,8 +329,9 @@ class LinkageParts:
     ) -> Group:
         # the ternary link carries the pins
         self._carriers |= {self.pin(ternary, j.at(ternary)): ternary for j in inner if j.kind == REVOLUTE}
-        built = [self._leg(*each, ternary) for each in zip(legs, outer, inner, strict=True)]
+        # before the legs: one that slides in it may do so at a point of it
         plate = self._bar(ternary, OWN)
+        built = [self._leg(*each, ternary) for each in zip(legs, outer, inner, strict=True)]
         x, y, angle = self.structure.poses[ternary]
         mass = plate.mass or Mass(0.0, 0.0, 0.0, 0.0)
         first, second, third = built

@@ -1,0 +1,247 @@
+"""An independent solution of a described linkage: Newton's method on the equations of all joints, and Lagrange
+multipliers, with numpy alone. It shares no line with the package: neither groups nor expressions nor loads.
+
+The unknowns are x, y and angle of the frame of each link. A revolute joint closes two points; a sliding one holds the
+point of `on` on the line of `by`, and the angle between both links; the driver has the last equation. A multiplier is
+the force (of a sliding joint the force across its line and the moment about the point) on `on` from `by`.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+
+FUNCTIONS = {name: getattr(math, name) for name in "sin cos tan sqrt asin acos atan2".split()}
+FUNCTIONS |= {"abs": abs, "min": min, "max": max, "pi": math.pi, "deg": math.pi / 180.0}
+
+
+def turned(v):
+    return np.array([-v[1], v[0]])
+
+
+def rotation(angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s], [s, c]])
+
+
+class Multibody:
+    """A linkage from the text of its description; `inputs` have values by name."""
+
+    def __init__(self, text, inputs=None):
+        data = self.data = json.loads(text)
+        self.values = {each["name"]: each["value"] for each in (*data["parameters"], *data["inputs"])}
+        self.values |= {"g": data["common"].get("g", 9.81), "ratio": 1.0}
+        for link in data["links"]:
+            self.values |= {f"{name}_of_{link['name']}": value for name, value in link["own"].items()}
+        self.values |= inputs or {}
+        self.names = [link["name"] for link in data["links"]]
+        self.points = {"ground": {name: self.vector(at) for name, at in data["ground"].items()}}
+        self.bodies = []
+        for link in data["links"]:
+            points = self.points[link["name"]] = {
+                name: self.vector(at) for name, at in link["points"].items()
+            }
+            self.bodies.append(
+                (
+                    link["name"],
+                    self.vector(link.get("centroid", (0, 0))),
+                    self.number(link.get("mass", 0)),
+                    self.number(link.get("inertia", 0)),
+                )
+            )
+            for point, mass in link["masses"].items():
+                self.bodies.append((link["name"], points[point], self.number(mass), 0.0))
+        self.joints = [joint for joint in data["joints"] if joint["name"] != data["driver"]["joint"]]
+        self.joints += [joint for joint in data["joints"] if joint["name"] == data["driver"]["joint"]]
+        self.start = data["start"]["value"]
+        self.rough = np.array([data["start"]["poses"][name] for name in self.names], float).ravel()
+
+    def number(self, entry, **more):
+        """The value of an entry."""
+        if isinstance(entry, str):
+            return eval(entry, {"__builtins__": {}}, FUNCTIONS | self.values | more)
+        return float(entry)
+
+    def vector(self, entries):
+        """The value of a point."""
+        return np.array([self.number(each) for each in entries])
+
+    def columns(self, link):
+        """Where the unknowns of a link stand."""
+        k = 3 * self.names.index(link)
+        return slice(k, k + 3)
+
+    def place(self, x, link, local):
+        """A point in the frame, and its matrix of derivatives by the unknowns."""
+        by = np.zeros((2, x.size), x.dtype)
+        if link == "ground":
+            return local.astype(x.dtype), by
+        at = x[self.columns(link)]
+        arm = rotation(at[2]) @ local
+        by[:, self.columns(link)] = np.column_stack([np.eye(2), turned(arm)])
+        return at[:2] + arm, by
+
+    def angle(self, x, link):
+        """The angle of a link, and its derivatives."""
+        by = np.zeros(x.size, x.dtype)
+        if link == "ground":
+            return 0.0, by
+        by[self.columns(link).start + 2] = 1.0
+        return x[self.columns(link)][2], by
+
+    def line(self, x, joint):
+        """The direction of a sliding joint in the frame."""
+        link, start = joint["by"]
+        way = self.points[link][joint["toward"]] - self.points[link][start]
+        return rotation(self.angle(x, link)[0]) @ (way / np.hypot(*way))
+
+    def equations(self, x, q):
+        """Misfits of all joints and of the driver, and their derivatives by the unknowns."""
+        gaps, rows = [], []
+        for joint in self.joints:
+            (p, p_by), (r, r_by) = (
+                self.place(x, link, self.points[link][name]) for link, name in (joint["on"], joint["by"])
+            )
+            if joint["type"] == "revolute":
+                gaps += [*(p - r)]
+                rows += [*(p_by - r_by)]
+                continue
+            d = self.line(x, joint)
+            n = turned(d)
+            (one, one_by), (other, other_by) = (self.angle(x, joint[end][0]) for end in ("on", "by"))
+            gaps += [(p - r) @ n, one - other - self.number(joint["angle"])]
+            rows += [n @ (p_by - r_by) - (p - r) @ d * other_by, one_by - other_by]
+        driver = self.data["driver"]
+        if driver["linear"]:
+            joint = self.joints[-1]
+            (p, p_by), (r, r_by) = (
+                self.place(x, link, self.points[link][name]) for link, name in (joint["on"], joint["by"])
+            )
+            d = self.line(x, joint)
+            other_by = self.angle(x, joint["by"][0])[1]
+            gaps.append((p - r) @ d - q)
+            rows.append(d @ (p_by - r_by) + (p - r) @ turned(d) * other_by)
+        else:
+            angle, by = self.angle(x, driver["link"])
+            gaps.append(angle - self.number(driver["zero"]) - driver["sense"] * q)
+            rows.append(by)
+        return np.array(gaps), np.array(rows)
+
+    def closed(self, q, near, steps=30):
+        """The pose at the driver's place `q`, by Newton's method from a pose that is nearly right; None where it does
+        not lead to one."""
+        x = np.array(near, float)
+        for _ in range(steps):
+            gaps, rows = self.equations(x, q)
+            # angles hold but for whole turns
+            for k in self.angular:
+                gaps[k] = math.remainder(gaps[k], 2.0 * math.pi)
+            step = np.linalg.solve(rows, gaps)
+            x = x - step
+            if np.max(np.abs(step)) < 1e-13:
+                return x
+        return x if np.max(np.abs(step)) < 1e-11 else None
+
+    @property
+    def angular(self):
+        """The numbers of the equations of angles."""
+        found, k = set(), 0
+        for joint in self.joints:
+            k += 2
+            if joint["type"] == "prismatic":
+                found.add(k - 1)
+        return found | (set() if self.data["driver"]["linear"] else {k})
+
+    def followed(self, q, most=0.1):
+        """The pose at `q`, followed from the start in small steps."""
+        x = self.closed(self.start, self.rough)
+        count = max(1, math.ceil(abs(q - self.start) / most))
+        for k in range(1, count + 1):
+            assert x is not None
+            x = self.closed(self.start + (q - self.start) * k / count, x, 12)
+        return x
+
+    def solution(self, x, q, w, a):
+        """Torque, reactions and motion at the pose `x`: outputs by the names of the package."""
+        size = x.size
+        _, rows = self.equations(x, q)
+        driver = self.data["driver"]
+        by_q = np.zeros(size)
+        by_q[-1] = 1.0 if driver["linear"] else driver["sense"]
+        x1 = np.linalg.solve(rows, by_q)
+        # rows(x) x1 = by_q, so that rows x2 = -(rows along x1) x1
+        along = self.equations(x.astype(complex) + 1e-30j * x1, q)[1].imag / 1e-30
+        x2 = np.linalg.solve(rows, -along @ x1)
+        v, accel = x1 * w, x1 * a + x2 * w * w
+
+        def motion(link, local):
+            p, by = self.place(x, link, local)
+            turn = self.place(x.astype(complex) + 1e-30j * v, link, local)[1].imag / 1e-30
+            return p, by, by @ v, by @ accel + turn @ v
+
+        needed, applied, load_power = np.zeros(size), np.zeros(size), 0.0
+        g = self.values["g"]
+        kinetic = potential = 0.0
+        for link, local, mass, inertia in self.bodies:
+            p, by, speed, growth = motion(link, local)
+            turn = self.angle(x, link)[1]
+            needed += by.T @ (mass * (growth + np.array([0.0, g]))) + turn * inertia * (turn @ accel)
+            kinetic += 0.5 * mass * speed @ speed + 0.5 * inertia * (turn @ v) ** 2
+            potential += mass * g * p[1]
+        for load in self.data["loads"]:
+            if load["type"] == "spring":
+                (p, p_by, pv, _), (r, r_by, rv, _) = (
+                    motion(link, self.points[link][name]) for link, name in (load["on"], load["by"])
+                )
+                length = np.hypot(*(r - p))
+                d = (r - p) / length
+                stiffness, free, damping = (self.number(load[k]) for k in ("stiffness", "length", "damping"))
+                pull = stiffness * (length - free) + damping * d @ (rv - pv)
+                applied += (p_by - r_by).T @ (d * pull)
+                potential += 0.5 * stiffness * (length - free) ** 2
+                continue
+            link = load["on"][0]
+            angle, turn = self.angle(x, link)
+            known = {"phi": q, "w": w, "angle_rate": turn @ v}
+            if load["type"] == "torque":
+                torque = self.number(load["torque"], **known)
+                applied += turn * torque
+                load_power += torque * (turn @ v)
+                continue
+            p, by, speed, _ = motion(link, self.points[link][load["on"][1]])
+            known |= {"x": p[0], "y": p[1], "vx": speed[0], "vy": speed[1]}
+            force = np.array([self.number(each, **known) for each in load["force"]])
+            if load["type"] == "follower":
+                force = rotation(angle) @ force
+            applied += by.T @ force
+            load_power += force @ speed
+        factors = np.linalg.solve(rows.T, needed - applied)
+        found = {"kinetic_energy": kinetic, "potential_energy": potential, "load_power": load_power}
+        found["tau"] = factors[-1] * by_q[-1]
+        for k, joint in enumerate(self.joints):
+            one, two = factors[2 * k : 2 * k + 2]
+            name = joint["name"]
+            if joint["type"] == "revolute":
+                found |= {f"{name}.fx": one, f"{name}.fy": two}
+                continue
+            force = turned(self.line(x, joint)) * one
+            found |= {f"{name}.fx": force[0], f"{name}.fy": force[1], f"{name}.normal": one}
+            found[f"{name}.moment"] = two
+            d = self.line(x, joint)
+            (p, _, pv, _), (r, _, rv, _) = (
+                motion(link, self.points[link][point]) for link, point in (joint["on"], joint["by"])
+            )
+            spin = self.angle(x, joint["by"][0])[1] @ v
+            found[f"{name}.s"] = (p - r) @ d
+            found[f"{name}.v"] = (pv - rv) @ d + (p - r) @ turned(d) * spin
+        for link in self.names:
+            _, turn = self.angle(x, link)
+            found |= {f"{link}.w": turn @ v, f"{link}.a": turn @ accel}
+            found[f"{link}.angle"] = self.angle(x, link)[0]
+            for point, local in self.points[link].items():
+                p, _, speed, growth = motion(link, local)
+                names = (f"{link}.{point}.{key}" for key in "x y vx vy ax ay".split())
+                found |= dict(zip(names, (*p, *speed, *growth), strict=True))
+        return found
