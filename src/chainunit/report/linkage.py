@@ -76,9 +76,10 @@ def hanging(turn: Mechanism) -> tuple[str, ...]:
     for pins in turn.topology.links.values():
         for pin in pins:
             if pin in turn.linkage.ground:
-                low.setdefault(pin, []).extend(float(np.mean(at[end][1])) for end in pins if end != pin)
+                ends = (end for end in pins if end != pin and end in at)
+                low.setdefault(pin, []).extend(float(np.mean(at[end][1])) for end in ends)
     span = max(float(np.ptp([np.mean(y) for _, y in at.values()])), 1e-9)
-    return tuple(pin for pin, ends in low.items() if np.mean(ends) < at[pin][1] - 0.1 * span)
+    return tuple(pin for pin, ends in low.items() if ends and np.mean(ends) < at[pin][1] - 0.1 * span)
 
 
 def arrows(
