@@ -14,6 +14,9 @@ from chainunit.machines.chain_unit import ChamberForces
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
+from chainunit.report.drawing import drawing
+from chainunit.study.config import parse
+from chainunit.study.run import run_study
 
 FOLDER = Path(__file__).parents[1] / "examples" / "linkages"
 FILES = sorted(FOLDER.glob("*.toml"))
@@ -21,6 +24,7 @@ KINDS = {
     "blake_jaw_crusher": ["RRR", "RRR"],
     "chain_unit": ["RRR", "RRR", "RRR"],
     "crank_shaper": ["RPR", "RRP"],
+    "cylinder_lift": ["RRR"],
     "dwell_six_bar": ["RRR", "RRR"],
     "edge_trimmer": ["triad"],
     "knife_drive": ["RRR", "triad"],
@@ -40,6 +44,15 @@ def machine(name: str) -> Machine:
     return Machine(read_linkage(FOLDER / f"{name}.toml"))
 
 
+def way(name):
+    """Places of the driver: a turn, or the range of a cylinder, not quite to its ends."""
+    described = machine(name).model.described_by
+    if not described.structure.driver.linear:
+        return TURN
+    low, high = described.data["range"]
+    return np.linspace(low + 1e-3, high - 1e-3, 101)
+
+
 def turn(name, speed=1.0, **values):
     """The outputs over a turn in steps of half a degree."""
     return machine(name).replace(values).outputs(TURN, w=speed)
@@ -57,7 +70,7 @@ def test_each_file_says_what_to_see_and_has_its_groups(file):
 def test_both_routes_to_the_torque_agree(name):
     """Virtual work of all links, and the balance of the driver with its reactions; friction is in neither."""
     m, a = machine(name), 7.0
-    state = m.state(m.inputs({"phi": TURN, "w": 4.0, "a": a}))
+    state = m.state(m.inputs({"phi": way(name), "w": 4.0, "a": a}))
     friction = sum(state.effects[each].dissipative for each in ("pins", "guides") if each in state.effects)
     torque = state.torque(a) - friction
     scale = np.max(np.abs(torque))
@@ -69,9 +82,9 @@ def test_both_routes_to_the_torque_agree(name):
 def test_the_power_balance_holds(name):
     """Exactly: tau w is J w a, the slope of J, and what weights, loads and friction take. And by differences of the
     energies over time."""
-    m, w, a, h = machine(name), 3.0, 5.0, 1e-5
+    m, w, a, h, q = machine(name), 3.0, 5.0, 1e-5, way(name)
     feed = m.model.feed_layout.by_name(m.model.Feed())
-    inputs = {"phi": TURN, "w": w, "a": a, **feed}
+    inputs = {"phi": q, "w": w, "a": a, **feed}
     out, effects = m.evaluate(inputs), m.state(m.inputs(inputs)).effects
     scale = np.max(np.abs(out["power"]))
     height = sum(each.conservative for each in effects.values())
@@ -80,7 +93,7 @@ def test_the_power_balance_holds(name):
     assert np.max(np.abs(balance)) < 1e-9 * scale
 
     def energy(t):
-        at = m.outputs(TURN + w * t + 0.5 * a * t * t, w + a * t, a)
+        at = m.outputs(q + w * t + 0.5 * a * t * t, w + a * t, a)
         return at.kinetic_energy + at.potential_energy
 
     rate = (energy(-2 * h) - 8 * energy(-h) + 8 * energy(h) - energy(2 * h)) / (12 * h)
@@ -150,6 +163,27 @@ def test_the_blade_slices_and_the_plunger_follows_a_cosine():
     assert (np.ptp(plate.K.x), np.ptp(plate.K.y)) == pytest.approx((1e-3 * along, 1e-3 * down), abs=5e-4)
     assert np.degrees(np.ptp(plate.angle)) == pytest.approx(turned, abs=0.05)
     assert turn("scotch_yoke_pump").yoke.S.x == pytest.approx(0.06 * np.cos(TURN), abs=1e-15)
+
+
+def test_the_force_of_the_cylinder_hardly_changes():
+    least, most, angle = said("cylinder_lift", r"from (\S+) to (\S+) kN, while .* by (\d+) degrees")
+    out = machine("cylinder_lift").outputs(way("cylinder_lift"), 0.0)
+    assert (np.min(out.tau), np.max(out.tau)) == pytest.approx((1e3 * least, 1e3 * most), abs=50.0)
+    assert np.degrees(np.ptp(out.lever.angle)) == pytest.approx(angle, abs=0.5)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("name", KINDS)
+def test_each_file_has_a_drawing_with_the_names_of_its_links(name):
+    m = machine(name)
+    picture = drawing(m, float(way(name)[len(way(name)) // 6]))
+    words = re.findall(r">([^<]+)</text>", picture)
+    for link, entry in m.model.described_by.structure.links.items():
+        if len(entry.points) > 1:
+            assert any(
+                each.startswith(link.replace("left_", "").replace("right_", "").replace("_", " "))
+                for each in words
+            ), link
 
 
 def test_the_foot_returns_higher():
@@ -273,3 +307,35 @@ def test_a_packaged_machine_as_a_file_has_its_start_values(name, packaged, param
     feeds = packaged.input_layout.by_name(packaged.Inputs()), machine(name).model.input_layout
     own = feeds[1].by_name(machine(name).model.Inputs())
     assert {each: feeds[0][each] for each in inputs} == {their: own[our] for their, our in inputs.items()}
+
+
+SIZED = """
+[machine]
+linkage = "{name}.toml"
+[run]
+crank_speed = "{speed}"
+[sizing]
+poles_least = 4
+poles_most = 4
+candidates = 1
+fluctuation = "10 %"
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "speed"), [("blake_jaw_crusher", "250 rpm"), ("scotch_yoke_pump", "150 rpm")]
+)
+def test_a_study_finds_a_motor(name, speed, tmp_path):
+    study = run_study(parse(SIZED.format(name=name, speed=speed), str(FOLDER / "study.toml")), tmp_path)
+    assert study.failure is None
+    best = study.sizing.best
+    assert study.sizing.chosen_candidate is best and best.fits
+    # the motor carries the cycle of the linkage, and not with twice the power that it needs
+    angular_speed = study.config.run.crank_speed
+    mean = float(np.mean(turn(name, angular_speed).power))
+    assert 0.7 * mean < best.motor.nameplate.power < 3.0 * mean
+    # the torque of the run is that of the linkage at its own motion
+    steady = study.steady
+    torque = turn(name, angular_speed).tau
+    crank = steady["machine.tau"].values * study.drive.ratio
+    assert np.max(np.abs(crank)) == pytest.approx(np.max(np.abs(torque)), rel=0.15)
