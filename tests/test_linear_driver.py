@@ -143,3 +143,133 @@ def test_a_lever_that_a_cylinder_lifts(tmp_path):
 def test_a_study_needs_a_driver_that_turns(tmp_path):
     with pytest.raises(InputError, match="has a driver that slides, and a motor turns"):
         config.parse(f'[machine]\nlinkage = "{LIFT.as_posix()}"', str(tmp_path / "mine.toml"))
+
+
+JIB = {
+    "ground": {"P": [0.0, 0.0], "Q": [0.8, 0.15]},
+    "driver": {"joint": "cylinder", "range": [0.45, 0.75]},
+    "links": {
+        "barrel": {
+            "points": {"P": [0, 0], "S": [0.1, 0.02], "S2": [0.5, 0.02]},
+            "mass": 25.0, "inertia": 0.6, "centroid": [0.2, 0.01],
+        },
+        "rod": {
+            "points": {"C": [0.35, -0.03], "E": [0.0, 0.0]}, "mass": 11.0, "inertia": 0.3, "centroid": [0.15, 0.0]
+        },
+        "jib": {
+            "points": {"Q": [0, 0], "C": [0.3, 0.45], "W": [-0.2, 1.7]},
+            "mass": 80.0, "inertia": 20.0, "centroid": [0.05, 0.7],
+        },
+        "stay": {"points": {"W": [0, 0], "V": [0.9, 0]}, "mass": 5.0, "inertia": 0.4, "centroid": [0.45, 0.0]},
+        "mast": {"points": {"M": [0, 0], "V": [0.8, 0]}, "mass": 7.0, "inertia": 0.5, "centroid": [0.4, 0.0]},
+    },
+    "joints": {"cylinder": {"on": "rod.E", "by": "barrel.S", "toward": "S2", "angle": 0.1}},
+    "loads": {"payload": {"on": "jib.W", "force": [300.0, -5000.0]}},
+    "guides": {"friction": 0.1, "damping": 20.0},
+    "pins": {"friction": 0.1, "diameter": 0.05, "damping": 1.0},
+}  # fmt: skip
+JIB["ground"]["M"] = [-0.9, 1.5]
+JIB["start"] = {
+    "phi": 0.6,
+    "points": {"C": [0.75, 0.7], "V": [-0.1, 1.3]},
+    "angles": {"barrel": 0.75, "jib": -0.1},
+}
+"""A cylinder that is pinned at both ends swings a jib; a dyad hangs on the jib. No line goes through a pin."""
+
+
+def jib(reverse=False):
+    data = JIB
+    if reverse:
+        # the same joint, described from the other side
+        links = {name: dict(each) for name, each in JIB["links"].items()}
+        c, s = math.cos(-0.1), math.sin(-0.1)
+        links["rod"]["points"] = {**links["rod"]["points"], "back": [-c, -s]}
+        joint = {"on": "barrel.S", "by": "rod.E", "toward": "back", "angle": -0.1}
+        data = {**JIB, "links": links, "joints": {"cylinder": joint}}
+    return Machine(machine_of(description_of(data, f"jib_{reverse}")))
+
+
+def test_a_cylinder_that_is_pinned_at_both_ends():
+    """Both routes to the force, slopes by dual numbers, and the balance of energy."""
+    machine = jib()
+    assert [group.kind for group in machine.model.described_by.structure.groups] == ["cylinder", "RRR"]
+    for q, w, a in ((0.5, 0.4, -0.8), (0.62, -0.7, 2.0), (0.7, 0.2, 0.0)):
+        u = machine.inputs({"phi": q, "w": w, "a": a})
+        state = machine.state(u)
+        losses = sum(state.effects[name].dissipative for name in ("pins", "guides"))
+        assert state.torque_by_reactions(a) + losses == pytest.approx(state.torque(a), rel=1e-12)
+        out = machine.outputs(q, w, a)
+        assert float(out.cylinder.s) == pytest.approx(q, rel=1e-12)
+        assert (float(out.cylinder.v), float(out.cylinder.a)) == pytest.approx((w, a), rel=1e-12)
+        # C lies on rod and jib, whatever the offsets
+        assert (float(out.rod.C.x), float(out.rod.C.y)) == pytest.approx(
+            (float(out.jib.C.x), float(out.jib.C.y))
+        )
+        assert (float(out.rod.C.ax), float(out.rod.C.ay)) == pytest.approx(
+            (float(out.jib.C.ax), float(out.jib.C.ay))
+        )
+        assert float(out.rod.angle - out.barrel.angle) == pytest.approx(0.1, abs=1e-12)
+        h = 1e-5
+
+        def bias(q, w):
+            return float(machine.outputs(q, w, 0.0).tau)
+
+        slopes = machine.evaluate({"phi": q, "w": w})
+        by_q = (bias(q - 2 * h, w) - 8 * bias(q - h, w) + 8 * bias(q + h, w) - bias(q + 2 * h, w)) / (12 * h)
+        by_w = (bias(q, w - 2 * h) - 8 * bias(q, w - h) + 8 * bias(q, w + h) - bias(q, w + 2 * h)) / (12 * h)
+        assert float(slopes["tau_bias_dphi"]) == pytest.approx(by_q, rel=1e-7)
+        assert float(slopes["tau_bias_dw"]) == pytest.approx(by_w, rel=1e-6, abs=1e-4)
+
+
+def test_each_link_of_a_cylinder_is_in_balance():
+    """Newton's and Euler's equations of barrel, rod and jib, from the outputs alone, moments about the centroids."""
+    frictionless = {**JIB, "guides": {}, "pins": {}}
+    machine = Machine(machine_of(description_of(frictionless, "jib_smooth")))
+    q, w, a = 0.62, -0.7, 2.0
+    o = machine.evaluate({"phi": q, "w": w, "a": a})
+    value = lambda name: float(o[name])  # noqa: E731
+
+    def vector(name):
+        return np.array([value(f"{name}.fx"), value(f"{name}.fy")])
+
+    def at(point):
+        return np.array([value(f"{point}.x"), value(f"{point}.y")])
+
+    line = at("barrel.S2") - at("barrel.S")
+    force = float(o["tau"]) * line / np.hypot(*line)
+    guide, moment = vector("cylinder"), value("cylinder.moment")
+    on = {
+        "barrel": [(vector("P"), at("barrel.P")), (-guide, at("rod.E")), (-force, at("rod.E"))],
+        "rod": [(guide, at("rod.E")), (force, at("rod.E")), (-vector("C"), at("rod.C"))],
+        "jib": [(vector("C"), at("rod.C")), (vector("Q"), at("jib.Q")), (-vector("W"), at("jib.W")),
+                (np.array([300.0, -5000.0]), at("jib.W"))],
+    }  # fmt: skip
+    assert machine.model.described_by.structure.joints["C"].on[0] == "jib"
+    for name, acting in on.items():
+        body = JIB["links"][name]
+        acceleration = np.array([value(f"{name}.centroid.ax"), value(f"{name}.centroid.ay") + 9.81])
+        total = sum(f for f, _ in acting)
+        assert total == pytest.approx(body["mass"] * acceleration, rel=1e-9, abs=1e-6), name
+        couple = {"barrel": -moment, "rod": moment, "jib": 0.0}[name]
+        for f, place in acting:
+            arm = place - at(f"{name}.centroid")
+            couple += arm[0] * f[1] - arm[1] * f[0]
+        assert couple == pytest.approx(body["inertia"] * value(f"{name}.a"), rel=1e-9, abs=1e-6), name
+
+
+def test_a_cylinder_described_from_the_other_side_is_the_same():
+    one, other = jib(), jib(reverse=True)
+    for q in (0.5, 0.7):
+        a, b = (m.outputs(q, 0.4, -0.8) for m in (one, other))
+        assert float(a.tau) == pytest.approx(float(b.tau), rel=1e-11)
+        assert float(b.cylinder.s) == pytest.approx(q, rel=1e-12)
+        assert float(a.jib.angle) == pytest.approx(float(b.jib.angle), rel=1e-12)
+        assert (float(a.Q.fx), float(a.Q.fy)) == pytest.approx((float(b.Q.fx), float(b.Q.fy)), rel=1e-9)
+
+
+def test_what_is_no_cylinder_is_refused():
+    links = {name: dict(each) for name, each in JIB["links"].items()}
+    links["rod"]["points"] = {"E": [0.0, 0.0]}
+    links["barrel"]["points"] = {**links["barrel"]["points"], "C": [0.9, 0.0]}
+    with pytest.raises(InputError, match="must be a cylinder: one of them on a pin of the ground"):
+        machine_of(description_of({**JIB, "links": links}, "loose"))

@@ -6,7 +6,7 @@ vertical, positive clockwise, so that the derivative of the crank's counter-cloc
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -126,10 +126,14 @@ class SolvedDriver(SolvedGroup):
         (link,) = self.links
         return [(ZERO, 0.0)], [link.third(end.p - link.pin.p, ZERO, 0.0) for end in self.pins]
 
-    def effort(self, load: Load) -> Any:
-        """The torque, or of a ram the force, along the coordinate that holds against the load of the link [N m,
+    def effort(self, loads: Sequence[Load]) -> Any:
+        """The torque, or of a ram the force, along the coordinate that holds against the loads of the links [N m,
         N]."""
         raise NotImplementedError
+
+    def turning(self, effort: Any) -> Iterator[tuple[int, Vec2]]:
+        """The derivative of the driver's own forces on its links, by their places, as their lines turn with q."""
+        return iter(())
 
 
 class TurnedCrank(SolvedDriver):
@@ -137,9 +141,9 @@ class TurnedCrank(SolvedDriver):
 
     __slots__ = ()
 
-    def effort(self, load: Load) -> Any:
+    def effort(self, loads: Sequence[Load]) -> Any:
         """See `SolvedDriver`."""
-        return load[1] * -self.links[0].t1
+        return loads[0][1] * -self.links[0].t1
 
     def reactions(self, loads: Sequence[Load]) -> tuple[Vec2, ...]:
         """The force on the crank at its bearing [N]."""
@@ -151,9 +155,9 @@ class PushedRam(SolvedDriver):
 
     __slots__ = ()
 
-    def effort(self, load: Load) -> Any:
+    def effort(self, loads: Sequence[Load]) -> Any:
         """See `SolvedDriver`."""
-        return -load[0].dot(self.links[0].u)
+        return -loads[0][0].dot(self.links[0].u)
 
     def reactions(self, loads: Sequence[Load]) -> tuple[Vec2, ...]:
         """The force and the moment of the rail on the ram."""

@@ -18,7 +18,7 @@ from typing import Any
 
 from ..engines import Dual, dual, slope
 from ..groups.body import NO_LOAD, Body, Load, body_on, reflected_inertia
-from ..groups.driver import SolvedDriver
+from ..groups.driver import PushedRam, SolvedDriver, TurnedCrank
 from ..groups.group import GuideForce, Joint, Slide, SolvedGroup, Third, rail_third
 from ..groups.loads import Effect, Moving, Wrench
 from ..planar import ZERO, Link, Motion, Vec2, growth
@@ -88,9 +88,13 @@ class Mechanism:
                     pins[point] = link.third(self.pins[point].p - link.pin.p, *thirds[name])
         return thirds, pins
 
-    def turning(self, reactions: Mapping[Joint, Vec2]) -> Iterator[Wrench]:
+    def turning(self, reactions: Mapping[Joint, Vec2], effort: Any) -> Iterator[Wrench]:
         """The part of the reactions in the moments on the links as their arms turn with q, and in the forces as the
         guides turn."""
+        driver, connections = self._groups[0]
+        assert isinstance(driver, SolvedDriver)
+        for k, force in driver.turning(effort):
+            yield Wrench(connections.links[k], force, 0.0)
         for _, connections in self._groups:
             for joint, carrier, _ in connections.joints:
                 (pin, name), force = joint, reactions[joint]
@@ -130,7 +134,9 @@ class Mechanism:
 
     def margins(self) -> list[Any]:
         """The margin of each group; 0 is a dead position."""
-        return [solved.margin for solved, _ in self._groups[1:]]
+        return [
+            solved.margin for solved, _ in self._groups if not isinstance(solved, (TurnedCrank, PushedRam))
+        ]
 
     def reactions(self, acting: Mapping[str, Load]) -> tuple[Any, dict[Joint, Vec2]]:
         """The torque (or force) along the coordinate [N m, N] and the force in each joint on its link [N], from what
@@ -152,9 +158,9 @@ class Mechanism:
                         total - force,
                         moment - (at.x - pin.x) * force.y + (at.y - pin.y) * force.x,
                     )
-        driver, _ = self._groups[0]
+        driver, connections = self._groups[0]
         assert isinstance(driver, SolvedDriver)
-        return driver.effort(loads.get(self.linkage.driver.bar.name, NO_LOAD)), reactions
+        return driver.effort([loads.get(name, NO_LOAD) for name in connections.links]), reactions
 
 
 def add_wrenches(loads: dict[str, Load], wrenches: Iterable[Wrench]) -> dict[str, Load]:
@@ -337,7 +343,7 @@ class MachineState:
         m, w2, field = self.m, self.w * self.w, self.steady.field
         links, pins = m.third()
         acting = {name: body.centrifugal_slope(w2, field, links[name]) for name, body in m.bodies.items()}
-        add_wrenches(acting, m.turning(self.steady.reactions))
+        add_wrenches(acting, m.turning(self.steady.reactions, self.steady.torque))
         return self._slope(LiftedMechanism(m, links, pins), self.w, acting, m.turns2())
 
     def _by_speed(self) -> Any:

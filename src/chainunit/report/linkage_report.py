@@ -151,7 +151,7 @@ def _animation(f: LinkageFindings) -> Animation:
         float(time[-1]),
         "An arrow is the force on a link from its neighbour.",
         hanging=linkage.hanging(state.m),
-        orbit=(driver.bar.pin, driver.end) if driver.bar.pin else None,
+        orbit=(driver.bar.pin, driver.end) if machine.model.turns else None,
         paths=linkage.paths(state.m),
     )
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..machines.linkages.model import LinkageDescription
+from ..machines.linkages.structure import CYLINDER
 from ..machines.machine import Machine
 from ..quantities import Value, declaration, quantity
 
@@ -69,9 +70,11 @@ class LinkageFindings:
     @property
     def sentence(self) -> str:
         """The groups in one line: ``crank + RRR dyad (coupler, rocker) + RRP dyad (rod, ram)``."""
-        parts = [self.machine.model.turning]
-        for group in self.description.structure.groups:
-            kind = "triad" if group.kind == "triad" else f"{group.kind} dyad"
+        groups = self.description.structure.groups
+        pinned = groups and groups[0].kind == CYLINDER
+        parts = [] if pinned else [self.machine.model.turning]
+        for group in groups:
+            kind = group.kind if group.kind in ("triad", CYLINDER) else f"{group.kind} dyad"
             parts.append(f"{kind} ({', '.join(group.links)})")
         return " + ".join(parts)
 

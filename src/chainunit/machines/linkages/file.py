@@ -7,7 +7,6 @@ Each entry that is a quantity is a number in SI units, a text with a unit ("80 m
 from __future__ import annotations
 
 import json
-import math
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -294,14 +293,13 @@ class _LinkageReader(EntryReader):
                 )
         sliding = {j["name"]: j for j in joints if j["type"] == PRISMATIC}
         joint = sliding.get(table["joint"]) if isinstance(table["joint"], str) else None
-        if joint is None or GROUND not in (joint["on"][0], joint["by"][0]):
+        if joint is None:
             self.fault(
                 "driver.joint",
-                f"is {shown(table['joint'])}; must be a prismatic joint of a link with the ground: "
-                f"{', '.join(sliding) or 'there is none'}",
+                f"is {shown(table['joint'])}; must be a prismatic joint: {', '.join(sliding) or 'there is none'}",
             )
             return {}, None
-        link = joint["on"][0] if joint["by"][0] == GROUND else joint["by"][0]
+        link = joint["by"][0] if joint["on"][0] == GROUND else joint["on"][0]
         span = [0.0, 0.0]
         with self.at("driver.range"):
             given = table.get("range")
@@ -410,7 +408,7 @@ class _LinkageReader(EntryReader):
             value = self.number("start.phi", table.get("phi", 0.0), "m" if driver["linear"] else "rad")
         self.given_pose(table, pose)
         if driver["linear"]:
-            self.placed_ram(driver, entries, pose, value)
+            pose.slide = next(each for each, _ in entries if each.name == driver["joint"]), value
         else:
             pose.angles[driver["link"]] = number(driver["zero"]) + driver["sense"] * value
         self.faults.refuse()
@@ -461,16 +459,3 @@ class _LinkageReader(EntryReader):
                     raise InputError(f"is {shown(place)}; must be a list of two, along x and y")
                 x, y = (self.number("", each, "m") for each in place)
                 yield link, point, (x, y)
-
-    @staticmethod
-    def placed_ram(
-        driver: dict[str, Any], joints: list[tuple[JointEntry, float]], pose: StartPose, value: float
-    ) -> None:
-        """The place of a link that slides in the ground."""
-        joint, _ = next(each for each in joints if each[0].name == driver["joint"])
-        ground, on = pose.points[GROUND], joint.on[0] == driver["link"]
-        if on:
-            (ax, ay), (bx, by) = ground[joint.by[1]], ground[joint.toward]
-            length = math.dist((ax, ay), (bx, by))
-            place = ax + (bx - ax) / length * value, ay + (by - ay) / length * value
-            pose.places[driver["link"], joint.on[1]] = place

@@ -278,19 +278,17 @@ class LinkageDescription:
 
     def _closing(self, linkage: Linkage, derived: Sequence[Any]) -> str:
         """The sentence on the first place at which the linkage does not close, and the group that does not."""
+        groups = self.structure.groups
+        behind_driver = len(groups) - len(linkage.groups)
         for q in self.places():
-            for k in range(len(linkage.groups)):
-                numbers = derived[: sum(each.derived for each in linkage.groups[: k + 1])]
+            for k, each in enumerate(groups):
+                number = k + 1 - behind_driver
+                part = linkage.before(number) if number < len(linkage.groups) else linkage
                 try:
-                    if k + 1 < len(linkage.groups):
-                        Mechanism(MATH, linkage.before(k + 1), q, numbers)
-                    else:
-                        Mechanism(MATH, linkage, q, derived)
+                    Mechanism(MATH, part, q, derived[: part.derived])
                 except (ArithmeticError, ValueError, IndexError):
-                    links = self.structure.groups[k].links
-                    return (
-                        f"the group of {', '.join(links)} cannot close at {self._at(q)}: change its lengths"
-                    )
+                    links = ", ".join(each.links)
+                    return f"the group of {links} cannot close at {self._at(q)}: change its lengths"
         return "the linkage does not close"
 
     # the model
@@ -362,7 +360,7 @@ class LinkageDescription:
             try:
                 margins = Mechanism(xp, linkage, q, derived).margins()
             except (ArithmeticError, ValueError):
-                margins = [math.nan] * len(linkage.groups)
+                margins = [math.nan] * len(self.structure.groups)
             signed = [margin * sign for margin, sign in zip(margins, self._signs, strict=True)]
             least = signed if not least else [_least(xp, *pair) for pair in zip(least, signed, strict=True)]
         for margin in least:

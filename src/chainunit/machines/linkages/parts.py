@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 from ...errors import InputError
 from ...groups.body import Bar, Mass
+from ...groups.cylinder import Cylinder
 from ...groups.driver import Crank, Driver, Ram
 from ...groups.dyad import Dyad
 from ...groups.group import Group, Rail
@@ -22,7 +23,7 @@ from ...groups.triad import Pose, Triad
 from ...mechanism.assur import GROUND, REVOLUTE, AssurGroup
 from ...mechanism.expressions import value_of
 from ...planar import ZERO, Vec2
-from .structure import Entry, JointEntry, LinkEntry, Structure
+from .structure import CYLINDER, Entry, JointEntry, LinkEntry, Structure
 
 ALONG_X = Vec2(1.0, 0.0)
 
@@ -81,8 +82,12 @@ class LinkageParts:
         self.receivers: dict[str, tuple[tuple[str, str], float]] = {}
         self._points: dict[str, dict[str, Vec2]] = {}
         self._carriers = {self.pin(GROUND, name): GROUND for name in structure.ground}
-        self.driver = self._driver()
-        self.groups: tuple[Group, ...] = tuple(self._group(each) for each in structure.groups)
+        first, *rest = [*structure.groups, None]
+        cylinder = first is not None and first.kind == CYLINDER
+        self.driver = self._cylinder(first) if first is not None and cylinder else self._driver()
+        self.groups: tuple[Group, ...] = tuple(
+            self._group(each) for each in (rest if cylinder else structure.groups) if each is not None
+        )
 
     def number(self, entry: Entry) -> Any:
         """The value of an entry."""
@@ -223,6 +228,39 @@ class LinkageParts:
         rail = Rail(None, self.point(GROUND, joint.at(GROUND)), self._direction(joint, GROUND) * sign)
         bar = self._bar(link, frame)
         return Ram(bar, rail, self._guide(joint, link), self.pin_on(link, joint.at(link)))
+
+    def _cylinder(self, group: AssurGroup) -> Driver:
+        barrel, rod, lever = group.links
+        slide = self.structure.joints[self.structure.driver.joint]
+        p, c, q = (self.structure.joints[joint.name] for joint in group.joints)
+        inner = self._inner(c, rod, lever)
+        # from the barrel to the rod
+        along = {link: self._direction(slide, link) for link in (barrel, rod)}
+        if slide.on[0] == barrel:
+            along = {link: -v for link, v in along.items()}
+        frames = {
+            link: LinkFrame(self.point(link, joint.at(link)), along[link])
+            for link, joint in ((barrel, p), (rod, c))
+        }
+        (near, far) = (frame.of(self.point(link, slide.at(link))) for link, frame in frames.items())
+        bars = self._bar(barrel, frames[barrel], self._outer(p, barrel)), self._bar(rod, frames[rod])
+        swung = self._rod(lever, q, c)
+
+        def turn() -> Any:
+            start, end = self._rough(GROUND, p), self._rough(GROUND, q)
+            return (end - start).cross(self._rough(lever, c) - start)
+
+        return Cylinder(
+            bars[0],
+            inner,
+            bars[1],
+            swung,
+            near.x - far.x,
+            near.y - far.y,
+            far.y,
+            self._guide(slide, rod),
+            self._side(barrel, turn),
+        )
 
     def _group(self, group: AssurGroup) -> Group:
         joints = [self.structure.joints[j.name] for j in group.joints]

@@ -31,6 +31,7 @@ class StartPose:
         self, points: Mapping[str, Mapping[str, Point]], joints: Sequence[tuple[JointEntry, float]]
     ) -> None:
         self.points, self.joints = points, joints
+        self.slide: tuple[JointEntry, float] | None = None
         self.poses: dict[str, Pose] = {GROUND: (0.0, 0.0, 0.0)}
         self.places: dict[tuple[str, str], Point] = {}
         self.angles: dict[str, float] = {GROUND: 0.0}
@@ -71,6 +72,7 @@ class StartPose:
                 c, s = math.cos(angle), math.sin(angle)
                 for name, (px, py) in points.items():
                     self.places.setdefault((link, name), (x + c * px - s * py, y + s * px + c * py))
+        self._slid()
         for joint, turn in self.joints:
             (on, by), pair = (joint.on, joint.by), (joint.on[0], joint.by[0])
             if joint.kind == PRISMATIC:
@@ -83,6 +85,24 @@ class StartPose:
                     if one in self.places:
                         self.places.setdefault(other, self.places[one])
         return before != (len(self.poses), len(self.places), len(self.angles))
+
+    def _slid(self) -> None:
+        """The point of the joint in which the driver slides, from its way and either link."""
+        if self.slide is None:
+            return
+        joint, way = self.slide
+        (on, on_point), (by, by_point) = joint.on, joint.by
+        if by not in self.angles:
+            return
+        (ax, ay), (bx, by_y) = self.points[by][by_point], self.points[by][joint.toward]
+        angle = self.angles[by] + math.atan2(by_y - ay, bx - ax)
+        dx, dy = way * math.cos(angle), way * math.sin(angle)
+        if (by, by_point) in self.places:
+            x, y = self.places[by, by_point]
+            self.places.setdefault((on, on_point), (x + dx, y + dy))
+        elif (on, on_point) in self.places:
+            x, y = self.places[on, on_point]
+            self.places.setdefault((by, by_point), (x - dx, y - dy))
 
     def _pose(self, link: str, points: Mapping[str, Point]) -> None:
         known = [name for name in points if (link, name) in self.places]

@@ -104,15 +104,19 @@ class Structure:
         InputError
             where the linkage is not determined, or has a group that is not covered.
         """
+        named = {joint.name: joint for joint in joints}
         seen = [JointOf(j.name, j.kind, j.on[0], j.by[0]) for j in joints if j.name != driver.joint]
-        groups = decompose([link.name for link in links], seen, driver.link)
+        slide = named[driver.joint]
+        if GROUND in (slide.on[0], slide.by[0]):
+            groups = decompose([link.name for link in links], seen, driver.link)
+        else:
+            groups = _with_cylinder([link.name for link in links], seen, slide)
         for group in groups:
             if driver.linear and group.kind == "triad":
                 raise InputError(
                     f"the links {', '.join(group.links)} form a triad, and the driver slides: a triad needs a driver "
                     "that turns; drive another link"
                 )
-        named = {joint.name: joint for joint in joints}
         marked = {
             end
             for each in groups
@@ -131,6 +135,44 @@ class Structure:
             start,
             poses,
         )
+
+
+CYLINDER = "cylinder"
+"""Kind of the group of a cylinder that is pinned at both ends, with the lever that it swings: barrel, rod, lever."""
+
+
+def _with_cylinder(links: Sequence[str], joints: Sequence[JointOf], slide: JointEntry) -> list[AssurGroup]:
+    """The groups of a linkage that a cylinder between two links drives, its own first.
+
+    At a given way barrel and rod are one link. With its lever it has to be a dyad on the ground.
+
+    Raises
+    ------
+    InputError
+        where it is not.
+    """
+    rod, barrel = slide.on[0], slide.by[0]
+    of = {joint.name: joint for joint in joints}
+    merged = [
+        joint._replace(**{end: barrel for end in ("on", "by") if getattr(joint, end) == rod})
+        for joint in joints
+    ]
+    groups = decompose([link for link in links if link != rod], merged, "")
+    own = next(group for group in groups if barrel in group.links)
+    others = [each for each in own.links if each != barrel]
+    p, c, q = own.joints if own.links[0] == barrel else own.joints[::-1]
+    near, far = (of[p.name].on, of[c.name].on)
+    near = near if near != GROUND else of[p.name].by
+    far = far if far not in others else of[c.name].by
+    grounded = all(GROUND in (joint.on, joint.by) for joint in (p, q))
+    if own.kind != "RRR" or not grounded or {near, far} != {rod, barrel}:
+        raise InputError(
+            f"the links {barrel} and {rod}, which the driver {slide.name} moves along each other, must be a "
+            "cylinder: one of them on a pin of the ground, the other one on a pin of a lever, and the lever on a pin "
+            "of the ground"
+        )
+    cylinder = AssurGroup(CYLINDER, (near, far, *others), (of[p.name], of[c.name], of[q.name]))
+    return [cylinder, *(group for group in groups if group is not own)]
 
 
 def pin_names(
