@@ -158,11 +158,33 @@ def test_the_commands(tmp_path):
     assert re.findall(r"chainunit keys (\w+)", machines) == list(MACHINES) and "web_share" not in machines
     assert "web_share" in chainunit("keys", "ChamberForces", cwd=tmp_path).stdout
     refusal = chainunit("keys", "jams", cwd=tmp_path)
-    assert refusal.returncode == 2 and "there are system, machine" in refusal.stderr
+    assert refusal.returncode == 2 and "tables: system, machine" in refusal.stderr
+    near = chainunit("keys", "knifedrive", cwd=tmp_path)
+    assert near.returncode == 2 and 'was "KnifeDrive" meant?' in near.stderr
     assert chainunit("schema", cwd=tmp_path).returncode == 0
     assert json.loads((tmp_path / "chainunit.schema.json").read_text("utf-8")) == json_schema()
     first, *_ = chainunit("study", "--example", "knife", cwd=tmp_path).stdout.splitlines()
     assert first == "#:schema chainunit.schema.json"
+
+
+@pytest.mark.parametrize(
+    ("asked", "tables", "keys"),
+    [
+        ("run.crank_speed", ["[run]"], ["crank_speed"]),
+        ("crank_speed", ["[run]"], ["crank_speed"]),
+        ("machine.r", ["[machine] of ChamberForces", "[machine] of KnifeDrive"], ["r"]),
+        ("KnifeDrive.knife.c", ["[machine] of KnifeDrive"], ["knife.c.x", "knife.c.y"]),
+        ("event.rise", [f"[[event]] of {name}" for name in ("jam", "lumps", "overload")], ["rise"]),
+        ("[sizing]", ["[sizing]"], [key.name for t in key_tables() if t.name == "sizing" for key in t.keys]),
+    ],
+)
+def test_a_key_is_found_by_its_name(asked, tables, keys, tmp_path):
+    done = chainunit("keys", asked, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    titles = [line.strip() for line in done.stdout.splitlines() if line.startswith("[")]
+    assert titles == tables
+    shown_keys = re.findall(r"^│ ([a-z]\S*) ", done.stdout, re.MULTILINE)
+    assert shown_keys == len(tables) * keys
 
 
 def test_the_page_of_reference_is_that_of_the_declarations():
@@ -171,7 +193,16 @@ def test_the_page_of_reference_is_that_of_the_declarations():
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     assert module.PAGE.read_text("utf-8") == module.text()
-    for command in ("study", "keys", "schema", "reproduce", "two-bar-error", "export", "export-ssp"):
+    for command in (
+        "study",
+        "keys",
+        "schema",
+        "reproduce",
+        "two-bar-error",
+        "linkage",
+        "export",
+        "export-ssp",
+    ):
         assert f"## chainunit {command}\n" in module.text()
     for name in ("ChamberForces", "KnifeDrive", "DcMotor", "CardanDriveline"):
         assert f"## FMU {name}\n" in module.text()

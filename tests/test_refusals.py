@@ -2,6 +2,7 @@
 
 import datetime
 import re
+from pathlib import Path
 
 import pytest
 from command import chainunit
@@ -121,3 +122,45 @@ def test_values_are_cited_as_toml_writes_them():
         (10**5000, "a number of about 5000 digits"),
     ):
         assert shown(value) == text
+
+
+def test_a_linkage_file_is_no_study_file(tmp_path):
+    linkage = Path(__file__).parents[1] / "examples" / "linkages" / "slider_crank_press.toml"
+    (tmp_path / "press.toml").write_text(linkage.read_text("utf-8"), "utf-8")
+    done = chainunit("study", "press.toml", "-o", "out", cwd=tmp_path)
+    (line,) = done.stderr.splitlines()
+    assert done.returncode == 2 and not (tmp_path / "out").exists()
+    assert re.match(r"chainunit: press.toml:\d+: links, driver: this is a linkage file", line)
+    assert "by linkage in [machine]" in line and "chainunit linkage FILE" in line
+
+
+@pytest.mark.parametrize("name", ["machine", "motor"])
+def test_a_name_in_place_of_a_table_is_sent_to_its_table(name):
+    with pytest.raises(
+        InputError, match=rf'^{name} = "KnifeDrive": must be a table; its name stands in \[system\]$'
+    ):
+        parse(f'{name} = "KnifeDrive"')
+
+
+@pytest.mark.parametrize(
+    ("words", "remedy"),
+    [
+        (["export"], "(chainunit export --help shows its options)"),
+        (["study", "--chek"], "(chainunit study --help shows its options)"),
+        (["study", "--backend", "rust"], "'rust' is not one of 'native', 'python' (chainunit study --help"),
+        (["stduy"], "(chainunit --help shows the commands)"),
+    ],
+)
+def test_a_wrong_command_names_the_help_that_has_the_right_one(words, remedy, tmp_path):
+    done = chainunit(*words, cwd=tmp_path)
+    (line,) = done.stderr.splitlines()
+    assert done.returncode == 2 and remedy in line and "Value error" not in line
+
+
+def test_a_missing_linkage_file_is_told_at_the_key_that_names_it(tmp_path):
+    (tmp_path / "mine.toml").write_text('[machine]\nlinkage = "press.toml"\n', "utf-8")
+    done = chainunit("study", "mine.toml", "-o", "out", cwd=tmp_path)
+    (line,) = done.stderr.splitlines()
+    assert (
+        line.startswith("chainunit: mine.toml:2: machine.linkage: ") and "press.toml: cannot be read" in line
+    )

@@ -43,7 +43,7 @@ class Example(StrEnum):
 
 _BackendOption = Annotated[
     Backend | None,
-    typer.Option("--backend", help="Of the FMUs: native where a C compiler is found, else python."),
+    typer.Option("--backend", help="FMUs in native code or in Python; native where a C compiler is found."),
 ]
 
 
@@ -66,7 +66,7 @@ class _Export(typer.core.TyperCommand):
         from .models import MODELS
 
         (name,) = (each for each in self.params if each.name == "name")
-        name.help = f"{', '.join(MODELS)}."  # type: ignore[attr-defined]
+        name.help = f"A linkage file (.toml), or one of {', '.join(MODELS)}."  # type: ignore[attr-defined]
         super().format_help(ctx, formatter)
 
 
@@ -226,7 +226,7 @@ def _stopped_early(failure: RunError, output: Path, errors: Console) -> None:
 @app.command()
 def keys(
     table: Annotated[
-        str | None, typer.Argument(help="Table of a study file, type of event, machine or motor.")
+        str | None, typer.Argument(help="Table of a study file, type of event, machine or motor; or a key.")
     ] = None,
 ) -> None:
     """Show the keys of study files and catalogues: what each means, allows, and is where a file leaves it out."""
@@ -490,7 +490,15 @@ def main() -> None:
         # wrong usage: an unknown command or option, a missing argument
         if not hasattr(error, "format_message"):
             raise
-        _end(f"{error.format_message()} (chainunit --help shows the commands)", 2)
+        _end(_usage(error), 2)
+
+
+def _usage(error: Any) -> str:
+    """The message of a wrong usage, with the command whose help shows the right one."""
+    context = getattr(error, "ctx", None)
+    command = f"chainunit {context.info_name}" if context and context.parent else "chainunit"
+    words = error.format_message().replace("Value error, ", "").removesuffix(".")
+    return f"{words} ({command} --help shows {'its options' if ' ' in command else 'the commands'})"
 
 
 def _end(message: str, status: int) -> None:

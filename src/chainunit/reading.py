@@ -232,7 +232,9 @@ def _line(error: ErrorDetails, file: type[BaseModel], prefix: str) -> str:
         return f"{where}: unknown key{hint}{' ' if hint.endswith('?') else '; '}{known}"
     if error["type"] == "model_type":
         array = f", below [{where}]" if isinstance(error["input"], list) else ""
-        return f"{where} = {shown(error['input'])}: must be a table{array}"
+        named = _holders(where, file) if isinstance(error["input"], str) else []
+        hint = f"; its name stands in {' or '.join(named)}" if named else ""
+        return f"{where} = {shown(error['input'])}: must be a table{array}{hint}"
     if error["type"] == "value_error":
         return str(error["ctx"]["error"])
     return f"{where} = {shown(error['input'])}: {_allowed(error, where.removeprefix(prefix))}"
@@ -240,13 +242,16 @@ def _line(error: ErrorDetails, file: type[BaseModel], prefix: str) -> str:
 
 def _elsewhere(key: str, file: type[BaseModel]) -> str:
     """Words on the tables of a file that have the key, to follow a refusal."""
-    tables = {name: field.annotation for name, field in file.model_fields.items()}
-    places = [f"[{name}]" for name, form in tables.items() if key in getattr(form, "model_fields", ())]
-    if key in file.model_fields:
-        places = ["before all tables"]
+    places = ["before all tables"] if key in file.model_fields else _holders(key, file)
     return (
         f"; it stands {'in ' if key not in file.model_fields else ''}{' or '.join(places)}" if places else ""
     )
+
+
+def _holders(key: str, file: type[BaseModel]) -> list[str]:
+    """The tables of a file that have the key."""
+    tables = {name: field.annotation for name, field in file.model_fields.items()}
+    return [f"[{name}]" for name, form in tables.items() if key in getattr(form, "model_fields", ())]
 
 
 _KINDS = {

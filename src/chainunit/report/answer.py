@@ -72,9 +72,9 @@ def _random(s: b.Source, study: StudyRecord) -> Line:
 def _speed(s: b.Source, study: StudyRecord, run: str) -> Line:
     """The crank speed of a run: the speed asked for, or, marked, the mean speed where the motor misses it."""
     if run != "steady" or study.reaches:
-        return s.line("{=run.crank_speed}")
+        return s.line("{=run.crank_speed:4}")
     mean_speed = Strong(s.line(f"▲ {{answers.{run}.speed_mean}}"))
-    return line(mean_speed, s.line(", not the {=run.crank_speed} asked for"))
+    return line(mean_speed, s.line(", not the {=run.crank_speed:4} asked for"))
 
 
 def _cards(s: b.Source, study: StudyRecord, run: str) -> Iterator[b.Card]:

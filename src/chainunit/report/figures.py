@@ -109,7 +109,7 @@ def _turn(s: b.Source, study: StudyRecord) -> fig.Figure:
         f"{' and '.join(torques).capitalize()} torque over the crank angle: {', '.join(study.statics.cycles)}.",
         fig.stacked(ANGLE, items.items()),
         s.line(
-            f"Inverse dynamics{' of two bars' * organs} at {{=run.crank_speed}} of the crank, without a motor."
+            f"Inverse dynamics{' of two bars' * organs} at {{=run.crank_speed:4}} of the crank, without a motor."
         ),
     )
 

@@ -131,7 +131,7 @@ def _marks(block: b.Given) -> str:
     """The legend of the marks that stand beside given values."""
     origins = {value.origin for _, values in block.sections for value in values} - {"", "file"}
     words = (f"{origin[0]}: {words}" for origin, words in _ORIGIN.items() if origin in origins)
-    return f'<p class="hint">Not in the study file: {"; ".join(words)}.</p>' if origins else ""
+    return f'<p class="hint marks">Not in the study file: {"; ".join(words)}.</p>' if origins else ""
 
 
 def _kind(block: b.Block) -> str:

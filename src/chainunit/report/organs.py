@@ -40,7 +40,7 @@ def _factors(s: b.Source, study: StudyRecord) -> b.Table:
     )
     # chains have no cycle at constant speed: the factors are those of two bars in every study
     by = "" if study.drive.chain is None else ", of two bars in place of the chains"
-    title = s.line("Overload factor, one side against both, at {=run.crank_speed}" + by)
+    title = s.line("Overload factor, one side against both, at {=run.crank_speed:4}" + by)
     return b.Table(tuple(rows), b.heads("factor", *sides, "use"), title=title, numeric=False)
 
 

@@ -3,10 +3,11 @@ follow from the declarations."""
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from ..errors import InputError
+from ..errors import InputError, near_name
 from ..fmu.description import Interface
 from ..model import Model
 from ..models import MODELS
@@ -47,28 +48,45 @@ def _kind(table: KeyTable) -> str:
 
 def keys_of(name: str) -> Report:
     """The keys of the table `name`, or of the tables of the machine, motor or event `name`. Where machines, motors or
-    events each have a table of this name, the report lists these tables and tells how to ask for one.
+    events each have a table of this name, the report lists these tables and tells how to ask for one. Where no
+    table has the name, it is that of a key, such as run.crank_speed or crank_speed, whose row is shown.
 
     Raises
     ------
     InputError
-        where no table has this name.
+        where neither a table nor a key has this name.
     """
+    name = name.strip("[]")
     tables = [
         table
         for table in (*key_tables(), catalogue_columns())
         if name in (table.name, table.of, _kind(table))
     ]
     if not tables:
+        tables = list(_with_key(name))
+    if not tables:
         table_names = dict.fromkeys(table.name for table in key_tables() if table.name)
-        kinds = dict.fromkeys(_kind(table) for table in key_tables() if table.of)
+        kinds = dict.fromkeys(_kind(table) for table in (*key_tables(), catalogue_columns()) if table.of)
+        near = near_name(name, (*table_names, *kinds)) or ";"
         raise InputError(
-            f"{name}: no such table; there are {', '.join(table_names)}; and of single types: {', '.join(kinds)}"
+            f"{name}: no such table and no such key{near} tables: {', '.join(table_names)}; tables of single types: "
+            f"{', '.join(kinds)}"
         )
     if sum(name == table.name and bool(table.of) for table in tables) > 1:
-        lead = Text(f"[{name}] has a table of keys for each type; a command shows one of them:")
+        heading = tables[0].heading.removesuffix(f" of {tables[0].of}")
+        lead = Text(f"{heading} has a table of keys for each type; a command shows one of them:")
         return Report("", "reference", {}, (lead, _contents(tables, head="command")), ())
     return Report("", "reference", {}, tuple(_block(table, table.heading) for table in tables), ())
+
+
+def _with_key(name: str) -> Iterator[KeyTable]:
+    """The tables that have a key of this name, or keys below it, cut down to these keys. The name may begin with that
+    of the table or of its type, as in run.crank_speed."""
+    for table in key_tables():
+        own = {name, *(name.removeprefix(f"{part}.") for part in (table.name, table.of) if part)}
+        keys = tuple(key for key in table.keys if any(f"{key.name}.".startswith(f"{each}.") for each in own))
+        if keys:
+            yield dataclasses.replace(table, keys=keys)
 
 
 def _block(table: KeyTable, title: str = "") -> Table:

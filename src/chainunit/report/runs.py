@@ -88,9 +88,9 @@ def table_of_runs(s: b.Source, study: StudyRecord) -> b.Table:
         or any(answers[run][v.name]["value"] is not None for run in runs)
         or (v.name == "recovery_time" and study.returns and study.overloads)
     )
-    head = "crank at {=run.crank_speed}"
+    head = "crank at {=run.crank_speed:4}"
     if not study.reaches:
-        head = "crank at {answers.steady.speed_mean}; {=run.crank_speed} NOT reached"
+        head = "crank at {answers.steady.speed_mean}; {=run.crank_speed:4} NOT reached"
     title = f"Demands of each run on the drive{'; the motor is insufficient' if study.insufficient else ''}"
     return over_runs(study, runs, rows, title, plain_line(s.line(head), study.config.units))
 

@@ -88,10 +88,10 @@ def _motion(study: StudyRecord) -> list[b.Block]:
 def _opening(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     noun = study.noun
     question = s.line(
-        f"Which motor, gear and flywheel does this {noun} need? Its crank turns at {{=run.crank_speed}}."
+        f"Which motor, gear and flywheel does this {noun} need? Its crank turns at {{=run.crank_speed:4}}."
         if "sizing" in s.result
         else f"What does the motor of this {noun} have to give? It turns the crank through a gear of ratio "
-        "{=machine.ratio}, in normal running at {=run.crank_speed}."
+        "{=machine.ratio}, in normal running at {=run.crank_speed:4}."
     )
     if study.answers:
         question += s.line(

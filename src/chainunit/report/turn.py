@@ -21,7 +21,7 @@ ANGLE = fig.Axis("crank angle from the upward vertical", "rad", low=0.0, high=2.
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     """The tables and the figure of a turn at constant speed."""
     turn: TurnFindings = study.findings["constant_speed"]
-    lead = s.line("Inverse dynamics at {=run.crank_speed} of the crank, without a motor.")
+    lead = s.line("Inverse dynamics at {=run.crank_speed:4} of the crank, without a motor.")
     yield b.Text(lead, "lead", "long")
     yield b.Table(s.rows(Turn, "constant_speed", none="none"), title="A turn at constant speed", form="long")
     if turn.pins:

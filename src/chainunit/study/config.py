@@ -202,10 +202,18 @@ def of_tables(data: Mapping[str, Any], source: str) -> Config:
         raise InputError(
             "motor: tables [[motor]] make a catalogue; name this file in a study file by catalogue", "motor"
         )
-    data = with_linkage(data)
-    parts, faults = check_values(data, source)
+    if isinstance(data.get("links"), Mapping) and "driver" in data:
+        raise InputError(
+            "links, driver: this is a linkage file, which describes a machine; a study file names it by linkage "
+            "in [machine], and chainunit linkage FILE shows it",
+            "links",
+        )
+    in_system = with_linkage(data)
+    parts, faults = check_values(in_system, source)
     if parts is None:
-        raise InputError.of(faults)
+        # a key that the file has, not the one that stands for it
+        raise InputError.of(faults if in_system is data else [_of_linkage(fault) for fault in faults])
+    data = in_system
     if not faults:
         return _of_values(data, parts, source)
     # the right values are checked together, too, as far as they do not depend on the wrong ones
@@ -214,6 +222,14 @@ def of_tables(data: Mapping[str, Any], source: str) -> Config:
     except InputError as error:
         faults += independent(error.faults, faults, parts)
     raise InputError.of(faults)
+
+
+def _of_linkage(fault: InputError) -> InputError:
+    """The refusal of the machine that ``linkage`` in [machine] names, by that key."""
+    if fault.placed or fault.key != "system.machine":
+        return fault
+    key = "machine.linkage"
+    return InputError(str(fault).replace(fault.key, key, 1), key)
 
 
 def _of_values(data: Mapping[str, Any], parts: Parts, source: str) -> Config:

@@ -84,7 +84,7 @@ def with_rods(number: int, start: Mapping[str, float]) -> type[Model]:
         for a number of rods that the model cannot have.
     """
     if not LEAST <= number <= MOST:
-        raise InputError(f"{number} rods an organ: must be >= {LEAST} and <= {MOST}")
+        raise InputError(f"rods = {number}: must be >= {LEAST} and <= {MOST}")
     lengths = ChamberForces.Parameters()
     return flexible(*split((start.get("l1", lengths.l1), start.get("l2", lengths.l2)), number))
 

@@ -94,7 +94,7 @@ class Coupling:
 class MonteCarlo:
     """Overloads at random crank angles and times."""
 
-    runs: Value = quantity("1", "number of runs; 0 leaves the study out", default=0.0, min=0.0, max=1e6)
+    runs: Value = quantity("1", "number of runs; with 0 there are none", default=0.0, min=0.0, max=1e6)
     duration: Value = quantity(
         "s", "time that is followed after the event", default=2.0, min=0.05, max=1e4, usual=(0.05, 600.0)
     )
@@ -230,7 +230,7 @@ class ChainOrgans(OrganLaw):
     )
     sweep_points: Value = quantity(
         "1",
-        "number of speeds of the sweep; 0 leaves all but the study's own out",
+        "number of speeds of the sweep, to which run.crank_speed is added; with 0 it is alone",
         default=15.0,
         min=0.0,
         max=200.0,
