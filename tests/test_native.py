@@ -514,12 +514,9 @@ def test_a_plain_c_host(native, fmi, tmp_path):
     }  # fmt: skip
 
 
-@pytest.mark.parametrize("share", [0.03, pytest.param(1.0, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("fmi", [2, 3])
-@pytest.mark.parametrize("name", list(MODELS))
-def test_random_calls_under_sanitizers(native, name, fmi, share, tmp_path):
-    """A million by .ci/full, a share of them each time."""
-    sources = Path(native[name, fmi][1]) / "sources"
+def random_calls(folder, fmi, calls, tmp_path):
+    """As many random calls of the unpacked FMU in `folder`, compiled with sanitizers."""
+    sources = folder / "sources"
     fuzz = tmp_path / "fuzz"
     command = [
         shutil.which("cc"), "-std=c99", "-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all",
@@ -533,10 +530,18 @@ def test_random_calls_under_sanitizers(native, name, fmi, share, tmp_path):
     kernels = compile_code(compiler(), ("-O1", "-c", "kernels.c", "-o", "kernels.o"), files, "kernels.o")
     (tmp_path / "kernels.o").write_bytes(kernels)
     subprocess.run([*command, str(tmp_path / "kernels.o")], check=True)
+    process = subprocess.run([fuzz, str(calls)], capture_output=True, text=True)
+    assert process.returncode == 0, process.stdout + process.stderr[-3000:]
+
+
+@pytest.mark.parametrize("share", [0.03, pytest.param(1.0, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("name", list(MODELS))
+def test_random_calls_under_sanitizers(native, name, fmi, share, tmp_path):
+    """A million by .ci/full, a share of them each time."""
     # whose steps take steps of their own
     calls = 200_000 if name == "ChainUnitFlexible" else 1_000_000
-    process = subprocess.run([fuzz, str(int(share * calls))], capture_output=True, text=True)
-    assert process.returncode == 0, process.stdout + process.stderr[-3000:]
+    random_calls(Path(native[name, fmi][1]), fmi, int(share * calls), tmp_path)
 
 
 def test_threads_do_not_see_each_other(native):

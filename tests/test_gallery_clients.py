@@ -1,0 +1,104 @@
+"""The gallery of linkage files as FMUs in other importers; one file each time, all of them in .ci/full."""
+
+from __future__ import annotations
+
+import contextlib
+import zipfile
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.fmi2 import FMU2Model
+from fmpy.validation import validate_fmu
+from test_clients import test_ecos as test_ecos
+from test_clients import test_libcosim as test_libcosim
+from test_native import random_calls
+
+from chainunit.fmu.native.export import export
+from chainunit.fmu.native.platforms import compiler
+from chainunit.machines.linkages.file import read_linkage
+from chainunit.machines.machine import Machine
+from chainunit.system.instance import Fmu
+
+pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
+GALLERY = sorted((Path(__file__).parents[1] / "examples" / "linkages").glob("*.toml"))
+OFTEN = ("blake_jaw_crusher", "cylinder_lift")
+FILES = [
+    pytest.param(file, id=file.stem, marks=() if file.stem in OFTEN else pytest.mark.slow) for file in GALLERY
+]
+
+
+def test_the_gallery_is_there():
+    assert len(GALLERY) >= 10 and {file.stem for file in GALLERY} >= {*OFTEN}
+
+
+@pytest.fixture(scope="module", params=FILES)
+def machine(request):
+    return Machine(read_linkage(request.param))
+
+
+@pytest.fixture(scope="module")
+def alone(machine, tmp_path_factory):
+    """Its FMUs by version of FMI, off a place where everything is 0, and the variables that are read."""
+    folder, model = tmp_path_factory.mktemp("gallery"), machine.model
+    low, high = model.span
+    start = {"phi": low + 0.3 * (high - low), "w": 0.0 if not model.turns else 2.0, "a": 0.7}
+    names = [
+        "tau",
+        "J",
+        "dJ_dphi",
+        "margin",
+        "kinetic_energy",
+        *[f"{name}.fx" for name in [*model.joints][:3]],
+    ]
+    return {fmi: export(model, folder / f"{model.name}{fmi}.fmu", start, fmi=fmi) for fmi in (2, 3)}, names
+
+
+def test_valid(alone):
+    for file in alone[0].values():
+        assert not validate_fmu(str(file))
+
+
+def test_directional_derivatives(machine, alone):
+    """Of all outputs by angle, speed and acceleration, against differences of the Python model."""
+    model = machine.model
+    description = fmpy.read_model_description(str(alone[0][2]))
+    references = {v.name: v.valueReference for v in description.modelVariables}
+    outputs = [v.name for v in description.modelVariables if v.causality == "output"]
+    low, high = model.span
+    at = {"phi": low + 0.3 * (high - low), "w": 2.0 if model.turns else 0.1, "a": 0.7}
+    at |= model.feed_layout.by_name(model.Feed())
+    with contextlib.closing(Fmu(alone[0][2])) as fmu:
+        told = fmu.description
+        unit = FMU2Model(
+            guid=told.guid, unzipDirectory=fmu.folder, instanceName="unit",
+            modelIdentifier=told.coSimulation.modelIdentifier,
+        )  # fmt: skip
+        unit.instantiate()
+        unit.setupExperiment()
+        unit.enterInitializationMode()
+        unit.exitInitializationMode()
+        unit.setReal([references[name] for name in at], list(at.values()))
+        for name, h in (("phi", 1e-5), ("w", 1e-5), ("a", 1e-3)):
+            got = np.array(
+                unit.getDirectionalDerivative([references[n] for n in outputs], [references[name]], [1.0])
+            )
+            near = [machine.evaluate({**at, name: at[name] + k * h}) for k in (-2, -1, 1, 2)]
+            a, b, c, d = (np.array([float(each[n]) for n in outputs]) for each in near)
+            wanted = (a - 8.0 * b + 8.0 * c - d) / (12.0 * h)
+            # what a difference of rounded values leaves
+            rounding = 1e-15 * (np.abs(a) + np.abs(d)) / h
+            worst = np.abs(got - wanted) / (1e-6 * np.abs(wanted) + 1e-9 + 10.0 * rounding)
+            assert np.max(worst) < 1.0, (name, outputs[int(np.argmax(worst))])
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("name", ["blake_jaw_crusher", "edge_trimmer", "scotch_yoke_pump"])
+@pytest.mark.slow
+def test_random_calls_under_sanitizers(name, fmi, tmp_path):
+    file = next(file for file in GALLERY if file.stem == name)
+    fmu = export(read_linkage(file), tmp_path / "unit.fmu", fmi=fmi)
+    with zipfile.ZipFile(fmu) as archive:
+        archive.extractall(tmp_path / "unpacked")
+    random_calls(tmp_path / "unpacked", fmi, 300_000, tmp_path)
