@@ -53,7 +53,7 @@ class AddedInertia:
 class TurningStates:
     """States of the direct machine; each is an output, too."""
 
-    phi: Value = quantity("rad", "motor angle; crank angle is phi/ratio, from the upward vertical, clockwise")
+    phi: Value = quantity("rad", "motor angle; crank angle is phi/ratio")
     w: Value = quantity("rad/s", "motor speed")
 
 

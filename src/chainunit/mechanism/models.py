@@ -103,6 +103,8 @@ class MachineModel(Model):
     """The machine's name in texts for people."""
     turning: ClassVar[str] = "crank"
     """The name, in texts for people, of the link that the motor turns."""
+    angle_counts: ClassVar[str] = "from the upward vertical, clockwise"
+    """How the angle of that link counts, in texts for people."""
     usual_speed: ClassVar[tuple[float, float]] = (0.05, 25.0)
     """Usual range of the crank speed [rad/s]; beyond it, a wrong unit is likely."""
     sides: ClassVar[tuple[str, ...]] = ()

@@ -18,7 +18,7 @@ from . import figure as fig
 from . import linkage
 from .edge_motion import ENDS, edge
 from .motion import DrawnLink
-from .turn import ANGLE
+from .turn import angle_axis
 
 PICTURE = "blade_path.png"
 _EDGE = DrawnLink("edge", ENDS, "heavy")
@@ -68,7 +68,7 @@ def _figure(study: StudyRecord, findings: BladeFindings) -> fig.Figure:
             "Path of the edge's middle; crank angles on its way down",
             equal=True,
         ),
-        fig.Panel(ANGLE, fig.Axis("tilt of the blade", "rad"), tilt, "Tilt of the blade"),
+        fig.Panel(angle_axis(study), fig.Axis("tilt of the blade", "rad"), tilt, "Tilt of the blade"),
     )
     return fig.Figure(
         "blade-path",

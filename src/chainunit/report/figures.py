@@ -19,7 +19,7 @@ from . import figure as fig
 from . import run_names
 from .pictures import Pictures
 from .shaft import TORQUE, shaft_torque
-from .turn import ANGLE
+from .turn import angle_axis
 
 PICTURES = Pictures()
 _MOTION = ("phi", "w", "a")
@@ -107,7 +107,7 @@ def _turn(s: b.Source, study: StudyRecord) -> fig.Figure:
         "turn",
         "Torque over a crank turn at constant speed",
         f"{' and '.join(torques).capitalize()} torque over the crank angle: {', '.join(study.statics.cycles)}.",
-        fig.stacked(ANGLE, items.items()),
+        fig.stacked(angle_axis(study), items.items()),
         s.line(
             f"Inverse dynamics{' of two bars' * organs} at {{=run.crank_speed:4}} of the crank, without a motor."
         ),

@@ -17,7 +17,7 @@ from . import blocks as b
 from . import figure as fig
 from .lines import Line, line
 from .style import LINES
-from .turn import ANGLE
+from .turn import angle_axis
 
 PICTURE = "flywheel.png"
 _HEADS = {
@@ -97,7 +97,7 @@ def _figure(study: StudyRecord, findings: FlywheelFindings, running: list[Wheel]
         }
         for axis, y in series.items():
             items[axis].append(fig.Curve(number(wheel.flywheel, "kg.m2"), *_last_turn(angle, y), look))
-    panels = [fig.Panel(ANGLE, axis, tuple(curves)) for axis, curves in items.items()]
+    panels = [fig.Panel(angle_axis(study), axis, tuple(curves)) for axis, curves in items.items()]
     return fig.Figure(
         "flywheel",
         "A turn with each flywheel, and the ripple of the speed over the inertia",

@@ -21,10 +21,7 @@ from .lines import Line, capital, join, line, spoken
 from .study_motion import motion
 
 DRAWING = "machine.svg"
-_DRAWING_CAPTION = (
-    "Pins and links, and dimensions by their names in a study file. φ is the crank angle, clockwise from the upward "
-    "vertical."
-)
+_DRAWING_CAPTION = "Pins and links, and dimensions by their names in a study file. φ is the crank angle, {}."
 _VERSIONS = ("numpy", "casadi", "fmpy", "plotly")
 
 
@@ -118,8 +115,10 @@ def _opening(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     ]
     yield b.Table(tuple(rows), title="In short", form="long")
     if not study.drive.outsider:
-        alt = f"The {noun}: its pins, links and dimensions"
-        yield b.Drawing(drawing(study.drive.machine), alt, DRAWING, _DRAWING_CAPTION)
+        alt, model = f"The {noun}: its pins, links and dimensions", study.drive.machine.model
+        yield b.Drawing(
+            drawing(study.drive.machine), alt, DRAWING, _DRAWING_CAPTION.format(model.angle_counts)
+        )
 
 
 def _given(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:

@@ -15,7 +15,12 @@ from . import blocks as b
 from . import figure as fig
 
 PICTURE = "turn.png"
-ANGLE = fig.Axis("crank angle from the upward vertical", "rad", low=0.0, high=2.0 * math.pi, step=45.0)
+
+
+def angle_axis(study: StudyRecord) -> fig.Axis:
+    """The axis of the crank angle over a turn."""
+    counts = study.drive.machine.model.angle_counts
+    return fig.Axis(f"crank angle {counts}", "rad", low=0.0, high=2.0 * math.pi, step=45.0)
 
 
 def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
@@ -34,12 +39,12 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
         yield b.Table(
             tuple(rows), heads, title="Largest forces in the pins over a turn at constant speed", form="long"
         )
-    yield _figure(turn)
+    yield _figure(turn, angle_axis(study))
 
 
-def _figure(turn: TurnFindings) -> fig.Figure:
+def _figure(turn: TurnFindings, angle: fig.Axis) -> fig.Figure:
     inertia = fig.Curve("inertia", turn.loaded.angle, turn.inertia, in_legend=False)
-    panels = [fig.Panel(ANGLE, fig.Axis("reflected inertia", "kg.m2", low=0.0), (inertia,))]
+    panels = [fig.Panel(angle, fig.Axis("reflected inertia", "kg.m2", low=0.0), (inertia,))]
     if turn.pins:
         panels.append(_reactions(turn))
     return fig.Figure(

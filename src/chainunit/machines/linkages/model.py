@@ -21,6 +21,7 @@ from ...groups.group import GuideForce
 from ...groups.loads import GuideLosses, PinLosses, Weight
 from ...mechanism.assur import GROUND, PRISMATIC
 from ...mechanism.driver_ports import ROTATING, SLIDING, AddedInertia
+from ...mechanism.expressions import value_of
 from ...mechanism.linkage import Linkage
 from ...mechanism.machine import MachineState, Mechanism, derived_numbers
 from ...mechanism.models import InverseMachine, declared_class, names_of
@@ -216,6 +217,16 @@ class LinkageDescription:
             return float(low), float(high)
         return self.structure.start, self.structure.start + 2.0 * math.pi
 
+    @property
+    def angle_counts(self) -> str:
+        """How the angle of the driver counts, in words."""
+        driver = self.structure.driver
+        zero = value_of(MATH, driver.zero, self.values(self.Parameters(), self.Inputs()))
+        way = "counter-clockwise" if driver.sense > 0.0 else "clockwise"
+        named = {0.0: "from the x axis", 90.0: "from the upward vertical"}
+        degrees = round(math.degrees(zero), 6)
+        return f"{named.get(degrees, f'from {degrees:g} deg to the x axis')}, {way}"
+
     def places(self) -> list[float]:
         """Places of the driver from the start on, around or over its range."""
         driver = self.data["driver"]
@@ -324,6 +335,7 @@ class LinkageDescription:
             driver_port = described.port
             span = described.span
             turns = not described.structure.driver.linear
+            angle_counts = described.angle_counts
             Parameters = described.Parameters
             Inputs = described.Inputs
             Outputs = described.outputs
