@@ -14,6 +14,7 @@ from chainunit.machines.chain_unit import ChamberForces
 from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
+from chainunit.report import linkage
 from chainunit.report.drawing import drawing
 from chainunit.study.config import parse
 from chainunit.study.run import run_study
@@ -176,6 +177,8 @@ def test_the_force_of_the_cylinder_hardly_changes():
 @pytest.mark.parametrize("name", KINDS)
 def test_each_file_has_a_drawing_with_the_names_of_its_links(name):
     m = machine(name)
+    traced = linkage.paths(m.state(m.inputs({"phi": way(name)})).m)
+    assert all(np.all(np.isfinite(axis)) for path in traced.values() for axis in path)
     picture = drawing(m, float(way(name)[len(way(name)) // 6]))
     words = re.findall(r">([^<]+)</text>", picture)
     for link, entry in m.model.described_by.structure.links.items():

@@ -64,7 +64,7 @@ def paths(turn: Mechanism) -> dict[str, tuple[Any, Any]]:
         f"path of {point}": at[point]
         for points in topology.points.values()
         for point in points
-        if point not in pins
+        if point in at and point not in pins
     }
 
 
