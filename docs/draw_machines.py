@@ -1,5 +1,5 @@
-"""Draws docs/machine.svg, knife.svg and accelerator.svg, and docs/linkages/*.svg: each packaged machine and each linkage
-file of the gallery with the names of its parts."""
+"""Draws docs/machine.svg, knife.svg, accelerator.svg and docs/linkages/*.svg: the packaged machines and the gallery of
+linkage files, with the names of their parts."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FOLDER = Path(__file__).parent
 FILES = {"ChamberForces": "machine.svg", "KnifeDrive": "knife.svg", "Accelerator": "accelerator.svg"}
 """File of each machine in the folder of this script."""
 GALLERY = FOLDER.parent / "examples" / "linkages"
-PLACES = {"cylinder_lift": 0.55}
+PLACES = {"cylinder_lift": 0.55, "tipper": 0.6}
 """Place of the driver in the picture, where it is not 1 rad [m]."""
 
 
