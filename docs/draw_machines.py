@@ -1,5 +1,5 @@
-"""Draws docs/machine.svg, knife.svg, accelerator.svg and docs/linkages/*.svg: the packaged machines and the gallery of
-linkage files, with the names of their parts."""
+"""Draws docs/machine.svg, knife.svg, accelerator.svg and docs/linkages/*.svg: the packaged machines and the gallery
+of linkage files, with the names of their parts."""
 
 from __future__ import annotations
 

@@ -196,8 +196,12 @@ def test_each_file_has_a_drawing_with_the_names_of_its_links(name):
 def test_the_page_shows_each_file_with_its_words():
     page = (FOLDER.parents[1] / "docs" / "linkages.md").read_text("utf-8")
     for file in FILES:
-        words = file.read_text("utf-8").partition("title =")[0].removeprefix("# ").replace("\n# ", " ").strip()
-        assert f"| **`{file.name}`** {words} | ![" in page and f"](linkages/{file.stem}.svg)" in page, file.stem
+        words = (
+            file.read_text("utf-8").partition("title =")[0].removeprefix("# ").replace("\n# ", " ").strip()
+        )
+        assert f"| **`{file.name}`** {words} | ![" in page and f"](linkages/{file.stem}.svg)" in page, (
+            file.stem
+        )
 
 
 def test_the_foot_returns_higher():
