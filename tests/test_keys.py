@@ -142,6 +142,18 @@ def test_the_full_example_names_every_key_once():
             assert len(message) == (here is None), (table.name, key.name)
 
 
+def test_a_bare_number_has_its_unit_in_the_comment_and_a_text_has_not():
+    lines = commented(
+        '[machine]\ncrank = { m = 40, s = "50 mm", I = -0.6 }\n[flywheel]\nJ = 2\n'
+    ).splitlines()
+    crank, flywheel = (line for line in lines if line.startswith(("crank =", "J =")))
+    assert crank.endswith(
+        "# crank O1-A: mass [kg]; distance of the centroid from the pin named first, along the link; "
+        "moment of inertia about the centroid [kg m2]"
+    )
+    assert flywheel.endswith("on the motor shaft [kg m2]")
+
+
 def test_each_line_of_the_full_example_has_a_comment():
     for line in commented(example("full")).splitlines():
         if "=" in line:

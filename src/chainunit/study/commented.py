@@ -9,6 +9,7 @@ from itertools import groupby
 from ..drives.motors import MOTORS
 from ..places import Statement, statements
 from ..reading import toml
+from ..refusals import unit_behind
 from .keys import Key, KeyTable, key_tables
 from .schema import FILE
 
@@ -37,7 +38,7 @@ def commented(text: str, machine: str = "ChamberForces") -> str:
     for number, line in enumerate(lines, 1):
         result += [line, *below.get(number, [])]
     for absent in _absent({each.table.split(".")[0] for each in settings}, machine):
-        title = f"{absent.title} of {absent.of}" if absent.of else absent.title
+        title = f"{absent.title}: {absent.of}" if absent.of else absent.title
         result += ["", f"{f'# [{absent.name}]':<{_COLUMN}} # {title}", *map(_line, absent.keys)]
     return "\n".join(result) + "\n"
 
@@ -61,10 +62,20 @@ def _absent(present: set[str], machine: str) -> Iterable[KeyTable]:
 
 def _comment(lines: list[str], statement: Statement, keys: dict[str, Key]) -> None:
     """Add the meaning of each key that a statement sets, where its line has no comment."""
-    meanings = [keys[name].description for name in statement.keys if name in keys]
     line = lines[statement.line - 1]
+    meanings = [_meaning(keys[name], line) for name in statement.keys if name in keys]
     if meanings and "#" not in re.sub(r"\"[^\"]*\"|'[^']*'", "", line):
+        part = meanings[0].partition(": ")[0] + ": "
+        if all(meaning.startswith(part) for meaning in meanings):
+            # of one link: its name stands once
+            meanings[1:] = [meaning.removeprefix(part) for meaning in meanings[1:]]
         lines[statement.line - 1] = f"{line:<{_COLUMN}} # {'; '.join(meanings)}"
+
+
+def _meaning(key: Key, line: str) -> str:
+    """The meaning of a key that a line sets; where the line gives a bare number, with the unit that it has."""
+    number = re.search(rf"(?<![\w.]){re.escape(key.name.rpartition('.')[2])}\s*=\s*[-+.\d]", line)
+    return key.description + (f" [{unit_behind(key.unit).strip()}]" if number and key.unit else "")
 
 
 def _line(key: Key) -> str:
