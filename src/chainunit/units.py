@@ -76,6 +76,7 @@ FITTING: dict[str, tuple[str, ...]] = {
     "N": ("N", "kN"),
     "N.m": ("N m", "kN m"),
     "N.m/rad": ("N m/rad", "kN m/rad", "N m/deg"),
+    "N/m2": ("GPa", "MPa", "N/m2"),
     "s": ("s", "ms", "min", "h"),
     "rad": ("deg", "rad"),
     "rad/s": ("rev/min", "rad/s", "Hz", "rpm"),
