@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import re
 
 import fmpy
 import numpy as np
@@ -122,3 +123,24 @@ def test_an_expression_may_begin_with_a_number():
         data["links"]["rod"]["points"]["C"] = [text, 0]
         with pytest.raises(InputError, match=r"links.rod.points.C: .* has no units inside: write"):
             description_of(data, "press")
+
+
+BAR = {"from": "A", "to": "C", "area": "400 mm2", "density": "7850 kg/m3"}
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"groups": {"first": {"kind": "RRP"}}}, "groups: unknown key"),
+        ({"tables": {"share": {"phi": [0, 1, 2], "value": [0, 1, 2]}}}, "tables.share: no load uses it"),
+        ({"bar": {**BAR, "to": "A"}}, "links.rod.bar: goes from A to A; from and to must be two points"),
+        ({"bar": {**BAR, "density": "-7850 kg/m3"}}, 'links.rod.bar.density: is "-7850 kg/m3"; must be > 0'),
+        ({"bar": {**BAR, "area": 0}}, "links.rod.bar.area: is 0; must be > 0"),
+    ],
+)
+def test_nothing_in_a_file_is_without_effect_or_without_mass(more, words):
+    data = tables(MACHINES["slider_crank_press"]["description"])
+    bar = more.pop("bar", BAR)
+    data["links"]["rod"] = {"points": data["links"]["rod"]["points"], "bar": bar}
+    with pytest.raises(InputError, match=re.escape(words)):
+        description_of(data | more, "press")

@@ -27,7 +27,7 @@ from .structure import JointEntry
 
 TABLES = (
     "title", "name", "gravity", "ratio", "parameters", "inputs", "tables", "ground", "driver", "links", "joints",
-    "groups", "loads", "pins", "guides", "start",
+    "loads", "pins", "guides", "start",
 )  # fmt: skip
 _LINK_KEYS = ("points", "mass", "inertia", "centroid", "masses", "bar")
 _JOINT_KEYS = ("type", "on", "by", "toward", "angle", "length")
@@ -87,6 +87,9 @@ class _LinkageReader(EntryReader):
                 if each["name"] not in self.used:
                     self.fault(f"{kind}.{each['name']}", "nothing uses it; use it, or take it out")
                 each["unit"] = each["unit"] or self.units[each["name"]] or "1"
+        for name in tables:
+            if name not in self.used:
+                self.fault(f"tables.{name}", "no load uses it; use it, or take it out")
         self.names(parameters, inputs, links, joints)
         self.faults.refuse()
         start = self.start(parameters, joints, driver)
@@ -172,9 +175,14 @@ class _LinkageReader(EntryReader):
             if end not in points:
                 self.fault(f"{key}.bar", f"from and to must be two points of the link: {', '.join(points)}")
                 return {}
+        if ends[0] == ends[1]:
+            self.fault(f"{key}.bar", f"goes from {ends[0]} to {ends[0]}; from and to must be two points")
         (ax, ay), (bx, by) = (points[str(end)] for end in ends)
         area = self.entry(f"{key}.bar.area", bar.get("area"), "m2")
         density = self.entry(f"{key}.bar.density", bar.get("density"), "kg/m3")
+        for each, value in (("area", area), ("density", density)):
+            if not isinstance(value, str) and value <= 0.0 and each in bar:
+                self.fault(f"{key}.bar.{each}", f"is {shown(bar[each])}; must be > 0")
         square = f"((({bx}) - ({ax}))**2 + (({by}) - ({ay}))**2)"
         mass = f"({area}) * ({density}) * sqrt({square})"
         middle = [f"0.5 * (({a}) + ({b}))" for a, b in ((ax, bx), (ay, by))]
