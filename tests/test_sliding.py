@@ -15,8 +15,9 @@ from chainunit.groups.dyad import Dyad
 from chainunit.groups.group import Rail
 from chainunit.groups.legs import BlockLeg, RodLeg, SlotLeg
 from chainunit.groups.loads import GuideLosses, PinLosses, Push, Weight
-from chainunit.groups.sliding import PRP, RPP, RPR, RRP
+from chainunit.groups.sliding import RPR, RRP
 from chainunit.groups.triad import Pose, Triad
+from chainunit.groups.yokes import PRP, RPP
 from chainunit.mechanism.linkage import Linkage
 from chainunit.mechanism.machine import MachineState, Mechanism, derived_numbers
 from chainunit.planar import Vec2

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+from ...mechanism.models import declared_class
 from ...ports import ShaftMotion
-from ...quantities import Value, declaration, group, quantity
+from ...quantities import Layout, Value, declaration, group, quantity
 from ..parts import Force, GuideLaw, Pin
 
 
@@ -101,3 +106,34 @@ class WayRunning(Energies):
     """Outputs of every machine whose driver slides."""
 
     tau: Value = quantity("N", "force needed at the driver, J a + tau_bias", nominal=1000.0)
+
+
+def field_of(entry: Mapping[str, Any]) -> tuple[str, Any, Any]:
+    """A quantity of the user's as a field of a declaration."""
+    bounds = {key: entry[key] for key in ("min", "max") if entry.get(key) is not None}
+    words = entry.get("description") or entry["name"]
+    return (
+        entry["name"],
+        Value,
+        quantity(entry["unit"], words, default=entry["value"], tunable=entry.get("tunable", False), **bounds),
+    )
+
+
+def with_starts(of: type, starts: Mapping[str, float]) -> type:
+    """A declaration with other start values, by name."""
+    flat = Layout(of).from_names(dict(starts))
+    fields = [
+        (f.name, f.type, group(f.metadata["of"], f.metadata["group"], default=getattr(flat, f.name)))
+        if "of" in f.metadata
+        else (
+            f.name,
+            f.type,
+            dataclasses.field(
+                default=getattr(flat, f.name),
+                metadata=f.metadata
+                | {"quantity": dataclasses.replace(f.metadata["quantity"], start=getattr(flat, f.name))},
+            ),
+        )
+        for f in dataclasses.fields(of)
+    ]
+    return declared_class(of.__name__, (), fields)

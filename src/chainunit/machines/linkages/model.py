@@ -8,16 +8,15 @@ x points right, y up, angles count counter-clockwise from the x axis. The coordi
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any, cast
 
 from ...engines import MATH
 from ...errors import InputError
-from ...groups.group import GuideForce
 from ...groups.loads import GuideLosses, PinLosses, Weight
 from ...mechanism.assur import GROUND, PRISMATIC
 from ...mechanism.driver_ports import ROTATING, SLIDING, AddedInertia
@@ -26,9 +25,9 @@ from ...mechanism.linkage import Linkage
 from ...mechanism.machine import MachineState, Mechanism, derived_numbers
 from ...mechanism.models import InverseMachine, declared_class, names_of
 from ...model import Requirement
-from ...planar import Motion, Vec2
+from ...planar import Vec2
 from ...ports import LoadInput, PortSlopes, PortValues, Start
-from ...quantities import Layout, Value, group, quantity
+from ...quantities import Value, group, quantity
 from ..parts import Force, force
 from .declarations import (
     CommonParameters,
@@ -39,9 +38,12 @@ from .declarations import (
     PointMotion,
     Running,
     WayRunning,
+    field_of,
+    with_starts,
 )
 from .loads import CoordinateTable, ForceLaw, SpringDamper, TorqueLaw
-from .parts import LinkageParts, LinkFrame
+from .parts import LinkageParts
+from .probes import guide_reaction, own_axis, point_motion
 from .structure import DriverEntry, JointEntry, LinkEntry, Structure
 
 ANGLES = 48
@@ -65,6 +67,13 @@ RESERVED = frozenset(
     for name in names_of(of)
 )
 """Names of variables that every machine has."""
+
+
+@dataclass
+class DescribedLinkage(Linkage):
+    """A linkage with the parts that it was made from."""
+
+    parts: LinkageParts
 
 
 def machine_of(text: str) -> type[InverseMachine]:
@@ -123,7 +132,7 @@ class LinkageDescription:
             for name, each in data.get("tables", {}).items()
         }
         self.Parameters = self._parameters()
-        inputs = [_field(each) for each in data.get("inputs", ())]
+        inputs = [field_of(each) for each in data.get("inputs", ())]
         self.port, motion = ROTATING, cast("type", LinkageMotion)
         if driver.linear:
             low, high = data["range"]
@@ -143,13 +152,13 @@ class LinkageDescription:
     # declarations
 
     def _parameters(self) -> Any:
-        fields = [_field(each) for each in self.data.get("parameters", ())]
+        fields = [field_of(each) for each in self.data.get("parameters", ())]
         for link in self.data["links"]:
             own = link.get("own", {})
             if own:
                 name, words = self.variable("link", link["name"]), f"link {link['name']}"
                 fields.append((name, LinkBody, group(LinkBody, words, default=LinkBody(**own))))
-        return declared_class("Parameters", (_with_starts(CommonParameters, self.data["common"]),), fields)
+        return declared_class("Parameters", (with_starts(CommonParameters, self.data["common"]),), fields)
 
     def variable(self, kind: str, name: str) -> str:
         """The name under which the variables of a link or a joint stand: with its kind where the name has another
@@ -173,8 +182,8 @@ class LinkageDescription:
         """The groups with the values of parameters and inputs."""
         return LinkageParts(xp, self.structure, self.values(p, u), self.sides)
 
-    def linkage(self, xp: Any, p: Any, u: Any) -> tuple[Linkage, LinkageParts]:
-        """The linkage with the values of parameters and inputs, and its parts."""
+    def linkage(self, xp: Any, p: Any, u: Any) -> DescribedLinkage:
+        """The linkage with the values of parameters and inputs."""
         parts = self.parts(xp, p, u)
         loads: dict[str, Any] = {"weight": Weight(p.g)}
         for load in self.data["loads"]:
@@ -187,7 +196,7 @@ class LinkageDescription:
                 if "length" in each
             }
             loads["guides"] = GuideLosses(p.guides, p.guides.damping, lengths)
-        return Linkage(parts.ground, parts.driver, parts.groups, loads), parts
+        return DescribedLinkage(parts.ground, parts.driver, parts.groups, loads, parts)
 
     def _load(self, load: Mapping[str, Any], parts: LinkageParts) -> Any:
         kind = load["type"]
@@ -244,7 +253,8 @@ class LinkageDescription:
         InputError
             where the linkage does not close, or passes a dead position, with the place of the driver.
         """
-        linkage, parts = self.linkage(MATH, p, u)
+        linkage = self.linkage(MATH, p, u)
+        parts = linkage.parts
         try:
             derived = derived_numbers(MATH, linkage)
         except (ArithmeticError, ValueError):
@@ -264,7 +274,7 @@ class LinkageDescription:
                 if not margin * sign > LEAST_MARGIN:
                     raise InputError(self._dead(each.links, q))
             for name in self.structure.links:
-                axis = _own_axis(m.links[name].u, parts.frames[name])
+                axis = own_axis(m.links[name].u, parts.frames[name])
                 angle = math.atan2(axis.y, axis.x)
                 before = angles.setdefault(name, [self.structure.poses[name][2]])
                 before.append(before[-1] + math.remainder(angle - before[-1], 2.0 * math.pi))
@@ -346,7 +356,7 @@ class LinkageDescription:
             @staticmethod
             def linkage(xp: Any, p: Any, u: Any) -> Linkage:
                 """See `LinkageDescription.linkage`."""
-                return described.linkage(xp, p, u)[0]
+                return described.linkage(xp, p, u)
 
             @staticmethod
             def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
@@ -365,7 +375,7 @@ class LinkageDescription:
     def limits(self, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
         """The least margin of each group over the way of the driver, and its limit."""
         u = self.Inputs()
-        linkage, _ = self.linkage(xp, p, u)
+        linkage = self.linkage(xp, p, u)
         derived = getattr(p, "derived", ())
         least: list[Any] = []
         for q in self.places():
@@ -381,7 +391,7 @@ class LinkageDescription:
     @cached_property
     def _signs(self) -> list[float]:
         """The signs of the margins with the start values."""
-        linkage, _ = self.linkage(MATH, self.Parameters(), self.Inputs())
+        linkage = self.linkage(MATH, self.Parameters(), self.Inputs())
         m = Mechanism(MATH, linkage, self.places()[0], derived_numbers(MATH, linkage))
         return [math.copysign(1.0, margin) for margin in m.margins()]
 
@@ -411,8 +421,9 @@ class LinkageDescription:
 
     def probes(self, xp: Any, p: Any, u: Any, s: MachineState, a: Any) -> dict[str, Any]:
         """Reactions, rotation of links and motion of points at acceleration `a` of the driver."""
-        parts = self.parts(xp, p, u)
         reactions, m, w = s.reactions(a), s.m, s.w
+        assert isinstance(m.linkage, DescribedLinkage)
+        parts = m.linkage.parts
         given = sum(
             s.effects[each["name"]].dissipative for each in self.data["loads"] if each["type"] != "spring"
         )
@@ -420,7 +431,7 @@ class LinkageDescription:
         for name, joint in self.structure.joints.items():
             key, sign = parts.receivers[name]
             if joint.kind == PRISMATIC:
-                value: Any = _guide(m, joint, key, sign, reactions[key], parts, w, a)
+                value: Any = guide_reaction(m, joint, key, sign, reactions[key], parts, w, a)
             else:
                 f = reactions[key]
                 value = force(f if sign > 0.0 else -f)
@@ -428,16 +439,16 @@ class LinkageDescription:
         for name, link in self.structure.links.items():
             moving, frame = m.links[name], parts.frames[name]
             fields = {
-                "angle": self._angle(xp, name, _own_axis(moving.u, frame), m.q),
+                "angle": self._angle(xp, name, own_axis(moving.u, frame), m.q),
                 "w": moving.t1 * w,
                 "a": moving.t2 * (w * w) + moving.t1 * a,
             }
             for point in link.points:
                 at = frame.of(parts.point(name, point))
-                fields[point] = _moved(moving.beside(at.x, at.y), w, a)
+                fields[point] = point_motion(moving.beside(at.x, at.y), w, a)
             if link.heavy:
                 at = frame.of(parts.vector(link.centroid))
-                fields["centroid"] = _moved(moving.beside(at.x, at.y), w, a)
+                fields["centroid"] = point_motion(moving.beside(at.x, at.y), w, a)
             values[self.variable("link", name)] = self.link_outputs[name](**fields)
         return values
 
@@ -450,88 +461,8 @@ class LinkageDescription:
         return about + xp.atan2(c * axis.y - s * axis.x, c * axis.x + s * axis.y)
 
 
-def _own_axis(u: Vec2, frame: LinkFrame) -> Vec2:
-    """The x axis of a link's description, from the direction of its frame in the group."""
-    e = frame.axis
-    return Vec2(u.x * e.x + u.y * e.y, u.y * e.x - u.x * e.y)
-
-
-def _moved(k: Motion, w: Any, a: Any) -> PointMotion:
-    w2 = w * w
-    return PointMotion(
-        x=k.p.x,
-        y=k.p.y,
-        vx=k.p1.x * w,
-        vy=k.p1.y * w,
-        ax=k.p1.x * a + k.p2.x * w2,
-        ay=k.p1.y * a + k.p2.y * w2,
-    )
-
-
 def _least(xp: Any, a: Any, b: Any) -> Any:
     """The lesser of two numbers; NaN where either is."""
     if isinstance(a, float) and math.isnan(a):
         return a
     return b if isinstance(b, float) and math.isnan(b) else xp.minimum(a, b)
-
-
-def _guide(
-    m: Mechanism,
-    joint: JointEntry,
-    key: tuple[str, str],
-    sign: float,
-    reaction: Vec2,
-    parts: LinkageParts,
-    w: Any,
-    a: Any,
-) -> GuideReaction:
-    """The reaction of a sliding joint on the link that is named first, about its point, and the motion in it."""
-    assert isinstance(reaction, GuideForce)
-    slide, block = m.slides[key], m.pins[key[0]]
-    # the line of the driver has the direction in which the driver moves
-    along = sign if joint.name == parts.structure.driver.joint else 1.0
-    d = slide.d * along
-    n = d.turned()
-    moment = reaction.moment - (block.p - m.links[key[1]].pin.p).cross(reaction)
-    start = m.pins[parts.pin_on(*joint.by)]
-    s1, s2 = slide.s1 * sign * along, slide.s2 * sign * along
-    return GuideReaction(
-        fx=reaction.x * sign,
-        fy=reaction.y * sign,
-        normal=reaction.dot(n) * sign,
-        moment=moment * sign,
-        s=(block.p - start.p).dot(d),
-        v=s1 * w,
-        a=s1 * a + s2 * (w * w),
-    )
-
-
-def _field(entry: Mapping[str, Any]) -> tuple[str, Any, Any]:
-    """A quantity of the user's as a field of a declaration."""
-    bounds = {key: entry[key] for key in ("min", "max") if entry.get(key) is not None}
-    words = entry.get("description") or entry["name"]
-    return (
-        entry["name"],
-        Value,
-        quantity(entry["unit"], words, default=entry["value"], tunable=entry.get("tunable", False), **bounds),
-    )
-
-
-def _with_starts(of: type, starts: Mapping[str, float]) -> type:
-    """A declaration with other start values, by name."""
-    flat = Layout(of).from_names(dict(starts))
-    fields = [
-        (f.name, f.type, group(f.metadata["of"], f.metadata["group"], default=getattr(flat, f.name)))
-        if "of" in f.metadata
-        else (
-            f.name,
-            f.type,
-            dataclasses.field(
-                default=getattr(flat, f.name),
-                metadata=f.metadata
-                | {"quantity": dataclasses.replace(f.metadata["quantity"], start=getattr(flat, f.name))},
-            ),
-        )
-        for f in dataclasses.fields(of)
-    ]
-    return declared_class(of.__name__, (), fields)

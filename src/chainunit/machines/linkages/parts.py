@@ -18,8 +18,9 @@ from ...groups.driver import Crank, Driver, Ram
 from ...groups.dyad import Dyad
 from ...groups.group import Group, Rail
 from ...groups.legs import BlockLeg, Leg, RodLeg, SlotLeg
-from ...groups.sliding import PRP, RPP, RPR, RRP
+from ...groups.sliding import RPR, RRP
 from ...groups.triad import Pose, Triad
+from ...groups.yokes import PRP, RPP
 from ...mechanism.assur import GROUND, REVOLUTE, AssurGroup
 from ...mechanism.expressions import value_of
 from ...planar import ZERO, Vec2
