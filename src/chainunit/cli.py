@@ -18,7 +18,7 @@ import typer.core
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from .errors import InputError, InterruptedRunError, RunError, WriteError, near_name, printable
+from .errors import InputError, InterruptedRunError, RunError, WriteError, printable
 from .files import claim, clear, full, write_all
 
 if TYPE_CHECKING:
@@ -308,18 +308,12 @@ def linkage_command(
     """
     from .machines.linkages.file import read_linkage
     from .machines.machine import Machine
-    from .quantities import Variable, quantity
-    from .reading import to_number
+    from .reading import option_value
 
     machine = Machine(read_linkage(file))
     turns = machine.model.turns
-    declared = quantity("rad/s" if turns else "m/s", "speed of the driver", above=0.0).metadata["quantity"]
-    try:
-        rate = to_number(
-            Variable("--speed", declared.description, declared), speed or ("60 rpm" if turns else 0.1)
-        )
-    except ValueError as error:
-        raise InputError(str(error)) from None
+    usual, unit = ("60 rpm", "rad/s") if turns else ("0.1 m/s", "m/s")
+    rate = option_value("--speed", speed or usual, unit, "speed of the driver")
     with claim(output):
         from .report import files, linkage_report
         from .study.linkage_turn import linkage_findings
@@ -360,23 +354,11 @@ def export(
 ) -> None:
     """Write a model as an FMU."""
     from .fmu.backends import export as write
-    from .models import MODELS
+    from .models import model_named
     from .study.package import start_of, with_rods
     from .study.sections import ChainOrgans
 
-    model: Any = MODELS.get(name)
-    if name.lower().endswith(".toml"):
-        from .machines.linkages.file import read_linkage
-
-        model = read_linkage(Path(name))
-        model = model.direct() if direct else model
-    elif model is None:
-        there = f"there are {', '.join(MODELS)}, and linkage files (.toml)"
-        raise InputError(f"{name}: no such model{near_name(name, MODELS) or ';'} {there}")
-    elif direct:
-        raise InputError(
-            "--direct: is of linkage files; the direct model of a machine has a name, as ChainUnit"
-        )
+    model: Any = model_named(name, direct)
     file = output or Path(f"{model.name}.fmu")
     if file.suffix != ".fmu":
         raise InputError(f"-o {file}: must be a file name that ends in .fmu")

@@ -1,12 +1,15 @@
 """The models that become FMUs, by name. A module of `machines` adds its own machine."""
 
 from importlib import import_module
+from pathlib import Path
 from pkgutil import iter_modules
 
 from . import machines
 from .drives.driveline import CardanDriveline
 from .drives.motors import MOTORS
+from .errors import InputError, near_name
 from .machines.flexible import ChainUnitFlexible
+from .machines.linkages.file import read_linkage
 from .mechanism.models import MACHINES as MACHINES
 from .model import Model
 
@@ -24,3 +27,24 @@ _MODELS: tuple[type[Model], ...] = (
 )
 MODELS = {model.name: model for model in _MODELS}
 """All models."""
+
+
+def model_named(name: str, direct: bool = False) -> type[Model]:
+    """The model of that name, or of a linkage file (.toml), of which also the `direct` model.
+
+    Raises
+    ------
+    InputError
+        for another name, for a file that is wrong, and for `direct` with a model.
+    """
+    if name.lower().endswith(".toml"):
+        machine = read_linkage(Path(name))
+        return machine.direct() if direct else machine
+    if name not in MODELS:
+        there = f"there are {', '.join(MODELS)}, and linkage files (.toml)"
+        raise InputError(f"{name}: no such model{near_name(name, MODELS) or ';'} {there}")
+    if direct:
+        raise InputError(
+            "--direct: is of linkage files; the direct model of a machine has a name, as ChainUnit"
+        )
+    return MODELS[name]

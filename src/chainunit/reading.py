@@ -30,7 +30,7 @@ from pydantic_core import ErrorDetails
 
 from . import places, units
 from .errors import InputError, near_name, printable, shown
-from .quantities import Layout, Variable, complaint, variables
+from .quantities import Layout, Quantity, Variable, complaint, variables
 from .refusals import unit_behind
 from .syntax import syntax_faults
 
@@ -76,6 +76,22 @@ def _converted(variable: Variable, text: str) -> float:
     meant = units.probable_text(text, variable.unit, variable.kind)
     hint = f'; was "{meant}" meant?' if meant else ""
     raise ValueError(f"{variable.name} = {shown(text)}: must be {_kind(variable)}{hint}")
+
+
+def option_value(name: str, text: str, unit: str, description: str) -> float:
+    """The positive value of an option of the command line in `unit`.
+
+    Raises
+    ------
+    InputError
+        in one line, with the range and an example.
+    """
+    try:
+        return to_number(
+            Variable(name, description, Quantity(unit, description, low=0.0, open_low=True)), text
+        )
+    except ValueError as error:
+        raise InputError(str(error)) from None
 
 
 @dataclass(frozen=True)

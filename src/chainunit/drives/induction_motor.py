@@ -14,7 +14,7 @@ of the supply.
 All leakage is on the rotor side, so that saturation of the main path follows from |psi_s| alone: 1/L_m grows by
 (beta |psi_s|)^6. The skin effect of a deep bar raises R_r and lowers L_l with the slip frequency, quasi-steadily, by
 2 s^2/(1 + s^2), with s = 1 at standstill on the line. Sources: H. R. Slemon, "Modelling of induction machines for
-electric drives", 1989; the saturation curve of the package motulator, with which the tests compare.
+electric drives", 1989; the saturation curve of motulator, with which the tests compare.
 """
 
 from __future__ import annotations
@@ -428,7 +428,6 @@ class InductionMotor(Motor):
             ("stator.R", "cage.R", "cage.skin_R", "cage.skin_L"),
         ),
     )
-
     control = "an inverter, which follows the speed asked for by its frequency"
 
     @staticmethod
@@ -477,16 +476,14 @@ class InductionMotor(Motor):
 
     @staticmethod
     def internal_step(xp: Any, p: Any) -> Any:
-        """The least of a quarter of the fluxes' time constant, a twelfth of a radian of the supply, the time constant
-        of the rotor with its friction alone, and 0.25 ms."""
+        """The least of a quarter of the fluxes' time constant, 1/12 rad of the supply, `friction_time`, 0.25 ms."""
         by_flux = 0.25 * p.cage.L * (1.0 - p.cage.skin_L) / _resistance(p)
         longest = xp.minimum(xp.minimum(2.5e-4, 1.0 / (12.0 * _TURN * p.supply.f)), by_flux)
         return xp.minimum(longest, friction_time(xp, p.rotor))
 
     @staticmethod
     def initial_states(xp: Any, p: Any) -> Any:
-        """The states without flux, at the start angle and speed, at ambient temperature; an inverter starts at
-        frequency 0."""
+        """The states without flux at the start, at ambient temperature; an inverter starts at frequency 0."""
         return States(
             phi=p.phi_start,
             w=p.w_start,
