@@ -318,3 +318,15 @@ def test_a_table_on_a_narrow_terminal_keeps_its_right_edge_and_its_numbers_whole
     text = out.getvalue()
     assert (width == 66 and not grouped) or text.count("0.00431 kg m²") == 9, text
     assert text.count("0.00431") == 9 and text.count("machine") == (3 if text.count("Inertias") == 1 else 6)
+
+
+def test_markdown_has_the_lines_below_the_numbers_of_a_card():
+    card = b.Card(
+        "crank torque",
+        ((Number(40.0, "N.m"), "peak"),),
+        (line("overload: peak ", Number(194.0, "N.m"), ", a lump"),),
+    )
+    cards = (card, b.Card("motor", (("IE3", "chosen"),)))
+    document = markdown(b.Report("T", "k", {}, (b.Cards(cards),), ()), [])
+    assert "| Crank torque | 40.0 N m | peak |" in document
+    assert document.count("\n- ") == 1 and "\n- Crank torque: overload: peak 194 N m, a lump\n" in document

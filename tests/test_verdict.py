@@ -164,7 +164,7 @@ def test_words_and_data():
     assert verdict.details(CALLED | {"feed_left": "feed to left"}) == [
         "Bars that are pushed, where a chain would go slack and snatch: feed to left (web -44.3 N, wall -26.2 N); "
         "a lump jams (wall -995 N).",
-        "Crank speed above the limit up to which two bars give the rocker torque to 10 %: 3.00 rad/s, limit "
+        "Crank speed at which the rocker torque of two bars may be wrong by more than 10 %: 3.00 rad/s, limit "
         "2.00 rad/s.",
     ]
     data = verdict.as_dict()

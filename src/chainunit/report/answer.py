@@ -32,9 +32,11 @@ def blocks(s: b.Source, study: StudyRecord) -> Iterator[b.Block]:
     answers = s.result["answers"]
     if answers:
         reference = "steady" if "steady" in answers else next(iter(answers))
-        worst = " Below them: the overload with the largest value." if study.overloads else ""
+        worst = " Then the overload with the largest value." if study.overloads else ""
         speed = _speed(s, study, reference)
-        lead = line(f"Large numbers: {run_names.title(study, reference)}, the crank at ", speed, f".{worst}")
+        lead = line(
+            f"First the values of {run_names.title(study, reference)}, the crank at ", speed, f".{worst}"
+        )
         yield b.Text(lead, "lead", "long")
         yield b.Cards(tuple(_cards(s, study, reference)))
     else:

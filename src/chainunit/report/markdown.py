@@ -65,7 +65,13 @@ def block_lines(block: Block, units: Units, pictures: Collection[str] = ()) -> l
                 for card in block.cards
                 for value, which in card.numbers
             ]
-            return list(_grid(rows, ("", "", "")))
+            heads = [markdown_text(capital(card.title)) for card in block.cards]
+            also = [
+                f"- {head}: {_line(line, units)}"
+                for head, card in zip(heads, block.cards, strict=True)
+                for line in card.also
+            ]
+            return [*_grid(rows, ("", "", "")), *also, *([""] if also else [])]
         case Table():
             return _table(block, units)
         case Tables():

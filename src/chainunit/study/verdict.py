@@ -53,13 +53,13 @@ _TOPICS = {
     ),
     "crank torque": (
         "the torques of rocker and crank may be off by more than 10 %, as a chain resonates",
-        "Crank speed above the limit up to which two bars give the crank torque to 10 %; the limit for the rocker "
+        "Crank speed at which the crank torque of two bars may be wrong by more than 10 %; the limit for the rocker "
         "torque is lower",
         _CHAINS,
     ),
     "rocker torque": (
         "the rocker torque may be off by more than 10 %, as a chain resonates",
-        "Crank speed above the limit up to which two bars give the rocker torque to 10 %",
+        "Crank speed at which the rocker torque of two bars may be wrong by more than 10 %",
         _CHAINS,
     ),
     "energy": (
