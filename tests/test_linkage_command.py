@@ -13,6 +13,9 @@ import pytest
 from command import chainunit
 from linkage_files import MACHINES
 
+from chainunit.errors import GeometryError
+from chainunit.fmu.native.export import export
+from chainunit.fmu.native.platforms import compiler
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
 from chainunit.study import config
@@ -131,3 +134,21 @@ def test_wrong_machines_of_a_study(tmp_path, change, words):
     (tmp_path / "mine.toml").write_text(STUDY.replace(*change), "utf-8")
     done = run("study", "mine.toml", cwd=tmp_path, status=2)
     assert words in done.stderr, done.stderr
+
+
+def test_lengths_that_do_not_close_say_where():
+    with pytest.raises(GeometryError, match=r"rod, ram cannot close at .* deg of crank: .*l = 0.1 m"):
+        Machine(read_linkage(PRESS), {"l": 0.1})
+
+
+@pytest.mark.skipif(compiler() is None, reason="no C compiler")
+def test_a_native_fmu_refuses_lengths_that_do_not_close(tmp_path):
+    """Although it closes at the start angle."""
+    file = export(read_linkage(PRESS), tmp_path / "press.fmu")
+    logged = []
+    with pytest.raises(Exception, match="InitializationMode failed"):
+        fmpy.simulate_fmu(
+            str(file), stop_time=0.01, start_values={"l": 0.1, "phi": 1.0}, fmi_type="CoSimulation",
+            logger=lambda *told: logged.append(told[-1].decode()),
+        )  # fmt: skip
+    assert any("least margin of the group of rod, ram" in line for line in logged)

@@ -16,7 +16,7 @@ from functools import cache, cached_property
 from typing import Any, cast
 
 from ...engines import MATH
-from ...errors import InputError
+from ...errors import GeometryError, InputError
 from ...groups.loads import GuideLosses, PinLosses, Weight
 from ...mechanism.assur import GROUND, PRISMATIC
 from ...mechanism.driver_ports import ROTATING, SLIDING, AddedInertia
@@ -28,6 +28,7 @@ from ...model import Requirement
 from ...planar import Vec2
 from ...ports import LoadInput, PortSlopes, PortValues, Start
 from ...quantities import Value, group, quantity
+from ...refusals import unit_behind
 from ..parts import Force, force
 from .declarations import (
     CommonParameters,
@@ -286,6 +287,19 @@ class LinkageDescription:
             turning[name] = rate, 0.5 * (min(rest) + max(rest)) - rate * around[0]
         return turning
 
+    def obstacle(self, p: Any) -> str:
+        """The sentence on the place at which the linkage with these parameters does not close or jams, with the
+        parameters; empty where there is none."""
+        try:
+            self._followed(p, self.Inputs())
+        except InputError as error:
+            given = ", ".join(
+                f"{each['name']} = {getattr(p, each['name']):g}{unit_behind(each['unit'])}"
+                for each in self.data.get("parameters", ())
+            )
+            return f"{error}{f' ({given})' * bool(given)}"
+        return ""
+
     def _dead(self, links: Sequence[str], q: float) -> str:
         return (
             f"the group of {', '.join(links)} comes to a dead position at {self._at(q)}: there its forces have no "
@@ -357,6 +371,15 @@ class LinkageDescription:
             def linkage(xp: Any, p: Any, u: Any) -> Linkage:
                 """See `LinkageDescription.linkage`."""
                 return described.linkage(xp, p, u)
+
+            @classmethod
+            def check(cls, p: Any, derived: list[Any] | None = None) -> Any:
+                """See `Model.check`; a refusal says where the linkage does not close."""
+                try:
+                    return super().check(p, derived)
+                except GeometryError as error:
+                    where = described.obstacle(p)
+                    raise (GeometryError(where) if where else error) from None
 
             @staticmethod
             def requirements(xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
@@ -462,7 +485,6 @@ class LinkageDescription:
 
 
 def _least(xp: Any, a: Any, b: Any) -> Any:
-    """The lesser of two numbers; NaN where either is."""
-    if isinstance(a, float) and math.isnan(a):
-        return a
-    return b if isinstance(b, float) and math.isnan(b) else xp.minimum(a, b)
+    """The lesser of two numbers, NaN where either is: `fmin` of C would pass by a NaN, and so a linkage that does not
+    close."""
+    return 0.5 * (a + b - xp.abs(a - b))
