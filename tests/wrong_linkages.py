@@ -39,3 +39,230 @@ force = [0, "press_force * share"]
 phi = "20 deg"
 points = { C = ["25 mm", "-356 mm"] }
 """
+
+GUIDE = '[joints.guide]\non = "ram.C"\nby = "ground.G"\ntoward = "G2"\n'
+ROUGH = 'points = { C = ["25 mm", "-356 mm"] }'
+R = 'r = { value = "80 mm", min = "10 mm", max = "200 mm" }'
+
+
+def crank(x):
+    """Another place of the point A of the crank."""
+    return [('["r", 0]', f'[{x}, "0 * r"]')]
+
+
+def added(text):
+    """More tables before [start]."""
+    return [("[start]", f"{text}\n[start]")]
+
+
+def called(name):
+    """The parameter l by another name."""
+    return [('l = "360 mm"', f'{name} = "360 mm"'), ('["l"', f'["{name}"')]
+
+
+def point(name):
+    """The point T of the ram by another name."""
+    return [("T = [0", f"{name} = [0"), ("T = ", f"{name} = "), ("ram.T", f"ram.{name}")]
+
+
+# what is changed, and for each fault its line, its key and words of the remedy
+CHANGES = [
+    # unknown keys
+    ([('mass = "14 kg"', 'maas = "14 kg"')], [(19, "links.crank.maas", 'was "mass" meant?')]),
+    ([("[loads.pressing]", "[load.pressing]")], [(32, "load", 'was "loads" meant?')]),
+    ([("toward =", "towards =")], [(31, "joints.guide.towards", 'was "toward" meant?')]),
+    ([("zero =", "zeros =")], [(16, "driver.zeros", 'was "zero" meant?')]),
+    ([("80 mm\", min", "80 mm\", mini")], [(3, "parameters.r.mini", 'was "min" meant?')]),
+    ([("value = [0", "values = [0")],
+     [(7, "tables.share", "two lists"), (9, "tables.share.values", "value")]),
+    (added("[pins]\nfrict = 0.1"), [(36, "pins.frict", 'was "friction" meant?')]),
+    ([(ROUGH, 'point = { C = [0, 0] }')], [(37, "start.point", 'was "points" meant?')]),
+    # units
+    ([('"14 kg"', '"14 mm"')], [(19, "links.crank.mass", 'write it as "2 kg"')]),
+    ([('"0.09 kg m2"', '"0.09 kg"')], [(20, "links.crank.inertia", 'write it as "2 kg m2"')]),
+    ([('zero = "0 deg"', 'zero = "5 mm"')], [(16, "driver.zero", 'write it as "2 deg"')]),
+    ([('"360 mm"', '"360 furlong"')], [(4, "parameters.l", "the unit is not known")]),
+    ([('"80 mm", min', '"80 mm", unit = "furlong", min')], [(3, "parameters.r", "known: 1, m, rad")]),
+    ([('"80 mm", min', '"80 mm", unit = "kg", min')], [(3, "parameters.r", 'write it as "2 kg"')]),
+    (added('[pins]\nfriction = "2 m"'), [(36, "pins.friction", 'write it as "0.2"')]),
+    ([('"240 deg"', '"4 mm"')], [(7, "tables.share", 'write it as "2 deg"')]),
+    # expressions
+    (crank('"radius"'), [(18, "links.crank.points.A", "radius is no parameter")]),
+    (crank('"2 * R"'), [(18, "links.crank.points.A", 'was "r" meant?')]),
+    (crank('"sinus(0.2) * r"'), [(18, "links.crank.points.A", 'was "sin" meant? known here: sin, cos')]),
+    (crank('"exp(1) * r"'), [(18, "links.crank.points.A", "no function exp; known here: sin, cos")]),
+    (crank('"r + "'), [(18, "links.crank.points.A", "no expression, such as 2 * r + 0.01")]),
+    (crank('"r ** 0.5"'), [(18, "links.crank.points.A", "whole powers up to 12")]),
+    (crank('"r if r else l"'), [(18, "links.crank.points.A", "an expression has numbers, names")]),
+    (crank('"r / 0"'), [(18, "links.crank.points.A", "divides by zero")]),
+    (crank('"10 mm + r"'), [(18, "links.crank.points.A", "write its numbers in SI units")]),
+    (crank('"press_force"'), [(18, "links.crank.points.A", "lengths cannot change in a run")]),
+    (crank('"r + phi"'), [(18, "links.crank.points.A", "phi is known in a load alone")]),
+    ([("press_force * share", "press_force * shore")],
+     [(7, "tables.share", "no load uses it"), (34, "loads.pressing.force", 'was "share" meant?')]),
+    ([('"360 mm"', '"2 * r"')], [(4, "parameters.l", "write an expression where it is used")]),
+    # dimensions
+    (crank('"r * l"'), [(18, "links.crank.points.A", "in m2; must be in m")]),
+    (crank('"r + l * l"'), [(18, "links.crank.points.A", "the one is in m, the other in m2")]),
+    (crank('"sin(r)"'), [(18, "links.crank.points.A", "takes an angle or a ratio, not m")]),
+    ([("press_force * share", "press_force * r")],
+     [(7, "tables.share", "no load uses it"), (34, "loads.pressing.force", "must be in N")]),
+    ([('mass = "32 kg"', 'mass = "2 * r"')], [(26, "links.ram.mass", "must be in kg")]),
+    # values
+    ([('mass = "32 kg"', 'mass = "-32 kg"')], [(26, "links.ram.mass", "must be >= 0")]),
+    ([('T = "2 kg"', 'T = "-2 kg"')], [(27, "links.ram.masses.T", "must be >= 0")]),
+    ([('T = "2 kg"', 'U = "2 kg"')], [(27, "links.ram.masses.U", "is no point of ram")]),
+    ([("value = \"80 mm\", min = \"10", "value = \"80 mm\", min = \"100")],
+     [(3, "parameters.r", "from min to max")]),
+    ([('value = "80 mm", ', "")], [(3, "parameters.r", "is missing; must be a number")]),
+    ([('l = "360 mm"', "l = nan")], [(4, "parameters.l", "must be finite")]),
+    (crank("inf"), [(18, "links.crank.points.A", "must be finite")]),
+    (crank('"nan"'), [(18, "links.crank.points.A", "nan is no parameter")]),
+    (crank("true"), [(18, "links.crank.points.A", "must be a number or a text with a unit")]),
+    ([('["r", 0]', '["r"]')], [(18, "links.crank.points.A", "a list of two, along x and y")]),
+    ([('"press"', '"press"\ngravity = "-3 m/s2"')], [(2, "gravity", "must be >= 0")]),
+    ([('"press"', "3")], [(1, "title", "must be a text")]),
+    ([('"press"', '"press"\nname = "a b"')], [(2, "name", "letters, digits and _")]),
+    ([("[0, 1, 0.5]", "[0, 1]")], [(7, "tables.share", "two lists of one length, of 3 or more")]),
+    ([('"240 deg"', '"100 deg"')], [(7, "tables.share", "phi must rise")]),
+    ([('"240 deg"', '"400 deg"')], [(7, "tables.share", "less than one turn")]),
+    ([('l = "360 mm"', 'l = "0 m"')], [(22, "links.rod.points", "place them apart")]),
+    ([('G2 = ["25 mm", "-1 m"]', 'G2 = ["25 mm", 0]')], [(31, "joints.guide.toward", "no direction")]),
+    # what is not used, or not there
+    ([('l = "360 mm"', 'l = "360 mm"\nq = 3')], [(5, "parameters.q", "use it, or take it out")]),
+    ([('force = [0, "press_force * share"]', "force = [0, 9]")],
+     [(6, "inputs.press_force", "take it out"), (7, "tables.share", "no load uses it")]),
+    ([('"ram.T"', '"ram.S"')], [(33, "loads.pressing.on", "S is no point of ram; its points: C, T")]),
+    ([('"ram.T"', '"rim.C"')], [(33, "loads.pressing.on", "rim is no link")]),
+    ([('"ram.T"', '"T"')], [(33, "loads.pressing.on", 'such as "rod.A"')]),
+    ([('"ram.T"', '"ground.G"')], [(33, "loads.pressing.on", "give a point of a link")]),
+    ([('on = "ram.T"\n', "")], [(32, "loads.pressing.on", "is missing; must be a link and its point")]),
+    ([('on = "ram.C"', 'on = "ram.c"')], [(29, "joints.guide.on", 'was "C" meant? its points')]),
+    ([('on = "ram.C"\n', "")], [(28, "joints.guide.on", "is missing")]),
+    ([('by = "ground.G"', 'by = "ram.T"')], [(28, "joints.guide", "with itself")]),
+    ([('toward = "G2"', 'toward = "G3"')], [(31, "joints.guide.toward", "another point of ground")]),
+    ([('toward = "G2"', 'type = "prismatic"')], [(28, "joints.guide.toward", "is missing; must be")]),
+    ([('toward = "G2"', 'type = "slider"')], [(31, "joints.guide.type", '"revolute" or "prismatic"')]),
+    ([("[loads.pressing]", '[loads.pressing]\ntype = "forc"')],
+     [(33, "loads.pressing.type", 'was "force" meant?')]),
+    # the driver
+    ([('[driver]\nlink = "crank"\nzero = "0 deg"\n', "")],
+     [(0, "driver", "the link that the motor turns")]),
+    ([('link = "crank"', 'link = "cronk"')], [(15, "driver.link", 'was "crank" meant?')]),
+    ([('link = "crank"', 'link = "rod"')], [(15, "driver.link", "one revolute joint with the ground")]),
+    ([('zero = "0 deg"', 'positive = "left"')], [(16, "driver.positive", '"counter-clockwise"')]),
+    # degrees of freedom and assembly
+    ([("A = [0, 0], C", "Q = [0, 0], C")], [(21, "links.rod", "rod has one joint; add a joint")]),
+    ([(GUIDE, "")], [(24, "links.ram", "too many degrees of freedom: 3")]),
+    ([("[links.ram]", "[links.extra]\npoints = { C = [0, 0] }\n[links.ram]")],
+     [(24, "links.extra", "has one joint")]),
+    ([("[links.ram]", "[links.extra]\npoints = { Z = [0, 0] }\n[links.ram]")],
+     [(24, "links.extra", "no joint")]),
+    ([("[links.ram]", "[links.extra]\n[links.ram]")],
+     [(24, "links.extra", "has no points; give points = {")]),
+    (added('[joints.more]\non = "ram.T"\nby = "ground.G"'),
+     [(24, "links.ram", "take out a joint, such as more")]),
+    ([('"80 mm", min', '"500 mm", min'), ('"200 mm"', '"2 m"')],
+     [(21, "links.rod", "cannot close at 20 deg of crank")]),
+    ([('"80 mm", min', '"360 mm", min'), ('"200 mm"', '"2 m"'), ('["25 mm"', "[0"), ('["25 mm"', "[0")],
+     [(21, "links.rod", "comes to a dead position at")]),
+    ([('"80 mm", min', '"360.5 mm", min'), ('"200 mm"', '"2 m"'), ('["25 mm"', "[0"), ('["25 mm"', "[0")],
+     [(21, "links.rod", "cannot close at")]),
+    ([(ROUGH, "")], [(35, "start", "does not place the links rod, ram: give the angle of rod")]),
+    ([(ROUGH, "points = { Z = [0, 0] }")], [(37, "start.points.Z", "is no point of a link")]),
+    ([(ROUGH, "points = { C = [0] }")], [(37, "start.points.C", "a list of two")]),
+    ([(ROUGH, 'angles = { rode = "3 deg" }')], [(37, "start.angles.rode", 'was "rod" meant?')]),
+    ([(ROUGH, "poses = { rod = [0, 0] }")], [(37, "start.poses.rod", "a list of three")]),
+    # springs
+    (added('[loads.s]\ntype = "spring"\non = "ram.C"\nby = "rod.C"'),
+     [(35, "loads.s", "give points that move apart")]),
+    (added('[loads.s]\ntype = "spring"\non = "ram.C"\nby = "ram.T"'),
+     [(35, "loads.s", "give points of two links")]),
+    (added('[loads.s]\ntype = "spring"\non = "ram.C"\nby = "ground.G"\nstiffness = -3'),
+     [(39, "loads.s.stiffness", "must be >= 0")]),
+    # names
+    (called("lambda"), [(4, "parameters.lambda", "choose another name, such as lambda_1")]),
+    (called("sin"), [(4, "parameters.sin", "has a meaning in expressions")]),
+    (called("x"), [(4, "parameters.x", "has a meaning in expressions")]),
+    (called("rod"), [(4, "parameters.rod", "is the name of a link, too")]),
+    (called("tau"), [(4, "parameters.tau", "is a variable of every linkage")]),
+    (called("mass_of_rod"), [(4, "parameters.mass_of_rod", "is a variable of every linkage")]),
+    (called("share"), [(7, "tables.share", "is a name in [parameters], too")]),
+    ([("[links.rod]", "[links.class]")], [(21, "links.class", "such as class_1")]),
+    ([("[links.rod]", '[links."rod 2"]')], [(21, "links.rod 2", "letters, digits and _")]),
+    ([("[joints.guide]", "[joints.if]")], [(28, "joints.if", "such as if_1")]),
+    ([("[joints.guide]", "[joints.A]")], [(28, "joints.A", "rename the point or the joint")]),
+    (point("angle"), [(25, "links.ram.points.angle", "is a variable of every link")]),
+    (point("centroid"), [(25, "links.ram.points.centroid", "is a variable of every link")]),
+    (point("is"), [(25, "links.ram.points.is", "such as is_1")]),
+    # several at once
+    ([*crank('"2 * R"'), ('"32 kg"', '"32 mm"'), ("toward =", "towards ="), ('l = "360 mm"', 'l = "360 mm"\nq = 3')],
+     [(5, "parameters.q", ""), (19, "links.crank.points.A", ""),
+      (27, "links.ram.mass", ""), (32, "joints.guide.towards", "")]),
+]  # fmt: skip
+
+FOUR_BARS = """\
+[ground]
+O1 = [0, 0]
+O2 = [1, 0]
+O3 = [1, 1]
+O4 = [0, 1]
+[driver]
+link = "crank"
+[links]
+crank = { points = { O1 = [0, 0], A = [0.1, 0] } }
+one = { points = { X = [0, 0], B = [0.2, 0], C = [0.1, 0.2] } }
+two = { points = { X = [0, 0], D = [0.2, 0], E = [0.1, 0.2] } }
+leg_b = { points = { A = [0, 0], B = [0.4, 0] } }
+leg_c = { points = { O2 = [0, 0], C = [0.4, 0] } }
+leg_d = { points = { O3 = [0, 0], D = [0.4, 0] } }
+leg_e = { points = { O4 = [0, 0], E = [0.4, 0] } }
+"""
+SLIDES = """\
+[ground]
+O1 = [0, 0]
+G = [1, 0]
+G2 = [1, 1]
+[driver]
+link = "crank"
+[links]
+crank = { points = { O1 = [0, 0], S = [0, 0], S2 = [1, 0] } }
+block = { points = { B = [0, 0], T = [0, 0], T2 = [0, 1] } }
+ram = { points = { C = [0, 0] } }
+[joints]
+one = { on = "block.B", by = "crank.S", toward = "S2" }
+two = { on = "ram.C", by = "block.T", toward = "T2" }
+three = { on = "ram.C", by = "ground.G", toward = "G2" }
+"""
+TRIAD = """\
+[ground]
+O1 = [0, 0]
+O2 = [1, 0]
+G = [1, 1]
+G2 = [2, 1]
+[driver]
+link = "crank"
+[links]
+crank = { points = { O1 = [0, 0], A = [0.1, 0] } }
+plate = { points = { B = [0, 0], C = [0.3, 0], S = [0, 0.3], S2 = [1, 0.3] } }
+leg_b = { points = { A = [0, 0], B = [0.5, 0] } }
+leg_c = { points = { O2 = [0, 0], C = [0.5, 0] } }
+leg_s = { points = { P = [0, 0], Q = [0.1, 0] } }
+[joints]
+rail = { on = "leg_s.P", by = "ground.G", toward = "G2" }
+slot = { on = "leg_s.Q", by = "plate.S", toward = "S2", angle = "30 deg" }
+"""
+STUDY = '[machine]\nr = "150 mm"\n[run]\nturns = 3\n'
+
+# whole files
+FILES = [
+    (FOUR_BARS,
+     [(10, "links.one", "the links one, two, leg_b, leg_c, leg_d, leg_e form one group with 6 links")]),
+    (SLIDES, [(9, "links.block", "three sliding joints, one, two and three")]),
+    (TRIAD, [(13, "links.leg_s", "slides in both of its joints, rail and slot")]),
+    ("", [(0, "links", "give at least the link that the driver turns")]),
+    (STUDY, [(1, "machine", "run a study file with chainunit study")]),
+    ("hello world", [(1, "no valid TOML", "expected '='")]),
+    ('{"a": 1}', [(1, "no valid TOML", "it is JSON")]),
+    (PRESS + "[links.rod]\nmass = 3\n", [(38, "no valid TOML", "first in line 21")]),
+]  # fmt: skip

@@ -117,6 +117,11 @@ def near_name(given: str, known: Iterable[str]) -> str:
     return f'; was "{names[near[0]]}" meant?' if near else ""
 
 
+def meant(given: str, known: Iterable[str]) -> str:
+    """Words to add to a refusal that goes on behind: with a question where a name is similar, else a semicolon."""
+    return near_name(given, known) or ";"
+
+
 _JOINERS = "\u200c\u200d"  # some scripts and signs need these characters inside a word
 
 

@@ -62,7 +62,7 @@ def decompose(links: Sequence[str], joints: Sequence[JointOf], driver: str) -> l
     matched = _matching(dict.fromkeys(unknown, 3), joints)
     free = {link: 3 - sum(1 for each in matched.values() if each == link) for link in unknown}
     if any(free.values()):
-        raise InputError(_freedoms(unknown, joints, matched, free))
+        raise _freedoms(unknown, joints, matched, free)
     groups, placed = [], {GROUND, driver}
     for part in _strong_parts(_dependences(unknown, joints, matched)):
         groups.append(_classified(tuple(part), joints, placed))
@@ -146,7 +146,8 @@ def _matching(room: Mapping[str, int], joints: Sequence[JointOf]) -> dict[tuple[
                 raise InputError(
                     f"too few degrees of freedom: the joints {', '.join(own)} fix the link"
                     f"{'s' * (len(involved) > 1)} {', '.join(involved)} more than once; take out a joint, such as "
-                    f"{joints[k].name}, or add a link between"
+                    f"{joints[k].name}, or add a link between",
+                    key=involved[0],
                 )
     return matched
 
@@ -156,7 +157,7 @@ def _freedoms(
     joints: Sequence[JointOf],
     matched: Mapping[tuple[int, int], str],
     free: Mapping[str, int],
-) -> str:
+) -> InputError:
     """The refusal of a linkage in which links can move by themselves."""
     number = sum(free.values())
     # all that a free link carries along: equations can be handed on to it
@@ -176,9 +177,11 @@ def _freedoms(
     if lone:
         joined = any(lone[0] in (j.on, j.by) for j in joints)
         hint = f"; {lone[0]} has {'one joint' if joined else 'no joint'}"
-    return (
-        f"too many degrees of freedom: {number + 1} where the driver gives one; the links {', '.join(names)} are "
-        f"free to move{hint}; add a joint, or take out a link"
+    many = len(names) > 1
+    return InputError(
+        f"too many degrees of freedom: {number + 1} where the driver gives one; the link{'s' * many} "
+        f"{', '.join(names)} {'are' if many else 'is'} free to move{hint}; add a joint, or take out a link",
+        key=(lone or names)[0],
     )
 
 
@@ -235,7 +238,8 @@ def _classified(part: tuple[str, ...], joints: Sequence[JointOf], placed: set[st
         f"the links {', '.join(part)} form one group with {len(part)} links and "
         f"{len(inner) + sum(map(len, outer.values()))} joints: a class that is not covered; covered are dyads "
         "(class II) and triads (class III, a ternary link on three legs); drive another link, or add a link that "
-        "splits the group"
+        "splits the group",
+        key=part[0],
     )
 
 
@@ -252,7 +256,8 @@ def _dyad(part: tuple[str, ...], inner: JointOf, outer: Mapping[str, JointOf]) -
     if kind not in DYADS:
         raise InputError(
             f"the links {first}, {second} have three sliding joints, {outer[first].name}, {inner.name} and "
-            f"{outer[second].name}: nothing holds their angles; make one of them a revolute joint"
+            f"{outer[second].name}: nothing holds their angles; make one of them a revolute joint",
+            key=first,
         )
     return AssurGroup(kind, (first, second), (outer[first], inner, outer[second]))
 
@@ -264,6 +269,7 @@ def _triad(
         if a.kind == b.kind == PRISMATIC:
             raise InputError(
                 f"the link {leg} slides in both of its joints, {a.name} and {b.name}: such a leg of a triad is not "
-                "covered; make one of them a revolute joint"
+                "covered; make one of them a revolute joint",
+                key=leg,
             )
     return AssurGroup("triad", (ternary, *legs), (*outer, *inner))

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
 
-from ..errors import InputError, near_name, shown
+from ..errors import InputError, meant, shown
 
 Evaluation = Callable[[Any, Mapping[str, Any]], Any]
 """The value of an expression: of the engine and the quantities by name."""
@@ -69,6 +69,8 @@ class Expression:
                 0 < power <= MOST_POWER and not isinstance(power, bool)
             ):
                 return self._power(self._compiled(base, names), power)
+            case ast.BinOp(op=ast.Div(), right=ast.Constant(value=number)) if number == 0:
+                raise InputError(f"{shown(self.text)}: {ast.unparse(node)} divides by zero")
             case ast.BinOp(op=op, left=left, right=right) if type(op) in _OPERATORS:
                 a, b, apply = self._compiled(left, names), self._compiled(right, names), _OPERATORS[type(op)]
                 return lambda xp, of: apply(a(xp, of), b(xp, of))
@@ -93,7 +95,7 @@ class Expression:
         wanted = 2 if name in _TWO else 1
         if name not in FUNCTIONS:
             raise InputError(
-                f"{shown(self.text)}: no function {name}{near_name(name, FUNCTIONS)}; known here: "
+                f"{shown(self.text)}: no function {name}{meant(name, FUNCTIONS)} known here: "
                 f"{', '.join(FUNCTIONS)}"
             )
         if len(args) != wanted:

@@ -5,15 +5,16 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import pairwise
 from typing import Any
 
 from ... import units
-from ...errors import Faults, InputError, near_name, refusal_prefix, shown
+from ...errors import Faults, InputError, meant, near_name, refusal_prefix, shown
 from ...mechanism.expressions import CONSTANTS, FUNCTIONS, expression
 from ...quantities import Layout, base_units
+from .checks import name_fault, words
 from .declarations import CommonParameters
 from .dimensions import checked_dimension
 from .loads import MOTION
@@ -23,7 +24,6 @@ UNITS = (
     "N/m2", "m/s", "m/s2", "rad/s", "s", "W", "J",
 )  # fmt: skip
 """Units of parameters and inputs, in the order in which they are tried on a text."""
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _MOTION_UNITS: dict[str, str | None] = {
     "phi": "rad", "w": "rad/s", "x": "m", "y": "m", "vx": "m/s", "vy": "m/s", "angle_rate": "rad/s",
 }  # fmt: skip
@@ -39,6 +39,7 @@ class EntryReader:
         self.table_units: dict[str, str | None] = {}
         self.units: dict[str, str | None] = {}
         self.used: set[str] = set()
+        self.refused: set[str] = set()
         self.points: dict[str, dict[str, list[Any]]] = {}
 
     @contextmanager
@@ -61,25 +62,45 @@ class EntryReader:
             return {}
         return given
 
+    def all(self, faults: Iterable[tuple[str, str]]) -> None:
+        """Collect faults, each by key and message."""
+        for key, message in faults:
+            self.fault(key, message)
+
+    def text(self, key: str, default: str) -> str:
+        """A text of the file."""
+        given = self.data.get(key, default)
+        if not isinstance(given, str):
+            self.fault(key, f"is {shown(given)}; must be a text")
+            return default
+        return given
+
+    def positive(self, key: str, given: Any, unit: str) -> Any:
+        """An entry that may name inputs; a number must be >= 0."""
+        value = self.entry(key, given, unit, inputs=True)
+        if not isinstance(value, str) and value < 0.0:
+            self.fault(key, f"is {shown(given)}; must be >= 0")
+        return value
+
     def keys(self, key: str, table: Mapping[str, Any], known: tuple[str, ...]) -> None:
         """Fault the keys of a table that are not known."""
         for each in table:
             if each not in known:
-                hint = near_name(each, known)
                 where = f"{key}.{each}" if key else each
-                self.fault(where, f"unknown key{hint or ';'} known here: {', '.join(known)}")
+                self.fault(where, f"unknown key{meant(each, known)} known here: {', '.join(known)}")
 
     def named(self, key: str, names: Mapping[str, Any]) -> None:
         """Fault names that no variable can have."""
         for each in names:
-            if not _NAME.fullmatch(each):
-                self.fault(f"{key}.{each}", "a name has letters, digits and _, and begins with a letter")
+            if wrong := name_fault(each):
+                self.fault(f"{key}.{each}", wrong)
+                self.refused.add(each)
 
     def number(self, key: str, given: Any, unit: str) -> float:
         """A number, or a text with a unit."""
         if isinstance(given, bool) or not isinstance(given, int | float | str):
             raise InputError(
-                f"is {shown(given)}; must be a number or a text with a unit, such as {_like(unit)}"
+                f"{is_given(given)}; must be a number or a text with a unit, such as {_like(unit)}"
             )
         if isinstance(given, str):
             parts = units.split(given)
@@ -104,6 +125,8 @@ class EntryReader:
         with self.at(key):
             if not isinstance(given, str) or _is_quantity(given):
                 return self.number(key, given, unit)
+            if self.refused & words(given):  # the name itself is faulted where it is given
+                return 0.0
             known = {**self.units, **(_MOTION_UNITS | self.table_units if motion else {})}
             each = expression(given)
             for name in each.names:
@@ -127,7 +150,7 @@ class EntryReader:
     ) -> list[Any]:
         """Two entries."""
         if not isinstance(given, list) or len(given) != 2:
-            self.fault(key, f"is {shown(given)}; must be a list of two, along x and y")
+            self.fault(key, f"{is_given(given)}; must be a list of two, along x and y")
             return [0.0, 0.0]
         return [self.entry(key, each, unit, motion, inputs) for each in given]
 
@@ -158,7 +181,7 @@ class EntryReader:
                         raise InputError(
                             f"is {shown(value)}; must be {declared[name].quantity.allowed_range}"
                         )
-                    common[name] = x
+                    common[name] = declared[name].quantity.within_bounds(x)
         return common
 
     def quantities(self, kind: str) -> list[dict[str, Any]]:
@@ -169,7 +192,7 @@ class EntryReader:
         for name, given in table.items():
             key = f"{kind}.{name}"
             if name in (*FUNCTIONS, *CONSTANTS, *MOTION):
-                self.fault(key, "the name has a meaning in expressions; choose another one")
+                self.refused.add(name)
             whole = given if isinstance(given, Mapping) else {"value": given}
             self.keys(key, whole, ("value", "unit", "min", "max", "description", "tunable"))
             with self.at(key):
@@ -204,6 +227,10 @@ class EntryReader:
                     f"unit = {shown(unit)}: no unit that a linkage knows; known: {', '.join(UNITS)}"
                 )
             return self.number("", given, fits[0]), fits[0]
+        if isinstance(given, str) and words(given) & {*self.units, *self.table("parameters")}:
+            raise InputError(
+                f"is {shown(given)}; must be a number with a unit: write an expression where it is used"
+            )
         if isinstance(given, str) and (parts := units.split(given)) and parts[1]:
             for each in UNITS:
                 try:
@@ -223,6 +250,7 @@ class EntryReader:
             key = f"tables.{name}"
             table = self.table(key, given)
             self.keys(key, table, ("phi", "value"))
+            self.refused.add(name)
             with self.at(key):
                 phi, value = table.get("phi"), table.get("value")
                 if (
@@ -237,6 +265,8 @@ class EntryReader:
                     raise InputError("phi must rise, within less than one turn: the table repeats itself")
                 curves[name] = {"places": at, "values": [x for x, _ in values]}
                 self.table_units[name] = values[0][1]
+                if not name_fault(name):
+                    self.refused.discard(name)
         return curves
 
 
@@ -257,6 +287,11 @@ def _is_quantity(text: str) -> bool:
             "2 * r + 0.01"
         )
     return True
+
+
+def is_given(value: Any) -> str:
+    """Words on a value that is wrong or missing."""
+    return "is missing" if value is None else f"is {shown(value)}"
 
 
 def _like(unit: str) -> str:

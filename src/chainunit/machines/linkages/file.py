@@ -14,12 +14,22 @@ from typing import Any
 
 from ... import places
 from ...engines import MATH
-from ...errors import InputError, near_name, shown
+from ...errors import InputError, each_refusal, meant, near_name, shown
 from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE
 from ...mechanism.expressions import expression
 from ...mechanism.models import InverseMachine
 from ...reading import file_text, in_file, toml
-from .entries import EntryReader
+from .checks import (
+    POINT_NAMES,
+    freedom_faults,
+    length_faults,
+    name_fault,
+    quantity_names,
+    spring_faults,
+    study_fault,
+    words,
+)
+from .entries import EntryReader, is_given
 from .model import RESERVED, machine_of
 from .shared_pins import shared_pins
 from .start import StartPose
@@ -50,7 +60,10 @@ def read_linkage(file: Path) -> type[InverseMachine]:
     """
     text = file_text(file)
     with in_file(str(file), lambda: places.lines_of(text)):
-        return machine_of(description_of(toml(text), file.stem))
+        description = description_of(toml(text), file.stem)
+        # what is wrong of a group is told at its first link
+        with each_refusal(lambda fault: InputError(f"{fault.key or 'links'}: {fault}", fault.key or "links")):
+            return machine_of(description)
 
 
 def description_of(data: Mapping[str, Any], name: str) -> str:
@@ -70,7 +83,11 @@ class _LinkageReader(EntryReader):
     def description(self) -> str:
         """The description."""
         data = self.data
+        study_fault(data)
         self.keys("", data, TABLES)
+        name, title = self.text("name", re.sub(r"\W", "_", self.name)), self.text("title", "")
+        if "name" in data and (wrong := name_fault(name)):
+            self.fault("name", f"is {shown(name)}; {wrong}")
         parameters = self.quantities("parameters")
         inputs = self.quantities("inputs")
         tables = self.curves()
@@ -80,23 +97,17 @@ class _LinkageReader(EntryReader):
         joints = self.joints()
         driver, span = self.driver(joints)
         loads = [self.load(name, given) for name, given in self.table("loads").items()]
-        self.springs(loads, joints)
         common = self.common()
-        for kind, entries in (("parameters", parameters), ("inputs", inputs)):
-            for each in entries:
-                if each["name"] not in self.used:
-                    self.fault(f"{kind}.{each['name']}", "nothing uses it; use it, or take it out")
-                each["unit"] = each["unit"] or self.units[each["name"]] or "1"
-        for name in tables:
-            if name not in self.used:
-                self.fault(f"tables.{name}", "no load uses it; use it, or take it out")
-        self.names(parameters, inputs, links, joints)
+        self.unused(parameters, inputs, tables)
+        self.all(quantity_names(parameters, inputs, self.table("tables"), RESERVED, links))
+        self.all(spring_faults(loads, joints))
         self.faults.refuse()
-        start = self.start(parameters, joints, driver)
+        self.all(freedom_faults(links, joints, driver))
+        start = self.start(parameters, links, joints, driver)
         self.faults.refuse()
         described = {
-            "name": data.get("name", re.sub(r"\W", "_", self.name)),
-            "title": data.get("title", ""),
+            "name": name,
+            "title": title,
             "common": common,
             "parameters": parameters,
             "inputs": inputs,
@@ -110,6 +121,22 @@ class _LinkageReader(EntryReader):
             "start": start,
         }
         return json.dumps(described, sort_keys=True)
+
+    def unused(
+        self, parameters: list[dict[str, Any]], inputs: list[dict[str, Any]], tables: Mapping[str, Any]
+    ) -> None:
+        """Fault parameters, inputs and tables that nothing uses; a name in a faulty entry may be meant to be used."""
+        spoilt = bool(self.faults.errors)
+        mentioned = words([self.data[key] for key in self.data if key not in ("parameters", "inputs")])
+        for kind, entries in (("parameters", parameters), ("inputs", inputs)):
+            for each in entries:
+                name = each["name"]
+                if name not in self.used | self.refused and not (spoilt and name in mentioned):
+                    self.fault(f"{kind}.{name}", "nothing uses it; use it, or take it out")
+                each["unit"] = each["unit"] or self.units[name] or "1"
+        for name in tables:
+            if name not in self.used | self.refused and not (spoilt and name in mentioned):
+                self.fault(f"tables.{name}", "no load uses it; use it, or take it out")
 
     def links(self) -> Mapping[str, Any]:
         """The tables of the links."""
@@ -131,7 +158,10 @@ class _LinkageReader(EntryReader):
         table = self.table(key, self.table("links"))
         self.keys(key, table, _LINK_KEYS)
         points = self.place(f"{key}.points", self.table(f"{key}.points", table))
-        if not points:
+        for point in points:
+            if point in POINT_NAMES:
+                self.fault(f"{key}.points.{point}", "is a variable of every link; choose another name")
+        if not points and isinstance(given, Mapping) and isinstance(given.get("points", {}), Mapping):
             self.fault(key, "has no points; give points = { A = [0, 0], ... } in the frame of the link")
         self.points[name] = points
         link: dict[str, Any] = {"name": name, "points": points, "own": {}}
@@ -140,8 +170,8 @@ class _LinkageReader(EntryReader):
         else:
             for quantity_name, unit in (("mass", "kg"), ("inertia", "kg.m2")):
                 if quantity_name in table:
-                    value = self.entry(f"{key}.{quantity_name}", table[quantity_name], unit, inputs=True)
-                    link[quantity_name] = self.own(f"{key}.{quantity_name}", link, quantity_name, value)
+                    value = self.positive(f"{key}.{quantity_name}", table[quantity_name], unit)
+                    link[quantity_name] = self.own(link, quantity_name, value)
             if "centroid" in table:
                 link["centroid"] = self.vector(f"{key}.centroid", table["centroid"], "m")
         masses = self.table(f"{key}.masses", table)
@@ -149,17 +179,14 @@ class _LinkageReader(EntryReader):
             if point not in points:
                 self.fault(f"{key}.masses.{point}", f"is no point of {name}{near_name(point, points)}")
         link["masses"] = {
-            point: self.entry(f"{key}.masses.{point}", mass, "kg", inputs=True)
-            for point, mass in masses.items()
+            point: self.positive(f"{key}.masses.{point}", mass, "kg") for point, mass in masses.items()
         }
         return link
 
-    def own(self, key: str, link: dict[str, Any], name: str, value: Any) -> Any:
+    def own(self, link: dict[str, Any], name: str, value: Any) -> Any:
         """A plain number becomes a parameter of the link."""
         if isinstance(value, str):
             return value
-        if value < 0.0:
-            self.fault(key, f"is {value:g}; must be >= 0")
         link["own"][name] = value
         return f"{name}_of_{link['name']}"
 
@@ -190,6 +217,8 @@ class _LinkageReader(EntryReader):
 
     def end(self, key: str, given: Any) -> list[str]:
         """A point of a link, as "link.point" or a list of two."""
+        if given is None:
+            raise InputError('is missing; must be a link and its point, such as "rod.A"')
         parts = given.split(".") if isinstance(given, str) else given
         if not isinstance(parts, list) or len(parts) != 2 or not all(isinstance(x, str) for x in parts):
             raise InputError(f'is {shown(given)}; must be a link and its point, such as "rod.A"')
@@ -199,7 +228,7 @@ class _LinkageReader(EntryReader):
         if point not in self.points[link]:
             known = ", ".join(self.points[link]) or "none"
             raise InputError(
-                f"is {shown(given)}; {point} is no point of {link}{near_name(point, self.points[link])}; its points: "
+                f"is {shown(given)}; {point} is no point of {link}{meant(point, self.points[link])} its points: "
                 f"{known}"
             )
         return [link, point]
@@ -220,9 +249,7 @@ class _LinkageReader(EntryReader):
             ends = []
             for each in ("on", "by"):
                 with self.at(f"{key}.{each}"):
-                    if each not in given:
-                        raise InputError('is missing; must be a link and its point, such as "rod.A"')
-                    ends.append(self.end(f"{key}.{each}", given[each]))
+                    ends.append(self.end(f"{key}.{each}", given.get(each)))
             if len(ends) < 2:
                 continue
             if ends[0][0] == ends[1][0]:
@@ -251,7 +278,7 @@ class _LinkageReader(EntryReader):
             others = [name for name in self.points[by[0]] if name != by[1]]
             self.fault(
                 f"{key}.toward",
-                f"is {shown(toward)}; must be another point of {by[0]}, to which the line goes: "
+                f"{is_given(toward)}; must be another point of {by[0]}, to which the line goes: "
                 f"{', '.join(others) or 'add one'}",
             )
         joint["toward"] = toward
@@ -269,11 +296,12 @@ class _LinkageReader(EntryReader):
         link = table.get("link")
         if link not in self.points or link == GROUND:
             known = [name for name in self.points if name != GROUND]
-            self.fault(
-                "driver.link" if "link" in table else "driver",
-                f"link = {shown(link)}; must be the link that the motor turns{near_name(str(link), known)}; links: "
-                f"{', '.join(known)}",
-            )
+            if known:
+                self.fault(
+                    "driver.link" if table else "driver",
+                    f"{is_given(link)}; must be the link that the motor turns{meant(str(link), known)} links: "
+                    f"{', '.join(known)}",
+                )
             return {}, None
         own = [j for j in joints if {j["on"][0], j["by"][0]} == {GROUND, link} and j["type"] == REVOLUTE]
         if len(own) != 1:
@@ -325,7 +353,7 @@ class _LinkageReader(EntryReader):
         kind = table.get("type", "force")
         if kind not in _LOADS:
             self.fault(
-                f"{key}.type", f"is {shown(kind)}{near_name(str(kind), _LOADS)}; must be {', '.join(_LOADS)}"
+                f"{key}.type", f"is {shown(kind)}{meant(str(kind), _LOADS)} must be {', '.join(_LOADS)}"
             )
             return {}
         self.keys(key, table, _LOADS[kind])
@@ -333,7 +361,7 @@ class _LinkageReader(EntryReader):
         if kind == "torque":
             on = table.get("on")
             if on not in self.points or on == GROUND:
-                self.fault(f"{key}.on", f"is {shown(on)}; must be a link{near_name(str(on), self.points)}")
+                self.fault(f"{key}.on", f"{is_given(on)}; must be a link{near_name(str(on), self.points)}")
             return load | {
                 "on": [on],
                 "torque": self.entry(f"{key}.torque", table.get("torque"), "N.m", True, True),
@@ -345,50 +373,19 @@ class _LinkageReader(EntryReader):
                     raise InputError("acts on the ground; give a point of a link")
         if kind == "spring":
             for each, unit in (("stiffness", "N/m"), ("length", "m"), ("damping", "N.s/m")):
-                load[each] = self.entry(f"{key}.{each}", table.get(each, 0.0), unit, inputs=True)
+                load[each] = self.positive(f"{key}.{each}", table.get(each, 0.0), unit)
         else:
             load["force"] = self.vector(f"{key}.force", table.get("force"), "N", True, True)
         return load
 
-    def springs(self, loads: list[dict[str, Any]], joints: list[dict[str, Any]]) -> None:
-        """Fault springs without a length: between two points of a link, or in a pin."""
-        pins = {
-            frozenset((tuple(j["on"]), tuple(j["by"]))): j["name"] for j in joints if j["type"] == REVOLUTE
-        }
-        for load in loads:
-            if not load.get("by") or not load.get("on"):
-                continue
-            ends, key = frozenset((tuple(load["on"]), tuple(load["by"]))), f"loads.{load['name']}"
-            if load["on"][0] == load["by"][0]:
-                self.fault(
-                    key,
-                    f"both ends are on {load['on'][0]}; give points of two links, or of one and the ground",
-                )
-            elif ends in pins:
-                self.fault(key, f"both ends are in the joint {pins[ends]}; give points that move apart")
-
-    def names(self, *tables: list[dict[str, Any]]) -> None:
-        """Fault names that two things share."""
-        parameters, inputs, links, joints = tables
-        owners: dict[str, str] = {}
-        for kind, entries in (("links", links), ("joints", joints)):
-            for each in entries:
-                name = each["name"]
-                if name in owners and kind == owners[name]:
-                    self.fault(f"{kind}.{name}", "is there twice")
-                owners[name] = kind
-        for kind, entries in (("parameters", parameters), ("inputs", inputs)):
-            for each in entries:
-                if each["name"] in owners or each["name"] in RESERVED:
-                    self.fault(
-                        f"{kind}.{each['name']}",
-                        "has the name of a link, a joint or a variable of every machine",
-                    )
-
     # the start pose
 
     def start(
-        self, parameters: list[dict[str, Any]], joints: list[dict[str, Any]], driver: dict[str, Any]
+        self,
+        parameters: list[dict[str, Any]],
+        links: list[dict[str, Any]],
+        joints: list[dict[str, Any]],
+        driver: dict[str, Any],
     ) -> dict[str, Any]:
         """The value of the driver at the start, and the poses of all links there."""
         table = self.table("start")
@@ -403,6 +400,7 @@ class _LinkageReader(EntryReader):
             link: {name: (number(x), number(y)) for name, (x, y) in those.items()}
             for link, those in self.points.items()
         }
+        self.all(length_faults(points, joints, driver["link"]))
         entries = [
             (
                 JointEntry(j["name"], j["type"], tuple(j["on"]), tuple(j["by"]), j.get("toward", "")),
@@ -459,6 +457,9 @@ class _LinkageReader(EntryReader):
             entries = [(point, name, place) for point, place in at.items()]
         elif not owners:
             self.fault(key, f"{name} is no point of a link")
+        elif not isinstance(at, list) or len(at) != 2:
+            self.fault(key, f"is {shown(at)}; must be a list of two, along x and y")
+            return
         for point, link, place in entries:
             with self.at(key):
                 if point not in self.points.get(link, {}):

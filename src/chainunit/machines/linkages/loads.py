@@ -18,6 +18,11 @@ MOTION = ("phi", "w", "x", "y", "vx", "vy", "angle_rate")
 and velocity of the point, and angular velocity of the link."""
 
 
+def name_of_load(load: Mapping[str, Any]) -> str:
+    """The name of a load of a file among all loads: the weight and the losses have names of their own."""
+    return f"loads.{load['name']}"
+
+
 class CoordinateTable:
     """A table over the coordinate, between its points by cubic pieces that rise or fall as their ends do (Fritsch and
     Carlson). Over an angle it repeats itself each turn; over a way its ends go on."""

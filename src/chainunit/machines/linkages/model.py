@@ -42,7 +42,8 @@ from .declarations import (
     field_of,
     with_starts,
 )
-from .loads import CoordinateTable, ForceLaw, SpringDamper, TorqueLaw
+from .loads import CoordinateTable, ForceLaw, SpringDamper, TorqueLaw, name_of_load
+from .narrow import lows
 from .parts import LinkageParts
 from .probes import guide_reaction, own_axis, point_motion
 from .structure import DriverEntry, JointEntry, LinkEntry, Structure
@@ -188,7 +189,7 @@ class LinkageDescription:
         parts = self.parts(xp, p, u)
         loads: dict[str, Any] = {"weight": Weight(p.g)}
         for load in self.data["loads"]:
-            loads[load["name"]] = self._load(load, parts)
+            loads[name_of_load(load)] = self._load(load, parts)
         loads["pins"] = PinLosses(p.pins, p.pins.damping)
         if any(j.kind == PRISMATIC for j in self.structure.joints.values()):
             lengths = {
@@ -259,26 +260,37 @@ class LinkageDescription:
         try:
             derived = derived_numbers(MATH, linkage)
         except (ArithmeticError, ValueError):
-            raise InputError(f"{self._closing(linkage, ())}") from None
+            raise self._closing(linkage, ()) from None
         places = self.places()
         around = [*places, places[0] + 2.0 * math.pi] if not self.data["driver"]["linear"] else places
         angles: dict[str, list[float]] = {}
         signs: list[float] = []
+        courses: list[list[float]] = []
         for q in around:
             try:
                 m = Mechanism(MATH, linkage, q, derived)
             except (ArithmeticError, ValueError):
-                raise InputError(self._closing(linkage, derived)) from None
+                raise self._closing(linkage, derived) from None
             margins = m.margins()
             signs = signs or [math.copysign(1.0, margin) for margin in margins]
-            for each, margin, sign in zip(self.structure.groups, margins, signs, strict=True):
-                if not margin * sign > LEAST_MARGIN:
-                    raise InputError(self._dead(each.links, q))
+            courses.append([margin * sign for margin, sign in zip(margins, signs, strict=True)])
+            for each, margin in zip(self.structure.groups, courses[-1], strict=True):
+                if not margin > LEAST_MARGIN:
+                    raise self._dead(each.links, q)
             for name in self.structure.links:
                 axis = own_axis(m.links[name].u, parts.frames[name])
                 angle = math.atan2(axis.y, axis.x)
                 before = angles.setdefault(name, [self.structure.poses[name][2]])
                 before.append(before[-1] + math.remainder(angle - before[-1], 2.0 * math.pi))
+
+        def margins_at(q: float) -> list[float]:
+            margins = Mechanism(MATH, linkage, q, derived).margins()
+            return [margin * sign for margin, sign in zip(margins, signs, strict=True)]
+
+        for k, q, least in lows(margins_at, courses, around):
+            links = self.structure.groups[k].links
+            if not least > LEAST_MARGIN:
+                raise self._open(links, q) if math.isnan(least) else self._dead(links, q)
         turning = {}
         for name, course in angles.items():
             course = course[1:]
@@ -300,10 +312,15 @@ class LinkageDescription:
             return f"{error}{f' ({given})' * bool(given)}"
         return ""
 
-    def _dead(self, links: Sequence[str], q: float) -> str:
-        return (
+    def _open(self, links: Sequence[str], q: float) -> InputError:
+        text = f"the group of {', '.join(links)} cannot close at {self._at(q)}: change its lengths"
+        return InputError(text, key=f"links.{links[0]}")
+
+    def _dead(self, links: Sequence[str], q: float) -> InputError:
+        return InputError(
             f"the group of {', '.join(links)} comes to a dead position at {self._at(q)}: there its forces have no "
-            "limit; change its lengths"
+            "limit; change its lengths",
+            key=f"links.{links[0]}",
         )
 
     def _at(self, q: float) -> str:
@@ -311,8 +328,8 @@ class LinkageDescription:
             return f"{self.data['driver']['joint']} = {q:.6g} m"
         return f"{math.degrees(q) % 360.0:.4g} deg of {self.data['driver']['link']}"
 
-    def _closing(self, linkage: Linkage, derived: Sequence[Any]) -> str:
-        """The sentence on the first place at which the linkage does not close, and the group that does not."""
+    def _closing(self, linkage: Linkage, derived: Sequence[Any]) -> InputError:
+        """The refusal with the first place at which the linkage does not close, and the group that does not."""
         groups = self.structure.groups
         behind_driver = len(groups) - len(linkage.groups)
         for q in self.places():
@@ -322,9 +339,8 @@ class LinkageDescription:
                 try:
                     Mechanism(MATH, part, q, derived[: part.derived])
                 except (ArithmeticError, ValueError, IndexError):
-                    links = ", ".join(each.links)
-                    return f"the group of {links} cannot close at {self._at(q)}: change its lengths"
-        return "the linkage does not close"
+                    return self._open(each.links, q)
+        return InputError("the linkage does not close: change its lengths", key="links")
 
     # the model
 
@@ -448,7 +464,9 @@ class LinkageDescription:
         assert isinstance(m.linkage, DescribedLinkage)
         parts = m.linkage.parts
         given = sum(
-            s.effects[each["name"]].dissipative for each in self.data["loads"] if each["type"] != "spring"
+            s.effects[name_of_load(each)].dissipative
+            for each in self.data["loads"]
+            if each["type"] != "spring"
         )
         values: dict[str, Any] = {"load_power": -(given * w)}
         for name, joint in self.structure.joints.items():

@@ -301,7 +301,8 @@ class LinkageParts:
             if abs(rough) < 1e-9:
                 raise InputError(
                     f"the start pose does not tell how {first} is assembled: it stands in a dead position; give the "
-                    "start at another place of the driver"
+                    "start at another place of the driver",
+                    key="start",
                 )
             self.sides[first] = math.copysign(1.0, rough)
         return self.sides[first]

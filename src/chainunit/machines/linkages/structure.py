@@ -65,6 +65,30 @@ class DriverEntry:
     sense: float = 1.0
 
 
+def groups_of(links: Sequence[str], joints: Sequence[JointEntry], driver: DriverEntry) -> list[AssurGroup]:
+    """The groups of a linkage.
+
+    Raises
+    ------
+    InputError
+        where the linkage is not determined, or has a group that is not covered; its key is the name of a link.
+    """
+    seen = [JointOf(j.name, j.kind, j.on[0], j.by[0]) for j in joints if j.name != driver.joint]
+    slide = next(joint for joint in joints if joint.name == driver.joint)
+    if GROUND in (slide.on[0], slide.by[0]):
+        groups = decompose(links, seen, driver.link)
+    else:
+        groups = _with_cylinder(links, seen, slide)
+    for group in groups:
+        if driver.linear and group.kind == "triad":
+            raise InputError(
+                f"the links {', '.join(group.links)} form a triad, and the driver slides: a triad needs a driver "
+                "that turns; drive another link",
+                key=group.links[0],
+            )
+    return groups
+
+
 @dataclass(frozen=True)
 class Structure:
     """A linkage without numbers: entries by name, the groups in order, the names of pins, and the assembly.
@@ -105,18 +129,7 @@ class Structure:
             where the linkage is not determined, or has a group that is not covered.
         """
         named = {joint.name: joint for joint in joints}
-        seen = [JointOf(j.name, j.kind, j.on[0], j.by[0]) for j in joints if j.name != driver.joint]
-        slide = named[driver.joint]
-        if GROUND in (slide.on[0], slide.by[0]):
-            groups = decompose([link.name for link in links], seen, driver.link)
-        else:
-            groups = _with_cylinder([link.name for link in links], seen, slide)
-        for group in groups:
-            if driver.linear and group.kind == "triad":
-                raise InputError(
-                    f"the links {', '.join(group.links)} form a triad, and the driver slides: a triad needs a driver "
-                    "that turns; drive another link"
-                )
+        groups = groups_of([link.name for link in links], joints, driver)
         marked = {
             end
             for each in groups
@@ -160,19 +173,26 @@ def _with_cylinder(links: Sequence[str], joints: Sequence[JointOf], slide: Joint
     groups = decompose([link for link in links if link != rod], merged, "")
     own = next(group for group in groups if barrel in group.links)
     others = [each for each in own.links if each != barrel]
+    if own.kind != "RRR":
+        raise _no_cylinder(barrel, rod, slide)
     p, c, q = own.joints if own.links[0] == barrel else own.joints[::-1]
     near, far = (of[p.name].on, of[c.name].on)
     near = near if near != GROUND else of[p.name].by
     far = far if far not in others else of[c.name].by
     grounded = all(GROUND in (joint.on, joint.by) for joint in (p, q))
-    if own.kind != "RRR" or not grounded or {near, far} != {rod, barrel}:
-        raise InputError(
-            f"the links {barrel} and {rod}, which the driver {slide.name} moves along each other, must be a "
-            "cylinder: one of them on a pin of the ground, the other one on a pin of a lever, and the lever on a pin "
-            "of the ground"
-        )
+    if not grounded or {near, far} != {rod, barrel}:
+        raise _no_cylinder(barrel, rod, slide)
     cylinder = AssurGroup(CYLINDER, (near, far, *others), (of[p.name], of[c.name], of[q.name]))
     return [cylinder, *(group for group in groups if group is not own)]
+
+
+def _no_cylinder(barrel: str, rod: str, slide: JointEntry) -> InputError:
+    return InputError(
+        f"the links {barrel} and {rod}, which the driver {slide.name} moves along each other, must be a cylinder: "
+        "one of them on a pin of the ground, the other one on a pin of a lever, and the lever on a pin of the "
+        "ground",
+        key=barrel,
+    )
 
 
 def pin_names(
