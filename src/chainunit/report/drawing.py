@@ -399,11 +399,13 @@ def _column(canvas: _Canvas, sizes: Mapping[tuple[str, ...], Dimension], ground:
             )
             rows.append((pin, f"{first.removesuffix(' mm')}, {second}", "bearing: x, y in the frame"))
     x, y = WIDTH + 4.0, 40.0
+    # beside the longest name there is room for the values
+    right = max([116.0, *(7.0 * len(name) + 66.0 for name, _, _ in rows)])
     for name, value, words in rows:
         canvas.add("text", name, x=x, y=y, font_style="italic", fill="#1b1b1b")
-        canvas.add("text", value, x=x + 116, y=y, text_anchor="end", fill="#1b1b1b")
-        for line in textwrap.wrap(words, 36):
-            canvas.add("text", line, x=x + 126, y=y, fill="#555555", font_size="11.5")
+        canvas.add("text", value, x=x + right, y=y, text_anchor="end", fill="#1b1b1b")
+        for line in textwrap.wrap(words, max(16, 36 - int((right - 116.0) / 6.0))):
+            canvas.add("text", line, x=x + right + 10.0, y=y, fill="#555555", font_size="11.5")
             y += 15.0
         y += 7.0
 
