@@ -193,6 +193,20 @@ def test_each_file_has_a_drawing_with_the_names_of_its_links(name):
             ), link
 
 
+def test_the_pump_is_the_textbook_s_scotch_yoke():
+    """Without friction: the plunger's way is r cos q, so that each term of the torque is closed."""
+    r, w, a, area = 0.06, 4.0, 7.0, 0.25 * np.pi * 0.08**2
+    out = machine("scotch_yoke_pump").replace({"guides.friction": 0.0}).outputs(TURN, w, a)
+    sine, cosine = np.sin(TURN), np.cos(TURN)
+    inertia = 0.02 + 7.0 * 0.01**2 + 1.5 * r**2 + 16.0 * (r * sine) ** 2
+    speed = -r * sine * w
+    force = 0.5 * 1.2e6 * area * (1.0 + speed / np.sqrt(speed**2 + 1e-4))
+    weight = 9.81 * (7.0 * 0.01 + 1.5 * r) * cosine
+    torque = inertia * a + 16.0 * r**2 * sine * cosine * w**2 + weight - force * r * sine
+    assert out.J == pytest.approx(inertia, rel=1e-13)
+    assert out.tau == pytest.approx(torque, rel=1e-12, abs=1e-10)
+
+
 def test_the_page_shows_each_file_with_its_words():
     page = (FOLDER.parents[1] / "docs" / "linkages.md").read_text("utf-8")
     for file in FILES:
