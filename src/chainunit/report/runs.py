@@ -123,7 +123,7 @@ def _pins(s: b.Source, study: StudyRecord) -> b.Table:
             b.Column("pin"),
             *columns,
             b.Column("largest peak", "largest"),
-            b.Column("in", form="long"),
+            b.Column("in the run", form="long"),
             b.Column("in", form="short"),
         ),
         title="Forces in the bearings (equivalent load: ISO 281)",
