@@ -46,16 +46,26 @@ class CoordinateTable:
         slopes.append(slopes[0])
         if not turns:
             slopes[0] = slopes[-1] = 0.0
-        self._first = places[0], values[0]
-        self._pieces = tuple(zip(places, widths, rises, slopes, slopes[1:], strict=False))
+        knots = [place - places[0] for place in places]
+        pieces = [*zip(widths, rises, slopes, slopes[1:], strict=False)]
+        self._first, self._value, self._before = places[0], values[0], 0.0
+        if turns:
+            # the turn begins within the last piece, not at a point: there the slope would be that of one side alone
+            knots.insert(0, knots[-2] - 2.0 * math.pi)
+            pieces.insert(0, pieces[-1])
+            self._value, self._before = values[-2], 0.5 * widths[-1]
+        self._knots, self._pieces = tuple(knots), tuple(pieces)
 
     def value(self, xp: Any, q: Any) -> Any:
         """The value at the coordinate `q` [rad, m]."""
-        first, total = self._first
-        # from the first place on, in one turn
-        way = xp.atan2(-xp.sin(q - first), -xp.cos(q - first)) + math.pi if self.turns else q - first
-        for place, width, rise, begin, end in self._pieces:
-            t = xp.minimum(xp.maximum((way - (place - first)) * (1.0 / width), 0.0), 1.0)
+        total, way = self._value, q - self._first
+        if self.turns:  # in one turn, from half of the last piece before the first place on
+            x = way + self._before
+            way = xp.atan2(-xp.sin(x), -xp.cos(x)) + (math.pi - self._before)
+        # where two pieces meet they share the size of one distance, so that the sum of their slopes is right there
+        sizes = [xp.abs(way - knot) for knot in self._knots]
+        for before, after, (width, rise, begin, end) in zip(sizes, sizes[1:], self._pieces, strict=False):
+            t = 0.5 + (before - after) * (0.5 / width)  # from 0 to 1
             # Hermite's cubic, from the value at its begin
             cubic = 3.0 * rise - 2.0 * begin - end + t * (begin + end - 2.0 * rise)
             total = total + width * t * (begin + t * cubic)
