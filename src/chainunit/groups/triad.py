@@ -108,7 +108,8 @@ def correct_pose(xp: Any, legs: Sequence[PlacedLeg], near: Pose, steps: int) -> 
 @dataclass
 class Triad(Group):
     """A triad as data: the ternary link with its `mass`, three legs, further points on the ternary link, and the pose
-    `assembly`, from which Newton's method leads to the assembly mode at the crank angle `start` [rad]."""
+    `assembly`, from which Newton's method leads to the assembly mode at the crank angle `start` [rad]. `turns` is how
+    often the ternary link turns counter-clockwise in a turn of the crank: the rest of its angle is periodic."""
 
     name: str
     mass: Mass
@@ -116,6 +117,7 @@ class Triad(Group):
     points: Mapping[str, tuple[Any, Any]]
     assembly: Pose
     start: float = 0.0
+    turns: float = 0.0
 
     derived: ClassVar[int] = 3 * (2 * HARMONICS + 1) + 2
     """The number of values that `derive` gives: the series of the pose, the largest misfit, the least margin."""
@@ -153,6 +155,8 @@ class Triad(Group):
         """The triad with the linkage `at` before it, on the branch that the series `derived` gives."""
         legs = self.placed(at)
         near = pose_of_series(derived, xp.cos(q), xp.sin(q))
+        if self.turns:
+            near = near._replace(theta=near.theta + self.turns * q)
         return SolvedTriad.at(xp, legs, correct_pose(xp, legs, near, _STEPS))
 
     def placed(self, at: Placed) -> tuple[PlacedLeg, ...]:
@@ -168,10 +172,8 @@ class Triad(Group):
             tuple(leg.arm for leg in rods),
         )
 
-    def derive(self, xp: Any, before: Callable[[float], Placed]) -> list[Any]:
-        """The series of the pose over the crank angle, the largest misfit and the least margin around; `before` gives
-        the linkage before the triad at a crank angle [rad]."""
-        angles = [self.start + 2.0 * math.pi * k / SAMPLES for k in range(SAMPLES)]
+    def _followed(self, xp: Any, before: Callable[[float], Placed], angles: Sequence[float]) -> list[Pose]:
+        """The poses at these crank angles, each from the ones before it."""
 
         def pose(q: float, near: Pose, steps: int = _STEPS) -> Pose:
             return correct_pose(xp, self.placed(before(q)), near, steps)
@@ -182,6 +184,24 @@ class Triad(Group):
             if len(poses) > 1:
                 near = Pose(*(2.0 * now - before for now, before in zip(near, poses[-2], strict=True)))
             poses.append(pose(q, near))
+        return poses
+
+    def turns_in_a_turn(self, xp: Any, before: Callable[[float], Placed]) -> float:
+        """How often the ternary link turns in a turn of the crank, see `turns`."""
+        angles = [self.start + 2.0 * math.pi * k / SAMPLES for k in range(SAMPLES + 1)]
+        first, *_, last = self._followed(xp, before, angles)
+        return float(round((last.theta - first.theta) / (2.0 * math.pi)))
+
+    def derive(self, xp: Any, before: Callable[[float], Placed]) -> list[Any]:
+        """The series of the pose over the crank angle, the largest misfit and the least margin around; `before` gives
+        the linkage before the triad at a crank angle [rad]."""
+        angles = [self.start + 2.0 * math.pi * k / SAMPLES for k in range(SAMPLES)]
+        poses = self._followed(xp, before, angles)
+        if self.turns:
+            poses = [
+                pose._replace(theta=pose.theta - self.turns * q)
+                for pose, q in zip(poses, angles, strict=True)
+            ]
         series = []
         for values in zip(*poses, strict=True):
             series.append(sum(values) / SAMPLES)

@@ -6,8 +6,9 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-from ...mechanism.models import declared_class
-from ...ports import ShaftMotion
+from ...mechanism.driver_ports import AddedInertia
+from ...mechanism.models import declared_class, names_of
+from ...ports import LoadInput, PortSlopes, PortValues, ShaftMotion, Start
 from ...quantities import Layout, Value, declaration, group, quantity
 from ..parts import Force, GuideLaw, Pin
 
@@ -137,3 +138,20 @@ def with_starts(of: type, starts: Mapping[str, float]) -> type:
         for f in dataclasses.fields(of)
     ]
     return declared_class(of.__name__, (), fields)
+
+
+RESERVED = frozenset(
+    name
+    for of in (
+        CommonParameters,
+        LinkageMotion,
+        PortValues,
+        PortSlopes,
+        Running,
+        Start,
+        AddedInertia,
+        LoadInput,
+    )
+    for name in names_of(of)
+)
+"""Names of variables that every machine has."""

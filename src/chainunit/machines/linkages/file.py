@@ -29,8 +29,9 @@ from .checks import (
     study_fault,
     words,
 )
+from .declarations import RESERVED
 from .entries import EntryReader, is_given
-from .model import RESERVED, machine_of
+from .model import machine_of
 from .shared_pins import shared_pins
 from .start import StartPose
 from .structure import JointEntry

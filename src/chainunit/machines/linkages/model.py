@@ -19,18 +19,18 @@ from ...engines import MATH
 from ...errors import GeometryError, InputError
 from ...groups.loads import GuideLosses, PinLosses, Weight
 from ...mechanism.assur import GROUND, PRISMATIC
-from ...mechanism.driver_ports import ROTATING, SLIDING, AddedInertia
+from ...mechanism.driver_ports import ROTATING, SLIDING
 from ...mechanism.expressions import value_of
 from ...mechanism.linkage import Linkage
 from ...mechanism.machine import MachineState, Mechanism, derived_numbers
-from ...mechanism.models import InverseMachine, declared_class, names_of
+from ...mechanism.models import InverseMachine, declared_class
 from ...model import Requirement
 from ...planar import Vec2
-from ...ports import LoadInput, PortSlopes, PortValues, Start
 from ...quantities import Value, group, quantity
 from ...refusals import unit_behind
 from ..parts import Force, force
 from .declarations import (
+    RESERVED,
     CommonParameters,
     GuideReaction,
     LinkageMotion,
@@ -43,7 +43,7 @@ from .declarations import (
     with_starts,
 )
 from .loads import CoordinateTable, ForceLaw, SpringDamper, TorqueLaw, name_of_load
-from .narrow import lows
+from .narrow import check_triads, lesser, lows, turns_of_triads
 from .parts import LinkageParts
 from .probes import guide_reaction, own_axis, point_motion
 from .structure import DriverEntry, JointEntry, LinkEntry, Structure
@@ -52,23 +52,6 @@ ANGLES = 48
 """Places of the driver at which a linkage is checked to close."""
 LEAST_MARGIN = 1e-3
 """Least margin of a group: closer to a dead position its forces have no limit."""
-
-
-RESERVED = frozenset(
-    name
-    for of in (
-        CommonParameters,
-        LinkageMotion,
-        PortValues,
-        PortSlopes,
-        Running,
-        Start,
-        AddedInertia,
-        LoadInput,
-    )
-    for name in names_of(of)
-)
-"""Names of variables that every machine has."""
 
 
 @dataclass
@@ -149,6 +132,7 @@ class LinkageDescription:
         self.Inputs = declared_class("Inputs", (motion,), inputs)
         p, u = self.Parameters(), self.Inputs()
         self.sides = dict(LinkageParts(MATH, self.structure, self.values(p, u)).sides)
+        self.sides |= turns_of_triads(self.linkage(MATH, p, u))
         self.turning = self._followed(p, u)
 
     # declarations
@@ -261,6 +245,7 @@ class LinkageDescription:
             derived = derived_numbers(MATH, linkage)
         except (ArithmeticError, ValueError):
             raise self._closing(linkage, ()) from None
+        check_triads(linkage, derived)
         places = self.places()
         around = [*places, places[0] + 2.0 * math.pi] if not self.data["driver"]["linear"] else places
         angles: dict[str, list[float]] = {}
@@ -423,7 +408,7 @@ class LinkageDescription:
             except (ArithmeticError, ValueError):
                 margins = [math.nan] * len(self.structure.groups)
             signed = [margin * sign for margin, sign in zip(margins, self._signs, strict=True)]
-            least = signed if not least else [_least(xp, *pair) for pair in zip(least, signed, strict=True)]
+            least = signed if not least else [lesser(xp, *pair) for pair in zip(least, signed, strict=True)]
         for margin in least:
             yield margin, LEAST_MARGIN, math.inf
 
@@ -500,9 +485,3 @@ class LinkageDescription:
         about = middle + rate * q if rate else middle
         c, s = (xp.cos(about), xp.sin(about)) if rate else (math.cos(about), math.sin(about))
         return about + xp.atan2(c * axis.y - s * axis.x, c * axis.x + s * axis.y)
-
-
-def _least(xp: Any, a: Any, b: Any) -> Any:
-    """The lesser of two numbers, NaN where either is: `fmin` of C would pass by a NaN, and so a linkage that does not
-    close."""
-    return 0.5 * (a + b - xp.abs(a - b))

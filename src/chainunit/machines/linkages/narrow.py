@@ -1,11 +1,20 @@
-"""The least margin of each group between the places at which a linkage is checked. Standard library only: FMUs carry
-this file."""
+"""Checks of a linkage over the way of its driver: the least margin of each group between the places at which it is
+looked at, and triads. Standard library only: FMUs carry this file."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from typing import Any
 
+from ...engines import MATH
+from ...errors import InputError
+from ...groups.triad import Triad
+from ...mechanism.linkage import Linkage
+from ...mechanism.machine import Mechanism, derived_numbers
+
+MOST_MISFIT = 1e-10
 NEAR = 0.35
 """Between two places the margin may fall from here to zero."""
 _GOLDEN = 0.6180339887498949
@@ -51,3 +60,45 @@ def _lowest(margin: Callable[[float], float], low: float, high: float) -> tuple[
             b = low + _GOLDEN * (high - low)
             at_b = margin(b)
     return (a, at_a) if at_a < at_b else (b, at_b)
+
+
+def turns_of_triads(linkage: Linkage) -> dict[str, float]:
+    """The turns of the ternary link of each triad in a turn of the crank, by name; the triads know them from here on.
+    One that does not close has none."""
+    turns = {}
+    for k, group in enumerate(linkage.groups):
+        if isinstance(group, Triad):
+            before = linkage.before(k)
+            try:
+                placed = partial(_placed, before, derived_numbers(MATH, before))
+                turns[group.name] = group.turns = group.turns_in_a_turn(MATH, placed)
+            except (ArithmeticError, ValueError):
+                break
+    return turns
+
+
+def _placed(linkage: Linkage, derived: Sequence[Any], q: float) -> Mechanism:
+    return Mechanism(MATH, linkage, q, derived)
+
+
+def check_triads(linkage: Linkage, derived: Sequence[Any]) -> None:
+    """Refuse triads that cannot be followed all the way round.
+
+    Raises
+    ------
+    InputError
+        in one line.
+    """
+    for k, group in enumerate(linkage.groups):
+        if isinstance(group, Triad) and not derived[linkage.before(k + 1).derived - 2] <= MOST_MISFIT:
+            raise InputError(
+                f"the triad of {group.name} does not close all the way round, or moves too sharply to be followed: "
+                "change its lengths",
+                key=f"links.{group.name}",
+            )
+
+
+def lesser(xp: Any, a: Any, b: Any) -> Any:
+    """The lesser of two numbers, NaN where either is: `fmin` of C would pass by a NaN, and so a linkage that does not
+    close."""
+    return 0.5 * (a + b - xp.abs(a - b))

@@ -74,7 +74,8 @@ class LinkageParts:
         """
         Parameters
         ----------
-        sides : the assembly modes; None to find them by the rough poses, which takes numbers and `MATH`
+        sides : the assembly modes, of a triad the turns of its ternary link; None to find modes by the rough poses,
+            which takes numbers and `MATH`
         """
         self.xp, self.structure, self.values = xp, structure, values
         self.sides: dict[str, float] = dict(sides or {})
@@ -376,7 +377,8 @@ class LinkageParts:
         mass = plate.mass or Mass(0.0, 0.0, 0.0, 0.0)
         first, second, third = built
         pose = Pose(x, y, angle)
-        return Triad(ternary, mass, (first, second, third), plate.points, pose, self.structure.start)
+        turns = self.sides.get(ternary, 0.0)
+        return Triad(ternary, mass, (first, second, third), plate.points, pose, self.structure.start, turns)
 
     def _leg(self, link: str, outer: JointEntry, inner: JointEntry, ternary: str) -> Leg:
         pin = self.pin(ternary, inner.at(ternary))
