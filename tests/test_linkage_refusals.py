@@ -44,6 +44,14 @@ def test_every_fault_has_its_line_key_and_remedy(text, faults, tmp_path):
         assert not re.search(r"\bNone\b(?!_)|\bTrue\b|\bFalse\b|<class|\?;|Error", message), line
 
 
+@pytest.mark.parametrize("unit", ["kg m2", "kg*m2", "kg·m²", "kg m^2", "N*m*s^2"])
+def test_a_unit_may_be_a_product(unit, tmp_path):
+    """It is no expression with a unit inside."""
+    file = tmp_path / "mine.toml"
+    file.write_text(changed([('"0.09 kg m2"', f'"0.09 {unit}"')]), "utf-8")
+    assert read_linkage(file).Parameters().crank.inertia == pytest.approx(0.09, rel=1e-15)
+
+
 def test_the_file_itself_is_right(tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text(PRESS, "utf-8")

@@ -151,6 +151,7 @@ CHANGES = [
     ([('link = "crank"', 'link = "cronk"')], [(15, "driver.link", 'was "crank" meant?')]),
     ([('link = "crank"', 'link = "rod"')], [(15, "driver.link", "one revolute joint with the ground")]),
     ([('zero = "0 deg"', 'positive = "left"')], [(16, "driver.positive", '"counter-clockwise"')]),
+    ([('zero = "0 deg"', "range = [0, 1]")], [(16, "driver.range", "belongs to a driver that slides")]),
     # degrees of freedom and assembly
     ([("A = [0, 0], C", "Q = [0, 0], C")], [(21, "links.rod", "rod has one joint; add a joint")]),
     ([(GUIDE, "")], [(24, "links.ram", "too many degrees of freedom: 3")]),

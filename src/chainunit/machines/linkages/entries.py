@@ -281,12 +281,23 @@ def _is_quantity(text: str) -> bool:
     parts = units.split(text)
     if parts is None or parts[1][:1] in ("+", "-", "*", "/"):
         return False
-    if re.search(r"[+*()]|\s[-/]\s", parts[1]):
+    if re.search(r"[+*()]|\s[-/]\s", parts[1]) and not _is_unit(parts[1]):
         raise InputError(
             f"is {shown(text)}; an expression has no units inside: write its numbers in SI units, such as "
             "2 * r + 0.01"
         )
     return True
+
+
+def _is_unit(text: str) -> bool:
+    """Whether a text is a unit of a linkage, such as kg*m2 or N/(m s)."""
+    for each in UNITS:
+        try:
+            units.convert(1.0, text, each)
+        except ValueError:
+            continue
+        return True
+    return False
 
 
 def is_given(value: Any) -> str:

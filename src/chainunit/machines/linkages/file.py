@@ -312,6 +312,10 @@ class _LinkageReader(EntryReader):
                 "name of a point in [ground]",
             )
             return {}, None
+        if "range" in table:
+            self.fault(
+                "driver.range", "belongs to a driver that slides; one that turns goes all the way round"
+            )
         positive = table.get("positive", "counter-clockwise")
         if positive not in ("clockwise", "counter-clockwise"):
             self.fault("driver.positive", f'is {shown(positive)}; must be "clockwise" or "counter-clockwise"')
