@@ -19,7 +19,7 @@ import math
 from types import SimpleNamespace
 from typing import Any
 
-NAMES = ("sin", "cos", "sqrt", "atan2", "asin", "acos", "abs", "minimum", "maximum")
+NAMES = ("sin", "cos", "sqrt", "atan2", "asin", "acos", "exp", "log", "abs", "minimum", "maximum")
 
 MATH = SimpleNamespace(
     sin=math.sin,
@@ -28,6 +28,8 @@ MATH = SimpleNamespace(
     atan2=math.atan2,
     asin=math.asin,
     acos=math.acos,
+    exp=math.exp,
+    log=math.log,
     abs=abs,
     minimum=min,
     maximum=max,
@@ -176,6 +178,8 @@ def dual(xp: Any) -> SimpleNamespace:
         sqrt=lift(xp.sqrt, lambda v, y: 0.5 / y),
         asin=lift(xp.asin, lambda v, y: 1.0 / xp.sqrt(1.0 - v * v)),
         acos=lift(xp.acos, lambda v, y: -1.0 / xp.sqrt(1.0 - v * v)),
+        exp=lift(xp.exp, lambda v, y: y),
+        log=lift(xp.log, lambda v, y: 1.0 / v),
         atan2=atan2,
         abs=absolute,
         minimum=minimum,

@@ -16,7 +16,7 @@ from ..errors import InputError, meant, shown
 Evaluation = Callable[[Any, Mapping[str, Any]], Any]
 """The value of an expression: of the engine and the quantities by name."""
 
-_ONE = ("sin", "cos", "sqrt", "asin", "acos", "abs")
+_ONE = ("sin", "cos", "sqrt", "asin", "acos", "exp", "log", "abs")
 _TWO = {"atan2": "atan2", "min": "minimum", "max": "maximum"}
 FUNCTIONS = (*_ONE, "tan", *_TWO)
 CONSTANTS = {"pi": math.pi, "deg": math.pi / 180.0}
@@ -71,6 +71,10 @@ class Expression:
                 return self._power(self._compiled(base, names), power)
             case ast.BinOp(op=ast.Div(), right=ast.Constant(value=number)) if number == 0:
                 raise InputError(f"{shown(self.text)}: {ast.unparse(node)} divides by zero")
+            case ast.BinOp(op=ast.Pow(), left=base, right=ast.Constant(value=float(power))):
+                # of a positive number, such as the pressure of a gas
+                value, exponent = self._compiled(base, names), float(power)
+                return lambda xp, of: xp.exp(exponent * xp.log(value(xp, of)))
             case ast.BinOp(op=op, left=left, right=right) if type(op) in _OPERATORS:
                 a, b, apply = self._compiled(left, names), self._compiled(right, names), _OPERATORS[type(op)]
                 return lambda xp, of: apply(a(xp, of), b(xp, of))
@@ -78,7 +82,7 @@ class Expression:
                 return self._call(name, [self._compiled(each, names) for each in args])
         raise InputError(
             f"{shown(self.text)}: {ast.unparse(node)} cannot be computed; an expression has numbers, names, "
-            f"+ - * /, whole powers up to {MOST_POWER}, brackets, and {', '.join(FUNCTIONS)}"
+            f"+ - * /, powers (whole ones up to {MOST_POWER}), brackets, and {', '.join(FUNCTIONS)}"
         )
 
     @staticmethod

@@ -18,8 +18,9 @@ def dimension_of_unit(unit: str) -> Dimension:
     return tuple((name, float(power)) for name, power in base_units(unit).items() if name != "rad" and power)
 
 
-def checked_dimension(text: str, units: Mapping[str, str | None], unit: str) -> None:
-    """Refuse an expression that is not of the dimension of `unit`; `units` are those of the names in it, None for one
+def checked_dimension(text: str, units: Mapping[str, str | None], unit: str | None) -> None:
+    """Refuse an expression that is not of the dimension of `unit`, or, without it, adds what does not fit together;
+    `units` are those of the names in it, None for one
     that is not known yet.
 
     Raises
@@ -29,7 +30,7 @@ def checked_dimension(text: str, units: Mapping[str, str | None], unit: str) -> 
     """
     known = {name: None if each is None else dimension_of_unit(each) for name, each in units.items()}
     result = _dimension(ast.parse(text.strip(), mode="eval").body, known, text)
-    if result is not None and result != dimension_of_unit(unit):
+    if unit is not None and result is not None and result != dimension_of_unit(unit):
         raise InputError(f"is {shown(text)}, in {_unit(result)}; must be in {unit.replace('.', ' ')}")
 
 
@@ -41,7 +42,7 @@ def _dimension(node: ast.AST, known: Mapping[str, Dimension | None], text: str) 
             return () if name in CONSTANTS else known[name]
         case ast.UnaryOp(operand=inner):
             return _dimension(inner, known, text)
-        case ast.BinOp(op=ast.Pow(), left=base, right=ast.Constant(value=int(power))):
+        case ast.BinOp(op=ast.Pow(), left=base, right=ast.Constant(value=int() | float() as power)):
             inside = _dimension(base, known, text)
             return None if inside is None else tuple((name, k * power) for name, k in inside)
         case ast.BinOp(op=op, left=left, right=right):

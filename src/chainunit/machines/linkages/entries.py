@@ -38,6 +38,7 @@ class EntryReader:
         self.inputs = self.table("inputs")
         self.table_units: dict[str, str | None] = {}
         self.units: dict[str, str | None] = {}
+        self.derived: dict[str, str] = {}
         self.used: set[str] = set()
         self.refused: set[str] = set()
         self.points: dict[str, dict[str, list[Any]]] = {}
@@ -128,6 +129,8 @@ class EntryReader:
             if self.refused & words(given):  # the name itself is faulted where it is given
                 return 0.0
             known = {**self.units, **(_MOTION_UNITS | self.table_units if motion else {})}
+            self.used |= words(given) & {*self.derived}
+            given = self.expanded(given)
             each = expression(given)
             for name in each.names:
                 if name not in known:
@@ -184,12 +187,60 @@ class EntryReader:
                     common[name] = declared[name].quantity.within_bounds(x)
         return common
 
+    def expanded(self, text: str) -> str:
+        """An expression without parameters that are expressions of others: these stand in it in brackets."""
+        for name in words(text) & {*self.derived}:
+            text = re.sub(rf"\b{name}\b", f"({self.derived[name]})", text)
+        return text
+
+    def checked_parameter(self, key: str, given: Any, text: str) -> str:
+        """A parameter that is an expression, in those that are numbers; empty where it is wrong."""
+        if self.refused & words(text):
+            return ""
+        with self.at(key):
+            if isinstance(given, Mapping):
+                self.keys(key, given, ("value", "description"))
+            self.used |= words(text) & {*self.derived}
+            whole = self.expanded(text)
+            for each in expression(whole).names:
+                if each not in self.units or each in self.inputs:
+                    raise InputError(f"is {shown(text)}; {each} is no parameter{near_name(each, self.units)}")
+            self.used |= {*expression(whole).names}
+            checked_dimension(whole, self.units, None)
+            return whole
+        return ""
+
+    def expressions(self, table: Mapping[str, Any]) -> None:
+        """Take up the parameters that are expressions of others, in any order, and check each."""
+        waiting = {
+            name: str(given["value"] if isinstance(given, Mapping) else given)
+            for name, given in table.items()
+            if is_expression(given)
+        }
+        while waiting:
+            ready = [name for name, text in waiting.items() if not words(text) & {*waiting}]
+            for name in ready:
+                self.derived[name] = self.checked_parameter(
+                    f"parameters.{name}", table[name], waiting.pop(name)
+                )
+                self.refused |= {name} if not self.derived[name] else set()
+            if not ready:
+                names = ", ".join(waiting)
+                for name in waiting:
+                    self.fault(
+                        f"parameters.{name}", f"refers to itself by way of {names}; give one of them a number"
+                    )
+                    self.derived[name] = "0"
+                return
+
     def quantities(self, kind: str) -> list[dict[str, Any]]:
-        """Parameters or inputs."""
+        """Parameters or inputs; parameters that are expressions of others are taken up apart."""
         entries = []
         table = self.table(kind)
         self.named(kind, table)
         for name, given in table.items():
+            if kind == "parameters" and is_expression(given):
+                continue
             key = f"{kind}.{name}"
             if name in (*FUNCTIONS, *CONSTANTS, *MOTION):
                 self.refused.add(name)
@@ -216,6 +267,8 @@ class EntryReader:
                     }
                 )
             self.units.setdefault(name, None)
+        if kind == "parameters":
+            self.expressions(table)
         return entries
 
     def with_unit(self, given: Any, unit: Any) -> tuple[float, str | None]:
@@ -229,7 +282,7 @@ class EntryReader:
             return self.number("", given, fits[0]), fits[0]
         if isinstance(given, str) and words(given) & {*self.units, *self.table("parameters")}:
             raise InputError(
-                f"is {shown(given)}; must be a number with a unit: write an expression where it is used"
+                f"is {shown(given)}; must be a number with a unit; a parameter may be an expression"
             )
         if isinstance(given, str) and (parts := units.split(given)) and parts[1]:
             for each in UNITS:
@@ -268,6 +321,18 @@ class EntryReader:
                 if not name_fault(name):
                     self.refused.discard(name)
         return curves
+
+
+def is_expression(given: Any) -> bool:
+    """Whether the entry of a parameter is an expression of others, and no number with a unit."""
+    value = given.get("value") if isinstance(given, Mapping) else given
+    parts = units.split(value) if isinstance(value, str) else (0.0, "")
+    if not isinstance(value, str) or (parts is not None and parts[1][:1] not in ("+", "-", "*", "/")):
+        return False
+    try:
+        return bool(expression(value).names)
+    except InputError:
+        return False
 
 
 def _is_quantity(text: str) -> bool:

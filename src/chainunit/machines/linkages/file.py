@@ -15,7 +15,7 @@ from typing import Any
 from ... import places
 from ...engines import MATH
 from ...errors import InputError, each_refusal, meant, near_name, shown
-from ...mechanism.assur import GROUND, PRISMATIC, REVOLUTE
+from ...mechanism.assur import DYADS, GROUND, PRISMATIC, REVOLUTE
 from ...mechanism.expressions import expression
 from ...mechanism.models import InverseMachine
 from ...reading import file_text, in_file, toml
@@ -34,11 +34,11 @@ from .entries import EntryReader, is_given
 from .model import machine_of
 from .shared_pins import shared_pins
 from .start import StartPose
-from .structure import JointEntry
+from .structure import CYLINDER, JointEntry
 
 TABLES = (
     "title", "name", "gravity", "ratio", "parameters", "inputs", "tables", "ground", "driver", "links", "joints",
-    "loads", "pins", "guides", "start",
+    "loads", "pins", "guides", "start", "groups",
 )  # fmt: skip
 _LINK_KEYS = ("points", "mass", "inertia", "centroid", "masses", "bar")
 _JOINT_KEYS = ("type", "on", "by", "toward", "angle", "length")
@@ -98,7 +98,7 @@ class _LinkageReader(EntryReader):
         joints = self.joints()
         driver, span = self.driver(joints)
         loads = [self.load(name, given) for name, given in self.table("loads").items()]
-        common = self.common()
+        common, groups = self.common(), self.groups()
         self.unused(parameters, inputs, tables)
         self.all(quantity_names(parameters, inputs, self.table("tables"), RESERVED, links))
         self.all(spring_faults(loads, joints))
@@ -119,9 +119,32 @@ class _LinkageReader(EntryReader):
             "driver": driver,
             "range": span,
             "loads": loads,
+            "groups": groups,
             "start": start,
         }
         return json.dumps(described, sort_keys=True)
+
+    def groups(self) -> list[Any]:
+        """The groups that the file lists, each with its kind, if it is given, and its links."""
+        given, groups = self.data.get("groups", []), []
+        if not isinstance(given, list) or not all(isinstance(each, Mapping) for each in given):
+            self.fault("groups", f"is {shown(given)}; must be tables [[groups]] with kind and links")
+            return []
+        kinds = (*DYADS, "triad", CYLINDER)
+        for k, table in enumerate(given, 1):
+            key = f"groups.{k}"
+            self.keys(key, table, ("kind", "links"))
+            kind, links = table.get("kind", ""), table.get("links")
+            if kind not in ("", *kinds):
+                self.fault(f"{key}.kind", f"is {shown(kind)}; must be one of {', '.join(kinds)}")
+            if not isinstance(links, list) or not links or not all(isinstance(each, str) for each in links):
+                self.fault(f"{key}.links", f"{is_given(links)}; must be a list of links")
+                continue
+            for link in links:
+                if link not in self.points:
+                    self.fault(f"{key}.links", f"{link} is no link{near_name(link, self.points)}")
+            groups.append([kind, links])
+        return groups
 
     def unused(
         self, parameters: list[dict[str, Any]], inputs: list[dict[str, Any]], tables: Mapping[str, Any]
@@ -135,6 +158,9 @@ class _LinkageReader(EntryReader):
                 if name not in self.used | self.refused and not (spoilt and name in mentioned):
                     self.fault(f"{kind}.{name}", "nothing uses it; use it, or take it out")
                 each["unit"] = each["unit"] or self.units[name] or "1"
+        for name in self.derived:
+            if name not in self.used and not (spoilt and name in mentioned):
+                self.fault(f"parameters.{name}", "nothing uses it; use it, or take it out")
         for name in tables:
             if name not in self.used | self.refused and not (spoilt and name in mentioned):
                 self.fault(f"tables.{name}", "no load uses it; use it, or take it out")

@@ -46,7 +46,7 @@ from .loads import CoordinateTable, ForceLaw, SpringDamper, TorqueLaw, name_of_l
 from .narrow import check_triads, lesser, lows, turns_of_triads
 from .parts import LinkageParts
 from .probes import guide_reaction, own_axis, point_motion
-from .structure import DriverEntry, JointEntry, LinkEntry, Structure
+from .structure import check_groups, structure_of
 
 ANGLES = 48
 """Places of the driver at which a linkage is checked to close."""
@@ -82,36 +82,9 @@ class LinkageDescription:
 
     def __init__(self, data: Mapping[str, Any], text: str) -> None:
         self.data, self.text = data, text
-        links = [
-            LinkEntry(
-                each["name"],
-                {name: (x, y) for name, (x, y) in each["points"].items()},
-                each.get("mass", 0.0),
-                each.get("inertia", 0.0),
-                tuple(each.get("centroid", (0.0, 0.0))),
-                each.get("masses", {}),
-            )
-            for each in data["links"]
-        ]
-        joints = [
-            JointEntry(
-                each["name"], each["type"], tuple(each["on"]), tuple(each["by"]),
-                each.get("toward", ""), each.get("angle", 0.0),
-            )
-            for each in data["joints"]
-        ]  # fmt: skip
-        driver = DriverEntry(**data["driver"])
-        start = data["start"]
-        ends = [tuple(load[key]) for load in data["loads"] for key in ("on", "by") if key in load]
-        self.structure = Structure.of(
-            {name: (x, y) for name, (x, y) in data["ground"].items()},
-            links,
-            joints,
-            driver,
-            start["value"],
-            {name: tuple(pose) for name, pose in start["poses"].items()},
-            [end for end in ends if len(end) == 2],
-        )
+        self.structure = structure_of(data)
+        driver = self.structure.driver
+        check_groups(self.structure, data.get("groups", ()))
         self.tables = {
             name: CoordinateTable(each["places"], each["values"], not driver.linear)
             for name, each in data.get("tables", {}).items()
@@ -217,10 +190,7 @@ class LinkageDescription:
         """How the angle of the driver counts, in words."""
         driver = self.structure.driver
         zero = value_of(MATH, driver.zero, self.values(self.Parameters(), self.Inputs()))
-        way = "counter-clockwise" if driver.sense > 0.0 else "clockwise"
-        named = {0.0: "from the x axis", 90.0: "from the upward vertical"}
-        degrees = round(math.degrees(zero), 6)
-        return f"{named.get(degrees, f'from {degrees:g} deg to the x axis')}, {way}"
+        return driver.angle_counts(zero)
 
     def places(self) -> list[float]:
         """Places of the driver from the start on, around or over its range."""

@@ -3,6 +3,7 @@ only: FMUs carry this file."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -63,6 +64,13 @@ class DriverEntry:
     linear: bool
     zero: Entry = 0.0
     sense: float = 1.0
+
+    def angle_counts(self, zero: float) -> str:
+        """How its angle counts, in words, where `zero` has this value [rad]."""
+        named = {0.0: "from the x axis", 90.0: "from the upward vertical"}
+        degrees = round(math.degrees(zero), 6)
+        way = "counter-clockwise" if self.sense > 0.0 else "clockwise"
+        return f"{named.get(degrees, f'from {degrees:g} deg to the x axis')}, {way}"
 
 
 def groups_of(links: Sequence[str], joints: Sequence[JointEntry], driver: DriverEntry) -> list[AssurGroup]:
@@ -219,3 +227,55 @@ def pin_names(
         for link in those:
             names[link, point] = point if len(met) == len(those) else f"{link}.{point}"
     return names
+
+
+def check_groups(structure: Structure, listed: Sequence[Any]) -> None:
+    """Refuse groups that a file lists, each as kind and links, and that the linkage does not have.
+
+    Raises
+    ------
+    InputError
+        in one line, with the groups that it has.
+    """
+    own = {frozenset(group.links): group.kind for group in structure.groups}
+    there = ", ".join(f"{group.kind} ({', '.join(group.links)})" for group in structure.groups)
+    for k, (kind, links) in enumerate(listed, 1):
+        found, names = own.get(frozenset(links)), ", ".join(links)
+        if found is None:
+            raise InputError(f"{names} is no group; the groups are {there}", f"groups.{k}.links")
+        if kind not in ("", found):
+            raise InputError(f"the links {names} form the group {found}, not {kind}", f"groups.{k}.kind")
+
+
+def structure_of(data: Mapping[str, Any]) -> Structure:
+    """The structure of a description; see `Structure.of`."""
+    links = [
+        LinkEntry(
+            each["name"],
+            {name: (x, y) for name, (x, y) in each["points"].items()},
+            each.get("mass", 0.0),
+            each.get("inertia", 0.0),
+            tuple(each.get("centroid", (0.0, 0.0))),
+            each.get("masses", {}),
+        )
+        for each in data["links"]
+    ]
+    joints = [
+        JointEntry(
+            each["name"], each["type"], tuple(each["on"]), tuple(each["by"]),
+            each.get("toward", ""), each.get("angle", 0.0),
+        )
+        for each in data["joints"]
+    ]  # fmt: skip
+    driver = DriverEntry(**data["driver"])
+    start = data["start"]
+    ends = [tuple(load[key]) for load in data["loads"] for key in ("on", "by") if key in load]
+    return Structure.of(
+        {name: (x, y) for name, (x, y) in data["ground"].items()},
+        links,
+        joints,
+        driver,
+        start["value"],
+        {name: tuple(pose) for name, pose in start["poses"].items()},
+        [end for end in ends if len(end) == 2],
+    )
