@@ -131,7 +131,7 @@ BAR = {"from": "A", "to": "C", "area": "400 mm2", "density": "7850 kg/m3"}
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        ({"groups": {"first": {"kind": "RRP"}}}, "groups: unknown key"),
+        ({"groups": {"first": {"kind": "RRP"}}}, "must be tables [[groups]] with kind and links"),
         ({"tables": {"share": {"phi": [0, 1, 2], "value": [0, 1, 2]}}}, "tables.share: no load uses it"),
         ({"bar": {**BAR, "to": "A"}}, "links.rod.bar: goes from A to A; from and to must be two points"),
         ({"bar": {**BAR, "density": "-7850 kg/m3"}}, 'links.rod.bar.density: is "-7850 kg/m3"; must be > 0'),
