@@ -11,6 +11,7 @@ import pytest
 from linkage_files import MACHINES, expected, model, tables
 from test_reference import deviation
 
+from chainunit.engines import MATH
 from chainunit.errors import InputError
 from chainunit.fmu.export import export as export_python
 from chainunit.fmu.native.export import export
@@ -144,3 +145,19 @@ def test_nothing_in_a_file_is_without_effect_or_without_mass(more, words):
     data["links"]["rod"] = {"points": data["links"]["rod"]["points"], "bar": bar}
     with pytest.raises(InputError, match=re.escape(words)):
         description_of(data | more, "press")
+
+
+def test_a_triad_that_does_not_close_with_other_lengths_is_refused():
+    """By Python, and by the requirement that FMUs check."""
+    data = tables(MACHINES["triad_slider"]["description"])
+    data["parameters"] = {"l": 0.6}
+    data["links"]["link"]["points"]["C"] = ["l", 0.0]
+    model = machine_of(description_of(data, "triad_with_length"))
+    Machine(model, {"l": 0.605})
+    for l in (0.9, 1.2):
+        with pytest.raises(InputError):
+            Machine(model, {"l": l})
+        p = model.parameter_layout.from_names({"l": l})
+        p = model.prepared(MATH, p, None)
+        met = [low < value < high for value, low, high in model.requirements(MATH, p)]
+        assert len(met) == len(model.required) == 2 and not all(met)

@@ -40,6 +40,8 @@ SAMPLES = 20
 """Number of crank angles at which a triad is followed once around."""
 HARMONICS = 8
 """Number of harmonics in the series of the pose."""
+MOST_MISFIT = 1e-10
+"""Largest misfit of a leg that counts as closed, in parts of its length."""
 _STEPS = 3
 """Steps of Newton's method from the series: three remove an error of 1e-3, as of a pose that moves sharply."""
 
@@ -259,7 +261,7 @@ def requirements(legs: tuple[str, ...], assembly: tuple[str, ...]) -> tuple[Requ
 def limits(derived: Sequence[Any]) -> Iterator[tuple[Any, Any, Any]]:
     """Value, lower and upper limit of each of `requirements`, from `Triad.derive`."""
     *_, misfit, least = derived
-    yield misfit, -math.inf, 1e-10
+    yield misfit, -math.inf, MOST_MISFIT
     yield least, 1e-3, math.inf
 
 

@@ -18,6 +18,7 @@ from typing import Any, cast
 from ...engines import MATH
 from ...errors import GeometryError, InputError
 from ...groups.loads import GuideLosses, PinLosses, Weight
+from ...groups.triad import MOST_MISFIT
 from ...mechanism.assur import GROUND, PRISMATIC
 from ...mechanism.driver_ports import ROTATING, SLIDING
 from ...mechanism.expressions import value_of
@@ -308,14 +309,20 @@ class LinkageDescription:
             for name, j in self.structure.joints.items()
             if j.kind != PRISMATIC
         }
+        given = tuple(each["name"] for each in data.get("parameters", ()))
+        words = {
+            "least margin of the group of {} over the way of the driver": (
+                "the linkage does not close all the way, or comes to a dead position"
+            ),
+            "largest misfit of a leg of the group of {} over the turn of the driver, in parts of its length": (
+                "the group does not close all the way round from the start pose, or moves too sharply to be followed"
+            ),
+        }
         required = tuple(
-            Requirement(
-                f"least margin of the group of {', '.join(each.links)} over the way of the driver",
-                "1",
-                "the linkage does not close all the way, or comes to a dead position",
-                tuple(each["name"] for each in data.get("parameters", ())),
-            )
+            Requirement(subject.format(", ".join(each.links)), "1", why, given)
+            for subject, why in words.items()
             for each in self.structure.groups
+            if subject.startswith("least") or each.kind == "triad"
         )
 
         class FileMachine(InverseMachine):
@@ -367,7 +374,8 @@ class LinkageDescription:
         return FileMachine
 
     def limits(self, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
-        """The least margin of each group over the way of the driver, and its limit."""
+        """The least margin of each group over the way of the driver, and the largest misfit of each triad, with
+        their limits."""
         u = self.Inputs()
         linkage = self.linkage(xp, p, u)
         derived = getattr(p, "derived", ())
@@ -381,6 +389,11 @@ class LinkageDescription:
             least = signed if not least else [lesser(xp, *pair) for pair in zip(least, signed, strict=True)]
         for margin in least:
             yield margin, LEAST_MARGIN, math.inf
+        last = 0
+        for each in linkage.groups:
+            last += each.derived
+            if each.derived:
+                yield derived[last - 2], -math.inf, MOST_MISFIT
 
     @cached_property
     def _signs(self) -> list[float]:
