@@ -171,7 +171,7 @@ def _math() -> Any:
 
 def _forces(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:
     yield b.Text(
-        s.line("Inverse dynamics at {=speed} of the driver, with the loads of normal running."), "lead"
+        s.line("Inverse dynamics at {=speed:4} of the driver, with the loads of normal running."), "lead"
     )
     turns, unit = f.machine.model.turns, f.machine.model.driver_port.unit
     effort, inertia_word = ("torque", "inertia") if turns else ("force", "mass")
