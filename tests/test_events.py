@@ -109,7 +109,7 @@ def test_what_lumps_and_jams_do_over_time():
 @pytest.mark.parametrize("kind", [name for name, of in TYPES.items() if not of.from_rest])
 def test_an_event_is_followed_to_its_end_and_a_turn_more(kind):
     """However long it lasts, and however short the turns that are asked for are."""
-    of, turn = TYPES[kind], 0.25
+    of, turn = TYPES[kind].of_input("load"), 0.25
     longer = {n: 7.0 for n in Layout(of.Parameters).names if n in ("duration", "shift")}
     event = of.on("left" if of.has_side else "", of.Parameters(turns=1.0, **longer))
     normal = dict.fromkeys(event.inputs(event.side), 50.0)
@@ -234,20 +234,20 @@ def test_two_of_a_kind_run_beside_each_other(tmp_path):
 
 
 @pytest.fixture
-def surge():
+def swell():
     """A type of event that the package does not have: the material of one side swells and stays."""
 
-    class Surge(Event):
+    class Swell(Event):
         """More material comes to one side."""
 
-        kind, run = "surge", "surge_{side}"
-        words, heading = "more material comes to the {side}", "surge {side}"
+        kind, run = "swell", "swell_{side}"
+        words, heading = "more material comes to the {side}", "swell {side}"
         role = Role.DUTY
         acts_on = ("{side}.material_mass",)
 
         @declaration
         class Parameters(Timing):
-            """Quantities of the surge."""
+            """Quantities of the swell."""
 
             added: Value = quantity("kg", "material that comes", default=20.0, min=0.0)
             time: Value = quantity("s", "time in which it comes", default=0.5, above=0.0)
@@ -257,27 +257,27 @@ def surge():
             (name,) = self.inputs(self.side)
             return {name: Profile(normal[name], ((at, self.p.time, normal[name] + self.p.added),))}
 
-    yield Surge
-    del TYPES["surge"]
+    yield Swell
+    del TYPES["swell"]
 
 
-def test_a_new_type_of_event_is_one_class(surge, tmp_path):
+def test_a_new_type_of_event_is_one_class(swell, tmp_path):
     """Defined here, it runs by a study file, on the terminal and the page, and as the event of random overloads."""
     from command import chainunit
 
-    text = '[[event]]\ntype = "surge"\nside = "right"\nadded = "45 kg"\nturns = 1\n'
-    (tmp_path / "surge.toml").write_text(f"{QUICK}{text}")
-    process = chainunit("study", "surge.toml", "-o", "out", cwd=tmp_path)
+    text = '[[event]]\ntype = "swell"\nside = "right"\nadded = "45 kg"\nturns = 1\n'
+    (tmp_path / "swell.toml").write_text(f"{QUICK}{text}")
+    process = chainunit("study", "swell.toml", "-o", "out", cwd=tmp_path)
     assert process.returncode == 0, process.stderr
     numbers = json.loads((tmp_path / "out" / "result.json").read_text())
-    assert numbers["event"]["surge_right"]["added"] == {"value": 45.0, "unit": "kg"}
-    steady, surged = (numbers["answers"][name] for name in ("steady", "surge_right"))
-    assert surged["crank_torque_peak"]["value"] > 1.02 * steady["crank_torque_peak"]["value"]
-    assert numbers["certificate"]["surge_right"]["energy_residual_share"]["value"] < 2e-3
-    assert "surge right" in process.stdout
+    assert numbers["event"]["swell_right"]["added"] == {"value": 45.0, "unit": "kg"}
+    steady, swelld = (numbers["answers"][name] for name in ("steady", "swell_right"))
+    assert swelld["crank_torque_peak"]["value"] > 1.02 * steady["crank_torque_peak"]["value"]
+    assert numbers["certificate"]["swell_right"]["energy_residual_share"]["value"] < 2e-3
+    assert "swell right" in process.stdout
     assert "more material comes to the right" in (tmp_path / "out" / "report.html").read_text().lower()
-    random = config.parse('[monte_carlo]\nevent = { type = "surge", added = ["1 kg", "9 kg"] }').random
+    random = config.parse('[monte_carlo]\nevent = { type = "swell", added = ["1 kg", "9 kg"] }').random
     event = random.event("left", random.draw(np.random.default_rng(1)))
-    assert isinstance(event, surge) and 1.0 <= event.p.added <= 9.0
-    with pytest.raises(InputError, match=r"event\.surge_left\.added = -1 kg: must be >= 0 kg"):
-        config.parse('[[event]]\ntype = "surge"\nside = "left"\nadded = -1')
+    assert isinstance(event, swell) and 1.0 <= event.p.added <= 9.0
+    with pytest.raises(InputError, match=r"event\.swell_left\.added = -1 kg: must be >= 0 kg"):
+        config.parse('[[event]]\ntype = "swell"\nside = "left"\nadded = -1')

@@ -65,7 +65,8 @@ def _one_key(table, key):
     """A study file with that key alone, at the value that it has where it is left out."""
     if table.name == "event":
         side = 'side = "left"\n' if TYPES[table.of].has_side else ""
-        own = "" if key.name in ("type", "side") else f"{key.name} = {key.left_out}\n"
+        side += 'input = "left.material_mass"\n' if TYPES[table.of].has_input else ""
+        own = "" if key.name in ("type", "side", "input") else f"{key.name} = {key.left_out}\n"
         machine = {"cut": "KnifeDrive", "overload": "Accelerator"}.get(table.of, "ChamberForces")
         return f'[system]\nmachine = "{machine}"\n[[event]]\ntype = "{table.of}"\n{side}{own}'
     system = f'[system]\nmachine = "{table.of}"\n' if table.of in MACHINES else ""
@@ -186,7 +187,7 @@ def test_the_commands(tmp_path):
         ("crank_speed", ["[run]"], ["crank_speed"]),
         ("machine.r", ["[machine] of ChamberForces", "[machine] of KnifeDrive"], ["r"]),
         ("KnifeDrive.knife.c", ["[machine] of KnifeDrive"], ["knife.c.x", "knife.c.y"]),
-        ("event.rise", [f"[[event]] of {name}" for name in ("jam", "lumps", "overload")], ["rise"]),
+        ("event.rise", [f"[[event]] of {name}" for name in ("jam", "lumps", "overload", "surge")], ["rise"]),
         ("[sizing]", ["[sizing]"], [key.name for t in key_tables() if t.name == "sizing" for key in t.keys]),
     ],
 )

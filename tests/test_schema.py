@@ -101,6 +101,8 @@ RIGHT = [
 
 @pytest.mark.parametrize("text", RIGHT, ids=range(len(RIGHT)))
 def test_no_right_file_is_marked(text):
+    if "polygon" in text:
+        pytest.importorskip("sectionproperties")
     assert refused(text) == "" and marks(text) == []
 
 

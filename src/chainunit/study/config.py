@@ -13,7 +13,7 @@ from ..drives.catalogue import CatalogueMotor
 from ..drives.gearing import Transmission
 from ..drives.motor import Motor
 from ..drives.motors import MOTORS
-from ..errors import Faults, GeometryError, InputError, each_refusal, refusal_prefix
+from ..errors import Faults, GeometryError, InputError, each_refusal, near_name, refusal_prefix
 from ..machines.api import machine_of, ratios
 from ..machines.chain_unit import SideLoads, SideName
 from ..machines.machine import Machine
@@ -432,10 +432,14 @@ def _loads_beyond(config: Config) -> Iterator[InputError]:
             asked = config.monte_carlo.runs or where != "monte_carlo.event"
             if asked and config.foreign is None and not needed <= {*inputs, *of_motors}:
                 yield InputError(
-                    f"{where}: the {model.name} has no {' or '.join(sorted(needed))}; leave it out", key=key
+                    f"{where}: the {model.name} has no {' or '.join(sorted(needed))}; leave it out"
+                    + "".join(near_name(name, inputs) for name in needed),
+                    key=key,
                 )
             # an input of the motor: the study checks whether the motor has it
             continue
+        if words := event.fault(normal):
+            yield InputError(f"{where}: {words}", key=key)
         for name, signal in event.signals(normal, 0.0, dict.fromkeys(event.reads, 0.0)).items():
             most = (
                 max([signal.start, *(x for *_, x in signal.changes)])

@@ -9,6 +9,7 @@ inputs its system does not have.
 
 from __future__ import annotations
 
+import copyreg
 from collections import defaultdict
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -44,6 +45,19 @@ TYPES: dict[str, type[Event]] = {}
 """The types of events, by the names that a study file uses."""
 
 
+class EventType(type):
+    """The type of all types of events."""
+
+
+def _reduced(of: Any) -> str | tuple[Any, tuple[Any, ...]]:
+    """A type of event as pickle stores it: by its name, or by the call that makes it."""
+    maker = vars(of).get("maker")
+    return of.__qualname__ if maker is None else maker
+
+
+copyreg.pickle(EventType, _reduced)
+
+
 @declaration
 class Timing:
     """When an event begins, and for how long the machine is followed."""
@@ -65,7 +79,7 @@ class Timing:
 
 
 @dataclass(frozen=True)
-class Event:
+class Event(metaclass=EventType):
     """An event with its quantities `p`, which is followed by the run `name`; `side` is empty for an event
     without a side.
 
@@ -93,6 +107,8 @@ class Event:
     """range of each quantity that random overloads draw, if the study file gives none: from, to"""
     counts: ClassVar[tuple[str, ...]] = ()
     """quantities that are whole numbers"""
+    has_input: ClassVar[bool] = False
+    """whether the study file names the input that the event changes, see `of_input`"""
     Parameters: ClassVar[type] = Timing
 
     name: str
@@ -110,9 +126,18 @@ class Event:
         return cls(name or on_side(cls.run, side), side, cls.Parameters() if p is None else p)
 
     @classmethod
+    def of_input(cls, name: str) -> type[Event]:
+        """The type of event for an input of the machine or the motor, by its name."""
+        return cls
+
+    @classmethod
     def inputs(cls, side: AnySide) -> tuple[str, ...]:
         """The inputs that the event changes on that side."""
         return tuple(on_side(name, side) for name in cls.acts_on)
+
+    def fault(self, normal: Values) -> str:
+        """The reason, in words, why the event changes nothing with these `normal` values; empty where it does."""
+        return ""
 
     @property
     def _mark(self) -> str:

@@ -49,6 +49,7 @@ def read_events(tables: Sequence[Any]) -> dict[str, Event]:
     for k, table in enumerate(tables, 1):
         with faults.collected():
             of = _type(table, f"event {k}", f"event.{k}")
+            of = _with_input(of, table, f"event {k} ({of.kind})", f"event.{k}", faults)
             where, place = f"event {k} ({of.kind})", f"event.{k}"
             side = _side(of, table, where, place, faults)
             if "side" not in table and of.has_side:
@@ -93,7 +94,8 @@ class RandomEvent:
     def as_dict(self) -> dict[str, Any]:
         """All values on which a drawn event depends, ready for JSON."""
         fixed = Layout(type(self.p)).by_name(self.p)
-        return {"type": self.of.kind, "side": self.side, "p": fixed, "ranges": dict(self.ranges)}
+        own = {"input": self.of.acts_on[0]} if self.of.has_input else {}
+        return {"type": self.of.kind, **own, "side": self.side, "p": fixed, "ranges": dict(self.ranges)}
 
 
 PLACED = ("crank_angle", "turns")
@@ -111,6 +113,7 @@ def read_random_event(table: Mapping[str, Any], where: str) -> RandomEvent:
     """
     faults = Faults()
     of = _type({"type": Jam.kind, **table}, where, where)
+    of = _with_input(of, table, where, where, faults)
     if of.from_rest:
         key = f"{where}.type"
         raise InputError(f'{key} = "{of.kind}": must be an event in steady running', key)
@@ -123,7 +126,7 @@ def read_random_event(table: Mapping[str, Any], where: str) -> RandomEvent:
     for v in given:
         with faults.collected():
             ranges[v.name] = _range(replace(v, name=f"{where}.{v.name}"), table[v.name])
-    drawn = {*ranges, *(v.name for v in given), *PLACED, "name"}
+    drawn = {*ranges, *(v.name for v in given), *PLACED, "name", "input"}
     ordered = {name: ranges[name] for name in Layout(of.Parameters).names if name in ranges}
     side = _side(of, table, where, where, faults)
     with faults.collected():
@@ -160,6 +163,24 @@ def _type(table: Any, where: str, place: str) -> type[Event]:
     return of
 
 
+def _with_input(
+    of: type[Event], table: Mapping[str, Any], where: str, place: str, faults: Faults
+) -> type[Event]:
+    """The type for the input that the table names; a refusal of that goes to the `faults`."""
+    name = table.get("input")
+    if of.has_input and isinstance(name, str) and name:
+        return of.of_input(name)
+    words = ""
+    if of.has_input:
+        given = ": must be given," if name is None else f" = {shown(name)}: must be"
+        words = f"{given} the name of an input, as [feed] has it"
+    elif name is not None:
+        words = ": this event has none; leave it out"
+    if words:
+        faults.add([InputError(f"{where}: input{words}", f"{place}.input")])
+    return of
+
+
 def _side(of: type[Event], table: Mapping[str, Any], where: str, place: str, faults: Faults) -> AnySide:
     """The side that the table names; empty for a wrong one, whose refusal goes to the `faults`."""
     if "side" not in table:
@@ -190,7 +211,7 @@ def _name(
     return next(name for name in numbers if name not in others)
 
 
-_TEXTS = ("type", "side", "name")
+_TEXTS = ("type", "side", "name", "input")
 """Keys of an event that are no quantities."""
 
 

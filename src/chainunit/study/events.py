@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import ClassVar
+from functools import cache
+from typing import Any, ClassVar
 
 from ..machines.chain_unit import other
 from ..quantities import Value, declaration, quantity
 from ..system.signals import Profile
 from ..text import number
-from .event import AnySide, Event, Role, Signals, Timing, Values, on_side
+from .event import AnySide, Event, EventType, Role, Signals, Timing, Values, on_side
 
 
 def _pulses(normal: float, height: float, begins: list[float], rise: float, hold: float) -> Profile:
@@ -328,3 +330,55 @@ class Overload(Event):
         """The torque of the material, added to that of normal running."""
         p = self.p
         return {"load": _pulses(normal["load"], p.torque, [at], p.rise, p.duration)}
+
+
+class Surge(Event):
+    """An input of the machine, which the key ``input`` names, rises to a multiple for a while."""
+
+    kind, run = "surge", "surge"
+    words, heading = "an input of the machine rises", "surge"
+    role, has_side, has_input = Role.SHOCK, False, True
+    draws: ClassVar[Mapping[str, tuple[float, float]]] = {"factor": (1.5, 4.0)}
+
+    @declaration
+    class Parameters(Timing):
+        """Quantities of the surge."""
+
+        factor: Value = quantity("1", "input over that of normal running", default=2.0, min=0.0, max=1e4)
+        duration: Value = quantity(
+            "s", "time for which it lasts", default=0.5, min=1e-4, max=1e4, usual=(1e-3, 60.0)
+        )
+        rise: Value = quantity(
+            "s", "time in which it rises and falls", default=0.02, min=1e-4, max=1e4, usual=(1e-4, 60.0)
+        )
+
+    @classmethod
+    def of_input(cls, name: str) -> type[Event]:
+        """See `Event`."""
+        return _surge_of(name)
+
+    def fault(self, normal: Values) -> str:
+        """See `Event`."""
+        (name,) = self.acts_on
+        return (
+            "" if normal[name] else f"{name} is 0 in normal running, and so is its multiple; give feed.{name}"
+        )
+
+    def signals(self, normal: Values, at: float, state: Values) -> Signals:
+        """The multiple of the input in place of that of normal running."""
+        p, (name,) = self.p, self.acts_on
+        return {name: _pulses(normal[name], (p.factor - 1.0) * normal[name], [at], p.rise, p.duration)}
+
+
+@cache
+def _surge_of(name: str) -> type[Event]:
+    title = re.sub(r"[^a-z0-9]+", "_", name.lower())
+    members = {
+        "acts_on": (name,),
+        "run": f"surge_{title}"[:36],
+        "words": f"{name} rises",
+        "heading": f"surge of {name}",
+        "maker": (_surge_of, (name,)),
+    }
+    of: Any = EventType("SurgeOfInput", (Surge,), members)
+    return of

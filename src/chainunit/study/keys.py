@@ -226,6 +226,8 @@ def _of_event(of: type[Event]) -> Iterator[Key]:
     yield Key("type", "type of the event", words=(f'"{of.kind}"',), sort="text")
     if of.has_side:
         yield Key("side", "side that it comes on", words=('"left"', '"right"'), sort="text")
+    if of.has_input:
+        yield Key("input", "input of the machine that rises, as [feed] has it", sort="text")
     yield Key("name", "name of its run, in small letters, digits and _", sort="text", follows="type and side")
     yield from _numbers(of.Parameters, of.Parameters(), whole=of.counts)
 

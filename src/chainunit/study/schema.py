@@ -126,6 +126,8 @@ class _Schema:
         needed = ["type"] if not random or table.of != "jam" else []
         if "side" in properties and not random:
             needed.append("side")
+        if "input" in properties:
+            needed.append("input")
         return {
             "type": "object",
             "title": table.of,

@@ -1,0 +1,113 @@
+"""A surge: any input of any machine rises for a while, as an event and at random."""
+
+from __future__ import annotations
+
+import json
+import pickle
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from command import chainunit
+
+from chainunit.errors import InputError
+from chainunit.machines.linkages.file import read_linkage
+from chainunit.machines.machine import Machine
+from chainunit.study import config
+from chainunit.study.event_table import read_events, read_random_event
+
+PRESS = Path(__file__).parents[1] / "examples" / "linkages" / "slider_crank_press.toml"
+STUDY = """
+[machine]
+linkage = "slider_crank_press.toml"
+ratio = 15
+[system]
+motor = "DcMotor"
+[motor]
+rotor = { J = 0.1 }
+[run]
+crank_speed = "60 rpm"
+turns = 1
+settle_turns = 2
+[feed]
+press_force = "2.5 kN"
+[[event]]
+type = "surge"
+input = "press_force"
+factor = 3
+crank_angle = "90 deg"
+duration = "0.2 s"
+turns = 1
+[monte_carlo]
+runs = 2
+event = { type = "surge", input = "press_force", factor = [1.5, 4] }
+"""
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("surge")
+    shutil.copy(PRESS, folder)
+    (folder / "mine.toml").write_text(STUDY, "utf-8")
+    done = chainunit("study", "mine.toml", "-o", "out", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    return folder / "out"
+
+
+def test_the_force_rises_and_falls_and_the_torque_follows(result):
+    """The torque of the crank is that of the machine alone at the motion and the force of the run."""
+    run = xr.open_datatree(result / "result.nc")["surge_press_force"]
+    force = run["machine.press_force"].values
+    assert force.max() == pytest.approx(7500.0) and force[0] == force[-1] == pytest.approx(2500.0)
+    above = run["time"].values[force > 5000.0]
+    # between the middles of rise and fall
+    assert np.ptp(above) == pytest.approx(0.22, abs=0.005)
+    machine = Machine(read_linkage(PRESS), {"ratio": 15.0})
+    out = machine.evaluate(
+        {name: run[f"machine.{ours}"].values for name, ours in
+         (("phi", "phi0"), ("w", "w0"), ("press_force", "press_force"))}
+    )  # fmt: skip
+    assert run["machine.tau_bias"].values == pytest.approx(np.asarray(out["tau_bias"]), rel=1e-6, abs=1e-6)
+
+
+def test_random_surges_reach_other_processes(result):
+    data = json.loads((result / "result.json").read_text("utf-8"))
+    assert data["status"] == "complete" and data["monte_carlo"]["runs"]["value"] == 2
+    lines = (result / data["monte_carlo"]["file"]).read_text("utf-8").splitlines()
+    drawn = [json.loads(line)["drawn"]["factor"] for line in lines]
+    assert len(set(drawn)) == 2 and all(1.5 <= factor <= 4.0 for factor in drawn)
+
+
+def test_events_and_parameters_are_pickled():
+    events = read_events(
+        [{"type": "surge", "input": "press_force"}, {"type": "surge", "input": "left.force"}]
+    )
+    assert list(events) == ["surge_press_force", "surge_left_force"]
+    for event in events.values():
+        again = pickle.loads(pickle.dumps(event))
+        assert again == event and type(again) is type(event) and again.title == event.title
+    model = read_linkage(PRESS)
+    machine = Machine(model, {"r": 0.07})
+    for instance in (machine.p, model.Feed(press_force=3.0), model.Inputs(phi=1.0)):
+        assert pickle.loads(pickle.dumps(instance)) == instance
+    drawn = read_random_event({"type": "surge", "input": "press_force"}, "monte_carlo.event")
+    assert drawn.ranges == {"factor": (1.5, 4.0)} and drawn.as_dict()["input"] == "press_force"
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (('input = "press_force"\nfactor', "factor"), "event 1 (surge): input: must be given, the name of an input"),
+        (('input = "press_force"\nfactor', 'input = "press_forse"\nfactor'), 'was "press_force" meant?'),
+        (('input = "press_force"\nfactor', "input = 3\nfactor"), "input = 3: must be the name of an input"),
+        (('press_force = "2.5 kN"', "press_force = 0"), "press_force is 0 in normal running, and so is its multiple"),
+        (('type = "surge"\ninput', 'type = "dip"\ninput'), "event 1 (dip): input: this event has none"),
+    ],
+)  # fmt: skip
+def test_wrong_surges(tmp_path, change, words):
+    shutil.copy(PRESS, tmp_path)
+    with pytest.raises(InputError) as caught:
+        config.parse(STUDY.replace(*change), str(tmp_path / "mine.toml"))
+    assert words in str(caught.value)
