@@ -140,7 +140,7 @@ class _LinkageReader(EntryReader):
             if not isinstance(links, list) or not links or not all(isinstance(each, str) for each in links):
                 self.fault(f"{key}.links", f"{is_given(links)}; must be a list of links")
                 continue
-            for link in {*links} - {*self.points}:
+            for link in sorted({*links} - {*self.points}):
                 self.fault(f"{key}.links", f"{link} is no link{near_name(link, self.points)}")
             groups.append([kind, links])
         return groups
