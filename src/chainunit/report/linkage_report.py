@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
+from ..engines import MATH
 from ..mechanism.assur import PRISMATIC
 from ..quantities import Layout
 from ..study.linkage_turn import GroupTurn, JointTurn, LinkageFindings
@@ -133,8 +134,9 @@ def _animation(f: LinkageFindings) -> Animation:
     effort, unit = ("Torque" if machine.model.turns else "Force"), machine.model.driver_port.unit
     time = (q - low) / f.speed
     description, driver = f.description, state.m.linkage.driver
-    joints = {description.variable("joint", name): linkage_pin for name, linkage_pin in _pins(f).items()}
-    titles = {f"{name}": description.variable("joint", name) for name in description.structure.joints}
+    titles = {name: description.variable("joint", name) for name in description.structure.joints}
+    receivers = description.parts(MATH, machine.p, machine.model.Inputs()).receivers
+    joints = {variable: receivers[name][0][0] for name, variable in titles.items()}
     arrows = linkage.arrows(
         titles, joints, lambda output: (f.outputs[f"{output}.fx"][::step], f.outputs[f"{output}.fy"][::step])
     )
@@ -154,19 +156,6 @@ def _animation(f: LinkageFindings) -> Animation:
         orbit=(driver.bar.pin, driver.end) if machine.model.turns else None,
         paths=linkage.paths(state.m),
     )
-
-
-def _pins(f: LinkageFindings) -> dict[str, str]:
-    """The pin of each joint's reaction."""
-    model = f.machine.model
-    parts = f.description.parts(_math(), f.machine.p, model.Inputs())
-    return {name: parts.receivers[name][0][0] for name in f.description.structure.joints}
-
-
-def _math() -> Any:
-    from ..engines import MATH
-
-    return MATH
 
 
 def _forces(s: b.Source, f: LinkageFindings) -> Iterator[b.Block]:

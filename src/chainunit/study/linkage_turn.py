@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..engines import numpy_
 from ..machines.linkages.model import LinkageDescription
 from ..machines.linkages.structure import CYLINDER
 from ..machines.machine import Machine
@@ -88,7 +89,7 @@ def linkage_findings(machine: Machine, speed: float) -> LinkageFindings:
     u = machine.inputs({"phi": q * machine.ratio, "w": speed * machine.ratio, **feed})
     state = machine.state(u)
     part = machine.model.parts[0]
-    given = part.equations(_engine(), machine.p, u, None, state)
+    given = part.equations(numpy_(), machine.p, u, None, state)
     outputs = {name: np.broadcast_to(x, q.shape) for name, x in part.layout.by_name(given).items()}
     torque = np.broadcast_to(state.bias, q.shape)
     inertia = np.broadcast_to(state.J, q.shape)
@@ -125,9 +126,3 @@ def linkage_findings(machine: Machine, speed: float) -> LinkageFindings:
 def _rms(x: Any) -> float:
     """Over the way of the driver; its two ends count as one."""
     return math.sqrt(float(np.mean(np.square(x[:-1]))))
-
-
-def _engine() -> Any:
-    from ..engines import numpy_
-
-    return numpy_()

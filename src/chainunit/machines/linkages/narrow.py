@@ -10,11 +10,10 @@ from typing import Any
 
 from ...engines import MATH
 from ...errors import InputError
-from ...groups.triad import Triad
+from ...groups.triad import MOST_MISFIT, Triad
 from ...mechanism.linkage import Linkage
 from ...mechanism.machine import Mechanism, derived_numbers
 
-MOST_MISFIT = 1e-10
 NEAR = 0.35
 """Between two places the margin may fall from here to zero."""
 _GOLDEN = 0.6180339887498949
