@@ -21,7 +21,14 @@ LAYERS = (
 )
 """From above to below; a package imports from its own row and from the rows below. `fmu` stands beside them on
 `core`, and serves `system` and all above."""
-HOMES = {"__main__": "cli", "cli": "cli", "studies": "cli", "models": "system"}
+HOMES = {
+    "__main__": "cli",
+    "cli": "cli",
+    "studies": "cli",
+    "models": "system",
+    "native": "core",
+    "batch": "core",
+}
 """Layer of a module or folder whose name is not that of its layer; any other module beside the folders is `core`."""
 
 

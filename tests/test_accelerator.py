@@ -11,9 +11,9 @@ from scipy.integrate import solve_ivp
 
 from chainunit.engines import MATH, Dual, dual, numpy_, slope
 from chainunit.fmu.native.export import export
-from chainunit.fmu.native.platforms import compiler
 from chainunit.machines.accelerator import Accelerator
 from chainunit.machines.api import machine_of
+from chainunit.native.compilers import compiler
 
 MODEL = Accelerator
 UNEVEN = {"rotor.s": 0.03, "joint_damping": 0.4, "pin.friction": 0.1, "ratio": 2.5}

@@ -13,11 +13,12 @@ from pathlib import Path
 import pytest
 
 from chainunit import RunError
-from chainunit.fmu.native import cache, platforms
-from chainunit.fmu.native.cache import OFF, VARIABLE, entry
+from chainunit.fmu.native import platforms
 from chainunit.fmu.native.export import export
-from chainunit.fmu.native.platforms import Compiler, compile_code
 from chainunit.models import MODELS
+from chainunit.native import cache
+from chainunit.native.cache import OFF, VARIABLE, entry
+from chainunit.native.compilers import Compiler, compile_code
 
 COUNTING = """#!/bin/sh
 if [ "$1" != --version ]; then echo called >> "$(dirname "$0")/calls"; fi

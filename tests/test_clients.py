@@ -22,8 +22,8 @@ from systems import pair as pair_of
 
 from chainunit.engines import MATH, numpy_
 from chainunit.fmu.native.export import export
-from chainunit.fmu.native.platforms import compiler
 from chainunit.models import MODELS
+from chainunit.native.compilers import compiler
 from chainunit.system import CoSimulation
 from chainunit.system.instance import Fmu, Instance
 

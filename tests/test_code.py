@@ -13,9 +13,10 @@ import pytest
 
 from chainunit.engines import casadi_
 from chainunit.fmu.description import Interface
-from chainunit.fmu.native import code, generate
-from chainunit.fmu.native.platforms import compile_code, compiler
+from chainunit.fmu.native import generate
 from chainunit.models import MODELS
+from chainunit.native import code
+from chainunit.native.compilers import compile_code, compiler
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 HEAD = """

@@ -12,8 +12,8 @@ from scipy.integrate import solve_ivp
 
 from chainunit import EMPTY, ChainUnitMachine, GeometryError, engines
 from chainunit.fmu.native.export import export
-from chainunit.fmu.native.platforms import compiler
 from chainunit.machines.chain_unit import ChamberForces
+from chainunit.native.compilers import compiler
 from chainunit.system.instance import Fmu, Instance
 
 MODEL = ChamberForces.direct()

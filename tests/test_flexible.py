@@ -25,7 +25,6 @@ from chainunit.engines import MATH
 from chainunit.errors import InterruptedRunError
 from chainunit.fmu.export import export as export_python
 from chainunit.fmu.native.export import export as export_native
-from chainunit.fmu.native.platforms import compiler
 from chainunit.machines import hanging
 from chainunit.machines.chain_organs import OrganLaw
 from chainunit.machines.chain_unit import (
@@ -39,6 +38,7 @@ from chainunit.machines.chain_unit import (
 from chainunit.machines.flexible import flexible
 from chainunit.machines.parts import Pin, Processing, Stop
 from chainunit.mechanism.machine import MachineState, Mechanism
+from chainunit.native.compilers import compiler
 from chainunit.study import config
 from chainunit.study.chain import numbers_at, study_chain
 from chainunit.study.drive import Drive

@@ -15,8 +15,8 @@ from reports import said_of
 
 from chainunit.errors import InputError, RunError, printable, shown
 from chainunit.fmu.native.export import export
-from chainunit.fmu.native.platforms import compiler
 from chainunit.models import MODELS
+from chainunit.native.compilers import compiler
 from chainunit.study import config
 from chainunit.system.instance import Fmu, Instance
 

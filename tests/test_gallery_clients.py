@@ -16,9 +16,9 @@ from test_clients import test_libcosim as test_libcosim
 from test_native import random_calls
 
 from chainunit.fmu.native.export import export
-from chainunit.fmu.native.platforms import compiler
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
+from chainunit.native.compilers import compiler
 from chainunit.system.instance import Fmu
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")

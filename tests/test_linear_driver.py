@@ -13,10 +13,10 @@ from fmpy.validation import validate_fmu
 
 from chainunit.errors import InputError
 from chainunit.fmu.native.export import export
-from chainunit.fmu.native.platforms import compiler
 from chainunit.machines.linkages.file import description_of, read_linkage
 from chainunit.machines.linkages.model import machine_of
 from chainunit.machines.machine import Machine
+from chainunit.native.compilers import compiler
 from chainunit.study import config
 
 LIFT = Path(__file__).parents[1] / "examples" / "linkages" / "cylinder_lift.toml"

@@ -15,9 +15,9 @@ from linkage_files import MACHINES
 
 from chainunit.errors import GeometryError
 from chainunit.fmu.native.export import export
-from chainunit.fmu.native.platforms import compiler
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
+from chainunit.native.compilers import compiler
 from chainunit.study import config
 
 PRESS = Path(__file__).parents[1] / "examples" / "linkages" / "slider_crank_press.toml"

@@ -15,10 +15,10 @@ from chainunit.engines import MATH
 from chainunit.errors import InputError
 from chainunit.fmu.export import export as export_python
 from chainunit.fmu.native.export import export
-from chainunit.fmu.native.platforms import compiler
 from chainunit.machines.linkages.file import description_of
 from chainunit.machines.linkages.model import machine_of
 from chainunit.machines.machine import Machine
+from chainunit.native.compilers import compiler
 
 STATES = [(name, state) for name, each in MACHINES.items() for state in each["states"]]
 KINDS = {

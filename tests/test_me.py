@@ -13,8 +13,8 @@ import xarray as xr
 from systems import component, pair
 
 from chainunit import InputError, RunError
-from chainunit.fmu.native.platforms import compiler
 from chainunit.machines.flexible import flexible
+from chainunit.native.compilers import compiler
 from chainunit.system import (
     CoSimulation,
     Jump,

@@ -32,15 +32,15 @@ from chainunit import ChainUnitMachine, GeometryError, InputError, RunError, int
 from chainunit.engines import MATH
 from chainunit.fmu.description import Interface
 from chainunit.fmu.export import export as export_python
-from chainunit.fmu.native.cache import OFF, VARIABLE
 from chainunit.fmu.native.export import export
 from chainunit.fmu.native.generate import rules
-from chainunit.fmu.native.platforms import compile_code, compiler
 from chainunit.fmu.recipe import Experiment, script_of
 from chainunit.fmu.reference import INPUTS, READ, REFERENCE, STANDARD, STEPPED, excitation
 from chainunit.fmu.reference import reference_results as reference_results_of
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.models import MODELS
+from chainunit.native.cache import OFF, VARIABLE
+from chainunit.native.compilers import compile_code, compiler
 from chainunit.quantities import TYPES
 from chainunit.system.instance import Fmu, Instance
 

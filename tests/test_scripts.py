@@ -16,8 +16,8 @@ import pytest
 from fmpy.validation import validate_fmu
 from lxml import etree
 
-from chainunit.fmu.native.platforms import host
 from chainunit.models import MODELS
+from chainunit.native.compilers import host
 
 FOLDER = Path(__file__).parents[1] / "fmu"
 OPTIONS = ("--handle-state", "--serialize-state")

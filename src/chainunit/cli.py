@@ -99,7 +99,7 @@ def _root(
     ] = False,
 ) -> None:
     if no_cache:
-        from .fmu.native.cache import OFF, VARIABLE
+        from .native.cache import OFF, VARIABLE
 
         os.environ[VARIABLE] = OFF
 

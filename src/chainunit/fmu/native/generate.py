@@ -14,10 +14,10 @@ from typing import Any
 from ... import integrate, refusals
 from ...engines import casadi_
 from ...integrate import MAX_STEPS
+from ...native.code import Program, number
 from ...quantities import Variable
 from .. import recipe
 from ..description import Interface
-from .code import Program, number
 
 
 def groups(interface: Interface) -> list[list[int]]:

@@ -1,28 +1,16 @@
-"""Platforms of native FMUs, and the C compilers that make code for them.
+"""Platforms of native FMUs, and the choice of a compiler for them.
 
-The system's own compiler makes code for this machine. The ``ziglang`` wheel (extra `cross`) makes code for
-every platform. Floors: glibc 2.17, by either compiler; macOS 10.15 on x86_64 and 11.0 on arm64.
+Floors: glibc 2.17, by either compiler; macOS 10.15 on x86_64 and 11.0 on arm64.
 """
 
 from __future__ import annotations
 
-import hashlib
-import importlib.util
-import os
-import platform
-import shutil
 import struct
-import subprocess
-import sys
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from pathlib import Path
-from typing import Any
 
 from ...errors import InputError, RunError
-from .cache import entry
+from ...native.compilers import Compiler, compile_code, compiler, host, zig_compiler
 
 _FLAGS = ("-std=c99", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off")
 _SHARED = ("-shared", "-s")
@@ -58,61 +46,9 @@ PLATFORMS: dict[str, Platform] = {
 """Platforms by their names for ``--platforms``. FMI 2.0 has no folder for Linux on ARM."""
 
 
-@dataclass(frozen=True)
-class Compiler:
-    """A C compiler: its command, and whether it is zig's, which takes a target."""
-
-    command: tuple[str, ...]
-    zig: bool
-
-    @property
-    def name(self) -> str:
-        """The name in messages."""
-        return "zig" if self.zig else self.command[0]
-
-    @cached_property
-    def identity(self) -> tuple[Any, ...]:
-        """Data that differ for another compiler or another version: the command, size and time of its file, its
-        version text, and the variables that lead it to other headers and libraries."""
-        file = Path(self.command[0]).resolve().stat()
-        version = subprocess.run([*self.command, "--version"], capture_output=True, text=True).stdout
-        paths = [os.environ.get(name) for name in ("CPATH", "C_INCLUDE_PATH", "LIBRARY_PATH")]
-        return self.command, file.st_size, file.st_mtime_ns, version, paths
-
-
-def host() -> str | None:
-    """This machine's platform, if it is among `PLATFORMS`."""
-    machine = {"AMD64": "x86_64", "arm64": "aarch64"}.get(platform.machine(), platform.machine())
-    return {
-        ("linux", "x86_64"): "linux64",
-        ("linux", "aarch64"): "aarch64-linux",
-        ("win32", "x86_64"): "win64",
-        ("darwin", "x86_64"): "darwin64",
-        ("darwin", "aarch64"): "darwin64",
-    }.get((sys.platform, machine))
-
-
-def compiler() -> Compiler | None:
-    """The compiler for this machine: the system's, else zig's."""
-    if host() is None:
-        return None
-    # other platforms have their own format of libraries, which zig knows
-    if sys.platform == "linux":
-        for name in ("cc", "gcc", "clang"):
-            if path := shutil.which(name):
-                return Compiler((path,), zig=False)
-    return _zig()
-
-
 def compiles(fmi: int) -> bool:
     """Whether there is a compiler for this machine, and a folder for it in that version of FMI."""
     return compiler() is not None and fmi in PLATFORMS[host() or "linux64"].folders
-
-
-def _zig() -> Compiler | None:
-    if importlib.util.find_spec("ziglang") is None:
-        return None
-    return Compiler((sys.executable, "-m", "ziglang", "cc"), zig=True)
 
 
 def choose(names: Sequence[str], fmi: int) -> tuple[tuple[str, ...], Compiler]:
@@ -140,7 +76,7 @@ def choose(names: Sequence[str], fmi: int) -> tuple[tuple[str, ...], Compiler]:
             raise InputError(f"FMI {fmi}.0 has no folder for {here}; export with --fmi 3 or --backend python")
         return (here,), own
     # zig comes first, for its old system libraries; the system's compiler knows only this machine
-    able = _zig() or (compiler() if set(names) == {here} else None)
+    able = zig_compiler() or (compiler() if set(names) == {here} else None)
     if able is None:
         raise InputError(
             f"--platforms {' '.join(names)}: needs zig, a C compiler for all of them: pip install 'chainunit[cross]'"
@@ -201,36 +137,6 @@ def _compile(
     others = [name for name in files if name != KERNELS]
     arguments = (*flags, *_SHARED, *others, KERNELS_OBJECT, "-o", library, *target_platform.link_options)
     return compile_code(compiler, arguments, rest, library)
-
-
-def compile_code(
-    compiler: Compiler, arguments: Sequence[str], files: Mapping[str, bytes], product: str
-) -> bytes:
-    """The file `product` that the compiler makes with `arguments` from these `files` (contents by name), or the
-    cached one, see `chainunit.fmu.native.cache`.
-
-    Raises
-    ------
-    RunError
-        where the compiler fails, with its messages.
-    """
-
-    def make() -> bytes:
-        with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
-            work = Path(scratch)
-            for name, content in files.items():
-                (work / name).write_bytes(content)
-            process = subprocess.run(
-                [*compiler.command, *arguments], cwd=work, capture_output=True, text=True
-            )
-            if process.returncode:
-                raise RunError(f"the C compiler {compiler.name} failed: {process.stderr.strip()}")
-            return (work / product).read_bytes()
-
-    key = hashlib.sha256(repr((compiler.identity, list(arguments), product)).encode())
-    for name, content in sorted(files.items()):
-        key.update(f"{name} {len(content)} ".encode() + content)
-    return entry(key.digest(), make)
 
 
 def fat(slices: Sequence[bytes]) -> bytes:

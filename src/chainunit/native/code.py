@@ -9,9 +9,11 @@ time of a compiler grows faster than the length.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
+
+from .operations import ARGUMENT, NUMBER, Operation, Operations
 
 _LONGEST = 2500
 """Largest number of operations in a part."""
@@ -19,10 +21,8 @@ _WIDEST = 60
 """Largest number of characters of an operation that is written inline instead of on a line of its own."""
 
 
-def _operations() -> Mapping[int, str]:
-    """The form of each CasADi operation in C."""
-    import casadi
-
+def forms() -> dict[str, str]:
+    """The form of each operation in C, by its kind."""
     signs = {"ADD": "+", "SUB": "-", "MUL": "*", "DIV": "/", "LT": "<", "LE": "<=", "EQ": "==", "NE": "!="}
     signs |= {"AND": "&&", "OR": "||"}
     unary = "sqrt exp log sin cos tan asin acos atan sinh cosh tanh floor ceil fabs"
@@ -36,8 +36,7 @@ def _operations() -> Mapping[int, str]:
     }
     forms |= {name: f"({{0}}{sign}{{1}})" for name, sign in signs.items()}
     forms |= {name.upper(): f"{name}({{0}})" for name in unary.split()}
-    forms |= {name.upper(): f"{name}({{0}},{{1}})" for name in binary.split()}
-    return {getattr(casadi, f"OP_{name}"): form for name, form in forms.items()}
+    return forms | {name.upper(): f"{name}({{0}},{{1}})" for name in binary.split()}
 
 
 def number(x: float) -> str:
@@ -79,48 +78,21 @@ class Program:
         self.text = "\n".join([*lines, *self._function(offsets)]) + "\n"
 
     def _collect(self, arguments: Sequence[Any], groups: Sequence[Any]) -> None:
-        """Collect all operations, each after its operands: its form in C, and the places of its operands. A number
-        and an argument are operations without operands. Results are places of operations."""
-        import casadi
+        """Collect all operations: the form of each in C, and the places of its operands. A number and an argument are
+        operations without operands."""
+        operations = Operations(arguments, groups)
+        in_c = forms()
 
-        rows = casadi.densify(casadi.vertcat(*groups))
-        function = casadi.Function("f", list(arguments), [casadi.cse(rows)])
-        forms = _operations()
-        self._forms: list[str] = []
-        self._operands: list[tuple[int, ...]] = []
-        self._arguments: dict[
-            int, tuple[int, int]
-        ] = {}  # by place: number of the argument, number of its value
-        places: dict[int, int] = {}  # by register of CasADi: place of its present value
-        simple: dict[str, int] = {}
-        results = [0] * rows.numel()
+        def form(operation: Operation) -> str:
+            if operation.kind == NUMBER:
+                return number(operation.value)
+            argument, place = operation.entry
+            return f"i{argument}[{place}]" if operation.kind == ARGUMENT else in_c[operation.kind]
 
-        def add(form: str, operands: tuple[int, ...] = ()) -> int:
-            self._forms.append(form)
-            self._operands.append(operands)
-            return len(self._forms) - 1
-
-        def once(form: str) -> int:
-            if form not in simple:
-                simple[form] = add(form)
-            return simple[form]
-
-        for k in range(function.n_instructions()):
-            kind = function.instruction_id(k)
-            into, of = function.instruction_output(k), function.instruction_input(k)
-            if kind == casadi.OP_CONST:
-                places[into[0]] = once(number(function.instruction_constant(k)))
-            elif kind == casadi.OP_INPUT:
-                places[into[0]] = once(f"i{of[0]}[{of[1]}]")
-                self._arguments[places[into[0]]] = of[0], of[1]
-            elif kind == casadi.OP_OUTPUT:
-                results[into[1]] = places[of[0]]
-            else:
-                places[into[0]] = add(forms[kind], tuple(places[i] for i in of))
-        ends = [0]
-        for group in groups:
-            ends.append(ends[-1] + group.numel())
-        self._results = [results[begin:end] for begin, end in pairwise(ends)]
+        self._forms = [form(each) for each in operations.items]
+        self._operands = [each.operands for each in operations.items]
+        self._arguments = {k: each.entry for k, each in enumerate(operations.items) if each.kind == ARGUMENT}
+        self._results = operations.results
 
     def _divide(self) -> None:
         """Divide the operations into parts, each with the groups that need it, and assign slots in memory to values

@@ -17,8 +17,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from ...errors import WriteError
-from ...files import whole
+from ..errors import WriteError
+from ..files import whole
 
 VARIABLE, OFF = "CHAINUNIT_CACHE", "off"
 _MOST = 256 * 2**20

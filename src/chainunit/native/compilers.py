@@ -1,0 +1,107 @@
+"""C compilers of this machine.
+
+The system's own compiler makes code for this machine. The ``ziglang`` wheel (extra `cross`) makes code for
+every platform.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from ..errors import RunError
+from .cache import entry
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """A C compiler: its command, and whether it is zig's, which takes a target."""
+
+    command: tuple[str, ...]
+    zig: bool
+
+    @property
+    def name(self) -> str:
+        """The name in messages."""
+        return "zig" if self.zig else self.command[0]
+
+    @cached_property
+    def identity(self) -> tuple[Any, ...]:
+        """Data that differ for another compiler or another version: the command, size and time of its file, its
+        version text, and the variables that lead it to other headers and libraries."""
+        file = Path(self.command[0]).resolve().stat()
+        version = subprocess.run([*self.command, "--version"], capture_output=True, text=True).stdout
+        paths = [os.environ.get(name) for name in ("CPATH", "C_INCLUDE_PATH", "LIBRARY_PATH")]
+        return self.command, file.st_size, file.st_mtime_ns, version, paths
+
+
+def host() -> str | None:
+    """This machine's platform, if it is among `PLATFORMS`."""
+    machine = {"AMD64": "x86_64", "arm64": "aarch64"}.get(platform.machine(), platform.machine())
+    return {
+        ("linux", "x86_64"): "linux64",
+        ("linux", "aarch64"): "aarch64-linux",
+        ("win32", "x86_64"): "win64",
+        ("darwin", "x86_64"): "darwin64",
+        ("darwin", "aarch64"): "darwin64",
+    }.get((sys.platform, machine))
+
+
+def compiler() -> Compiler | None:
+    """The compiler for this machine: the system's, else zig's."""
+    if host() is None:
+        return None
+    # other platforms have their own format of libraries, which zig knows
+    if sys.platform == "linux":
+        for name in ("cc", "gcc", "clang"):
+            if path := shutil.which(name):
+                return Compiler((path,), zig=False)
+    return zig_compiler()
+
+
+def zig_compiler() -> Compiler | None:
+    """The compiler of the ``ziglang`` wheel."""
+    if importlib.util.find_spec("ziglang") is None:
+        return None
+    return Compiler((sys.executable, "-m", "ziglang", "cc"), zig=True)
+
+
+def compile_code(
+    compiler: Compiler, arguments: Sequence[str], files: Mapping[str, bytes], product: str
+) -> bytes:
+    """The file `product` that the compiler makes with `arguments` from these `files` (contents by name), or the
+    cached one, see `chainunit.native.cache`.
+
+    Raises
+    ------
+    RunError
+        where the compiler fails, with its messages.
+    """
+
+    def make() -> bytes:
+        with tempfile.TemporaryDirectory(prefix="chainunit_") as scratch:
+            work = Path(scratch)
+            for name, content in files.items():
+                (work / name).write_bytes(content)
+            process = subprocess.run(
+                [*compiler.command, *arguments], cwd=work, capture_output=True, text=True
+            )
+            if process.returncode:
+                raise RunError(f"the C compiler {compiler.name} failed: {process.stderr.strip()}")
+            return (work / product).read_bytes()
+
+    key = hashlib.sha256(repr((compiler.identity, list(arguments), product)).encode())
+    for name, content in sorted(files.items()):
+        key.update(f"{name} {len(content)} ".encode() + content)
+    return entry(key.digest(), make)
