@@ -22,6 +22,7 @@ from chainunit.fmu.native import platforms
 from chainunit.fmu.native.export import export
 from chainunit.fmu.native.platforms import PLATFORMS
 from chainunit.models import MODELS
+from chainunit.native import compilers
 from chainunit.native.compilers import Compiler
 
 here = pytest.mark.skipif(platforms.host() != "linux64", reason="run on 64-bit Linux")
@@ -53,7 +54,8 @@ def test_backends_say_what_they_took(tmp_path, monkeypatch):
     ):
         export_any(motor, tmp_path / "d.fmu", platforms=["aarch64-linux"])
     # without zig the system's compiler serves this machine alone
-    monkeypatch.setattr(platforms, "_zig", lambda: None)
+    for module in (compilers, platforms):
+        monkeypatch.setattr(module, "zig_compiler", lambda: None)
     assert "linux64 (run)" in str(export_any(motor, tmp_path / "a.fmu", platforms=["linux64"]))
     with pytest.raises(InputError, match=r"needs zig.*pip install 'chainunit\[cross\]'"):
         export_any(motor, tmp_path / "d.fmu", platforms=["linux64", "win64"])
