@@ -15,6 +15,7 @@ from ..engines import casadi_
 from ..errors import InputError
 from ..model import Model
 from ..quantities import DISPLAY_UNITS, TYPES, Variable, base_units
+from ..trace import trace
 from .recipe import Experiment, script_of
 from .script import Script
 
@@ -81,7 +82,8 @@ class Interface:
     def trace(self) -> tuple[list[Any], Any, Any, Any, list[Any], list[Any]]:
         """The model in symbols: the casadi vectors (p, u, x, derived values); p, u and x as instances of their
         declarations; the outputs part by part in declared order; and the derivatives of the states."""
-        return _shared(self.model)._trace
+        t = trace(self.model)
+        return t.symbols, t.p, t.u, t.x, t.outputs, t.derivatives
 
     @property
     def dependencies(self) -> list[tuple[list[int], list[int]]]:
@@ -89,29 +91,6 @@ class Interface:
         and states) and at the start (parameters and inputs). They come from the sparsity of the traced equations. In
         a run a state depends only on itself."""
         return _shared(self.model)._dependencies
-
-    @cached_property
-    def _trace(self) -> tuple[list[Any], Any, Any, Any, list[Any], list[Any]]:
-        import casadi
-
-        model = self.model
-        symbols = [
-            casadi.SX.sym(name, len(group))
-            for name, group in (("p", self.parameters), ("u", self.inputs), ("x", self.states))
-        ]
-        symbols.append(casadi.SX.sym("k", model.derived))
-        p = model.parameter_layout.instance(casadi.vertsplit(symbols[0]))
-        if model.derived:
-            p = model.prepared(casadi_(), p, casadi.vertsplit(symbols[3]))
-        u = model.input_layout.instance(casadi.vertsplit(symbols[1]))
-        x = model.state_layout.instance(casadi.vertsplit(symbols[2])) if model.state_layout else None
-        outputs = self._outputs(p, u, x)
-        derivatives = model.derivatives(casadi_(), p, u, x) if model.state_layout else []
-        return symbols, p, u, x, outputs, derivatives
-
-    def _outputs(self, p: Any, u: Any, x: Any) -> list[Any]:
-        parts = self.model.evaluate(casadi_(), p, u, x)
-        return [v for part, out in zip(self.model.parts, parts, strict=True) for v in part.layout.values(out)]
 
     @cached_property
     def _dependencies(self) -> list[tuple[list[int], list[int]]]:
@@ -123,7 +102,7 @@ class Interface:
             states = model.state_layout.values(x)
             first = model.start(casadi_(), p, u, rounds=min(2, model.start_rounds))
             start = model.state_layout.values(first)
-            rows_at_start = [*self._outputs(p, u, first), *model.derivatives(casadi_(), p, u, first)]
+            rows_at_start = [*trace(model).outputs_at(first), *model.derivatives(casadi_(), p, u, first)]
         in_run = self._influences(symbols, [*states, *outputs, *derivatives])
         at_start = self._influences(symbols, [*start, *rows_at_start])
         n = len(self.parameters)

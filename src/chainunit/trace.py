@@ -1,0 +1,52 @@
+"""The equations of a model in CasADi's symbols, from which native code, derivatives and dependencies come."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+from .engines import casadi_
+from .model import Model
+
+
+@dataclass(frozen=True)
+class Trace:
+    """A model in symbols.
+
+    `symbols` are the casadi vectors (p, u, x, derived values); `p`, `u` and `x` the same as instances of their
+    declarations, `p` prepared with the derived values; `outputs` the outputs part by part in declared order, and
+    `derivatives` those of the states.
+    """
+
+    model: type[Model]
+    symbols: list[Any]
+    p: Any
+    u: Any
+    x: Any
+    outputs: list[Any]
+    derivatives: list[Any]
+
+    def outputs_at(self, x: Any) -> list[Any]:
+        """The outputs with the states `x` in place of the symbols."""
+        parts = self.model.evaluate(casadi_(), self.p, self.u, x)
+        return [v for part, out in zip(self.model.parts, parts, strict=True) for v in part.layout.values(out)]
+
+
+@lru_cache(maxsize=8)
+def trace(model: type[Model]) -> Trace:
+    """The equations of `model` in symbols."""
+    import casadi
+
+    layouts = (model.parameter_layout, model.input_layout, model.state_layout)
+    sizes = [len(of.names) if of else 0 for of in layouts]
+    symbols = [casadi.SX.sym(name, size) for name, size in zip("pux", sizes, strict=True)]
+    symbols.append(casadi.SX.sym("k", model.derived))
+    p = model.parameter_layout.instance(casadi.vertsplit(symbols[0]))
+    if model.derived:
+        p = model.prepared(casadi_(), p, casadi.vertsplit(symbols[3]))
+    u = model.input_layout.instance(casadi.vertsplit(symbols[1]))
+    x = model.state_layout.instance(casadi.vertsplit(symbols[2])) if model.state_layout else None
+    derivatives = model.derivatives(casadi_(), p, u, x) if model.state_layout else []
+    empty = Trace(model, symbols, p, u, x, [], derivatives)
+    return Trace(model, symbols, p, u, x, empty.outputs_at(x), derivatives)
