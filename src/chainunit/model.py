@@ -101,6 +101,25 @@ def _reduced(model: Any) -> str | tuple[Callable[..., Any], tuple[Any, ...]]:
 copyreg.pickle(ModelType, _reduced)
 
 
+def keep(model: type[Model], *names: str) -> None:
+    """Let pickle take instances of these declarations of a model with a `maker`, whose classes no module names."""
+    for name in names:
+        of = getattr(model, name)
+
+        def reduced(instance: Any, of: type = of, name: str = name) -> tuple[Any, tuple[Any, ...]]:
+            return _kept, (model, name, Layout(of).values(instance), getattr(instance, "derived", None))
+
+        of.__reduce__ = reduced
+
+
+def _kept(model: type[Model], name: str, values: Sequence[Any], derived: Any) -> Any:
+    """The instance of that declaration of a model; see `keep`."""
+    instance = Layout(getattr(model, name)).instance(values)
+    if derived is not None:
+        object.__setattr__(instance, "derived", derived)
+    return instance
+
+
 class Model(metaclass=ModelType):
     """A model: four declarations and the equations between them.
 
@@ -134,6 +153,8 @@ class Model(metaclass=ModelType):
     `closed` after each substep; otherwise it integrates in equal steps."""
     built_by: ClassVar[str] = ""
     """The call that makes this class, if a function of its module makes it; else empty."""
+    modules: ClassVar[tuple[str, ...]] = ()
+    """Further modules of this package that the call imports by name, such as ``drives.dc_motor``."""
     maker: ClassVar[tuple[Callable[..., Any], tuple[Any, ...]] | None] = None
     """The same call as function and arguments, by which another process gets the class."""
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any, TypeAlias, TypeVar, dataclass_transform
@@ -258,6 +258,53 @@ def declaration(cls: type[T]) -> type[T]:
     """Make `cls` a declaration: a frozen dataclass with keyword-only fields."""
     # no slots: declarations may inherit from several others
     return dataclass(frozen=True, kw_only=True)(cls)
+
+
+Fields = Sequence[tuple[str, Any, Any]]
+"""Name, type and field of each quantity or group, to build a declaration from."""
+
+
+def declared_class(name: str, bases: tuple[type, ...], fields: Fields = ()) -> Any:
+    """A declaration with these fields and those of `bases`."""
+    return dataclasses.make_dataclass(name, fields, bases=bases, frozen=True, kw_only=True)
+
+
+def fields_of(of: type, *, without: Sequence[str] = ()) -> Fields:
+    """The fields of a declaration except those in `without`, to build another one from."""
+    return [
+        (f.name, f.type, dataclasses.field(default=f.default, metadata=f.metadata))
+        for f in dataclasses.fields(of)
+        if f.name not in without
+    ]
+
+
+def pruned(of: type, leave_out: Container[str], prefix: str = "") -> type | None:
+    """The declaration `of` without the quantities whose full names, after `prefix`, are in `leave_out`: `of` itself
+    where nothing is left out, None where nothing is left."""
+    fields = []
+    for f in dataclasses.fields(of):
+        name = prefix + f.name
+        if "quantity" in f.metadata:
+            if name not in leave_out:
+                fields.append((f.name, f.type, dataclasses.field(default=f.default, metadata=f.metadata)))
+            continue
+        inner = pruned(f.metadata["of"], leave_out, f"{name}.")
+        if inner is not None:
+            default = f.metadata["default"]
+            if default is not None and inner is not f.metadata["of"]:
+                default = narrowed(default, inner)
+            fields.append((f.name, inner, group(inner, f.metadata["group"], default=default)))
+    if not fields:
+        return None
+    layout = {v.name for v in variables(of)}
+    there = any(prefix + name in leave_out for name in layout)
+    return declared_class(of.__name__, (), fields) if there else of
+
+
+def narrowed(instance: Any, to: type) -> Any:
+    """The instance of the declaration `to` with the values of an `instance` that has more."""
+    layout = Layout(to)
+    return layout.instance([attrgetter(name)(instance) for name in layout.names])
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,9 +20,9 @@ from ..integrate import Solver
 from ..mechanism.chains import ChainedState
 from ..mechanism.linkage import Linkage
 from ..mechanism.machine import Mechanism
-from ..mechanism.models import declared_class, running
+from ..mechanism.models import running
 from ..planar import Vec2
-from ..quantities import Layout, Value, declaration, group, quantity
+from ..quantities import Layout, Value, declaration, declared_class, group, quantity
 from . import chain_unit
 from .chain_unit import NAMES, SIDES, ChamberForces, Rocker, on_drive, on_side, rocker_load, rocker_motion
 

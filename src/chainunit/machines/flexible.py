@@ -24,10 +24,10 @@ from typing import Any, ClassVar
 from ..errors import InputError
 from ..mechanism.chains import ChainedState
 from ..mechanism.linkage import Linkage
-from ..mechanism.models import DirectMachine, InverseMachine, LinkageModel, acceleration, declared_class
+from ..mechanism.models import DirectMachine, InverseMachine, LinkageModel, acceleration
 from ..model import Requirement
 from ..ports import PortSlopes
-from ..quantities import Layout, group
+from ..quantities import Layout, declared_class, group
 from .chain_organs import MOST, Organs, Parameters, both
 from .chain_unit import SIDES, ChamberForces, Inputs, Outputs, drive
 

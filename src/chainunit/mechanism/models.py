@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any, ClassVar
 
@@ -17,29 +17,13 @@ from ..engines import MATH
 from ..groups.group import Joint
 from ..model import Model, Part
 from ..ports import PortSlopes, ShaftMotion
-from ..quantities import Layout, Value, declaration, quantity
+from ..quantities import Fields, Layout, Value, declaration, declared_class, fields_of, quantity
 from .driver_ports import ROTATING, DriverPort, TurningStates
 from .linkage import Linkage, Topology
 from .machine import MachineState, Mechanism, derived_numbers
 
 MACHINES: dict[str, type[InverseMachine]] = {}
 """The machines by name: every subclass of `InverseMachine` with a name is a machine that study files may name."""
-Fields = Sequence[tuple[str, Any, Any]]
-"""Name, type and field of each quantity or group, to build a declaration from."""
-
-
-def declared_class(name: str, bases: tuple[type, ...], fields: Fields = ()) -> Any:
-    """A declaration with these fields and those of `bases`."""
-    return dataclasses.make_dataclass(name, fields, bases=bases, frozen=True, kw_only=True)
-
-
-def fields_of(of: type, *, without: Sequence[str] = ()) -> Fields:
-    """The fields of a declaration except those in `without`, to build another one from."""
-    return [
-        (f.name, f.type, dataclasses.field(default=f.default, metadata=f.metadata))
-        for f in dataclasses.fields(of)
-        if f.name not in without
-    ]
 
 
 def names_of(of: type) -> tuple[str, ...]:

@@ -1,12 +1,13 @@
 """A system: models or FMU files that are joined by terminals, and their simulation and export.
 
 `System` is the graph of components and connections. From it come the FMUs (`export`), the co-simulation
-(`CoSimulation`), one ODE of Model Exchange FMUs (`ModelExchange`), the reference from the models' own equations
-(`monolithic`), the certificate of a run (`energy_residual` of every power bond), the SSP package
+(`CoSimulation`), one ODE of Model Exchange FMUs (`ModelExchange`), one model of a system of models (`compiled`), its
+reference solution (`monolithic`), the certificate of a run (`energy_residual` of every power bond), the SSP package
 (`chainunit.system.ssp`), and twins without one part (`without`, `rigid`, `hold_loads`). A foreign FMU can be a
 component, too: `foreign_component`."""
 
 from .certificate import certify, energy_residual, shaft_torque, through
+from .compiled import compiled
 from .fmus import export
 from .foreign import NAMES, fmu_component, foreign_component
 from .graph import (
@@ -42,6 +43,7 @@ __all__ = [
     "Simulation",
     "System",
     "certify",
+    "compiled",
     "energy_residual",
     "export",
     "fmu_component",

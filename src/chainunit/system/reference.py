@@ -1,4 +1,4 @@
-"""The monolithic reference: the models' own equations as one ODE under an error-controlled solver.
+"""The monolithic reference: the one model of a system (`chainunit.system.compiled`) under an error-controlled solver.
 
 There is no communication step and no linearised load: each evaluation gives the driver the load of the machine at
 exactly the present angle and speed. A co-simulation converges to this solution. casadi traces the equations once,
@@ -8,8 +8,6 @@ which is several times as fast as the equations in Python.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -18,9 +16,9 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 
 from ..engines import MATH, casadi_
-from ..errors import InputError, RunError
-from ..model import Model
-from .graph import ModelComponent, System, hold_loads, order
+from ..errors import RunError
+from .compiled import compiled
+from .graph import System
 from .signals import at_time, corners
 
 
@@ -79,109 +77,34 @@ def monolithic(
     return equations.dataset(times, states)
 
 
-@dataclass(frozen=True)
-class _Unit:
-    """A model in casadi: `function` maps its inputs and states to its outputs and the derivatives of its states."""
-
-    model: type[Model]
-    p: Any
-    function: Any
-
-    @cached_property
-    def state_names(self) -> tuple[str, ...]:
-        return self.model.state_layout.names if self.model.state_layout else ()
-
-    @cached_property
-    def output_names(self) -> tuple[str, ...]:
-        return self.model.parts[0].layout.names
-
-    @cached_property
-    def direct(self) -> dict[str, set[str]]:
-        """By state and output, the inputs on which it depends directly."""
-        inputs: dict[str, set[str]] = {name: set() for name in (*self.state_names, *self.output_names)}
-        names = self.model.input_layout.names
-        for row, column in zip(*self.function.jac_sparsity(0, 0).get_triplet(), strict=True):
-            inputs[self.output_names[row]].add(names[column])
-        return inputs
-
-
-def _trace(name: str, component: Any) -> _Unit:
-    import casadi
-
-    if not isinstance(component, ModelComponent):
-        raise InputError(
-            f"{name} ({component.title}): is an FMU, whose equations are not known; there is no monolithic reference"
-        )
-    model = component.model
-    engine, p = casadi_(), model.prepared(MATH, component.parameters)
-    layouts = (model.input_layout, model.state_layout)
-    symbols = [casadi.SX.sym(s, len(of.names) if of else 0) for s, of in zip("ux", layouts, strict=True)]
-    u, x = (
-        of.instance(casadi.vertsplit(symbol)) if of else None
-        for of, symbol in zip(layouts, symbols, strict=True)
-    )
-    part = model.parts[0]
-    outputs = part.layout.values(part.equations(engine, p, u, x, model.shared(engine, p, u, x)))
-    rates = model.derivatives(engine, p, u, x) if model.state_layout else []
-    sides = [casadi.vertcat(*side) if side else casadi.SX(0, 1) for side in (outputs, rates)]
-    return _Unit(model, p, casadi.Function(name, symbols, sides))
-
-
 class _Equations:
-    """The system as one ODE in the states of all models."""
+    """The system as one ODE in the states of all models, at its parameters."""
 
     def __init__(self, system: System, signals: Mapping[str, Any]) -> None:
-        self._units = {name: _trace(name, c) for name, c in system.components.items()}
-        self._connections = hold_loads(system).connections
-        self._sources = {target: source for source, target in self._connections}
-        self.states = [f"{name}.{x}" for name, unit in self._units.items() for x in unit.state_names]
+        import casadi
+
+        component = compiled(system)
+        model = self._model = component.model
         values = system.values
-        self._outside = {
-            f"{name}.{v.name}": signals.get(
-                f"{name}.{v.name}", values.get(f"{name}.{v.name}", v.quantity.start)
-            )
-            for name, unit in self._units.items()
-            for v in unit.model.input_layout.variables
-            if f"{name}.{v.name}" not in self._sources
-        }
-        self._compose()
-
-    def _compose(self) -> None:
-        """Compose the functions of the external inputs and of all states: the derivatives, and all outputs."""
-        import casadi
-
+        self._outside = [
+            signals.get(v.name, values.get(v.name, v.quantity.start)) for v in model.input_layout.variables
+        ]
+        self._states = model.state_layout.variables if model.state_layout else ()
+        self._outputs = model.parts[0].layout.variables
+        self.states = [v.name for v in self._states]
+        p = self._p = model.prepared(MATH, component.parameters)
         symbols = [casadi.SX.sym(s, len(of)) for s, of in (("u", self._outside), ("x", self.states))]
-        values = dict(zip(self._outside, casadi.vertsplit(symbols[0]), strict=True))
-        values |= zip(self.states, casadi.vertsplit(symbols[1]), strict=True)
-        direct = {name: unit.direct for name, unit in self._units.items()}
-        for name, outputs in order(self._connections, direct):
-            missing = [output for output in outputs if f"{name}.{output}" not in values]
-            if missing:
-                own, _ = self._call(name, values)
-                values |= {f"{name}.{output}": own[output] for output in missing}
-        rates: list[Any] = []
-        all_outputs: dict[str, Any] = {}
-        for name in self._units:
-            own, dx = self._call(name, values)
-            all_outputs |= {f"{name}.{output}": y for output, y in own.items()}
-            rates.append(dx)
-        self._outputs = list(all_outputs)
-        self._rates = casadi.Function("rates", symbols, [casadi.cse(casadi.vertcat(*rates))])
-        self._all = casadi.Function("outputs", symbols, [casadi.cse(casadi.vertcat(*all_outputs.values()))])
-
-    def _call(self, name: str, values: Mapping[str, Any]) -> tuple[dict[str, Any], Any]:
-        """Outputs by name and derivatives of a model; inputs without a value yet are NaN."""
-        import casadi
-
-        unit = self._units[name]
-        fulls = [f"{name}.{v}" for v in unit.model.input_layout.names]
-        u = [values.get(self._sources.get(full, full), casadi.SX.nan()) for full in fulls]
-        x = [values[f"{name}.{v}"] for v in unit.state_names]
-        y, dx = unit.function(casadi.vertcat(*u), casadi.vertcat(*x) if x else casadi.SX(0, 1))
-        return dict(zip(unit.output_names, casadi.vertsplit(y), strict=True)), dx
+        u = model.input_layout.instance(casadi.vertsplit(symbols[0]))
+        x = model.state_layout.instance(casadi.vertsplit(symbols[1])) if model.state_layout else None
+        rates = model.derivatives(casadi_(), p, u, x) if model.state_layout else []
+        outputs = model.parts[0].layout.values(model.evaluate(casadi_(), p, u, x)[0])
+        self._rates, self._all = (
+            casadi.Function(name, symbols, [casadi.cse(casadi.vertcat(*map(casadi.SX, rows)))])
+            for name, rows in (("rates", rates), ("outputs", outputs))
+        )
 
     def _inputs(self, t: Any) -> list[Any]:
-        return [at_time(signal, t) for signal in self._outside.values()]
+        return [at_time(signal, t) for signal in self._outside]
 
     def rates(self, t: float, x: Any) -> Any:
         """Derivatives of all states."""
@@ -189,51 +112,21 @@ class _Equations:
 
     def tolerances(self, rtol: float) -> list[float]:
         """The absolute tolerance of each state."""
-        layouts = [unit.model.state_layout for unit in self._units.values() if unit.model.state_layout]
-        sizes = [v.quantity.nominal or 1.0 for layout in layouts for v in layout.variables]
-        return [max(1e-12, rtol * 1e-3 * size) for size in sizes]
+        return [max(1e-12, rtol * 1e-3 * (v.quantity.nominal or 1.0)) for v in self._states]
 
     def start(self, t: float) -> list[float]:
-        """States at the start. A state may depend on an input that is a state of another model, and so on: each pass
-        resolves one such dependency."""
-        values = dict(zip(self._outside, self._inputs(t), strict=True))
-        x: list[float] = []
-        for _ in range(len(self._units) + 1):
-            before, x = x, []
-            for name, unit in self._units.items():
-                if unit.model.state_layout:
-                    inputs = {
-                        v: values[self._sources.get(f"{name}.{v}", f"{name}.{v}")]
-                        for v in unit.model.input_layout.names
-                        if self._sources.get(f"{name}.{v}", f"{name}.{v}") in values
-                    }
-                    u = unit.model.input_layout.from_names(inputs)
-                    x += unit.model.state_layout.values(unit.model.start(MATH, unit.p, u))
-            values |= zip(self.states, x, strict=True)
-            outputs = self._all(self._inputs(t), x).full().ravel()
-            values |= zip(self._outputs, map(float, outputs), strict=True)
-            if x == before:
-                break
-        return x
+        """States at the start."""
+        layout = self._model.state_layout
+        u = self._model.input_layout.instance(self._inputs(t))
+        return layout.values(self._model.start(MATH, self._p, u)) if layout else []
 
     def dataset(self, times: Any, states: Any) -> xr.Dataset:
         """All states and outputs; `states` have the shape (states, times)."""
         outside = [np.broadcast_to(u, times.shape) for u in self._inputs(times)]
         outputs = np.asarray(self._all(np.array(outside).reshape(-1, len(times)), states))
-        declarations = {
-            f"{name}.{v.name}": v
-            for name, unit in self._units.items()
-            for layout in (unit.model.state_layout, unit.model.parts[0].layout)
-            if layout
-            for v in layout.variables
-        }
-        rows = [*zip(self.states, states, strict=True), *zip(self._outputs, outputs, strict=True)]
+        rows = zip((*self._states, *self._outputs), (*states, *outputs), strict=True)
         variables = {
-            full: (
-                "time",
-                row,
-                {"units": declarations[full].unit, "long_name": declarations[full].description},
-            )
-            for full, row in rows
+            v.name: ("time", row, {"units": v.unit, "long_name": v.description.partition(": ")[2]})
+            for v, row in rows
         }
         return xr.Dataset(variables, {"time": ("time", times, {"units": "s", "long_name": "time"})})

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...mechanism.driver_ports import AddedInertia
-from ...mechanism.models import declared_class, names_of
+from ...mechanism.models import names_of
 from ...ports import LoadInput, PortSlopes, PortValues, ShaftMotion, Start
-from ...quantities import Layout, Value, declaration, group, quantity
+from ...quantities import Layout, Value, declaration, declared_class, group, quantity
 from ..parts import Force, GuideLaw, Pin
 
 

@@ -24,10 +24,10 @@ from ...mechanism.driver_ports import ROTATING, SLIDING
 from ...mechanism.expressions import value_of
 from ...mechanism.linkage import Linkage
 from ...mechanism.machine import MachineState, Mechanism, derived_numbers
-from ...mechanism.models import InverseMachine, declared_class
-from ...model import Requirement
+from ...mechanism.models import InverseMachine
+from ...model import Requirement, keep
 from ...planar import Vec2
-from ...quantities import Layout, Value, group, quantity
+from ...quantities import Value, declared_class, group, quantity
 from ...refusals import unit_behind
 from ..parts import Force, force
 from .declarations import (
@@ -76,23 +76,6 @@ def machine_of(text: str) -> type[InverseMachine]:
 @cache
 def _machine_of(text: str) -> type[InverseMachine]:
     return LinkageDescription(json.loads(text), text).model()
-
-
-def _keep(of: type, text: str, which: str) -> None:
-    """Let pickle take instances of a declaration of the machine, which no module names, to another process."""
-
-    def reduced(instance: Any) -> tuple[Any, tuple[Any, ...]]:
-        return _kept, (text, which, Layout(of).values(instance), getattr(instance, "derived", None))
-
-    of.__reduce__ = reduced  # type: ignore[method-assign, assignment]
-
-
-def _kept(text: str, which: str, values: Sequence[Any], derived: Any) -> Any:
-    """The instance of that declaration of a machine; see `_keep`."""
-    instance = Layout(getattr(machine_of(text), which)).instance(values)
-    if derived is not None:
-        object.__setattr__(instance, "derived", derived)
-    return instance
 
 
 class LinkageDescription:
@@ -388,8 +371,7 @@ class LinkageDescription:
 
         FileMachine.required = required
         FileMachine.__name__ = FileMachine.__qualname__ = data["name"]
-        for which in ("Parameters", "Inputs", "Feed"):
-            _keep(getattr(FileMachine, which), self.text, which)
+        keep(FileMachine, "Parameters", "Inputs", "Feed")
         return FileMachine
 
     def limits(self, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:

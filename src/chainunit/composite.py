@@ -1,0 +1,257 @@
+"""The model of a system of models: `composed` makes it from its description (`chainunit.composition`).
+
+Standard library only: FMUs carry this file.
+"""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Callable, Iterable, Iterator
+from functools import cache
+from typing import Any, ClassVar
+
+from .composition import Composition, SystemPoint, modules_of
+from .errors import GeometryError, refusal_prefix
+from .model import Model, Part, keep
+from .quantities import Layout
+
+
+class CompositeModel(Model):
+    """A model that a system of models makes; `composed` gives its subclasses."""
+
+    of: ClassVar[Composition]
+
+    @classmethod
+    def at(cls, xp: Any, p: Any, u: Any, x: Any) -> SystemPoint:
+        """The system at one point."""
+        names = [name for name, member in cls.of.members.items() if member.states]
+        return SystemPoint(cls.of, xp, p, u, {name: getattr(x, name) for name in names} if x else {})
+
+    @classmethod
+    def _components(cls) -> Iterator[tuple[str, type[Model]]]:
+        yield from cls.of.models.items()
+
+    @classmethod
+    def prepared(cls, xp: Any, p: Any, derived: list[Any] | None = None) -> Any:
+        """See `Model.prepared`; each component gets its own derived values."""
+        if not cls.derived:
+            return p
+        ready, first = copy.copy(p), 0
+        values: list[Any] = []
+        # the copy has those of the original
+        vars(ready).pop("of_components", None)
+        own = cls.of.parameters(ready)
+        for name, model in cls._components():
+            given = None if derived is None else derived[first : first + model.derived]
+            own[name] = model.prepared(xp, own[name], given)
+            values += own[name].derived if model.derived else []
+            first += model.derived
+        object.__setattr__(ready, "derived", values)
+        return ready
+
+    @classmethod
+    def derive(cls, xp: Any, p: Any) -> list[Any]:
+        """The derived values of all components."""
+        own = cls.of.parameters(p)
+        return [v for name, model in cls._components() for v in model.derive(xp, own[name])]
+
+    @classmethod
+    def check(cls, p: Any, derived: list[Any] | None = None) -> Any:
+        """See `Model.check`; where a model has more to say on its geometry, the refusal says it."""
+        try:
+            return super().check(p, derived)
+        except GeometryError as error:
+            own = cls.of.parameters(p)
+            for name, model in cls._components():
+                if next(base for base in model.__mro__ if "check" in vars(base)) is not Model:
+                    with refusal_prefix(f"{name}: "):
+                        model.check(own[name])
+            raise error from None
+
+    @classmethod
+    def requirements(cls, xp: Any, p: Any) -> Iterator[tuple[Any, Any, Any]]:
+        """The limits of all components."""
+        own = cls.of.parameters(p)
+        for name, model in cls._components():
+            yield from model.requirements(xp, own[name])
+
+    # -- the start
+
+    @classmethod
+    def _begin(
+        cls, xp: Any, p: Any, u: Any, unknowns: Callable[[type[Model], Any, Any], list[Any]]
+    ) -> tuple[list[Any], SystemPoint]:
+        """The unknowns of the start of all components, and the system with the states that follow from them;
+        `unknowns` gives those of a component from its model, parameters and inputs."""
+        point = SystemPoint(cls.of, xp, p, u, {})
+        z: list[Any] = []
+        for name, outputs in cls.of.start:
+            if outputs is not None:
+                point.advance([(name, outputs)])
+                continue
+            model, own = cls.of.models[name], point.p[name]
+            entries, _ = point.inputs(name)
+            mine = unknowns(model, own, entries) if model.start_unknowns else []
+            z += mine
+
+            def states(
+                model: type[Model] = model, own: Any = own, entries: Any = entries, z: list[Any] = mine
+            ) -> Any:
+                return model.start_states(xp, own, entries, z)
+
+            point.begin(name, states)
+        return z, point
+
+    @classmethod
+    def start_guess(cls, xp: Any, p: Any, u: Any) -> list[Any]:
+        """See `Model.start_guess`."""
+        return cls._begin(xp, p, u, lambda model, own, entries: model.start_guess(xp, own, entries))[0]
+
+    @classmethod
+    def start_improved(cls, xp: Any, p: Any, u: Any, z: list[Any]) -> list[Any]:
+        """See `Model.start_improved`."""
+        before = iter(z)
+
+        def improved(model: type[Model], own: Any, entries: Any) -> list[Any]:
+            mine = [next(before) for _ in range(model.start_unknowns)]
+            return model.start_improved(xp, own, entries, mine)
+
+        return cls._begin(xp, p, u, improved)[0]
+
+    @classmethod
+    def start_states(cls, xp: Any, p: Any, u: Any, z: list[Any]) -> Any:
+        """See `Model.start_states`."""
+        before = iter(z)
+        take = cls._begin(
+            xp, p, u, lambda model, own, entries: [next(before) for _ in range(model.start_unknowns)]
+        )
+        point = take[1]
+        assert cls.States is not None
+        return cls.States(**{name: point.states(name) for name, m in cls.of.members.items() if m.states})
+
+    @classmethod
+    def start_limits(cls, xp: Any, p: Any, u: Any, x: Any) -> Iterator[tuple[Any, Any, Any]]:
+        """The limits of all components."""
+        point = cls.at(xp, p, u, x)
+        point.advance(cls.of.steps)
+        for name, model in cls._components():
+            if model.start_required:
+                entries, _ = point.inputs(name)
+                yield from model.start_limits(xp, point.p[name], entries, point.states(name))
+
+    # -- the run
+
+    @classmethod
+    def derivatives(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+        """Time derivatives of the states, component by component."""
+        point = cls.at(xp, p, u, x)
+        point.advance(cls.of.rate_steps)
+        rates: list[Any] = []
+        for name, model in cls._components():
+            if model.state_layout:
+                entries, _ = point.inputs(name)
+                rates += model.derivatives(xp, point.p[name], entries, point.states(name))
+        return rates
+
+    @classmethod
+    def shared(cls, xp: Any, p: Any, u: Any, x: Any) -> SystemPoint:
+        """The system with all inputs of its components."""
+        point = cls.at(xp, p, u, x)
+        point.advance(cls.of.steps)
+        return point
+
+    @classmethod
+    def _outputs(cls, declared: Any) -> Callable[..., Any]:
+        """The equations of a part with this declaration."""
+        layout = Layout(declared)
+        names: dict[str, list[str]] = {}
+        for full in layout.names:
+            name, _, output = full.partition(".")
+            names.setdefault(name, []).append(output)
+
+        def equations(xp: Any, p: Any, u: Any, x: Any, point: SystemPoint) -> Any:
+            return layout.instance([y for name, own in names.items() for _, y in point.outputs(name, own)])
+
+        return equations
+
+    @classmethod
+    def _least(cls, xp: Any, values: Iterable[Any]) -> Any:
+        least, *others = values
+        for value in others:
+            least = xp.minimum(least, value)
+        return least
+
+    @classmethod
+    def internal_step(cls, xp: Any, p: Any) -> Any:
+        """The least of the components' longest steps."""
+        own = cls.of.parameters(p)
+        models = [(name, model) for name, model in cls._components() if model.state_layout]
+        return cls._least(xp, (model.internal_step(xp, own[name]) for name, model in models))
+
+    @classmethod
+    def tolerance(cls, xp: Any, p: Any) -> Any:
+        """The least of the tolerances of the components that control the error."""
+        own = cls.of.parameters(p)
+        models = [(name, model) for name, model in cls._components() if model.controlled]
+        return cls._least(xp, (model.tolerance(xp, own[name]) for name, model in models))
+
+    @classmethod
+    def closed(cls, xp: Any, p: Any, u: Any, x: Any) -> list[Any]:
+        """The states near `x` that meet the constraints of each component; the others are those of `x`."""
+        point = cls.at(xp, p, u, x)
+        point.advance(cls.of.closed_steps)
+        values: list[Any] = []
+        for name, model in cls._components():
+            if model.controlled:
+                entries, _ = point.inputs(name)
+                values += model.closed(xp, point.p[name], entries, point.states(name))
+            elif model.state_layout:
+                values += model.state_layout.values(point.states(name))
+        return values
+
+
+def composed(text: str) -> type[CompositeModel]:
+    """The model of a description."""
+    return _composed(text)
+
+
+@cache
+def _composed(text: str) -> type[CompositeModel]:
+    of = Composition(json.loads(text))
+    models = of.models.values()
+    references = [each for _, each in of.data["components"]]
+    apart = of.by_differences()
+    members: dict[str, Any] = {
+        "__module__": __name__,
+        "__doc__": of.data["title"],
+        "name": of.data["name"],
+        "description": of.data["title"].partition("\n")[0],
+        "of": of,
+        "maker": (composed, (text,)),
+        "built_by": f"composed({text!r})",
+        "modules": tuple(sorted(set[str]().union(*map(modules_of, references)))),
+        "Parameters": of.Parameters,
+        "Inputs": of.Inputs,
+        "States": of.States if of.has_states else None,
+        "required": of.required(lambda model: model.required),
+        "start_required": of.required(lambda model: model.start_required),
+        "terminals": of.terminals(),
+        "derived": sum(model.derived for model in models),
+        "input_rates": of.input_rates(),
+        "start_unknowns": sum(model.start_unknowns for model in models),
+        "start_rounds": of.data["start_rounds"],
+        "controlled": any(model.controlled for model in models),
+        "parts": tuple(
+            Part(
+                declared,
+                CompositeModel._outputs(declared),
+                by_differences=apart & {*Layout(declared).names},
+            )
+            for declared in (of.Outputs, of.Extra)
+            if declared
+        ),
+    }
+    model = type(of.data["name"], (CompositeModel,), members)
+    keep(model, *("Parameters", "Inputs", *(["States"] if of.has_states else [])))
+    return model

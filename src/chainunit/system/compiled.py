@@ -1,0 +1,246 @@
+"""A system of models compiled to one model, from which all follows that exists for models: FMU, batch evaluation,
+monolithic reference.
+
+Each load is evaluated at its own point, at the present angle and speed of its shaft: there is no linearised load and
+no error of a coupling.
+"""
+
+from __future__ import annotations
+
+import json
+import keyword
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+from ..composite import composed
+from ..composition import RESERVED, reference
+from ..engines import casadi_
+from ..errors import InputError, shown
+from ..fmu.description import Interface
+from ..integrate import MAX_STEPS
+from ..model import Model
+from .graph import Connection, ModelComponent, System, hold_loads, order
+
+
+def compiled(system: System, name: str = "System", title: str = "") -> ModelComponent:
+    """One model of a system of models, with the values of its parameters.
+
+    Its names are the full names of the system: of parameters ("motor.armature.R"), states and outputs.
+    Its inputs are the inputs without a connection. The slopes of load ports that are joined are neither inputs nor
+    outputs. Terminals that are not joined are its terminals. One `solver.max_steps`, the largest of the components,
+    holds for the integrator of the whole.
+
+    Parameters
+    ----------
+    system : its components are all models
+    name : name of the model and of its FMU
+    title : description of the model; by default that of the components
+
+    Raises
+    ------
+    InputError
+        where a component is an FMU, whose equations are not known; for an algebraic loop, also of the start; and for
+        a name that a component of a compiled system cannot have.
+    """
+    models: dict[str, type[Model]] = {}
+    for own, component in system.components.items():
+        if not isinstance(component, ModelComponent):
+            raise InputError(
+                f"{own} ({component.title}): is an FMU, whose equations are not known; only a system of models can "
+                "be one model"
+            )
+        if own in RESERVED or own.startswith("_") or keyword.iskeyword(own):
+            raise InputError(
+                f"{shown(own)}: a component of a system that becomes one model cannot have this name"
+            )
+        models[own] = component.model
+    model = composed(json.dumps(_description(system, models, name, title), sort_keys=True))
+    values = system.values
+    layout = model.parameter_layout
+    budgets = [values[full] for each in models if (full := f"{each}.{MAX_STEPS}") in values]
+    own_values = {full: values[full] for full in layout.names if full in values}
+    own_values |= {MAX_STEPS: max(budgets)} if budgets else {}
+    return ModelComponent(model, layout.from_names(own_values))
+
+
+def input_starts(system: System, model: type[Model]) -> dict[str, float]:
+    """The start values of the inputs of a compiled system, where the system gives one."""
+    return {full: system.values[full] for full in model.input_layout.names if full in system.values}
+
+
+def _description(system: System, models: Mapping[str, type[Model]], name: str, title: str) -> dict[str, Any]:
+    """See `chainunit.composition.Composition`."""
+    exact = hold_loads(system)
+    slopes = set(system.connections) - set(exact.connections)
+    free = _free_terminals(system)
+    further = {
+        f"{name}.{output}"
+        for name, each in models.items()
+        for part in each.parts[1:]
+        for output in part.layout.names
+    }
+    members = {
+        f"{full.partition('.')[0]}.{variable}"
+        for full in free
+        for variable in system.terminal(full)[1].members.values()
+    }
+    extra = sorted(further & (members | {source for source, _ in exact.connections}))
+    influences = {each: _influences(model) for each, model in models.items()}
+    plan = _Plan(exact.connections, models, influences)
+    kinds = ", ".join(f"{each} ({model.name})" for each, model in models.items())
+    return {
+        "name": name,
+        "title": title or f"System of {kinds}",
+        "components": [[each, reference(model)] for each, model in models.items()],
+        "connections": [list(connection) for connection in exact.connections],
+        "left_out": sorted({full for connection in slopes for full in connection} - set(extra)),
+        "terminals": free,
+        "extra": extra,
+        "steps": plan.steps,
+        "rate_steps": plan.steps_for("rates"),
+        "closed_steps": plan.steps_for("closed"),
+        "start": plan.start(),
+        "start_rounds": plan.start_rounds(),
+    }
+
+
+def _free_terminals(system: System) -> list[str]:
+    """The terminals, by full name, none of whose variables is connected or belongs to a joined terminal. A load port
+    needs the free shaft to which it belongs."""
+    taken = {full for connection in system.connections for full in connection}
+    for joint in system.joints:
+        for full in joint:
+            name, terminal = system.terminal(full)
+            taken |= {f"{name}.{variable}" for variable in terminal.members.values()}
+    free = []
+    for name, component in system.components.items():
+        own = [
+            terminal
+            for terminal in component.terminals.values()
+            if not taken & {f"{name}.{variable}" for variable in terminal.members.values()}
+        ]
+        # who gives the motion takes the load
+        shafts = {component.connectors[t.members["phi"]].causality for t in own if "phi" in t.members}
+        ports = {t.name: component.connectors[t.members["tau_bias"]] for t in own if "tau_bias" in t.members}
+        free += [f"{name}.{t.name}" for t in own if t.name not in ports or shafts - {ports[t.name].causality}]
+    return free
+
+
+@dataclass(frozen=True)
+class _Influences:
+    """The inputs of a model on which its quantities depend directly: by output and state, and of the derivatives, the
+    states at the start, and the constraints."""
+
+    direct: Mapping[str, set[str]]
+    rates: set[str]
+    start: set[str]
+    closed: set[str]
+
+
+@lru_cache(maxsize=64)
+def _influences(model: type[Model]) -> _Influences:
+    interface = Interface(model, {})
+    n_states, n_outputs = len(interface.states), len(interface.others)
+
+    def inputs(references: list[int]) -> set[str]:
+        signals = (interface.signals[i] for i in references if i < len(interface.signals))
+        return {signal.name for signal in signals if signal.causality == "input"}
+
+    rows = interface.dependencies
+    ends = n_states + n_outputs
+    names = [v.name for v in (*interface.states, *interface.others)]
+    return _Influences(
+        {name: inputs(in_run) for name, (in_run, _) in zip(names, rows, strict=False)},
+        set[str]().union(*(inputs(in_run) for in_run, _ in rows[ends:])),
+        set[str]().union(*(inputs(first) for _, first in rows[:n_states])),
+        _constraints(interface) if model.controlled else set(),
+    )
+
+
+def _constraints(interface: Interface) -> set[str]:
+    import casadi
+
+    (_, us, *_), p, u, x, *_ = interface.trace
+    rows = casadi.vertcat(*interface.model.closed(casadi_(), p, u, x))
+    names = [v.name for v in interface.inputs]
+    return {
+        name for name, counts in zip(names, casadi.which_depends(rows, us, 1, False), strict=True) if counts
+    }
+
+
+class _Plan:
+    """The order in which the equations of a system are evaluated."""
+
+    def __init__(
+        self,
+        connections: list[Connection],
+        models: Mapping[str, type[Model]],
+        influences: Mapping[str, _Influences],
+    ) -> None:
+        self._models, self._of = models, influences
+        self._sources = {target: source for source, target in connections}
+        direct = {name: each.direct for name, each in influences.items()}
+        self.steps = [(name, outputs) for name, outputs in order(connections, direct)]
+
+    def _feeding(self, name: str, inputs: set[str]) -> list[tuple[str, str]]:
+        """Component and variable of each source of these inputs of a component."""
+        fulls = [f"{name}.{each}" for each in sorted(inputs)]
+        sources = [self._sources[full] for full in fulls if full in self._sources]
+        return [(source.partition(".")[0], source.partition(".")[2]) for source in sources]
+
+    def steps_for(self, kind: str) -> list[tuple[str, list[str]]]:
+        """The steps that the derivatives ("rates") or the constraints ("closed") of the components need."""
+        needed: set[tuple[str, str]] = set()
+        waiting = [each for name, of in self._of.items() for each in self._feeding(name, getattr(of, kind))]
+        while waiting:
+            name, output = waiting.pop()
+            if (name, output) not in needed:
+                needed.add((name, output))
+                waiting += self._feeding(name, self._of[name].direct[output])
+        steps = [(name, [x for x in outputs if (name, x) in needed]) for name, outputs in self.steps]
+        return [(name, outputs) for name, outputs in steps if outputs]
+
+    def start(self) -> list[tuple[str, list[str] | None]]:
+        """The order of the start: components, whose states start, and outputs that such a start depends on."""
+        steps: list[tuple[str, list[str] | None]] = []
+        self._started_by: dict[str, set[str]] = {}
+
+        def begin(name: str, above: tuple[str, ...]) -> None:
+            if name in above:
+                loop = " -> ".join((*above[above.index(name) :], name))
+                raise InputError(f"the states at the start depend on each other: {loop}")
+            layout = self._models[name].state_layout
+            if name in self._started_by or layout is None:
+                return
+            before: set[str] = set()
+            for each in self._feeding(name, self._of[name].start):
+                before |= know(*each, (*above, name))
+            self._started_by[name] = before
+            steps.append((name, None))
+
+        def know(name: str, variable: str, above: tuple[str, ...]) -> set[str]:
+            """Compute a variable; returns the components whose start it depends on."""
+            layout = self._models[name].state_layout
+            begin(name, above)
+            before = {name} if layout else set()
+            if layout is None or variable not in layout.names:
+                for each in self._feeding(name, self._of[name].direct[variable]):
+                    before |= know(*each, above)
+                steps.append((name, [variable]))
+            return before
+
+        for name in self._models:
+            begin(name, ())
+        return steps
+
+    def start_rounds(self) -> int:
+        """Rounds of the iteration of the start: where one start depends on another, one iteration needs the result of
+        the other."""
+
+        def rounds(name: str) -> int:
+            before = max(map(rounds, self._started_by[name]), default=0)
+            return before + self._models[name].start_rounds
+
+        return max(map(rounds, self._started_by), default=0)
