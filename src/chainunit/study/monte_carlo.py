@@ -13,7 +13,6 @@ import hashlib
 import json
 import math
 import os
-import signal
 from collections.abc import Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -27,13 +26,13 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from .. import __version__
+from ..ending import end_at_signals
 from ..errors import InterruptedRunError, RunError
 from ..files import whole, writing
 from ..machines.chain_unit import SIDES, SideName
 from ..progress import Report
 from ..quantities import Layout, Value, declaration, quantity
 from ..system import Simulation
-from ..system.instance import remove_unpacked
 from ..text import entry
 from .config import Config
 from .drive import Drive
@@ -132,16 +131,8 @@ def _close() -> None:
 
 
 def _begin() -> None:
-    """Prepare a worker process: it leaves Ctrl-C to the process that started it, and leaves no files behind
-    after SIGTERM."""
-
-    def leave(number: int, frame: Any) -> None:
-        # the process may be inside an FMU, which then cannot be closed
-        remove_unpacked()
-        os._exit(128 + number)
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, leave)
+    """Prepare a worker process."""
+    end_at_signals()
     atexit.register(_close)
 
 

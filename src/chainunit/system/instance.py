@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import atexit
 import contextlib
 import ctypes
 import logging
 import math
 import os
 import re
-import secrets
-import shutil
-import tempfile
 import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
+from ..ending import remove_folder, temporary_folder
 from ..errors import InputError, RunError, printable, shown
 
 log = logging.getLogger("chainunit.fmu")
@@ -25,15 +22,6 @@ Kind = Literal["Co-Simulation", "Model Exchange"]
 """Interface of an FMU."""
 _working_directory = threading.Lock()
 """Locked while fmpy loads a library: all threads of the process share one working directory."""
-_folders: set[str] = set()
-"""The folders into which this process has unpacked FMUs."""
-
-
-@atexit.register
-def remove_unpacked() -> None:
-    """Remove the unpacked files of every FMU that was not closed, at the end of the process."""
-    while _folders:
-        shutil.rmtree(_folders.pop(), ignore_errors=True)
 
 
 class DiscardError(RunError):
@@ -63,12 +51,8 @@ class Fmu:
         self.file, self.kind = file, kind
         if not Path(file).is_file():
             raise InputError(f"{file}: no such FMU")
-        self.folder = str(Path(tempfile.gettempdir()) / f"chainunit_fmu_{secrets.token_hex(8)}")
-        _folders.add(
-            self.folder
-        )  # before the folder exists: a signal may end the process between any two lines
+        self.folder = temporary_folder("chainunit_fmu")
         try:
-            Path(self.folder).mkdir(0o700)
             extract(str(file), unzipdir=self.folder)
             self.description = read_model_description(self.folder, validate=False)
             self.interface = self._interface()
@@ -125,8 +109,7 @@ class Fmu:
 
     def close(self) -> None:
         """Remove the unpacked files."""
-        shutil.rmtree(self.folder, ignore_errors=True)
-        _folders.discard(self.folder)
+        remove_folder(self.folder)
 
 
 def _unloadable(fmu: Fmu, error: Exception) -> str:

@@ -1,0 +1,347 @@
+"""Runs a job: makes the batches that its store does not have, in this process, in local processes, or on a cluster.
+
+A kill loses the batches in work, at most one for each worker; the next run makes these and the others that are
+missing. Each worker has one batch at a time, and a finished batch is written before the next one is taken from the
+workers: the memory does not grow with the number of points.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import concurrent.futures
+import contextlib
+import logging
+import os
+import pickle
+import signal
+import threading
+from collections.abc import Generator, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from . import __version__, ending
+from .batch_store import BatchStore
+from .errors import InputError, InterruptedRunError, RunError, printable
+from .files import claim
+from .job import Job
+from .progress import Report
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Made: TypeAlias = Generator[tuple[int, Any], None, None]
+"""Batches with their results, in the order in which they are finished."""
+PATIENCE = 3.0
+"""Time in which a scheduler and its workers must answer [s]."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The results of a job, complete."""
+
+    store: BatchStore = field(repr=False)
+    earlier_points: int
+    """number of points that the store had before"""
+    damaged_batches: int
+    """number of batches that the store had in part or with other bytes than were written; they were made anew"""
+
+    @property
+    def file(self) -> Path:
+        """The store, a folder."""
+        return self.store.path
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """The results of all points, opened lazily; see `BatchStore.open`."""
+        return self.store.open()
+
+
+def run(
+    job: Job, folder: Path, report: Report, workers: int | None = None, scheduler: str | None = None
+) -> Outcome:
+    """Make the missing batches of the job, and write each into the store in `folder` when it is finished.
+
+    Parameters
+    ----------
+    job : the work; of its store see `BatchStore`
+    folder : where the store is, or is made, by its `Job.store_name`
+    report : a function that is called with the title of the job and the numbers of complete and of all points
+    workers : number of local processes; by default one for each processor. One worker, or a single batch, runs in
+        this process itself, without Dask
+    scheduler : address of a Dask scheduler, such as ``tcp://10.0.0.5:8786``, whose workers make the batches in
+        place of local processes. They need this package in the same version, and no files in common with this
+        process
+
+    Raises
+    ------
+    InputError
+        where the scheduler or its workers do not answer, or another process writes to the store.
+    RunError
+        where `work` fails, or a worker ends; the message names the batch. Earlier batches are in the store.
+    InterruptedRunError
+        after Ctrl-C; likewise.
+    WriteError
+        where the store cannot be written; likewise.
+    """
+    with claim(folder / job.store_name) as path:
+        store = BatchStore(job, path)
+        report(job.title, 0, job.points)
+        gaps, damaged = store.missing(lambda complete: report(job.title, complete, job.points))
+        complete = earlier = job.points - sum(_size(store, batch) for batch in gaps)
+        workers = min(workers or os.cpu_count() or 1, len(gaps))
+        try:
+            with contextlib.closing(_batches(store, gaps, workers, scheduler)) as batches:
+                for batch, results in batches:
+                    store.write(batch, results)
+                    complete += _size(store, batch)
+                    report(job.title, complete, job.points)
+        except (KeyboardInterrupt, InterruptedRunError) as error:
+            words = f"interrupted after {complete} of {job.points} {job.title}"
+            raise InterruptedRunError(words) from error
+        except _BatchError as error:
+            begin, end = store.extent(error.batch)
+            raise RunError(
+                f"{job.title}: batch {error.batch} ({job.dimension} {begin} to {end - 1}) {error}; {complete} of "
+                f"{job.points} are in {path}: run it again to go on"
+            ) from error.__cause__
+    return Outcome(store, earlier, damaged)
+
+
+def _size(store: BatchStore, batch: int) -> int:
+    """The number of points of a batch that the job asks for."""
+    begin, end = store.extent(batch)
+    return min(end, store.job.points) - begin
+
+
+class _BatchError(Exception):
+    """A batch failed; the message is the end of a sentence."""
+
+    def __init__(self, batch: int, words: str) -> None:
+        super().__init__(words)
+        self.batch = batch
+
+
+def _batches(store: BatchStore, gaps: list[int], workers: int, scheduler: str | None) -> Made:
+    if not gaps or (scheduler is None and workers == 1):
+        return _here(store, gaps)
+    return _on_workers(store, gaps, workers, scheduler)
+
+
+def _here(store: BatchStore, gaps: list[int]) -> Made:
+    """Make batches in this process."""
+    job = store.job
+    try:
+        for batch in gaps:
+            try:
+                results = job.work(job.task, *store.extent(batch))
+            except InterruptedRunError:
+                raise
+            except Exception as error:
+                raise _BatchError(batch, f"failed: {_words(error)}") from error
+            yield batch, results
+    finally:
+        if job.close is not None:
+            job.close()
+
+
+def _words(error: BaseException) -> str:
+    return printable(str(error) if isinstance(error, RunError | InputError) else repr(error), 500)
+
+
+# -- on workers
+
+_at_work = threading.Lock()
+"""Held by the thread that makes a batch: a worker with several threads makes one batch at a time."""
+_jobs: dict[str, Any] = {}
+"""The job of this worker, by its digest."""
+
+
+def _made_on_worker(version: str, digest: str, parcel: bytes, begin: int, end: int) -> Any:
+    """Make a batch in a worker process. The parcel of a job is unpacked once."""
+    with _at_work:
+        if version != __version__:
+            raise RunError(f"the worker has chainunit {__version__}, and must have {version}")
+        if digest not in _jobs:
+            _close()
+            _jobs[digest] = pickle.loads(parcel)
+        work, task, _ = _jobs[digest]
+        return work(task, begin, end)
+
+
+def _close() -> None:
+    """Release what the job of this worker keeps."""
+    while _jobs:
+        _, _, close = _jobs.popitem()[1]
+        if close is not None:
+            close()
+
+
+def _finish() -> None:
+    """Release it at the end of the job, unless the worker is already at another one."""
+    if _at_work.acquire(blocking=False):
+        try:
+            _close()
+        finally:
+            _at_work.release()
+
+
+def _on_workers(store: BatchStore, gaps: list[int], workers: int, scheduler: str | None) -> Made:
+    """Make batches on the workers of a cluster. A worker gets its next batch when the last one is finished; the
+    finished one is then yielded."""
+    from distributed import as_completed
+    from distributed.scheduler import KilledWorker
+
+    job = store.job
+    digest = job.layout().hex()
+    parcel = pickle.dumps((job.work, job.task, job.close))
+    with _client(workers, scheduler) as client:
+        sent = client.scatter(parcel, broadcast=True, hash=False)
+        waiting = iter(gaps)
+        batch_of: dict[str, int] = {}
+        finished = as_completed(loop=client.loop)
+
+        def refill() -> None:
+            wanted = len(client.nthreads()) if scheduler else workers
+            while len(batch_of) < wanted and (batch := next(waiting, None)) is not None:
+                future = client.submit(
+                    _made_on_worker, __version__, digest, sent, *store.extent(batch), pure=False
+                )
+                batch_of[future.key] = batch
+                finished.add(future)
+
+        refill()
+        for future in finished:
+            batch = batch_of.pop(future.key)
+            try:
+                results = future.result()
+            except KilledWorker as error:
+                raise _BatchError(batch, "was lost, as its worker process ended") from error
+            except (asyncio.CancelledError, concurrent.futures.CancelledError) as error:
+                raise _BatchError(batch, f"was lost, as the scheduler {scheduler or ''} ended") from error
+            except InterruptedRunError:
+                raise
+            except Exception as error:
+                raise _BatchError(batch, f"failed: {_words(error)}") from error
+            del future
+            refill()
+            yield batch, results
+        client.run(_finish)
+
+
+@contextmanager
+def _client(workers: int, scheduler: str | None) -> Iterator[Any]:
+    """A client of that scheduler, or of as many local processes."""
+    with _silent():
+        if scheduler is not None:
+            with _connected(scheduler) as client:
+                yield client
+        else:
+            with _local(workers) as client:
+                yield client
+
+
+_LOGS = ("distributed", "distributed.client", "tornado.application")
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """No lines of Dask on the terminal: every failure becomes an error of this package."""
+    import distributed  # noqa: F401 - it sets the levels when it is imported
+
+    before = {name: logging.getLogger(name).level for name in _LOGS}
+    for name in _LOGS:
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for name, level in before.items():
+            logging.getLogger(name).setLevel(level)
+
+
+@contextmanager
+def _local(workers: int) -> Iterator[Any]:
+    """A client of local processes with one thread each."""
+    import dask
+    from distributed import Client, LocalCluster
+
+    # a batch whose worker ends is not tried again: it would end the next worker, too
+    settings = {"distributed.scheduler.allowed-failures": 0, "distributed.worker.profile.enabled": False}
+    with (
+        dask.config.set(settings),
+        LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            dashboard_address=None,
+            memory_limit=0,
+            silence_logs=logging.CRITICAL + 1,
+            preload=[ending.__name__],
+        ) as cluster,
+        Client(cluster, set_as_default=False) as client,
+    ):
+        try:
+            yield client
+        except BaseException:
+            for nanny in cluster.workers.values():
+                # it would wait for its batch first, and then be killed with its temporary folders left behind
+                process = nanny.pid
+                nanny.close_gracefully()
+                if process:
+                    with contextlib.suppress(ProcessLookupError):
+                        os.kill(process, signal.SIGTERM)
+            raise
+
+
+@contextmanager
+def _connected(scheduler: str) -> Iterator[Any]:
+    """A client of the scheduler at that address."""
+    from distributed import Client
+
+    _ask(scheduler)
+    with Client(scheduler, timeout=PATIENCE, set_as_default=False) as client:
+        yield client
+
+
+def _ask(scheduler: str) -> None:
+    """Ask a scheduler for its workers. A client that cannot connect would go on trying in the background."""
+    import distributed
+
+    async def ask() -> Any:
+        async with distributed.rpc(scheduler) as remote:
+            return await remote.identity()
+
+    async def ask_in_time() -> Any:
+        return await asyncio.wait_for(ask(), PATIENCE)
+
+    address = printable(scheduler)
+    try:
+        # in a thread, as the caller may have a loop that runs, such as that of a notebook
+        with concurrent.futures.ThreadPoolExecutor(1) as thread:
+            answer = thread.submit(lambda: asyncio.run(ask_in_time())).result()
+    except Exception as error:
+        words = f"within {PATIENCE:g} s" if isinstance(error, TimeoutError) else f"({_reason(error)})"
+        raise InputError(
+            f'scheduler {address}: does not answer {words}; start it by "dask scheduler", and give the address that '
+            "it prints, such as tcp://10.0.0.5:8786"
+        ) from error
+    if answer.get("type") != "Scheduler":
+        raise InputError(f"scheduler {address}: is no scheduler of Dask; give the address that it prints")
+    if not answer.get("workers"):
+        raise InputError(f'scheduler {address}: has no workers; start them by "dask worker {address}"')
+
+
+def _reason(error: BaseException) -> str:
+    return printable(str(error).splitlines()[0] if str(error) else type(error).__name__)
+
+
+def check_scheduler(scheduler: str) -> None:
+    """Find out whether a scheduler and its workers answer, before long work that comes first.
+
+    Raises
+    ------
+    InputError
+        where they do not answer within a few seconds.
+    """
+    with _silent():
+        _ask(scheduler)

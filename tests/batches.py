@@ -1,0 +1,76 @@
+"""A job for tests of the runner, in a module that workers import."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from chainunit.job import Coordinate, Job, ResultVariable
+from chainunit.runner import run
+
+VARIABLES = (
+    ResultVariable("height", "m", "height of a point"),
+    ResultVariable("colour", "1", "colour of a point", "int8", flags=("red", "green", "blue")),
+    ResultVariable("curve", "N.m", "torque over the angle", "float32", dims=("angle", "side")),
+    ResultVariable("remark", "1", "remark on a point", letters=12),
+)
+COORDINATES = (
+    Coordinate("angle", (0.0, 0.5, 1.0), "rad", "crank angle"),
+    Coordinate("side", (0.0, 1.0), "1", "side"),
+)
+
+
+def results(begin, end):
+    """The results of some points, from their numbers alone."""
+    n = np.arange(begin, end)
+    return {
+        "height": np.where(n % 7 == 3, np.nan, np.sin(n)),
+        "colour": n % 3,
+        "curve": np.cos(n[:, None, None] + np.arange(6.0).reshape(3, 2)),
+        "remark": [f"point {k}" if k % 5 == 0 else "" for k in n],
+    }
+
+
+def work(task, begin, end):
+    """Make a batch; `task` says what goes wrong."""
+    if "seen" in task:
+        Path(task["seen"], f"{begin}_{os.getpid()}").touch()
+    if begin in task.get("slow", ()):
+        time.sleep(task["seconds"])
+    if begin == task.get("waits"):
+        while len(list(Path(task["marks"]).glob("?"))) < 2:
+            time.sleep(0.01)
+    if begin == task.get("dies"):
+        os.kill(os.getpid(), signal.SIGKILL)
+    if begin == task.get("fails"):
+        raise ValueError("no such point")
+    return results(begin, end)
+
+
+def job(points=100, batch=16, digest="0123456789abcdef", closing=None, **task):
+    return Job(
+        name="demo",
+        title="points of a demo",
+        points=points,
+        batch=batch,
+        variables=VARIABLES,
+        work=work,
+        task=task,
+        digest=digest,
+        coordinates=COORDINATES,
+        close=closing,
+    )
+
+
+if __name__ == "__main__":
+    import batches
+
+    folder, points, workers = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
+    slow = {"slow": range(0, points, 4), "seconds": 0.05} if len(sys.argv) > 4 else {}
+    outcome = run(batches.job(points, 4, **slow), folder, lambda *said: None, workers)
+    print(outcome.earlier_points, "distributed" in sys.modules)
