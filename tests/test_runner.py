@@ -58,7 +58,7 @@ def test_the_dataset_is_the_work(unbroken):
     assert list(dataset["colour"].attrs["flag_values"]) == [0, 1, 2]
     assert list(dataset["angle"].values) == [0.0, 0.5, 1.0] and dataset["angle"].attrs["units"] == "rad"
     # the store is one of Zarr to any reader
-    other = xr.open_zarr(unbroken.file, chunks=None)
+    other = xr.open_zarr(unbroken.file, consolidated=False)
     xr.testing.assert_identical(other[list(wanted)].drop_attrs(), dataset.drop_attrs())
 
 

@@ -4,7 +4,7 @@ One process writes. A chunk appears whole or not at all, and the checksum of a b
 a batch without the right checksum is missing. The bytes of the store follow from the job alone, and not from the
 order of the batches or the number of kills between them. Any reader of Zarr reads the store::
 
-    xarray.open_zarr("results/monte_carlo_0123456789ab.zarr")
+    xarray.open_zarr("results/monte_carlo_0123456789ab.zarr", consolidated=False)
 """
 
 from __future__ import annotations
