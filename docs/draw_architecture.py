@@ -95,7 +95,7 @@ TEXTS = {
     "drives": "motors, gear, shafts, control",
     "mechanism": "any linkage from data: one forward pass, one force pass",
     "groups": "crank, dyad, triad, chain, bodies, friction",
-    "core": "quantities, model, engines, vectors of the plane, load port, integrators, reading, errors",
+    "core": "quantities, model, engines, batches, vectors of the plane, load port, integrators, reading, errors",
     "fmu": "any model as an FMU",
 }
 WAYS = {

@@ -112,6 +112,26 @@ def base_units(unit: str) -> dict[str, int]:
     return {base: exponents[base] for base in SI if exponents.get(base)}
 
 
+def quotient(unit: str, by: str) -> str:
+    """The unit of a derivative: ``N.m`` by ``kg.m2`` -> ``N/(kg.m)``."""
+    powers: dict[str, int] = {}
+    for sign, text in ((1, unit), (-1, by)):
+        for side, part in zip((sign, -sign), text.split("/"), strict=False):
+            for factor in part.strip("()").split("."):
+                name, power = re.fullmatch(r"([A-Za-z]+|1)(-?\d*)", factor).groups()  # type: ignore[union-attr]
+                powers[name] = powers.get(name, 0) + side * int(power or 1)
+    powers.pop("1", None)
+
+    def product(sign: int) -> list[str]:
+        return [
+            f"{name}{p if p > 1 else ''}" for name, p in ((n, sign * q) for n, q in powers.items()) if p > 0
+        ]
+
+    above, below = ".".join(product(1)) or "1", product(-1)
+    under = below[0] if len(below) == 1 else f"({'.'.join(below)})"
+    return f"{above}/{under}" if below else above
+
+
 MOST: dict[str, float] = {
     "1": 1e6,
     "m": 1e4,

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Self
 
 import numpy as np
+import xarray as xr
 
 from ..engines import numpy_
 from ..errors import InputError
@@ -146,6 +147,23 @@ class Machine:
         for part in self.model.parts:
             outputs |= part.layout.by_name(part.equations(_XP, self.p, u, None, state))
         return dict(zip(outputs, np.broadcast_arrays(*outputs.values()), strict=True))
+
+    def batch(
+        self, values: Mapping[str, Any], outputs: Sequence[str] | None = None, **options: Any
+    ) -> xr.Dataset:
+        """Outputs, derivatives and cycle quantities over arrays of inputs and parameters, in compiled code; this
+        machine gives all other parameters. Arguments and result are those of `chainunit.batch.evaluate`.
+
+        Examples
+        --------
+        >>> from chainunit import ChainUnitMachine
+        >>> turn = ChainUnitMachine().batch({"phi": [0.0, 0.5], "r": [0.14, 0.15], "w": 3.0}, ["tau"])
+        >>> turn.tau.dims, turn.tau.units
+        (('phi', 'r'), 'N.m')
+        """
+        from ..batch import evaluate
+
+        return evaluate(self.model, values, outputs, parameters=self.p, **options)
 
     def pin_turns(self, run: Mapping[str, Any]) -> dict[str, Any]:
         """Relative angle in each of the model's joints over a `run`, by output, up to a constant [rad], shape (n,).

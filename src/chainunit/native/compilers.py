@@ -105,3 +105,24 @@ def compile_code(
     for name, content in sorted(files.items()):
         key.update(f"{name} {len(content)} ".encode() + content)
     return entry(key.digest(), make)
+
+
+def for_this_processor(compiler: Compiler) -> tuple[tuple[str, ...], tuple[str, ...], dict[str, bytes]]:
+    """Flags for fast code that runs on this machine alone, the libraries behind them, and a file that is part of the
+    code's name in the cache: the properties of this processor.
+
+    The code has vectors and may contract products and sums; it does not reorder sums, and NaN and infinity keep their
+    meaning.
+    """
+    flags: tuple[str, ...] = ("-std=gnu11", "-O3", "-march=native", "-fPIC", "-shared", "-w")
+    flags += ("-fno-math-errno", "-fno-trapping-math", "-ffp-contract=fast", "-fno-semantic-interposition")
+    macros = subprocess.run(
+        [*compiler.command, "-march=native", "-dM", "-E", "-x", "c", os.devnull], capture_output=True
+    ).stdout
+    libc, version = platform.libc_ver()
+    if compiler.zig or libc != "glibc" or host() != "linux64":
+        return flags, ("-lm",), {"processor.txt": macros}
+    number = "".join(part.zfill(2) if k else part for k, part in enumerate(version.split(".")[:2]))
+    # schedules a long body for its many values; GCC for this processor would not
+    flags += ("-fschedule-insns", "-fsched-pressure")
+    return (*flags, f"-DVECTOR_LIBRARY={number}"), ("-lmvec", "-lm"), {"processor.txt": macros}

@@ -6,8 +6,9 @@ FMUs and of batches, and the array code of numpy and jax.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import pairwise
 from typing import Any
@@ -85,3 +86,26 @@ class Operations:
         for group in groups:
             ends.append(ends[-1] + group.numel())
         self.results = [results[begin:end] for begin, end in pairwise(ends)]
+
+    def rearranged(self, items: Sequence[Operation]) -> Operations:
+        """The same results from other `items`, whose order does not matter: those that are needed are put in order.
+        The first ones have the places of the present ones."""
+        places: dict[int, int] = {}
+        order: list[Operation] = []
+        for result in (place for group in self.results for place in group):
+            waiting = [result]
+            while waiting:
+                place = waiting[-1]
+                missing = [k for k in items[place].operands if k not in places] if place not in places else []
+                if missing:
+                    waiting += reversed(missing)
+                    continue
+                waiting.pop()
+                if place not in places:
+                    each = items[place]
+                    places[place] = len(order)
+                    order.append(replace(each, operands=tuple(places[k] for k in each.operands)))
+        other = copy.copy(self)
+        other.items = order
+        other.results = [[places[place] for place in group] for group in self.results]
+        return other

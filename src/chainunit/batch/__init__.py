@@ -1,0 +1,5 @@
+"""Outputs of a model, and their derivatives, over arrays of parameters, inputs and states."""
+
+from .evaluate import ENGINES, evaluate
+
+__all__ = ["ENGINES", "evaluate"]

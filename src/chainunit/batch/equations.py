@@ -1,0 +1,144 @@
+"""The chosen outputs of a model and their derivatives, as operations of parameters, inputs and states."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+from ..engines import casadi_
+from ..errors import InputError, near_name
+from ..model import Model
+from ..native.operations import Operations
+from ..quantities import Variable, quotient
+from ..trace import trace
+
+
+@dataclass(frozen=True)
+class Result:
+    """A column of results: an output, or the derivative of one."""
+
+    name: str
+    unit: str
+    description: str
+
+
+@dataclass(frozen=True, eq=False)
+class Equations:
+    """What a batch computes.
+
+    `arguments` are the parameters, inputs and states of the model in declared order. `operations` has two groups of
+    results: the `results`, and one number, which is 0 where all requirements of the model are met, and else the
+    place of the first that is not, from 1.
+    """
+
+    model: type[Model]
+    arguments: tuple[Variable, ...]
+    results: tuple[Result, ...]
+    operations: Operations
+
+    @property
+    def not_finite(self) -> int:
+        """The reason of a state that meets all requirements and has no finite result."""
+        return len(self.model.required) + 1
+
+    @property
+    def sizes(self) -> tuple[int, int, int]:
+        """Numbers of parameters, inputs and states."""
+        layouts = (self.model.parameter_layout, self.model.input_layout, self.model.state_layout)
+        p, u, x = (len(of.names) if of else 0 for of in layouts)
+        return p, u, x
+
+    def place(self, entry: tuple[int, int]) -> int:
+        """The place among all arguments of an entry of the parameters (0), inputs (1) or states (2)."""
+        return sum(self.sizes[: entry[0]]) + entry[1]
+
+
+def outputs_of(model: type[Model]) -> tuple[Variable, ...]:
+    """All outputs of a model in declared order."""
+    return tuple(v for part in model.parts for v in part.layout.variables)
+
+
+def arguments_of(model: type[Model]) -> tuple[Variable, ...]:
+    """All parameters, inputs and states of a model in declared order."""
+    layouts = (model.parameter_layout, model.input_layout, model.state_layout)
+    return tuple(v for of in layouts if of for v in of.variables)
+
+
+def find(names: Sequence[str], among: Sequence[Variable], kind: str) -> list[int]:
+    """The places of these names.
+
+    Raises
+    ------
+    InputError
+        for a name that is not there.
+    """
+    places = {v.name: k for k, v in enumerate(among)}
+    for name in names:
+        if name not in places:
+            raise InputError(f"{name}: no such {kind} of the model{near_name(name, list(places))}")
+    return [places[name] for name in names]
+
+
+@lru_cache(maxsize=64)
+def equations(model: type[Model], outputs: tuple[str, ...], by: tuple[str, ...]) -> Equations:
+    """The `outputs` of a model, and the derivative of each by each of the arguments `by`.
+
+    Raises
+    ------
+    InputError
+        for a name that the model does not have.
+    """
+    import casadi
+
+    t, arguments, declared = trace(model), arguments_of(model), outputs_of(model)
+    places, columns = find(outputs, declared, "output"), find(by, arguments, "parameter, input or state")
+    p, u, x, k = t.symbols
+    rows = casadi.vertcat(*(casadi.SX(t.outputs[place]) for place in places), casadi.SX(0, 1))
+    codes = _first_unmet(list(model.requirements(casadi_(), t.p)))
+    if model.derived:
+        derived = casadi.vertcat(
+            *model.derive(casadi_(), model.parameter_layout.instance(casadi.vertsplit(p)))
+        )
+        rows, codes = casadi.substitute([rows, codes], [k], [derived])
+    point = casadi.vertcat(p, u, x)
+    slopes = [casadi.jtimes(rows, point, _unit_vector(point.numel(), column)) for column in columns]
+    results = [Result(v.name, v.unit, v.description) for v in (declared[place] for place in places)]
+    results += [
+        Result(
+            f"d({declared[place].name})/d({arguments[column].name})",
+            quotient(declared[place].unit, arguments[column].unit),
+            f"derivative of {declared[place].description} by {arguments[column].description}",
+        )
+        for column in columns
+        for place in places
+    ]
+    operations = Operations([p, u, x], [casadi.vertcat(rows, *slopes), codes])
+    return Equations(model, arguments, tuple(results), operations)
+
+
+def _unit_vector(size: int, place: int) -> Any:
+    import casadi
+
+    vector = casadi.DM.zeros(size, 1)
+    vector[place] = 1.0
+    return casadi.SX(vector)
+
+
+def _first_unmet(limits: Sequence[tuple[Any, Any, Any]]) -> Any:
+    """The place of the first requirement that is not met, from 1, or 0; a comparison with NaN is not met."""
+    import casadi
+
+    code, open_still = casadi.SX(0.0), casadi.SX(1.0)
+    for place, (value, low, high) in enumerate(limits, 1):
+        value, low, high = casadi.SX(value), casadi.SX(low), casadi.SX(high)
+        met = casadi.SX(1.0)
+        for smaller, larger in ((low, value), (value, high)):
+            if not (smaller.is_constant() and float(smaller) == -float("inf")) and not (
+                larger.is_constant() and float(larger) == float("inf")
+            ):
+                met = met * (smaller < larger)
+        code = code + place * open_still * (1.0 - met)
+        open_still = open_still * met
+    return code

@@ -1,0 +1,279 @@
+"""Outputs over arrays: xarray in, xarray out, with units."""
+
+from __future__ import annotations
+
+import math
+import os
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..errors import InputError, RunError
+from ..model import Model
+from ..native.operations import ARGUMENT
+from ..quantities import Variable
+from ..units import convert
+from . import arrays
+from .equations import Equations, equations, find, outputs_of
+from .native import Reductions, aligned, native_kernel
+from .reductions import REDUCTIONS
+
+ENGINES = ("native", "numpy", "jax")
+_LEAST_INNER = 64
+"""A last dimension that is shorter is no loop of its own: all dimensions are one loop then."""
+
+
+def evaluate(
+    model: type[Model],
+    values: Mapping[str, Any],
+    outputs: Sequence[str] | None = None,
+    *,
+    by: Sequence[str] = (),
+    over: str | None = None,
+    reduce: Mapping[str, Sequence[str]] | None = None,
+    parameters: Any = None,
+    engine: str = "native",
+    workers: int | None = None,
+) -> xr.Dataset:
+    """Outputs of a model over arrays of parameters, inputs and states.
+
+    Parameters
+    ----------
+    model : the model, such as `ChamberForces`; a model with states takes each state from `values`
+    values : by the name of a parameter, input or state: a number, a DataArray, or an array of one dimension, which
+        becomes the dimension of that name. A DataArray whose ``units`` differ from those of the declaration is
+        converted. Dimensions of the same name belong together; all others are combined.
+    outputs : names of the outputs; by default all
+    by : names of parameters, inputs and states by which each output is differentiated; the derivatives are exact,
+        with the names ``d(tau)/d(r)``
+    over, reduce : the dimension over which outputs are reduced, and by output the names of `REDUCTIONS`; the results
+        have the names ``peak(tau)``. With them, `outputs` and `by` are not given.
+    parameters : an instance of `model.Parameters` with the values of all other parameters
+    engine : "native" (compiled C, SIMD, threads), "numpy" or "jax"; without a C compiler "native" is numpy, with a
+        warning
+    workers : number of threads of the native engine; by default that of the processors
+
+    Returns
+    -------
+    a Dataset with a variable for each output, and ``reason``: 0 for a valid state. Where it is not 0 the results are
+    NaN; its attributes ``flag_values`` and ``reasons`` say why.
+
+    Raises
+    ------
+    InputError
+        for an unknown name, a value that is missing or of a wrong unit, and sizes that do not fit.
+    """
+    if engine not in ENGINES:
+        raise InputError(f"engine {engine!r}: must be one of {', '.join(ENGINES)}")
+    reductions: Reductions = ()
+    if reduce is not None:
+        if over is None or outputs is not None or by:
+            raise InputError("reduce: needs the dimension `over`, and takes the place of `outputs` and `by`")
+        outputs, reductions = list(reduce), _reductions(reduce)
+    names = tuple(outputs if outputs is not None else (v.name for v in outputs_of(model)))
+    own = equations(model, names, tuple(by))
+    grid = Grid(own, values, parameters, over)
+    out, reason = grid.compute(engine, reductions, workers or os.cpu_count() or 1)
+    return grid.dataset(out, reason, reductions)
+
+
+def _reductions(reduce: Mapping[str, Sequence[str]]) -> Reductions:
+    pairs = []
+    for place, (output, names) in enumerate(reduce.items()):
+        for name in names:
+            if name not in REDUCTIONS:
+                raise InputError(f"{output}: no reduction {name!r}; there are {', '.join(REDUCTIONS)}")
+            pairs.append((place, name))
+    return tuple(pairs)
+
+
+class Grid:
+    """The states of a batch: arguments over named dimensions."""
+
+    def __init__(self, own: Equations, values: Mapping[str, Any], parameters: Any, over: str | None) -> None:
+        model = own.model
+        self._equations = own
+        find(list(values), own.arguments, "parameter, input or state")
+        given = {
+            name: _array(own.arguments[find([name], own.arguments, "")[0]], x) for name, x in values.items()
+        }
+        self.sizes: dict[str, int] = {}
+        self._coords: dict[str, Any] = {}
+        for name, x in given.items():
+            for dim, size in x.sizes.items():
+                if self.sizes.setdefault(str(dim), size) != size:
+                    raise InputError(
+                        f"{name}: has {size} values over {dim}, another one has {self.sizes[str(dim)]}"
+                    )
+            self._coords |= {str(k): c for k, c in x.coords.items()}
+        if over is not None and over not in self.sizes:
+            raise InputError(
+                f"over = {over!r}: no such dimension; there are {', '.join(self.sizes) or 'none'}"
+            )
+        self._over = over
+        last = over or max(reversed(self.sizes), key=self.sizes.__getitem__, default=None)
+        self.dims = [d for d in self.sizes if d != last] + ([last] if last else [])
+        self._loops()
+        base = {v.name: v.quantity.start for v in own.arguments}
+        if parameters is not None:
+            base |= model.parameter_layout.by_name(parameters)
+        items = own.operations.items
+        self._needed = {own.arguments[own.place(each.entry)].name for each in items if each.kind == ARGUMENT}
+        self._bounds: list[tuple[str, Any]] = []
+        self._arguments = [self._flat(v, given.get(v.name), base[v.name]) for v in own.arguments]
+
+    def _loops(self) -> None:
+        """Divide the dimensions into outer ones and the inner one, the longest."""
+        last = self.dims[-1] if self.dims else None
+        total = math.prod(self.sizes.values())
+        if last is not None and (self._over or self.sizes[last] >= _LEAST_INNER):
+            self._outer, self._inner = self.dims[:-1], [last]
+        else:
+            self._outer, self._inner = [], self.dims
+        inner = math.prod(self.sizes[d] for d in self._inner)
+        self.size = (total // inner, inner) if inner else (0, 1)
+
+    def _flat(self, variable: Variable, x: xr.DataArray | None, start: float | None) -> Any:
+        """An argument as an array of shape (1 or outer, 1 or inner)."""
+        if x is None:
+            if start is None and variable.name in self._needed:
+                raise InputError(f"{variable.name}: has no value; a state has no start value of its own")
+            return np.full((1, 1), np.nan if start is None else start)
+        q = variable.quantity
+        values = np.asarray(x.values, float)
+        with np.errstate(invalid="ignore"):
+            above = values > q.low if q.open_low else values >= q.low - q.slack
+            outside: Any = ~(np.isfinite(values) & above & (values <= q.high + q.slack))
+            inside = np.where(outside, values, np.clip(values, q.low, q.high))
+        if outside.any():
+            self._bounds.append((variable.name, x.copy(data=outside)))
+        return self._shaped(x.copy(data=inside))
+
+    def _shaped(self, x: xr.DataArray) -> Any:
+        """The values over the outer and the inner dimensions, each flat, or of length 1 where they do not vary."""
+        dims = set(map(str, x.dims))
+        sides = [side if dims & set(side) else [] for side in (self._outer, self._inner)]
+        order = [d for side in sides for d in side]
+        full = x.expand_dims({d: self.sizes[d] for d in order if d not in dims}).transpose(*order)
+        shape = [math.prod(self.sizes[d] for d in side) for side in sides]
+        return np.ascontiguousarray(np.broadcast_to(full.values, full.shape), float).reshape(shape)
+
+    def compute(self, engine: str, reductions: Reductions, workers: int) -> tuple[Any, Any]:
+        """Results, shape (results, outer, inner) or reduced (reductions, outer), and their reasons."""
+        own, (outer, inner) = self._equations, self.size
+        entries = self._entries()
+        if not outer:
+            shape = (0,) if reductions else self.size
+            return np.empty((len(reductions or own.results), *shape)), np.zeros(shape, np.int16)
+        if engine == "native" and (call := self._native(entries, reductions)) is not None:
+            shape = (outer,) if reductions else (outer, inner)
+            out = aligned((len(reductions or own.results), *shape))
+            reason = np.zeros(shape, np.int16)
+            columns = [np.broadcast_to(entries[e], (len(entries[e]), inner)) for e in call.columns]
+            call(
+                [entries[e][:, 0].copy() for e in call.inputs],
+                [np.ascontiguousarray(c) for c in columns],
+                out,
+                reason,
+                self.size,
+                workers,
+            )
+        else:
+            out, reason = np.empty((len(own.results), outer, inner)), np.zeros((outer, inner), np.int16)
+            fill = arrays.by_jax if engine == "jax" else arrays.by_numpy
+            fill(own.operations, entries, out, reason, own.not_finite)
+            if reductions:
+                reason = np.max(reason, axis=1)
+                with np.errstate(invalid="ignore"):
+                    out = np.array([REDUCTIONS[name].of_array(out[place]) for place, name in reductions])
+        self._refuse(out, reason)
+        return out, reason
+
+    def _entries(self) -> dict[tuple[int, int], Any]:
+        sizes = self._equations.sizes
+        entries = [(kind, k) for kind, size in enumerate(sizes) for k in range(size)]
+        return dict(zip(entries, self._arguments, strict=True))
+
+    def _native(self, entries: Mapping[tuple[int, int], Any], reductions: Reductions) -> Any:
+        varying = tuple(entry for entry, x in entries.items() if x.shape[1] > 1)
+        try:
+            kernel = native_kernel(self._equations, varying, reductions)
+        except RunError as error:
+            warnings.warn(f"the native engine is not available, numpy computes: {error}", stacklevel=4)
+            return None
+        if kernel is None:
+            warnings.warn(
+                "no C compiler (cc, gcc, clang, or zig by pip install 'chainunit[cross]') found: numpy computes, "
+                "some twenty times slower",
+                stacklevel=4,
+            )
+        return kernel
+
+    def _refuse(self, out: Any, reason: Any) -> None:
+        """Values outside their bounds come before all other reasons."""
+        for k, (_, outside) in enumerate(self._bounds):
+            bad: Any = np.broadcast_to(self._shaped(outside).astype(bool), self.size)
+            bad = bad.any(axis=1) if reason.ndim == 1 else bad
+            reason[bad] = self._equations.not_finite + 1 + k
+            out[:, bad] = np.nan
+
+    @property
+    def reasons(self) -> list[str]:
+        """The reasons by their number."""
+        model = self._equations.model
+        bounds = {v.name: v.quantity.allowed_range for v in self._equations.arguments}
+        return [
+            "valid",
+            *(f"{each.subject}: {each.why}" for each in model.required),
+            "the machine cannot be assembled in this position, or stands in a dead position",
+            *(f"{name}: must be {bounds[name]}" for name, _ in self._bounds),
+        ]
+
+    def dataset(self, out: Any, reason: Any, reductions: Reductions) -> xr.Dataset:
+        """The results with names, units and coordinates."""
+        results = self._equations.results
+        dims = self.dims[:-1] if reductions else self.dims
+        shape = [self.sizes[d] for d in dims]
+        if reductions:
+            columns = [
+                (
+                    f"{name}({results[k].name})",
+                    results[k].unit,
+                    f"{REDUCTIONS[name].words}, {results[k].description}",
+                )
+                for k, name in reductions
+            ]
+        else:
+            columns = [(r.name, r.unit, r.description) for r in results]
+        variables = {
+            name: (dims, x.reshape(shape), {"units": unit, "long_name": words})
+            for (name, unit, words), x in zip(columns, out, strict=True)
+        }
+        flags: dict[str, Any] = {"flag_values": list(range(len(self.reasons))), "reasons": self.reasons}
+        flags["long_name"] = "reason for which there is no result"
+        variables["reason"] = (dims, reason.reshape(shape), flags)
+        coords = {name: c for name, c in self._coords.items() if set(map(str, c.dims)) <= set(dims)}
+        return xr.Dataset(variables, coords)
+
+
+def _array(variable: Variable, x: Any) -> xr.DataArray:
+    """The values of an argument as a DataArray in the declared unit."""
+    if isinstance(x, xr.DataArray):
+        unit = x.attrs.get("units")
+        if unit is None or unit == variable.unit:
+            return x
+        try:
+            offset = convert(0.0, str(unit), variable.unit, variable.kind)
+            scale = convert(1.0, str(unit), variable.unit, variable.kind) - offset
+        except ValueError as error:
+            raise InputError(f"{variable.name} in {unit}: {error}") from error
+        return x * scale + offset
+    values = np.asarray(x, float)
+    if values.ndim > 1:
+        raise InputError(f"{variable.name}: has {values.ndim} dimensions; give them names, in a DataArray")
+    attributes = {"units": variable.unit, "long_name": variable.description}
+    coords = {variable.name: (variable.name, values, attributes)} if values.ndim else {}
+    return xr.DataArray(values, coords, [variable.name] if values.ndim else [])

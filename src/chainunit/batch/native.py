@@ -1,0 +1,230 @@
+"""Batches in native code: one loop over vectors of lanes, in several threads.
+
+The code is compiled at its first use for the processor of this machine. It may contract a product and a sum to one
+rounding, and takes sines from a vector library; FMUs do neither.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import itertools
+import math
+import os
+import tempfile
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..native.compilers import Compiler, compile_code, compiler, for_this_processor
+from .equations import Equations
+from .reductions import REDUCTIONS
+from .vector_code import VectorCode, header
+
+Reductions = tuple[tuple[int, str], ...]
+"""Places of results, each with the name of its reduction; empty where the results themselves are stored."""
+_PIECES = 4
+"""Number of pieces of the work for each thread."""
+_LANES = 8
+"""Number of numbers in a line of the cache; the pieces of the last dimension are multiples of it."""
+
+_BLOCK = 64
+"""Number of states that are kept in the first cache before they are stored."""
+
+_LOOP = """
+void batch(long o0, long o1, long i0, long i1, long n, const double *const *in, const long *in_step,
+           const double *const *column, const long *column_step, double *out, long out_step, short *reason) {
+  for (long o = o0; o < o1; ++o) {
+    double given[INPUTS + 1], U[ROOM];
+    for (int k = 0; k < INPUTS; ++k) given[k] = in[k][o * in_step[k]];
+    uniform(given, U);
+    REDUCED_BEGIN
+    short worst = 0;
+    /* rows of a batch may lie a power of two apart, where stores of one state push one another out of the cache */
+    double block[RESULTS + 1][BLOCK + W];
+    long begin = i0;
+    for (long i = i0; i < i1; i += W) {
+      const long m = i1 - i < W ? i1 - i : W;
+      v a[COLUMNS + 1], y[RESULTS + 1], one = V(1.0);
+      for (int k = 0; k < COLUMNS; ++k) {
+        const double *c = column[k] + o * column_step[k] + i;
+        if (m == W) a[k] = LOAD(c);
+        else for (int l = 0; l < W; ++l) a[k][l] = c[l < m ? l : m - 1];
+      }
+      if (m < W) for (int l = 0; l < W; ++l) one[l] = l < m;
+      states(U, a, y);
+      v finite = V(0.0);
+      for (int r = 0; r < RESULTS; ++r) finite += y[r] * 0.0;
+      const bits bad = (finite != finite) | (y[RESULTS] != 0.0);
+      if (any(bad)) for (int l = 0; l < m; ++l) if (bad[l]) {
+        const short code = y[RESULTS][l] != 0.0 ? (short)y[RESULTS][l] : NOT_FINITE;
+        worst = code;
+        if (!REDUCED) reason[o * n + i + l] = code;
+        for (int r = 0; r < RESULTS; ++r) y[r][l] = NAN;
+      }
+      TAKE
+    }
+    REDUCED_END
+  }
+}
+"""
+_STORE = """\
+for (int r = 0; r < RESULTS; ++r) STORE(&block[r][i - begin], y[r]);
+      if (i + W >= i1 || i + W - begin >= BLOCK) {
+        const long length = (i + W < i1 ? i + W : i1) - begin;
+        for (int r = 0; r < RESULTS; ++r) copy(out + r * out_step + o * n + begin, block[r], length);
+        begin = i + W;
+      }"""
+
+
+def _source(equations: Equations, code: VectorCode, reductions: Reductions) -> str:
+    """The C source of the loop."""
+    begin, take, end = [], [], []
+    for k, (place, name) in enumerate(reductions):
+        each, words = REDUCTIONS[name], {"a": f"A{k}", "y": f"y[{place}]", "one": "one", "n": "i1-i0"}
+        begin.append(f"v A{k} = {each.begin};")
+        take.append(f"A{k} = {each.take.format(**words)};")
+        end.append(f"out[{k} * out_step + o] = worst ? NAN : {each.end.format(**words)};")
+    if reductions:
+        end.append("reason[o] = worst;")
+    loop = _LOOP.replace("REDUCED_BEGIN", "\n    ".join(begin)).replace("REDUCED_END", "\n    ".join(end))
+    defines = {
+        "INPUTS": len(code.inputs),
+        "COLUMNS": len(code.columns),
+        "RESULTS": len(equations.results),
+        "ROOM": code.room,
+        "REDUCED": int(bool(reductions)),
+        "BLOCK": _BLOCK,
+        "NOT_FINITE": equations.not_finite,
+    }
+    return "\n".join(
+        [
+            header(),
+            *(f"#define {name} {value}" for name, value in defines.items()),
+            code.uniform(),
+            code.body("states", (0, 1)),
+            loop.replace("TAKE", "\n      ".join(take) if reductions else _STORE),
+        ]
+    )
+
+
+class NativeKernel:
+    """The compiled loop of some equations with given varying arguments."""
+
+    def __init__(
+        self,
+        equations: Equations,
+        varying: Sequence[tuple[int, int]],
+        reductions: Reductions,
+        compiler: Compiler,
+    ) -> None:
+        code = VectorCode(equations.operations, varying)
+        self.inputs, self.columns = code.inputs, code.columns
+        self._library = load(_source(equations, code, reductions), compiler)
+
+    def __call__(
+        self,
+        uniform: Sequence[Any],
+        columns: Sequence[Any],
+        out: Any,
+        reason: Any,
+        size: tuple[int, int],
+        workers: int,
+    ) -> None:
+        """Compute all states.
+
+        Parameters
+        ----------
+        uniform : arrays of shape (1,) or (outer,), by `inputs`
+        columns : arrays of shape (1, inner) or (outer, inner), by `columns`
+        out, reason : arrays to be filled, (results, outer, inner) and (outer, inner), or, reduced, without `inner`
+        size : (outer, inner)
+        workers : number of threads
+        """
+        outer, inner = size
+        pointers = [_pointers(arrays) for arrays in (uniform, columns)]
+        steps = [
+            (ctypes.c_long * (len(uniform) + 1))(*(int(len(x) > 1) for x in uniform)),
+            (ctypes.c_long * (len(columns) + 1))(*(inner * int(len(x) > 1) for x in columns)),
+        ]
+
+        def piece(ends: tuple[int, int, int, int]) -> None:
+            self._library.batch(
+                *map(ctypes.c_long, (*ends, inner)),
+                pointers[0],
+                steps[0],
+                pointers[1],
+                steps[1],
+                out.ctypes.data_as(ctypes.c_void_p),
+                ctypes.c_long(out[0].size if len(out) else 0),
+                reason.ctypes.data_as(ctypes.c_void_p),
+            )
+
+        pieces = _pieces(outer, inner, workers, divide=reason.ndim > 1)
+        if workers == 1 or len(pieces) == 1:
+            for each in pieces:
+                piece(each)
+        else:
+            with ThreadPoolExecutor(workers) as pool:
+                list(pool.map(piece, pieces))
+
+
+def aligned(shape: tuple[int, ...]) -> Any:
+    """An array for results that begins at a line of the cache."""
+    size = math.prod(shape)
+    memory = np.empty(size + _LANES)
+    begin = -(memory.ctypes.data // memory.itemsize) % _LANES
+    return memory[begin : begin + size].reshape(shape)
+
+
+def _pointers(arrays: Sequence[Any]) -> Any:
+    return (ctypes.c_void_p * (len(arrays) + 1))(*(x.ctypes.data for x in arrays))
+
+
+def _pieces(outer: int, inner: int, workers: int, divide: bool) -> list[tuple[int, int, int, int]]:
+    """Ranges of both dimensions; the inner one is divided only where there are too few outer ones."""
+    count = 1 if workers == 1 else _PIECES * workers
+    if outer >= count or not divide:
+        cuts = [outer * k // count for k in range(count + 1)]
+        return [(a, b, 0, inner) for a, b in itertools.pairwise(cuts) if a < b]
+    length = max(_LANES, -(-inner * outer // count) // _LANES * _LANES)
+    return [(o, o + 1, a, min(a + length, inner)) for o in range(outer) for a in range(0, inner, length)]
+
+
+def load(source: str, compiler: Compiler) -> ctypes.CDLL:
+    """The compiled library of a C source.
+
+    Raises
+    ------
+    RunError
+        where the compiler fails.
+    """
+    flags, libraries, files = for_this_processor(compiler)
+    arguments = (*flags, "batch.c", "-o", "batch.so", *libraries)
+    binary = compile_code(compiler, arguments, {"batch.c": source.encode(), **files}, "batch.so")
+    handle, name = tempfile.mkstemp(suffix=".so", prefix="chainunit_")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(binary)
+        return ctypes.CDLL(name)
+    finally:
+        if os.name == "posix":  # a loaded library stays usable
+            Path(name).unlink()
+
+
+@lru_cache(maxsize=64)
+def native_kernel(
+    equations: Equations, varying: tuple[tuple[int, int], ...], reductions: Reductions
+) -> NativeKernel | None:
+    """The loop, compiled at the first call; None without a C compiler.
+
+    Raises
+    ------
+    RunError
+        where the compiler fails.
+    """
+    own = compiler()
+    return None if own is None else NativeKernel(equations, varying, reductions, own)

@@ -1,0 +1,142 @@
+"""C code of operations over vectors of lanes.
+
+The operations are divided by level: those that follow from uniform arguments alone are computed once, as numbers,
+and are kept in ``U``; the others are computed for each vector of lanes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from importlib import resources
+
+from ..native.code import forms, number
+from ..native.operations import ARGUMENT, NUMBER, Operation, Operations
+
+_ARITHMETIC = {"ADD", "SUB", "MUL", "DIV", "SQ", "TWICE", "INV", "NEG", "ASSIGN"}
+"""Operations that C has for vectors, or for a vector and a number; all others are functions of vectors."""
+_NAMES = {"CONSTPOW": "pow"}
+
+
+def header() -> str:
+    """The vectors and their operations."""
+    return (resources.files(__package__) / "lanes.h").read_text("utf-8")
+
+
+class VectorCode:
+    """Code of `operations` in which the arguments `varying` are vectors and all others are uniform.
+
+    `inputs` are the entries of the uniform arguments that are used, and `columns` those of the varying ones, in the
+    order in which the code takes them.
+    """
+
+    def __init__(self, operations: Operations, varying: Sequence[tuple[int, int]]) -> None:
+        operations = _uniform_divisors(operations, _varies(operations.items, varying))
+        self._items, self._results = operations.items, operations.results
+        self._varies = _varies(self._items, varying)
+        self._forms = forms()
+        entries = [each.entry for each in self._items if each.kind == ARGUMENT]
+        self.columns = [entry for entry in varying if entry in entries]
+        self.inputs = [entry for entry in entries if entry not in self.columns]
+
+    @cached_property
+    def _slots(self) -> dict[int, int]:
+        """By place of a uniform value that lanes or results need, its place in ``U``."""
+        needed = {k for k, each in enumerate(self._items) if self._varies[k] for k in each.operands}
+        needed |= {place for group in self._results for place in group}
+        slots = [k for k in sorted(needed) if not self._varies[k] and self._items[k].kind != NUMBER]
+        return {place: slot for slot, place in enumerate(slots)}
+
+    @property
+    def room(self) -> int:
+        """Length of ``U``."""
+        return max(1, len(self._slots))
+
+    def varies(self, group: int) -> bool:
+        """Whether a result of the group varies over the lanes."""
+        return any(self._varies[place] for place in self._results[group])
+
+    def _needed(self, places: set[int]) -> list[int]:
+        """The places of all operations on which these depend, and they themselves, in order."""
+        open_places, needed = list(places), set()
+        while open_places:
+            place = open_places.pop()
+            if place not in needed:
+                needed.add(place)
+                open_places.extend(self._items[place].operands)
+        return sorted(needed)
+
+    def uniform(self) -> str:
+        """The function ``uniform(in, U)`` from the uniform arguments, in the order of `inputs`."""
+        lines = ["static void uniform(const double *in, double *U) {"]
+        places = {entry: k for k, entry in enumerate(self.inputs)}
+        for k in self._needed(set(self._slots)):
+            each = self._items[k]
+            if each.kind == ARGUMENT:
+                lines.append(f"  const double a{k}=in[{places[each.entry]}];")
+            elif each.kind != NUMBER:
+                lines.append(f"  const double a{k}={self._text(k, vectors=False)};")
+        lines += [f"  U[{slot}]=a{k};" for k, slot in self._slots.items()]
+        return "\n".join([*lines, "  (void)in,(void)U;", "}", ""])
+
+    def body(self, name: str, groups: Sequence[int]) -> str:
+        """The function ``name(U, a, y)`` from the vectors ``a`` of the varying arguments, in the order of `columns`;
+        ``y`` are the results of these groups one after the other."""
+        results = [place for group in groups for place in self._results[group]]
+        columns = {entry: k for k, entry in enumerate(self.columns)}
+        lines = [
+            f"static inline void {name}(const double *restrict U, const v *restrict a, v *restrict y) {{"
+        ]
+        for k in self._needed({place for place in results if self._varies[place]}):
+            each = self._items[k]
+            if not self._varies[k]:
+                continue
+            if each.kind == ARGUMENT:
+                lines.append(f"  const v a{k}=a[{columns[each.entry]}];")
+            else:
+                lines.append(f"  const v a{k}={self._text(k, vectors=True)};")
+        lines += [f"  y[{n}]={self._vector(place)};" for n, place in enumerate(results)]
+        return "\n".join([*lines, "  (void)U,(void)a,(void)y;", "}", ""])
+
+    def _value(self, place: int, vectors: bool) -> str:
+        each = self._items[place]
+        if each.kind == NUMBER:
+            return number(each.value)
+        if vectors and not self._varies[place]:
+            return f"U[{self._slots[place]}]"
+        return f"a{place}"
+
+    def _vector(self, place: int) -> str:
+        text = self._value(place, vectors=True)
+        return text if self._varies[place] else f"V({text})"
+
+    def _text(self, place: int, vectors: bool) -> str:
+        each = self._items[place]
+        if not vectors or each.kind in _ARITHMETIC:
+            return self._forms[each.kind].format(*(self._value(k, vectors) for k in each.operands))
+        name = _NAMES.get(each.kind, each.kind.lower())
+        return f"{name}_v({','.join(self._vector(k) for k in each.operands)})"
+
+
+def _varies(items: Sequence[Operation], varying: Sequence[tuple[int, int]]) -> list[bool]:
+    """Whether each operation depends on an argument that varies."""
+    varies: list[bool] = []
+    for each in items:
+        varies.append(
+            (each.kind == ARGUMENT and each.entry in varying) or any(varies[k] for k in each.operands)
+        )
+    return varies
+
+
+def _uniform_divisors(operations: Operations, varies: Sequence[bool]) -> Operations:
+    """The same results with products in place of divisions by a uniform number, whose inverse is computed once: a
+    division takes as long as some ten products. A result changes by a unit in the last place."""
+    items = list(operations.items)
+    inverses: dict[int, int] = {}
+    for k, each in enumerate(operations.items):
+        if each.kind == "DIV" and varies[k] and not varies[divisor := each.operands[1]]:
+            if divisor not in inverses:
+                inverses[divisor] = len(items)
+                items.append(Operation("INV", (divisor,)))
+            items[k] = Operation("MUL", (each.operands[0], inverses[divisor]))
+    return operations.rearranged(items)
