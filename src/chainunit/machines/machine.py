@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-import xarray as xr
 
 from ..engines import numpy_
 from ..errors import InputError
 from ..mechanism.machine import MachineState, Mechanism
 from ..mechanism.models import InverseMachine
 from ..quantities import Variable, complaint
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _XP = numpy_()
 
