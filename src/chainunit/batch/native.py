@@ -22,7 +22,7 @@ import numpy as np
 from ..native.compilers import Compiler, compile_code, compiler, for_this_processor
 from .equations import Equations
 from .reductions import REDUCTIONS
-from .vector_code import VectorCode, header
+from .vector_code import VectorCode, c_file
 
 Reductions = tuple[tuple[int, str], ...]
 """Places of results, each with the name of its reduction; empty where the results themselves are stored."""
@@ -33,51 +33,6 @@ _LANES = 8
 
 _BLOCK = 64
 """Number of states that are kept in the first cache before they are stored."""
-
-_LOOP = """
-void batch(long o0, long o1, long i0, long i1, long n, const double *const *in, const long *in_step,
-           const double *const *column, const long *column_step, double *out, long out_step, short *reason) {
-  for (long o = o0; o < o1; ++o) {
-    double given[INPUTS + 1], U[ROOM];
-    for (int k = 0; k < INPUTS; ++k) given[k] = in[k][o * in_step[k]];
-    uniform(given, U);
-    REDUCED_BEGIN
-    short worst = 0;
-    /* rows of a batch may lie a power of two apart, where stores of one state push one another out of the cache */
-    double block[RESULTS + 1][BLOCK + W];
-    long begin = i0;
-    for (long i = i0; i < i1; i += W) {
-      const long m = i1 - i < W ? i1 - i : W;
-      v a[COLUMNS + 1], y[RESULTS + 1], one = V(1.0);
-      for (int k = 0; k < COLUMNS; ++k) {
-        const double *c = column[k] + o * column_step[k] + i;
-        if (m == W) a[k] = LOAD(c);
-        else for (int l = 0; l < W; ++l) a[k][l] = c[l < m ? l : m - 1];
-      }
-      if (m < W) for (int l = 0; l < W; ++l) one[l] = l < m;
-      states(U, a, y);
-      v finite = V(0.0);
-      for (int r = 0; r < RESULTS; ++r) finite += y[r] * 0.0;
-      const bits bad = (finite != finite) | (y[RESULTS] != 0.0);
-      if (any(bad)) for (int l = 0; l < m; ++l) if (bad[l]) {
-        const short code = y[RESULTS][l] != 0.0 ? (short)y[RESULTS][l] : NOT_FINITE;
-        worst = code;
-        if (!REDUCED) reason[o * n + i + l] = code;
-        for (int r = 0; r < RESULTS; ++r) y[r][l] = NAN;
-      }
-      TAKE
-    }
-    REDUCED_END
-  }
-}
-"""
-_STORE = """\
-for (int r = 0; r < RESULTS; ++r) STORE(&block[r][i - begin], y[r]);
-      if (i + W >= i1 || i + W - begin >= BLOCK) {
-        const long length = (i + W < i1 ? i + W : i1) - begin;
-        for (int r = 0; r < RESULTS; ++r) copy(out + r * out_step + o * n + begin, block[r], length);
-        begin = i + W;
-      }"""
 
 
 def _source(equations: Equations, code: VectorCode, reductions: Reductions) -> str:
@@ -90,7 +45,6 @@ def _source(equations: Equations, code: VectorCode, reductions: Reductions) -> s
         end.append(f"out[{k} * out_step + o] = worst ? NAN : {each.end.format(**words)};")
     if reductions:
         end.append("reason[o] = worst;")
-    loop = _LOOP.replace("REDUCED_BEGIN", "\n    ".join(begin)).replace("REDUCED_END", "\n    ".join(end))
     defines = {
         "INPUTS": len(code.inputs),
         "COLUMNS": len(code.columns),
@@ -99,14 +53,17 @@ def _source(equations: Equations, code: VectorCode, reductions: Reductions) -> s
         "REDUCED": int(bool(reductions)),
         "BLOCK": _BLOCK,
         "NOT_FINITE": equations.not_finite,
+        "BEGIN": " ".join(begin),
+        "TAKE": " ".join(take),
+        "END": " ".join(end),
     }
     return "\n".join(
         [
-            header(),
+            c_file("lanes.h"),
             *(f"#define {name} {value}" for name, value in defines.items()),
             code.uniform(),
             code.body("states", (0, 1)),
-            loop.replace("TAKE", "\n      ".join(take) if reductions else _STORE),
+            c_file("states.h"),
         ]
     )
 

@@ -18,9 +18,9 @@ _ARITHMETIC = {"ADD", "SUB", "MUL", "DIV", "SQ", "TWICE", "INV", "NEG", "ASSIGN"
 _NAMES = {"CONSTPOW": "pow"}
 
 
-def header() -> str:
-    """The vectors and their operations."""
-    return (resources.files(__package__) / "lanes.h").read_text("utf-8")
+def c_file(name: str) -> str:
+    """The text of a C file of this package."""
+    return (resources.files(__package__) / name).read_text("utf-8")
 
 
 class VectorCode:

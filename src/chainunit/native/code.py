@@ -47,6 +47,16 @@ def number(x: float) -> str:
     return f"(-{text})" if math.copysign(1.0, x) < 0.0 else text
 
 
+def constant(name: str, value: Any) -> str:
+    """The definition of a number, an array, or an array of rows, where zeros fill up the shorter rows."""
+    if not isinstance(value, tuple):
+        return f"#define {name} {number(value)}"
+    if not isinstance(value[0], tuple):
+        return f"static const double {name}[{len(value)}] = {{{', '.join(map(number, value))}}};"
+    rows = ",\n".join(f"    {{{', '.join(map(number, row)) or '0.0'}}}" for row in value)
+    return f"static const double {name}[{len(value)}][{max(map(len, value))}] = {{\n{rows},\n}};"
+
+
 class Program:
     """Groups of results of the same arguments.
 

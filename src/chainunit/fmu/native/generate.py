@@ -14,7 +14,7 @@ from typing import Any
 from ... import integrate, refusals
 from ...engines import casadi_
 from ...integrate import MAX_STEPS
-from ...native.code import Program, number
+from ...native.code import Program, constant, number
 from ...quantities import Variable
 from .. import recipe
 from ..description import Interface
@@ -142,10 +142,8 @@ def rules() -> str:
     for name, value in (*_capitals(refusals), *_capitals(integrate)):
         if isinstance(value, str):
             lines.append(f"#define {name} {_text(_printf(value))}")
-        elif isinstance(value, tuple):
-            lines.append(_numbers(name, value))
         else:
-            lines.append(f"#define {name} {number(value)}")
+            lines.append(constant(name, value))
     return "\n".join(lines) + "\n"
 
 
@@ -157,14 +155,6 @@ def _printf(text: str) -> str:
     kinds = {"": "%s", "g": "%g", "d": "%u"}
     pieces = Formatter().parse(text)
     return "".join(x.replace("%", "%%") + (kinds[kind or ""] if name else "") for x, name, kind, _ in pieces)
-
-
-def _numbers(name: str, values: tuple[Any, ...]) -> str:
-    """An array of numbers, or an array of rows, where zeros fill up the shorter rows."""
-    if not isinstance(values[0], tuple):
-        return f"static const double {name}[{len(values)}] = {{{', '.join(map(number, values))}}};"
-    rows = ",\n".join(f"    {{{', '.join(map(number, row)) or '0.0'}}}" for row in values)
-    return f"static const double {name}[{len(values)}][{max(map(len, values))}] = {{\n{rows},\n}};"
 
 
 def tables(interface: Interface, guid: str, room: int) -> str:

@@ -1,0 +1,294 @@
+"""Transients of a model in blocks: many runs side by side, in one native loop without Python between the steps.
+
+Runs differ in parameters, states at the start, signals, and end. Each is integrated by the method of the model's FMU,
+with equal steps or with error control of its own (`chainunit.integrate`), and its signals are evaluated at every
+stage.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import os
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from .. import integrate
+from ..engines import MATH, casadi_
+from ..errors import InputError
+from ..model import Model
+from ..native.code import constant
+from ..native.compilers import Compiler, compiler
+from ..native.operations import Operations
+from ..quantities import Variable
+from ..trace import trace
+from .equations import arguments_of, find, outputs_of
+from .native import load
+from .vector_code import VectorCode, c_file
+
+_NUMBERS = (
+    "RK4_NODES RK4_WEIGHTS NODES STAGES ERRORS SHORTEST FIRST SAFETY ERROR_POWER LEAST_GROWTH MOST_GROWTH NO_ERROR"
+).split()
+"""The numbers of `chainunit.integrate` that the loops need."""
+_LANES = 8
+"""The number of runs is filled up to a multiple of it, a multiple of the lanes of every vector."""
+
+
+def profile_rows(signal: Any, changes: int) -> list[float]:
+    """A number or a `chainunit.system.signals.Profile` as `Transients.run` takes it: the value before, and so many
+    changes with begin [s], duration [s] and value after it.
+
+    Raises
+    ------
+    ValueError
+        for a profile with more changes.
+    """
+    own = getattr(signal, "changes", ())
+    if len(own) > changes:
+        raise ValueError(f"a profile with {len(own)} changes, where {changes} are the most")
+    rows = [float(getattr(signal, "start", signal)), *(float(x) for change in own for x in change)]
+    while len(rows) < 1 + 3 * changes:
+        rows += [math.inf, 1.0, rows[-1]]
+    return rows
+
+
+@dataclass(frozen=True)
+class Runs:
+    """The results of a block of runs.
+
+    `rows` has the shape (outputs, runs, rows); a run has `count` rows, shape (runs,), behind which the values have no
+    meaning. Where `failed`, shape (runs,), the last of them is not finite. `states` are those at the end, shape
+    (states, runs), and `times` the times of the rows [s], shape (runs, rows).
+    """
+
+    rows: Any
+    count: Any
+    failed: Any
+    states: Any
+    times: Any
+
+
+class Transients:
+    """The compiled loop of a model.
+
+    Parameters
+    ----------
+    model : a model with states, such as a compiled system
+    outputs : names of the outputs and states to keep
+    varying : names of the parameters that differ between runs
+    driven : names of the inputs with signals or with values that differ between runs
+    guarded : those of the outputs that may end a run by a limit of their size
+
+    Raises
+    ------
+    InputError
+        for an unknown name, a model without states, and where there is no C compiler.
+    """
+
+    def __init__(
+        self,
+        model: type[Model],
+        outputs: Sequence[str],
+        *,
+        varying: Sequence[str] = (),
+        driven: Sequence[str] = (),
+        guarded: Sequence[str] = (),
+        changes: int = 0,
+    ) -> None:
+        if model.state_layout is None:
+            raise InputError(f"{model.name}: has no states, and so no transients")
+        self.model, self.outputs = model, tuple(outputs)
+        self._varying, self._driven, self._guarded = tuple(varying), tuple(driven), tuple(guarded)
+        self._changes = changes
+        own = compiler()
+        if own is None:
+            raise InputError("no C compiler (cc, gcc, clang, or zig by pip install 'chainunit[cross]') found")
+        self._library, self._inputs = _compiled(
+            model, self.outputs, self._varying, self._driven, self._guarded, changes, own
+        )
+
+    def run(
+        self,
+        parameters: Any,
+        inputs: Mapping[str, float],
+        states: Any,
+        *,
+        begin: float,
+        step: float,
+        stop: Any,
+        varying: Any = None,
+        signals: Any = None,
+        limits: Any = None,
+        longest: float | None = None,
+        workers: int = 1,
+    ) -> Runs:
+        """Simulate a block of runs.
+
+        Parameters
+        ----------
+        parameters : an instance of the model's declaration, for all that do not vary
+        inputs : values of the inputs by name; all others have their start values
+        states : at the begin, shape (states,) or (states, runs)
+        begin, step : [s]
+        stop : end of each run [s], shape (runs,)
+        varying : values of the parameters that differ, shape (parameters, runs)
+        signals : of the driven inputs, shape (inputs, 1 + 3*changes, runs): the value before, and for each change its
+            begin [s], its duration [s] and the value after it; see `chainunit.system.signals.Profile`
+        limits : of the guarded outputs, shape (guarded, runs): a run ends with the row beyond its limit
+        longest : longest step of the integrator [s]; by default that of the model
+        workers : number of threads
+        """
+        stop = np.atleast_1d(np.asarray(stop, float))
+        runs = len(stop)
+        room = -(-runs // _LANES) * _LANES
+        rows = 1 + max(0, math.ceil((float(np.max(stop)) - begin) / step - 1e-9))
+        n_x = len(np.atleast_1d(states))
+
+        def filled(x: Any, *shape: int) -> Any:
+            """The values of all runs, filled up by those of the last run."""
+            full = np.broadcast_to(np.asarray(x, float), (*shape, runs))
+            return np.ascontiguousarray(
+                np.concatenate([full, np.repeat(full[..., -1:], room - runs, -1)], -1)
+            )
+
+        x = np.asarray(states, float)
+        x = filled(x if x.ndim == 2 else x[:, None], n_x)
+        ends = filled(stop)
+        n_s = 1 + 3 * self._changes
+        arrays = [
+            filled(np.zeros(runs) if varying is None else varying, len(self._varying)),
+            filled(np.zeros(runs) if signals is None else signals, len(self._driven), n_s),
+            ends,
+            filled(np.inf if limits is None else limits, len(self._guarded)),
+        ]
+        uniform = self._uniform(parameters, inputs)
+        out = np.empty((len(self.outputs), room, rows))
+        count = np.zeros(room, np.int64)
+        p, model = self.model.prepared(MATH, parameters), self.model
+        numbers = [
+            begin,
+            step,
+            longest or float(model.internal_step(MATH, p)),
+            float(model.tolerance(MATH, p)) if model.controlled else 0.0,
+            model.parameter_layout.by_name(parameters)[integrate.MAX_STEPS],
+        ]
+
+        def piece(ends_of: tuple[int, int]) -> None:
+            self._library.transients(
+                *map(ctypes.c_long, (*ends_of, room, rows)),
+                *map(ctypes.c_double, numbers),
+                *(ctypes.c_void_p(array.ctypes.data) for array in (uniform, *arrays, x, out, count)),
+            )
+
+        pieces = [(r, r + _LANES) for r in range(0, room, _LANES)]
+        if workers == 1:
+            piece((0, room))
+        else:
+            with ThreadPoolExecutor(min(workers, os.cpu_count() or 1)) as pool:
+                list(pool.map(piece, pieces))
+        times = np.minimum(begin + step * np.arange(rows), stop[:, None])
+        count = count[:runs]
+        return Runs(out[:, :runs], np.abs(count), count < 0, x[:, :runs], times)
+
+    def _uniform(self, parameters: Any, inputs: Mapping[str, float]) -> Any:
+        """The uniform arguments in the order of the code."""
+        model = self.model
+        own = {v.name: v.quantity.start for v in arguments_of(model)}
+        own |= model.parameter_layout.by_name(parameters) | dict(inputs)
+        return np.array([own[name] for name in self._inputs] or [0.0], float)
+
+
+@lru_cache(maxsize=32)
+def _compiled(
+    model: type[Model],
+    outputs: tuple[str, ...],
+    varying: tuple[str, ...],
+    driven: tuple[str, ...],
+    guarded: tuple[str, ...],
+    changes: int,
+    own: Compiler,
+) -> tuple[ctypes.CDLL, list[str]]:
+    """The library of the loop, and the names of its uniform arguments."""
+    operations = _operations(model, outputs)
+    assert model.state_layout is not None
+    states = model.state_layout.variables
+    entries = [
+        *((0, k) for k in find(varying, model.parameter_layout.variables, "parameter")),
+        *((1, k) for k in find(driven, model.input_layout.variables, "input")),
+        *((2, k) for k in range(len(states))),
+    ]
+    find(guarded, [_named(name) for name in outputs], "output that is kept")
+    code = VectorCode(operations, entries)
+    sizes = len(model.parameter_layout.names), len(model.input_layout.names)
+    places = {entry: k for k, entry in enumerate(entries)}
+    put = []
+    for column, entry in enumerate(code.columns):
+        k = places[entry]
+        if k < len(varying):
+            put.append(f"a[{column}] = b->given[{k}];")
+        elif k < len(varying) + len(driven):
+            offset = (k - len(varying)) * (1 + 3 * changes)
+            put.append(f"a[{column}] = signal_at(b->signal + {offset} * b->runs, b->runs, t);")
+        else:
+            put.append(f"a[{column}] = x[{entry[1]}];")
+    guards = [
+        f"if (fabs(y[{outputs.index(name)}][l]) > limit[{k} * runs + r + l]) ends = 1;"
+        for k, name in enumerate(guarded)
+    ]
+    defines = {
+        "STATES": len(states),
+        "ROWS": len(outputs),
+        "PARAMS": len(varying),
+        "COLUMNS": len(code.columns),
+        "ROOM": code.room,
+        "CHANGES": changes,
+        "CONTROLLED": int(model.controlled),
+        "PUT": " ".join(put),
+        "GUARDED": " ".join(guards),
+    }
+    constants = {name: value for name, value in vars(integrate).items() if name in _NUMBERS}
+    constants["NOMINAL"] = tuple(v.quantity.nominal or 1.0 for v in states)
+    source = "\n".join(
+        [
+            c_file("lanes.h"),
+            *(f"#define {name} {value}" for name, value in defines.items()),
+            *(constant(name, value) for name, value in constants.items()),
+            code.uniform(),
+            code.body("rates", (0,)),
+            code.body("results", (1,)),
+            code.body("closed", (2,)) if model.controlled else "",
+            c_file("transients.h"),
+        ]
+    )
+    names = [v.name for v in arguments_of(model)]
+    starts = (0, sizes[0], sum(sizes))
+    return load(source, own), [names[starts[kind] + k] for kind, k in code.inputs]
+
+
+def _named(name: str) -> Variable:
+    return Variable(name, "", None)  # type: ignore[arg-type]
+
+
+def _operations(model: type[Model], outputs: Sequence[str]) -> Operations:
+    """Three groups: the derivatives of the states, these outputs and states, and the states that meet the constraints
+    of a model with error control."""
+    import casadi
+
+    t = trace(model)
+    assert model.state_layout is not None
+    declared = (*model.state_layout.variables, *outputs_of(model))
+    values = [*casadi.vertsplit(t.symbols[2]), *t.outputs]
+    rows = casadi.vertcat(*(casadi.SX(values[k]) for k in find(outputs, declared, "output")), casadi.SX(0, 1))
+    rates = casadi.vertcat(*(casadi.SX(rate) for rate in t.derivatives))
+    closed = model.closed(casadi_(), t.p, t.u, t.x) if model.controlled else []
+    met = casadi.vertcat(*(casadi.SX(x) for x in closed), casadi.SX(0, 1))
+    if model.derived:
+        p = model.parameter_layout.instance(casadi.vertsplit(t.symbols[0]))
+        derived = casadi.vertcat(*model.derive(casadi_(), p))
+        rates, rows, met = casadi.substitute([rates, rows, met], [t.symbols[3]], [derived])
+    return Operations(t.symbols[:3], [rates, rows, met])

@@ -1,0 +1,170 @@
+"""Blocks of transients in compiled code: against the monolithic solution, and each run as if it were alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from chainunit import InputError
+from chainunit.batch.transients import Transients, profile_rows
+from chainunit.drives.dc_motor import DcMotor
+from chainunit.engines import MATH
+from chainunit.machines.chain_unit import ChamberForces
+from chainunit.native.compilers import compiler
+from chainunit.study.config import parse
+from chainunit.study.drive import Drive
+from chainunit.system import Profile, compiled, monolithic
+
+pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
+KEPT = ["motor.tau", "motor.air_gap_tau", "machine.rocker.tau", "motor.w", "motor.phi"]
+DRIVEN = ["motor.w_ref", "machine.left.processing_force"]
+STEP, STOP = 1e-3, 1.2
+
+
+def drive_of(text=""):
+    config = parse(text)
+    return Drive(DcMotor, config.motor, config.machine, chain=config.chain), config
+
+
+def events(drive, force, at=0.7):
+    """A start, and a lump that jams the left side."""
+    ramp = Profile(0.0, ((0.0, 0.6, 3.0 * drive.ratio),))
+    return {DRIVEN[0]: ramp, DRIVEN[1]: Profile(10.0, ((at, 0.02, force), (at + 0.2, 0.02, 10.0)))}
+
+
+class Rig:
+    """The drive as a compiled model, and its loop."""
+
+    def __init__(self, text="", **options):
+        self.drive, config = drive_of(text)
+        component = compiled(self.drive.graph)
+        self.model, self.p = component.model, component.parameters
+        self.loads = self.drive.loads(config.feed)
+        inputs = self.model.input_layout.from_names(self.loads)
+        self.start = self.model.state_layout.values(self.model.begin(self.model.check(self.p), inputs))
+        self.loop = Transients(self.model, KEPT, driven=DRIVEN, changes=2, **options)
+
+    def run(self, signals, stop=STOP, **options):
+        """The runs of a list of signals by input."""
+        table = [[profile_rows(each[name], 2) for each in signals] for name in DRIVEN]
+        stops = np.broadcast_to(stop, len(signals))
+        options = {"states": self.start, "begin": 0.0, "step": STEP, "stop": stops, **options}
+        states = options.pop("states")
+        return self.loop.run(self.p, self.loads, states, signals=np.moveaxis(table, 1, -1), **options)
+
+
+@pytest.fixture(scope="module")
+def rig():
+    return Rig(guarded=["motor.tau"])
+
+
+def test_a_run_is_the_monolithic_solution(rig):
+    signals = events(rig.drive, 1500.0)
+    result = rig.run([signals])
+    reference = monolithic(rig.drive.graph, {**rig.loads, **signals}, result.times[0])
+    assert result.count[0] == 1201 and not result.failed.any()
+    for k, name in enumerate(KEPT):
+        wanted = reference[name].values
+        assert np.max(np.abs(result.rows[k, 0] - wanted)) < 1e-7 * np.max(np.abs(wanted)), name
+
+
+def test_chains_are_the_monolithic_solution_to_their_tolerance():
+    rig = Rig('organ = "chain"\n[chain]\nrods = 4\n')
+    signals = events(rig.drive, 200.0)
+    result = rig.run([signals, events(rig.drive, 300.0)], stop=0.8)
+    times = result.times[0]
+    reference = monolithic(rig.drive.graph, {**rig.loads, **signals}, times, rtol=1e-9)
+    assert rig.model.controlled and not result.failed.any()
+    for k, name in enumerate(KEPT):
+        wanted = reference[name].values
+        assert np.max(np.abs(result.rows[k, 0] - wanted)) < 2e-6 * np.max(np.abs(wanted)), name
+    # error control of a lane does not depend on its neighbours
+    alone = rig.run([events(rig.drive, 300.0)], stop=0.8)
+    np.testing.assert_array_equal(alone.rows[:, 0], result.rows[:, 1])
+
+
+def test_runs_do_not_know_one_another(rig):
+    """Different events and ends, in one block and alone, in one thread or two: the same bits."""
+    many = [events(rig.drive, force, at) for force, at in ((0.0, 0.2), (1500.0, 0.3), (2500.0, 0.5))] * 4
+    stop = np.linspace(0.4, 1.0, len(many)) + 0.0004
+    block = rig.run(many, stop=stop)
+    threads = rig.run(many, stop=stop, workers=2)
+    for k in range(len(many)):
+        alone = rig.run([many[k]], stop=stop[k])
+        n = int(block.count[k])
+        assert n == alone.count[0] == threads.count[k] == int(np.ceil(stop[k] / STEP)) + 1
+        assert block.times[k, n - 1] == stop[k]  # the last step is shorter
+        np.testing.assert_array_equal(block.rows[:, k, :n], alone.rows[:, 0])
+        np.testing.assert_array_equal(threads.rows[:, k, :n], alone.rows[:, 0])
+
+
+def test_a_run_goes_on_from_its_states(rig):
+    signals = [events(rig.drive, 1500.0), events(rig.drive, 500.0)]
+    whole = rig.run(signals)
+    first = rig.run(signals, stop=0.75)
+    rest = rig.run(signals, states=first.states, begin=0.75)
+    np.testing.assert_allclose(rest.rows, whole.rows[:, :, 750:], rtol=1e-12, atol=1e-12)
+
+
+def test_a_guard_ends_one_run_alone(rig):
+    signals = [events(rig.drive, force) for force in (0.0, 3000.0)]
+    free = rig.run(signals)
+    limit = 0.9 * np.max(np.abs(free.rows[0, 1]))
+    ended = rig.run(signals, limits=np.full((1, 2), limit))
+    beyond = np.flatnonzero(np.abs(free.rows[0, 1]) > limit)
+    assert ended.count.tolist() == [1201, beyond[0] + 1] and not ended.failed.any()
+    n = int(ended.count[1])
+    np.testing.assert_array_equal(ended.rows[:, 1, :n], free.rows[:, 1, :n])
+    np.testing.assert_array_equal(ended.rows[:, 0], free.rows[:, 0])
+
+
+def test_parameters_may_differ_between_runs(rig):
+    names = ["machine.crank.m", "motor.armature.R"]
+    model, signals = rig.model, events(rig.drive, 1000.0)
+    loop = Transients(model, KEPT, varying=names, driven=DRIVEN, changes=2)
+    table = np.repeat([[profile_rows(signals[name], 2)] for name in DRIVEN], 2, axis=1)
+    varying = np.array([[40.0, 80.0], [9.5, 7.0]])
+    options = {"begin": 0.0, "step": STEP, "stop": np.full(2, 1.0)}
+    both = loop.run(
+        rig.p, rig.loads, rig.start, varying=varying, signals=np.moveaxis(table, 1, -1), **options
+    )
+    for k in range(2):
+        p = model.parameter_layout.from_names(dict(zip(names, varying[:, k], strict=True)), rig.p)
+        one = rig.loop.run(
+            p, rig.loads, rig.start, signals=np.moveaxis(table, 1, -1)[..., :1],
+            **{**options, "stop": np.ones(1)},
+        )  # fmt: skip
+        np.testing.assert_allclose(both.rows[:, k], one.rows[:, 0], rtol=1e-10, atol=1e-9)
+    assert np.max(np.abs(both.rows[0, 0] - both.rows[0, 1])) > 0.01
+
+
+def test_states_that_leave_all_bounds_fail_alone(rig):
+    wild = np.repeat(np.array(rig.start, float)[:, None], 2, axis=1)
+    wild[rig.model.state_layout.names.index("motor.w"), 1] = 1e200
+    result = rig.run([events(rig.drive, 0.0)] * 2, states=wild, stop=0.1)
+    assert result.failed.tolist() == [False, True] and result.count[0] == 101 and result.count[1] < 3
+    assert np.isfinite(result.rows[:, 0]).all()
+
+
+def test_the_profile_is_that_of_the_signals(rig):
+    """The rows of a profile give its values: a motor without load follows nothing else."""
+    profile = Profile(1.0, ((0.1, 0.2, 3.0), (0.5, 0.1, -2.0)))
+    before, *changes = profile_rows(profile, 3)
+    assert len(changes) == 9 and changes[-1] == -2.0
+    t = np.linspace(0.0, 1.0, 101)
+    value, last = before, before
+    for begin, duration, after in np.reshape(changes, (3, 3)):
+        s = np.clip((t - begin) / duration, 0.0, 1.0)
+        value, last = value + (after - last) * s**3 * (10.0 + s * (6.0 * s - 15.0)), after
+    np.testing.assert_allclose(value, profile(t), rtol=1e-14)
+    assert profile_rows(7.0, 1) == [7.0, np.inf, 1.0, 7.0]
+    with pytest.raises(ValueError, match="3 changes"):
+        profile_rows(Profile(0.0, ((0.0, 1.0, 1.0), (1.0, 1.0, 2.0), (2.0, 1.0, 0.0))), 2)
+
+
+def test_wrong_requests_are_refused(rig):
+    with pytest.raises(InputError, match="has no states"):
+        Transients(ChamberForces, ["tau"])
+    with pytest.raises(InputError, match=r"motor\.tua: no such output.*motor\.tau"):
+        Transients(rig.model, ["motor.tua"])
+    assert rig.model.internal_step(MATH, rig.model.prepared(MATH, rig.p)) < STEP
