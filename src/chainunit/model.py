@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 from . import refusals
 from .engines import MATH
 from .errors import GeometryError, InputError
-from .quantities import Layout, violations, within_bounds
+from .quantities import Layout, Variable, violations, within_bounds
 
 
 @dataclass(frozen=True)
@@ -317,3 +317,9 @@ class Model(metaclass=ModelType):
             p = cls.prepared(MATH, p)
         shared = cls.shared(xp, p, u, x)
         return tuple(part.equations(xp, p, u, x, shared) for part in cls.parts)
+
+    @classmethod
+    def further(cls, xp: Any, p: Any, u: Any, x: Any = None) -> list[tuple[Variable, Any]]:
+        """Quantities beside the outputs, each declared and with its value at one point. Batches and cycle quantities
+        know them; FMUs do not have them."""
+        return []

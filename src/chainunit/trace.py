@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 from .engines import casadi_
 from .model import Model
+from .quantities import Variable
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,11 @@ class Trace:
     x: Any
     outputs: list[Any]
     derivatives: list[Any]
+
+    @cached_property
+    def further(self) -> list[tuple[Variable, Any]]:
+        """The quantities beside the outputs, see `Model.further`."""
+        return self.model.further(casadi_(), self.p, self.u, self.x)
 
     def outputs_at(self, x: Any) -> list[Any]:
         """The outputs with the states `x` in place of the symbols."""

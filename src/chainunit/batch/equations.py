@@ -60,6 +60,11 @@ def outputs_of(model: type[Model]) -> tuple[Variable, ...]:
     return tuple(v for part in model.parts for v in part.layout.variables)
 
 
+def columns_of(model: type[Model]) -> tuple[Variable, ...]:
+    """All that a batch can compute of a model: its outputs, and the quantities of `Model.further`."""
+    return (*outputs_of(model), *(variable for variable, _ in trace(model).further))
+
+
 def arguments_of(model: type[Model]) -> tuple[Variable, ...]:
     """All parameters, inputs and states of a model in declared order."""
     layouts = (model.parameter_layout, model.input_layout, model.state_layout)
@@ -92,10 +97,11 @@ def equations(model: type[Model], outputs: tuple[str, ...], by: tuple[str, ...])
     """
     import casadi
 
-    t, arguments, declared = trace(model), arguments_of(model), outputs_of(model)
+    t, arguments, declared = trace(model), arguments_of(model), columns_of(model)
     places, columns = find(outputs, declared, "output"), find(by, arguments, "parameter, input or state")
     p, u, x, k = t.symbols
-    rows = casadi.vertcat(*(casadi.SX(t.outputs[place]) for place in places), casadi.SX(0, 1))
+    traced = [*t.outputs, *(value for _, value in t.further)]
+    rows = casadi.vertcat(*(casadi.SX(traced[place]) for place in places), casadi.SX(0, 1))
     codes = _first_unmet(list(model.requirements(casadi_(), t.p)))
     if model.derived:
         derived = casadi.vertcat(

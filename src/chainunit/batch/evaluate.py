@@ -46,7 +46,8 @@ def evaluate(
     values : by the name of a parameter, input or state: a number, a DataArray, or an array of one dimension, which
         becomes the dimension of that name. A DataArray whose ``units`` differ from those of the declaration is
         converted. Dimensions of the same name belong together; all others are combined.
-    outputs : names of the outputs; by default all
+    outputs : names of the outputs, or of quantities beside them (`Model.further`: ``crank_torque``,
+        ``force(pivot)``); by default all outputs
     by : names of parameters, inputs and states by which each output is differentiated; the derivatives are exact,
         with the names ``d(tau)/d(r)``
     over, reduce : the dimension over which outputs are reduced, and by output the names of `REDUCTIONS`; the results

@@ -17,7 +17,17 @@ from ..engines import MATH
 from ..groups.group import Joint
 from ..model import Model, Part
 from ..ports import PortSlopes, ShaftMotion
-from ..quantities import Fields, Layout, Value, declaration, declared_class, fields_of, quantity
+from ..quantities import (
+    Fields,
+    Layout,
+    Quantity,
+    Value,
+    Variable,
+    declaration,
+    declared_class,
+    fields_of,
+    quantity,
+)
 from .driver_ports import ROTATING, DriverPort, TurningStates
 from .linkage import Linkage, Topology
 from .machine import MachineState, Mechanism, derived_numbers
@@ -172,6 +182,29 @@ class InverseMachine(LinkageModel, MachineModel):
             w0=u.w,
             **running(s, a) | cls.probes(xp, p, u, s, a),
         )
+
+    @classmethod
+    def further(cls, xp: Any, p: Any, u: Any, x: Any = None) -> list[tuple[Variable, Any]]:
+        """The effort at the driver, ``crank_torque``; the size of each force, ``force(pivot)``; and the places of all
+        pins, ``x(A)`` and ``y(A)``. A machine whose outputs depend on states has no places here."""
+        outputs = cls.parts[0].layout.by_name(cls.evaluate(xp, p, u, x)[0])
+        unit = cls.driver_port.unit("N.m")
+        columns = [
+            (Variable("crank_torque", "effort at the driver", Quantity(unit, "")), outputs["tau"] * p.ratio)
+        ]
+        for name in outputs:
+            pin, _, axis = name.rpartition(".")
+            if axis == "fx" and f"{pin}.fy" in outputs:
+                size = xp.sqrt(outputs[name] * outputs[name] + outputs[f"{pin}.fy"] * outputs[f"{pin}.fy"])
+                columns.append(
+                    (Variable(f"force({pin})", f"size of the force {pin}", Quantity("N", "")), size)
+                )
+        if cls.States is None:
+            for pin, motion in cls.shared(xp, p, u, x).m.pins.items():
+                for axis in "xy":
+                    place = Variable(f"{axis}({pin})", f"place {axis} of the pin {pin}", Quantity("m", ""))
+                    columns.append((place, getattr(motion.p, axis)))
+        return columns
 
     @classmethod
     @cache
