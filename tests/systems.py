@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from chainunit.drives.dc_motor import DcMotor
+from chainunit.machines.flexible import flexible
 from chainunit.models import MODELS
+from chainunit.study import config
+from chainunit.study.drive import Drive
 from chainunit.system import ModelComponent, System, shaft_joints
 
 
@@ -21,3 +25,26 @@ def pair(machine, motor, files=None, values=None):
         "motor": component(motor, files.get("motor")),
     }
     return System(components, shaft_joints("motor", "machine")).with_values(values or {})
+
+
+def whole_systems():
+    """A machine with chains, whose start is an iteration; and by name systems of models: a motor on its machine, with
+    a shaft line between, with a model of the machine in the control, and with chains."""
+    chains = flexible(2, 1)
+    parts = {
+        "machine": component("ChamberForces", values={"ratio": 2.0}),
+        "line": component("CardanDriveline", values={"ratio": 10.0, "d2": 20.0, "d3": 20.0}),
+        "motor": component("InductionMotor"),
+    }
+    joints = [
+        *shaft_joints("line", "machine", flange="driven", load="machine"),
+        *shaft_joints("motor", "line"),
+    ]
+    study = config.load()
+    turning = {"machine.ratio": 20.0, "motor.phi_start": 5.0, "motor.w_start": 10.0}
+    return chains, {
+        "motor": pair("ChamberForces", "DcMotor", values={"machine.ratio": 20.0}),
+        "line": System(parts, joints),
+        "feed-forward": Drive(DcMotor, study.motor, study.machine, feed_forward=True).graph,
+        "chains": pair(chains, "DcMotor", values=turning),
+    }

@@ -24,7 +24,7 @@ from chainunit.engines import MATH, numpy_
 from chainunit.fmu.native.export import export
 from chainunit.models import MODELS
 from chainunit.native.compilers import compiler
-from chainunit.system import CoSimulation
+from chainunit.system import CoSimulation, compiled
 from chainunit.system.instance import Fmu, Instance
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
@@ -36,6 +36,11 @@ ALONE = {
     "ChainUnitFlexible": (
         {"phi": 1.0, "w": 8.0},
         ["phi0", "tau", "J", "left.theta_1", "right.pull_8", "rocker.tau"],
+    ),
+    # a motor and its machine as one model
+    "System": (
+        {"motor.w_ref": 100.0, "machine.left.material_mass": 20.0, "machine.ratio": 20.0},
+        ["motor.phi", "motor.w", "motor.a", "motor.armature.i", "machine.tau", "machine.left.support.fx"],
     ),
     "KnifeDrive": ({"phi": 1.0, "a": 2.0}, ["tau", "J", "blade.y", "blade.tilt", "d_pin.fx", "margin"]),
 }
@@ -68,7 +73,10 @@ SIMULATE = """
 def alone(request, tmp_path_factory):
     """Single FMUs by version of FMI, and the variables that are read from them."""
     folder, (start, names) = tmp_path_factory.mktemp("clients"), ALONE[request.param]
-    model = MODELS[request.param]
+    if request.param == "System":
+        model = compiled(pair_of("ChamberForces", "DcMotor")).model
+    else:
+        model = MODELS[request.param]
     return {fmi: export(model, folder / f"{request.param}{fmi}.fmu", start, fmi=fmi) for fmi in (2, 3)}, names
 
 

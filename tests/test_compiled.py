@@ -10,53 +10,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from systems import component, pair
+from systems import component, pair, whole_systems
 
 from chainunit import InputError
 from chainunit.composite import composed
-from chainunit.drives.dc_motor import DcMotor
+from chainunit.composition import SOLVER
 from chainunit.engines import MATH, casadi_, numpy_
 from chainunit.errors import GeometryError
-from chainunit.machines.flexible import flexible
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.model import Model, Part
 from chainunit.models import MODELS
 from chainunit.ports import LoadPort
 from chainunit.quantities import Layout, Value, declaration, quantity
-from chainunit.study import config
-from chainunit.study.drive import Drive
-from chainunit.system import System, compiled, shaft_joints
+from chainunit.system import System, compiled
 
-CHAINS = flexible(3, 1)
 GALLERY = Path(__file__).parents[1] / "examples" / "linkages"
-
-
-def with_line(machine="ChamberForces", motor="InductionMotor"):
-    return System(
-        {
-            "machine": component(machine, values={"ratio": 2.0}),
-            "line": component("CardanDriveline", values={"ratio": 10.0}),
-            "motor": component(motor),
-        },
-        [*shaft_joints("line", "machine", flange="driven", load="machine"), *shaft_joints("motor", "line")],
-    )
-
-
-def with_feed_forward():
-    values = config.load()
-    return Drive(DcMotor, values.motor, values.machine, feed_forward=True).graph
-
-
-SYSTEMS = {
-    "motor": pair("ChamberForces", "DcMotor", values={"machine.ratio": 20.0}),
-    "line": with_line(),
-    "feed-forward": with_feed_forward(),
-    "chains": pair(
-        CHAINS,
-        "DcMotor",
-        values={"machine.ratio": 20.0, "motor.phi_start": 5.0, "motor.w_start": 10.0},
-    ),
-}
+CHAINS, SYSTEMS = whole_systems()
 
 
 @pytest.fixture(params=SYSTEMS)
@@ -91,9 +60,8 @@ def test_names_are_the_full_names_of_the_system(system):
     }
     assert len(model.parts) == 1 and not model.terminals
     parameters = {f"{name}.{v}" for name, m in every for v in m.parameter_layout.names}
-    assert set(model.parameter_layout.names) == {name for name in parameters if ".solver." not in name} | {
-        "solver.max_steps"
-    }
+    own = {name for name in parameters if ".solver." not in name}
+    assert set(model.parameter_layout.names) == own | {"solver.max_steps", "solver.tolerance"}
     described = {v.name: v for v in model.parameter_layout.variables}
     assert described["machine.r"].description.startswith("machine: ")
     assert compiled(system).parameters.machine.r == system.values["machine.r"]
@@ -172,7 +140,9 @@ def test_a_state_at_the_start_may_depend_on_another_model():
         Layout(CHAINS.States).values(x.machine), Layout(CHAINS.States).values(alone), rtol=1e-12, atol=1e-12
     )
     assert part.model.controlled and part.model.start_unknowns == CHAINS.start_unknowns
-    assert part.model.tolerance(MATH, p=part.parameters) == p.tolerance
+    for tolerance, least in ((1e-12, 1e-12), (1e-3, 1e-10)):
+        tuned = compiled(system.with_values({"machine.tolerance": tolerance}))
+        assert tuned.model.tolerance(MATH, tuned.parameters) == least
     folded = compiled(system.with_values({"machine.organ.fold_limit": 0.1}))
     with pytest.raises(
         GeometryError, match=r"^machine: largest angle between rods of the left organ .* machine\.z = "
@@ -221,7 +191,7 @@ def test_another_process_gets_the_same_model(system):
 
 def test_free_terminals_remain():
     """A line that drives a machine, without motor, is a load with port and slopes like any machine."""
-    whole = with_line()
+    whole = SYSTEMS["line"]
     rest = System({name: whole.components[name] for name in ("machine", "line")}, whole.joints[:2])
     part = compiled(rest, "Line")
     names = [t.name for t in part.model.terminals]
@@ -244,7 +214,7 @@ def test_free_terminals_remain():
     nested = dict(zip(again.model.state_layout.names, again.model.derivatives(MATH, p2, u2, x2), strict=True))
     assert {name.removeprefix("plant."): v for name, v in nested.items()} == rates
     assert "plant.machine.r" in again.model.parameter_layout.names
-    assert [n for n in again.model.parameter_layout.names if "solver" in n] == ["solver.max_steps"]
+    assert [n for n in again.model.parameter_layout.names if "solver" in n] == [*SOLVER]
 
 
 @declaration

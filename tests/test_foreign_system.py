@@ -489,6 +489,10 @@ def test_a_study_file_that_does_not_fit_is_refused_in_a_line(change, said, folde
             ["export", "DcMotor", "--config", "foreign.toml"],
             r"the study's motor is ForeignMotor\.fmu, not DcMotor",
         ),
+        (
+            ["export", "foreign.toml"],
+            r"motor \(ForeignMotor\.fmu\): is an FMU, whose equations are not known; only a system of models can be",
+        ),
     ],
 )
 def test_what_needs_a_model_of_the_motor_is_refused(command, said, folder):

@@ -113,7 +113,7 @@ def test_values_that_do_not_follow_stand_in_the_script():
 
 @pytest.mark.parametrize("name", ["DcMotor", "ChainUnitFlexible"])
 def test_a_model_without_a_script_becomes_a_python_fmu(name, fmus, tmp_path, monkeypatch):
-    monkeypatch.setattr(python, "recipes", lambda: tmp_path)
+    monkeypatch.setattr(python, "script_file", lambda model: None)
     file = python.export(MODELS[name], tmp_path / "a.fmu")
     rows = [fmpy.simulate_fmu(str(f), stop_time=0.01, output_interval=0.005) for f in (file, fmus[name])]
     assert rows[0].dtype == rows[1].dtype and rows[0].tolist() == rows[1].tolist()

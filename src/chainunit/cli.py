@@ -66,7 +66,7 @@ class _Export(typer.core.TyperCommand):
         from .models import MODELS
 
         (name,) = (each for each in self.params if each.name == "name")
-        name.help = f"A linkage file (.toml), or one of {', '.join(MODELS)}."  # type: ignore[attr-defined]
+        name.help = f"A study file or a linkage file (.toml), or one of {', '.join(MODELS)}."  # type: ignore[attr-defined]
         super().format_help(ctx, formatter)
 
 
@@ -325,9 +325,10 @@ def linkage_command(
 
 @app.command(cls=_Export)
 def export(
-    name: Annotated[str, typer.Argument(help="The model, or a linkage file (.toml).")],
+    name: Annotated[str, typer.Argument(help="The model, a linkage file or a study file (.toml).")],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="FMU file; NAME.fmu by default.")
+        Path | None,
+        typer.Option("-o", "--output", help="FMU file; by default NAME.fmu, of the model's name."),
     ] = None,
     config: Annotated[
         Path | None,
@@ -352,28 +353,27 @@ def export(
         bool, typer.Option("--direct", help="Of a linkage file: torque in and motion out.")
     ] = False,
 ) -> None:
-    """Write a model as an FMU."""
+    """Write a model as an FMU; of a study file its whole system, from control to machine, as one FMU."""
     from .fmu.backends import export as write
-    from .models import model_named
-    from .study.package import start_of, with_rods
-    from .study.sections import ChainOrgans
+    from .study.package import is_study_file, model_and_start
 
-    model: Any = model_named(name, direct)
-    file = output or Path(f"{model.name}.fmu")
-    if file.suffix != ".fmu":
+    file = output
+    if file and file.suffix != ".fmu":
         raise InputError(f"-o {file}: must be a file name that ends in .fmu")
+    whole = is_study_file(name)
+    if whole and (config or direct):
+        given = f"--config {config}" if config else "--direct"
+        raise InputError(
+            f"{given}: is not of a study file, which has its own values; leave it out for {name}"
+        )
     if rods is not None and name != "ChainUnitFlexible":
         raise InputError(f"--rods {rods}: is of ChainUnitFlexible; leave it out for {name}")
+    study_path = Path(name) if whole else config
+    loaded = _study_file(study_path) if study_path else None
     kind: Any = backend.value if backend else None
     with _console(stderr=True).status("exporting") as status:
-        start = {}
-        if config:
-            loaded = _study_file(config)
-            start = start_of(loaded, model, backend=kind, report=status.update)
-            if rods is None and loaded.chain:
-                rods = int(loaded.chain.rods)
-        if name == "ChainUnitFlexible":
-            model = with_rods(int(ChainOrgans().rods) if rods is None else rods, start)
+        model, start = model_and_start(name, loaded, rods, direct=direct, backend=kind, report=status.update)
+        file = file or Path(f"{model.name}.fmu")
         made = write(
             model,
             file,

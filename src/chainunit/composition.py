@@ -15,13 +15,31 @@ from typing import Any
 
 from .integrate import MAX_STEPS, Solver
 from .model import Model, Requirement, Terminal
-from .quantities import Layout, declared_class, group, pruned
+from .quantities import Layout, Value, declaration, declared_class, group, pruned, quantity
 
 _SOLVER = MAX_STEPS.partition(".")[0]
-RESERVED = (_SOLVER, "derived")
+RESERVED = (_SOLVER, "derived", "of_components")
 """Names that a component cannot have, as the model has something else by that name."""
 Steps = Sequence[tuple[str, Sequence[str]]]
 """Outputs that are evaluated together, by component, in order."""
+
+
+@declaration
+class SystemSolver(Solver):
+    """Limits of the internal integrator of a system, in place of those of its components."""
+
+    tolerance: Value = quantity(
+        "1",
+        "relative tolerance of the internal integrator, of each state or its nominal size",
+        default=1e-10,
+        min=1e-12,
+        max=1e-2,
+        tunable=True,
+    )
+
+
+SOLVER = tuple(f"{_SOLVER}.{name}" for name in Layout(SystemSolver).names)
+"""Full names of the parameters of the integrator."""
 
 
 # -- models by reference
@@ -109,10 +127,10 @@ class Composition:
         self.start: Sequence[tuple[str, Sequence[str] | None]] = data["start"]
         self.has_states = any(model.state_layout for model in self.models.values())
         left_out = {*data["left_out"]}
-        budgets = {f"{name}.{MAX_STEPS}" for name in self.models}
-        own = [(_SOLVER, Solver, group(Solver, "internal integrator", default=Solver()))]
+        common = {f"{name}.{own}": own for name in self.models for own in SOLVER if self.has_states}
+        own = [(_SOLVER, SystemSolver, group(SystemSolver, "internal integrator", default=SystemSolver()))]
         self.Parameters = self._declared(
-            "Parameters", lambda model: model.Parameters, budgets, own if self.has_states else ()
+            "Parameters", lambda model: model.Parameters, common, own if self.has_states else ()
         )
         inputs = left_out | set(self.sources)
         self.Inputs = self._declared("Inputs", lambda model: model.Inputs, inputs)
@@ -120,7 +138,7 @@ class Composition:
         self.Outputs = self._declared("Outputs", lambda model: model.parts[0].layout.cls, left_out)
         self.Extra = self._extra(data["extra"])
         self.members = {
-            name: self._member(name, model, inputs, budgets) for name, model in self.models.items()
+            name: self._member(name, model, inputs, common) for name, model in self.models.items()
         }
 
     def _declared(
@@ -153,7 +171,9 @@ class Composition:
                 fields.append((component, of, group(of, component)))
         return declared_class("FurtherOutputs", (), fields) if fields else None
 
-    def _member(self, name: str, model: type[Model], inputs: Iterable[str], budgets: Iterable[str]) -> Member:
+    def _member(
+        self, name: str, model: type[Model], inputs: Iterable[str], common: Mapping[str, str]
+    ) -> Member:
         def getter(full: str) -> Any:
             return attrgetter(full)
 
@@ -162,7 +182,7 @@ class Composition:
         return Member(
             name,
             model,
-            [getter(MAX_STEPS if full in {*budgets} else full) for full in own],
+            [getter(common.get(full, full)) for full in own],
             [None if full in {*inputs} else getter(full) for full in taken],
             [self.sources.get(full) for full in taken],
             {

@@ -153,6 +153,8 @@ class Model(metaclass=ModelType):
     `closed` after each substep; otherwise it integrates in equal steps."""
     built_by: ClassVar[str] = ""
     """The call that makes this class, if a function of its module makes it; else empty."""
+    components: ClassVar[Mapping[str, type[Model]]] = {}
+    """By name, the models that make this one, if it is a system of models."""
     modules: ClassVar[tuple[str, ...]] = ()
     """Further modules of this package that the call imports by name, such as ``drives.dc_motor``."""
     maker: ClassVar[tuple[Callable[..., Any], tuple[Any, ...]] | None] = None

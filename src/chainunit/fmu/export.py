@@ -27,7 +27,7 @@ from ..model import Model
 from .accompany import companion_files
 from .description import Interface, model_description
 from .pack import interface_of, pack
-from .recipe import recipes
+from .recipe import script_file, script_of
 from .script import Script
 
 _PACKAGE = Path(__file__).parents[1]
@@ -188,24 +188,29 @@ def _file(module: tuple[str, ...]) -> Path | None:
 
 
 _SCRIPT = """\
-from {package} import {module}
+{imports}
 from chainunit.fmu.slave import ModelSlave, hold
 
 
 @hold(globals())
 class {name}(ModelSlave):
     model = {module}.{call}
-"""
+{more}"""
 
 
 def _script(model: type[Model], start: dict[str, float]) -> str:
     """The model's script in `fmu/`, or else a script of the same form, with these start values and, for a class that
     a function makes, the arguments of that function."""
-    file = recipes() / f"{model.name}.py"
-    *package, module = model.__module__.split(".")
+    file = script_file(model)
+    module = model.__module__.rpartition(".")[2]
     call = model.built_by or model.__qualname__
-    plain = _SCRIPT.format(name=model.name, package=".".join(package), module=module, call=call)
-    text = file.read_text() if file.is_file() else plain
+    paths = (*(f"{__package__.partition('.')[0]}.{each}" for each in model.modules), model.__module__)
+    imports = "\n".join("from {0} import {2}".format(*path.rpartition(".")) for path in paths)
+    own = script_of(model)
+    extras = {"experiment": own.experiment, "sizes": own.sizes}
+    more = "".join(f"    {name} = {values!r}\n" for name, values in extras.items() if values)
+    plain = _SCRIPT.format(name=model.name, imports=imports, module=module, call=call, more=more)
+    text = file.read_text() if file else plain
     if model.built_by:
         text = re.sub(
             r"(?m)^(    model = \w+\.)\w+\([\d, ]*\)(?:\.\w+\(\))*", rf"\g<1>{model.built_by}", text

@@ -37,14 +37,31 @@ def recipes() -> Path:
 
 
 def script_of(model: type[Model]) -> type[Script]:
-    """The class of the model's script; `Script` itself for a model without a script."""
-    return _script(model.name)
+    """The class of the model's script; `Script` itself for a model without a script. A system of models has the
+    shortest step and stop of its components, and their sizes."""
+    file = script_file(model)
+    if file or not model.components:
+        return _script(file) if file else Script
+    own = {name: script_of(component) for name, component in model.components.items()}
+    experiment: dict[str, float] = {}
+    for script in own.values():
+        experiment = {k: min(x, experiment.get(k, x)) for k, x in (experiment | script.experiment).items()}
+    inputs = set(model.input_layout.names)
+    sizes = {f"{name}.{k}": x for name, script in own.items() for k, x in script.sizes.items()}
+    members = {"experiment": experiment, "sizes": {full: x for full, x in sizes.items() if full in inputs}}
+    return type("SystemScript", (Script,), members)
+
+
+def script_file(model: type[Model]) -> Path | None:
+    """The model's script; None where there is none, or where the script of its name is that of another model."""
+    file = recipes() / f"{model.name}.py"
+    return file if file.is_file() and _script(file).model.__module__ == model.__module__ else None
 
 
 @cache
-def _script(name: str) -> type[Script]:
-    file = recipes() / f"{name}.py"
-    return runpy.run_path(str(file))[name] if file.is_file() else Script
+def _script(file: Path) -> type[Script]:
+    own: type[Script] = runpy.run_path(str(file))[file.stem]
+    return own
 
 
 def often(model: type[Model]) -> set[str]:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..drives.driveline import CardanDriveline
 from ..drives.motor import Motor
-from ..errors import InputError, RunError
+from ..errors import InputError, RunError, printable
 from ..fmu.backends import Backend
 from ..machines.chain_organs import LEAST, MOST
 from ..machines.chain_unit import ChamberForces
@@ -18,12 +18,16 @@ from ..machines.hanging import split
 from ..machines.machine import Machine
 from ..mechanism.models import DirectMachine
 from ..model import Model
+from ..models import model_named
 from ..quantities import Layout
-from ..system import System
+from ..reading import file_text, toml
+from ..system import ModelComponent, System, compiled
+from ..system.compiled import input_starts
 from ..system.ssp import export
 from .choice import choose
 from .config import Config
 from .drive import Drive
+from .sections import ChainOrgans
 
 
 def study_system(config: Config, drive: Drive) -> System:
@@ -72,6 +76,77 @@ def start_of(
         title = drive.graph.components["motor"].title
         raise InputError(f"the study's motor is {title}, not {model.name}")
     return model.parameter_layout.by_name(drive.fmu_parameters)
+
+
+def is_study_file(name: str) -> bool:
+    """Whether the name is that of a study file: a file in TOML without the tables of a linkage."""
+    if not name.lower().endswith(".toml"):
+        return False
+    try:
+        data = toml(file_text(Path(name)))
+    except InputError:
+        return False  # whoever reads the file says what is wrong
+    return not {"links", "ground", "driver", "joints"} & set(data)
+
+
+def model_and_start(
+    name: str,
+    config: Config | None,
+    rods: int | None = None,
+    *,
+    direct: bool = False,
+    backend: Backend | None = None,
+    report: Callable[[str], None] = lambda what: None,
+) -> tuple[type[Model], dict[str, float]]:
+    """The model that `chainunit export NAME` writes, and its start values by name.
+
+    Parameters
+    ----------
+    name : a model, a linkage file, or a study file, which `config` then is: its whole system
+    config : the study that gives the start values, or None
+    rods : number of rods of an organ of ChainUnitFlexible; by default the study's, or the usual one
+    direct : whether the direct model of a linkage file is meant
+
+    Raises
+    ------
+    InputError
+        see `start_of`, `whole_system` and `chainunit.models.model_named`.
+    RunError
+        where sizing finds no motor.
+    """
+    if config and is_study_file(name):
+        return whole_system(config, backend=backend, report=report)
+    model = model_named(name, direct)
+    start = start_of(config, model, backend=backend, report=report) if config else {}
+    if name == "ChainUnitFlexible":
+        if rods is None:
+            rods = int(((config and config.chain) or ChainOrgans()).rods)
+        model = with_rods(rods, start)
+    return model, start
+
+
+def whole_system(
+    config: Config,
+    *,
+    backend: Backend | None = None,
+    report: Callable[[str], None] = lambda what: None,
+) -> tuple[type[Model], dict[str, float]]:
+    """The one model of the whole system of a study, and its start values by name: parameters, the speed reference and
+    the loads of normal running. With `sizing` the motor is chosen first.
+
+    Raises
+    ------
+    InputError
+        where motor or machine is a foreign FMU.
+    RunError
+        where sizing finds no motor.
+    """
+    drive = _drive(config, backend, report)
+    system = study_system(config, drive)
+    machine = system.components["machine"]
+    name = machine.model.name if isinstance(machine, ModelComponent) else machine.title
+    part = compiled(system, f"{name}System", printable(config.title))
+    return part.model, part.start | input_starts(system, part.model)
 
 
 def with_rods(number: int, start: Mapping[str, float]) -> type[Model]:

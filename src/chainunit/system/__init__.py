@@ -7,7 +7,7 @@ reference solution (`monolithic`), the certificate of a run (`energy_residual` o
 component, too: `foreign_component`."""
 
 from .certificate import certify, energy_residual, shaft_torque, through
-from .compiled import compiled
+from .compiled import compiled, export_compiled
 from .fmus import export
 from .foreign import NAMES, fmu_component, foreign_component
 from .graph import (
@@ -46,6 +46,7 @@ __all__ = [
     "compiled",
     "energy_residual",
     "export",
+    "export_compiled",
     "fmu_component",
     "foreign_component",
     "hold_loads",

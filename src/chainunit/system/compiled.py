@@ -9,15 +9,18 @@ from __future__ import annotations
 
 import json
 import keyword
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 from ..composite import composed
-from ..composition import RESERVED, reference
+from ..composition import RESERVED, SOLVER, reference
 from ..engines import casadi_
 from ..errors import InputError, shown
+from ..fmu.backends import Backend, Origin
+from ..fmu.backends import export as export_fmu
 from ..fmu.description import Interface
 from ..integrate import MAX_STEPS
 from ..model import Model
@@ -30,13 +33,13 @@ def compiled(system: System, name: str = "System", title: str = "") -> ModelComp
     Its names are the full names of the system: of parameters ("motor.armature.R"), states and outputs.
     Its inputs are the inputs without a connection. The slopes of load ports that are joined are neither inputs nor
     outputs. Terminals that are not joined are its terminals. One `solver.max_steps`, the largest of the components,
-    holds for the integrator of the whole.
+    holds for the integrator of the whole, which controls the error to `solver.tolerance`.
 
     Parameters
     ----------
     system : its components are all models
     name : name of the model and of its FMU
-    title : description of the model; by default that of the components
+    title : description of the model, before that of the components
 
     Raises
     ------
@@ -49,7 +52,7 @@ def compiled(system: System, name: str = "System", title: str = "") -> ModelComp
         if not isinstance(component, ModelComponent):
             raise InputError(
                 f"{own} ({component.title}): is an FMU, whose equations are not known; only a system of models can "
-                "be one model"
+                "be one model (an SSP package takes FMUs as they are)"
             )
         if own in RESERVED or own.startswith("_") or keyword.iskeyword(own):
             raise InputError(
@@ -59,15 +62,45 @@ def compiled(system: System, name: str = "System", title: str = "") -> ModelComp
     model = composed(json.dumps(_description(system, models, name, title), sort_keys=True))
     values = system.values
     layout = model.parameter_layout
-    budgets = [values[full] for each in models if (full := f"{each}.{MAX_STEPS}") in values]
+    limits = {own: [values[full] for each in models if (full := f"{each}.{own}") in values] for own in SOLVER}
     own_values = {full: values[full] for full in layout.names if full in values}
-    own_values |= {MAX_STEPS: max(budgets)} if budgets else {}
+    # as many steps as the part that needs most of them, as exact as the most exact part
+    own_values |= {own: (max if own == MAX_STEPS else min)(given) for own, given in limits.items() if given}
     return ModelComponent(model, layout.from_names(own_values))
+
+
+def export_compiled(
+    system: System,
+    file: Path,
+    *,
+    name: str = "System",
+    title: str = "",
+    backend: Backend | None = None,
+    fmi: int = 2,
+    platforms: Sequence[str] = (),
+    report: Callable[[str], None] = lambda what: None,
+) -> Origin:
+    """Write a system of models as one FMU, with the start values of the system.
+
+    Parameters
+    ----------
+    system, name, title : see `compiled`
+    file, backend, fmi, platforms, report : see `chainunit.fmu.backends.export`
+
+    Raises
+    ------
+    InputError, RunError
+        see `compiled` and `chainunit.fmu.backends.export`.
+    """
+    part = compiled(system, name, title)
+    start = part.start | input_starts(system, part.model)
+    return export_fmu(part.model, file, start, backend=backend, fmi=fmi, platforms=platforms, report=report)
 
 
 def input_starts(system: System, model: type[Model]) -> dict[str, float]:
     """The start values of the inputs of a compiled system, where the system gives one."""
-    return {full: system.values[full] for full in model.input_layout.names if full in system.values}
+    values = system.values
+    return {full: values[full] for full in model.input_layout.names if full in values}
 
 
 def _description(system: System, models: Mapping[str, type[Model]], name: str, title: str) -> dict[str, Any]:
@@ -92,7 +125,7 @@ def _description(system: System, models: Mapping[str, type[Model]], name: str, t
     kinds = ", ".join(f"{each} ({model.name})" for each, model in models.items())
     return {
         "name": name,
-        "title": title or f"System of {kinds}",
+        "title": f"{title}: {kinds}" if title else f"System of {kinds}",
         "components": [[each, reference(model)] for each, model in models.items()],
         "connections": [list(connection) for connection in exact.connections],
         "left_out": sorted({full for connection in slopes for full in connection} - set(extra)),

@@ -39,7 +39,9 @@ def monolithic(
     signals : by full name of an input, a number or a function of time; the solver stops at their `corners`
     times : times of the rows [s], shape (n,)
     rtol : relative tolerance of the solver (DOP853); the absolute tolerance of a state is a thousandth of it times
-        the state's nominal size, and at least 1e-12
+        the state's nominal size, and at least 1e-12. Rows inside a step are interpolated, without control of the
+        error: where a limit of the control bends the course, a row may be wrong by 1e-6 of the peak at the usual
+        tolerance, by less than 1e-9 at 1e-12
     start : every state by full name at the first of the times, to continue another solution; by default the
         models' own start
 
