@@ -24,6 +24,7 @@ LAYERS = (
 HOMES = {
     "__main__": "cli",
     "cli": "cli",
+    "console": "cli",
     "studies": "cli",
     "models": "system",
     "native": "core",

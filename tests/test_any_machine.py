@@ -12,7 +12,6 @@ from chainunit import InputError
 from chainunit.report.markdown import markdown
 from chainunit.report.study import report
 from chainunit.study.config import parse
-from chainunit.study.monte_carlo import read_rows
 from chainunit.study.result import as_dict
 from chainunit.study.run import run_study
 
@@ -71,14 +70,12 @@ def test_a_flywheel_makes_a_small_motor_fit_a_load_that_comes_and_goes(sized):
 
 def test_random_overloads_of_a_machine_without_sides(sized):
     study, _ = sized
-    rows = study.monte_carlo.rows
-    assert len(rows) == 2 and study.monte_carlo.failures == 0 and study.monte_carlo.sides == {}
-    for row in rows:
-        assert row["side"] is None and row["rocker_torque_peak"] is None
-        assert 3e4 <= row["drawn"]["force"] <= 1e5 and np.isfinite(row["crank_torque_peak"])
-    # read again they count, but not for a machine that has a rocker
-    assert len(read_rows(study.monte_carlo.file, frozenset(study.absent))[0]) == 2
-    assert read_rows(study.monte_carlo.file) == ({}, 2)
+    random = study.monte_carlo
+    runs = random.dataset
+    assert random.runs == 2 and random.failures == 0 and random.sides == {}
+    assert (runs["side"] == 0).all() and np.isnan(runs["rocker_torque_peak"]).all()
+    assert ((runs["drawn_force"] >= 3e4) & (runs["drawn_force"] <= 1e5)).all()
+    assert np.isfinite(runs["crank_torque_peak"]).all()
     assert len(json.dumps(as_dict(study), allow_nan=False)) > 1000
 
 

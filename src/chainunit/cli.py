@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
@@ -15,14 +15,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 import typer.core
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from .errors import InputError, InterruptedRunError, RunError, WriteError, printable
-from .files import claim, clear, full, write_all
+from .console import finish, leave, progress_bar, terminal_console
+from .errors import InputError, InterruptedRunError, RunError, printable
+from .files import claim, clear, full
 
 if TYPE_CHECKING:
-    from .report.blocks import Report
+    from rich.console import Console
 
 
 class Backend(StrEnum):
@@ -104,18 +103,13 @@ def _root(
         os.environ[VARIABLE] = OFF
 
 
-def _console(**options: Any) -> Console:
-    # titles and paths come from the user: they may hold text that rich would take for markup
-    return Console(markup=False, highlight=False, **options)
-
-
 def _study_file(file: Path | None) -> Any:
     """The study of a file; a value that looks like a slip of a unit is named before any run."""
     from .study import config as configuration
 
     loaded = configuration.load(file)
     for slip in loaded.slips:
-        _console(stderr=True).print(f"Remark: {slip.sentence}", soft_wrap=True)
+        terminal_console(stderr=True).print(f"Remark: {slip.sentence}", soft_wrap=True)
     return loaded
 
 
@@ -129,6 +123,13 @@ def study(
         bool, typer.Option("--check", help="Also compare every run with the monolithic solution.")
     ] = False,
     backend: _BackendOption = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            "--scheduler",
+            help="Address of a Dask scheduler whose workers make the random overloads: tcp://10.0.0.5:8786.",
+        ),
+    ] = None,
     example: Annotated[
         Example | None,
         typer.Option("--example", help="Print a packaged study file, as a start for your own, and stop."),
@@ -153,13 +154,18 @@ def study(
     from .study.record import INSUFFICIENT
 
     with claim(output):
-        errors = _console(stderr=True)
-        with _progress(errors) as progress:
+        errors = terminal_console(stderr=True)
+        with progress_bar(errors) as progress:
             record = results.compute(
-                loaded, output, progress, check=check, backend=backend.value if backend else None
+                loaded,
+                output,
+                progress,
+                check=check,
+                backend=backend.value if backend else None,
+                scheduler=scheduler,
             )
         report = contents.report(record)
-        unwritten = _leave(report, results.writers(record, report, output), remarks=not errors.is_terminal)
+        unwritten = leave(report, results.writers(record, report, output), remarks=not errors.is_terminal)
     if record.failure is not None:
         _stopped_early(record.failure, output, errors)
     if unwritten is not None:
@@ -167,54 +173,6 @@ def study(
     if record.insufficient:
         errors.print(INSUFFICIENT)
         raise typer.Exit(1)
-
-
-def _leave(
-    report: Report, writers: Iterable[Callable[[], list[Path]]], *, remarks: bool = True
-) -> WriteError | None:
-    """Write all files of a report and show the report. Returns the error of the first file that the disk had
-    no room for; the other files are written all the same. Without `remarks` the report is shown without its
-    remarks, which the terminal then has already.
-    """
-    from .report import terminal
-
-    written, unwritten = write_all(writers)
-    console = _console()
-    terminal.show(report, console, remarks=remarks or not console.is_terminal)
-    console.print("Written: " + ", ".join(printable(str(path), 500) for path in written), soft_wrap=True)
-    return unwritten
-
-
-def _finish(report: Report, output: Path, name: str) -> None:
-    """Write and show a report whose run is complete."""
-    from .report import files
-
-    if (unwritten := _leave(report, files.writers(report, output, name))) is not None:
-        raise unwritten
-
-
-@contextmanager
-def _progress(console: Console) -> Iterator[Callable[[str, float, float], None]]:
-    """A progress bar that begins with the first report, so that a fault of the input is shown without a bar.
-    Yields the function that reports the current task, the complete amount of work, and the total amount."""
-    bar = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-        console=console,
-    )
-    task = bar.add_task("", total=1.0)
-
-    def report(what: str, done: float, todo: float) -> None:
-        bar.start()
-        bar.update(task, description=what, completed=done, total=todo)
-
-    try:
-        yield report
-    finally:
-        if bar.live.is_started:
-            bar.stop()
 
 
 def _stopped_early(failure: RunError, output: Path, errors: Console) -> None:
@@ -232,7 +190,7 @@ def keys(
     """Show the keys of study files and catalogues: what each means, allows, and is where a file leaves it out."""
     from .report import reference, terminal
 
-    terminal.show(reference.keys_of(table) if table else reference.overview(), _console())
+    terminal.show(reference.keys_of(table) if table else reference.overview(), terminal_console())
 
 
 @app.command()
@@ -266,10 +224,10 @@ def reproduce(
         from .papers.output import report
         from .report import files
 
-        with _console(stderr=True).status("computing"):
+        with terminal_console(stderr=True).status("computing"):
             contents = report(compute())
         clear(output, *files.names("reproduction", tuple(figure.file for figure in contents.figures)))
-        _finish(contents, output, "reproduction")
+        finish(contents, output, "reproduction")
 
 
 @app.command("two-bar-error")
@@ -286,11 +244,11 @@ def two_bar_error(
         from .report import files
 
         clear(output, *files.names(two_bar.NAME, (two_bar.PICTURE,)))
-        with _progress(_console(stderr=True)) as progress:
+        with progress_bar(terminal_console(stderr=True)) as progress:
             progress("bars and catenaries", 0.0, 1.0)
             comparison = two_bar.two_bar_error(lambda done: progress("bars and catenaries", done, 1.0))
         contents = two_bar.report(comparison)
-        _finish(contents, output, two_bar.NAME)
+        finish(contents, output, two_bar.NAME)
 
 
 @app.command("linkage")
@@ -320,7 +278,7 @@ def linkage_command(
 
         clear(output, *files.names(linkage_report.NAME, linkage_report.PICTURES))
         contents = linkage_report.linkage_report(linkage_findings(machine, rate), str(file))
-        _finish(contents, output, linkage_report.NAME)
+        finish(contents, output, linkage_report.NAME)
 
 
 @app.command(cls=_Export)
@@ -371,7 +329,7 @@ def export(
     study_path = Path(name) if whole else config
     loaded = _study_file(study_path) if study_path else None
     kind: Any = backend.value if backend else None
-    with _console(stderr=True).status("exporting") as status:
+    with terminal_console(stderr=True).status("exporting") as status:
         model, start = model_and_start(name, loaded, rods, direct=direct, backend=kind, report=status.update)
         file = file or Path(f"{model.name}.fmu")
         made = write(
@@ -400,7 +358,7 @@ def export_ssp(
     if output.suffix != ".ssp":
         raise InputError(f"-o {output}: must be a file name that ends in .ssp")
     loaded = _study_file(config)
-    with _console(stderr=True).status("exporting") as status:
+    with terminal_console(stderr=True).status("exporting") as status:
         made = export_study(loaded, output, backend=backend.value if backend else None, report=status.update)
     print(f"{output}: {made}")
 

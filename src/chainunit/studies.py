@@ -167,6 +167,7 @@ class Study:
         check: bool = False,
         backend: Backend | None = None,
         progress: Progress | None = None,
+        scheduler: str | None = None,
     ) -> StudyResult:
         """Run the study: start-up, steady running, every event. The packaged example takes half a minute.
 
@@ -178,6 +179,8 @@ class Study:
         backend : backend of the FMUs, "native" or "python"; by default native where there is a C compiler
         progress : a function that is called with the task, the amount of work that is complete, and the total
             amount
+        scheduler : address of a Dask scheduler, such as ``tcp://10.0.0.5:8786``, whose workers make the random
+            overloads in place of local processes
 
         Raises
         ------
@@ -188,10 +191,11 @@ class Study:
         WriteError
             for a file that cannot be written; the others are written.
         """
+        options: dict[str, Any] = {"check": check, "backend": backend, "scheduler": scheduler}
         if folder is None:
             temporary = Path(tempfile.mkdtemp(prefix="chainunit_"))
             try:
-                record = results.compute(self.config, temporary, progress, check=check, backend=backend)
+                record = results.compute(self.config, temporary, progress, **options)
             except BaseException:
                 shutil.rmtree(temporary, ignore_errors=True)
                 raise
@@ -199,7 +203,7 @@ class Study:
             weakref.finalize(result, shutil.rmtree, temporary, ignore_errors=True)
         else:
             with claim(Path(folder)) as place:
-                record = results.compute(self.config, place, progress, check=check, backend=backend)
+                record = results.compute(self.config, place, progress, **options)
                 result = StudyResult(record, place)
                 result._write(place)
         if record.failure is not None:
@@ -310,7 +314,8 @@ class StudyResult:
                 clear(place, *results.FILES)
                 shutil.copytree(self._folder / "fmu", place / "fmu", dirs_exist_ok=True)
                 if self.record.monte_carlo is not None:
-                    shutil.copy(self._folder / self.record.monte_carlo.file.name, place)
+                    store = self.record.monte_carlo.file
+                    shutil.copytree(store, place / store.name, dirs_exist_ok=True)
             return self._write(place)
 
     def _write(self, folder: Path) -> list[Path]:

@@ -30,6 +30,7 @@ def compute(
     *,
     check: bool = False,
     backend: Backend | None = None,
+    scheduler: str | None = None,
 ) -> StudyRecord:
     """Run a study in a folder that belongs to this process alone (see `files.claim`). The files of an earlier run
     in it are removed. Arguments and errors are those of `run_study`; a refusal begins with the name of the study
@@ -45,7 +46,7 @@ def compute(
     if progress is not None:
         progress("the machine at constant speed", 0.0, 1.0)
     with file_context():
-        return run_study(config, folder, progress, check=check, backend=backend)
+        return run_study(config, folder, progress, check=check, backend=backend, scheduler=scheduler)
 
 
 def writers(record: StudyRecord, report: Report, folder: Path) -> list[Callable[[], list[Path]]]:

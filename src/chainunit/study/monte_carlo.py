@@ -1,46 +1,44 @@
-"""Overloads at random sides, crank angles, times and sizes, in local processes.
+"""Overloads at random sides, crank angles, times and sizes, in batches of runs (see `chainunit.runner`).
 
-Each run branches from the same steady state and is determined by the study and its own number alone. When a
-run ends, its row is appended to ``monte_carlo_<study>.jsonl``, where <study> is a digest of everything on
-which the rows depend. A study that was killed goes on from these rows, and never uses the rows of another
-study. Lines that are no rows are left out.
+Each run branches from the same steady state and is determined by the study and its own number alone. The runs
+are a Zarr store, ``monte_carlo_<study>.zarr``, where <study> is a digest of everything on which they depend. A
+study that was killed goes on from it, and never uses the runs of another study.
 """
 
 from __future__ import annotations
 
-import atexit
 import hashlib
 import json
 import math
-import os
-from collections.abc import Mapping
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
-from dataclasses import asdict, dataclass, fields
-from itertools import islice
-from multiprocessing import get_context
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from .. import __version__
-from ..ending import end_at_signals
+from ..ending import remove_folder, temporary_folder
 from ..errors import InterruptedRunError, RunError
-from ..files import whole, writing
+from ..job import Job, ResultVariable, texts
 from ..machines.chain_unit import SIDES, SideName
 from ..progress import Report
-from ..quantities import Layout, Value, declaration, quantity
+from ..quantities import Layout, Value, declaration, quantity, variables
+from ..runner import run as run_job
 from ..system import Simulation
 from ..text import entry
 from .config import Config
 from .drive import Drive
 from .event import AnySide, Event
+from .event_table import RandomEvent
 from .measures import MEASURES, read_measure, same_measure
 from .quantiles import CONFIDENCE, Estimate, quantile, runs_needed, share
 from .rig import Rig
 from .window import Phase, Window
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @declaration
@@ -59,23 +57,10 @@ class Sample:
     trips: Value = quantity("1", "1 where the safety coupling opens")
 
 
-def _row_form() -> type[BaseModel]:
-    """The form of a row, from the declaration of a sample. The missing numbers of a failed run are null, and
-    so is the trip torque without a coupling."""
-    number = float | None
-    fields: dict[str, Any] = {v.name: (number, Field(allow_inf_nan=False)) for v in Layout(Sample).variables}
-    return create_model(
-        "Row",
-        __config__=ConfigDict(extra="forbid", strict=True),
-        run=(int, Field(ge=0)),
-        side=(SideName | None, Field()),
-        drawn=(dict[str, Annotated[float, Field(allow_inf_nan=False)]], Field()),
-        failed=(str | None, Field()),
-        **fields,
-    )
-
-
-_Row = _row_form()
+BATCH = 16
+"""Number of runs in a batch: a second or two of work, which a kill loses."""
+_LETTERS = 300
+_NO_SIDE = "none"
 QUANTILES = (0.05, 0.5, 0.95, 0.99)
 
 
@@ -89,8 +74,6 @@ class Task:
     steady: float
     fed_from: float | None = None
     """time at which a machine that starts empty was fed [s]"""
-    absent: frozenset[str] = frozenset()
-    """names of the measures that this motor or machine does not have"""
 
     @property
     def rig(self) -> Rig:
@@ -113,7 +96,6 @@ class Task:
             "coupling": asdict(config.coupling) if config.coupling else None,
             "steady": self.steady,
             "fed_from": self.fed_from,
-            "row": list(_Row.model_fields),
         }
         content = hashlib.sha256(json.dumps(relevant, sort_keys=True).encode())
         for name in sorted(self.files):
@@ -121,30 +103,67 @@ class Task:
         return content.hexdigest()[:12]
 
 
-_worker: dict[str, Simulation] = {}
+def result_variables(event: RandomEvent) -> list[ResultVariable]:
+    """The results of a run: its side, the drawn quantities of its event, the sample, and the reason why it
+    failed. The numbers of the sample are NaN where the run failed, where the machine has no such quantity, and,
+    of the trip torque, without a coupling."""
+    units = {v.name: v for v in variables(event.of.Parameters)}
+    return [
+        ResultVariable("side", "1", "side of the event", "int8", flags=(_NO_SIDE, *SIDES)),
+        *(
+            ResultVariable(f"drawn_{name}", units[name].unit, f"drawn: {units[name].description}")
+            for name in event.ranges
+        ),
+        *(ResultVariable(v.name, v.unit, v.description) for v in Layout(Sample).variables),
+        ResultVariable("failed", "1", "reason why an FMU failed; empty where none did", letters=_LETTERS),
+    ]
 
 
-def _close() -> None:
-    for simulation in _worker.values():
-        simulation.close()
-    _worker.clear()
+@dataclass(frozen=True)
+class Parcel:
+    """A task with the content of its FMUs by their names: a worker on another machine does not have their
+    files."""
 
+    task: Task
+    digest: str
+    content: Mapping[str, bytes]
 
-def _begin() -> None:
-    """Prepare a worker process."""
-    end_at_signals()
-    atexit.register(_close)
+    @classmethod
+    def of(cls, task: Task) -> Parcel:
+        """The parcel of a task whose FMUs are files."""
+        return cls(task, task.digest(), {name: Path(file).read_bytes() for name, file in task.files.items()})
 
-
-def _saved_simulation(task: Task, digest: str) -> Simulation:
-    """The co-simulation of this process, after the start-up, with its steady state saved."""
-    if digest not in _worker:
-        _close()
-        simulation = task.rig.from_rest()
-        simulation.run(task.steady, task.rig.step)
+    def start(self) -> Simulation:
+        """The co-simulation of the task after the start-up, with its steady state saved."""
+        folder = temporary_folder("chainunit_runs")
+        try:
+            files = {name: Path(folder, f"{name}.fmu") for name in self.content}
+            for name, file in files.items():
+                file.write_bytes(self.content[name])
+            # it unpacks the FMUs
+            simulation = replace(self.task, files=files).rig.from_rest()
+        finally:
+            remove_folder(folder)
+        simulation.run(self.task.steady, self.task.rig.step)
         simulation.save()
-        _worker[digest] = simulation
-    return _worker[digest]
+        return simulation
+
+
+_simulations: dict[str, Simulation] = {}
+"""The co-simulation of this process, by the digest of its task."""
+
+
+def _saved_simulation(parcel: Parcel) -> Simulation:
+    if parcel.digest not in _simulations:
+        close_simulation()
+        _simulations[parcel.digest] = parcel.start()
+    return _simulations[parcel.digest]
+
+
+def close_simulation() -> None:
+    """Close the co-simulation that `make_runs` keeps in this process."""
+    while _simulations:
+        _simulations.popitem()[1].close()
 
 
 @dataclass(frozen=True)
@@ -201,76 +220,59 @@ def one(task: Task, number: int, simulation: Simulation) -> Sample:
     )
 
 
-def row_of(task: Task, digest: str, number: int) -> dict[str, Any]:
-    """The result of the run with that number, as a row of the file."""
-    simulation = _saved_simulation(task, digest)
-    layout = Layout(Sample)
-    chance = draw(task.config, number)
-    head = {"run": number, "side": chance.event.side or None, "drawn": chance.values}
+def make_runs(parcel: Parcel, begin: int, end: int) -> dict[str, Any]:
+    """The results of the runs from number `begin` to `end` - 1, by the names of `result_variables`."""
+    simulation = _saved_simulation(parcel)
+    runs = [_result_of(parcel.task, number, simulation) for number in range(begin, end)]
+    return {name: [run[name] for run in runs] for name in runs[0]}
+
+
+def _result_of(task: Task, number: int, simulation: Simulation) -> dict[str, Any]:
+    """The results of the run with that number."""
+    chance, failed = draw(task.config, number), ""
+    sample = dict.fromkeys(Layout(Sample).names)
     try:
-        return {**head, "failed": None, **layout.by_name(one(task, number, simulation))}
+        sample = Layout(Sample).by_name(one(task, number, simulation))
     except InterruptedRunError:
         raise
     except RunError as error:
         # a run that fails is a result, too; the next run starts from the saved state again
-        return {**head, "failed": str(error), **dict.fromkeys(layout.names)}
-
-
-def read_rows(file: Path, absent: frozenset[str] = frozenset()) -> tuple[dict[int, dict[str, Any]], int]:
-    """The rows of a results file by their number, and the number of lines that were left out.
-
-    A line counts as a row if it has the complete form: every number is present and finite, except those of
-    the `absent` measures; or the run failed and no number is present. Rows of the same number that differ do
-    not count. A last line that was cut off when the study was killed is ignored.
-    """
-    rows: dict[int, dict[str, Any]] = {}
-    twice: set[int] = set()
-    left_out = 0
-    if not file.exists():
-        return rows, left_out
-    with file.open("rb") as lines:
-        for line in lines:
-            row = _row_in(line, absent)
-            if row is None:
-                left_out += line.endswith(b"\n")
-            elif rows.setdefault(row["run"], row) is not row:
-                left_out += 1
-                if rows[row["run"]] != row:
-                    twice.add(row["run"])
-    return {number: row for number, row in rows.items() if number not in twice}, left_out + len(twice)
-
-
-def _row_in(line: bytes, absent: frozenset[str]) -> dict[str, Any] | None:
-    """The row in a line; None where the line is no row."""
-    try:
-        row = _Row.model_validate_json(line).model_dump()
-    except ValidationError:
-        return None
-    gaps = {name for name in Layout(Sample).names if row[name] is None}
-    whole_row = (
-        gaps <= {"trip_torque", *absent} if row["failed"] is None else len(gaps) == len(Layout(Sample).names)
-    )
-    return row if whole_row else None
+        failed = str(error) or type(error).__name__
+    return {
+        "side": np.int8((_NO_SIDE, *SIDES).index(chance.event.side or _NO_SIDE)),
+        **{f"drawn_{name}": value for name, value in chance.values.items()},
+        **{name: math.nan if value is None else float(value) for name, value in sample.items()},
+        "failed": failed,
+    }
 
 
 @dataclass(frozen=True)
 class MonteCarloResult:
-    """The results of the runs: the rows of the file, and the file."""
+    """The results of the runs, by the names of `result_variables`, over the dimension ``run``; and their store."""
 
-    rows: list[dict[str, Any]]
+    dataset: xr.Dataset
     file: Path
-    earlier_runs: int
-    """number of runs that the file had before"""
-    left_out: int = 0
-    """number of lines that were no rows, or were differing rows of the same run; these runs were computed
-    anew"""
+    earlier_runs: int = 0
+    """number of runs that the store had before"""
+    damaged_batches: int = 0
+    """number of batches that were damaged in the store; their runs were computed anew"""
+
+    @property
+    def runs(self) -> int:
+        """Number of runs."""
+        return int(self.dataset.sizes["run"])
+
+    def values(self, name: str) -> Sequence[float]:
+        """The values of a result in the runs that have it."""
+        values = self.dataset[name].values
+        return [float(x) for x in values[~np.isnan(values)]]
 
     def quantiles(self) -> dict[str, dict[str, Estimate]]:
         """Quantiles of every answer, and shares of the runs that stall or trip, each with its interval. A
         quantile is left out where there are too few runs for its interval."""
         estimates_of: dict[str, dict[str, Estimate]] = {}
         for v in Layout(Sample).variables:
-            values = [row[v.name] for row in self.rows if row[v.name] is not None]
+            values = self.values(v.name)
             if not values or v.name in ("event", "crank_angle"):
                 continue
             if v.name in ("stalls", "trips"):
@@ -283,7 +285,7 @@ class MonteCarloResult:
     @property
     def remark(self) -> str:
         """Words on the quantiles for which there are too few runs; empty where there are enough."""
-        count = len(self.rows) - self.failures
+        count = self.runs - self.failures
         omissions = [q for q in QUANTILES if count < runs_needed(q)]
         if not omissions:
             return ""
@@ -293,22 +295,27 @@ class MonteCarloResult:
     @property
     def sides(self) -> dict[SideName, int]:
         """Number of runs by the side of the event; empty for an event without a side."""
-        sides = {row["side"] for row in self.rows}
-        return {side: sum(row["side"] == side for row in self.rows) for side in SIDES if sides != {None}}
+        sides = self.dataset["side"].values
+        return {side: int(np.sum(sides == k)) for k, side in enumerate(SIDES, 1) if np.any(sides)}
+
+    @cached_property
+    def reasons(self) -> dict[int, str]:
+        """Why an FMU failed, by the number of the run."""
+        return {k: words for k, words in enumerate(texts(self.dataset["failed"])) if words}
 
     @property
     def failures(self) -> int:
         """Number of runs in which an FMU failed."""
-        return sum(row["failed"] is not None for row in self.rows)
+        return len(self.reasons)
 
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON, each number with its unit."""
         units, kinds = {v.name: v.unit for v in Layout(Sample).variables}, {"share": ("1", "percent")}
         return {
-            "runs": entry(len(self.rows), "1"),
+            "runs": entry(self.runs, "1"),
             "sides": {side: entry(runs, "1") for side, runs in self.sides.items()},
             "failed": entry(self.failures, "1"),
-            "left_out": entry(self.left_out, "1"),
+            "damaged_batches": entry(self.damaged_batches, "1"),
             "file": self.file.name,
             "quantiles": {
                 name: {k: each.as_dict(*kinds.get(k, (units[name],))) for k, each in sizes.items()}
@@ -318,66 +325,27 @@ class MonteCarloResult:
         }
 
 
-def run(task: Task, folder: Path, report: Report, workers: int | None = None) -> MonteCarloResult:
-    """Make the missing runs of the task on all processors, and append each row to the file in `folder` when
-    its run ends.
-
-    Raises
-    ------
-    RunError
-        where an FMU fails, or the file cannot be written; earlier results are in the file.
-    InterruptedRunError
-        after Ctrl-C; likewise.
-    """
-    digest = task.digest()
-    file = folder / f"monte_carlo_{digest}.jsonl"
-    rows, left_out = read_rows(file, task.absent)
-    earlier_runs = len(rows)
-    count = int(task.config.monte_carlo.runs)
-    open_runs = [k for k in range(count) if k not in rows]
-    workers = workers or os.cpu_count() or 1
-    what = "overloads at random"
-    complete = count - len(open_runs)
-    report(what, complete, count)
-    if left_out or (file.exists() and not file.read_bytes().endswith(b"\n")):
-        # the next row must not be appended to a last line that was cut off
-        with whole(file) as part:
-            part.write_text("".join(_line(row) for row in rows.values()), "utf-8")
-    with writing(file):
-        out = file.open("a", encoding="utf-8")
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_begin) as pool, out:
-        waiting: set[Future[dict[str, Any]]] = set()
-        numbers = iter(open_runs)
-        try:
-            while True:
-                # a few runs at a time, as a study may have a million
-                for k in islice(numbers, 2 * workers - len(waiting)):
-                    waiting.add(pool.submit(row_of, task, digest, k))
-                if not waiting:
-                    break
-                finished_runs, waiting = wait(waiting, return_when=FIRST_COMPLETED)
-                new = sorted((future.result() for future in finished_runs), key=lambda row: row["run"])
-                rows |= {row["run"]: row for row in new}
-                with writing(file):
-                    out.writelines(_line(row) for row in new)
-                    out.flush()
-                complete += len(finished_runs)
-                report(what, complete, count)
-        except BrokenProcessPool as error:
-            raise RunError(
-                f"a process of the random overloads was ended from outside after {len(rows)} of {count} runs; "
-                "run the study again to go on"
-            ) from error
-        except OSError as error:
-            raise RunError(
-                f"a process of the random overloads failed after {len(rows)} of {count} runs "
-                f"({error.strerror or error}); run the study again to go on"
-            ) from error
-        except KeyboardInterrupt as error:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise InterruptedRunError(f"interrupted after {len(rows)} of {count} random overloads") from error
-    return MonteCarloResult([rows[k] for k in sorted(rows) if k < count], file, earlier_runs, left_out)
+def job_of(task: Task) -> Job:
+    """The random overloads of a task, as work in batches."""
+    parcel = Parcel.of(task)
+    return Job(
+        name="monte_carlo",
+        title="overloads at random",
+        points=int(task.config.monte_carlo.runs),
+        batch=BATCH,
+        variables=result_variables(task.config.random),
+        work=make_runs,
+        task=parcel,
+        digest=parcel.digest,
+        dimension="run",
+        close=close_simulation,
+    )
 
 
-def _line(row: Mapping[str, Any]) -> str:
-    return json.dumps(row, allow_nan=False) + "\n"
+def run(
+    task: Task, folder: Path, report: Report, workers: int | None = None, scheduler: str | None = None
+) -> MonteCarloResult:
+    """Make the missing runs of the task and write them to the store in `folder`; the other arguments and the errors
+    are those of `chainunit.runner.run`."""
+    outcome = run_job(job_of(task), folder, report, workers, scheduler)
+    return MonteCarloResult(outcome.dataset, outcome.file, outcome.earlier_points, outcome.damaged_batches)

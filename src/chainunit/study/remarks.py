@@ -365,12 +365,11 @@ def _on_random_overloads(study: StudyRecord) -> None:
             )
     if random and random.remark:
         note("too few runs", "overloads at random: {text}", text=random.remark)
-    if random and random.left_out:
+    if random and random.damaged_batches:
         note(
-            "rows left out",
-            "overloads at random: {rows} lines of {file} were no rows of this study and are left out; their "
-            "runs, if they had any, were repeated.",
-            rows=str(random.left_out),
+            "runs made anew",
+            "overloads at random: {batches} batches of runs in {file} were damaged, and were computed anew.",
+            batches=str(random.damaged_batches),
             file=random.file.name,
         )
 

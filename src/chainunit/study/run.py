@@ -15,6 +15,7 @@ import xarray as xr
 from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
 from ..progress import Progress, Report
+from ..runner import check_scheduler
 from ..system import Simulation
 from ..text import number, shown_in
 from . import verdict
@@ -46,10 +47,12 @@ def run_study(
     *,
     check: bool = False,
     backend: Backend | None = None,
+    scheduler: str | None = None,
 ) -> StudyRecord:
     """Run the study; FMUs are written to ``folder/fmu``, by `backend` (see `chainunit.fmu.backends`).
 
-    With `check`, every run is also compared with the monolithic solution.
+    With `check`, every run is also compared with the monolithic solution. The workers of a `scheduler` of Dask, by
+    its address, make the random overloads; without it local processes do.
     A run that fails ends the study early: the record has the earlier results, and `failure` is the error.
 
     Raises
@@ -57,14 +60,27 @@ def run_study(
     InputError
         for a communication step that is too long for the driveline, a catalogue that sizing cannot use,
         random overloads for which the drive has no inputs, and a foreign motor that does not fit or cannot
-        save its state.
+        save its state; and for a scheduler that does not answer, or has nothing to do.
     """
+    if scheduler is not None:
+        if not config.monte_carlo.runs:
+            raise InputError(
+                "--scheduler: is for random overloads, and this study has none (monte_carlo.runs); leave it out"
+            )
+        check_scheduler(scheduler)
     with shown_in(config.units):
-        return _run_study(config, folder, report or (lambda what, done, todo: None), check, backend)
+        return _run_study(
+            config, folder, report or (lambda what, done, todo: None), check, backend, scheduler
+        )
 
 
 def _run_study(
-    config: Config, folder: Path, report: Report, check: bool, backend: Backend | None
+    config: Config,
+    folder: Path,
+    report: Report,
+    check: bool,
+    backend: Backend | None,
+    scheduler: str | None,
 ) -> StudyRecord:
     """See `run_study`."""
     choice = choose(config, folder / "fmu", report, backend)
@@ -87,8 +103,8 @@ def _run_study(
     try:
         runner.run(check, lambda: drive.coasting(folder / "fmu", backend))
         if config.monte_carlo.runs:
-            task = Task(config, drive, files, runner.stop, runner.rig.fed_from, frozenset(study.absent))
-            study.monte_carlo = run_monte_carlo(task, folder, report)
+            task = Task(config, drive, files, runner.stop, runner.rig.fed_from)
+            study.monte_carlo = run_monte_carlo(task, folder, report, scheduler=scheduler)
         _analyse(study, runner.rig, report, needs_runs=True)
     except RunError as error:
         if error.partial is not None:
