@@ -7,8 +7,10 @@ import dataclasses
 import json
 import math
 import os
+import pickle
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import textwrap
@@ -294,12 +296,41 @@ def test_a_damaged_batch_is_computed_anew_and_told(killed, tmp_path):
     assert reports == [(0, 50), (48, 50), (50, 50)] and content(copy) == content(store)
 
 
+def test_a_machine_without_the_files_of_the_fmus_makes_the_same_runs(killed, tmp_path):
+    """A parcel that has come over a wire holds all that a run needs."""
+    parcel = monte_carlo.Parcel.of(task_of(killed[0]))
+    nowhere = dict.fromkeys(parcel.content, tmp_path / "nowhere.fmu")
+    away = dataclasses.replace(parcel, task=dataclasses.replace(parcel.task, files=nowhere))
+    try:
+        runs = monte_carlo.make_runs(pickle.loads(pickle.dumps(away)), 17, 19)
+    finally:
+        monte_carlo.close_simulation()
+    wanted = opened(killed[0]).dataset.isel(run=slice(17, 19))
+    assert runs["failed"] == ["", ""] and len(runs) == len(wanted)
+    for name in set(runs) - {"failed"}:
+        np.testing.assert_array_equal(runs[name], wanted[name])
+
+
+def test_a_scheduler_is_asked_before_any_run(tmp_path):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        address = f"tcp://127.0.0.1:{taken.getsockname()[1]}"
+        for runs, words in (
+            (4, f"scheduler {address}: does not answer"),
+            (0, f"scheduler {address}: is for random"),
+        ):
+            (tmp_path / "study.toml").write_text(STUDY.format(runs=runs))
+            done = chainunit("study", "study.toml", "-o", "out", "--scheduler", address, cwd=tmp_path)
+            assert done.returncode == 2 and words in done.stderr and len(done.stderr.splitlines()) == 1
+            assert not (tmp_path / "out" / "fmu").exists()
+
+
 @pytest.mark.parametrize("end", [None, signal.SIGTERM])
 def test_processes_leave_nothing_behind(end, tmp_path):
     """No folder stays behind when the processes end, nor after SIGTERM to all of them."""
     scratch = tmp_path / "scratch"
     scratch.mkdir()
-    running = start(tmp_path, 40 if end is None else 10_000, env=os.environ | {"TMPDIR": str(scratch)})
+    running = start(tmp_path, 18 if end is None else 10_000, env=os.environ | {"TMPDIR": str(scratch)})
     if end is not None:
         while not marks(tmp_path) or len(list(scratch.glob("chainunit*"))) < 4:
             assert running.poll() is None

@@ -12,6 +12,7 @@ from ..progress import Report as Progress
 from ..reading import in_file
 from ..study.choice import check_files
 from ..study.config import Config
+from ..study.monte_carlo import check_workers
 from ..study.record import LOAD_CYCLE, StudyRecord
 from ..study.run import run_study
 from . import files, series
@@ -42,6 +43,8 @@ def compute(
     with file_context():
         # before the files of an earlier run are removed, and before any progress is reported
         check_files(config)
+    if scheduler is not None:
+        check_workers(config, scheduler)
     clear(folder, *FILES)
     if progress is not None:
         progress("the machine at constant speed", 0.0, 1.0)

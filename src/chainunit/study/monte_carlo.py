@@ -20,11 +20,12 @@ import numpy as np
 
 from .. import __version__
 from ..ending import remove_folder, temporary_folder
-from ..errors import InterruptedRunError, RunError
+from ..errors import InputError, InterruptedRunError, RunError, printable
 from ..job import Job, ResultVariable, texts
 from ..machines.chain_unit import SIDES, SideName
 from ..progress import Report
 from ..quantities import Layout, Value, declaration, quantity, variables
+from ..runner import check_scheduler
 from ..runner import run as run_job
 from ..system import Simulation
 from ..text import entry
@@ -323,6 +324,22 @@ class MonteCarloResult:
             },
             "confidence": entry(CONFIDENCE, "1", "percent"),
         }
+
+
+def check_workers(config: Config, scheduler: str) -> None:
+    """Refuse a scheduler that is not needed, or does not answer, before the runs that come first.
+
+    Raises
+    ------
+    InputError
+        see `chainunit.runner.check_scheduler`.
+    """
+    if not config.monte_carlo.runs:
+        raise InputError(
+            f"scheduler {printable(scheduler)}: is for random overloads, and this study has none (monte_carlo.runs); "
+            "leave it out"
+        )
+    check_scheduler(scheduler)
 
 
 def job_of(task: Task) -> Job:

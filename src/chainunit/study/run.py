@@ -15,7 +15,6 @@ import xarray as xr
 from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
 from ..progress import Progress, Report
-from ..runner import check_scheduler
 from ..system import Simulation
 from ..text import number, shown_in
 from . import verdict
@@ -60,14 +59,8 @@ def run_study(
     InputError
         for a communication step that is too long for the driveline, a catalogue that sizing cannot use,
         random overloads for which the drive has no inputs, and a foreign motor that does not fit or cannot
-        save its state; and for a scheduler that does not answer, or has nothing to do.
+        save its state.
     """
-    if scheduler is not None:
-        if not config.monte_carlo.runs:
-            raise InputError(
-                "--scheduler: is for random overloads, and this study has none (monte_carlo.runs); leave it out"
-            )
-        check_scheduler(scheduler)
     with shown_in(config.units):
         return _run_study(
             config, folder, report or (lambda what, done, todo: None), check, backend, scheduler
