@@ -82,6 +82,14 @@ def marks(folder):
     return list(folder.glob(f"*.zarr/{CHECKS}/c/*"))
 
 
+def vanish(process):
+    """Wait until the last process of a group is gone."""
+    with contextlib.suppress(ProcessLookupError):
+        while True:
+            os.killpg(process.pid, 0)
+            time.sleep(0.02)
+
+
 def opened(folder):
     """The results in a folder."""
     (store,) = folder.glob("*.zarr")
@@ -98,12 +106,17 @@ def killed(tmp_path_factory):
     """The folder of a study that was killed after its first batch, whose first chunk was then cut off, and that was
     resumed; the number of batches that it had, and what the second process said."""
     folder = tmp_path_factory.mktemp("monte carlo")
-    first = start(folder, RUNS)
+    scratch = folder / "scratch"
+    scratch.mkdir()
+    first = start(folder, RUNS, env=os.environ | {"TMPDIR": str(scratch)})
     while not marks(folder):
         assert first.poll() is None, first.stderr.read()
         time.sleep(0.02)
-    os.killpg(first.pid, signal.SIGKILL)
+    # its workers notice, and remove what they have unpacked
+    os.kill(first.pid, signal.SIGKILL)
     first.communicate()
+    vanish(first)
+    assert list(scratch.glob("chainunit*")) == []
     done = marks(folder)
     (store,) = folder.glob("*.zarr")
     (store / "crank_torque_peak" / "c" / done[0].name).write_bytes(b"cut off")
@@ -338,10 +351,7 @@ def test_processes_leave_nothing_behind(end, tmp_path):
         os.killpg(running.pid, end)
     _, errors = running.communicate(timeout=120)
     assert (running.returncode == 0) == (end is None), errors
-    with contextlib.suppress(ProcessLookupError):
-        while True:  # until the last of its processes is gone
-            os.killpg(running.pid, 0)
-            time.sleep(0.02)
+    vanish(running)
     assert list(scratch.glob("chainunit*")) == []
 
 

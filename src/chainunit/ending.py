@@ -8,8 +8,9 @@ import secrets
 import shutil
 import signal
 import tempfile
+import threading
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 _folders: set[str] = set()
 """The temporary folders of this process."""
@@ -30,11 +31,16 @@ def remove_folder(folder: str) -> None:
     _folders.discard(folder)
 
 
+_removing = threading.RLock()
+"""Held while all folders are removed: no other thread ends the process in the middle. A signal may come then, too."""
+
+
 @atexit.register
 def remove_folders() -> None:
     """Remove all temporary folders of this process."""
-    while _folders:
-        shutil.rmtree(_folders.pop(), ignore_errors=True)
+    with _removing:
+        while _folders:
+            shutil.rmtree(_folders.pop(), ignore_errors=True)
 
 
 def end_at_signals() -> None:
@@ -53,3 +59,11 @@ def end_at_signals() -> None:
 def dask_setup(worker: Any) -> None:
     """What a worker of Dask calls when it begins, as this module is preloaded there."""
     end_at_signals()
+    leave = os._exit
+
+    def leave_nothing(status: int) -> NoReturn:
+        remove_folders()
+        leave(status)
+
+    # a thread of Dask ends the worker so, and calls nothing else, where the process that started it is gone
+    os._exit = leave_nothing
