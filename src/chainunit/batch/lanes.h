@@ -64,7 +64,7 @@ BY_LANES(sqrt)
 BY_LANES(floor)
 BY_LANES(ceil)
 BY_LANES(sign)
-PAIR_BY_LANES(pow)
+VECTOR_PAIR(pow)
 PAIR_BY_LANES(fmod)
 PAIR_BY_LANES(copysign)
 

@@ -2,12 +2,14 @@
 
 Runs differ in parameters, states at the start, signals, and end. Each is integrated by the method of the model's FMU,
 with equal steps or with error control of its own (`chainunit.integrate`), and its signals are evaluated at every
-stage.
+stage. Without constraints a step need not end at a row: the rows are interpolated (the dense output of Dormand and
+Prince, of fourth order, with scipy's coefficients).
 """
 
 from __future__ import annotations
 
 import ctypes
+import hashlib
 import math
 import os
 from collections.abc import Mapping, Sequence
@@ -17,6 +19,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from scipy.integrate import RK45
 
 from .. import integrate
 from ..engines import MATH, casadi_
@@ -24,7 +27,7 @@ from ..errors import InputError
 from ..model import Model
 from ..native.code import constant
 from ..native.compilers import Compiler, compiler
-from ..native.operations import Operations
+from ..native.operations import ARGUMENT, Operations
 from ..quantities import Variable
 from ..trace import trace
 from .equations import arguments_of, find, outputs_of
@@ -74,7 +77,7 @@ class Runs:
 
 
 class Transients:
-    """The compiled loop of a model.
+    """The compiled loop of a model; `digest` is that of its source.
 
     Parameters
     ----------
@@ -108,7 +111,7 @@ class Transients:
         own = compiler()
         if own is None:
             raise InputError("no C compiler (cc, gcc, clang, or zig by pip install 'chainunit[cross]') found")
-        self._library, self._inputs = _compiled(
+        self.digest, self._library, self._inputs = _compiled(
             model, self.outputs, self._varying, self._driven, self._guarded, changes, own
         )
 
@@ -118,7 +121,7 @@ class Transients:
         inputs: Mapping[str, float],
         states: Any,
         *,
-        begin: float,
+        begin: Any,
         step: float,
         stop: Any,
         varying: Any = None,
@@ -134,8 +137,8 @@ class Transients:
         parameters : an instance of the model's declaration, for all that do not vary
         inputs : values of the inputs by name; all others have their start values
         states : at the begin, shape (states,) or (states, runs)
-        begin, step : [s]
-        stop : end of each run [s], shape (runs,)
+        begin, stop : begin and end of each run [s], shape (runs,), or one begin of all
+        step : time between rows [s]; the last step of a run may be shorter
         varying : values of the parameters that differ, shape (parameters, runs)
         signals : of the driven inputs, shape (inputs, 1 + 3*changes, runs): the value before, and for each change its
             begin [s], its duration [s] and the value after it; see `chainunit.system.signals.Profile`
@@ -146,7 +149,8 @@ class Transients:
         stop = np.atleast_1d(np.asarray(stop, float))
         runs = len(stop)
         room = -(-runs // _LANES) * _LANES
-        rows = 1 + max(0, math.ceil((float(np.max(stop)) - begin) / step - 1e-9))
+        begin = np.broadcast_to(np.asarray(begin, float), runs)
+        rows = 1 + max(0, math.ceil(float(np.max(stop - begin)) / step - 1e-9))
         n_x = len(np.atleast_1d(states))
 
         def filled(x: Any, *shape: int) -> Any:
@@ -158,12 +162,12 @@ class Transients:
 
         x = np.asarray(states, float)
         x = filled(x if x.ndim == 2 else x[:, None], n_x)
-        ends = filled(stop)
         n_s = 1 + 3 * self._changes
         arrays = [
             filled(np.zeros(runs) if varying is None else varying, len(self._varying)),
             filled(np.zeros(runs) if signals is None else signals, len(self._driven), n_s),
-            ends,
+            filled(begin),
+            filled(stop),
             filled(np.inf if limits is None else limits, len(self._guarded)),
         ]
         uniform = self._uniform(parameters, inputs)
@@ -171,7 +175,6 @@ class Transients:
         count = np.zeros(room, np.int64)
         p, model = self.model.prepared(MATH, parameters), self.model
         numbers = [
-            begin,
             step,
             longest or float(model.internal_step(MATH, p)),
             float(model.tolerance(MATH, p)) if model.controlled else 0.0,
@@ -191,7 +194,7 @@ class Transients:
         else:
             with ThreadPoolExecutor(min(workers, os.cpu_count() or 1)) as pool:
                 list(pool.map(piece, pieces))
-        times = np.minimum(begin + step * np.arange(rows), stop[:, None])
+        times = np.minimum(begin[:, None] + step * np.arange(rows), stop[:, None])
         count = count[:runs]
         return Runs(out[:, :runs], np.abs(count), count < 0, x[:, :runs], times)
 
@@ -212,8 +215,8 @@ def _compiled(
     guarded: tuple[str, ...],
     changes: int,
     own: Compiler,
-) -> tuple[ctypes.CDLL, list[str]]:
-    """The library of the loop, and the names of its uniform arguments."""
+) -> tuple[str, ctypes.CDLL, list[str]]:
+    """A digest of the source of the loop, its library, and the names of its uniform arguments."""
     operations = _operations(model, outputs)
     assert model.state_layout is not None
     states = model.state_layout.variables
@@ -247,11 +250,13 @@ def _compiled(
         "COLUMNS": len(code.columns),
         "ROOM": code.room,
         "CHANGES": changes,
-        "CONTROLLED": int(model.controlled),
+        "SIGNALS": len(driven),
+        "METHOD": _method(model, operations),
         "PUT": " ".join(put),
         "GUARDED": " ".join(guards),
     }
     constants = {name: value for name, value in vars(integrate).items() if name in _NUMBERS}
+    constants["DENSE"] = tuple(map(tuple, RK45.P))
     constants["NOMINAL"] = tuple(v.quantity.nominal or 1.0 for v in states)
     source = "\n".join(
         [
@@ -267,7 +272,17 @@ def _compiled(
     )
     names = [v.name for v in arguments_of(model)]
     starts = (0, sizes[0], sum(sizes))
-    return load(source, own), [names[starts[kind] + k] for kind, k in code.inputs]
+    digest = hashlib.sha256(source.encode()).hexdigest()
+    return digest, load(source, own), [names[starts[kind] + k] for kind, k in code.inputs]
+
+
+def _method(model: type[Model], operations: Operations) -> str:
+    """How the model is integrated, see transients.h."""
+    if not model.controlled:
+        return "EVEN"
+    met = [operations.items[place] for place in operations.results[2]]
+    free = all(each.kind == ARGUMENT and each.entry == (2, k) for k, each in enumerate(met))
+    return "INTERPOLATED" if free else "TO_ROWS"
 
 
 def _named(name: str) -> Variable:
