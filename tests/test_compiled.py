@@ -15,6 +15,7 @@ from systems import component, pair, whole_systems
 from chainunit import InputError
 from chainunit.composite import composed
 from chainunit.composition import SOLVER
+from chainunit.drives.gear import Gear
 from chainunit.engines import MATH, casadi_, numpy_
 from chainunit.errors import GeometryError
 from chainunit.machines.linkages.file import read_linkage
@@ -22,7 +23,7 @@ from chainunit.model import Model, Part
 from chainunit.models import MODELS
 from chainunit.ports import LoadPort
 from chainunit.quantities import Layout, Value, declaration, quantity
-from chainunit.system import System, compiled
+from chainunit.system import ModelComponent, System, compiled, shaft_joints
 
 GALLERY = Path(__file__).parents[1] / "examples" / "linkages"
 CHAINS, SYSTEMS = whole_systems()
@@ -217,6 +218,37 @@ def test_free_terminals_remain():
     assert [n for n in again.model.parameter_layout.names if "solver" in n] == [*SOLVER]
 
 
+def test_a_gear_passes_slopes_on_where_they_are_asked_for():
+    """The load port of gear and machine is that of a machine with this ratio; between motor and machine, nobody
+    needs slopes."""
+    machine = MODELS["ChamberForces"]
+    geared = ModelComponent(Gear, Gear.Parameters(ratio=5.0))
+    joints = shaft_joints("gear", "machine", flange="driven", load="machine")
+    plant = System({"machine": component(machine), "gear": geared}, joints)
+    part = compiled(plant)
+    p = part.model.check(part.parameters)
+    moving = {"phi": 3.0, "w": 20.0, "a": 2.0}
+    u = part.model.input_layout.from_names(
+        {f"gear.{name}": v for name, v in moving.items()} | {"machine.left.material_mass": 7.0}
+    )
+    gear = part.model.evaluate(MATH, p, u)[0].gear
+    whole = machine.check(machine.parameter_layout.from_names({"ratio": 5.0}))
+    load, slopes = machine.evaluate(
+        MATH, whole, machine.input_layout.from_names(moving | {"left.material_mass": 7.0})
+    )
+    assert slopes.tau_bias_dphi != 0.0 != slopes.tau_bias_dw
+    for name in Layout(LoadPort).names:
+        wanted = getattr(slopes if hasattr(slopes, name) else load, name)
+        assert getattr(gear, name) == pytest.approx(wanted, rel=1e-12), name
+    driven = System(
+        plant.components | {"motor": component("DcMotor")}, [*joints, *shaft_joints("motor", "gear")]
+    )
+    model = compiled(driven).model
+    assert len(model.parts) == 1
+    assert not {n for n in model.parts[0].layout.names if n.endswith(("tau_bias_dphi", "tau_bias_dw"))}
+    assert "gear.dJ_dphi" in model.parts[0].layout.names
+
+
 @declaration
 class Nothing:
     pass
@@ -242,6 +274,9 @@ def test_loops_and_names_are_refused(system):
     )
     with pytest.raises(InputError, match=r"algebraic loop: a\.y -> b\.y -> a\.y"):
         compiled(loop)
+    local = type("Local", (Through,), {"__module__": __name__, "__qualname__": "f.<locals>.Local"})
+    with pytest.raises(InputError, match=r"^f\.<locals>\.Local: is defined inside a function"):
+        compiled(System({"a": component(local)}))
     for name in ("solver", "derived", "_x", "class"):
         with pytest.raises(InputError, match=rf'"{name}": a component .* cannot have this name'):
             compiled(System({name: component("DcMotor")}))

@@ -12,7 +12,7 @@ from functools import cache
 from types import MappingProxyType
 from typing import Any, ClassVar
 
-from .composition import Composition, SystemPoint, modules_of
+from .composition import Composition, SystemPoint, modules_of, referred
 from .errors import GeometryError, refusal_prefix
 from .model import Model, Part, keep
 from .quantities import Layout
@@ -221,13 +221,13 @@ class CompositeModel(Model):
 
 def composed(text: str) -> type[CompositeModel]:
     """The model of a description."""
-    return _composed(text)
+    # a class that was defined anew, as in a notebook, makes a new model
+    return _composed(text, *(referred(each) for _, each in json.loads(text)["components"]))
 
 
 @cache
-def _composed(text: str) -> type[CompositeModel]:
-    of = Composition(json.loads(text))
-    models = of.models.values()
+def _composed(text: str, *models: type[Model]) -> type[CompositeModel]:
+    of = Composition(json.loads(text), models)
     references = [each for _, each in of.data["components"]]
     apart = of.by_differences()
     members: dict[str, Any] = {

@@ -13,6 +13,7 @@ from importlib import import_module
 from operator import attrgetter
 from typing import Any
 
+from .errors import InputError
 from .integrate import MAX_STEPS, Solver
 from .model import Model, Requirement, Terminal
 from .quantities import Layout, Value, declaration, declared_class, group, pruned, quantity
@@ -59,8 +60,19 @@ def _argument(value: Any) -> Any:
 
 
 def _place(thing: Any) -> str:
-    """Module and name, such as ``.drives.dc_motor:DcMotor``; a module of this package begins with a dot."""
+    """Module and name, such as ``.drives.dc_motor:DcMotor``; a module of this package begins with a dot.
+
+    Raises
+    ------
+    InputError
+        for a name that no module has.
+    """
     module = thing.__module__
+    if "<locals>" in thing.__qualname__:
+        raise InputError(
+            f"{thing.__qualname__}: is defined inside a function; the model of a component must have a name in a "
+            "module, or a `maker`"
+        )
     own = f"{__package__}."
     return f"{module[len(own) - 1 :] if module.startswith(own) else module}:{thing.__qualname__}"
 
@@ -117,9 +129,9 @@ class Composition:
     no outputs stand for the states.
     """
 
-    def __init__(self, data: Mapping[str, Any]) -> None:
+    def __init__(self, data: Mapping[str, Any], models: Iterable[type[Model]]) -> None:
         self.data = data
-        self.models: dict[str, type[Model]] = {name: referred(of) for name, of in data["components"]}
+        self.models = {name: model for (name, _), model in zip(data["components"], models, strict=True)}
         self.sources: dict[str, str] = {target: source for source, target in data["connections"]}
         self.steps: Steps = data["steps"]
         self.rate_steps: Steps = data["rate_steps"]

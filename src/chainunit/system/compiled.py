@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import json
 import keyword
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -30,10 +30,10 @@ from .graph import Connection, ModelComponent, System, hold_loads, order
 def compiled(system: System, name: str = "System", title: str = "") -> ModelComponent:
     """One model of a system of models, with the values of its parameters.
 
-    Its names are the full names of the system: of parameters ("motor.armature.R"), states and outputs.
-    Its inputs are the inputs without a connection. The slopes of load ports that are joined are neither inputs nor
-    outputs. Terminals that are not joined are its terminals. One `solver.max_steps`, the largest of the components,
-    holds for the integrator of the whole, which controls the error to `solver.tolerance`.
+    Its names are the full names of the system: of parameters ("motor.armature.R"), states and outputs. Its inputs are
+    the inputs without a connection. The slopes of load ports that are joined are neither inputs nor outputs, unless a
+    free terminal passes them on. Terminals that are not joined are its terminals. One `solver.max_steps`, the largest
+    of the components, holds for the integrator of the whole, which controls the error to `solver.tolerance`.
 
     Parameters
     ----------
@@ -105,38 +105,60 @@ def input_starts(system: System, model: type[Model]) -> dict[str, float]:
 
 def _description(system: System, models: Mapping[str, type[Model]], name: str, title: str) -> dict[str, Any]:
     """See `chainunit.composition.Composition`."""
-    exact = hold_loads(system)
-    slopes = set(system.connections) - set(exact.connections)
+    exact = hold_loads(system).connections
+    influences = {each: _influences(model) for each, model in models.items()}
     free = _free_terminals(system)
+    members = {
+        f"{full.partition('.')[0]}.{variable}"
+        for full in free
+        for variable in system.terminal(full)[1].members.values()
+    }
+    slopes = {c for c in replace(system, slopes=True).connections if c not in exact}
+    gears = {each: influences[each] for each, model in models.items() if not model.state_layout}
+    passed = _passed_on(slopes, members, gears)
+    connections = [*exact, *passed]
+    left_out = {full for connection in slopes - set(passed) for full in connection}
     further = {
         f"{name}.{output}"
         for name, each in models.items()
         for part in each.parts[1:]
         for output in part.layout.names
     }
-    members = {
-        f"{full.partition('.')[0]}.{variable}"
-        for full in free
-        for variable in system.terminal(full)[1].members.values()
-    }
-    extra = sorted(further & (members | {source for source, _ in exact.connections}))
-    influences = {each: _influences(model) for each, model in models.items()}
-    plan = _Plan(exact.connections, models, influences)
+    extra = further & (members | {source for source, _ in connections})
+    plan = _Plan(connections, models, influences)
     kinds = ", ".join(f"{each} ({model.name})" for each, model in models.items())
     return {
         "name": name,
         "title": f"{title}: {kinds}" if title else f"System of {kinds}",
         "components": [[each, reference(model)] for each, model in models.items()],
-        "connections": [list(connection) for connection in exact.connections],
-        "left_out": sorted({full for connection in slopes for full in connection} - set(extra)),
+        "connections": [list(connection) for connection in connections],
+        "left_out": sorted(left_out - extra),
         "terminals": free,
-        "extra": extra,
+        "extra": sorted(extra),
         "steps": plan.steps,
         "rate_steps": plan.steps_for("rates"),
         "closed_steps": plan.steps_for("closed"),
         "start": plan.start(),
         "start_rounds": plan.start_rounds(),
     }
+
+
+def _passed_on(
+    slopes: Collection[Connection], members: Collection[str], gears: Mapping[str, _Influences]
+) -> list[Connection]:
+    """The connections of slopes, by source and target, on which outputs of free terminals depend: a gear, which has
+    no states, passes the slopes of its machine on. A component with states takes the load at its own point."""
+    sources = {target: source for source, target in slopes}
+    passed: list[Connection] = []
+    waiting = sorted(members)
+    while waiting:
+        name, _, output = waiting.pop(0).partition(".")
+        for entry in sorted(gears[name].direct.get(output, ()) if name in gears else ()):
+            source = sources.pop(full := f"{name}.{entry}", None)
+            if source is not None:
+                passed.append((source, full))
+                waiting.append(source)
+    return passed
 
 
 def _free_terminals(system: System) -> list[str]:
