@@ -47,7 +47,11 @@ def test_each_key_of_the_form_is_documented(machine, motor):
     }
     asked = {name for name in _leaves(form) if name not in ("event", "report.units")}
     assert asked <= documented
-    assert {name for name in documented - asked if not name.startswith(("event.", "report.units."))} == set()
+    assert {
+        name
+        for name in documented - asked
+        if not name.startswith(("event.", "report.units.", "sweep.parameter."))
+    } == set()
 
 
 def test_each_type_of_event_has_a_table():
@@ -71,6 +75,9 @@ def _one_key(table, key):
         return f'[system]\nmachine = "{machine}"\n[[event]]\ntype = "{table.of}"\n{side}{own}'
     system = f'[system]\nmachine = "{table.of}"\n' if table.of in MACHINES else ""
     system += f'[system]\nmotor = "{table.of}"\n' if table.of in MOTORS else ""
+    if table.name == "sweep.parameter":
+        own = f"{key.name} = {key.left_out}\n"
+        return f'[[sweep.parameter]]\nname = "machine.r"\ntolerance = "1 mm"\n{own}'
     if table.name in ("gear", "starter"):
         system = '[system]\nmotor = "IE3 4-pole 0.75 kW, 80M"\n'
     if table.name == "torsion":
@@ -113,7 +120,16 @@ def test_a_key_at_its_value_changes_nothing(table, key):
         assert _values(getattr(values, part)) == pytest.approx(_values(getattr(left_out, part)), rel=1e-11)
     for one, other in zip(values.events.values(), left_out.events.values(), strict=True):
         assert _values(one) == pytest.approx(_values(other), rel=1e-11) and one.name == other.name
-    for part in ("starter", "driveline", "torsion", "chain", "simulation", "damping_ratios", "place"):
+    for part in (
+        "sweep",
+        "starter",
+        "driveline",
+        "torsion",
+        "chain",
+        "simulation",
+        "damping_ratios",
+        "place",
+    ):
         assert getattr(values, part) == getattr(left_out, part)
 
 
@@ -131,7 +147,7 @@ def test_the_full_example_names_every_key_once():
     for table in key_tables():
         if table.name in ("", "event", "system") or table.of not in ("", "ChamberForces"):
             continue
-        own = re.split(rf"^(?:# )?\[{table.name}\]", text, flags=re.MULTILINE)[1]
+        own = re.split(rf"^(?:# )?{re.escape(table.bracketed)}", text, flags=re.MULTILINE)[1]
         own = re.split(r"^(?:# )?\[", own, flags=re.MULTILINE)[0]
         set_here = tomllib.loads(text).get(table.name, {})
         for key in table.keys:

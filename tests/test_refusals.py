@@ -81,7 +81,7 @@ def _head(table):
         return f'[[event]]\ntype = "{table.of}"\n'
     part = "machine" if table.of in MACHINES else "motor" if table.of in MOTORS else ""
     system = f'[system]\n{part} = "{table.of}"\n' if part else ""
-    return system + (f"[{table.name}]\n" if table.name else "")
+    return system + (f"{table.bracketed}\n" if table.name else "")
 
 
 @pytest.mark.parametrize("shift", range(3))

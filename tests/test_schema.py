@@ -96,6 +96,10 @@ RIGHT = [
     "[system]\nmotor = 'InductionMotor'\n[motor]\npole_pairs = 2",
     "[system]\nmachine = 'KnifeDrive'\n[[event]]\ntype = 'cut'",
     "[ratios]\nrho = 0.1\n[machine]\ng = 9.81",
+    "[sweep]\nmethod = 'grid'\nquantities = ['min(margin)']\n[[sweep.parameter]]\nname = 'machine.r'\n"
+    "from = '100 mm'\nto = 0.2\npoints = 5\n[[sweep.parameter]]\nname = 'run.crank_speed'\nvalues = ['30 rpm', 4]",
+    "[sweep]\npoints = 100\nangles = 90\n[[sweep.parameter]]\nname = 'machine.l1'\ntolerance = '1 mm'\n"
+    "distribution = 'normal'",
 ]
 
 
@@ -160,6 +164,10 @@ WRONG += [
     "[monte_carlo]\nevent = { type = 'start', side = 'left' }",
     "[monte_carlo]\nevent = { type = 'lumps', turns = 3 }",
     "[monte_carlo]\nevent = { force = [1] }",
+    "[[sweep.parameter]]\nname = 'machine.r'\nfrom = 1",
+    "[[sweep.parameter]]\nname = 'machine.r'\nvalues = [0.1]\ntolerance = 0.1",
+    "[sweep]\nquantities = 'min(margin)'",
+    "[sweep]\nquantities = ['min(margin)']\n[system]\nmachine = 'ChamberForces'\n[chain]",
     "[monte_carlo]\nevent = { force = ['1 m', 2] }",
     "[flywheel]\ncompare = ['1 kg']",
     "[flywheel]\ncompare = 3",

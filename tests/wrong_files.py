@@ -194,4 +194,30 @@ FILES = [
             (7, "run.turns", "must be a whole number"),
         ],
     ),
+    (
+        "[sweep]\nmethod = 'gird'\npoints = 2.5\n[[sweep.parameter]]\nname = 'machine.r'\nfrom = '9 kg'\nto = 1",
+        [(2, "sweep.method", '"grid", "latin_hypercube" or "sobol"'), (3, "sweep.points", "must be a whole number"),
+         (6, "sweep.parameter.1.from", 'such as "2 mm"')],
+    ),
+    (
+        "[sweep]\nquantities = ['peak(crank_torqe)']\nmeasures = ['stall']\nbest = 'rms(tau)'\n"
+        "[[sweep.parameter]]\nname = 'machine.rr'\nfrom = '90 mm'\nto = 1\n"
+        "[[sweep.parameter]]\nname = 'machine.l1'\ntolerance = '2 kg'\npoints = 3\n"
+        "[[sweep.parameter]]\nname = 'machine.l'\nto = '2 m'\n"
+        "[[sweep.parameter]]\nname = 'machine.h'\nfrom = '2 m'\nto = 1\n",
+        [
+            (1, "sweep.event", "must be given, one of"),
+            (2, 'sweep.quantities: "peak(crank_torqe)"', 'was "crank_torque" meant?'),
+            (3, 'sweep.measures: "stall"', "must be one of crank_torque_peak"),
+            (4, "sweep.best", "must be one of the quantities and measures of the sweep"),
+            (6, "sweep.parameter.1.name", 'was "machine.r" meant?'),
+            (11, "sweep.parameter.2.tolerance", 'such as "2 mm"'),
+            (12, "sweep.parameter.2.points", "is of a grid"),
+            (13, "sweep.parameter.3.from", "must be given, beside the other end"),
+            (19, "sweep.parameter.4.to", "must be > from, 2"),
+        ],
+    ),
+    ("[sweep]\n[sizing]", [(1, "sweep", "leave out one of the two")]),
+    ("[sweep]\nmethod = 'grid'\npoints = 3", [(3, "sweep.points", "a grid has the points of its parameters")]),
+    ("[[sweep.parameter]]\nname = 'machine.r'", [(1, "sweep.parameter.1 (machine.r)", "has no values")]),
 ]  # fmt: skip

@@ -10,7 +10,7 @@ from ..drives.motors import MOTORS
 from ..places import Statement, statements
 from ..reading import toml
 from ..refusals import unit_behind
-from .keys import Key, KeyTable, key_tables
+from .keys import PARAMETERS, Key, KeyTable, key_tables
 from .schema import FILE
 
 _OF_OTHERS = ("motor_names.", "machine_names.")
@@ -39,13 +39,14 @@ def commented(text: str, machine: str = "ChamberForces") -> str:
         result += [line, *below.get(number, [])]
     for absent in _absent({each.table.split(".")[0] for each in settings}, machine):
         title = f"{absent.title}: {absent.of}" if absent.of else absent.title
-        result += ["", f"{f'# [{absent.name}]':<{_COLUMN}} # {title}", *map(_line, absent.keys)]
+        result += ["", f"{f'# {absent.bracketed}':<{_COLUMN}} # {title}", *map(_line, absent.keys)]
     return "\n".join(result) + "\n"
 
 
 def _keys(table: str, machine: str, types: list[str]) -> Iterator[Key]:
     """The keys of a table of the file; of an event, those of its type."""
     name, _, number = table.partition(".")
+    name = PARAMETERS if table.startswith(f"{PARAMETERS}.") else name
     of = types[int(number) - 1] if name == "event" else machine
     for each in key_tables():
         if each.name == name and each.of in ("", of):

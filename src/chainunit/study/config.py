@@ -46,6 +46,8 @@ from .sections import (
     Starter,
     TorsionTable,
 )
+from .sweep_plan import SweepPlan
+from .sweep_reading import Sweepable, read_plan
 
 
 @dataclasses.dataclass(frozen=True)
@@ -97,6 +99,7 @@ class Config:
     """the organs as chains, or None for two bars"""
     foreign: ForeignMotor | None
     """the motor, if it is a foreign FMU; `motor` then has no meaning"""
+    sweep: SweepPlan | None
     source: str
     given: frozenset[str]
     """names of all values that the file sets, such as "machine.crank.m"; see `of_example`"""
@@ -297,6 +300,8 @@ def _config(
             parts.motor.check(values["motor"])
     with faults.collected(), refusal_prefix("", "monte_carlo.event"):
         random = read_random_event(checked.monte_carlo.event, "monte_carlo.event")
+    with faults.collected():
+        of_study["sweep"] = _sweep(data, checked, parts, machine, of_study, events)
     faults.refuse()
     config = Config(
         title=checked.title,
@@ -333,6 +338,22 @@ def _config(
     faults.add(_endless(config))
     faults.refuse()
     return config
+
+
+def _sweep(
+    data: Mapping[str, Any],
+    checked: Any,
+    parts: Parts,
+    machine: Machine | None,
+    values: Mapping[str, Any],
+    events: Mapping[str, Event],
+) -> SweepPlan | None:
+    """The plan of the table [sweep]; None without one, and for a machine that was refused."""
+    if "sweep" not in data or machine is None:
+        return None
+    fixed = {"machine.ratio": "follows from the motor's rated speed"} if parts.designation else {}
+    quantities = Sweepable.of(machine, values["feed"], values["run"], events)
+    return read_plan(checked.sweep, values["sweep"], parts.machine, quantities, fixed)
 
 
 def _read_sections(

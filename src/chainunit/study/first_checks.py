@@ -97,6 +97,13 @@ def without(data: Mapping[str, Any], faults: Collection[InputError]) -> dict[str
     return rest
 
 
+def _table(key: str) -> str:
+    """The table of a key; the lists of a sweep, and each of its parameters, count as tables by themselves."""
+    names = key.split(".")
+    lists = (["sweep", "parameter"], ["sweep", "quantities"], ["sweep", "measures"])
+    return ".".join(names[:3]) if names[:2] in lists else names[0]
+
+
 def _key(fault: InputError) -> str:
     """The key that a fault concerns; a fault in another file concerns the catalogue."""
     return "catalogue" if fault.placed else fault.key
@@ -108,19 +115,22 @@ def independent(
     """The refusals of values that do not fit together, without those that depend on a refused value. The
     remaining ones concern other tables, a count, or two limits that are both right."""
     wrong = set(map(_key, faults))
-    tables = {key.partition(".")[0] for key in wrong}
+    tables = {_table(key) for key in wrong}
     if tables & {"system", ""}:
         return []
     if "catalogue" in wrong:
         # it is not known whether the catalogue has the motor
         tables.add("system")
+    if "sweep.method" in wrong:
+        # it decides whether the parameters have points
+        further = [fault for fault in further if fault.key.split(".")[::3] != ["sweep", "points"]]
     counts = {f"{name}.{key}" for name, section in parts.sections.items() for key in section.whole}
     return [
         fault
         for fault in further
         if fault.key not in wrong
         and (
-            fault.key.partition(".")[0] not in tables
+            _table(fault.key) not in tables
             or fault.key in counts
             or (fault.key in LOWER_LIMITS and LOWER_LIMITS[fault.key] not in wrong)
         )

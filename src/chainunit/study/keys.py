@@ -3,6 +3,7 @@ commented example and the schema for editors are made from them."""
 
 from __future__ import annotations
 
+import dataclasses
 import typing
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
@@ -25,6 +26,7 @@ from .config import Config, parse
 from .event import TYPES, Event
 from .parts import ReportTable
 from .sections import CHOICES, SECTIONS, Ratios, SystemTable
+from .sweep_table import SweepEntry
 
 _FOLLOWS = {
     "gear.ratio": "the one with which the crank has its speed under the mean load",
@@ -35,8 +37,14 @@ _FOLLOWS = {
     "motor.current_control.ki": "tuned",
     "driveline.d2": "from damping_ratio",
     "driveline.d3": "from damping_ratio",
+    "sweep.quantities": "without measures peak(crank_torque) and rms(crank_torque)",
+    "sweep.event": "the only one of the study, or that whose quantities are swept",
+    "sweep.best": "the first one",
 }
 """By key, the source of its value if the file leaves the key out."""
+
+
+_VALUE = "a number, or a text with a unit"
 
 
 @dataclass(frozen=True)
@@ -49,7 +57,8 @@ class Key:
     """the quantity of the key; None for a word, a switch or a list"""
     words: tuple[str, ...] = ()
     """the allowed values, as a file writes them; empty where any text is allowed"""
-    sort: typing.Literal["number", "text", "switch", "list", "table"] = "number"
+    sort: typing.Literal["number", "text", "switch", "list", "table", "value"] = "number"
+    """a value is a number or a text with a unit, of a quantity that another key names"""
     left_out: str = ""
     """the value of a key that a file leaves out, as a file would write it; empty where there is none"""
     whole: bool = False
@@ -73,7 +82,7 @@ class Key:
             return self.variable.quantity.allowed_range
         if self.words:
             return ", ".join(self.words)
-        return {"text": "a text", "list": "a list", "table": "a table"}.get(self.sort, "")
+        return {"text": "a text", "list": "a list", "table": "a table", "value": _VALUE}.get(self.sort, "")
 
 
 @dataclass(frozen=True)
@@ -90,10 +99,23 @@ class KeyTable:
     @property
     def heading(self) -> str:
         """The heading of the table: ``[motor] of DcMotor``."""
-        name = f"[[{self.name}]]" if self.name == "event" else f"[{self.name}]"
-        return " ".join(
-            filter(None, (name if self.name else "before all tables", self.of and f"of {self.of}"))
-        )
+        return " ".join(filter(None, (self.bracketed, self.of and f"of {self.of}")))
+
+    @property
+    def is_list(self) -> bool:
+        """Whether a file may have several tables of this name."""
+        return self.name in ("event", PARAMETERS)
+
+    @property
+    def bracketed(self) -> str:
+        """The line that opens the table: ``[motor]``."""
+        if self.is_list:
+            return f"[[{self.name}]]"
+        return f"[{self.name}]" if self.name else "before all tables"
+
+
+PARAMETERS = "sweep.parameter"
+"""Name of the tables with the parameters of a sweep."""
 
 
 @cache
@@ -115,6 +137,7 @@ def key_tables() -> tuple[KeyTable, ...]:
         ),
         *(KeyTable("motor", "Motor", tuple(_of_motor(name)), name) for name in MOTORS),
         *(KeyTable(name, SECTIONS[name].title, tuple(_of_section(name))) for name in SECTIONS),
+        KeyTable(PARAMETERS, "Parameter of a sweep", tuple(_of_fields(_entry_fields()))),
         KeyTable("report", "Report", tuple(_of_report())),
         *(KeyTable("event", _first_sentence(of), tuple(_of_event(of)), name) for name, of in TYPES.items()),
     )
@@ -170,7 +193,9 @@ def _of_section(name: str) -> Iterator[Key]:
     if values is None:
         values = section.default or section.declaration()
     yield from _numbers(section.declaration, values, table=name, whole=section.whole)
-    yield from _of_fields(section.keys)
+    for key in _of_fields(section.keys):
+        follows = _FOLLOWS.get(f"{name}.{key.name}", "")
+        yield dataclasses.replace(key, follows=follows) if follows else key
     if name == "driveline":
         yield from _numbers(Damping)
         for shaft, stiffness in SHAFTS.items():
@@ -232,6 +257,10 @@ def _of_event(of: type[Event]) -> Iterator[Key]:
     yield from _numbers(of.Parameters, of.Parameters(), whole=of.counts)
 
 
+def _entry_fields() -> dict[str, Any]:
+    return {name: (field.annotation, field) for name, field in SweepEntry.model_fields.items()}
+
+
 def _of_fields(fields: Mapping[str, Any], config: Config | None = None) -> Iterator[Key]:
     """Keys that are no quantities, from their pydantic fields."""
     for name, (annotation, field) in fields.items():
@@ -246,8 +275,10 @@ def _of_field(name: str, annotation: Any, field: FieldInfo, value: Any) -> Key:
     items = next((each for each in more if isinstance(each, Variable)), None)
     lengths = [limit.max_length for each in more for limit in getattr(each, "metadata", ())]
     words: tuple[str, ...] = ()
-    sort: typing.Literal["text", "switch", "list", "table"] = "text"
-    if typing.get_origin(base) is typing.Literal:
+    sort: typing.Literal["text", "switch", "list", "table", "value"] = "text"
+    if base is Any:
+        sort = "value"
+    elif typing.get_origin(base) is typing.Literal:
         words = tuple(f'"{word}"' for word in typing.get_args(base))
     elif base is bool:
         words, sort = ("true", "false"), "switch"

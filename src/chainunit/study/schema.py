@@ -17,9 +17,10 @@ from ..reading import may_be_share
 from ..unit_patterns import pattern, zero
 from .event import TYPES
 from .event_table import LONGEST_NAME, PLACED, RESERVED
-from .keys import Key, KeyTable, key_tables
+from .keys import PARAMETERS, Key, KeyTable, key_tables
 from .parts import LONGEST_FILE
 from .schema_rules import OF_PARTS, rules
+from .sweep_table import MEASURES_OF_SWEEP, MOST_PARAMETERS, MOST_RESULTS, MOST_VALUES
 
 FILE = "chainunit.schema.json"
 """The name by which examples refer to it."""
@@ -27,13 +28,19 @@ _EVENT_NAME = {
     "pattern": rf"^[a-z][a-z0-9_]{{0,{LONGEST_NAME - 1}}}$",
     "not": {"anyOf": [{"enum": list(RESERVED)}, {"pattern": "_coasting$"}]},
 }
+_VALUE: dict[str, Any] = {"type": ["number", "string"]}
 _FORMS: dict[str, dict[str, Any]] = {
+    "sweep.quantities": {"items": {"type": "string"}, "maxItems": MOST_RESULTS},
+    "sweep.measures": {"items": {"enum": list(MEASURES_OF_SWEEP)}, "maxItems": len(MEASURES_OF_SWEEP)},
+    "sweep.parameter": {"maxItems": MOST_PARAMETERS},
+    f"{PARAMETERS}.name": {"minLength": 1},
+    f"{PARAMETERS}.values": {"items": _VALUE, "minItems": 1, "maxItems": MOST_VALUES},
     "event.name": _EVENT_NAME,
     "catalogue": {"maxLength": LONGEST_FILE, "pattern": r"^[^\x00-\x1f\x7f]*$"},
     "system.machine": {"minLength": 1, "maxLength": LONGEST_FILE},
     "system.motor": {"minLength": 1, "maxLength": LONGEST_FILE},
 }
-"""By the name of a key, further conditions on its text."""
+"""By the name of a key, further conditions on its text or list."""
 
 
 def json_schema() -> dict[str, Any]:
@@ -58,6 +65,9 @@ class _Schema:
                 self.definitions[f"event.{table.of}"] = self._event(table)
                 continue
             place = properties
+            if table.name == PARAMETERS:
+                properties["sweep"]["properties"]["parameter"]["items"] = self._of_sweep(table)
+                continue
             if table.name:
                 place = _object(properties, table.name, table.title)["properties"]
             for key in table.keys:
@@ -137,14 +147,30 @@ class _Schema:
             "required": needed,
         }
 
+    def _of_sweep(self, table: KeyTable) -> dict[str, Any]:
+        """The table of a swept parameter: its values in one of three ways."""
+        ways = ({"required": ["from", "to"]}, {"required": ["values"]}, {"required": ["tolerance"]})
+        return {
+            "type": "object",
+            "description": table.title,
+            "additionalProperties": False,
+            "properties": {key.name: self._form(key, table) for key in table.keys},
+            "required": ["name"],
+            "oneOf": list(ways),
+        }
+
     def _form(self, key: Key, table: KeyTable) -> dict[str, Any]:
         description = {"description": _sentence(key)}
         if key.variable is not None:
             return self._quantity(key.variable, whole=key.whole) | description
         if key.sort == "switch":
             return {"type": "boolean"} | description
+        if key.sort == "list" and key.items is None:
+            return {"type": "array"} | _FORMS[f"{table.name}.{key.name}"] | description
         if key.sort == "list":
             return self._list(key) | description
+        if key.sort == "value":
+            return dict(_VALUE) | description
         if key.sort == "table":
             return {"type": "object"} | description
         choices = [word.strip('"') for word in key.words if word.startswith('"')]
@@ -158,7 +184,7 @@ class _Schema:
         return form | ({"examples": choices} if choices else {}) | description
 
     def _list(self, key: Key) -> dict[str, Any]:
-        assert key.items is not None  # each list is one of numbers
+        assert key.items is not None
         entry = self._quantity(key.items)
         if not key.name.startswith("shaft"):
             return {"type": "array", "items": entry, "maxItems": key.most}

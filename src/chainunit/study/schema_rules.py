@@ -40,6 +40,10 @@ def rules() -> Iterator[Rule]:
     yield from _of_sizing()
     yield from _of_driveline()
     yield _where(_given("chain"), _equal("organ", {"const": "chain"}))
+    yield _where(_equal("sweep.method", {"const": "grid"}), _without("sweep.points"))
+    some = {"type": "array", "minItems": 1}
+    yield _where(_equal("organ", {"const": "chain"}), _not(_equal("sweep.quantities", some)))
+    yield _where(_equal("system.motor", _FMU), _not(_equal("sweep.measures", some)))
     set_by_ratios = ratios(**filled(Ratios, {}))
     yield _where(_given("ratios"), _without(*(f"machine.{name}" for name in set_by_ratios)))
 
@@ -147,7 +151,7 @@ def _of_foreign_parts() -> Iterator[Rule]:
     needs_model = [
         _equal("feed_forward", {"const": True}),
         _equal("monte_carlo.runs", {"type": "number", "exclusiveMinimum": 0}),
-        *map(_given, ("ratios", "chain", "organ")),
+        *map(_given, ("ratios", "chain", "organ", "sweep")),
     ]
     yield _where(_equal("system.machine", _FMU), _not(_any(*needs_model)))
 
@@ -158,6 +162,7 @@ def _of_sizing() -> Iterator[Rule]:
     others = [
         _equal("feed_forward", {"const": True}),
         _equal("flywheel", {"minProperties": 1}),
+        _given("sweep"),
         *map(_given, own),
     ]
     yield _where(_given("sizing"), _not(_any(*others)))

@@ -20,6 +20,7 @@ from ..mechanism.models import MachineModel
 from ..quantities import Value, declaration, group, quantity, variables
 from ..reading import given_values, schema, to_number
 from ..system import NAMES
+from .sweep_table import FIELDS, WHOLE, SweepTable
 
 
 @declaration
@@ -432,6 +433,9 @@ SECTIONS: Mapping[str, FileSection] = {
             ),
         },
         title="Torsion of the driveline",
+    ),
+    "sweep": FileSection(
+        SweepTable, optional=True, whole=WHOLE, keys=FIELDS, title="Sweep", is_used=lambda config: False
     ),
 }
 """The tables of every study file, except those of its machine, its feed, and its motor."""

@@ -1,0 +1,117 @@
+"""The table [sweep] of a study file and its entries [[sweep.parameter]]: declarations only."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model
+from pydantic_core import PydanticCustomError
+
+from ..quantities import Value, declaration, quantity
+from .cycle_quantities import CycleBasis
+
+METHODS = ("grid", "latin_hypercube", "sobol")
+DISTRIBUTIONS = ("uniform", "normal")
+MEASURES_OF_SWEEP = (
+    "crank_torque_peak",
+    "motor_torque_peak",
+    "current_peak",
+    "rocker_torque_peak",
+    "speed_least",
+    "speed_dip",
+    "stall_time",
+)
+"""The measures of a run with an event that a sweep can have."""
+USUAL_QUANTITIES = ("peak(crank_torque)", "rms(crank_torque)")
+"""The cycle quantities of a sweep that names neither quantities nor measures."""
+MOST_PARAMETERS, MOST_VALUES, MOST_RESULTS = 32, 1000, 40
+
+
+@declaration
+class SweepTable(CycleBasis):
+    """A sweep over parameters of the study."""
+
+    points: Value = quantity(
+        "1", "number of points; of a grid that of its parameters", default=1024.0, min=1.0, max=1e9
+    )
+    seed: Value = quantity("1", "seed of the points, except of a grid", default=1.0, min=0.0, max=1e9)
+    angles: Value = quantity("1", "crank angles of a turn", default=720.0, min=8.0, max=1e5)
+
+
+WHOLE = ("points", "seed", "angles")
+"""Quantities of the table that are whole numbers."""
+
+FIELDS: Mapping[str, Any] = {
+    "method": (
+        Literal[METHODS],
+        Field(
+            "sobol", description="points: all combinations of values (a grid), or points that fill the space"
+        ),
+    ),
+    "quantities": (
+        list[str],
+        Field(
+            [],
+            max_length=MOST_RESULTS,
+            description='quantities of a turn, such as "peak(crank_torque)" or "installed_power"',
+        ),
+    ),
+    "measures": (
+        list[str],
+        Field([], max_length=len(MEASURES_OF_SWEEP), description="measures of a run with the event"),
+    ),
+    "event": (str, Field("", description="event of the measures, by the name of its run")),
+    "best": (str, Field("", description="quantity or measure whose least values are best")),
+    "parameter": (
+        list[Any],
+        Field([], max_length=MOST_PARAMETERS, description="swept quantities: tables [[sweep.parameter]]"),
+    ),
+}
+"""Keys of the table that are no quantities, as pydantic fields."""
+
+
+def _admitted(given: Any) -> Any:
+    """A number or a text; its quantity, and so its unit, stand in another key."""
+    is_number = isinstance(given, int | float) and not isinstance(given, bool) and math.isfinite(given)
+    if is_number or isinstance(given, str):
+        return given
+    raise PydanticCustomError("number_or_text", "must be a number, or a text with a unit")
+
+
+_Entered = Annotated[Any, BeforeValidator(_admitted)]
+_ENTRY: dict[str, Any] = {
+    "name": (
+        str,
+        Field(
+            "",
+            min_length=1,
+            description='full name of a quantity, such as "machine.r", "run.crank_speed", "feed.left.material_mass", '
+            '"event.jam_left.force"',
+        ),
+    ),
+    "from": (_Entered, Field(None, description="least value")),
+    "to": (_Entered, Field(None, description="largest value")),
+    "points": (
+        _Entered,
+        Field(None, description="number of values of a grid between these, 11 by default; of a tolerance 3"),
+    ),
+    "values": (
+        list[_Entered],
+        Field([], max_length=MOST_VALUES, description="values, in place of from and to"),
+    ),
+    "tolerance": (
+        _Entered,
+        Field(None, description="largest difference from the value of the study, in place of from and to"),
+    ),
+    "distribution": (
+        Literal[DISTRIBUTIONS],
+        Field(
+            "uniform",
+            description="of a tolerance, where the method is no grid; of a normal one it is 3 standard deviations",
+        ),
+    ),
+}
+SweepEntry: type[BaseModel] = create_model("sweep_parameter", __config__=ConfigDict(extra="forbid"), **_ENTRY)
+"""The form of an entry [[sweep.parameter]]."""
