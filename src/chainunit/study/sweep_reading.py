@@ -170,11 +170,10 @@ def _event(form: Any, names: list[str], events: Mapping[str, Event]) -> str:
     running = [name for name, event in events.items() if not event.from_rest]
     candidates = [form.event] if form.event else swept or running
     wrong = [name for name in (*candidates, *swept) if name not in running]
-    if wrong:
-        words = f"must be one of the events in steady running: {', '.join(running) or 'none'}"
-        raise InputError(
-            f"sweep.event = {shown(wrong[0])}: {words}{near_name(wrong[0], running)}", "sweep.event"
-        )
+    if wrong or not candidates:
+        given, hint = (shown(wrong[0]), near_name(wrong[0], running)) if wrong else ('""', "")
+        words = f"must be one of the events in steady running: {', '.join(running) or 'none'}{hint}"
+        raise InputError(f"sweep.event = {given}: {words}", "sweep.event")
     if len({*candidates, *swept}) != 1:
         words = f"must be given, one of {', '.join(dict.fromkeys((*candidates, *swept)))}; a sweep follows one event"
         raise InputError(f"sweep.event: {words}", "sweep.event")
