@@ -63,6 +63,7 @@ def test_names_are_the_full_names_of_the_system(system):
     parameters = {f"{name}.{v}" for name, m in every for v in m.parameter_layout.names}
     own = {name for name in parameters if ".solver." not in name}
     assert set(model.parameter_layout.names) == own | {"solver.max_steps", "solver.tolerance"}
+    assert "motor.w to " in model.__doc__ and "machine is of the model " in model.__doc__
     described = {v.name: v for v in model.parameter_layout.variables}
     assert described["machine.r"].description.startswith("machine: ")
     assert compiled(system).parameters.machine.r == system.values["machine.r"]
@@ -274,6 +275,8 @@ def test_loops_and_names_are_refused(system):
     )
     with pytest.raises(InputError, match=r"algebraic loop: a\.y -> b\.y -> a\.y"):
         compiled(loop)
+    with pytest.raises(InputError, match=r'"my system": the name of a model must be of letters'):
+        compiled(system, "my system")
     local = type("Local", (Through,), {"__module__": __name__, "__qualname__": "f.<locals>.Local"})
     with pytest.raises(InputError, match=r"^f\.<locals>\.Local: is defined inside a function"):
         compiled(System({"a": component(local)}))

@@ -128,10 +128,11 @@ class CompositeModel(Model):
     def start_states(cls, xp: Any, p: Any, u: Any, z: list[Any]) -> Any:
         """See `Model.start_states`."""
         before = iter(z)
-        take = cls._begin(
-            xp, p, u, lambda model, own, entries: [next(before) for _ in range(model.start_unknowns)]
-        )
-        point = take[1]
+
+        def given(model: type[Model], own: Any, entries: Any) -> list[Any]:
+            return [next(before) for _ in range(model.start_unknowns)]
+
+        _, point = cls._begin(xp, p, u, given)
         assert cls.States is not None
         return cls.States(**{name: point.states(name) for name, m in cls.of.members.items() if m.states})
 
@@ -232,9 +233,9 @@ def _composed(text: str, *models: type[Model]) -> type[CompositeModel]:
     apart = of.by_differences()
     members: dict[str, Any] = {
         "__module__": __name__,
-        "__doc__": of.data["title"],
+        "__doc__": of.words(),
         "name": of.data["name"],
-        "description": of.data["title"].partition("\n")[0],
+        "description": of.data["title"],
         "of": of,
         "components": MappingProxyType(of.models),
         "maker": (composed, (text,)),

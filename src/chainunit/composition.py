@@ -101,8 +101,9 @@ def modules_of(place: Mapping[str, Any]) -> set[str]:
 class Member:
     """A component: its model, and how its parameters and inputs follow from those of the system.
 
-    For each parameter and each input there is a function of the system's instance, or None: for an input, its source
-    by full name, or None where it has its declared start value.
+    `parameters` has for each parameter a function of the system's parameters; `free` for each input a function of the
+    system's inputs, or None, and `sources` then its source by full name, or None where it has its declared start
+    value.
     """
 
     name: str
@@ -205,6 +206,16 @@ class Composition:
         )
 
     # -- attributes of the model
+
+    def words(self) -> str:
+        """A text on the model for its users."""
+        kinds = ", ".join(f"{name} is of the model {model.name}" for name, model in self.models.items())
+        joined = ", ".join(f"{source} to {target}" for target, source in self.sources.items())
+        return (
+            f"A system as one model: {kinds}. Each load is evaluated at the present angle and speed of its shaft, so "
+            "that there is no error of a coupling; one integrator, which controls the error to solver.tolerance, "
+            f"makes the steps of all.\n\nConnected inside: {joined or 'nothing'}."
+        )
 
     def required(self, of: Callable[[type[Model]], Sequence[Requirement]]) -> tuple[Requirement, ...]:
         """The requirements of all components, by full names."""

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..drives.driveline import CardanDriveline
 from ..drives.motor import Motor
-from ..errors import InputError, RunError, printable
+from ..errors import InputError, RunError
 from ..fmu.backends import Backend
 from ..machines.chain_organs import LEAST, MOST
 from ..machines.chain_unit import ChamberForces
@@ -145,7 +145,7 @@ def whole_system(
     system = study_system(config, drive)
     machine = system.components["machine"]
     name = machine.model.name if isinstance(machine, ModelComponent) else machine.title
-    part = compiled(system, f"{name}System", printable(config.title))
+    part = compiled(system, f"{name}System", config.title)
     return part.model, part.start | input_starts(system, part.model)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import keyword
+import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -18,7 +19,7 @@ from typing import Any
 from ..composite import composed
 from ..composition import RESERVED, SOLVER, reference
 from ..engines import casadi_
-from ..errors import InputError, shown
+from ..errors import InputError, printable, shown
 from ..fmu.backends import Backend, Origin
 from ..fmu.backends import export as export_fmu
 from ..fmu.description import Interface
@@ -38,7 +39,7 @@ def compiled(system: System, name: str = "System", title: str = "") -> ModelComp
     Parameters
     ----------
     system : its components are all models
-    name : name of the model and of its FMU
+    name : name of the model and of its FMU: letters, digits and _
     title : description of the model, before that of the components
 
     Raises
@@ -59,7 +60,11 @@ def compiled(system: System, name: str = "System", title: str = "") -> ModelComp
                 f"{shown(own)}: a component of a system that becomes one model cannot have this name"
             )
         models[own] = component.model
-    model = composed(json.dumps(_description(system, models, name, title), sort_keys=True))
+    if not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII) or keyword.iskeyword(name):
+        raise InputError(
+            f"{shown(name)}: the name of a model must be of letters, digits and _, and begin with a letter"
+        )
+    model = composed(json.dumps(_description(system, models, name, printable(title)), sort_keys=True))
     values = system.values
     layout = model.parameter_layout
     limits = {own: [values[full] for each in models if (full := f"{each}.{own}") in values] for own in SOLVER}
