@@ -175,6 +175,31 @@ def study(
         raise typer.Exit(1)
 
 
+@app.command()
+def compare(
+    a: Annotated[Path, typer.Argument(help="Folder of a study, or its result.json.")],
+    b: Annotated[Path, typer.Argument(help="Another one.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the comparison.")] = Path(
+        "comparison"
+    ),
+) -> None:
+    """Show two results side by side: the given values that differ, and every measure of each run of both.
+
+    Writes report.html, comparison.json and comparison.md into the output folder.
+    """
+    from .report import comparison, files
+    from .study.comparison import FILE, read_result
+    from .study.comparison import compare as compared
+
+    results = read_result(a), read_result(b)
+    if (output / FILE).exists():
+        raise InputError(f"-o {output}: has the page of a study, which would be lost; name another folder")
+    contents = comparison.comparison_report(compared(*results))
+    with claim(output):
+        clear(output, *files.names(comparison.NAME, ()))
+        finish(contents, output, comparison.NAME)
+
+
 def _stopped_early(failure: RunError, output: Path, errors: Console) -> None:
     sentence = f"The run stopped early: {failure}. What was computed before is in {output}."
     errors.print(printable(sentence, 2000), soft_wrap=True)

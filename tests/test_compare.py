@@ -1,0 +1,197 @@
+"""Two results side by side: every number is that of the two result.json, and what differs in the input is first."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import pytest
+from command import chainunit
+
+from chainunit.study.comparison import compare, read_result
+from chainunit.study.config import parse
+from chainunit.study.result import as_dict
+from chainunit.study.run import run_study
+from chainunit.text import number as shown
+
+STUDY = """
+title = "{title}"
+[machine]
+r = "{r} mm"
+[run]
+ramp = 0.3
+settle_turns = 0
+step = 4e-3
+crank_speed = "{speed} rpm"
+[[event]]
+type = "jam"
+side = "left"
+force = "{force} kN"
+turns = 1
+[[event]]
+type = "{other}"
+side = "right"
+turns = 1
+"""
+FIRST = {"title": "short crank", "r": 150, "speed": 30, "force": 2, "other": "jam"}
+SECOND = {"title": "long crank", "r": 160, "speed": 25, "force": 2.5, "other": "empties"}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """The results `a` and `b` of two studies, and their comparison `out`."""
+    folder = tmp_path_factory.mktemp("compare")
+    for name, values in (("a", FIRST), ("b", SECOND)):
+        study = run_study(parse(STUDY.format(**values)), folder / name)
+        assert study.failure is None
+        (folder / name / "result.json").write_text(json.dumps(as_dict(study), allow_nan=False))
+    done = chainunit("compare", "a", "b", "-o", "out", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    (folder / "printed.txt").write_text(done.stdout)
+    return folder
+
+
+def numbers(folder, name):
+    return json.loads((folder / name / "result.json").read_text())
+
+
+def rows_of(folder, title):
+    """The cells of the table of a run in Markdown, by their first cell."""
+    text = (folder / "out" / "comparison.md").read_text()
+    lines = text.partition(f"**{title}**\n")[2].strip().splitlines()
+    rows = {}
+    for line in lines:
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        if len(cells) != 5:
+            if rows:
+                break
+            continue
+        rows[cells[0]] = cells[1:]
+    return rows
+
+
+@pytest.mark.parametrize(
+    ("run", "title"), [("steady", "Steady running"), ("jam_left", "A lump jams the left side")]
+)
+def test_every_measure_is_shown_with_its_difference(folder, run, title):
+    """Computed again from the two results, and compared with the cells of the table."""
+    a, b = (numbers(folder, name)["answers"][run] for name in "ab")
+    rows, data = rows_of(folder, title), json.loads((folder / "out" / "comparison.json").read_text())
+    measures = data["runs"][f"answers.{run}"]["measures"]
+    have = [name for name in a if a[name]["value"] is not None or b[name]["value"] is not None]
+    assert list(measures) == have and len(rows) >= len(have) > 15
+    for name in have:
+        x, y, unit, kind = a[name]["value"], b[name]["value"], a[name]["unit"], a[name].get("kind", "")
+        cells = rows[measures[name]["title"].replace("|", "\\|")]
+        assert cells[:2] == [shown(x, unit, kind), shown(y, unit, kind)], name
+        if x is None or y is None:
+            assert cells[2:] == ["-", "-"]
+            continue
+        assert measures[name]["difference"]["value"] == y - x
+        kind_of_difference = {"dip": "percent", "used": "percent"}.get(kind, kind)
+        assert cells[2] == shown(y - x, unit, "difference" if unit == "K" else kind_of_difference), name
+        share = None if x == 0.0 or unit == "K" else (y - x) / abs(x)
+        assert measures[name]["relative"]["value"] == share
+        assert cells[3] == shown(share, "1", "percent")
+
+
+def test_numbers_of_pins_and_of_the_start_are_there(folder):
+    a, b = (numbers(folder, name) for name in "ab")
+    runs = json.loads((folder / "out" / "comparison.json").read_text())["runs"]
+    for pin, sizes in a["pins"]["steady"].items():
+        for size, each in sizes.items():
+            entry = runs["pins.steady"]["measures"][f"{pin}.{size}"]
+            assert entry["difference"]["value"] == b["pins"]["steady"][pin][size]["value"] - each["value"]
+    assert runs["start_up"]["measures"]["start_time"]["a"] == a["start_up"]["start_time"]
+
+
+def test_given_values_that_differ_come_first(folder):
+    data = json.loads((folder / "out" / "comparison.json").read_text())
+    given = data["given"]
+    assert given["machine.r"]["a"]["value"] == pytest.approx(0.15)
+    assert given["machine.r"]["b"]["value"] == pytest.approx(0.16)
+    assert given["event.jam_left.force"]["b"] == {"value": 2500.0, "unit": "N"}
+    own = {name for name in given if not name.startswith(("event.jam_right.", "event.right_empties."))}
+    # the gains are tuned to the machine, and the half width of the example is rounded where r is not its own
+    assert own - {"machine.z", "machine.c"} == {
+        "machine.r",
+        "run.crank_speed",
+        "event.jam_left.force",
+        "motor.speed_control.kp",
+        "motor.speed_control.ki",
+    }
+    assert given["motor.speed_control.kp"]["origin_b"] == "tuned"
+    all_values = {*numbers(folder, "a")["machine"]} | {*numbers(folder, "b")["machine"]}
+    assert data["given_equal"]["value"] > len(all_values) - 5
+    printed = (folder / "printed.txt").read_text()
+    assert "machine.r" in printed and "0.15 m" in printed and "(tuned)" in printed
+    assert printed.index("Given values that differ") < printed.index("Steady running")
+
+
+def test_what_only_one_has_is_named(folder):
+    data = json.loads((folder / "out" / "comparison.json").read_text())
+    assert data["only"]["a"]["runs"] == ["a lump jams the right side"]
+    assert data["only"]["b"]["runs"] == ["the right side empties"]
+    assert data["only"]["a"]["events"] == ["jam_right"]
+    printed = " ".join((folder / "printed.txt").read_text().split())
+    assert "Only A has the runs: a lump jams the right side." in printed
+    page = (folder / "out" / "report.html").read_text()
+    assert "Only B has the runs: the right side empties." in page and "long crank" in page
+
+
+def test_a_result_beside_itself_differs_in_nothing(folder, tmp_path):
+    done = chainunit("compare", folder / "a", folder / "a" / "result.json", "-o", "out", cwd=tmp_path)
+    assert done.returncode == 0 and "Every number is the same in: start-up; steady running" in done.stdout
+    data = json.loads((tmp_path / "out" / "comparison.json").read_text())
+    assert data["given"] == {} and data["only"]["a"] == data["only"]["b"]
+    assert f"All {data['given_equal']['value']:.0f} given values are the same." in done.stdout
+
+
+def test_a_measure_of_one_alone_and_other_units(folder, tmp_path):
+    """As of another version of the program: a measure more, a unit that is another, a name that nobody declares."""
+    shutil.copytree(folder / "a", tmp_path / "old")
+    file = tmp_path / "old" / "result.json"
+    data = json.loads(file.read_text())
+    steady = data["answers"]["steady"]
+    steady["mystery_number"] = {"value": 3.0, "unit": "furlong"}
+    steady["current_rms"]["unit"] = "kA"
+    del steady["speed_dip"]
+    data["title"], data["status"] = "bad \x1b[31m title", "failed: it broke"
+    file.write_text(json.dumps(data))
+    result = compare(read_result(file), read_result(folder / "a"))
+    measures = result["runs"]["answers.steady"]["measures"]
+    assert result["only"]["a"]["measures"] == ["steady running: mystery number"]
+    assert result["only"]["b"]["measures"] == ["steady running: speed dip"]
+    assert measures["current_rms"]["difference"]["value"] is None
+    assert measures["current_rms"]["a"]["unit"] == "kA" and measures["current_rms"]["b"]["unit"] == "A"
+    done = chainunit("compare", "old", folder / "a", "-o", "out", cwd=tmp_path)
+    assert done.returncode == 0 and "A: failed: it broke." in done.stdout and "\x1b[31m" not in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (None, "there: has no result (No such file or directory); make it by chainunit study -o there"),
+        ("{", "result.json: is no result of a study ("),
+        ('{"answers": {"steady": NaN}}', "is no result of a study (NaN is no number of JSON)"),
+        ("[" * 100_000, "is no result of a study ("),
+        ("[]", "is no result of a study; chainunit study writes result.json"),
+        ('{"answers": []}', "is no result of a study; chainunit study writes result.json"),
+        ("\x00\xff", "is no result of a study ("),
+    ],
+)
+@pytest.mark.parametrize("second", [False, True])
+def test_a_folder_without_a_result_is_refused(folder, tmp_path, content, words, second):
+    if content is not None:
+        (tmp_path / "there").mkdir()
+        (tmp_path / "there" / "result.json").write_text(content, "latin-1")
+    pair = [folder / "a", "there"] if second else ["there", folder / "a"]
+    done = chainunit("compare", *pair, "-o", "out", cwd=tmp_path)
+    assert done.returncode == 2 and words in done.stderr and len(done.stderr.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_page_of_a_study_is_not_written_over(folder):
+    done = chainunit("compare", "a", "b", "-o", "a", cwd=folder)
+    assert done.returncode == 2 and "-o a: has the page of a study" in done.stderr
+    assert not (folder / "a" / "report.html").exists()
