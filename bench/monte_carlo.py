@@ -1,15 +1,24 @@
 # %% [markdown]
 # Random overloads
 #
-# 1,000 runs of 2 s each with a step of 1 ms, on two processes, with native FMUs; the limit is 120 s on two cores.
-# The floor beside it is the importer's own: as many steps in which fmpy only calls the FMUs (set, step, get).
+# Runs of 2 s with a row every millisecond, on two processes: on the compiled system, and by the co-simulation of native
+# FMUs, in one run of this script. The same runs are compared. The limit of the co-simulation is the importer's own
+# time: as many steps in which fmpy only calls the FMUs (set, step, get). The limit of the compiled system is its
+# native loop alone. `python bench/monte_carlo.py 1000000` makes so many runs on the compiled system, and prints memory
+# and size of the store.
 
 # %%
 from __future__ import annotations
 
+import dataclasses
+import os
+import resource
+import sys
 import tempfile
 import time
 from pathlib import Path
+
+import numpy as np
 
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.study import monte_carlo
@@ -17,7 +26,44 @@ from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 from chainunit.system.instance import Fmu, Instance
 
-STUDY = "[monte_carlo]\nruns = 1000\nduration = 2\n[coupling]\ntrip_torque = 1000\n"
+STUDY = "[monte_carlo]\nruns = {runs}\nduration = 2\n[coupling]\ntrip_torque = 1000\n"
+COSIMULATED, COMPILED, WORKERS = 200, 8192, 2
+MEASURES = ("crank_torque_peak", "motor_torque_peak", "current_peak", "rocker_torque_peak", "speed_least")
+
+
+def task_of(runs: int, folder: Path) -> monte_carlo.Task:
+    """The packaged study; its FMUs are written into the folder."""
+    config = parse(STUDY.format(runs=runs))
+    drive = Drive(DcMotor, config.motor, config.machine)
+    files, _ = drive.export(folder)
+    return monte_carlo.Task(config, drive, files, 6.7)
+
+
+def timed(task: monte_carlo.Task, folder: Path) -> tuple[monte_carlo.MonteCarloResult, float]:
+    """The runs of a task, and their time [s]."""
+    began = time.perf_counter()
+    result = monte_carlo.run(task, folder, lambda *said: None, workers=WORKERS)
+    return result, time.perf_counter() - began
+
+
+def loop_alone(task: monte_carlo.Task, runs: int = 256) -> float:
+    """Seconds a run of the native loop, without what Python does before and after it."""
+    block = task.block()
+    requests = [monte_carlo.request(task, monte_carlo.draw(task.config, k)) for k in range(runs)]
+    spent = 0.0
+    real = block.loop.run
+
+    def run(*args, **more):
+        nonlocal spent
+        began = time.thread_time()
+        result = real(*args, **more)
+        spent += time.thread_time() - began
+        return result
+
+    block.loop.run = run
+    for _ in block.runs(requests):
+        pass
+    return spent / runs
 
 
 def importer(files) -> float:
@@ -42,18 +88,47 @@ def importer(files) -> float:
     return duration
 
 
+def compare(folder: Path) -> None:
+    task = task_of(COMPILED, folder)
+    few = dataclasses.replace(task_of(COSIMULATED, folder), cosimulated=True)
+    reference, slow = timed(few, folder)
+    result, fast = timed(task, folder)
+    rates = COSIMULATED / slow, COMPILED / fast
+    floor = importer(task.files) / WORKERS
+    print(f"runs of 2 s, {WORKERS} processes, start of the processes included:")
+    print(
+        f"co-simulation    {rates[0]:8.1f} runs/s   {COSIMULATED} runs in {slow:.1f} s; fmpy alone {1 / floor:.1f} runs/s"
+    )
+    print(
+        f"compiled system  {rates[1]:8.1f} runs/s   {COMPILED} runs in {fast:.1f} s; loop alone {WORKERS / loop_alone(task):.1f} runs/s"
+    )
+    print(f"ratio            {rates[1] / rates[0]:8.1f}")
+    same = result.dataset.isel(run=slice(0, COSIMULATED))
+    for name in MEASURES:
+        a, b = (np.asarray(each[name]) for each in (same, reference.dataset))
+        print(f"{name:20} largest difference {np.nanmax(np.abs(a - b) / np.abs(b)):.1e} of the value")
+
+
+def many(runs: int, folder: Path) -> None:
+    result, spent = timed(task_of(runs, folder), folder)
+    size = sum(file.stat().st_size for file in result.file.rglob("*") if file.is_file())
+    count = sum(1 for file in result.file.rglob("*") if file.is_file())
+    own, workers = (
+        resource.getrusage(who).ru_maxrss / 1024 for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    )
+    print(f"{result.runs} runs in {spent:.0f} s, {result.runs / spent:.0f} runs/s")
+    print(
+        f"largest memory: {own:.0f} MB, of a worker {workers:.0f} MB; store: {size / 1e6:.0f} MB in {count} files"
+    )
+    print({name: f"{each['q99'].value:.4g}" for name, each in result.quantiles().items() if "q99" in each})
+
+
 def main() -> None:
-    config = parse(STUDY)
-    drive = Drive(DcMotor, config.motor, config.machine)
     with tempfile.TemporaryDirectory() as folder:
-        files, _ = drive.export(Path(folder))
-        task = monte_carlo.Task(config, drive, files, 6.7)
-        began = time.perf_counter()
-        result = monte_carlo.run(task, Path(folder), lambda *said: None, workers=2)
-        duration = time.perf_counter() - began
-        floor = 1000 * importer(files) / 2
-    print(f"{result.runs} runs of 2 s in {duration:.0f} s on two processes (limit 120 s);")
-    print(f"{duration / floor:.1f} times the time of fmpy alone for the same calls ({floor:.0f} s).")
+        if len(sys.argv) > 1:
+            many(int(sys.argv[1]), Path(os.environ.get("STORE", folder)))
+        else:
+            compare(Path(folder))
 
 
 if __name__ == "__main__":

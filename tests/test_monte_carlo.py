@@ -15,6 +15,7 @@ import subprocess
 import sys
 import textwrap
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,12 +25,17 @@ from command import chainunit
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.errors import RunError
 from chainunit.job import CHECKS
+from chainunit.native.compilers import compiler
 from chainunit.study import monte_carlo, quantiles
+from chainunit.study.choice import choose
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
+from chainunit.study.event_runs import EventSimulation
+from chainunit.study.rig import Rig
 from chainunit.system import CoSimulation
 from chainunit.text import number as shown
 
+needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 RUNS = 50
 """Three whole batches, and one of two runs."""
 STUDY = """
@@ -57,7 +63,7 @@ SCRIPT = """
         config = parse(Path("study.toml").read_text())
         drive = Drive(DcMotor, config.motor, config.machine)
         files, _ = drive.export(Path("."))
-        task = monte_carlo.Task(config, drive, files, 1.0)
+        task = monte_carlo.Task(config, drive, files, 1.0, cosimulated=True)
         result = monte_carlo.run(task, Path("."), lambda what, done, todo: print(done, todo, flush=True), workers=2)
         print("resumed", result.earlier_runs, result.damaged_batches, flush=True)
 """
@@ -126,11 +132,11 @@ def killed(tmp_path_factory):
     return folder, len(done), message
 
 
-def task_of(folder, runs=RUNS, text=STUDY):
+def task_of(folder, runs=RUNS, text=STUDY, cosimulated=True):
     config = parse(text.format(runs=runs))
     drive = Drive(DcMotor, config.motor, config.machine)
     files = {name: folder / f"{part.model.name}.fmu" for name, part in drive.graph.components.items()}
-    return monte_carlo.Task(config, drive, files, 1.0)
+    return monte_carlo.Task(config, drive, files, 1.0, cosimulated=cosimulated)
 
 
 def test_a_killed_study_goes_on_from_what_it_saved(killed):
@@ -143,7 +149,14 @@ def test_the_store_is_that_of_an_unbroken_study(killed, tmp_path):
     """In this process, from the first to the last run: the bytes of every file are the same."""
     folder, _, _ = killed
     result = monte_carlo.run(task_of(folder), tmp_path, lambda *said: None, workers=1)
-    assert content(result.file) == content(opened(folder).file) and not monte_carlo._simulations
+    assert content(result.file) == content(opened(folder).file) and not monte_carlo._systems
+
+
+def branches(task, simulation, *drawn):
+    """The runs with these events from the saved state of a simulation."""
+    system = EventSimulation.__new__(EventSimulation)
+    system._rig, system._simulation = task.rig, simulation
+    return list(system.runs([monte_carlo.request(task, each) for each in drawn]))
 
 
 def test_a_run_is_what_its_number_says(killed):
@@ -155,8 +168,9 @@ def test_a_run_is_what_its_number_says(killed):
         simulation.run(1.0, config.run.step)
         simulation.save()
         for number in (7, 3, 20):
-            got = monte_carlo.Layout(monte_carlo.Sample).by_name(monte_carlo.one(task, number, simulation))
             drawn, run = monte_carlo.draw(config, number), results.isel(run=number)
+            (branch,) = branches(task, simulation, drawn)
+            got = monte_carlo.Layout(monte_carlo.Sample).by_name(monte_carlo.sample(task, drawn, branch))
             assert ("none", "left", "right")[int(run["side"])] == drawn.event.side
             assert float(run["drawn_force"]) == drawn.values["force"]
             assert {name: float(run[name]) for name in got} == got
@@ -228,8 +242,8 @@ def test_the_lump_comes_on_the_side_of_its_number(number):
     task = monte_carlo.Task(config, Drive(DcMotor, config.motor, config.machine), {}, 1.0)
     drawn, simulation = monte_carlo.draw(config, number), Still()
     assert drawn == monte_carlo.draw(parse(STUDY.format(runs=99)), number)
-    with pytest.raises(RunError, match="seen"):
-        monte_carlo.one(task, number, simulation)
+    (branch,) = branches(task, simulation, drawn)
+    assert str(branch.error) == "seen"
     feed, lump = {"left": 100.0, "right": 700.0}, drawn.event.p
     for side, normal in feed.items():
         force = simulation.signals[f"machine.{side}.processing_force"]
@@ -278,14 +292,15 @@ def test_what_the_numbers_depend_on_is_in_the_name(killed):
 
 def test_a_run_that_fails_is_a_result(killed, tmp_path, monkeypatch):
     """Its numbers are missing, its event and the reason are kept, and the runs after it are the same."""
-    task, good = task_of(killed[0], runs=5), monte_carlo.one
+    task, good = task_of(killed[0], runs=5), Rig.follow
+    third = task.steady + monte_carlo.draw(task.config, 2).offset
 
-    def fails(task, number, simulation):
-        if number == 2:
+    def fails(rig, simulation, event, begin, *rest, **more):
+        if begin == third:
             raise RunError("machine: it broke")
-        return good(task, number, simulation)
+        return good(rig, simulation, event, begin, *rest, **more)
 
-    monkeypatch.setattr(monte_carlo, "one", fails)
+    monkeypatch.setattr(Rig, "follow", fails)
     result = monte_carlo.run(task, tmp_path, lambda *said: None, workers=1)
     assert result.reasons == {2: "machine: it broke"} and result.failures == 1
     assert result.as_dict()["failed"]["value"] == 1 and len(result.values("event")) == 4
@@ -317,7 +332,7 @@ def test_a_machine_without_the_files_of_the_fmus_makes_the_same_runs(killed, tmp
     try:
         runs = monte_carlo.make_runs(pickle.loads(pickle.dumps(away)), 17, 19)
     finally:
-        monte_carlo.close_simulation()
+        monte_carlo.close_system()
     wanted = opened(killed[0]).dataset.isel(run=slice(17, 19))
     assert runs["failed"] == ["", ""] and len(runs) == len(wanted)
     for name in set(runs) - {"failed"}:
@@ -375,3 +390,77 @@ def test_question_and_answer_tell_of_random_overloads(tmp_path):
     peak = shown(quantiles_of["crank_torque_peak"]["q50"]["value"], "N.m")
     assert f"Of 6 overloads at random: 50 % stay below a crank torque of {peak} (" in answer
     assert f"the safety coupling opens in {opens} (" in " ".join(process.stdout.split())
+
+
+MOTOR = '[system]\nmotor = "InductionMotor"\n'
+CHAIN = 'organ = "chain"\n[chain]\nrods = 3\n'
+BLOCKED = STUDY.replace(
+    "event = {{ force = [4000, 9000], duration = 0.1 }}", 'event = {{ type = "blocked" }}'
+)
+
+
+def compiled_task(text, folder=None, runs=6):
+    """The task of a study on its compiled system; the FMUs are written where a `folder` is given."""
+    config = parse(text.format(runs=runs).replace("step = 0.004", "step = 0.001"))
+    drive = choose(config, Path("fmu"), lambda *said: None).drive
+    files = drive.export(folder)[0] if folder else {}
+    return monte_carlo.Task(config, drive, files, 1.2)
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    "text", [STUDY, BLOCKED, MOTOR + STUDY, CHAIN + STUDY], ids="bars blocked induction chains".split()
+)
+def test_the_compiled_system_agrees_with_the_co_simulation(text, tmp_path):
+    """To the error of the coupling; the same runs trip, at the same row."""
+    task = compiled_task(text, tmp_path)
+    drawn = [monte_carlo.draw(task.config, number) for number in range(4)]
+    requests = [monte_carlo.request(task, each) for each in drawn]
+    reference = EventSimulation(dataclasses.replace(task, cosimulated=True).rig, task.steady)
+    try:
+        wanted = list(reference.runs(requests))
+    finally:
+        reference.close()
+    for got, other, each in zip(task.block().runs(requests), wanted, drawn, strict=True):
+        assert got.error is None and got.ended == other.ended and got.series.sizes == other.series.sizes
+        a, b = (
+            monte_carlo.Layout(monte_carlo.Sample).by_name(monte_carlo.sample(task, each, run))
+            for run in (got, other)
+        )
+        for name, x in a.items():
+            assert x == b[name] or abs(x - b[name]) < 1e-3 * max(abs(b[name]), 0.1), (name, x, b[name])
+
+
+@needs_compiler
+def test_runs_on_the_compiled_system_do_not_depend_on_their_batch(tmp_path):
+    """In one process without Dask; made again by a worker from its parcel, in other batches."""
+    task = compiled_task(STUDY, runs=30)
+    result = monte_carlo.run(task, tmp_path, lambda *said: None)
+    assert result.runs == 30 and not result.failures and not monte_carlo._systems
+    parcel = pickle.loads(pickle.dumps(monte_carlo.Parcel.of(task)))
+    try:
+        pieces = [monte_carlo.make_runs(parcel, a, b) for a, b in ((0, 7), (7, 30))]
+    finally:
+        monte_carlo.close_system()
+    for name in pieces[0]:
+        both = [x for piece in pieces for x in piece[name]]
+        stored = result.dataset[name].values
+        assert name == "failed" or np.array_equal(both, stored, equal_nan=True), name
+    # the event of a run is that of its number, whatever computes it
+    drawn = [monte_carlo.draw(task.config, k).values["force"] for k in range(30)]
+    np.testing.assert_array_equal(result.dataset["drawn_force"], drawn)
+    assert task.digest() != dataclasses.replace(task, cosimulated=True).digest()
+
+
+@needs_compiler
+def test_a_wild_run_on_the_compiled_system_fails_alone():
+    task = compiled_task(STUDY)
+    block, drawn = task.block(), [monte_carlo.draw(task.config, k) for k in range(3)]
+    requests = [monte_carlo.request(task, each) for each in drawn]
+    wild = dataclasses.replace(requests[1].event, p=dataclasses.replace(requests[1].event.p, force=1e300))
+    runs = list(block.runs([requests[0], dataclasses.replace(requests[1], event=wild), requests[2]]))
+    assert [run.error is None for run in runs] == [True, False, True]
+    assert "the states left all bounds" in str(runs[1].error)
+    for k in (0, 2):
+        (alone,) = block.runs([requests[k]])
+        xr.testing.assert_identical(alone.series, runs[k].series)

@@ -5,10 +5,8 @@ The co-simulation of separate FMUs remains the reference; both agree to the erro
 
 from __future__ import annotations
 
-import math
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from operator import itemgetter
 from typing import Any
@@ -21,7 +19,7 @@ from ..errors import RunError
 from ..system import compiled, monolithic
 from ..system.compiled import input_starts
 from ..system.signals import at_time
-from .event import Event
+from .event_runs import EventRun, Request
 from .event_table import RandomEvent
 from .rig import Rig
 
@@ -32,27 +30,6 @@ TOLERANCE = 1e-9
 co-simulation has an error of some 1e-5."""
 _LONGEST = 20.0
 """Longest step of the integrator, over the time between rows."""
-
-
-@dataclass(frozen=True)
-class EventRun:
-    """A run with an event: the rows from the steady state on, whether the guard ended it, and the error of a run that
-    failed."""
-
-    series: xr.Dataset
-    ended: bool
-    error: RunError | None = None
-
-
-@dataclass(frozen=True)
-class Request:
-    """A run that is asked for: the event with its begin [s], the end of the run [s], and the torque of the motor's
-    shaft that ends it [N m]."""
-
-    event: Event
-    begin: float
-    stop: float
-    limit: float = math.inf
 
 
 class EventBlock:
@@ -87,11 +64,15 @@ class EventBlock:
         self._p = self.model.check(own)
         assert self.model.state_layout is not None
         normal = {full: float(at_time(signal, steady)) for full, signal in rig.signals().items()}
-        self._inputs = input_starts(rig.graph, self.model) | normal
-        self.states = self._start() if states is None else states
+        declared = {v.name: float(v.quantity.start or 0.0) for v in self.model.input_layout.variables}
+        self._inputs = declared | input_starts(rig.graph, self.model) | normal
+        self._given_states = states
 
-    def _start(self) -> Any:
-        """The states at the steady time."""
+    @cached_property
+    def states(self) -> Any:
+        """The states at the steady time, in the order of the model."""
+        if self._given_states is not None:
+            return self._given_states
         assert self.model.state_layout is not None
         run = monolithic(self._rig.graph, self._rig.signals(ramp=True), [0.0, self._steady])
         return np.array([float(run[name][-1]) for name in self.model.state_layout.names])
@@ -139,6 +120,9 @@ class EventBlock:
             guarded=[self._rig.drive.motor_torque],
             changes=self._changes,
         )
+
+    def close(self) -> None:
+        """See `EventSimulation`; nothing is left to close."""
 
     def runs(self, requests: Sequence[Request], workers: int = 1) -> Iterator[EventRun]:
         """The requested runs in order. A run depends on its request alone, whatever the others are."""

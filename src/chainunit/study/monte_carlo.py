@@ -20,18 +20,20 @@ import numpy as np
 
 from .. import __version__
 from ..ending import remove_folder, temporary_folder
-from ..errors import InputError, InterruptedRunError, RunError, printable
+from ..errors import InputError, printable
 from ..job import Job, ResultVariable, texts
 from ..machines.chain_unit import SIDES, SideName
+from ..native.compilers import compiler
 from ..progress import Report
 from ..quantities import Layout, Value, declaration, quantity, variables
 from ..runner import check_scheduler
 from ..runner import run as run_job
-from ..system import Simulation
 from ..text import entry
 from .config import Config
 from .drive import Drive
 from .event import AnySide, Event
+from .event_block import EventBlock
+from .event_runs import EventRun, EventSimulation, Request
 from .event_table import RandomEvent
 from .measures import MEASURES, read_measure, same_measure
 from .quantiles import CONFIDENCE, Estimate, quantile, runs_needed, share
@@ -58,8 +60,11 @@ class Sample:
     trips: Value = quantity("1", "1 where the safety coupling opens")
 
 
-BATCH = 16
-"""Number of runs in a batch: a second or two of work, which a kill loses."""
+BATCH, COSIMULATED_BATCH = 512, 16
+"""Numbers of runs in a batch, on the compiled system and by co-simulation: a second or two of work, which a kill
+loses."""
+_IN_PROCESS = 8
+"""Most batches on the compiled system that are made without other processes, whose start takes longer."""
 _LETTERS = 300
 _NO_SIDE = "none"
 QUANTILES = (0.05, 0.5, 0.95, 0.99)
@@ -67,7 +72,11 @@ QUANTILES = (0.05, 0.5, 0.95, 0.99)
 
 @dataclass(frozen=True)
 class Task:
-    """The data that a worker needs: the study, its drive, the FMUs, the time of the steady state [s]."""
+    """The data that a worker needs: the study, its drive, the FMUs, the time of the steady state [s].
+
+    The runs are made on the compiled system; without a C compiler, or if they are to be `cosimulated`, by the
+    co-simulation of the FMUs.
+    """
 
     config: Config
     drive: Drive
@@ -75,6 +84,12 @@ class Task:
     steady: float
     fed_from: float | None = None
     """time at which a machine that starts empty was fed [s]"""
+    cosimulated: bool = False
+
+    @property
+    def is_compiled(self) -> bool:
+        """Whether the runs are made on the compiled system."""
+        return not self.cosimulated and compiler() is not None
 
     @property
     def rig(self) -> Rig:
@@ -82,8 +97,8 @@ class Task:
         return Rig(self.config, self.drive, self.files, fed_from=self.fed_from)
 
     def digest(self) -> str:
-        """A digest of everything on which the results depend: every parameter, and the content of the
-        FMUs."""
+        """A digest of everything on which the results depend: every parameter, and the code of the compiled system or
+        the content of the FMUs."""
         config, drive = self.config, self.drive
         relevant = {
             "chainunit": __version__,
@@ -99,9 +114,15 @@ class Task:
             "fed_from": self.fed_from,
         }
         content = hashlib.sha256(json.dumps(relevant, sort_keys=True).encode())
-        for name in sorted(self.files):
+        if self.is_compiled:
+            content.update(self.block().loop.digest.encode())
+        for name in () if self.is_compiled else sorted(self.files):
             content.update(Path(self.files[name]).read_bytes())
         return content.hexdigest()[:12]
+
+    def block(self, states: Any = None) -> EventBlock:
+        """The compiled system in its steady state, with these `states` if they are known."""
+        return EventBlock(self.rig, self.config.random, self.steady, states)
 
 
 def result_variables(event: RandomEvent) -> list[ResultVariable]:
@@ -122,49 +143,57 @@ def result_variables(event: RandomEvent) -> list[ResultVariable]:
 
 @dataclass(frozen=True)
 class Parcel:
-    """A task with the content of its FMUs by their names: a worker on another machine does not have their
-    files."""
+    """A task as it goes to a worker, which may be on another machine: with the steady states of the compiled system,
+    or with the content of its FMUs by their names."""
 
     task: Task
     digest: str
     content: Mapping[str, bytes]
+    states: Any = None
 
     @classmethod
     def of(cls, task: Task) -> Parcel:
         """The parcel of a task whose FMUs are files."""
+        if task.is_compiled:
+            return cls(replace(task, files={}), task.digest(), {}, task.block().states)
         return cls(task, task.digest(), {name: Path(file).read_bytes() for name, file in task.files.items()})
 
-    def start(self) -> Simulation:
-        """The co-simulation of the task after the start-up, with its steady state saved."""
+    def start(self) -> EventBlock | EventSimulation:
+        """The system of the task in its steady state.
+
+        Raises
+        ------
+        InputError
+            where a worker has no C compiler for the compiled system.
+        """
+        if self.states is not None:
+            return self.task.block(self.states)
         folder = temporary_folder("chainunit_runs")
         try:
             files = {name: Path(folder, f"{name}.fmu") for name in self.content}
             for name, file in files.items():
                 file.write_bytes(self.content[name])
             # it unpacks the FMUs
-            simulation = replace(self.task, files=files).rig.from_rest()
+            return EventSimulation(replace(self.task, files=files).rig, self.task.steady)
         finally:
             remove_folder(folder)
-        simulation.run(self.task.steady, self.task.rig.step)
-        simulation.save()
-        return simulation
 
 
-_simulations: dict[str, Simulation] = {}
-"""The co-simulation of this process, by the digest of its task."""
+_systems: dict[str, EventBlock | EventSimulation] = {}
+"""The system of this process, by the digest of its task."""
 
 
-def _saved_simulation(parcel: Parcel) -> Simulation:
-    if parcel.digest not in _simulations:
-        close_simulation()
-        _simulations[parcel.digest] = parcel.start()
-    return _simulations[parcel.digest]
+def _system_of(parcel: Parcel) -> EventBlock | EventSimulation:
+    if parcel.digest not in _systems:
+        close_system()
+        _systems[parcel.digest] = parcel.start()
+    return _systems[parcel.digest]
 
 
-def close_simulation() -> None:
-    """Close the co-simulation that `make_runs` keeps in this process."""
-    while _simulations:
-        _simulations.popitem()[1].close()
+def close_system() -> None:
+    """Close the system that `make_runs` keeps in this process."""
+    while _systems:
+        _systems.popitem()[1].close()
 
 
 @dataclass(frozen=True)
@@ -198,52 +227,50 @@ def draw(config: Config, number: int) -> Draw:
     return Draw(config.random.event(side, values), values, offset, trip)
 
 
-def one(task: Task, number: int, simulation: Simulation) -> Sample:
-    """Run the overload with that number from the saved steady state of the `simulation`."""
-    config, drive, chance = task.config, task.drive, draw(task.config, number)
-    run, trip = config.run, chance.trip_torque
-    event = task.steady + chance.offset
-    stop = event + config.monte_carlo.duration
-    guards = {"motor.tau": trip / drive.ratio} if config.coupling else None
-    series = task.rig.follow(simulation, chance.event, event, stop, guards=guards).run
-    angle = float(np.interp(event, series["time"].values, drive.crank_motion(series)[0]))
-    has_tripped = simulation.time < stop - 0.5 * run.step
+def request(task: Task, chance: Draw) -> Request:
+    """The run with these random quantities."""
+    begin = task.steady + chance.offset
+    stop = begin + task.config.monte_carlo.duration
+    return Request(chance.event, begin, stop, chance.trip_torque / task.drive.ratio)
+
+
+def sample(task: Task, chance: Draw, run: EventRun) -> Sample:
+    """The results of a run that did not fail."""
+    assert run.series is not None
+    config, drive, begin = task.config, task.drive, task.steady + chance.offset
+    angle = float(np.interp(begin, run.series["time"].values, drive.crank_motion(run.series)[0]))
     # from the saved state on, as the event may begin inside a step
-    window = Window(Phase.EVENT, series, drive, (), run.crank_speed)
-    stalls = not has_tripped and read_measure("stall_time", window) is not None
+    window = Window(Phase.EVENT, run.series, drive, (), config.run.crank_speed)
+    stalls = not run.ended and read_measure("stall_time", window) is not None
     return Sample(
         crank_angle=angle % (2.0 * math.pi),
-        event=event,
-        trip_torque=trip if config.coupling else None,
+        event=begin,
+        trip_torque=chance.trip_torque if config.coupling else None,
         **{each.name: read_measure(each.name, window) for each in fields(Sample) if each.name in MEASURES},
         stalls=float(stalls),
-        trips=float(has_tripped),
+        trips=float(run.ended),
     )
 
 
 def make_runs(parcel: Parcel, begin: int, end: int) -> dict[str, Any]:
     """The results of the runs from number `begin` to `end` - 1, by the names of `result_variables`."""
-    simulation = _saved_simulation(parcel)
-    runs = [_result_of(parcel.task, number, simulation) for number in range(begin, end)]
-    return {name: [run[name] for run in runs] for name in runs[0]}
+    task = parcel.task
+    chances = [draw(task.config, number) for number in range(begin, end)]
+    runs = _system_of(parcel).runs([request(task, chance) for chance in chances])
+    results = [_result_of(task, chance, run) for chance, run in zip(chances, runs, strict=True)]
+    return {name: [result[name] for result in results] for name in results[0]}
 
 
-def _result_of(task: Task, number: int, simulation: Simulation) -> dict[str, Any]:
-    """The results of the run with that number."""
-    chance, failed = draw(task.config, number), ""
-    sample = dict.fromkeys(Layout(Sample).names)
-    try:
-        sample = Layout(Sample).by_name(one(task, number, simulation))
-    except InterruptedRunError:
-        raise
-    except RunError as error:
-        # a run that fails is a result, too; the next run starts from the saved state again
-        failed = str(error) or type(error).__name__
+def _result_of(task: Task, chance: Draw, run: EventRun) -> dict[str, Any]:
+    """The results of a run by name; one that fails is a result, too."""
+    numbers = dict.fromkeys(Layout(Sample).names)
+    if run.error is None:
+        numbers = Layout(Sample).by_name(sample(task, chance, run))
     return {
         "side": np.int8((_NO_SIDE, *SIDES).index(chance.event.side or _NO_SIDE)),
         **{f"drawn_{name}": value for name, value in chance.values.items()},
-        **{name: math.nan if value is None else float(value) for name, value in sample.items()},
-        "failed": failed,
+        **{name: math.nan if value is None else float(value) for name, value in numbers.items()},
+        "failed": "" if run.error is None else str(run.error) or type(run.error).__name__,
     }
 
 
@@ -349,13 +376,13 @@ def job_of(task: Task) -> Job:
         name="monte_carlo",
         title="overloads at random",
         points=int(task.config.monte_carlo.runs),
-        batch=BATCH,
+        batch=BATCH if task.is_compiled else COSIMULATED_BATCH,
         variables=result_variables(task.config.random),
         work=make_runs,
         task=parcel,
         digest=parcel.digest,
         dimension="run",
-        close=close_simulation,
+        close=close_system,
     )
 
 
@@ -364,5 +391,8 @@ def run(
 ) -> MonteCarloResult:
     """Make the missing runs of the task and write them to the store in `folder`; the other arguments and the errors
     are those of `chainunit.runner.run`."""
-    outcome = run_job(job_of(task), folder, report, workers, scheduler)
+    job = job_of(task)
+    if workers is None and scheduler is None and task.is_compiled and job.points <= _IN_PROCESS * BATCH:
+        workers = 1
+    outcome = run_job(job, folder, report, workers, scheduler)
     return MonteCarloResult(outcome.dataset, outcome.file, outcome.earlier_points, outcome.damaged_batches)
