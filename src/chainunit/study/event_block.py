@@ -186,9 +186,10 @@ class EventBlock:
         pieces = [self._rows(k, lead)[:, :-1]] if lead is not None else []
         n = int(result.count[k])
         table = np.concatenate([*pieces, self._rows(k, result)], axis=1)
+        # without an index, which would take as long as a tenth of the run
+        time = xr.Coordinates({"time": ("time", table[0])}, indexes={})
         series = xr.Dataset(
-            {name: ("time", row) for name, row in zip(self.outputs, table[1:], strict=True)},
-            {"time": table[0]},
+            {name: ("time", row) for name, row in zip(self.outputs, table[1:], strict=True)}, time
         )
         end = float(result.times[k, n - 1])
         error = None
