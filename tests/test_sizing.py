@@ -33,7 +33,7 @@ from chainunit.study.measures import time_to_start
 from chainunit.study.rig import Rig
 from chainunit.study.sizing import Standing
 from chainunit.study.trial import Trial, permitted_starts
-from chainunit.system import CoSimulation, Profile, System
+from chainunit.system import CompiledSimulation, CoSimulation, Profile, System
 
 ANGLE = np.linspace(0.0, 2.0 * math.pi, 7200, endpoint=False)
 
@@ -453,7 +453,8 @@ def test_ctrl_c_ends_sizing(tmp_path, monkeypatch):
     def stopped(*arguments, **options):
         raise InterruptedRunError("interrupted at t = 1 s")
 
-    monkeypatch.setattr(CoSimulation, "run", stopped)
+    for way in (CoSimulation, CompiledSimulation):
+        monkeypatch.setattr(way, "run", stopped)
     with pytest.raises(InterruptedRunError):
         sizing.size(one_candidate(""), tmp_path, lambda *said: None)
 

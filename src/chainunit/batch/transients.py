@@ -164,11 +164,11 @@ class Transients:
         x = filled(x if x.ndim == 2 else x[:, None], n_x)
         n_s = 1 + 3 * self._changes
         arrays = [
-            filled(np.zeros(runs) if varying is None else varying, len(self._varying)),
-            filled(np.zeros(runs) if signals is None else signals, len(self._driven), n_s),
+            filled(np.zeros(runs) if not self._varying else varying, len(self._varying)),
+            filled(np.zeros(runs) if not self._driven else signals, len(self._driven), n_s),
             filled(begin),
             filled(stop),
-            filled(np.inf if limits is None else limits, len(self._guarded)),
+            filled(np.inf if limits is None or not self._guarded else limits, len(self._guarded)),
         ]
         uniform = self._uniform(parameters, inputs)
         out = np.empty((len(self.outputs), room, rows))

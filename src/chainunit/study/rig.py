@@ -16,6 +16,7 @@ import xarray as xr
 from ..errors import refusal_prefix
 from ..progress import Progress
 from ..system import (
+    CompiledSimulation,
     CoSimulation,
     Jump,
     ModelComponent,
@@ -80,7 +81,8 @@ class Rig:
 
     config: Config
     drive: Drive
-    files: Mapping[str, Path]
+    files: Mapping[str, Path] | None
+    """by component; None for the compiled system, which needs no FMUs"""
     twin: Callable[[System], System] | None = None
     fed_from: float | None = None
     """time at which the feed came to a machine that starts empty [s], once it is known"""
@@ -96,7 +98,7 @@ class Rig:
     @property
     def system(self) -> System:
         """The FMUs and their connections."""
-        return self._twin(self.drive.system(self.files))
+        return self.graph if self.files is None else self._twin(self.drive.system(self.files))
 
     @cached_property
     def graph(self) -> System:
@@ -180,6 +182,8 @@ class Rig:
         InputError
             for an FMU without Model Exchange, if the study uses Model Exchange.
         """
+        if self.files is None:
+            return CompiledSimulation(system, signals, begin)
         if self.config.simulation == "cs":
             return CoSimulation(system, signals, begin)
         with refusal_prefix('simulation = "me": '):

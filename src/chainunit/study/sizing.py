@@ -20,6 +20,7 @@ from typing import Any
 from ..drives.catalogue import CatalogueMotor, catalogue
 from ..errors import InputError, InterruptedRunError, RunError
 from ..fmu.backends import Backend
+from ..native.compilers import compiler
 from ..progress import Report
 from ..quantities import Value, declaration, quantity
 from ..text import entries, number
@@ -220,13 +221,15 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
         )
         strong = [m for m in motors if m.nameplate.power == motors[-1].nameplate.power]
     candidates: list[Candidate] = []
-    files: Mapping[str, Path] = {}
+    # without FMUs the candidates run on the compiled system
+    compiles = compiler() is not None and backend != "python"
+    files: Mapping[str, Path] | None = None if compiles else {}
     for k, motor in enumerate(strong):
         if len(candidates) >= limits.candidates and any(c.fits for c in candidates):
             break
-        report(f"co-simulating {motor.designation}", float(k), float(len(strong)))
+        report(f"simulating {motor.designation}", float(k), float(len(strong)))
         candidate = proposal(config, motor, duty)
-        if not files:
+        if files == {}:
             files, _ = candidate.drive.export(folder, backend, partial(_exporting, report))
         candidates.append(with_flywheel(config, candidate, duty, files))
     rank(candidates)
@@ -237,7 +240,7 @@ def _exporting(report: Report, what: str) -> None:
     report(what, 0.0, 1.0)
 
 
-def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[str, Path]) -> Candidate:
+def with_flywheel(config: Config, bare: Candidate, duty: Duty, files: Mapping[str, Path] | None) -> Candidate:
     """The candidate with the least flywheel, to about a tenth, that keeps the permitted fluctuation and the
     limits of torque and temperature. It has no flywheel where none is needed, or where it exceeds a limit
     that no flywheel improves. If such a flywheel exceeds another limit, it is the flywheel that comes nearest
@@ -334,7 +337,7 @@ def proposal(config: Config, motor: CatalogueMotor, duty: Duty) -> Candidate:
     return Candidate(motor, drive, {})
 
 
-def judge(config: Config, c: Candidate, duty: Duty, files: Mapping[str, Path]) -> None:
+def judge(config: Config, c: Candidate, duty: Duty, files: Mapping[str, Path] | None) -> None:
     """Try a candidate and fill in its checks."""
     try:
         trial = try_motor(config, c.motor, c.drive, duty, files)

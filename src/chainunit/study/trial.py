@@ -199,9 +199,9 @@ class Trial:
 
 
 def try_motor(
-    config: Config, motor: CatalogueMotor, drive: Drive, duty: Duty, files: Mapping[str, Path]
+    config: Config, motor: CatalogueMotor, drive: Drive, duty: Duty, files: Mapping[str, Path] | None
 ) -> Trial:
-    """Co-simulate a motor in its drive.
+    """Simulate a motor in its drive, by the FMU `files`, or without them on the compiled system.
 
     Raises
     ------

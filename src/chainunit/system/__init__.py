@@ -8,6 +8,7 @@ component, too: `foreign_component`."""
 
 from .certificate import certify, energy_residual, shaft_torque, through
 from .compiled import compiled, export_compiled
+from .compiled_simulation import CompiledSimulation
 from .fmus import export
 from .foreign import NAMES, fmu_component, foreign_component
 from .graph import (
@@ -33,6 +34,7 @@ __all__ = [
     "NAMES",
     "Bond",
     "CoSimulation",
+    "CompiledSimulation",
     "Component",
     "Connector",
     "FmuComponent",

@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 
 from .instance import Instance
-from .simulation import Simulation, Watch
+from .simulation import FmuSimulation, Watch
 
 _Table = list[tuple[Instance, Any, Any]]
 """For each instance a handle and the values of its signals, shape (n, signals)."""
 
 
-class CoSimulation(Simulation):
-    """A running co-simulation; see `Simulation`."""
+class CoSimulation(FmuSimulation):
+    """A running co-simulation; see `FmuSimulation`."""
 
     kind = "Co-Simulation"
     instances = Instance

@@ -21,7 +21,7 @@ from ..errors import InputError, RunError
 from .graph import System
 from .instance import DiscardError, ExchangeInstance
 from .signals import at_time, corners
-from .simulation import Simulation, Watch, beyond
+from .simulation import FmuSimulation, Watch, beyond
 
 METHODS = ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")
 """Solvers of scipy. The explicit ones suit motors, shafts and chains; Radau and BDF suit stiff systems."""
@@ -33,12 +33,12 @@ _HALVINGS = 60
 """Number of bisections that locate an event in its step."""
 
 
-class ModelExchange(Simulation):
+class ModelExchange(FmuSimulation):
     """A running system of Model Exchange FMUs.
 
     Parameters
     ----------
-    system, signals, start_time : see `Simulation`; a signal that jumps or bends must have `corners`
+    system, signals, start_time : see `FmuSimulation`; a signal that jumps or bends must have `corners`
     rtol : relative tolerance of the solver; the absolute tolerance of a state is a thousandth of it times the state's
         nominal size, and at least 1e-12
     method : one of `METHODS`

@@ -66,6 +66,53 @@ def stoppable() -> Iterator[Callable[[], bool]]:
 
 
 class Simulation(ABC):
+    """A running system, from whose saved state branches can run; use it as a context manager."""
+
+    time: float
+    """the present time [s]"""
+    signals: dict[str, Any]
+    """by full name of an input, a number or a function of time; see `chainunit.system.signals`"""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    @abstractmethod
+    def close(self) -> None:
+        """Free all that the system holds."""
+
+    @abstractmethod
+    def run(
+        self,
+        stop: float,
+        step: float,
+        progress: Progress | None = None,
+        *,
+        guards: Mapping[str, float] | None = None,
+        every: int = 1,
+        names: Iterable[str] | None = None,
+        file: Path | None = None,
+    ) -> xr.Dataset:
+        """Simulate to the time `stop` [s]; see `FmuSimulation.run`."""
+
+    @abstractmethod
+    def save(self) -> float:
+        """Save the present state in place of the last saved one; returns the time."""
+
+    @abstractmethod
+    def restore(self) -> None:
+        """Return to the saved state, from which another branch can run."""
+
+    @abstractmethod
+    def check_states(self) -> None:
+        """Refuse a system whose state cannot be saved."""
+
+
+class FmuSimulation(Simulation):
     """A running system of FMUs; use it as a context manager.
 
     Parameters
@@ -101,14 +148,6 @@ class Simulation(ABC):
         except BaseException:
             self.close()
             raise
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Free every instance and the unpacked files."""

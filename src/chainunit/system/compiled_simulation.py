@@ -1,0 +1,166 @@
+"""A compiled system that runs: the same calls as the co-simulation of its FMUs, in one native loop, without FMUs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..batch.transients import Transients, profile_rows
+from ..engines import MATH
+from ..errors import InputError, InterruptedRunError, RunError
+from ..progress import Progress
+from ..quantities import Variable
+from .compiled import compiled, input_starts
+from .graph import System
+from .signals import at_time
+from .simulation import Simulation
+
+TOLERANCE = 1e-9
+"""Relative tolerance of the integrator: a run agrees with the monolithic solution to some 1e-7 of the peaks, where a
+co-simulation has an error of some 1e-5."""
+LONGEST = 20.0
+"""Longest step of the integrator, over the time between rows."""
+
+
+class CompiledSimulation(Simulation):
+    """A running compiled system.
+
+    Parameters
+    ----------
+    system : a system of models
+    signals : by full name of an input, a number or a `Profile`
+    start_time : time at the start [s]
+
+    Raises
+    ------
+    InputError
+        where a component is an FMU, for an unknown input, and where there is no C compiler.
+    """
+
+    def __init__(
+        self, system: System, signals: Mapping[str, Any] | None = None, start_time: float = 0.0
+    ) -> None:
+        component = compiled(system)
+        self.model, layout = component.model, component.model.parameter_layout
+        self.p = self.model.check(layout.from_names({"solver.tolerance": TOLERANCE}, component.parameters))
+        declared = {v.name: float(v.quantity.start or 0.0) for v in self.model.input_layout.variables}
+        self.inputs = declared | input_starts(system, self.model)
+        self.time, self.signals = start_time, dict(signals or {})
+        self._checked(self.signals)
+        states = self.model.state_layout
+        assert states is not None
+        start = {full: float(at_time(signal, start_time)) for full, signal in self.signals.items()}
+        own = self.model.input_layout.from_names(self.inputs | start)
+        self._states = np.array(states.values(self.model.begin(self.p, own)), float)
+        self._saved = self.time, self._states
+
+    def _checked(self, signals: Mapping[str, Any]) -> None:
+        for full, signal in signals.items():
+            if full not in self.inputs:
+                raise InputError(f"{full}: no such input of the system")
+            if callable(signal) and not hasattr(signal, "changes"):
+                raise InputError(f"{full}: a compiled system takes numbers and profiles as signals")
+
+    @property
+    def outputs(self) -> dict[str, Variable]:
+        """The states and outputs that a run keeps, by full name."""
+        assert self.model.state_layout is not None
+        parts = (self.model.state_layout, *(part.layout for part in self.model.parts))
+        return {v.name: v for layout in parts for v in layout.variables}
+
+    def close(self) -> None:
+        """See `Simulation`; nothing is left to free."""
+
+    def run(
+        self,
+        stop: float,
+        step: float,
+        progress: Progress | None = None,
+        *,
+        guards: Mapping[str, float] | None = None,
+        every: int = 1,
+        names: Iterable[str] | None = None,
+        file: Path | None = None,
+    ) -> xr.Dataset:
+        """See `FmuSimulation.run`; all rows are in memory, without a `file`.
+
+        Raises
+        ------
+        InputError
+            for a run that does not go forward, and for a name that cannot be guarded or kept.
+        InterruptedRunError
+            after Ctrl-C; the time is then that before the run.
+        RunError
+            where the states leave all bounds; the attribute ``partial`` of the error holds the rows before.
+        """
+        if not (0.0 < step < math.inf) or not self.time < stop < math.inf:
+            raise InputError(
+                f"a run from t = {self.time:g} to {stop:g} s in steps of {step:g} s: must go forward"
+            )
+        if file is not None:
+            raise InputError("a compiled system keeps its rows in memory: leave the file out")
+        known, guards = self.outputs, dict(guards or {})
+        kept = [name for name in known if names is None or name in set(names) or name in guards]
+        self._checked(self.signals)
+        driven = {full: signal for full, signal in self.signals.items() if hasattr(signal, "changes")}
+        changes = max((len(signal.changes) for signal in driven.values()), default=0)
+        loop = Transients(self.model, kept, driven=list(driven), guarded=list(guards), changes=changes)
+        try:
+            result = loop.run(
+                self.p,
+                self.inputs | {full: float(x) for full, x in self.signals.items() if full not in driven},
+                self._states,
+                begin=self.time,
+                step=step,
+                stop=[stop],
+                signals=np.reshape(
+                    [profile_rows(signal, changes) for signal in driven.values()],
+                    (len(driven), 1 + 3 * changes, 1),
+                ),
+                limits=np.reshape(list(guards.values()), (len(guards), 1)),
+                longest=max(LONGEST * step, float(self.model.internal_step(MATH, self.p))),
+            )
+        except KeyboardInterrupt:
+            raise InterruptedRunError(f"interrupted at t = {self.time:g} s") from None
+        n = int(result.count[0])
+        self.time, self._states = float(result.times[0, n - 1]), result.states[:, 0]
+        run = self._dataset(result.times[0, :n], dict(zip(kept, result.rows[:, 0, :n], strict=True)), every)
+        if result.failed[0]:
+            failure = RunError(f"at t = {self.time:g} s: the states left all bounds")
+            failure.partial = run.isel(time=slice(None, -1))
+            raise failure
+        if progress:
+            progress(self.time)
+        return run
+
+    def _dataset(self, times: Any, rows: Mapping[str, Any], every: int) -> xr.Dataset:
+        chosen = np.unique([*range(0, len(times), every), len(times) - 1])
+        known = self.outputs
+        rows = {
+            **rows,
+            **{full: np.broadcast_to(at_time(x, times), times.shape) for full, x in self.signals.items()},
+        }
+        inputs = {v.name: v for v in self.model.input_layout.variables}
+        variables = {
+            full: ("time", np.asarray(row)[chosen], {"units": v.unit, "long_name": v.description})
+            for full, row in rows.items()
+            for v in [known[full] if full in known else inputs[full]]
+        }
+        return xr.Dataset(variables, {"time": ("time", times[chosen], {"units": "s", "long_name": "time"})})
+
+    def check_states(self) -> None:
+        """See `Simulation`; the state can always be saved."""
+
+    def save(self) -> float:
+        """See `Simulation`."""
+        self._saved = self.time, self._states
+        return self.time
+
+    def restore(self) -> None:
+        """See `Simulation`."""
+        self.time, self._states = self._saved

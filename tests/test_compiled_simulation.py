@@ -1,0 +1,89 @@
+"""A compiled system runs as its co-simulation does: rows, branches, guards, failures."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from systems import pair
+
+from chainunit import InputError, RunError
+from chainunit.native.compilers import compiler
+from chainunit.system import CompiledSimulation, CoSimulation, Jump, Profile, export, monolithic
+
+pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
+SPEED = "motor.w_ref"
+FORCE = "machine.left.processing_force"
+
+
+@pytest.fixture(scope="module")
+def system():
+    return pair("ChamberForces", "DcMotor", values={"machine.ratio": 50.0})
+
+
+def signals(force=1000.0):
+    ramp = Profile(0.0, ((0.0, 0.4, 150.0),))
+    return {SPEED: ramp, FORCE: Profile(0.0, ((0.5, 0.02, force), (0.6, 0.02, 0.0)))}
+
+
+def test_its_run_is_the_monolithic_solution_with_all_names(system, tmp_path):
+    with CompiledSimulation(system, signals()) as simulation:
+        run = simulation.run(0.7, 1e-3)
+        assert simulation.time == 0.7
+    reference = monolithic(system, signals(), run["time"].values)
+    assert set(map(str, run.data_vars)) == {*map(str, reference.data_vars), SPEED, FORCE}
+    for name, row in reference.items():
+        peak = float(np.max(np.abs(row)))
+        assert float(np.max(np.abs(run[name] - row))) <= 1e-6 * peak, name
+        assert run[name].attrs["units"] == row.attrs["units"]
+    np.testing.assert_allclose(run[FORCE], signals()[FORCE](run["time"].values))
+    # the separate FMUs have the rows of the same instants, and every name but those of the slopes
+    exported, _ = export(system, tmp_path)
+    with CoSimulation(exported, signals()) as reference:
+        rows = reference.run(0.7, 1e-3)
+    np.testing.assert_array_equal(rows["time"], run["time"])
+    missing = {str(name) for name in rows.data_vars} - {str(name) for name in run.data_vars}
+    assert missing == {"machine.tau_bias_dphi", "machine.tau_bias_dw"}
+
+
+def test_branches_go_on_from_the_saved_state(system):
+    with CompiledSimulation(system, signals()) as simulation:
+        first = simulation.run(0.45, 1e-3)
+        assert simulation.save() == 0.45
+        hard = simulation.run(0.7, 1e-3)
+        simulation.restore()
+        simulation.signals = signals(0.0)
+        soft = simulation.run(0.7, 1e-3, names=["motor.tau"])
+    assert list(soft.data_vars) == ["motor.tau", SPEED, FORCE]
+    assert float(first["motor.w"][-1]) == float(hard["motor.w"][0])
+    whole = CompiledSimulation(system, signals(0.0)).run(0.7, 1e-3)
+    np.testing.assert_allclose(soft["motor.tau"], whole["motor.tau"][450:], atol=1e-6)
+    assert float(np.max(np.abs(hard["motor.tau"] - soft["motor.tau"]))) > 0.1
+
+
+def test_a_guard_and_every_keep_the_right_rows(system):
+    with CompiledSimulation(system, signals()) as simulation:
+        run = simulation.run(0.7, 1e-3)
+    limit = 0.8 * float(np.max(np.abs(run["motor.tau"])))
+    beyond = int(np.flatnonzero(np.abs(run["motor.tau"]) > limit)[0])
+    with CompiledSimulation(system, signals()) as simulation:
+        ended = simulation.run(0.7, 1e-3, guards={"motor.tau": limit}, every=7)
+        assert simulation.time == float(run["time"][beyond])
+    wanted = sorted({*range(0, beyond, 7), beyond})
+    np.testing.assert_array_equal(ended["time"], run["time"][wanted])
+
+
+def test_faults_are_told(system):
+    with pytest.raises(InputError, match=r"motor\.w_reff: no such input"):
+        CompiledSimulation(system, {"motor.w_reff": 1.0})
+    with pytest.raises(InputError, match="takes numbers and profiles"):
+        CompiledSimulation(system, {SPEED: Jump(0.1, 0.0, 1.0)})
+    with CompiledSimulation(system, signals()) as simulation:
+        with pytest.raises(InputError, match="must go forward"):
+            simulation.run(0.0, 1e-3)
+        with pytest.raises(InputError, match=r"motor\.tua"):
+            simulation.run(0.1, 1e-3, guards={"motor.tua": 1.0})
+        simulation.signals = signals(1e300)
+        with pytest.raises(RunError, match="left all bounds") as failure:
+            simulation.run(0.7, 1e-3)
+    assert 0.5 <= float(failure.value.partial["time"][-1]) < 0.7
+    assert np.isfinite(failure.value.partial["motor.w"]).all()
