@@ -142,7 +142,7 @@ class Sizing:
     poles_most: Value = quantity("1", "largest number of poles", default=6.0, min=2.0, max=48.0)
     candidates: Value = quantity(
         "1",
-        "least number of motors that are co-simulated; more follow until one fits",
+        "least number of motors that are tried; more follow until one fits",
         default=9.0,
         min=1.0,
         max=200.0,

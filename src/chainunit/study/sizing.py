@@ -1,6 +1,6 @@
 """Sizing of the drive: which motor of the catalogue, behind which gear, with which flywheel.
 
-First the cycle is computed by inverse dynamics. Then the FMU of every candidate is co-simulated: a start
+First the cycle is computed by inverse dynamics. Then every candidate is simulated: a start
 under load, steady running, and steady running with all feed on one side. Each check is a utilisation, value
 over limit. Hand formulas (RMS torque, flywheel, relay) are here and in `protection`; all else is read from
 the runs.
