@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import multiprocessing
 import os
@@ -77,6 +78,21 @@ def test_a_small_job_needs_no_dask(tmp_path):
     assert made.stdout.split() == ["0", "False"]
 
 
+def test_a_script_that_is_run_by_its_workers_is_told_what_to_do(tmp_path):
+    """Each local process imports the script, which then starts processes itself."""
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import sys; from pathlib import Path; import batches\nfrom chainunit.runner import run\n"
+        "run(batches.job(), Path(sys.argv[1]), print, workers=2)\n"
+    )
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(HERE), *filter(None, sys.path)])}
+    made = subprocess.run(
+        [sys.executable, script, tmp_path], env=environment, cwd=tmp_path, capture_output=True, text=True
+    )
+    assert made.returncode == 1
+    assert "RunError: the local processes cannot be started" in made.stderr and "__main__" in made.stderr
+
+
 def test_progress_and_the_end_are_told(tmp_path):
     said, ends = [], []
     runner.run(batches.job(40, closing=lambda: ends.append(1)), tmp_path, lambda *each: said.append(each), 1)
@@ -86,7 +102,12 @@ def test_progress_and_the_end_are_told(tmp_path):
 
 def test_local_processes_make_the_same_store(unbroken, tmp_path):
     (tmp_path / "seen").mkdir()
-    made = runner.run(batches.job(seen=str(tmp_path / "seen")), tmp_path, quiet, workers=2)
+    with contextlib.ExitStack() as stack:
+        for host in ("127.0.0.1", "0.0.0.0"):
+            # the port at which a scheduler shows its state is taken, by this or another process
+            with contextlib.suppress(OSError):
+                stack.enter_context(socket.create_server((host, 8787)))
+        made = runner.run(batches.job(seen=str(tmp_path / "seen")), tmp_path, quiet, workers=2)
     assert content(made.file) == content(unbroken.file)
     processes = {p.name.split("_")[1] for p in (tmp_path / "seen").iterdir()}
     assert seen(tmp_path / "seen") == list(range(0, 100, 16)) and str(os.getpid()) not in processes

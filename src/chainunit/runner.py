@@ -268,18 +268,24 @@ def _local(workers: int) -> Iterator[Any]:
 
     # a batch whose worker ends is not tried again: it would end the next worker, too
     settings = {"distributed.scheduler.allowed-failures": 0, "distributed.worker.profile.enabled": False}
-    with (
-        dask.config.set(settings),
-        LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            dashboard_address=None,
-            memory_limit=0,
-            silence_logs=logging.CRITICAL + 1,
-            preload=[ending.__name__],
-        ) as cluster,
-        Client(cluster, set_as_default=False) as client,
-    ):
+    with dask.config.set(settings), contextlib.ExitStack() as stack:
+        try:
+            cluster = LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                dashboard_address=None,
+                # any free port, and not the one that another scheduler of this machine may have
+                scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
+                memory_limit=0,
+                silence_logs=logging.CRITICAL + 1,
+                preload=[ending.__name__],
+            )
+        except (RuntimeError, OSError) as error:
+            raise RunError(
+                f"the local processes cannot be started ({_reason(error)}); a script must have its calls below "
+                'if __name__ == "__main__":'
+            ) from error
+        client = stack.enter_context(Client(stack.enter_context(cluster), set_as_default=False))
         try:
             yield client
         except BaseException:
