@@ -200,6 +200,30 @@ def compare(
         finish(contents, output, comparison.NAME)
 
 
+@app.command()
+def optimize(
+    config: Annotated[Path, typer.Argument(help="Study file (TOML) with the table [optimize].")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path("best"),
+    backend: _BackendOption = None,
+) -> None:
+    """Search for the best machine: parameters with the least torque, load, power or energy under limits.
+
+    Writes best.toml, report.html, result.json, result.md and pictures into the output folder.
+    """
+    loaded = _study_file(config)
+    with claim(output):
+        from .report import optimum
+
+        with progress_bar(terminal_console(stderr=True)) as progress:
+            best = optimum.compute(loaded, output, progress, backend.value if backend else None)
+        contents = optimum.optimum_report(best, loaded)
+        unwritten = leave(contents, optimum.writers(best, loaded, contents, output))
+    if unwritten is not None:
+        raise unwritten
+    if not best.met:
+        raise typer.Exit(1)
+
+
 def _stopped_early(failure: RunError, output: Path, errors: Console) -> None:
     sentence = f"The run stopped early: {failure}. What was computed before is in {output}."
     errors.print(printable(sentence, 2000), soft_wrap=True)

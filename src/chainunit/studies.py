@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from .errors import InputError, WriteError, near_name, shown
+from .errors import InputError, RunError, WriteError, near_name, shown
 from .files import claim, clear, write_all
 from .fmu.backends import Backend
 from .machines.machine import Machine
@@ -24,7 +24,7 @@ from .places import lines_of
 from .progress import Report as Progress
 from .quantities import Layout
 from .reading import in_file
-from .report import files, html, results, series, terminal
+from .report import files, html, optimum, results, series, terminal
 from .report import study as contents
 from .report.blocks import Report
 from .report.drawing import drawing
@@ -32,6 +32,9 @@ from .study import config as study_files
 from .study.config import Config
 from .study.foreign_machine import ForeignMachine
 from .study.measures import Answers, measures_of
+from .study.optimum.best import Best
+from .study.optimum.study_file import best_tables
+from .study.optimum.words import conflict_sentences
 from .study.parts import over_example, parts_of
 from .study.record import INSUFFICIENT, StudyRecord
 from .study.result import as_dict
@@ -211,6 +214,33 @@ class Study:
             raise record.failure
         return result
 
+    def optimize(
+        self,
+        folder: str | Path | None = None,
+        backend: Backend | None = None,
+        progress: Progress | None = None,
+    ) -> BestResult:
+        """Search for the best machine, as the table [optimize] asks: 20 starts take some ten seconds.
+
+        Parameters
+        ----------
+        folder : the folder to which the files of ``chainunit optimize -o`` are written
+        backend, progress : as of `run`
+
+        Raises
+        ------
+        InputError
+            for a fault of the table [optimize].
+        WriteError
+            for a file that cannot be written; the others are written.
+        """
+        if folder is None:
+            return BestResult(self.config, optimum.search(self.config, progress, backend))
+        with claim(Path(folder)) as place:
+            result = BestResult(self.config, optimum.compute(self.config, place, progress, backend))
+            result._write(place)
+        return result
+
     def __repr__(self) -> str:
         config = self.config
         with shown_in(config.units):
@@ -331,6 +361,73 @@ class StudyResult:
     def _repr_html_(self) -> str:
         """The summary as HTML, for notebooks."""
         return html.fragment(self._summary)
+
+
+class BestResult:
+    """The result of a search for the best machine. Its `repr` shows the answer, the parameters and what binds."""
+
+    def __init__(self, config: Config, best: Best) -> None:
+        self.config = config
+        self.best = best
+        """all that the search found"""
+        self._report = optimum.optimum_report(best, config)
+
+    @property
+    def met(self) -> bool:
+        """Whether a machine was found that meets all limits."""
+        return self.best.met
+
+    @property
+    def machine(self) -> Machine | None:
+        """The best machine; None where no machine meets all limits."""
+        return self.best.machine
+
+    @property
+    def study(self) -> Study:
+        """The study with the best machine.
+
+        Raises
+        ------
+        RunError
+            where no machine meets all limits.
+        """
+        source = Path(self.config.source).parent / optimum.FILE
+        config = study_files.of_tables(self._tables(source.parent), str(source))
+        return Study.__new__(Study)._take(config, str(source))
+
+    def _tables(self, folder: Path) -> dict[str, Any]:
+        if self.best.machine is None:
+            raise RunError("no machine meets all limits: " + " ".join(conflict_sentences(self.best)))
+        return best_tables(self.config, self.best.machine, self.best.wishes.names, folder)
+
+    def to_json(self) -> str:
+        """All numbers with their units, as the text of result.json."""
+        return files.numbers_text(self._report)
+
+    def save(self, folder: str | Path) -> list[Path]:
+        """Write the files of ``chainunit optimize -o``; returns the files.
+
+        Raises
+        ------
+        InputError, WriteError
+            as `Study.optimize`.
+        """
+        with claim(Path(folder)) as place:
+            clear(place, *optimum.FILES)
+            return self._write(place)
+
+    def _write(self, folder: Path) -> list[Path]:
+        paths, failure = write_all(optimum.writers(self.best, self.config, self._report, folder))
+        if failure is not None:
+            raise WriteError(str(failure)) from failure
+        return paths
+
+    def __repr__(self) -> str:
+        return terminal.plain(self._report)
+
+    def _repr_html_(self) -> str:
+        """The same as HTML, for notebooks."""
+        return html.fragment(self._report)
 
 
 def _plain(value: Any) -> Any:

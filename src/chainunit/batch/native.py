@@ -84,8 +84,8 @@ class NativeKernel:
 
     def __call__(
         self,
-        uniform: Sequence[Any],
-        columns: Sequence[Any],
+        uniform: Any,
+        columns: Any,
         out: Any,
         reason: Any,
         size: tuple[int, int],
@@ -95,8 +95,8 @@ class NativeKernel:
 
         Parameters
         ----------
-        uniform : arrays of shape (1,) or (outer,), by `inputs`
-        columns : arrays of shape (1, inner) or (outer, inner), by `columns`
+        uniform : arrays of shape (1,) or (outer,), by `inputs`, or one array of which they are the rows
+        columns : arrays of shape (1, inner) or (outer, inner), by `columns`, or one array of which they are the parts
         out, reason : arrays to be filled, (results, outer, inner) and (outer, inner), or, reduced, without `inner`
         size : (outer, inner)
         workers : number of threads
@@ -137,7 +137,10 @@ def aligned(shape: tuple[int, ...]) -> Any:
     return memory[begin : begin + size].reshape(shape)
 
 
-def _pointers(arrays: Sequence[Any]) -> Any:
+def _pointers(arrays: Any) -> Any:
+    if isinstance(arrays, np.ndarray):
+        first, step = arrays.ctypes.data, arrays.strides[0]
+        return (ctypes.c_void_p * (len(arrays) + 1))(*range(first, first + step * len(arrays), step))
     return (ctypes.c_void_p * (len(arrays) + 1))(*(x.ctypes.data for x in arrays))
 
 

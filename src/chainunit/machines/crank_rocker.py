@@ -82,6 +82,7 @@ def rocker_extremes(xp: Any, p: Any) -> tuple[Any, Any]:
     return right, left
 
 
+_NONE = 1e-100  # the square of no length; the root of 0 has no derivative
 _FAR = 1e300  # larger than any length; the sign of a length times this number selects one of two limits
 
 
@@ -97,7 +98,7 @@ def half_width_range(xp: Any, e: Any, l1: Any, l2: Any, swing: Any, z: Any = mat
     reach = e * xp.sin(swing)
     drop2 = e * e - reach * reach
     short2 = (l1 - l2) * (l1 - l2) - drop2
-    left_out = xp.sqrt(xp.maximum(short2, 0.0))
+    left_out = xp.sqrt(xp.maximum(short2, _NONE))
     whole = _FAR * xp.maximum(-short2, 0.0)
     low = reach + left_out - whole - _FAR * xp.maximum(reach - z, 0.0)
     high = reach - left_out + whole + _FAR * xp.maximum(z - reach, 0.0)

@@ -30,6 +30,7 @@ from .event_table import RandomEvent, read_events, read_random_event
 from .events import OneSidedFeed
 from .first_checks import check_values, independent, plate_of, without
 from .foreign_machine import ForeignMachine, ForeignModel
+from .optimum.table import Optimize
 from .parts import Parts, beside, example, over_example, with_linkage
 from .sections import (
     CHOICES,
@@ -97,6 +98,8 @@ class Config:
     """damping ratios of that map; empty for that of the line itself"""
     chain: ChainOrgans | None
     """the organs as chains, or None for two bars"""
+    optimize: Optimize | None
+    """the table of a search for the best machine; a study does not read it"""
     foreign: ForeignMotor | None
     """the motor, if it is a foreign FMU; `motor` then has no meaning"""
     sweep: SweepPlan | None

@@ -30,6 +30,7 @@ _EVENT_NAME = {
 }
 _VALUE: dict[str, Any] = {"type": ["number", "string"]}
 _FORMS: dict[str, dict[str, Any]] = {
+    "optimize.objectives": {"items": {"type": "string"}, "maxItems": 2},
     "sweep.quantities": {"items": {"type": "string"}, "maxItems": MOST_RESULTS},
     "sweep.measures": {"items": {"enum": list(MEASURES_OF_SWEEP)}, "maxItems": len(MEASURES_OF_SWEEP)},
     "sweep.parameter": {"maxItems": MOST_PARAMETERS},

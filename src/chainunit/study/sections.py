@@ -20,6 +20,7 @@ from ..mechanism.models import MachineModel
 from ..quantities import Value, declaration, group, quantity, variables
 from ..reading import given_values, schema, to_number
 from ..system import NAMES
+from .optimum import table as optimize_table
 from .sweep_table import FIELDS, WHOLE, SweepTable
 
 
@@ -412,6 +413,15 @@ SECTIONS: Mapping[str, FileSection] = {
     ),
     "starter": FileSection(
         Starter, title="Starter", is_used=lambda config: config.of_catalogue and config.start != "direct"
+    ),
+    "optimize": FileSection(
+        optimize_table.Optimize,
+        optional=True,
+        whole=optimize_table.WHOLE,
+        keys=optimize_table.FIELDS,
+        title="Search for the best machine",
+        is_used=lambda config: False,
+        apart=True,
     ),
     "chain": FileSection(ChainOrgans, whole=("rods", "sweep_points", "starts", "turns"), title="Chains"),
     "driveline": FileSection(

@@ -1,0 +1,253 @@
+"""The report on a search for the best machine: its values beside today's, what binds, the starts, and the checks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..files import clear, whole
+from ..fmu.backends import Backend
+from ..progress import Report as Progress
+from ..reading import in_file
+from ..study.config import Config
+from ..study.optimum.best import Best, find_best
+from ..study.optimum.result import as_dict
+from ..study.optimum.study_file import best_tables, toml_text
+from ..study.optimum.table import wishes_of
+from ..study.optimum.wishes import Wishes
+from . import blocks as b
+from . import figure as fig
+from . import files
+from .lines import Line, line
+
+NAME, PICTURES = "result", ("torque.png", "front.png")
+FILE = "best.toml"
+"""The study file with the best machine."""
+FILES = (*files.names(NAME, PICTURES), FILE)
+"""The names of all files that a search may write into its folder."""
+
+
+def optimum_report(best: Best, config: Config) -> b.Report:
+    """The report on a search."""
+    result = as_dict(best, config)
+    s = b.Source(result)
+    sections = [b.Section("parameters", "Parameters and limits", tuple(_machine(s, best)))]
+    if best.met:
+        sections.append(b.Section("binding", "What binds", tuple(_binding(s))))
+    if best.front:
+        sections.append(b.Section("front", "Two objectives", tuple(_front(s, best))))
+    sections.append(b.Section("checks", "Starts and checks", tuple(_checks(s, best))))
+    return b.Report(
+        config.title or "The best machine",
+        "Search for the best machine",
+        result,
+        tuple(_opening(s, best)),
+        tuple(sections),
+        source=s.line("Study file: {source} · chainunit {chainunit}"),
+        units=config.units,
+        opening_title="The answer",
+    )
+
+
+def compute(
+    config: Config, folder: Path, progress: Progress | None = None, backend: Backend | None = None
+) -> Best:
+    """Search for the best machine of a study; the files of an earlier search in the folder are removed. A refusal
+    begins with the name of the study file, if there is one.
+
+    Raises
+    ------
+    InputError
+        with a line for each fault of the table [optimize].
+    """
+    wishes = _wishes(config)
+    clear(folder, *FILES)
+    return _search(wishes, config, progress, backend)
+
+
+def search(config: Config, progress: Progress | None = None, backend: Backend | None = None) -> Best:
+    """The same without a folder."""
+    return _search(_wishes(config), config, progress, backend)
+
+
+def _wishes(config: Config) -> Wishes:
+    with _of_file(config):
+        return wishes_of(config)
+
+
+def _search(wishes: Wishes, config: Config, progress: Progress | None, backend: Backend | None) -> Best:
+    with _of_file(config):
+        return find_best(wishes, progress or (lambda *_: None), backend)
+
+
+def _of_file(config: Config) -> AbstractContextManager[None]:
+    return in_file(config.source, lambda: config.lines) if config.lines else nullcontext()
+
+
+def writers(best: Best, config: Config, report: b.Report, folder: Path) -> list[Callable[[], list[Path]]]:
+    """The functions that write the study file with the best machine, where there is one, and the files of the
+    report."""
+
+    def study_file() -> list[Path]:
+        assert best.machine is not None
+        text = toml_text(best_tables(config, best.machine, best.wishes.names, folder))
+        with whole(folder / FILE) as part:
+            part.write_text(text, "utf-8")
+        return [folder / FILE]
+
+    own = [study_file] if best.met else []
+    return [*own, *files.writers(report, folder, NAME)]
+
+
+def _opening(s: b.Source, best: Best) -> Iterator[b.Block]:
+    if not best.met:
+        sentences = s.lines("conflict.sentences")
+        yield b.Judgement("bad", sentences[0], items=())
+        for each in sentences[1:]:
+            yield b.Text(each)
+        return
+    for k, name in enumerate(s.result["objectives"]):
+        path = f"quantities.{name}"
+        words = line(
+            f"{name}: ", s.number(f"{path}.best"), ", today ", s.number(f"{path}.today"), _share(s, path), "."
+        )
+        yield b.Judgement("good", words) if k == 0 else b.Text(words)
+    yield _turns(best)
+
+
+def _share(s: b.Source, path: str) -> Line:
+    today, value = s.value(f"{path}.today"), s.value(f"{path}.best")
+    if not today or value is None:
+        return ()
+    change = 100.0 * (value - today) / abs(today)
+    return f" ({change:+.1f} %)".replace("-", "\u2212")
+
+
+def _turns(best: Best) -> fig.Figure:
+    angle = fig.Axis("crank angle", "rad", step=45.0)
+    curves = tuple(
+        fig.Curve(name, best.turns["angle"], best.turns[key], look)
+        for look, (name, key) in enumerate((("best", "best"), ("today", "today")))
+    )
+    torque = fig.Axis(f"torque at the {best.wishes.machine.model.turning}", "N.m")
+    return fig.Figure(
+        "best-torque",
+        "Torque over the turn, today and best",
+        "The torque over a turn at constant speed of today's machine and of the best one.",
+        ((fig.Panel(angle, torque, curves),),),
+        file=PICTURES[0],
+    )
+
+
+def _machine(s: b.Source, best: Best) -> Iterator[b.Block]:
+    head = "best" if best.met else "nearest"
+    rows = [
+        b.TableRow((name, *(s.number(f"parameters.{name}.{key}", digits=5) for key in ("today", "best")),
+                    *(s.number(f"parameters.{name}.{key}", as_given=True) for key in ("min", "max"))))
+        for name in s.result["parameters"]
+    ]  # fmt: skip
+    yield b.Table(
+        tuple(rows), b.heads("parameter", "today", head, "least", "largest"), title="Free parameters"
+    )
+    rows = [
+        b.TableRow((name, *(s.number(f"quantities.{name}.{key}", digits=4) for key in ("today", "best")),
+                    *(s.number(f"quantities.{name}.{key}", as_given=True) for key in ("min", "max"))))
+        for name in s.result["quantities"]
+    ]  # fmt: skip
+    yield b.Table(
+        tuple(rows),
+        b.heads("quantity", "today", head, "least", "largest"),
+        title=s.line("Objectives and limits, of a turn at {=speed:4}"),
+    )
+
+
+def _binding(s: b.Source) -> Iterator[b.Block]:
+    if not s.result["bindings"]:
+        yield b.Text("No limit and no bound holds the best machine back.")
+    for each in s.lines("bindings"):
+        yield b.Text(line(each, "."))
+    for words in s.lines("clearances"):
+        yield b.Text(
+            line("It is as near as the clearance allows to a limit within which it turns: ", words, ".")
+        )
+
+
+def _front(s: b.Source, best: Best) -> Iterator[b.Block]:
+    first, second = best.wishes.objectives
+    names = best.wishes.names
+    rows = [
+        b.TableRow(
+            (
+                s.number(f"front.{k}.values.{first.name}", digits=4),
+                s.number(f"front.{k}.values.{second.name}", digits=4),
+                *(s.number(f"front.{k}.parameters.{name}", digits=4) for name in names),
+            )
+        )
+        for k in range(len(best.front))
+    ]
+    yield b.Text(
+        "No machine is better than one of the front in one objective without being worse in the other. The best "
+        "machine of this report is the one nearest to the least values of both.",
+        "lead",
+    )
+    yield b.Table(tuple(rows), b.heads(first.name, second.name, *names), title="Front of the two objectives")
+    values = np.array([point.values for point in best.front])
+    chosen = [[best.found[q.name]] for q in (first, second)]
+    items: tuple[Any, ...] = (
+        fig.Curve("front", values[:, 0], values[:, 1], marker="o"),
+        fig.Curve("best of this report", chosen[0], chosen[1], 1, marker="s", has_line=False),
+    )
+    yield fig.Figure(
+        "front",
+        "Front of the two objectives",
+        "The values of both objectives along the front.",
+        ((fig.Panel(fig.Axis(first.name, first.unit), fig.Axis(second.name, second.unit), items),),),
+        file=PICTURES[1],
+    )
+
+
+def _checks(s: b.Source, best: Best) -> Iterator[b.Block]:
+    yield b.Text(
+        s.line(
+            "{=starts.number} starts over the bounds, {=starts.moved} of them moved until the machine closes: "
+            "{=starts.feasible} ended at a machine that meets all limits, {=starts.agree} at the best value to a "
+            "millionth."
+        )
+    )
+    yield b.Text(
+        s.line(
+            "{=starts.programs} programs, {=starts.iterations} iterations, {=starts.evaluations} turns computed."
+        ),
+        "fine",
+        form="long",
+    )
+    if best.neighbours is not None:
+        severity: b.Severity = "warning" if best.neighbours.better else "good"
+        yield b.Judgement(
+            severity,
+            s.line(
+                "Of {=neighbours.number} machines around it {=neighbours.feasible} meet all limits, and "
+                "{=neighbours.better} of these are better."
+            ),
+        )
+    if best.fmu:
+        rows = (
+            b.TableRow(
+                (
+                    name,
+                    s.number(f"quantities.{name}.best", digits=7),
+                    s.number(f"quantities.{name}.fmu", digits=7),
+                )
+            )
+            for name in best.fmu
+        )
+        yield b.Table(
+            tuple(rows),
+            b.heads("quantity", "search", "FMU"),
+            title="The best machine's FMU over the turn",
+            form="long",
+        )

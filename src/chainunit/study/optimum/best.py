@@ -1,0 +1,278 @@
+"""The best machine of a study: the search from many starts, the front of two objectives, checks, and conflicts."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...fmu.backends import Backend
+from ...machines.machine import Machine
+from ...progress import Report
+from ..cycle import cycle
+from ..cycle_quantities import CycleQuantity
+from .checks import FmuValue, Neighbours, by_fmu, neighbours
+from .conflict import Conflict, conflict, nearest
+from .search import Answer, Effort, Search
+from .wishes import TurnLimit, Wishes
+
+AGREES = 1e-6
+"""Share of the best value within which a start counts as one that found it."""
+_RETRIES = 6
+"""Number of starts of the search for a feasible machine, where no start found one."""
+
+
+@dataclass(frozen=True)
+class FrontPoint:
+    """A machine of the front of two objectives, with their values."""
+
+    x: Any
+    values: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Best:
+    """What a search found. Without a machine that meets all limits, `answer` is None and `conflict` says why."""
+
+    wishes: Wishes
+    answer: Answer | None
+    conflict: Conflict | None
+    starts: int
+    moved: int
+    """starts that were moved until the machine can be assembled"""
+    feasible: int
+    """starts that ended at a machine that meets all limits"""
+    agree: int
+    """starts that reached the best value"""
+    values: tuple[float, ...]
+    """the value that each feasible start reached, in rising order"""
+    today: Mapping[str, float]
+    """quantities of today's machine, by name"""
+    found: Mapping[str, float]
+    """quantities of the best machine, or of the nearest one"""
+    neighbours: Neighbours | None
+    fmu: Mapping[str, FmuValue]
+    front: tuple[FrontPoint, ...]
+    effort: Effort
+    turns: Mapping[str, Any] = field(default_factory=dict)
+    """crank angle [rad] and crank torque [N m] of today's machine and of the best one"""
+
+    @property
+    def quantities(self) -> dict[str, CycleQuantity]:
+        """Objectives and limited quantities by name."""
+        return quantities_of(self.wishes)
+
+    @property
+    def machine(self) -> Machine | None:
+        """The best machine."""
+        return None if self.answer is None else machine_at(self.wishes, self.answer.x)
+
+    @property
+    def met(self) -> bool:
+        """Whether a machine was found that meets all limits."""
+        return self.answer is not None
+
+
+def quantities_of(wishes: Wishes) -> dict[str, CycleQuantity]:
+    """Objectives and limited quantities by name."""
+    return {q.name: q for q in (*wishes.objectives, *(limit.quantity for limit in wishes.limits))}
+
+
+def machine_at(wishes: Wishes, x: Any) -> Machine:
+    """The machine with the free parameters `x`.
+
+    Raises
+    ------
+    GeometryError
+        for one that does not turn.
+    """
+    return wishes.machine.replace(dict(zip(wishes.names, map(float, x), strict=True)))
+
+
+def _quiet(what: str, done: float, total: float) -> None:
+    pass
+
+
+def find_best(wishes: Wishes, report: Report = _quiet, backend: Backend | None = None) -> Best:
+    """Search for the best machine, and check it.
+
+    Raises
+    ------
+    GeometryError
+        where no machine within the bounds turns.
+    """
+    search = Search(wishes)
+    starts, moved = search.starts(wishes.starts)
+    answers = _from_starts(search, starts, wishes.objectives[0], report)
+    good = [answer for answer in answers if answer.feasible]
+    failure = None
+    if not good:
+        report("a machine that meets all limits", 0.0, 1.0)
+        good, failure = _repaired(search, starts)
+    today = _values(search, search.today)
+    if not good:
+        assert failure is not None
+        found = _values(search, failure.nearest.x)
+        return Best(
+            wishes, None, failure, len(starts), moved, 0, 0, (), today, found, None, {}, (), search.effort
+        )
+    best = min(good, key=lambda answer: answer.value)
+    front: tuple[FrontPoint, ...] = ()
+    if len(wishes.objectives) > 1:
+        front = _front(search, best, starts, report)
+        best = _compromise(search, front)
+    agree = sum(answer.value - good_value(good) <= AGREES * abs(good_value(good)) for answer in good)
+    report("the checks", 0.0, 1.0)
+    objective, limits = _checked(wishes, best, search)
+    around = neighbours(search, best.x, objective, limits, search.value(objective, best.x))
+    found = _values(search, best.x)
+    machine = machine_at(wishes, best.x)
+    return Best(
+        wishes,
+        best,
+        None,
+        len(starts),
+        moved,
+        len(good),
+        agree,
+        tuple(sorted(answer.value for answer in good)),
+        today,
+        found,
+        around,
+        _by_fmu(search, best, machine, found, backend),
+        front,
+        search.effort,
+        _turns(wishes, machine),
+    )
+
+
+def good_value(answers: Sequence[Answer]) -> float:
+    """The least value of some answers."""
+    return min(answer.value for answer in answers)
+
+
+def _from_starts(
+    search: Search, starts: Sequence[Any], objective: CycleQuantity, report: Report
+) -> list[Answer]:
+    answers = []
+    for k, x in enumerate(starts):
+        report(f"starts, least {objective.name}", float(k), float(len(starts)))
+        answers.append(search.solve(x, objective))
+    report(f"starts, least {objective.name}", float(len(starts)), float(len(starts)))
+    return answers
+
+
+def _repaired(search: Search, starts: Sequence[Any]) -> tuple[list[Answer], Conflict | None]:
+    """Answers from machines that meet the limits, or the conflict."""
+    first, met = nearest(search, starts)
+    if met and first is not None:
+        answer = search.solve(first.x, search.wishes.objectives[0])
+        # a single feasible machine may be the answer itself
+        return [answer if answer.feasible else replace(answer, x=first.x, feasible=True)], None
+    if first is None:
+        first = search.solve(search.base, None)
+    return [], conflict(search, starts[:_RETRIES], first)
+
+
+def _values(search: Search, x: Any) -> dict[str, float]:
+    """The quantities of a machine; NaN where it cannot be assembled."""
+    quantities = quantities_of(search.wishes)
+    if not search.turns(x):
+        return dict.fromkeys(quantities, math.nan)
+    return {name: search.value(q, x) for name, q in quantities.items()}
+
+
+# -- two objectives
+
+
+def _front(search: Search, best: Answer, starts: Sequence[Any], report: Report) -> tuple[FrontPoint, ...]:
+    """The front of two objectives: the first is least while the second is limited, step by step."""
+    first, second = search.wishes.objectives
+    answers = [answer for answer in _from_starts(search, starts, second, report) if answer.feasible]
+    limits, total = list(search.wishes.limits), search.wishes.pareto_points
+    ends = [best, min(answers, key=lambda answer: answer.value)] if answers else [best]
+    # at either end the other objective is as small as it can be
+    corner = search.solve(best.x, second, [*limits, TurnLimit(first, None, best.value * (1.0 + AGREES))])
+    points = [_point(search, corner.x if corner.feasible else best.x)]
+    high = points[0].values[1]
+    if len(ends) > 1:
+        low = ends[1].value
+        near = [points[0].x]
+        for k in range(1, total):
+            report("front of two objectives", float(k), float(total))
+            bound = high + (low - high) * k / (total - 1)
+            allowed = TurnLimit(
+                second, None, bound * (1.0 + math.copysign(AGREES, bound)) if k == total - 1 else bound
+            )
+            found = [search.solve(x, first, [*limits, allowed]) for x in (near[-1], ends[1].x, *starts[:2])]
+            found = [answer for answer in found if answer.feasible]
+            if found:
+                least = min(found, key=lambda answer: answer.value)
+                points.append(_point(search, least.x))
+                near.append(least.x)
+    return tuple(p for p in points if not any(_dominates(other, p) for other in points))
+
+
+def _point(search: Search, x: Any) -> FrontPoint:
+    first, second = search.wishes.objectives
+    return FrontPoint(x, (search.value(first, x), search.value(second, x)))
+
+
+def _dominates(a: FrontPoint, b: FrontPoint) -> bool:
+    margins = [1e-6 * abs(y) for y in b.values]
+    return all(x < y - m for x, y, m in zip(a.values, b.values, margins, strict=True))
+
+
+def _compromise(search: Search, front: Sequence[FrontPoint]) -> Answer:
+    """The point of the front that is nearest to the least values of both, each as a share of its range; solved
+    again with the second objective limited to its value."""
+    values = np.array([point.values for point in front])
+    span = np.ptp(values, axis=0)
+    shares = (values - np.min(values, axis=0)) / np.where(span > 0.0, span, 1.0)
+    point = front[int(np.argmin(np.hypot(*shares.T)))]
+    first, second = search.wishes.objectives
+    limits = [
+        *search.wishes.limits,
+        TurnLimit(second, None, point.values[1] * (1.0 + math.copysign(1e-9, point.values[1]))),
+    ]
+    answer = search.solve(point.x, first, limits)
+    return answer if answer.feasible else replace(answer, x=point.x, value=point.values[0], feasible=True)
+
+
+def _checked(wishes: Wishes, best: Answer, search: Search) -> tuple[CycleQuantity, list[TurnLimit]]:
+    """The objective and the limits under which the answer is the best: of two objectives the second is a limit."""
+    limits = list(wishes.limits)
+    if len(wishes.objectives) > 1:
+        second = wishes.objectives[1]
+        limits.append(TurnLimit(second, None, search.value(second, best.x)))
+    return wishes.objectives[0], limits
+
+
+# -- the best machine
+
+
+def _by_fmu(
+    search: Search, best: Answer, machine: Machine, found: Mapping[str, float], backend: Backend | None
+) -> dict[str, FmuValue]:
+    """The quantities by the FMU of the best machine."""
+    folder = Path(tempfile.mkdtemp(prefix="chainunit_"))
+    angles = [
+        angle for q in quantities_of(search.wishes).values() for angle in search.extreme_angles(q, best.x)
+    ]
+    try:
+        quantities = quantities_of(search.wishes)
+        return by_fmu(search.wishes, machine, quantities, found, angles, folder, backend)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _turns(wishes: Wishes, machine: Machine) -> dict[str, Any]:
+    today = cycle(wishes.machine, wishes.crank_speed, wishes.feed)
+    then = cycle(machine, wishes.crank_speed, wishes.feed)
+    return {"angle": today.angle, "today": today.crank_torque, "best": then.crank_torque}

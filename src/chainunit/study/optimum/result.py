@@ -1,0 +1,153 @@
+"""The result of a search for the best machine as data: the content of result.json."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ... import __version__
+from ...text import array_entry, entry, shown_in
+from ..config import Config
+from .best import Best
+from .checks import STEPS
+from .words import bindings, clearances, conflict_sentences, sentence
+
+EVERY = 4
+"""One of so many angles of the turns is in the result."""
+CONFLICT = "no machine meets all limits"
+
+
+def as_dict(best: Best, config: Config) -> dict[str, Any]:
+    """All results, ready for JSON, each number with its unit."""
+    with shown_in(config.units):
+        return _as_dict(best, config)
+
+
+def _as_dict(best: Best, config: Config) -> dict[str, Any]:
+    wishes = best.wishes
+    variables = {v.name: v for v in wishes.machine.model.parameter_layout.variables}
+    x = (
+        best.answer.x
+        if best.answer is not None
+        else best.conflict.nearest.x
+        if best.conflict
+        else wishes.today
+    )
+    return {
+        "chainunit": __version__,
+        "title": config.title,
+        "source": config.source,
+        "report": dict(config.labels),
+        "status": "complete" if best.met else CONFLICT,
+        "objectives": [q.name for q in wishes.objectives],
+        "speed": entry(wishes.crank_speed, "rad/s", "speed"),
+        "clearance": entry(wishes.clearance, "1", "percent"),
+        "slack_free_speed": entry(wishes.slack_free_speed or None, "rad/s", "speed"),
+        "operating_hours": entry(wishes.basis.operating_hours, "1"),
+        "overload": entry(wishes.basis.overload, "1"),
+        "parameters": {
+            name: {
+                "title": variables[name].description,
+                "today": entry(float(today), variables[name].unit, variables[name].kind),
+                "best": entry(float(value), variables[name].unit, variables[name].kind),
+                "min": entry(wishes.free[name][0], variables[name].unit, variables[name].kind),
+                "max": entry(wishes.free[name][1], variables[name].unit, variables[name].kind),
+            }
+            for name, today, value in zip(wishes.names, wishes.today, x, strict=True)
+        },
+        "quantities": {name: _quantity(best, name) for name in best.quantities},
+        "bindings": _bindings(best),
+        "clearances": clearances(best) if best.met else [],
+        "conflict": _conflict(best),
+        "starts": _starts(best),
+        "neighbours": _neighbours(best),
+        "front": _front(best),
+        "over_turn": {
+            name: array_entry(y[::EVERY], "rad" if name == "angle" else "N.m")
+            for name, y in best.turns.items()
+        },
+    }
+
+
+def _quantity(best: Best, name: str) -> dict[str, Any]:
+    q = best.quantities[name]
+    limit = next((each for each in best.wishes.limits if each.name == name), None)
+    fmu = best.fmu.get(name)
+    return {
+        "title": q.description,
+        "today": entry(best.today[name], q.unit),
+        "best": entry(best.found[name], q.unit),
+        "min": entry(limit.low if limit else None, q.unit),
+        "max": entry(limit.high if limit else None, q.unit),
+        "fmu": entry(fmu.fmu if fmu else None, q.unit),
+        "fmu_deviation": entry(fmu.deviation if fmu else None, "1"),
+    }
+
+
+def _bindings(best: Best) -> list[dict[str, Any]]:
+    if not best.met:
+        return []
+    objective = best.wishes.objectives[0]
+    return [
+        {
+            "name": each.name,
+            "side": each.side,
+            "value": entry(each.value, each.unit),
+            "step": entry(each.step, each.unit),
+            "change": entry(each.change, objective.unit),
+            "text": sentence(best, each),
+        }
+        for each in bindings(best)
+    ]
+
+
+def _conflict(best: Best) -> dict[str, Any] | None:
+    if best.conflict is None:
+        return None
+    return {
+        "limits": list(best.conflict.names),
+        "bounds": [f"{name}.{side}" for name, side in best.conflict.bounds],
+        "sentences": list(conflict_sentences(best)),
+    }
+
+
+def _starts(best: Best) -> dict[str, Any]:
+    objective = best.wishes.objectives[0]
+    return {
+        "number": entry(float(best.starts), "1"),
+        "moved": entry(float(best.moved), "1"),
+        "feasible": entry(float(best.feasible), "1"),
+        "agree": entry(float(best.agree), "1"),
+        "values": array_entry(best.values, objective.unit),
+        "programs": entry(float(best.effort.programs), "1"),
+        "iterations": entry(float(best.effort.iterations), "1"),
+        "evaluations": entry(float(best.effort.evaluations), "1"),
+    }
+
+
+def _neighbours(best: Best) -> dict[str, Any] | None:
+    if best.neighbours is None:
+        return None
+    own = best.neighbours
+    return {
+        "steps": array_entry(STEPS, "1"),
+        "number": entry(float(own.number), "1"),
+        "feasible": entry(float(own.feasible), "1"),
+        "better": entry(float(own.better), "1"),
+    }
+
+
+def _front(best: Best) -> list[dict[str, Any]]:
+    names = best.wishes.names
+    units = {v.name: v.unit for v in best.wishes.machine.model.parameter_layout.variables}
+    return [
+        {
+            "values": {
+                q.name: entry(value, q.unit)
+                for q, value in zip(best.wishes.objectives, point.values, strict=True)
+            },
+            "parameters": {
+                name: entry(float(x), units[name]) for name, x in zip(names, point.x, strict=True)
+            },
+        }
+        for point in best.front
+    ]

@@ -1,0 +1,149 @@
+"""The sentences of an answer: what binds, what one unit more of a limit would bring, and why there is none."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from ...text import number
+from .best import Best
+from .wishes import SLACK, TURNS, TurnLimit
+
+_UNITS = {
+    "m": (1e-3, "1 mm"),
+    "rad": (math.radians(1.0), "1 deg"),
+    "N": (100.0, "100 N"),
+    "J": (3.6e6, "1 kWh"),
+    "W": (100.0, "100 W"),
+    "1": (0.01, "0.01"),
+    "kg.m2": (0.1, "0.1 kg m2"),
+}
+"""By unit, a step of a limit that a reader knows, in the unit and in words."""
+_ACTIVE = 1e-6
+"""Least change of the objective, as a share of it, by a step of a limit that binds."""
+
+
+@dataclass(frozen=True)
+class Binding:
+    """A limit or bound that binds: its name, its side ("min" or "max"), its value, the change of the objective by
+    one unit of it (`slope`), and the change by a `step`."""
+
+    name: str
+    side: str
+    value: float
+    unit: str
+    slope: float
+    step: float
+    step_words: str
+    is_bound: bool
+
+    @property
+    def change(self) -> float:
+        """Change of the objective by a step of the limit."""
+        return self.slope * self.step
+
+
+def step_of(unit: str) -> tuple[float, str]:
+    """A step of a quantity, and its words."""
+    return _UNITS.get(unit, (1.0, number(1.0, unit, full=False)))
+
+
+def bindings(best: Best) -> list[Binding]:
+    """What binds, the strongest first: limits, the slack-free speed, and bounds of parameters."""
+    assert best.answer is not None
+    wishes, found = best.wishes, []
+    size = abs(best.answer.value) or 1.0
+    limits = {limit.name: limit for limit in wishes.limits}
+    for (name, side), slope in best.answer.sensitivities.items():
+        if name in limits:
+            limit = limits[name]
+            value = limit.low if side == "min" else limit.high
+            unit = limit.quantity.unit
+        elif name == SLACK:
+            # the limit is a pull of 0: its slope is that by the pull
+            value, unit = 0.0, "N"
+        else:
+            continue
+        found.append(_binding(name, side, value, unit, slope, False))
+    units = {v.name: v.unit for v in wishes.machine.model.parameter_layout.variables}
+    for (name, side), slope in best.answer.at_bounds.items():
+        value = wishes.free[name][side == "max"]
+        found.append(_binding(name, side, value, units[name], slope, True))
+    active = [each for each in found if abs(each.change) > _ACTIVE * size]
+    return sorted(active, key=lambda each: -abs(each.change))
+
+
+def _binding(name: str, side: str, value: Any, unit: str, slope: float, is_bound: bool) -> Binding:
+    step, words = step_of(unit)
+    return Binding(name, side, float(value), unit, slope, step, words, is_bound)
+
+
+def sentence(best: Best, each: Binding) -> str:
+    """A binding in words: ``1 mm more of r.max lowers peak(crank_torque) by 0.3 N m``."""
+    objective = best.wishes.objectives[0]
+    amount = number(abs(each.change), objective.unit)
+    verb = "lowers" if each.change < 0.0 else "raises"
+    if each.name == SLACK:
+        return (
+            f"{each.step_words} of least pull in the webs at that speed {verb} {objective.name} by {amount}"
+        )
+    return f"{each.step_words} more of {each.name}.{each.side} {verb} {objective.name} by {amount}"
+
+
+def clearances(best: Best) -> list[str]:
+    """The requirements of the model whose distance binds."""
+    assert best.answer is not None
+    size = abs(best.answer.value) or 1.0
+    return [
+        subject
+        for (owner, subject), slope in best.answer.sensitivities.items()
+        if owner == TURNS and abs(slope) * best.wishes.clearance > 1e-4 * size
+    ]
+
+
+def limit_words(limit: TurnLimit) -> str:
+    """A limit in words: ``range(rocker.psi) from 16 deg to 20 deg``."""
+    q = limit.quantity
+    low, high = (None if x is None else number(x, q.unit, full=False) for x in (limit.low, limit.high))
+    if low is not None and high is not None:
+        return f"{q.name} = {low}" if limit.low == limit.high else f"{q.name} from {low} to {high}"
+    return f"{q.name} of at least {low}" if low is not None else f"{q.name} of at most {high}"
+
+
+def conflict_sentences(best: Best) -> Iterator[str]:
+    """Why no machine meets the limits: which of them conflict, and how near the nearest machine comes."""
+    assert best.conflict is not None
+    wishes, own = best.wishes, best.conflict
+    limits = {limit.name: limit for limit in wishes.limits}
+    names = [_wish_words(best, name) for name in own.names]
+    if len(names) == 1:
+        yield f"No machine within the bounds has {names[0]}."
+    else:
+        yield (
+            f"No machine within the bounds has {', '.join(names[:-1])} and {names[-1]} together; without any one "
+            "of them the others can be met."
+        )
+    reached = [
+        f"{name} = {number(value, limits[name].quantity.unit)}"
+        for name in own.names
+        if name in limits and not math.isnan(value := best.found[name])
+    ]
+    if reached:
+        yield f"The machine that comes nearest has {', '.join(reached)}."
+    if own.bounds:
+        units = {v.name: v.unit for v in wishes.machine.model.parameter_layout.variables}
+        words = (
+            f"{name}.{side} = {number(wishes.free[name][side == 'max'], units[name], full=False)}"
+            for name, side in own.bounds
+        )
+        yield f"The bounds that hold it: {', '.join(words)}."
+
+
+def _wish_words(best: Best, name: str) -> str:
+    if name == SLACK:
+        return f"webs that keep their pull up to {number(best.wishes.slack_free_speed, 'rad/s', 'speed')}"
+    if name == TURNS:
+        return f"a distance of {number(best.wishes.clearance, '1', 'percent')} from where it no longer turns"
+    return limit_words(next(limit for limit in best.wishes.limits if limit.name == name))
