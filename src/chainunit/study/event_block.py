@@ -16,6 +16,7 @@ import xarray as xr
 
 from ..batch.transients import Runs, Transients, profile_rows
 from ..errors import RunError
+from ..model import Model
 from ..system import compiled, monolithic
 from ..system.compiled import input_starts
 from ..system.signals import at_time
@@ -28,8 +29,21 @@ BLOCK = 64
 TOLERANCE = 1e-9
 """Relative tolerance of the integrator: a run agrees with the monolithic solution to some 1e-7 of the peaks, where a
 co-simulation has an error of some 1e-5."""
-_LONGEST = 20.0
+LONGEST = 20.0
 """Longest step of the integrator, over the time between rows."""
+
+
+def kept_outputs(rig: Rig, model: type[Model], reads: Sequence[str]) -> list[str]:
+    """The outputs and states of the compiled system of a rig that the measures of a run with an event need, and the
+    outputs of the machine that the event itself `reads`."""
+    assert model.state_layout is not None
+    known = {*model.state_layout.names, *(v.name for part in model.parts for v in part.layout.variables)}
+    names = {"motor.air_gap_tau", f"motor.{rig.drive.motor.current}", "machine.rocker.tau"}
+    names |= {f"machine.{name}" for name in reads}
+    for bond in rig.graph.bonds:
+        for name, terminal in zip((bond.driver, bond.machine), bond.flanges, strict=True):
+            names |= {f"{name}.{terminal.members[x]}" for x in ("phi", "w", "tau") if x in terminal.members}
+    return sorted(names & known)
 
 
 class EventBlock:
@@ -80,17 +94,7 @@ class EventBlock:
     @cached_property
     def outputs(self) -> list[str]:
         """The outputs and states that the measures of a run with an event read, and the events themselves."""
-        drive, declared = self._rig.drive, self.model.state_layout
-        assert declared is not None
-        known = {*declared.names, *(v.name for part in self.model.parts for v in part.layout.variables)}
-        names = {"motor.air_gap_tau", f"motor.{drive.motor.current}", "machine.rocker.tau"}
-        names |= {f"machine.{name}" for name in self._random_reads}
-        for bond in self._rig.graph.bonds:
-            for name, terminal in zip((bond.driver, bond.machine), bond.flanges, strict=True):
-                names |= {
-                    f"{name}.{terminal.members[x]}" for x in ("phi", "w", "tau") if x in terminal.members
-                }
-        return sorted(names & known)
+        return kept_outputs(self._rig, self.model, self._random_reads)
 
     @property
     def _random_reads(self) -> tuple[str, ...]:
@@ -178,7 +182,7 @@ class EventBlock:
             stop=stop,
             signals=np.moveaxis(np.array(table), 1, -1),
             limits=limits,
-            longest=_LONGEST * self._rig.step,
+            longest=LONGEST * self._rig.step,
             workers=workers,
         )
 

@@ -19,7 +19,7 @@ from .sections import Run
 from .sweep_plan import MOST_OF_HYPERCUBE, SweepPlan, SweptParameter
 from .sweep_table import MEASURES_OF_SWEEP, MOST_VALUES, USUAL_QUANTITIES, SweepEntry, SweepTable
 
-_SPEED = "run.crank_speed"
+SPEED = "run.crank_speed"
 _MOST_OF_GRID = 1_000_000_000
 _VALUES, _VALUES_OF_TOLERANCE = 11, 3
 
@@ -38,7 +38,7 @@ class Sweepable:
         own = [
             *((v, "machine.") for v in _with_values(type(machine.p), machine.p)),
             *((v, "feed.") for v in _with_values(type(feed), feed)),
-            *((v, "run.") for v in _with_values(Run, run) if f"run.{v[0].name}" == _SPEED),
+            *((v, "run.") for v in _with_values(Run, run) if f"run.{v[0].name}" == SPEED),
             *(
                 (v, f"event.{name}.")
                 for name, event in events.items()
@@ -194,7 +194,7 @@ def _parameter(
     if name not in quantities.variables:
         raise InputError(
             f"{place}.name = {shown(name)}: must be the full name of a number of the machine (machine.r), of its "
-            f"feed (feed. ..), of an event of the study (event.NAME. ..), or {_SPEED}"
+            f"feed (feed. ..), of an event of the study (event.NAME. ..), or {SPEED}"
             f"{near_name(name, quantities.variables)}",
             f"{place}.name",
         )

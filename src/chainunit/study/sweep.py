@@ -1,0 +1,290 @@
+"""Runs a sweep: its points as batches of the runner (see `chainunit.runner`), and its results as a dataset."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import __version__
+from ..composition import reference
+from ..errors import InputError
+from ..job import Job, ResultVariable
+from ..machines.machine import Machine
+from ..progress import Report
+from ..quantities import Layout
+from ..runner import Outcome
+from ..runner import run as run_job
+from .choice import choose
+from .config import Config
+from .cycle_quantities import CycleQuantity, cycle_quantity, evaluate
+from .measures import Answers
+from .rig import Rig
+from .sweep_plan import SweepPlan
+from .sweep_reading import SPEED
+from .sweep_runs import REASONS_OF_RUNS, SweepBlock
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+TITLE = "points of the sweep"
+_STATES, _STATES_OF_RATIOS, _RUNS = 12e6, 2e6, 64
+"""Largest numbers of states of a batch, of states where the ratio of the gear is swept (each then has an angle of its
+own), and of transients of a batch."""
+_ELSE = "another value of the point is outside its bounds"
+
+
+@dataclass(frozen=True)
+class SweepTask:
+    """The data that a worker needs: the plan, the machine with its feed and crank speed [rad/s], and for measures the
+    drive."""
+
+    plan: SweepPlan
+    machine: Machine
+    feed: Any
+    crank_speed: float
+    rig: Rig | None = None
+    threads: int = 1
+    """number of threads of the native loops; the results do not depend on it"""
+
+    @cached_property
+    def quantities(self) -> list[CycleQuantity]:
+        """The quantities of a turn."""
+        return [cycle_quantity(name, self.machine.model) for name in self.plan.quantities]
+
+    @cached_property
+    def block(self) -> SweepBlock:
+        """The transients of the measures."""
+        assert self.rig is not None
+        return SweepBlock(self.rig, self.plan)
+
+    @cached_property
+    def reasons(self) -> list[str]:
+        """The reasons for which a point has no result, by their codes."""
+        own = [str(each) for each in self.turns(self.plan.values(0, 1)).reason.attrs["reasons"]]
+        whole = len(self.machine.model.required) + 2
+        bounds = [
+            f"{each.name}: must be {each.variable.quantity.allowed_range}" for each in self.plan.parameters
+        ]
+        return [*own[:whole], *bounds, _ELSE, *(REASONS_OF_RUNS if self.plan.measures else ())]
+
+    def turns(self, values: Mapping[str, Any]) -> xr.Dataset:
+        """The quantities of a turn at points with these values by full name, each of shape (points,)."""
+        import xarray as xr
+
+        arrays = {name: xr.DataArray(x, dims="point") for name, x in values.items()}
+        own = {
+            name.partition(".")[2]: x for name, x in arrays.items() if name.startswith(("machine.", "feed."))
+        }
+        if not own:
+            # the shape of the results
+            gravity = next(iter(self.machine.by_name.items()))
+            own = {
+                gravity[0]: xr.DataArray(np.full(len(next(iter(values.values()))), gravity[1]), dims="point")
+            }
+        return evaluate(
+            self.machine,
+            self.quantities or [cycle_quantity("peak(crank_torque)", self.machine.model)],
+            arrays.get(SPEED, self.crank_speed),
+            self.feed,
+            own,
+            self.plan.basis,
+            self.plan.angles,
+            workers=self.threads,
+        )
+
+    def codes(self, local: Sequence[int], reasons: Sequence[str]) -> Any:
+        """The codes of the sweep for those of a batch, whose texts are its own, shape (points,)."""
+        known = {reason: code for code, reason in enumerate(self.reasons)}
+        short = {each.name.partition(".")[2]: each.name for each in self.plan.parameters}
+
+        def code(reason: str) -> int:
+            name, colon, rest = reason.partition(":")
+            return known.get(reason, known.get(f"{short.get(name, name)}{colon}{rest}", known[_ELSE]))
+
+        return np.array([code(each) for each in reasons], np.int16)[np.asarray(local)]
+
+    def digest(self) -> str:
+        """A digest of everything on which the results depend, in hexadecimal digits. The number of points of Sobol's
+        sequence is not of it: such a sweep may grow."""
+        plan = self.plan
+        relevant: dict[str, Any] = {
+            "chainunit": __version__,
+            "model": reference(self.machine.model),
+            "machine": self.machine.by_name,
+            "feed": Layout(type(self.feed)).by_name(self.feed),
+            "crank_speed": self.crank_speed,
+            "plan": [plan.method, plan.seed, plan.quantities, plan.measures, plan.event, plan.angles],
+            "points": None if plan.method == "sobol" else plan.points,
+            "basis": asdict(plan.basis),
+            "parameters": [
+                [p.name, p.centre, p.values, repr(p.ends), p.tolerance, p.distribution]
+                for p in plan.parameters
+            ],
+            # other versions of scipy may have other points
+            "first": [list(map(float, x)) for x in plan.values(0, min(8, plan.points)).values()],
+            "batch": batch_of(plan),
+        }
+        if self.rig is not None:
+            config, drive = self.rig.config, self.rig.drive
+            event = config.events[plan.event]
+            relevant |= {
+                "run": asdict(config.run),
+                "event": [event.kind, event.side, Layout(type(event.p)).by_name(event.p)],
+                "connections": drive.graph.connections,
+                "start": drive.graph.values,
+                "empty_start": config.empty_start,
+                "ramp_end": config.ramp_end,
+            }
+        return hashlib.sha256(json.dumps(relevant, sort_keys=True).encode()).hexdigest()
+
+
+def plain_name(name: str) -> str:
+    """The name of a result or parameter in the store: ``peak(crank_torque)`` -> peak_crank_torque."""
+    return re.sub(r"\W+", "_", name).strip("_")
+
+
+def batch_of(plan: SweepPlan) -> int:
+    """The number of points of a batch, a power of 2: some tenths of a second of work, and some 100 MB."""
+    has_ratio = any(each.name == "machine.ratio" for each in plan.parameters)
+    states = (_STATES_OF_RATIOS if has_ratio else _STATES) / plan.angles
+    return _RUNS if plan.measures else 1 << max(4, int(math.log2(states)))
+
+
+def result_variables(task: SweepTask) -> list[ResultVariable]:
+    """The results of a point: its parameters, its quantities and measures, and the reason why it has none."""
+    plan, known = task.plan, {v.name: v for v in Layout(Answers).variables}
+    words = [re.sub(r"[^\w.+@-]+", "_", reason).strip("_") for reason in task.reasons]
+    return [
+        *(
+            ResultVariable(plain_name(p.name), p.variable.unit, p.variable.description)
+            for p in plan.parameters
+        ),
+        *(ResultVariable(plain_name(q.name), q.unit, q.description) for q in task.quantities),
+        *(ResultVariable(name, known[name].unit, known[name].description) for name in plan.measures),
+        ResultVariable("reason", "1", "reason for which there is no result", "int16", flags=tuple(words)),
+    ]
+
+
+def make_points(task: SweepTask, begin: int, end: int) -> dict[str, Any]:
+    """The results of the points from `begin` to `end` - 1, by the names of `result_variables`."""
+    plan = task.plan
+    values = plan.values(begin, end)
+    table = task.turns(values)
+    reason = task.codes(table.reason.values, table.reason.attrs["reasons"])
+    results = {plain_name(name): x for name, x in values.items()}
+    for name in plan.quantities:
+        results[plain_name(name)] = np.where(
+            reason == 0, np.broadcast_to(table[name].values, reason.shape), np.nan
+        )
+    if plan.measures:
+        results |= {name: np.full(end - begin, np.nan) for name in plan.measures}
+        sound = np.flatnonzero(reason == 0)
+        if len(sound):
+            own = {name: x[sound] for name, x in values.items()}
+            measures, codes = task.block.measures(own, task.threads)
+            for name, x in measures.items():
+                results[name][sound] = x
+            first = len(task.reasons) - len(REASONS_OF_RUNS)
+            reason[sound] = np.where(codes == 0, 0, first - 1 + codes)
+    return results | {"reason": reason.astype(np.int16)}
+
+
+def task_of(config: Config) -> SweepTask:
+    """The task of the sweep of a study.
+
+    Raises
+    ------
+    InputError
+        for a study without a sweep or without swept parameters; of measures see `chainunit.study.sweep_runs`.
+    """
+    plan = config.sweep
+    if plan is None or not plan.parameters:
+        raise InputError(
+            "sweep.parameter: the study has none; add a table [[sweep.parameter]] with name, from and to "
+            "(chainunit keys sweep.parameter)",
+            "sweep.parameter",
+        )
+    drive = choose(config, Path(), lambda *said: None).drive
+    rig = Rig(config, drive, {}) if plan.measures else None
+    return SweepTask(plan, drive.machine, config.feed, float(config.run.crank_speed), rig)
+
+
+def job_of(task: SweepTask) -> Job:
+    """The points of a sweep, as work in batches."""
+    return Job(
+        name="sweep",
+        title=TITLE,
+        points=task.plan.points,
+        batch=batch_of(task.plan),
+        variables=result_variables(task),
+        work=make_points,
+        task=task,
+        digest=task.digest(),
+    )
+
+
+@dataclass(frozen=True)
+class SweepFindings:
+    """The results of a sweep, in the store of `outcome`."""
+
+    config: Config
+    task: SweepTask
+    outcome: Outcome
+
+    @property
+    def plan(self) -> SweepPlan:
+        """Its plan."""
+        return self.task.plan
+
+    @property
+    def results(self) -> tuple[str, ...]:
+        """The names of all quantities and measures."""
+        return (*self.plan.quantities, *self.plan.measures)
+
+    @cached_property
+    def points(self) -> xr.Dataset:
+        """All points over the dimension ``point``, by the names of the study: parameters, results and ``reason``. The
+        values are read when they are used."""
+        plan = self.plan
+        names = {plain_name(name): name for name in (*(p.name for p in plan.parameters), *self.results)}
+        dataset = self.outcome.dataset.rename(names)
+        dataset["reason"].attrs["reasons"] = self.task.reasons
+        return dataset.set_coords([each.name for each in plan.parameters])
+
+    @cached_property
+    def dataset(self) -> xr.Dataset:
+        """The results by the names of the study: over the parameters of a grid, else over ``point``, with the
+        parameters as coordinates."""
+        import xarray as xr
+
+        plan, points = self.plan, self.points
+        if not plan.is_grid:
+            return points
+        about = {each.name: points[each.name].attrs for each in plan.parameters}
+        axes = {each.name: (each.name, list(each.values), about[each.name]) for each in plan.parameters}
+        variables = {
+            name: (plan.dims, x.values.reshape(plan.shape), x.attrs) for name, x in points.data_vars.items()
+        }
+        return xr.Dataset(variables, axes, points.attrs)
+
+
+def run_sweep(
+    config: Config, folder: Path, report: Report, workers: int | None = None, scheduler: str | None = None
+) -> SweepFindings:
+    """Make the points of the sweep of a study that its store in `folder` does not have; the other arguments and the
+    errors are those of `task_of` and `chainunit.runner.run`."""
+    task = task_of(config)
+    if scheduler is None and not config.sweep.measures:
+        # the native loop leaves so little to Python that threads do; processes take longer to start
+        task, workers = replace(task, threads=workers or os.cpu_count() or 1), 1
+    return SweepFindings(config, task, run_job(job_of(task), folder, report, workers, scheduler))

@@ -1,0 +1,312 @@
+"""Transients of a sweep, in blocks on the compiled system: each point starts its own drive from rest, runs it until it
+is steady, and then meets the event.
+
+A point depends on its own values alone, whatever the others of its block are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from ..batch.transients import Runs, Transients, profile_rows
+from ..errors import InputError
+from ..quantities import Layout
+from ..system import Profile, compiled
+from ..system.compiled import input_starts
+from .cycle import no_feed
+from .drive import Drive
+from .event import Event
+from .event_block import LONGEST, TOLERANCE, kept_outputs
+from .measures import read_measure
+from .rig import PATIENCE, Rig
+from .sweep_plan import SweepPlan
+from .sweep_reading import SPEED
+from .window import Phase, Window, is_settled, whole_turns
+
+REASONS_OF_RUNS = (
+    "the states of the drive left all bounds",
+    f"the motor does not settle in {PATIENCE:g} turns of the crank",
+)
+"""The reasons for which a run has no measures; their codes count from 1."""
+_LEFT_BOUNDS, _UNSETTLED = 1, 2
+_RATIO = "machine.ratio"
+_ROWS_OF_START = 16
+"""Rows of the start of a run, which no measure reads."""
+_RISE = 0.1
+"""Share of a turn in which the feed comes to a machine that starts empty."""
+
+
+@dataclass(frozen=True)
+class _Point:
+    """A point: its crank speed [rad/s], its event, and the rig with its feed and drive."""
+
+    speed: float
+    event: Event
+    rig: Rig
+
+    @property
+    def drive(self) -> Drive:
+        """Its drive."""
+        return self.rig.drive
+
+    @property
+    def loads(self) -> dict[str, Any]:
+        """Its loads in normal running, by full name."""
+        return self.drive.loads(self.rig.config.feed)
+
+    @property
+    def turn(self) -> float:
+        """Time of a turn [s]."""
+        return 2.0 * math.pi / self.speed
+
+
+class SweepBlock:
+    """The compiled system of a rig whose values a sweep varies.
+
+    Raises
+    ------
+    InputError
+        where the drive has an FMU, where there is no C compiler, for a swept quantity that the drive does not have,
+        and for an event that it cannot have.
+    """
+
+    def __init__(self, rig: Rig, plan: SweepPlan) -> None:
+        self._rig, self._plan = rig, plan
+        event = rig.config.events[plan.event]
+        if not rig.takes(event):
+            raise InputError(f"sweep.event = {plan.event}: {event.without}", "sweep.event")
+        component = compiled(rig.graph)
+        self.model = component.model
+        layout = self.model.parameter_layout
+        own = {"solver.tolerance": TOLERANCE} if "solver.tolerance" in layout.names else {}
+        self._p = layout.from_names(own, component.parameters)
+        self._inputs = input_starts(rig.graph, self.model) | rig.drive.loads(rig.config.feed)
+        self._varying: dict[str, str] = {}
+        for each in plan.parameters:
+            inner = each.name.partition(".")[2]
+            if each.name.startswith("machine."):
+                full = [f"{part}.{inner}" for part in ("machine", "model")]
+                names = [name for name in full if name in layout.names]
+                if not names or (each.name == _RATIO and rig.drive.line is not None):
+                    raise InputError(
+                        f"sweep.parameter: {each.name} is not one number of the drive; sweep it without measures",
+                        "sweep.parameter",
+                    )
+                self._varying |= dict.fromkeys(names, each.name)
+
+    @cached_property
+    def outputs(self) -> list[str]:
+        """The outputs and states that the measures read."""
+        return kept_outputs(self._rig, self.model, self._event.reads)
+
+    @property
+    def _event(self) -> Event:
+        return self._rig.config.events[self._plan.event]
+
+    @cached_property
+    def _driven(self) -> list[str]:
+        """The inputs that differ between points, or over time."""
+        unknown: Mapping[str, float] = defaultdict(float)
+        of_event = self._rig.event_signals(self._event, 0.0, unknown)
+        reference = self._rig.drive.reference(self._rig.config.run.crank_speed)
+        return [*dict.fromkeys([*self._rig.drive.loads(self._rig.config.feed), *of_event, *reference])]
+
+    @cached_property
+    def _changes(self) -> int:
+        unknown: Mapping[str, float] = defaultdict(float)
+        of_event = self._rig.event_signals(self._event, 0.0, unknown).values()
+        return max(1, *(len(getattr(signal, "changes", ())) for signal in of_event))
+
+    @cached_property
+    def _loop(self) -> Transients:
+        return Transients(
+            self.model,
+            self.outputs,
+            varying=list(self._varying),
+            driven=self._driven,
+            guarded=[self._rig.drive.motor_torque],
+            changes=self._changes,
+        )
+
+    def measures(self, values: Mapping[str, Any], threads: int = 1) -> tuple[dict[str, Any], Any]:
+        """The measures of the plan by name, and the codes of `REASONS_OF_RUNS`, 0 for none, of points with these values
+        by full name, each of shape (points,)."""
+        count = len(next(iter(values.values())))
+        points = [self._point({name: float(x[k]) for name, x in values.items()}) for k in range(count)]
+        given = np.array([values[name] for name in self._varying.values()]).reshape(len(self._varying), count)
+        work = _Work(self, points, given, threads)
+        states, codes, steady = work.steady()
+        results = {name: np.full(count, np.nan) for name in self._plan.measures}
+        good = np.flatnonzero(codes == 0)
+        if len(good):
+            windows = work.only(good).windows(states[:, good], [steady[k] for k in good])
+            for k, window in zip(good, windows, strict=True):
+                if window is None:
+                    codes[k] = _LEFT_BOUNDS
+                    continue
+                for name in self._plan.measures:
+                    value = read_measure(name, window)
+                    results[name][k] = np.nan if value is None else value
+        return results, codes
+
+    def _point(self, values: Mapping[str, float]) -> _Point:
+        rig, event = self._rig, self._event
+        feed = {name.removeprefix("feed."): x for name, x in values.items() if name.startswith("feed.")}
+        begin = f"event.{event.name}."
+        own = {name.removeprefix(begin): x for name, x in values.items() if name.startswith(begin)}
+        if _RATIO in values:
+            machine = rig.drive.machine.replace(ratio=values[_RATIO])
+            rig = replace(rig, drive=replace(rig.drive, machine=machine))
+        if feed:
+            whole = Layout(type(rig.config.feed)).from_names(feed, rig.config.feed)
+            rig = replace(rig, config=replace(rig.config, feed=whole))
+        speed = values.get(SPEED, float(rig.config.run.crank_speed))
+        return _Point(speed, replace(event, p=replace(event.p, **own)), rig)
+
+
+class _Work:
+    """Points of a block in work."""
+
+    def __init__(self, block: SweepBlock, points: Sequence[_Point], given: Any, threads: int) -> None:
+        self._block, self._points, self._given, self._threads = block, points, given, threads
+        self._rig = block._rig
+        self._step = self._rig.step
+
+    def only(self, places: Any) -> _Work:
+        """Some of the points."""
+        return _Work(self._block, [self._points[k] for k in places], self._given[:, places], self._threads)
+
+    def _run(
+        self, states: Any, signals: Sequence[Mapping[str, Any]], stop: Any, step: float, limits: Any = None
+    ) -> Runs:
+        block = self._block
+        table = [
+            [profile_rows(each.get(full, block._inputs.get(full, 0.0)), block._changes) for each in signals]
+            for full in block._driven
+        ]
+        return block._loop.run(
+            block._p,
+            block._inputs,
+            states,
+            begin=0.0,
+            step=step,
+            stop=np.asarray(stop, float),
+            varying=self._given,
+            signals=np.moveaxis(np.array(table), 1, -1),
+            limits=limits,
+            longest=LONGEST * self._step,
+            workers=self._threads,
+        )
+
+    def _constant(self, point: _Point) -> dict[str, Any]:
+        """The signals of a point in steady running."""
+        return {**point.loads, **point.drive.reference(point.speed)}
+
+    def _from_rest(self) -> Any:
+        """The states at rest, shape (states, points)."""
+        block = self._block
+        model, layout = block.model, block.model.parameter_layout
+        assert model.state_layout is not None
+        columns = []
+        for k, point in enumerate(self._points):
+            own = dict(zip(block._varying, map(float, self._given[:, k]), strict=True))
+            inputs = block._inputs | self._constant(point) | dict.fromkeys(point.drive.reference(1.0), 0.0)
+            known = {name: x for name, x in inputs.items() if name in model.input_layout.names}
+            p = model.check(layout.from_names(own, block._p))
+            columns.append(model.state_layout.values(model.begin(p, model.input_layout.from_names(known))))
+        return np.array(columns, float).T
+
+    def _started(self) -> Runs:
+        """The start from rest until running should be steady."""
+        config, rest = self._rig.config, self._from_rest()
+        ramp, settle = config.run.ramp, config.run.settle_turns
+        signals, stops, lasts = [], [], config.ramp_end
+        for point in self._points:
+            own = self._constant(point)
+            for full, w in point.drive.reference(point.speed).items():
+                own[full] = Profile(0.0, ((0.0, ramp, w),)) if w else 0.0
+            if config.empty_start:
+                empty = point.drive.loads(no_feed(config.feed))
+                fed = lasts + settle * point.turn
+                own |= {
+                    full: Profile(empty[full], ((fed, _RISE * point.turn, x),))
+                    for full, x in point.loads.items()
+                }
+            signals.append(own)
+            stops.append(lasts + settle * point.turn * (2.0 if config.empty_start else 1.0))
+        return self._run(rest, signals, stops, max(stops) / _ROWS_OF_START)
+
+    def steady(self) -> tuple[Any, Any, list[xr.Dataset]]:
+        """The states in steady running, shape (states, points), the codes of the reasons, and the run of the last
+        turns of each point."""
+        runs = self._started()
+        states, codes = runs.states, np.where(runs.failed, _LEFT_BOUNDS, 0)
+        steady: list[Any] = [None] * len(self._points)
+        waiting = np.flatnonzero(codes == 0)
+        for _ in range(int(PATIENCE)):
+            if not len(waiting):
+                break
+            part = self.only(waiting)
+            stops = [(self._rig.config.run.turns + 0.1) * point.turn for point in part._points]
+            runs = part._run(states[:, waiting], [part._constant(p) for p in part._points], stops, self._step)
+            states[:, waiting] = runs.states
+            unsettled = []
+            for k, place in enumerate(waiting):
+                point, run = part._points[k], part._series(runs, k)
+                if runs.failed[k]:
+                    codes[place] = _LEFT_BOUNDS
+                    continue
+                steady[place] = run
+                turns = whole_turns(point.drive, run, self._rig.config.run.turns)
+                if self._rig.drive.chain is None and not is_settled(point.drive, turns):
+                    unsettled.append(place)
+            waiting = np.array(unsettled, int)
+        codes[waiting] = _UNSETTLED
+        return states, codes, steady
+
+    def windows(self, states: Any, steady: Sequence[xr.Dataset]) -> list[Window | None]:
+        """The runs with the event, each from its event on; None for one whose states left all bounds."""
+        before, begins = [], []
+        for point, run in zip(self._points, steady, strict=True):
+            turns = whole_turns(point.drive, run, self._rig.config.run.turns)
+            window = Window(Phase.STEADY, turns, point.drive, (), point.speed)
+            before.append(window)
+            angle = float(point.drive.crank_motion(run)[0][-1])
+            begins.append(point.rig.lead(point.event, angle, window.speed_mean))
+        lead = self._run(states, [self._constant(p) for p in self._points], begins, self._step)
+        signals, stops = [], []
+        for k, point in enumerate(self._points):
+            row = int(lead.count[k]) - 1
+            read = {
+                name: float(lead.rows[self._block.outputs.index(f"machine.{name}"), k, row])
+                for name in point.event.reads
+            }
+            signals.append(self._constant(point) | point.rig.event_signals(point.event, 0.0, read))
+            stops.append(point.event.follow(point.turn))
+        limits = np.array([[self._limit(point) for point in self._points]])
+        runs = self._run(lead.states, signals, stops, self._step, limits)
+        return [
+            None
+            if runs.failed[k] or lead.failed[k]
+            else Window(Phase.EVENT, self._series(runs, k), point.drive, (), point.speed, 0.0, before[k])
+            for k, point in enumerate(self._points)
+        ]
+
+    def _limit(self, point: _Point) -> float:
+        """The torque of the motor's shaft at which a safety coupling opens [N m]."""
+        coupling = self._rig.config.coupling
+        return math.inf if coupling is None else float(coupling.trip_torque / point.drive.ratio)
+
+    def _series(self, runs: Runs, k: int) -> xr.Dataset:
+        """A run as a dataset over its time."""
+        n = int(runs.count[k])
+        rows = {name: ("time", runs.rows[i, k, :n]) for i, name in enumerate(self._block.outputs)}
+        return xr.Dataset(rows, {"time": runs.times[k, :n]})
