@@ -116,7 +116,19 @@ class Field:
     bold: float | None = None
 
 
-Item: TypeAlias = "Curve | Between | Shade | Mark | Bars | Label | Field"
+@dataclass(frozen=True)
+class Hatch:
+    """Hatched cells of a map, such as those without values: `cells`, shape (len(y) - 1, len(x) - 1), says which of the
+    cells between the lines `x` and `y`. Each `look` is another direction of the lines."""
+
+    name: str
+    x: Any
+    y: Any
+    cells: Any
+    look: int = 0
+
+
+Item: TypeAlias = "Curve | Between | Shade | Mark | Bars | Label | Field | Hatch"
 
 
 @dataclass(frozen=True)
@@ -177,7 +189,7 @@ def stacked(x: Axis, panels: Iterable[tuple[Axis, Iterable[Item]]]) -> tuple[tup
 def along(item: Item) -> dict[str, str]:
     """The fields of an item whose values lie along an axis, each with its axis, x or y."""
     match item:
-        case Curve() | Label() | Field():
+        case Curve() | Label() | Field() | Hatch():
             return {"x": "x", "y": "y"}
         case Between():
             return {"x": "x", "low": "y", "high": "y"}
@@ -187,6 +199,39 @@ def along(item: Item) -> dict[str, str]:
             return {"at": item.axis}
         case Bars():
             return {"size": "x"}
+
+
+_DIRECTIONS = ((1.0, 1.0), (1.0, -1.0), (0.0, 1.0), (1.0, 0.0))
+"""Normals of the lines of a hatch by its look, in parts of the width and the height of the map."""
+_SPACING = 0.035
+
+
+def hatch_lines(hatch: Hatch) -> tuple[Any, Any]:
+    """The lines of a hatch: x and y of their ends, with NaN between two lines."""
+    (x0, x1), (y0, y1) = ((float(e[0]), float(e[-1])) for e in (np.asarray(hatch.x), np.asarray(hatch.y)))
+    x, y = (np.asarray(hatch.x) - x0) / (x1 - x0), (np.asarray(hatch.y) - y0) / (y1 - y0)
+    a, b = _DIRECTIONS[hatch.look % len(_DIRECTIONS)]
+    cells, ends = np.asarray(hatch.cells, bool), list[list[float]]()
+    size = a * a + b * b
+    for c in np.arange(min(0.0, b) + 0.5 * _SPACING, a + max(0.0, b), _SPACING * size**0.5):
+        # the line a u + b v = c from its foot along (-b, a), with its crossings of all lines of the map
+        u0, v0 = a * c / size, b * c / size
+        cuts = [*((u0 - x) / b if b else ()), *((y - v0) / a if a else ())]
+        t = np.unique(np.round(cuts, 12))
+        middle = 0.5 * (t[1:] + t[:-1])
+        u, v = u0 - b * middle, v0 + a * middle
+        column, row = np.searchsorted(x, u) - 1, np.searchsorted(y, v) - 1
+        inside = (column >= 0) & (column < len(x) - 1) & (row >= 0) & (row < len(y) - 1)
+        drawn = np.zeros(len(middle), bool)
+        drawn[inside] = cells[row[inside], column[inside]]
+        begins = np.flatnonzero(drawn & ~np.concatenate([[False], drawn[:-1]]))
+        stops = np.flatnonzero(drawn & ~np.concatenate([drawn[1:], [False]])) + 1
+        ends += [[t[i], t[j], u0, v0] for i, j in zip(begins, stops, strict=True)]
+    table = np.array(ends).reshape(-1, 4)
+    gap = np.full(len(table), np.nan)
+    u = np.stack([table[:, 2] - b * table[:, 0], table[:, 2] - b * table[:, 1], gap], axis=1).ravel()
+    v = np.stack([table[:, 3] + a * table[:, 0], table[:, 3] + a * table[:, 1], gap], axis=1).ravel()
+    return x0 + (x1 - x0) * u, y0 + (y1 - y0) * v
 
 
 def in_units(figure: Figure, units: Units) -> Figure:

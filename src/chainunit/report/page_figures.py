@@ -9,8 +9,23 @@ import numpy as np
 import plotly.graph_objects as go  # type: ignore[import-untyped]
 
 from ..text import Units
-from .figure import Axis, Bars, Between, Curve, Field, Figure, Item, Label, Mark, Panel, Shade, in_units
-from .style import BARS, CLASSES, FILLS, INK, look_of
+from .figure import (
+    Axis,
+    Bars,
+    Between,
+    Curve,
+    Field,
+    Figure,
+    Hatch,
+    Item,
+    Label,
+    Mark,
+    Panel,
+    Shade,
+    hatch_lines,
+    in_units,
+)
+from .style import BARS, FILLS, HATCHES, INK, class_colours, look_of
 
 _AXIS = {
     "gridcolor": "#e4e4e4",
@@ -82,7 +97,7 @@ def figure(spec: Figure, units: Units) -> Any:
 def _hovers_by_point(panel: Panel) -> bool:
     """Whether the cursor shows single points of a panel: its x is not a variable that runs from left to right."""
     curves = (item for item in panel.items if isinstance(item, Curve) and item.has_line)
-    bars = any(isinstance(item, Bars | Field) for item in panel.items)
+    bars = any(isinstance(item, Bars | Field | Hatch) for item in panel.items)
     return panel.equal or bars or any(bool(np.any(np.diff(curve.x) < 0.0)) for curve in curves)
 
 
@@ -200,6 +215,8 @@ class _Drawing:
                 self._words(x, y, at_x, at_y, item.words, **white, **_PLACES[item.place])
             case Field():
                 self._field(item, place)
+            case Hatch():
+                self._hatch(item, place)
 
     def _curve(self, curve: Curve, panel: Panel, place: dict[str, Any]) -> None:
         samples = self.samples[id(curve.x)] if curve.has_line and not curve.marker else slice(None)
@@ -249,7 +266,7 @@ class _Drawing:
 
     def _field(self, field: Field, place: dict[str, Any]) -> None:
         count, z = len(field.names), _small(classes(field))
-        shades = [[i / (count - 1), colour] for i, colour in enumerate(CLASSES[:count])]
+        shades = [[i / max(1, count - 1), colour] for i, colour in enumerate(class_colours(count))]
         common = {"x": _small(field.x), "y": _small(field.y), "z": z, "showscale": False, "hoverinfo": "skip"}
         levels = {"start": 1, "end": count - 1, "size": 1, "coloring": "fill"}
         self.figure.add_contour(**common, **place, colorscale=shades, contours=levels, line={"width": 0})
@@ -258,8 +275,15 @@ class _Drawing:
             edge = {"start": k, "end": k, "size": 1, "coloring": "none"}
             line = {"width": 1.5, "color": INK}
             self.figure.add_contour(**common, **place, contours=edge, line=line, showlegend=False)
-        for name, colour in zip(field.names, CLASSES, strict=False):
+        for name, colour in zip(field.names, class_colours(count), strict=True):
             self._sample(name, place, mode="markers", marker=_square(colour))
+
+    def _hatch(self, hatch: Hatch, place: dict[str, Any]) -> None:
+        x, y = hatch_lines(hatch)
+        line = {"color": HATCHES[hatch.look % len(HATCHES)], "width": 1.0}
+        self.figure.add_scatter(
+            x=_small(x), y=_small(y), mode="lines", line=line, hoverinfo="skip", **self._legend(hatch.name), **place
+        )
 
 
 def _axis(axis: Axis) -> dict[str, Any]:

@@ -12,10 +12,25 @@ import numpy as np
 from matplotlib.ticker import FuncFormatter
 
 from ..text import Units
-from .figure import Axis, Bars, Between, Curve, Field, Figure, Item, Label, Mark, Panel, Shade, in_units
+from .figure import (
+    Axis,
+    Bars,
+    Between,
+    Curve,
+    Field,
+    Figure,
+    Hatch,
+    Item,
+    Label,
+    Mark,
+    Panel,
+    Shade,
+    hatch_lines,
+    in_units,
+)
 from .lines import capital
 from .page_figures import classes
-from .style import BARS, CLASSES, FILLS, INK, draw, look_of
+from .style import BARS, FILLS, HATCHES, INK, class_colours, draw, look_of
 
 _ROW, _COLUMN = 2.5, 4.3  # of a panel [in]
 _WHITE = {"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.85}
@@ -162,6 +177,9 @@ def _draw(axis: Any, item: Item) -> None:
             axis.annotate(item.words, (item.x, item.y), offset, textcoords="offset points", **style)
         case Field():
             _field(axis, item)
+        case Hatch():
+            style = {"color": HATCHES[item.look % len(HATCHES)], "linewidth": 0.9}
+            axis.plot(*hatch_lines(item), label=_name(axis, item.name), **style)
 
 
 def _bars(axis: Any, bars: Bars) -> None:
@@ -176,7 +194,7 @@ def _bars(axis: Any, bars: Bars) -> None:
 
 
 def _field(axis: Any, field: Field) -> None:
-    shades = CLASSES[: len(field.names)]
+    shades = class_colours(len(field.names))
     z = np.ma.masked_invalid(classes(field))
     axis.contourf(field.x, field.y, z, levels=range(len(field.levels)), colors=shades)
     if field.bold is not None and np.nanmax(field.z) > field.bold:

@@ -49,6 +49,15 @@ INK = "#1b1b1b"
 FILLS = {"pale": "#ececec", "dark": "#a9a9a9", "band": "#c8c8c8", "hatched": "#e4e4e4"}
 CLASSES = ("#ffffff", "#d4d4d4", "#9a9a9a", "#4d4d4d")
 """Shades of the classes of a map."""
+SEQUENCE = ("#f7fbff", "#dbe9f6", "#bad6eb", "#89bedc", "#539ecd", "#2b7bba", "#0b559f", "#08306b")
+"""Shades of a map of more classes, from the least values to the largest."""
+
+
+def class_colours(count: int) -> tuple[str, ...]:
+    """The shades of so many classes of a map, at most those of `SEQUENCE`."""
+    return CLASSES[:count] if count <= len(CLASSES) else SEQUENCE[:count]
+
+
 BARS = (
     {"color": "#ffffff", "pattern": "", "hatch": ""},
     {"color": "#d4d4d4", "pattern": "", "hatch": ""},
@@ -59,6 +68,8 @@ BARS = (
     {"color": "#ffffff", "pattern": "-", "hatch": "--"},
     {"color": "#d9e4d0", "pattern": "+", "hatch": "++"},
 )
+HATCHES = ("#c1440e", "#1b1b1b", "#7b3f98", "#8a6d00")
+"""Colours of hatched cells of a map; the direction of the lines differs, too."""
 WIDE = 30.0
 """The ratio of the largest value to the least from which an axis is logarithmic."""
 

@@ -284,7 +284,7 @@ def run_sweep(
     """Make the points of the sweep of a study that its store in `folder` does not have; the other arguments and the
     errors are those of `task_of` and `chainunit.runner.run`."""
     task = task_of(config)
-    if scheduler is None and not config.sweep.measures:
+    if scheduler is None and not task.plan.measures:
         # the native loop leaves so little to Python that threads do; processes take longer to start
         task, workers = replace(task, threads=workers or os.cpu_count() or 1), 1
     return SweepFindings(config, task, run_job(job_of(task), folder, report, workers, scheduler))

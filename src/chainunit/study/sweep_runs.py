@@ -1,5 +1,5 @@
-"""Transients of a sweep, in blocks on the compiled system: each point starts its own drive from rest, runs it until it
-is steady, and then meets the event.
+"""Transients of a sweep, in blocks on the compiled system: each point starts its own drive from rest, runs it until
+it is steady, and then meets the event.
 
 A point depends on its own values alone, whatever the others of its block are.
 """
@@ -137,8 +137,8 @@ class SweepBlock:
         )
 
     def measures(self, values: Mapping[str, Any], threads: int = 1) -> tuple[dict[str, Any], Any]:
-        """The measures of the plan by name, and the codes of `REASONS_OF_RUNS`, 0 for none, of points with these values
-        by full name, each of shape (points,)."""
+        """The measures of the plan by name, and the codes of `REASONS_OF_RUNS`, 0 for none, of points with these
+        values by full name, each of shape (points,)."""
         count = len(next(iter(values.values())))
         points = [self._point({name: float(x[k]) for name, x in values.items()}) for k in range(count)]
         given = np.array([values[name] for name in self._varying.values()]).reshape(len(self._varying), count)

@@ -1,0 +1,222 @@
+"""The report on a sweep: best points, extremes, influences, spread, and maps or curves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from ..files import clear
+from ..progress import Report as Progress
+from ..study.config import Config
+from ..study.sweep import SweepFindings, run_sweep
+from ..study.sweep_summary import SweepSummary
+from ..text import shown_in
+from . import blocks as b
+from . import files, sweep_figures
+from .lines import Line, capital, join, line
+
+NAME = "result"
+_MOST_COLUMNS = 8
+"""Columns of a table on the terminal."""
+
+
+def report(summary: SweepSummary) -> b.Report:
+    """The report on a sweep."""
+    s = b.Source(summary.as_dict())
+    findings = summary.findings
+    with shown_in(findings.config.units):
+        sections = (
+            b.Section("best", "Best points", tuple(_best(s))),
+            b.Section("extremes", "Extremes", tuple(_extremes(s))),
+            b.Section("maps", "Results over the parameters", tuple(sweep_figures.over_parameters(summary))),
+            b.Section("influences", "Which parameter moves what", tuple(_influences(s, summary))),
+            b.Section("spread", "Spread by tolerances", tuple(_spread(s, summary))),
+            b.Section("basis", "Basis of the numbers", tuple(_basis(s, summary))),
+        )
+        entries = [s.line(f"{capital(name)}: {{report.{name}}} · ") for name in s.result["report"]]
+        return b.Report(
+            findings.config.title,
+            "Sweep",
+            s.result,
+            tuple(_opening(s)),
+            sections,
+            source=line(*entries, s.line("Study file: {source} · chainunit {chainunit}")),
+            units=findings.config.units,
+            opening_title="The sweep",
+        )
+
+
+def writers(summary: SweepSummary, contents: b.Report, folder: Path) -> list[Callable[[], list[Path]]]:
+    """The functions that write the numbers, the pictures, the text and the page of a sweep; the store is written while
+    the sweep runs."""
+    return [*files.writers(contents, folder, NAME), lambda: [summary.findings.outcome.file]]
+
+
+def compute(
+    config: Config, folder: Path, progress: Progress, workers: int | None = None, scheduler: str | None = None
+) -> SweepSummary:
+    """Run the sweep of a study in a folder that belongs to this process alone (see `files.claim`). The files of an
+    earlier report in it are removed; a store that fits is continued. Errors are those of `run_sweep`."""
+    findings = run_sweep(config, folder, progress, workers, scheduler)
+    clear(folder, *files.names(NAME, tuple(sorted(each.name for each in folder.glob("sweep_*.png")))))
+    return SweepSummary(findings)
+
+
+def _opening(s: b.Source) -> Iterator[b.Block]:
+    names = list(s.result["parameters"])
+    yield b.Text(
+        line(
+            s.line("{=points} points, {method}, over "),
+            join(_range(s, name) for name in names),
+            s.line("; {feasible} of them have results."),
+        )
+    )
+    for i, each in enumerate(s.result["reasons"]):
+        if each["points"]["value"]:
+            path = f"reasons.{i}"
+            yield b.Judgement("warning", s.line(f"No result at {{{path}.share}} of the points: {{{path}.reason}}."))
+    if not s.result["feasible"]["value"]:
+        yield b.Judgement("bad", "No point of the sweep has a result; take other ranges.", form="both")
+
+
+def _range(s: b.Source, name: str) -> Line:
+    path = f"parameters.{name}"
+    if s.result["parameters"][name]["tolerance"]["value"] is None:
+        return s.line(f"{name} {{={path}.from}} to {{={path}.to}}")
+    return s.line(f"{name} {{={path}.study}} ± {{={path}.tolerance}}")
+
+
+def _columns(names: list[str]) -> tuple[b.Column, ...]:
+    return tuple(
+        b.Column(name, form="both" if k < _MOST_COLUMNS else "long") for k, name in enumerate(names)
+    )
+
+
+def _best(s: b.Source) -> Iterator[b.Block]:
+    names = [*s.result["parameters"], *s.result["results"]]
+    rows = [
+        b.TableRow(
+            (s.number(f"best.{i}.point", as_given=True), *(s.number(f"best.{i}.{name}", digits=4) for name in names)),
+            form="both" if i < 5 else "long",
+        )
+        for i in range(len(s.result["best"]))
+    ]
+    if rows:
+        heads = (b.Column("point"), *_columns(names))
+        yield b.Table(tuple(rows), heads, title=s.line("Points with the least {best_by}, the best first"))
+
+
+def _extremes(s: b.Source) -> Iterator[b.Block]:
+    parameters = list(s.result["parameters"])
+    rows = []
+    for name in s.result["extremes"]:
+        for end in ("least", "largest"):
+            path = f"extremes.{name}.{end}"
+            cells = (s.number(f"{path}.{each}", digits=4) for each in (name, *parameters))
+            rows.append(b.TableRow((f"{name}, {end}", *cells)))
+    if rows:
+        heads = (b.Column("result"), b.Column("value"), *_columns(parameters))
+        yield b.Table(tuple(rows), heads, title="Least and largest values, and the points at which they stand")
+
+
+def _influences(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
+    parameters, table = list(s.result["parameters"]), s.result["influences"]
+    if not table or len(parameters) < 2:
+        return
+    for name, of in table.items():
+        most = max(of, key=lambda each: of[each]["share"]["value"] or 0.0)
+        path = f"influences.{name}.{most}"
+        words = f"{name}: {most} moves it most; alone it explains {{{path}.share}} of the variance."
+        yield b.Text(s.line(words), form="long")
+
+    def cell(name: str, each: str) -> Line:
+        if each not in table[name]:
+            return "-"
+        path = f"influences.{name}.{each}"
+        return s.line(f"{{{path}.rank:2}} ({{{path}.share:2}})")
+
+    rows = (b.TableRow((each, *(cell(name, each) for name in table))) for each in parameters)
+    title = "Rank correlation; in brackets the share of the variance that the parameter explains alone"
+    yield b.Table(tuple(rows), (b.Column("parameter"), *_columns(list(table))), title=title)
+    yield b.Text(
+        "A rank correlation of 1 or -1: the result only rises or only falls with the parameter. Near 0 with a large "
+        "share: it rises and falls. Shares that add up to less than 100 %: the parameters act together.",
+        "fine",
+        "long",
+    )
+    if len(parameters) > 2:
+        yield from sweep_figures.tornado(summary)
+
+
+def _spread(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
+    spread = s.result["spread"]
+    if not spread:
+        return
+    quantiles = list(dict.fromkeys(key for of in spread.values() for key in of if key.startswith("q")))
+
+    def cell(name: str, key: str) -> Line:
+        return s.number(f"spread.{name}.{key}", digits=4) if key in spread[name] else "-"
+
+    rows = (
+        b.TableRow(
+            (
+                name,
+                s.number(f"nominal.{name}", digits=4) if name in s.result["nominal"] else "-",
+                *(cell(name, key) for key in ("mean", "deviation", *quantiles)),
+            )
+        )
+        for name in spread
+    )
+    heads = b.heads("result", "at the study's values", "mean", "standard deviation")
+    columns = (*heads, *(b.Column(f"{key.removeprefix('q')} %") for key in quantiles))
+    yield b.Table(tuple(rows), columns, title="Spread of the results and their quantiles")
+    yield b.Text(
+        s.line(
+            "result.json has the interval of {=confidence} confidence of each quantile, as for points that are drawn "
+            "independently; points that fill the space evenly are more exact."
+        ),
+        "fine",
+        "long",
+    )
+    yield from sweep_figures.distribution(summary)
+
+
+def _basis(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
+    columns = b.heads("parameter", "meaning", "in the study", "from", "to", "tolerance")
+    rows = (
+        b.TableRow(
+            (
+                name,
+                s.words(f"parameters.{name}.description"),
+                *(s.number(f"parameters.{name}.{key}", as_given=True) for key in ("study", "from", "to", "tolerance")),
+            )
+        )
+        for name in s.result["parameters"]
+    )
+    yield b.Table(tuple(rows), columns, title="Swept quantities; all others have their values of the study", form="long")
+    rows = (b.TableRow((name, s.words(f"results.{name}.description"))) for name in s.result["results"])
+    yield b.Table(tuple(rows), b.heads("result", "meaning"), title="Results", numeric=False, form="long")
+    if summary.findings.plan.quantities:
+        yield b.Text(
+            s.line(
+                "Quantities of a turn are those at constant speed of the crank with the feed of normal running, at "
+                "{=angles} crank angles; extremes are those at these angles."
+            ),
+            "note",
+            "long",
+        )
+    named = {"installed_power", "energy_per_year"} & set(summary.findings.plan.quantities)
+    if named:
+        yield b.Text(
+            s.line("Assumed: {=basis.operating_hours} operating hours in a year, permitted overload {=basis.overload}."),
+            "note",
+        )
+    if summary.findings.plan.measures:
+        yield b.Text(
+            s.line(
+                "Measures are of a run in which {event}: from rest to steady running, then the event, each point by "
+                "itself, with the control as tuned for the values of the study."
+            ),
+            "note",
+        )
+    yield b.Text(s.line("All points: {store} (Zarr)."), "fine", "long")

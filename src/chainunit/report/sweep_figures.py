@@ -1,0 +1,185 @@
+"""The figures of a sweep: maps over two parameters, curves over one, influences, and the spread."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator
+from itertools import batched
+from typing import Any
+
+import numpy as np
+
+from ..quantities import Variable
+from ..study.sweep import plain_name
+from ..study.sweep_summary import SweepSummary
+from ..text import number
+from . import figure as fig
+
+_CLASSES = 7
+_MOST_ROWS, _MOST_PANELS = 6, 8
+_MOST_OF_AXIS = 400
+"""Largest numbers of panels of a figure, of rows and of both columns, and of values on an axis of a map."""
+_NARROW = 60
+"""Letters of a reason in a legend."""
+
+
+def _axis(v: Variable, **more: Any) -> fig.Axis:
+    return fig.Axis(v.name, v.unit, v.kind, **more)
+
+
+def over_parameters(summary: SweepSummary) -> Iterator[fig.Figure]:
+    """Maps of a grid over two parameters, curves over one parameter; none over more."""
+    plan = summary.findings.plan
+    if len(plan.parameters) == 1:
+        yield from _curves(summary)
+    elif plan.is_grid and len(plan.parameters) == 2:
+        for name in summary.findings.results:
+            if name in summary.extremes:
+                yield _map(summary, name)
+
+
+def _levels(z: Any) -> tuple[float, ...]:
+    """Even levels around the finite values, in rounded steps, at most `_CLASSES` + 1."""
+    low, high = float(np.nanmin(z)), float(np.nanmax(z))
+    if not high - low > 1e-9 * max(abs(low), abs(high)):
+        wide = max(abs(low), 1e-9)
+        return (low - wide, low, low + wide)
+    raw = (high - low) / _CLASSES
+    size = 10.0 ** np.floor(np.log10(raw))
+    for factor in (1.0, 2.0, 2.5, 5.0, 10.0, 20.0, 25.0, 50.0):
+        step = factor * size
+        first, last = np.floor(low / step + 1e-9), np.ceil(high / step - 1e-9)
+        if last - first <= _CLASSES:
+            break
+    return tuple(float(step * k) for k in np.arange(first, max(last, first + 2) + 1))
+
+
+def _map(summary: SweepSummary, name: str) -> fig.Figure:
+    plan, dataset = summary.findings.plan, summary.findings.dataset
+    across, up = plan.parameters
+    order = {each.name: np.argsort(each.values)[:: -(-len(each.values) // _MOST_OF_AXIS)] for each in plan.parameters}
+    part = dataset.isel(order).transpose(up.name, across.name)
+    x, y, z = part[across.name].values, part[up.name].values, part[name].values
+    v, levels = summary.variables[name], _levels(part[name].values)
+    names = tuple(
+        f"{number(low, v.unit, v.kind, full=False, beside=False)} to "
+        f"{number(high, v.unit, v.kind, full=False, beside=False)}"
+        for low, high in zip(levels[:-1], levels[1:], strict=True)
+    )
+    items: list[fig.Item] = [fig.Field(x, y, z, levels, names)]
+    items += _infeasible(summary, x, y, part["reason"].values)
+    items.append(fig.Curve("the study", [across.centre], [up.centre], 1, "o", has_line=False))
+    if summary.best and name == plan.best:
+        k = np.unravel_index(summary.best[0], plan.shape)
+        at = [float(each.values[int(i)]) for each, i in zip(plan.parameters, k, strict=True)]
+        items.append(fig.Curve("least", [at[0]], [at[1]], 3, "s", has_line=False))
+    ends = [{"low": float(axis[0]), "high": float(axis[-1])} for axis in (x, y)]
+    panel = fig.Panel(_axis(across.variable, **ends[0]), _axis(up.variable, **ends[1]), tuple(items))
+    return fig.Figure(
+        f"map-{plain_name(name)}",
+        f"{name}: {v.description}",
+        f"Map of {name} over {across.name} and {up.name}; points without a result are hatched.",
+        ((panel,),),
+        file=f"sweep_{plain_name(name)}.png",
+        heights=(1.7,),
+    )
+
+
+def _infeasible(summary: SweepSummary, x: Any, y: Any, reason: Any) -> Iterator[fig.Hatch]:
+    """The cells of a map with a corner that has no result, by their reasons."""
+    corners = np.stack([reason[:-1, :-1], reason[1:, :-1], reason[:-1, 1:], reason[1:, 1:]])
+    worst = np.max(corners, axis=0)
+    for look, code in enumerate(np.unique(worst[worst > 0])):
+        words = textwrap.shorten(summary.findings.task.reasons[int(code)], _NARROW, placeholder=" ...")
+        yield fig.Hatch(words, x, y, worst == code, look)
+
+
+def _curves(summary: SweepSummary) -> Iterator[fig.Figure]:
+    plan, points = summary.findings.plan, summary.findings.points
+    (parameter,) = plan.parameters
+    part = points.isel(point=slice(None, None, -(-points.sizes["point"] // 20_000)))
+    order = np.argsort(part[parameter.name].values, kind="stable")
+    x, reason = part[parameter.name].values[order], part["reason"].values[order]
+    marks: list[fig.Item] = [fig.Mark(parameter.centre, "the study", look="mark"), *_gaps(summary, x, reason)]
+    names = [name for name in summary.findings.results if name in summary.extremes]
+    for k, some in enumerate(batched(names, _MOST_ROWS)):
+        rows = (
+            (
+                _axis(summary.variables[name]),
+                [fig.Curve(name, x, part[name].values[order], 0, "o" if len(x) <= 40 else "", in_legend=False), *marks],
+            )
+            for name in some
+        )
+        yield fig.Figure(
+            f"curves-{k}" if k else "curves",
+            f"Results over {parameter.name}: {parameter.variable.description}",
+            f"Results over {parameter.name}; ranges without a result are shaded.",
+            fig.stacked(_axis(parameter.variable), rows),
+            file=f"sweep_curves{f'_{k + 1}' if k else ''}.png",
+        )
+
+
+def _gaps(summary: SweepSummary, x: Any, reason: Any) -> Iterator[fig.Shade]:
+    """The ranges of a parameter without a result."""
+    edges = np.flatnonzero(np.diff(reason)) + 1
+    for part in np.split(np.arange(len(x)), edges):
+        if reason[part[0]]:
+            low, high = x[max(0, part[0] - 1)], x[min(len(x) - 1, part[-1] + 1)]
+            words = textwrap.shorten(summary.findings.task.reasons[int(reason[part[0]])], _NARROW, placeholder=" ...")
+            look = ("dark", "pale", "band")[int(reason[part[0]]) % 3]
+            yield fig.Shade(0.5 * (x[part[0]] + low), 0.5 * (x[part[-1]] + high), words, look=look)
+
+
+def _in_pairs(panels: list[fig.Panel]) -> tuple[tuple[fig.Panel | None, ...], ...]:
+    """Panels in rows of two, or below each other where there is one."""
+    if len(panels) == 1:
+        return ((panels[0],),)
+    filled = [*panels, *([None] if len(panels) % 2 else [])]
+    return tuple((filled[k], filled[k + 1]) for k in range(0, len(filled), 2))
+
+
+def tornado(summary: SweepSummary) -> Iterator[fig.Figure]:
+    """Bars of the rank correlation of each result with each parameter, the largest share of the variance first."""
+    for k, some in enumerate(batched(summary.influences.items(), _MOST_PANELS)):
+        panels = []
+        for name, table in some:
+            order = sorted(table, key=lambda each: -table[each].share)  # noqa: B023 - used in this round
+            words = tuple(f"{100.0 * table[each].share:.0f} %" for each in order)
+            ranks = [table[each].rank for each in order]
+            bars = fig.Bars("rank correlation", np.arange(len(order)), ranks, 0.7, 1, words=words)
+            x = fig.Axis("rank correlation", low=-1.35, high=1.35, step=0.5)
+            panels.append(fig.Panel(x, fig.Axis("parameter", names=tuple(order)), (bars, fig.Mark(0.0)), name))
+        rows = _in_pairs(panels)
+        yield fig.Figure(
+            f"tornado-{k}" if k else "tornado",
+            "Which parameter moves what; beside the bars the share of the variance that it explains alone",
+            "Bars of the rank correlation between each result and each parameter.",
+            rows,
+            file=f"sweep_tornado{f'_{k + 1}' if k else ''}.png",
+            heights=(max(0.6, 0.16 * len(summary.findings.plan.parameters)),) * len(rows),
+        )
+
+
+def distribution(summary: SweepSummary) -> Iterator[fig.Figure]:
+    """The share of the points below each value of each result."""
+    shares = np.linspace(0.0, 1.0, 201)
+    names = [name for name in summary.influences if len(summary.sample[name])]
+    for k, some in enumerate(batched(names, _MOST_PANELS)):
+        panels = []
+        for name in some:
+            values = summary.sample[name][np.isfinite(summary.sample[name])]
+            x = np.quantile(values, shares)
+            items: list[fig.Item] = [fig.Curve("share of the points below", x, shares, in_legend=False)]
+            items += [fig.Mark(q, "5 %, 95 %", axis="y", look="thin") for q in (0.05, 0.95)]
+            if name in summary.nominal:
+                items.append(fig.Mark(summary.nominal[name], "at the values of the study"))
+            y = fig.Axis("share below", "1", "percent", low=0.0, high=1.0)
+            panels.append(fig.Panel(_axis(summary.variables[name]), y, tuple(items)))
+        rows = _in_pairs(panels)
+        yield fig.Figure(
+            f"spread-{k}" if k else "spread",
+            "Distribution of the results by the tolerances",
+            "The share of the points below each value of each result.",
+            rows,
+            file=f"sweep_spread{f'_{k + 1}' if k else ''}.png",
+        )

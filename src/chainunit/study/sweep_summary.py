@@ -1,0 +1,283 @@
+"""A sweep in few numbers: reasons, extremes, best points, what moves what, and the spread by tolerances.
+
+Extremes, best points and reasons are of all points, which are read in parts. Correlations and quantiles are of
+`SAMPLE` points at most.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import __version__
+from ..quantities import Layout, Quantity, Variable
+from ..text import entry, shown_in
+from .measures import Answers
+from .quantiles import CONFIDENCE, quantile
+from .sweep import SweepFindings
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+SAMPLE = 2**20
+"""Largest number of points behind correlations and quantiles."""
+BEST = 10
+"""Number of best points."""
+QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
+_PART = 2**18
+_BINS = 16
+_LEAST = 8
+"""Least number of points of a correlation."""
+
+
+@dataclass(frozen=True)
+class Influence:
+    """What a parameter does to a result: their rank correlation (Spearman), and the share of the variance of the
+    result that the parameter explains alone (the correlation ratio over classes of the parameter, less its bias)."""
+
+    rank: float
+    share: float
+
+
+@dataclass(frozen=True)
+class SweepSummary:
+    """The numbers of a sweep."""
+
+    findings: SweepFindings
+
+    @cached_property
+    def variables(self) -> dict[str, Variable]:
+        """Parameters and results by name."""
+        own = {each.name: each.variable for each in self.findings.plan.parameters}
+        for each in self.findings.task.quantities:
+            own[each.name] = Variable(each.name, each.description, Quantity(each.unit, each.description))
+        measures = {v.name: v for v in Layout(Answers).variables}
+        return own | {name: measures[name] for name in self.findings.plan.measures}
+
+    @property
+    def _parameters(self) -> list[str]:
+        return [each.name for each in self.findings.plan.parameters]
+
+    def _parts(self) -> Iterator[tuple[int, xr.Dataset]]:
+        """The points in parts, each with the number of its first point."""
+        points = self.findings.points
+        for begin in range(0, points.sizes["point"], _PART):
+            yield begin, points.isel(point=slice(begin, begin + _PART)).load()
+
+    @cached_property
+    def _passed(self) -> tuple[Any, dict[str, tuple[int, int]], list[int]]:
+        """Points by reason; the numbers of the points with the least and the largest value of each result; the
+        numbers of the best points."""
+        names = self.findings.results
+        counts = np.zeros(len(self.findings.task.reasons), np.int64)
+        ends: dict[str, list[tuple[float, int]]] = {name: [] for name in names}
+        best: list[tuple[float, int]] = []
+        for begin, part in self._parts():
+            counts += np.bincount(part["reason"].values, minlength=len(counts))
+            for name in names:
+                x = part[name].values
+                if np.isfinite(x).any():
+                    ends[name] += [(float(x[k]), begin + int(k)) for k in (np.nanargmin(x), np.nanargmax(x))]
+            x = part[self.findings.plan.best].values
+            order = np.argsort(x, kind="stable")[:BEST]
+            best += [(float(x[k]), begin + int(k)) for k in order if np.isfinite(x[k])]
+            best = sorted(best)[:BEST]
+        extremes = {
+            name: (min(of)[1], max(of, key=lambda each: (each[0], -each[1]))[1])
+            for name, of in ends.items()
+            if of
+        }
+        return counts, extremes, [k for _, k in best]
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of points by reason, those without points left out."""
+        counts = zip(self.findings.task.reasons, self._passed[0], strict=True)
+        return {reason: int(count) for reason, count in counts if count}
+
+    @property
+    def feasible(self) -> int:
+        """Number of points with results."""
+        return int(self._passed[0][0])
+
+    @property
+    def extremes(self) -> Mapping[str, tuple[int, int]]:
+        """By result, the numbers of the points where it is least and largest; only results that have values."""
+        return self._passed[1]
+
+    @property
+    def best(self) -> list[int]:
+        """The numbers of the best points, the best first."""
+        return self._passed[2]
+
+    @cached_property
+    def sample(self) -> dict[str, Any]:
+        """Parameters and results at the points behind correlations and quantiles, shape (points,), without those that
+        have a reason."""
+        points = self.findings.points
+        count = points.sizes["point"]
+        if self.findings.plan.is_grid:
+            part = points.isel(point=slice(None, None, -(-count // SAMPLE)))
+        else:
+            part = points.isel(point=slice(0, SAMPLE))
+        sound = part["reason"].values == 0
+        return {name: part[name].values[sound] for name in self.variables}
+
+    @cached_property
+    def influences(self) -> dict[str, dict[str, Influence]]:
+        """By result and parameter the influence; only results that vary."""
+        from scipy.stats import rankdata
+
+        ranks = {name: rankdata(self.sample[name]) for name in self._parameters}
+        table: dict[str, dict[str, Influence]] = {}
+        for name in self.findings.results:
+            y = self.sample[name]
+            has = np.isfinite(y)
+            if has.sum() < _LEAST or np.ptp(y[has]) <= 1e-12 * np.max(np.abs(y[has])):
+                continue
+            order = rankdata(y[has])
+            table[name] = {
+                each: Influence(
+                    _correlation(ranks[each][has], order), _explained(self.sample[each][has], y[has])
+                )
+                for each in self._parameters
+                if np.ptp(self.sample[each][has]) > 0.0
+            }
+        return table
+
+    @cached_property
+    def nominal(self) -> dict[str, float]:
+        """The quantities of a turn at the values of the study, by name."""
+        plan, task = self.findings.plan, self.findings.task
+        turn = task.turns({each.name: np.array([each.centre]) for each in plan.parameters})
+        values = {name: float(np.ravel(turn[name].values)[0]) for name in plan.quantities}
+        return {name: x for name, x in values.items() if np.isfinite(x)}
+
+    @property
+    def has_spread(self) -> bool:
+        """Whether the points are those of tolerances."""
+        plan = self.findings.plan
+        return not plan.is_grid and any(each.tolerance is not None for each in plan.parameters)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Ready for JSON, each number with its unit."""
+        with shown_in(self.findings.config.units):
+            return self._as_dict()
+
+    def _as_dict(self) -> dict[str, Any]:
+        config, plan = self.findings.config, self.findings.plan
+        rows = self._rows(sorted({*self.best, *(k for ends in self.extremes.values() for k in ends)}))
+        return {
+            "chainunit": __version__,
+            "title": config.title,
+            "source": config.source,
+            "report": dict(config.labels),
+            "method": plan.method.replace("_", " "),
+            "points": entry(plan.points, "1"),
+            "states": entry(float(plan.points) * plan.angles if plan.quantities else None, "1"),
+            "seed": entry(plan.seed, "1"),
+            "angles": entry(plan.angles, "1"),
+            "feasible": entry(self.feasible, "1"),
+            "reasons": [
+                {
+                    "reason": reason,
+                    "points": entry(count, "1"),
+                    "share": entry(count / plan.points, "1", "percent"),
+                }
+                for reason, count in self.counts.items()
+                if reason != self.findings.task.reasons[0]
+            ],
+            "basis": {name: entry(x, "1") for name, x in vars(plan.basis).items()},
+            "event": config.events[plan.event].title if plan.event else None,
+            "best_by": plan.best,
+            "parameters": {
+                each.name: {
+                    "description": each.variable.description,
+                    **{
+                        key: self._entry(each.name, x)
+                        for key, x in (("from", each.ends[0]), ("to", each.ends[1]), ("study", each.centre))
+                    },
+                    "tolerance": self._tolerance(each),
+                    "distribution": each.distribution
+                    if each.tolerance is not None and not plan.is_grid
+                    else None,
+                }
+                for each in plan.parameters
+            },
+            "results": {
+                name: {"description": self.variables[name].description} for name in self.findings.results
+            },
+            "nominal": {name: self._entry(name, x) for name, x in self.nominal.items()},
+            "extremes": {
+                name: {"least": rows[low], "largest": rows[high]}
+                for name, (low, high) in self.extremes.items()
+            },
+            "best": [rows[k] for k in self.best],
+            "influences": {
+                name: {
+                    each: {"rank": entry(of.rank, "1"), "share": entry(of.share, "1", "percent")}
+                    for each, of in table.items()
+                }
+                for name, table in self.influences.items()
+            },
+            "spread": self._spread() if self.has_spread else {},
+            "confidence": entry(CONFIDENCE, "1", "percent"),
+            "store": self.findings.outcome.file.name,
+        }
+
+    def _entry(self, name: str, value: float | None) -> dict[str, Any]:
+        v = self.variables[name]
+        return entry(value, v.unit, v.kind)
+
+    def _tolerance(self, parameter: Any) -> dict[str, Any]:
+        v = parameter.variable
+        return entry(parameter.tolerance, v.unit, "difference" if v.unit == "K" else v.kind)
+
+    def _rows(self, numbers: list[int]) -> dict[int, dict[str, Any]]:
+        """Points by their numbers: parameters and results."""
+        part = self.findings.points.isel(point=numbers).load() if numbers else None
+        return {
+            number: {"point": entry(number, "1")}
+            | {name: self._entry(name, float(part[name].values[k])) for name in self.variables}
+            for k, number in enumerate(numbers)
+            if part is not None
+        }
+
+    def _spread(self) -> dict[str, Any]:
+        spread = {}
+        for name in self.findings.results:
+            x = self.sample[name][np.isfinite(self.sample[name])]
+            if not len(x):
+                continue
+            estimates = {f"q{100 * q:.0f}": quantile(x, q) for q in QUANTILES}
+            v = self.variables[name]
+            spread[name] = {
+                "mean": self._entry(name, float(np.mean(x))),
+                "deviation": self._entry(name, float(np.std(x))),
+                **{key: each.as_dict(v.unit, v.kind) for key, each in estimates.items() if each is not None},
+            }
+        return spread
+
+
+def _correlation(a: Any, b: Any) -> float:
+    a, b = a - np.mean(a), b - np.mean(b)
+    size = np.sqrt(np.sum(a * a) * np.sum(b * b))
+    return float(np.sum(a * b) / size) if size > 0.0 else 0.0
+
+
+def _explained(x: Any, y: Any) -> float:
+    """The share of the variance of `y` that is one of classes of `x`, between 0 and 1, corrected for the number of
+    classes."""
+    values = np.unique(x)
+    edges = values if len(values) <= _BINS else np.quantile(x, np.arange(_BINS) / _BINS)
+    place = np.searchsorted(edges, x, "right") - 1
+    count = np.bincount(place, minlength=len(edges))
+    used = count > 0
+    means = np.bincount(place, y, len(edges))[used] / count[used]
+    between = np.sum(count[used] * (means - np.mean(y)) ** 2) / np.sum((y - np.mean(y)) ** 2)
+    chance = (np.count_nonzero(used) - 1) / max(1, len(y) - 1)
+    return float(min(1.0, max(0.0, (between - chance) / (1.0 - chance)))) if chance < 1.0 else 0.0
