@@ -26,6 +26,7 @@ HOMES = {
     "cli": "cli",
     "console": "cli",
     "studies": "cli",
+    "sweeps": "cli",
     "models": "system",
     "native": "core",
     "batch": "core",

@@ -19,6 +19,7 @@ __all__ = [
     "SideLoads",
     "Study",
     "StudyResult",
+    "SweepResult",
     "__version__",
 ]
 
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from .machines.api import EMPTY, ChainUnitMachine
     from .machines.chain_unit import ChamberForces, SideLoads
     from .studies import Study, StudyResult
+    from .sweeps import SweepResult
 
     __version__: str
 else:
@@ -37,6 +39,7 @@ else:
         "SideLoads": ".machines.chain_unit",
         "Study": ".studies",
         "StudyResult": ".studies",
+        "SweepResult": ".sweeps",
     }
 
     def __getattr__(name):

@@ -39,6 +39,7 @@ from .study.parts import over_example, parts_of
 from .study.record import INSUFFICIENT, StudyRecord
 from .study.result import as_dict
 from .study.window import Phase
+from .sweeps import SweepResult, make_sweep
 from .text import number, shown_in
 
 if TYPE_CHECKING:
@@ -240,6 +241,34 @@ class Study:
             result = BestResult(self.config, optimum.compute(self.config, place, progress, backend))
             result._write(place)
         return result
+
+    def sweep(
+        self,
+        folder: str | Path | None = None,
+        workers: int | None = None,
+        scheduler: str | None = None,
+        progress: Progress | None = None,
+    ) -> SweepResult:
+        """Run the sweep of the study, its table ``sweep``, as ``chainunit sweep`` does.
+
+        Parameters
+        ----------
+        folder : the folder with the store of all points and the report; a store that fits is continued. Without it
+            the store is in a temporary folder, which lasts as long as the result
+        workers : number of threads, or with measures of processes; by default one for each processor
+        scheduler : address of a Dask scheduler whose workers make the points, such as ``tcp://10.0.0.5:8786``
+        progress : as of `run`
+
+        Raises
+        ------
+        InputError
+            for a study without a sweep, and for a fault that only a run shows.
+        RunError
+            where a batch fails; earlier ones are in the store.
+        WriteError
+            for a file that cannot be written.
+        """
+        return make_sweep(self.config, None if folder is None else Path(folder), workers, scheduler, progress)
 
     def __repr__(self) -> str:
         config = self.config

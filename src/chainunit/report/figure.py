@@ -118,8 +118,8 @@ class Field:
 
 @dataclass(frozen=True)
 class Hatch:
-    """Hatched cells of a map, such as those without values: `cells`, shape (len(y) - 1, len(x) - 1), says which of the
-    cells between the lines `x` and `y`. Each `look` is another direction of the lines."""
+    """Hatched cells of a map, such as those without values: `cells`, shape (len(y) - 1, len(x) - 1), says which cells
+    between the lines `x` and `y` they are. Each `look` is another direction of the lines."""
 
     name: str
     x: Any

@@ -24,7 +24,7 @@ from ..text import Units, forms
 from . import blocks as b
 from . import motion, page_figures
 from .figure import Figure
-from .lines import Aside, Line, Number, Piece, Strong, Words, pieces
+from .lines import Aside, Line, Name, Number, Piece, Strong, Words, pieces
 
 NAME = "report.html"
 
@@ -179,6 +179,8 @@ class _Page:
                 return self.number(piece)
             case Words():
                 return f'<span class="t" data-path="{escape(piece.path)}">{escape(piece.text)}</span>'
+            case Name():
+                return f'<span class="as-is">{escape(piece.text)}</span>'
             case Strong():
                 return f"<strong>{self.line(piece.line)}</strong>"
             case Aside():

@@ -33,6 +33,13 @@ class Words:
 
 
 @dataclass(frozen=True)
+class Name:
+    """A name as a file has it, such as that of a key: its letters stay as they are."""
+
+    text: str
+
+
+@dataclass(frozen=True)
 class Strong:
     """A line with emphasis."""
 
@@ -46,7 +53,7 @@ class Aside:
     line: Line
 
 
-Piece: TypeAlias = "str | Number | Words | Strong | Aside"
+Piece: TypeAlias = "str | Number | Words | Name | Strong | Aside"
 Line: TypeAlias = "Piece | tuple[Piece, ...]"
 
 

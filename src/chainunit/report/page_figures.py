@@ -282,7 +282,13 @@ class _Drawing:
         x, y = hatch_lines(hatch)
         line = {"color": HATCHES[hatch.look % len(HATCHES)], "width": 1.0}
         self.figure.add_scatter(
-            x=_small(x), y=_small(y), mode="lines", line=line, hoverinfo="skip", **self._legend(hatch.name), **place
+            x=_small(x),
+            y=_small(y),
+            mode="lines",
+            line=line,
+            hoverinfo="skip",
+            **self._legend(hatch.name),
+            **place,
         )
 
 

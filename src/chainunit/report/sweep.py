@@ -8,12 +8,12 @@ from pathlib import Path
 from ..files import clear
 from ..progress import Report as Progress
 from ..study.config import Config
-from ..study.sweep import SweepFindings, run_sweep
+from ..study.sweep import run_sweep
 from ..study.sweep_summary import SweepSummary
 from ..text import shown_in
 from . import blocks as b
 from . import files, sweep_figures
-from .lines import Line, capital, join, line
+from .lines import Line, Name, Number, capital, join, line
 
 NAME = "result"
 _MOST_COLUMNS = 8
@@ -26,8 +26,8 @@ def report(summary: SweepSummary) -> b.Report:
     findings = summary.findings
     with shown_in(findings.config.units):
         sections = (
-            b.Section("best", "Best points", tuple(_best(s))),
-            b.Section("extremes", "Extremes", tuple(_extremes(s))),
+            b.Section("best", "Best points", tuple(_best(s, summary))),
+            b.Section("extremes", "Extremes", tuple(_extremes(s, summary))),
             b.Section("maps", "Results over the parameters", tuple(sweep_figures.over_parameters(summary))),
             b.Section("influences", "Which parameter moves what", tuple(_influences(s, summary))),
             b.Section("spread", "Spread by tolerances", tuple(_spread(s, summary))),
@@ -47,8 +47,8 @@ def report(summary: SweepSummary) -> b.Report:
 
 
 def writers(summary: SweepSummary, contents: b.Report, folder: Path) -> list[Callable[[], list[Path]]]:
-    """The functions that write the numbers, the pictures, the text and the page of a sweep; the store is written while
-    the sweep runs."""
+    """The functions that write the numbers, the pictures, the text and the page of a sweep. The store is written
+    while the sweep runs."""
     return [*files.writers(contents, folder, NAME), lambda: [summary.findings.outcome.file]]
 
 
@@ -68,35 +68,45 @@ def _opening(s: b.Source) -> Iterator[b.Block]:
         line(
             s.line("{=points} points, {method}, over "),
             join(_range(s, name) for name in names),
-            s.line("; {feasible} of them have results."),
+            s.line("; {=feasible} of them have results."),
         )
     )
     for i, each in enumerate(s.result["reasons"]):
         if each["points"]["value"]:
             path = f"reasons.{i}"
-            yield b.Judgement("warning", s.line(f"No result at {{{path}.share}} of the points: {{{path}.reason}}."))
+            yield b.Judgement(
+                "warning", s.line(f"No result at {{{path}.share}} of the points: {{{path}.reason}}.")
+            )
     if not s.result["feasible"]["value"]:
         yield b.Judgement("bad", "No point of the sweep has a result; take other ranges.", form="both")
 
 
 def _range(s: b.Source, name: str) -> Line:
-    path = f"parameters.{name}"
+    path, words = f"parameters.{name}", Name(name)
     if s.result["parameters"][name]["tolerance"]["value"] is None:
-        return s.line(f"{name} {{={path}.from}} to {{={path}.to}}")
-    return s.line(f"{name} {{={path}.study}} ± {{={path}.tolerance}}")
+        return line(words, s.line(f" {{={path}.from}} to {{={path}.to}}"))
+    return line(words, s.line(f" {{={path}.study}} ± {{={path}.tolerance}}"))
 
 
 def _columns(names: list[str]) -> tuple[b.Column, ...]:
     return tuple(
-        b.Column(name, form="both" if k < _MOST_COLUMNS else "long") for k, name in enumerate(names)
+        b.Column(Name(name), form="both" if k < _MOST_COLUMNS else "long") for k, name in enumerate(names)
     )
 
 
-def _best(s: b.Source) -> Iterator[b.Block]:
+def _value(s: b.Source, summary: SweepSummary, path: str, name: str) -> Number:
+    """A value of a parameter or result, with so many digits that points differ."""
+    return s.number(f"{path}.{name}", digits=summary.digits(name))
+
+
+def _best(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
     names = [*s.result["parameters"], *s.result["results"]]
     rows = [
         b.TableRow(
-            (s.number(f"best.{i}.point", as_given=True), *(s.number(f"best.{i}.{name}", digits=4) for name in names)),
+            (
+                s.number(f"best.{i}.point", as_given=True),
+                *(_value(s, summary, f"best.{i}", name) for name in names),
+            ),
             form="both" if i < 5 else "long",
         )
         for i in range(len(s.result["best"]))
@@ -106,17 +116,19 @@ def _best(s: b.Source) -> Iterator[b.Block]:
         yield b.Table(tuple(rows), heads, title=s.line("Points with the least {best_by}, the best first"))
 
 
-def _extremes(s: b.Source) -> Iterator[b.Block]:
+def _extremes(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
     parameters = list(s.result["parameters"])
     rows = []
     for name in s.result["extremes"]:
         for end in ("least", "largest"):
             path = f"extremes.{name}.{end}"
-            cells = (s.number(f"{path}.{each}", digits=4) for each in (name, *parameters))
-            rows.append(b.TableRow((f"{name}, {end}", *cells)))
+            cells = (_value(s, summary, path, each) for each in (name, *parameters))
+            rows.append(b.TableRow((line(Name(name), f", {end}"), *cells)))
     if rows:
         heads = (b.Column("result"), b.Column("value"), *_columns(parameters))
-        yield b.Table(tuple(rows), heads, title="Least and largest values, and the points at which they stand")
+        yield b.Table(
+            tuple(rows), heads, title="Least and largest values, and the points at which they stand"
+        )
 
 
 def _influences(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
@@ -126,8 +138,8 @@ def _influences(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
     for name, of in table.items():
         most = max(of, key=lambda each: of[each]["share"]["value"] or 0.0)
         path = f"influences.{name}.{most}"
-        words = f"{name}: {most} moves it most; alone it explains {{{path}.share}} of the variance."
-        yield b.Text(s.line(words), form="long")
+        words = f"{{name}}: {{most}} moves it most; alone it explains {{{path}.share}} of the variance."
+        yield b.Text(s.line(words, name=Name(name), most=Name(most)), form="long")
 
     def cell(name: str, each: str) -> Line:
         if each not in table[name]:
@@ -135,7 +147,7 @@ def _influences(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
         path = f"influences.{name}.{each}"
         return s.line(f"{{{path}.rank:2}} ({{{path}.share:2}})")
 
-    rows = (b.TableRow((each, *(cell(name, each) for name in table))) for each in parameters)
+    rows = (b.TableRow((Name(each), *(cell(name, each) for name in table))) for each in parameters)
     title = "Rank correlation; in brackets the share of the variance that the parameter explains alone"
     yield b.Table(tuple(rows), (b.Column("parameter"), *_columns(list(table))), title=title)
     yield b.Text(
@@ -155,14 +167,16 @@ def _spread(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
     quantiles = list(dict.fromkeys(key for of in spread.values() for key in of if key.startswith("q")))
 
     def cell(name: str, key: str) -> Line:
-        return s.number(f"spread.{name}.{key}", digits=4) if key in spread[name] else "-"
+        return s.number(f"spread.{name}.{key}", digits=summary.digits(name)) if key in spread[name] else "-"
 
     rows = (
         b.TableRow(
             (
-                name,
-                s.number(f"nominal.{name}", digits=4) if name in s.result["nominal"] else "-",
-                *(cell(name, key) for key in ("mean", "deviation", *quantiles)),
+                Name(name),
+                _value(s, summary, "nominal", name) if name in s.result["nominal"] else "-",
+                cell(name, "mean"),
+                s.number(f"spread.{name}.deviation"),
+                *(cell(name, key) for key in quantiles),
             )
         )
         for name in spread
@@ -186,15 +200,20 @@ def _basis(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
     rows = (
         b.TableRow(
             (
-                name,
+                Name(name),
                 s.words(f"parameters.{name}.description"),
-                *(s.number(f"parameters.{name}.{key}", as_given=True) for key in ("study", "from", "to", "tolerance")),
+                *(
+                    s.number(f"parameters.{name}.{key}", as_given=True)
+                    for key in ("study", "from", "to", "tolerance")
+                ),
             )
         )
         for name in s.result["parameters"]
     )
-    yield b.Table(tuple(rows), columns, title="Swept quantities; all others have their values of the study", form="long")
-    rows = (b.TableRow((name, s.words(f"results.{name}.description"))) for name in s.result["results"])
+    yield b.Table(
+        tuple(rows), columns, title="Swept quantities; all others have their values of the study", form="long"
+    )
+    rows = (b.TableRow((Name(name), s.words(f"results.{name}.description"))) for name in s.result["results"])
     yield b.Table(tuple(rows), b.heads("result", "meaning"), title="Results", numeric=False, form="long")
     if summary.findings.plan.quantities:
         yield b.Text(
@@ -208,7 +227,9 @@ def _basis(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
     named = {"installed_power", "energy_per_year"} & set(summary.findings.plan.quantities)
     if named:
         yield b.Text(
-            s.line("Assumed: {=basis.operating_hours} operating hours in a year, permitted overload {=basis.overload}."),
+            s.line(
+                "Assumed: {=basis.operating_hours} operating hours in a year, permitted overload {=basis.overload}."
+            ),
             "note",
         )
     if summary.findings.plan.measures:

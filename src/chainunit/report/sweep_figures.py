@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
-from collections.abc import Iterator
-from itertools import batched
+from collections.abc import Iterable, Iterator
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -14,13 +15,20 @@ from ..study.sweep import plain_name
 from ..study.sweep_summary import SweepSummary
 from ..text import number
 from . import figure as fig
+from .style import WIDE
 
 _CLASSES = 7
 _MOST_ROWS, _MOST_PANELS = 6, 8
 _MOST_OF_AXIS = 400
 """Largest numbers of panels of a figure, of rows and of both columns, and of values on an axis of a map."""
-_NARROW = 60
+_NARROW = 80
 """Letters of a reason in a legend."""
+
+
+def _pieces(items: Iterable[Any], size: int) -> Iterator[list[Any]]:
+    """The items in lists of this size; the last one may be shorter."""
+    whole = list(items)
+    return (whole[k : k + size] for k in range(0, len(whole), size))
 
 
 def _axis(v: Variable, **more: Any) -> fig.Axis:
@@ -44,6 +52,8 @@ def _levels(z: Any) -> tuple[float, ...]:
     if not high - low > 1e-9 * max(abs(low), abs(high)):
         wide = max(abs(low), 1e-9)
         return (low - wide, low, low + wide)
+    if low > 0.0 and high > WIDE * low:
+        return _wide_levels(low, high)
     raw = (high - low) / _CLASSES
     size = 10.0 ** np.floor(np.log10(raw))
     for factor in (1.0, 2.0, 2.5, 5.0, 10.0, 20.0, 25.0, 50.0):
@@ -54,17 +64,33 @@ def _levels(z: Any) -> tuple[float, ...]:
     return tuple(float(step * k) for k in np.arange(first, max(last, first + 2) + 1))
 
 
+def _wide_levels(low: float, high: float) -> tuple[float, ...]:
+    """Levels around values of several decades: 1, 2, 5, 10, .., or the powers of 10, or some of these."""
+    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    for steps in ((1.0, 2.0, 5.0), (1.0, 3.0), (1.0,)):
+        levels = [step * 10.0**k for k in decades for step in steps]
+        first = max(k for k, x in enumerate(levels) if x <= low)
+        last = min(k for k, x in enumerate(levels) if x >= high)
+        if last - first <= _CLASSES:
+            return tuple(levels[first : last + 1])
+    some = {*levels[first : last : -(-(last - first) // _CLASSES)], levels[last]}
+    return tuple(sorted(some))
+
+
 def _map(summary: SweepSummary, name: str) -> fig.Figure:
     plan, dataset = summary.findings.plan, summary.findings.dataset
     across, up = plan.parameters
-    order = {each.name: np.argsort(each.values)[:: -(-len(each.values) // _MOST_OF_AXIS)] for each in plan.parameters}
+    order = {
+        each.name: np.argsort(each.values)[:: -(-len(each.values) // _MOST_OF_AXIS)]
+        for each in plan.parameters
+    }
     part = dataset.isel(order).transpose(up.name, across.name)
     x, y, z = part[across.name].values, part[up.name].values, part[name].values
     v, levels = summary.variables[name], _levels(part[name].values)
     names = tuple(
         f"{number(low, v.unit, v.kind, full=False, beside=False)} to "
         f"{number(high, v.unit, v.kind, full=False, beside=False)}"
-        for low, high in zip(levels[:-1], levels[1:], strict=True)
+        for low, high in pairwise(levels)
     )
     items: list[fig.Item] = [fig.Field(x, y, z, levels, names)]
     items += _infeasible(summary, x, y, part["reason"].values)
@@ -77,7 +103,7 @@ def _map(summary: SweepSummary, name: str) -> fig.Figure:
     panel = fig.Panel(_axis(across.variable, **ends[0]), _axis(up.variable, **ends[1]), tuple(items))
     return fig.Figure(
         f"map-{plain_name(name)}",
-        f"{name}: {v.description}",
+        f"Map of {name}: {v.description}",
         f"Map of {name} over {across.name} and {up.name}; points without a result are hatched.",
         ((panel,),),
         file=f"sweep_{plain_name(name)}.png",
@@ -102,11 +128,16 @@ def _curves(summary: SweepSummary) -> Iterator[fig.Figure]:
     x, reason = part[parameter.name].values[order], part["reason"].values[order]
     marks: list[fig.Item] = [fig.Mark(parameter.centre, "the study", look="mark"), *_gaps(summary, x, reason)]
     names = [name for name in summary.findings.results if name in summary.extremes]
-    for k, some in enumerate(batched(names, _MOST_ROWS)):
+    for k, some in enumerate(_pieces(names, _MOST_ROWS)):
         rows = (
             (
                 _axis(summary.variables[name]),
-                [fig.Curve(name, x, part[name].values[order], 0, "o" if len(x) <= 40 else "", in_legend=False), *marks],
+                [
+                    fig.Curve(
+                        name, x, part[name].values[order], 0, "o" if len(x) <= 40 else "", in_legend=False
+                    ),
+                    *marks,
+                ],
             )
             for name in some
         )
@@ -125,7 +156,9 @@ def _gaps(summary: SweepSummary, x: Any, reason: Any) -> Iterator[fig.Shade]:
     for part in np.split(np.arange(len(x)), edges):
         if reason[part[0]]:
             low, high = x[max(0, part[0] - 1)], x[min(len(x) - 1, part[-1] + 1)]
-            words = textwrap.shorten(summary.findings.task.reasons[int(reason[part[0]])], _NARROW, placeholder=" ...")
+            words = textwrap.shorten(
+                summary.findings.task.reasons[int(reason[part[0]])], _NARROW, placeholder=" ..."
+            )
             look = ("dark", "pale", "band")[int(reason[part[0]]) % 3]
             yield fig.Shade(0.5 * (x[part[0]] + low), 0.5 * (x[part[-1]] + high), words, look=look)
 
@@ -140,15 +173,17 @@ def _in_pairs(panels: list[fig.Panel]) -> tuple[tuple[fig.Panel | None, ...], ..
 
 def tornado(summary: SweepSummary) -> Iterator[fig.Figure]:
     """Bars of the rank correlation of each result with each parameter, the largest share of the variance first."""
-    for k, some in enumerate(batched(summary.influences.items(), _MOST_PANELS)):
+    for k, some in enumerate(_pieces(summary.influences.items(), _MOST_PANELS)):
         panels = []
         for name, table in some:
-            order = sorted(table, key=lambda each: -table[each].share)  # noqa: B023 - used in this round
+            order = sorted(table, key=lambda each: -table[each].share)
             words = tuple(f"{100.0 * table[each].share:.0f} %" for each in order)
             ranks = [table[each].rank for each in order]
             bars = fig.Bars("rank correlation", np.arange(len(order)), ranks, 0.7, 1, words=words)
-            x = fig.Axis("rank correlation", low=-1.35, high=1.35, step=0.5)
-            panels.append(fig.Panel(x, fig.Axis("parameter", names=tuple(order)), (bars, fig.Mark(0.0)), name))
+            x = fig.Axis("rank correlation", low=-1.5, high=1.5, step=0.5)
+            panels.append(
+                fig.Panel(x, fig.Axis("parameter", names=tuple(order)), (bars, fig.Mark(0.0)), name)
+            )
         rows = _in_pairs(panels)
         yield fig.Figure(
             f"tornado-{k}" if k else "tornado",
@@ -164,7 +199,7 @@ def distribution(summary: SweepSummary) -> Iterator[fig.Figure]:
     """The share of the points below each value of each result."""
     shares = np.linspace(0.0, 1.0, 201)
     names = [name for name in summary.influences if len(summary.sample[name])]
-    for k, some in enumerate(batched(names, _MOST_PANELS)):
+    for k, some in enumerate(_pieces(names, _MOST_PANELS)):
         panels = []
         for name in some:
             values = summary.sample[name][np.isfinite(summary.sample[name])]

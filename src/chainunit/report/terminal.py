@@ -11,7 +11,7 @@ from rich.text import Text as Styled
 
 from ..text import DEFAULT_UNITS, Units, number
 from .blocks import Block, Cell, Column, Judgement, Report, Share, Table, Text
-from .lines import Aside, Line, Number, Piece, Strong, Words, pieces
+from .lines import Aside, Line, Name, Number, Piece, Strong, Words, pieces
 
 _LAST = {"warning": "Warning: ", "note": "Note: "}
 
@@ -34,7 +34,7 @@ def _plain(piece: Piece, units: Units) -> str:
                 none=piece.none,
                 units=units,
             )
-        case Words():
+        case Words() | Name():
             return piece.text
         case Strong():
             return plain_line(piece.line, units)

@@ -31,7 +31,7 @@ from .measures import Answers
 from .rig import Rig
 from .sweep_plan import SweepPlan
 from .sweep_reading import SPEED
-from .sweep_runs import REASONS_OF_RUNS, SweepBlock
+from .sweep_runs import REASONS_OF_RUNS, SweepBlock, check_drive
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -181,6 +181,10 @@ def make_points(task: SweepTask, begin: int, end: int) -> dict[str, Any]:
     values = plan.values(begin, end)
     table = task.turns(values)
     reason = task.codes(table.reason.values, table.reason.attrs["reasons"])
+    for k, each in enumerate(plan.parameters):
+        q, x = each.variable.quantity, values[each.name]
+        above = x > q.low if q.open_low else x >= q.low - q.slack
+        reason[~(above & (x <= q.high + q.slack))] = len(task.machine.model.required) + 2 + k
     results = {plain_name(name): x for name, x in values.items()}
     for name in plan.quantities:
         results[plain_name(name)] = np.where(
@@ -216,6 +220,8 @@ def task_of(config: Config) -> SweepTask:
         )
     drive = choose(config, Path(), lambda *said: None).drive
     rig = Rig(config, drive, {}) if plan.measures else None
+    if rig is not None:
+        check_drive(rig, plan)
     return SweepTask(plan, drive.machine, config.feed, float(config.run.crank_speed), rig)
 
 

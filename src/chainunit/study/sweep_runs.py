@@ -17,7 +17,8 @@ import numpy as np
 import xarray as xr
 
 from ..batch.transients import Runs, Transients, profile_rows
-from ..errors import InputError
+from ..errors import Faults, InputError
+from ..native.compilers import compiler
 from ..quantities import Layout
 from ..system import Profile, compiled
 from ..system.compiled import input_starts
@@ -68,39 +69,60 @@ class _Point:
         return 2.0 * math.pi / self.speed
 
 
-class SweepBlock:
-    """The compiled system of a rig whose values a sweep varies.
+def check_drive(rig: Rig, plan: SweepPlan) -> None:
+    """Refuse what the transients of a drive cannot have.
 
     Raises
     ------
     InputError
-        where the drive has an FMU, where there is no C compiler, for a swept quantity that the drive does not have,
-        and for an event that it cannot have.
+        for an event that the drive cannot have, for a swept quantity that changes no run or is not one number of the
+        drive, and where there is no C compiler.
     """
+    event, faults = rig.config.events[plan.event], Faults()
+    if not rig.takes(event):
+        faults.add([InputError(f"sweep.event = {plan.event}: {event.without}", "sweep.event")])
+    known = rig.drive.load_model()[0].parameter_layout.names
+    for name in (each.name for each in plan.parameters):
+        words = ""
+        if name == SPEED and not rig.drive.follows:
+            words = "changes no run, as the motor has the speed of its supply"
+        elif name.startswith("machine.") and name.partition(".")[2] not in known:
+            words = "is not of the drive"
+        elif name == _RATIO and (rig.drive.line is not None or rig.drive.gear != 1.0):
+            words = "is not one number of the drive"
+        if words:
+            line = f"sweep.parameter: {name} {words}; leave it out, or sweep it without measures"
+            faults.add([InputError(line, "sweep.parameter")])
+    if compiler() is None:
+        faults.add(
+            [
+                InputError(
+                    "sweep.measures: need a C compiler, and there is none; leave them out", "sweep.measures"
+                )
+            ]
+        )
+    faults.refuse()
+
+
+class SweepBlock:
+    """The compiled system of a rig whose values a sweep varies; see `check_drive`."""
 
     def __init__(self, rig: Rig, plan: SweepPlan) -> None:
         self._rig, self._plan = rig, plan
-        event = rig.config.events[plan.event]
-        if not rig.takes(event):
-            raise InputError(f"sweep.event = {plan.event}: {event.without}", "sweep.event")
         component = compiled(rig.graph)
         self.model = component.model
         layout = self.model.parameter_layout
         own = {"solver.tolerance": TOLERANCE} if "solver.tolerance" in layout.names else {}
         self._p = layout.from_names(own, component.parameters)
         self._inputs = input_starts(rig.graph, self.model) | rig.drive.loads(rig.config.feed)
-        self._varying: dict[str, str] = {}
-        for each in plan.parameters:
-            inner = each.name.partition(".")[2]
-            if each.name.startswith("machine."):
-                full = [f"{part}.{inner}" for part in ("machine", "model")]
-                names = [name for name in full if name in layout.names]
-                if not names or (each.name == _RATIO and rig.drive.line is not None):
-                    raise InputError(
-                        f"sweep.parameter: {each.name} is not one number of the drive; sweep it without measures",
-                        "sweep.parameter",
-                    )
-                self._varying |= dict.fromkeys(names, each.name)
+        # the machine of the feed-forward has the same parameters
+        self._varying = {
+            full: each.name
+            for each in plan.parameters
+            for part in ("machine", "model")
+            if each.name.startswith("machine.")
+            and (full := f"{part}.{each.name.partition('.')[2]}") in layout.names
+        }
 
     @cached_property
     def outputs(self) -> list[str]:

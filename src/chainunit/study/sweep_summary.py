@@ -6,6 +6,7 @@ Extremes, best points and reasons are of all points, which are read in parts. Co
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -28,6 +29,7 @@ SAMPLE = 2**20
 BEST = 10
 """Number of best points."""
 QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
+_METHODS = {"grid": "a grid", "latin_hypercube": "a Latin hypercube", "sobol": "Sobol's sequence"}
 _PART = 2**18
 _BINS = 16
 _LEAST = 8
@@ -149,6 +151,17 @@ class SweepSummary:
             }
         return table
 
+    def digits(self, name: str) -> int:
+        """The number of digits with which a hundredth of the range of a parameter or result shows."""
+        ends = {each.name: each.ends for each in self.findings.plan.parameters}
+        if name in self.extremes:
+            part = self.findings.points[name].isel(point=list(self.extremes[name])).values
+            ends[name] = (float(part[0]), float(part[1]))
+        low, high = ends.get(name, (0.0, 1.0))
+        if not high > low:
+            return 4
+        return min(12, max(4, 3 + math.ceil(math.log10(max(abs(low), abs(high)) / (high - low)))))
+
     @cached_property
     def nominal(self) -> dict[str, float]:
         """The quantities of a turn at the values of the study, by name."""
@@ -176,7 +189,7 @@ class SweepSummary:
             "title": config.title,
             "source": config.source,
             "report": dict(config.labels),
-            "method": plan.method.replace("_", " "),
+            "method": _METHODS[plan.method],
             "points": entry(plan.points, "1"),
             "states": entry(float(plan.points) * plan.angles if plan.quantities else None, "1"),
             "seed": entry(plan.seed, "1"),

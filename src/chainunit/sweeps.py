@@ -1,0 +1,97 @@
+"""`SweepResult`: the results of a sweep over parameters of a study, in Python."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+import weakref
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .errors import WriteError
+from .files import claim, write_all
+from .progress import Report as Progress
+from .report import files, html, terminal
+from .report import sweep as contents
+from .report.blocks import Report
+from .study.config import Config
+from .study.sweep_summary import SweepSummary
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+
+class SweepResult:
+    """The results of a sweep. Its `repr` shows the size of the sweep, the best points and the extremes."""
+
+    def __init__(self, summary: SweepSummary) -> None:
+        self.summary = summary
+        """Extremes, best points, influences and spread, as the report reads them."""
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """All results by their names in the study, with units: over the parameters of a grid, else over ``point``,
+        with the parameters as coordinates. ``reason`` is 0 where a point has results; its attribute ``reasons`` has
+        the texts. Values of points that are no grid are read when they are used."""
+        return self.summary.findings.dataset
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """A row for each point: its parameters, its results, and ``reason``, a text, empty where there is none."""
+        points = self.summary.findings.points.load()
+        table = points.to_dataframe()
+        reasons = ["", *self.summary.findings.task.reasons[1:]]
+        table["reason"] = [reasons[code] for code in points["reason"].values]
+        return table[[*self.summary.variables, "reason"]]
+
+    @property
+    def file(self) -> Path:
+        """The store of all points (Zarr), a folder."""
+        return self.summary.findings.outcome.file
+
+    @cached_property
+    def _report(self) -> Report:
+        return contents.report(self.summary)
+
+    def to_json(self) -> str:
+        """The numbers of the report with their units, as the text of result.json."""
+        return files.numbers_text(self._report)
+
+    def __repr__(self) -> str:
+        return terminal.plain(self._report)
+
+    def _repr_html_(self) -> str:
+        """The summary as HTML, for notebooks."""
+        return html.fragment(self._report)
+
+
+def make_sweep(
+    config: Config,
+    folder: Path | None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Progress | None = None,
+) -> SweepResult:
+    """Run the sweep of a study, see `chainunit.Study.sweep`."""
+
+    def quiet(what: str, complete: float, total: float) -> None:
+        pass
+
+    if folder is None:
+        temporary = Path(tempfile.mkdtemp(prefix="chainunit_"))
+        try:
+            summary = contents.compute(config, temporary, progress or quiet, workers, scheduler)
+        except BaseException:
+            shutil.rmtree(temporary, ignore_errors=True)
+            raise
+        result = SweepResult(summary)
+        weakref.finalize(result, shutil.rmtree, temporary, ignore_errors=True)
+        return result
+    with claim(folder) as place:
+        summary = contents.compute(config, place, progress or quiet, workers, scheduler)
+        _, failure = write_all(contents.writers(summary, contents.report(summary), place))
+        if failure is not None:
+            raise WriteError(str(failure)) from failure
+    return SweepResult(summary)

@@ -1,0 +1,577 @@
+"""Sweeps over parameters of a study: every number by another route, whatever ends a run, and what the report says."""
+
+from __future__ import annotations
+
+import json
+import pickle
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sweeps
+import xarray as xr
+from command import chainunit
+from scipy.stats import qmc, spearmanr
+
+from chainunit import GeometryError, InputError, Study
+from chainunit.errors import InputError as Refusal
+from chainunit.job import CHECKS
+from chainunit.native.compilers import compiler
+from chainunit.report.figure import Hatch, hatch_lines
+from chainunit.study import sweep
+from chainunit.study.choice import choose
+from chainunit.study.config import parse
+from chainunit.study.cycle import cycle
+from chainunit.study.sweep_summary import _correlation, _explained
+
+HERE = Path(__file__).parent
+NATIVE = pytest.mark.skipif(compiler() is None, reason="no C compiler")
+QUANTITIES = ["peak(crank_torque)", "rms(tau)", "min(margin)", "max(force(pivot))", "installed_power"]
+GRID = """title = "Crank, coupler and speed"
+[sweep]
+method = "grid"
+angles = 90
+quantities = ["peak(crank_torque)", "rms(tau)", "min(margin)", "max(force(pivot))", "installed_power"]
+best = "installed_power"
+[[sweep.parameter]]
+name = "machine.r"
+values = ["120 mm", "150 mm", 0.4, 0.9]
+[[sweep.parameter]]
+name = "machine.l"
+from = 1.5
+to = 2.1
+points = 3
+[[sweep.parameter]]
+name = "run.crank_speed"
+values = [2, 4]
+[[sweep.parameter]]
+name = "feed.left.material_mass"
+values = [0, "40 kg"]
+"""
+SPREAD = """[sweep]
+points = 200
+angles = 90
+[[sweep.parameter]]
+name = "machine.r"
+from = "130 mm"
+to = "170 mm"
+[[sweep.parameter]]
+name = "machine.l1"
+tolerance = "3 mm"
+distribution = "normal"
+[[sweep.parameter]]
+name = "machine.crank.m"
+tolerance = "1 kg"
+"""
+
+
+def content(store):
+    """All files of a store, by their names."""
+    return {p.relative_to(store).as_posix(): p.read_bytes() for p in store.rglob("*") if p.is_file()}
+
+
+@pytest.fixture(scope="module")
+def grid():
+    return Study.from_text(GRID).sweep(workers=1)
+
+
+@pytest.fixture(scope="module")
+def spread():
+    return Study.from_text(SPREAD).sweep(workers=1)
+
+
+def by_hand(study, values):
+    """The quantities of a point from the outputs of its machine, or the words of its refusal."""
+    machine, feed = study.machine, study.config.feed
+    own = {name.partition(".")[2]: x for name, x in values.items() if name.startswith("machine.")}
+    loads = {name.removeprefix("feed."): x for name, x in values.items() if name.startswith("feed.")}
+    try:
+        machine = machine.replace(own)
+    except GeometryError as error:
+        return str(error)
+    layout = machine.model.feed_layout
+    speed = values.get("run.crank_speed", study.config.run.crank_speed)
+    turn = cycle(machine, speed, layout.from_names(loads, feed), study.config.sweep.angles)
+    out, rms = turn.outputs, np.sqrt(np.mean(turn.outputs.tau**2))
+    return {
+        "peak(crank_torque)": np.max(np.abs(turn.crank_torque)),
+        "rms(tau)": rms,
+        "min(margin)": np.min(out.margin),
+        "max(force(pivot))": np.max(np.hypot(out.pivot.fx, out.pivot.fy)),
+        "installed_power": speed * machine.ratio * max(rms, np.max(np.abs(out.tau)) / 1.6),
+        "rms(crank_torque)": rms * machine.ratio,
+    }
+
+
+def test_a_grid_is_that_of_the_machines(grid):
+    study, dataset = Study.from_text(GRID), grid.dataset
+    assert dict(dataset.sizes) == {
+        "machine.r": 4,
+        "machine.l": 3,
+        "run.crank_speed": 2,
+        "feed.left.material_mass": 2,
+    }
+    assert dataset["machine.r"].attrs["units"] == "m" and dataset["installed_power"].attrs["units"] == "W"
+    texts, seen = dataset.reason.attrs["reasons"], set()
+    for place in np.ndindex(*dataset.sizes.values()):
+        point = dataset[dict(zip(dataset.sizes, place, strict=True))]
+        wanted = by_hand(study, {name: float(point[name]) for name in dataset.sizes})
+        code = int(point.reason)
+        if isinstance(wanted, str):
+            # the machine itself is refused for the same reason
+            subject, _, why = texts[code].partition(": ")
+            assert code and why in wanted, (texts[code], wanted)
+            assert all(np.isnan(point[name]) for name in QUANTITIES)
+            seen.add(subject)
+            continue
+        assert code == 0
+        for name in QUANTITIES:
+            assert float(point[name]) == pytest.approx(wanted[name], rel=1e-11), (place, name)
+    assert len(seen) >= 2
+
+
+def test_points_of_a_sequence_are_those_of_the_machines(spread):
+    study, table = Study.from_text(SPREAD), spread.table
+    assert list(table.columns)[:3] == ["machine.r", "machine.l1", "machine.crank.m"] and len(table) == 200
+    u = qmc.Sobol(3, rng=np.random.default_rng(1)).random(256)[:200]
+    np.testing.assert_allclose(table["machine.r"], 0.13 + 0.04 * u[:, 0], atol=1e-10)
+    for number in (0, 77, 199):
+        row = table.iloc[number]
+        wanted = by_hand(study, {name: row[name] for name in study.config.sweep and table.columns[:3]})
+        for name in ("peak(crank_torque)", "rms(crank_torque)"):
+            assert row[name] == pytest.approx(wanted[name], rel=1e-11)
+    assert set(table["reason"]) == {""}
+    assert spread.dataset["machine.r"].dims == ("point",)
+
+
+def test_the_store_is_one_of_zarr(spread, grid):
+    """Readable without this package: values, units, and the words of the reasons."""
+    stored = xr.open_zarr(grid.file, consolidated=False)
+    assert stored.sizes["point"] == 48 and stored["machine_r"].attrs["units"] == "m"
+    np.testing.assert_array_equal(
+        stored["peak_crank_torque"].values.reshape(4, 3, 2, 2), grid.dataset["peak(crank_torque)"].values
+    )
+    words = stored["reason"].attrs["flag_meanings"].split()
+    assert len(words) == len(grid.dataset.reason.attrs["reasons"]) and words[0] == "valid"
+    used = sorted({words[code] for code in stored["reason"].values})
+    assert "r_the_crank_cannot_turn" in used
+
+
+@pytest.mark.parametrize("method", ["grid", "sobol", "latin_hypercube"])
+def test_a_batch_can_start_anywhere(method):
+    points = "points = 7" if method == "grid" else ""
+    count = "" if method == "grid" else "points = 49"
+    text = f"[sweep]\nmethod = '{method}'\nangles = 45\n{count}\n"
+    for name in ("r", "l1"):
+        text += f"[[sweep.parameter]]\nname = 'machine.{name}'\ntolerance = '20 mm'\n{points}\n"
+    task = sweep.task_of(parse(text))
+    whole = sweep.make_points(task, 0, 49)
+    again = pickle.loads(pickle.dumps(task))
+    for begin, end in ((30, 49), (5, 6), (0, 30)):
+        for name, x in sweep.make_points(again, begin, end).items():
+            np.testing.assert_array_equal(x, whole[name][begin:end])
+
+
+def test_values_outside_their_bounds_have_their_reason():
+    """A wide normal tolerance leaves the bounds of its quantity, of the machine and of the speed."""
+    text = "[sweep]\npoints = 64\nangles = 16\n" + "".join(
+        f"[[sweep.parameter]]\nname = '{name}'\ntolerance = {wide}\ndistribution = 'normal'\n"
+        for name, wide in (("machine.web_share", 5.0), ("run.crank_speed", 9.0), ("machine.crank.m", 400.0))
+    )
+    result = Study.from_text(text).sweep(workers=1)
+    table = result.table
+    for name, low, high in (
+        ("machine.web_share", 0.0, 1.0),
+        ("run.crank_speed", 0.01, np.inf),
+        ("machine.crank.m", 0.0, np.inf),
+    ):
+        outside = (table[name] < low) | (table[name] > high)
+        assert outside.any() and (table["reason"][outside] != "").all()
+        told = table["reason"].str.startswith(f"{name}: must be ")
+        assert told.any() and outside[told].all()
+    assert (table["reason"] == "").any()
+    assert np.isnan(table["peak(crank_torque)"][table["reason"] != ""]).all()
+
+
+@NATIVE
+def test_a_linkage_file():
+    """A parameter of its own, in another process's copy of the task."""
+    file = HERE.parent / "examples" / "linkages" / "watt_six_bar.toml"
+    text = f"[system]\nmachine = '{file}'\n[sweep]\nangles = 36\npoints = 8\n"
+    text += "[[sweep.parameter]]\nname = 'machine.coupler.mass'\nfrom = 1\nto = 3\n"
+    config = parse(text)
+    task = sweep.task_of(config)
+    results = sweep.make_points(pickle.loads(pickle.dumps(task)), 0, 8)
+    value = float(config.sweep.values(3, 4)["machine.coupler.mass"][0])
+    turn = cycle(task.machine.replace({"coupler.mass": value}), config.run.crank_speed, config.feed, 36)
+    assert results["peak_crank_torque"][3] == pytest.approx(np.max(np.abs(turn.crank_torque)), rel=1e-11)
+
+
+# -- execution
+
+
+@pytest.fixture
+def in_small_batches(monkeypatch):
+    monkeypatch.setattr(sweep, "batch_of", sweeps.small_batches)
+
+
+@pytest.fixture(scope="module")
+def unbroken(tmp_path_factory):
+    """The store of a sweep in small batches that nothing disturbed."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sweep, "batch_of", sweeps.small_batches)
+        folder = tmp_path_factory.mktemp("unbroken")
+        return sweep.run_sweep(parse(SPREAD), folder, lambda *said: None, workers=1).outcome.file
+
+
+def test_threads_make_the_same_store(unbroken, in_small_batches, tmp_path):
+    made = sweep.run_sweep(parse(SPREAD), tmp_path, lambda *said: None, workers=3).outcome
+    assert made.file.name == unbroken.name and content(made.file) == content(unbroken)
+
+
+def test_a_killed_sweep_goes_on(unbroken, in_small_batches, tmp_path):
+    """SIGKILL after some batches; the store is then that of a sweep that nothing disturbed, byte by byte."""
+    text = SPREAD.replace("points = 200", "points = 1280").replace("angles = 90", "angles = 1440")
+    (tmp_path / "file.toml").write_text(text, "utf-8")
+    task = sweep.task_of(parse(text))
+    marks = tmp_path / "killed" / sweep.job_of(task).store_name / CHECKS / "c"
+    process = subprocess.Popen(
+        [sys.executable, HERE / "sweeps.py", tmp_path / "file.toml", tmp_path / "killed"]
+    )
+    while not marks.exists() or len(list(marks.iterdir())) < 5:
+        assert process.poll() is None
+        time.sleep(0.005)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    assert len(list(marks.iterdir())) < 40
+    again = sweep.run_sweep(parse(text), tmp_path / "killed", lambda *said: None).outcome
+    assert 4 * sweeps.BATCH <= again.earlier_points < 1280
+    whole = sweep.run_sweep(parse(text), tmp_path / "whole", lambda *said: None).outcome
+    assert content(again.file) == content(whole.file)
+
+
+def test_a_sweep_grows(unbroken, in_small_batches, tmp_path):
+    """More points of Sobol's sequence go on from the store; those of a hypercube are others."""
+    few = sweep.run_sweep(parse(SPREAD.replace("200", "96")), tmp_path, lambda *said: None).outcome
+    more = sweep.run_sweep(parse(SPREAD), tmp_path, lambda *said: None).outcome
+    assert more.earlier_points == 96 and few.file == more.file and content(more.file) == content(unbroken)
+    cube = SPREAD.replace("[sweep]", "[sweep]\nmethod = 'latin_hypercube'")
+    digests = {sweep.task_of(parse(text)).digest() for text in (cube, cube.replace("200", "96"), SPREAD)}
+    assert len(digests) == 3
+    other = (
+        SPREAD.replace("130 mm", "131 mm"),
+        "[machine]\nrocker.m = 61\n" + SPREAD,
+        SPREAD + "[feed]\nleft.material_mass = 9\n",
+    )
+    digests |= {sweep.task_of(parse(text)).digest() for text in other}
+    assert len(digests) == 6
+
+
+def test_two_workers_of_a_scheduler(unbroken, in_small_batches, tmp_path):
+    """On loopback, in processes that share no file with this one."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    address, started = f"tcp://127.0.0.1:{port}", []
+
+    def start(*arguments):
+        out = subprocess.DEVNULL
+        started.append(
+            subprocess.Popen([sys.executable, "-m", *arguments], stdout=out, stderr=out, cwd=tmp_path)
+        )
+
+    try:
+        start("distributed.cli.dask_scheduler", "--port", str(port), "--no-dashboard")
+        for _ in range(2):
+            start("distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard")
+        deadline = time.monotonic() + 60.0
+        while True:
+            try:
+                made = sweep.run_sweep(parse(SPREAD), tmp_path, lambda *said: None, scheduler=address).outcome
+                break
+            except Refusal:
+                # not yet up
+                assert time.monotonic() < deadline and not [p for p in started if p.poll() is not None]
+                time.sleep(0.2)
+        assert content(made.file) == content(unbroken)
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
+
+
+# -- transients
+
+
+def gains():
+    """The tuned gains of the example, as a table: a study of another machine would tune others."""
+    config = parse("")
+    drive = choose(config, Path(), lambda *said: None).drive
+    of = {"speed_control": ("kp", "ki"), "current_control": ("kp", "ki")}
+    lines = [
+        f"{name}.{key} = {getattr(getattr(drive.parameters, name), key)!r}" for name in of for key in of[name]
+    ]
+    return "[motor]\n" + "\n".join(lines) + "\n"
+
+
+TRANSIENTS = """\
+[[event]]
+type = "jam"
+side = "left"
+[sweep]
+points = 12
+quantities = ["min(margin)"]
+measures = ["crank_torque_peak", "motor_torque_peak", "current_peak", "rocker_torque_peak", "speed_least", \
+"speed_dip"]
+[[sweep.parameter]]
+name = "machine.r"
+from = 0.13
+to = 0.17
+[[sweep.parameter]]
+name = "run.crank_speed"
+from = 2
+to = 4
+[[sweep.parameter]]
+name = "feed.left.material_mass"
+from = 0
+to = 50
+[[sweep.parameter]]
+name = "event.jam_left.force"
+from = 100
+to = 2000
+"""
+
+
+@pytest.fixture(scope="module")
+def jams():
+    return Study.from_text(gains() + TRANSIENTS), sweep.task_of(parse(gains() + TRANSIENTS))
+
+
+@NATIVE
+def test_measures_are_those_of_the_co_simulation(jams):
+    """A point as a study of its own, to the error of the coupling."""
+    study, task = jams
+    results = sweep.make_points(task, 4, 7)
+    names = [each.name for each in task.plan.parameters]
+    values = {name: float(results[sweep.plain_name(name)][1]) for name in names}
+    answers = study.with_values(values).run().answers["jam_left"]
+    for name in task.plan.measures:
+        assert results[name][1] == pytest.approx(answers[name], rel=2e-5), name
+    np.testing.assert_array_equal(results["reason"], 0)
+
+
+@NATIVE
+def test_transients_do_not_know_one_another(jams):
+    _, task = jams
+    whole = sweep.make_points(task, 0, 9)
+    for begin, end in ((3, 4), (4, 9)):
+        for name, x in sweep.make_points(task, begin, end).items():
+            np.testing.assert_array_equal(x, whole[name][begin:end], err_msg=name)
+
+
+@NATIVE
+def test_a_jam_that_stops_the_crank_and_a_machine_that_cannot_turn():
+    text = gains() + TRANSIENTS.replace('["min(margin)"]', "[]").replace(
+        '"speed_dip"]', '"speed_dip", "stall_time"]'
+    )
+    head, *_ = text.split("[[sweep.parameter]]")
+    rows = "[[sweep.parameter]]\nname = 'machine.r'\nvalues = [0.15, 0.9]\n"
+    rows += "[[sweep.parameter]]\nname = 'event.jam_left.force'\nvalues = [100, '40 kN']\n"
+    head = head.replace("points = 12", "method = 'grid'")
+    result = Study.from_text(head + rows).sweep(workers=1)
+    free, stopped = result.dataset["speed_dip"].sel({"machine.r": 0.15}).values
+    assert free < 0.1 and stopped > 0.9
+    # it goes on when the lump is gone
+    assert np.isnan(result.dataset["stall_time"]).all()
+    torques = result.dataset["crank_torque_peak"].sel({"machine.r": 0.15}).values
+    assert torques[1] > 3.0 * torques[0]
+    assert np.isnan(result.dataset["crank_torque_peak"].sel({"machine.r": 0.9})).all()
+    assert (result.dataset.reason.sel({"machine.r": 0.9}) > 0).all()
+    assert (result.dataset.reason.sel({"machine.r": 0.15}) == 0).all()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "add a table [[sweep.parameter]]"),
+        ("[sweep]\n", "add a table [[sweep.parameter]]"),
+        (
+            "[system]\nmotor = 'InductionMotor'\n[sweep]\nmeasures = ['current_peak']\nevent = 'jam_left'\n"
+            "[[sweep.parameter]]\nname = 'run.crank_speed'\nvalues = [3]\n",
+            "the motor has the speed of its supply",
+        ),
+        (
+            "[driveline]\n[sweep]\nmeasures = ['current_peak']\nevent = 'jam_left'\n"
+            "[[sweep.parameter]]\nname = 'machine.ratio'\nvalues = [40]\n",
+            "machine.ratio is not one number of the drive",
+        ),
+    ],
+)
+def test_sweeps_that_cannot_be_are_refused(text, words):
+    with pytest.raises(InputError) as error:
+        Study.from_text(text).sweep(workers=1)
+    assert words in str(error.value)
+
+
+# -- summary and report
+
+
+def test_the_summary_is_that_of_the_table(grid, spread):
+    for result in (grid, spread):
+        table, numbers = result.table, json.loads(result.to_json())
+        good = table[table["reason"] == ""]
+        assert numbers["feasible"]["value"] == len(good)
+        assert {each["reason"]: each["points"]["value"] for each in numbers["reasons"]} == dict(
+            table[table["reason"] != ""]["reason"].value_counts()
+        )
+        for name, ends in numbers["extremes"].items():
+            for end, row in (
+                ("least", good.loc[good[name].idxmin()]),
+                ("largest", good.loc[good[name].idxmax()]),
+            ):
+                assert ends[end][name]["value"] == row[name] and ends[end]["point"]["value"] == row.name
+        best = good.sort_values(numbers["best_by"], kind="stable").head(10)
+        assert [each["point"]["value"] for each in numbers["best"]] == list(best.index)
+        assert [each["machine.r"]["value"] for each in numbers["best"]] == list(best["machine.r"])
+
+
+def test_influences(spread):
+    table = spread.table
+    for name, of in spread.summary.influences.items():
+        for each, influence in of.items():
+            assert influence.rank == pytest.approx(spearmanr(table[each], table[name]).statistic, abs=1e-12)
+    torque = spread.summary.influences["peak(crank_torque)"]
+    assert (
+        torque["machine.r"].rank > 0.99
+        and torque["machine.r"].share > 0.97
+        and torque["machine.crank.m"].share < 0.05
+    )
+    x = qmc.Sobol(2, rng=np.random.default_rng(0)).random(4096) - 0.5
+    y = x[:, 0] ** 2 + 0.1 * x[:, 1]
+    # Var(x^2) = 1/180, Var(0.1 x) = 1/1200: neither rank nor slope tells of the first
+    assert abs(_correlation(x[:, 0], y)) < 0.02
+    assert _explained(x[:, 0], y) == pytest.approx((1 / 180) / (1 / 180 + 1 / 1200), abs=0.02)
+    assert _explained(x[:, 1], y) == pytest.approx((1 / 1200) / (1 / 180 + 1 / 1200), abs=0.02)
+    assert _explained(np.random.default_rng(1).random(4096), y) < 0.01
+
+
+def test_the_spread_has_quantiles_and_the_values_of_the_study(spread):
+    numbers, table = json.loads(spread.to_json()), spread.table
+    torque = numbers["spread"]["peak(crank_torque)"]
+    for key, q in (("q5", 0.05), ("q50", 0.5), ("q95", 0.95)):
+        assert torque[key]["value"] == pytest.approx(np.quantile(table["peak(crank_torque)"], q), rel=1e-12)
+        assert torque[key]["low"]["value"] <= torque[key]["value"] <= torque[key]["high"]["value"]
+    assert "q99" not in torque  # 200 points are too few for it
+    study = Study.from_text(SPREAD)
+    wanted = by_hand(study, {})["peak(crank_torque)"]
+    assert numbers["nominal"]["peak(crank_torque)"]["value"] == pytest.approx(wanted, rel=1e-11)
+
+
+MAP = """title = "Map"
+[report]
+author = "A. Nonymous"
+[sweep]
+method = "grid"
+angles = 36
+quantities = ["peak(crank_torque)", "min(margin)"]
+[[sweep.parameter]]
+name = "machine.l"
+from = 1.0
+to = 1.9
+points = 13
+[[sweep.parameter]]
+name = "machine.r"
+from = 0.05
+to = 0.7
+points = 12
+"""
+
+
+def test_the_command(tmp_path):
+    (tmp_path / "map.toml").write_text(MAP, "utf-8")
+    done = chainunit("sweep", "map.toml", "-o", "map", "--workers", "2", cwd=tmp_path)
+    assert done.returncode == 0 and "Points with the least peak(crank_torque)" in done.stdout
+    assert "the organs cannot follow the rocker over its swing" in done.stdout
+    names = {"report.html", "result.json", "result.md", "sweep_peak_crank_torque.png", "sweep_min_margin.png"}
+    written = {p.name for p in (tmp_path / "map").iterdir()}
+    assert names <= written and len(written) == len(names) + 1
+    numbers = json.loads((tmp_path / "map" / "result.json").read_text("utf-8"))
+    page = (tmp_path / "map" / "report.html").read_text("utf-8")
+    assert "A. Nonymous" in page and "Map of min(margin)" in page and numbers["store"] in page
+    # another report of the same sweep finds all points
+    (tmp_path / "map.toml").write_text(MAP.replace('title = "Map"', 'title = "Again"'), "utf-8")
+    (tmp_path / "map" / "sweep_of_old.png").write_bytes(b"")
+    (store,) = (tmp_path / "map").glob("*.zarr")
+    before = {p: p.stat().st_mtime_ns for p in store.rglob("c/*")}
+    assert chainunit("sweep", "map.toml", "-o", "map", cwd=tmp_path).returncode == 0
+    assert before == {p: p.stat().st_mtime_ns for p in store.rglob("c/*")} and before
+    assert not (tmp_path / "map" / "sweep_of_old.png").exists()
+    again = json.loads((tmp_path / "map" / "result.json").read_text("utf-8"))
+    assert again["title"] == "Again" and again["best"] == numbers["best"]
+
+
+def test_the_command_refuses(tmp_path):
+    (tmp_path / "x.toml").write_text(
+        "[sweep]\npoints = 0\n[[sweep.parameter]]\nname = 'r'\nvalues = [1]\n", "utf-8"
+    )
+    done = chainunit("sweep", "x.toml", cwd=tmp_path)
+    lines = done.stderr.splitlines()
+    assert done.returncode == 2 and not (tmp_path / "sweep").exists() and len(lines) == 2
+    assert (
+        lines[0].startswith("chainunit: x.toml:2: sweep.points")
+        and "x.toml:4: sweep.parameter.1.name" in lines[1]
+    )
+    (tmp_path / "y.toml").write_text("[run]\nstep = 0.001\n", "utf-8")
+    done = chainunit("sweep", "y.toml", cwd=tmp_path)
+    assert done.returncode == 2 and "add a table [[sweep.parameter]]" in done.stderr
+    text = "[sweep]\nangles = 16\n[[sweep.parameter]]\nname = 'machine.r'\nvalues = [0.9, 0.95]\n"
+    (tmp_path / "z.toml").write_text(text, "utf-8")
+    done = chainunit("sweep", "z.toml", cwd=tmp_path)
+    assert done.returncode == 1 and "No point of the sweep has a result" in done.stdout
+
+
+def test_one_parameter_gives_curves(tmp_path):
+    text = MAP.split('[[sweep.parameter]]\nname = "machine.r"')[0].replace("to = 1.9", "to = 2.4")
+    result = Study.from_text(text).sweep(tmp_path)
+    assert (tmp_path / "sweep_curves.png").exists()
+    assert repr(result).startswith("13 points, a grid, over machine.l 1 m to 2.4 m; 6 of them have ")
+    (figure,) = result._report.figures
+    curve = figure.panels[0][0].items[0]
+    np.testing.assert_array_equal(curve.x, result.dataset["machine.l"])
+    np.testing.assert_array_equal(curve.y, result.dataset["peak(crank_torque)"])
+    assert "<h" in result._repr_html_() or "<table" in result._repr_html_()
+
+
+def test_hatches_cover_their_cells_alone():
+    x, y = np.array([0.0, 1.0, 3.0, 4.0]), np.array([10.0, 20.0, 50.0])
+    cells = np.array([[1, 0, 1], [0, 0, 1]], bool)
+    for look in range(4):
+        u, v = hatch_lines(Hatch("h", x, y, cells, look))
+        begin, end = np.stack([u[0::3], v[0::3]]), np.stack([u[1::3], v[1::3]])
+        assert np.isnan(u[2::3]).all() and begin.shape[1] > 5
+        inside = np.zeros_like(cells)
+        for share in np.linspace(0.001, 0.999, 41):
+            a, b = begin + share * (end - begin)
+            column, row = np.searchsorted(x, a) - 1, np.searchsorted(y, b) - 1
+            assert cells[row, column].all()
+            inside[row, column] = True
+        np.testing.assert_array_equal(inside, cells)
+
+
+def test_a_map_is_hatched_by_its_reasons():
+    result = Study.from_text(MAP).sweep()
+    figure = next(each for each in result._report.figures if "min_margin" in each.file)
+    items = figure.panels[0][0].items
+    field, *hatches = [item for item in items if type(item).__name__ in ("Field", "Hatch")]
+    np.testing.assert_array_equal(field.z, result.dataset["min(margin)"].transpose("machine.r", "machine.l"))
+    bad = np.isnan(field.z)
+    corners = bad[:-1, :-1] | bad[1:, :-1] | bad[:-1, 1:] | bad[1:, 1:]
+    np.testing.assert_array_equal(np.sum([each.cells for each in hatches], axis=0), corners)
+    reasons = result.dataset.reason.attrs["reasons"]
+    assert {each.name for each in hatches} <= set(reasons) and len(hatches) >= 2
+    assert field.levels[0] <= np.nanmin(field.z) and field.levels[-1] >= np.nanmax(field.z)
