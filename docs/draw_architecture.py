@@ -26,6 +26,7 @@ HOMES = {
     "cli": "cli",
     "console": "cli",
     "studies": "cli",
+    "sweep_command": "cli",
     "sweeps": "cli",
     "models": "system",
     "native": "core",

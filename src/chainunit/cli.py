@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 import typer.core
 
-from .console import finish, leave, progress_bar, terminal_console
+from .console import finish, leave, progress_bar, study_file, terminal_console
 from .errors import InputError, InterruptedRunError, RunError, printable
 from .files import claim, clear, full
+from .sweep_command import sweep
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -103,16 +104,6 @@ def _root(
         os.environ[VARIABLE] = OFF
 
 
-def _study_file(file: Path | None) -> Any:
-    """The study of a file; a value that looks like a slip of a unit is named before any run."""
-    from .study import config as configuration
-
-    loaded = configuration.load(file)
-    for slip in loaded.slips:
-        terminal_console(stderr=True).print(f"Remark: {slip.sentence}", soft_wrap=True)
-    return loaded
-
-
 @app.command()
 def study(
     config: Annotated[
@@ -148,7 +139,7 @@ def study(
         text = parts.example(example.value)
         print(commented(text) if example is Example.full else f"#:schema {FILE}\n{text}", end="")
         return
-    loaded = _study_file(config)
+    loaded = study_file(config)
     from .report import results
     from .report import study as contents
     from .study.record import INSUFFICIENT
@@ -210,7 +201,7 @@ def optimize(
 
     Writes best.toml, report.html, result.json, result.md and pictures into the output folder.
     """
-    loaded = _study_file(config)
+    loaded = study_file(config)
     with claim(output):
         from .report import optimum
 
@@ -230,41 +221,7 @@ def _stopped_early(failure: RunError, output: Path, errors: Console) -> None:
     raise typer.Exit(_status(failure))
 
 
-@app.command()
-def sweep(
-    config: Annotated[Path, typer.Argument(help="Study file (TOML) with a table [sweep].")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path("sweep"),
-    workers: Annotated[
-        int | None,
-        typer.Option(
-            "--workers", min=1, help="Threads, or with measures processes; one for each processor by default."
-        ),
-    ] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(
-            "--scheduler",
-            help="Address of a Dask scheduler whose workers make the points: tcp://10.0.0.5:8786.",
-        ),
-    ] = None,
-) -> None:
-    """Vary parameters of a study: quantities of a turn, and measures of runs with an event, at many points.
-
-    Writes report.html, result.json, result.md, plots and the store of all points into the output folder. A sweep that
-    was killed goes on from its store.
-    """
-    loaded = _study_file(config)
-    from .report import sweep as contents
-
-    with claim(output):
-        with progress_bar(terminal_console(stderr=True)) as progress:
-            summary = contents.compute(loaded, output, progress, workers, scheduler)
-        report = contents.report(summary)
-        unwritten = leave(report, contents.writers(summary, report, output))
-    if unwritten is not None:
-        raise unwritten
-    if not summary.feasible:
-        raise typer.Exit(1)
+app.command()(sweep)
 
 
 @app.command()
@@ -413,7 +370,7 @@ def export(
     if rods is not None and name != "ChainUnitFlexible":
         raise InputError(f"--rods {rods}: is of ChainUnitFlexible; leave it out for {name}")
     study_path = Path(name) if whole else config
-    loaded = _study_file(study_path) if study_path else None
+    loaded = study_file(study_path) if study_path else None
     kind: Any = backend.value if backend else None
     with terminal_console(stderr=True).status("exporting") as status:
         model, start = model_and_start(name, loaded, rods, direct=direct, backend=kind, report=status.update)
@@ -443,7 +400,7 @@ def export_ssp(
 
     if output.suffix != ".ssp":
         raise InputError(f"-o {output}: must be a file name that ends in .ssp")
-    loaded = _study_file(config)
+    loaded = study_file(config)
     with terminal_console(stderr=True).status("exporting") as status:
         made = export_study(loaded, output, backend=backend.value if backend else None, report=status.update)
     print(f"{output}: {made}")

@@ -69,3 +69,13 @@ def progress_bar(console: Console) -> Iterator[Callable[[str, float, float], Non
     finally:
         if bar.live.is_started:
             bar.stop()
+
+
+def study_file(file: Path | None) -> Any:
+    """The study of a file; a value that looks like a slip of a unit is named before any run."""
+    from .study import config as configuration
+
+    loaded = configuration.load(file)
+    for slip in loaded.slips:
+        terminal_console(stderr=True).print(f"Remark: {slip.sentence}", soft_wrap=True)
+    return loaded

@@ -89,8 +89,12 @@ def _range(s: b.Source, name: str) -> Line:
 
 
 def _columns(names: list[str]) -> tuple[b.Column, ...]:
+    """Columns of parameters or results. On a terminal a parameter is called by the last part of its name, where no
+    other one has it."""
+    ends = [name.rpartition(".")[2] if "(" not in name else name for name in names]
     return tuple(
-        b.Column(Name(name), form="both" if k < _MOST_COLUMNS else "long") for k, name in enumerate(names)
+        b.Column(Name(name), end if ends.count(end) == 1 else "", "both" if k < _MOST_COLUMNS else "long")
+        for k, (name, end) in enumerate(zip(names, ends, strict=True))
     )
 
 
@@ -113,7 +117,10 @@ def _best(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
     ]
     if rows:
         heads = (b.Column("point"), *_columns(names))
-        yield b.Table(tuple(rows), heads, title=s.line("Points with the least {best_by}, the best first"))
+        some = len(s.result["parameters"])
+        groups = (tuple(range(1, 1 + some)), tuple(range(1 + some, 1 + len(names))))
+        title = s.line("Points with the least {best_by}, the best first")
+        yield b.Table(tuple(rows), heads, title=title, groups=groups)
 
 
 def _extremes(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
@@ -181,9 +188,14 @@ def _spread(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
         )
         for name in spread
     )
-    heads = b.heads("result", "at the study's values", "mean", "standard deviation")
-    columns = (*heads, *(b.Column(f"{key.removeprefix('q')} %") for key in quantiles))
-    yield b.Table(tuple(rows), columns, title="Spread of the results and their quantiles")
+    of_study = (
+        b.Column("at the study's values", "study"),
+        b.Column("mean"),
+        b.Column("standard deviation", "deviation"),
+    )
+    columns = (b.Column("result"), *of_study, *(b.Column(f"{key.removeprefix('q')} %") for key in quantiles))
+    groups = ((1, 2, 3), tuple(range(4, len(columns))))
+    yield b.Table(tuple(rows), columns, title="Spread of the results and their quantiles", groups=groups)
     yield b.Text(
         s.line(
             "result.json has the interval of {=confidence} confidence of each quantile, as for points that are drawn "

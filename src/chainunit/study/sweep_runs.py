@@ -46,7 +46,7 @@ _RISE = 0.1
 
 
 @dataclass(frozen=True)
-class _Point:
+class _PointRun:
     """A point: its crank speed [rad/s], its event, and the rig with its feed and drive."""
 
     speed: float
@@ -164,7 +164,7 @@ class SweepBlock:
         count = len(next(iter(values.values())))
         points = [self._point({name: float(x[k]) for name, x in values.items()}) for k in range(count)]
         given = np.array([values[name] for name in self._varying.values()]).reshape(len(self._varying), count)
-        work = _Work(self, points, given, threads)
+        work = _BlockWork(self, points, given, threads)
         states, codes, steady = work.steady()
         results = {name: np.full(count, np.nan) for name in self._plan.measures}
         good = np.flatnonzero(codes == 0)
@@ -179,7 +179,7 @@ class SweepBlock:
                     results[name][k] = np.nan if value is None else value
         return results, codes
 
-    def _point(self, values: Mapping[str, float]) -> _Point:
+    def _point(self, values: Mapping[str, float]) -> _PointRun:
         rig, event = self._rig, self._event
         feed = {name.removeprefix("feed."): x for name, x in values.items() if name.startswith("feed.")}
         begin = f"event.{event.name}."
@@ -191,20 +191,22 @@ class SweepBlock:
             whole = Layout(type(rig.config.feed)).from_names(feed, rig.config.feed)
             rig = replace(rig, config=replace(rig.config, feed=whole))
         speed = values.get(SPEED, float(rig.config.run.crank_speed))
-        return _Point(speed, replace(event, p=replace(event.p, **own)), rig)
+        return _PointRun(speed, replace(event, p=replace(event.p, **own)), rig)
 
 
-class _Work:
+class _BlockWork:
     """Points of a block in work."""
 
-    def __init__(self, block: SweepBlock, points: Sequence[_Point], given: Any, threads: int) -> None:
+    def __init__(self, block: SweepBlock, points: Sequence[_PointRun], given: Any, threads: int) -> None:
         self._block, self._points, self._given, self._threads = block, points, given, threads
         self._rig = block._rig
         self._step = self._rig.step
 
-    def only(self, places: Any) -> _Work:
+    def only(self, places: Any) -> _BlockWork:
         """Some of the points."""
-        return _Work(self._block, [self._points[k] for k in places], self._given[:, places], self._threads)
+        return _BlockWork(
+            self._block, [self._points[k] for k in places], self._given[:, places], self._threads
+        )
 
     def _run(
         self, states: Any, signals: Sequence[Mapping[str, Any]], stop: Any, step: float, limits: Any = None
@@ -228,7 +230,7 @@ class _Work:
             workers=self._threads,
         )
 
-    def _constant(self, point: _Point) -> dict[str, Any]:
+    def _constant(self, point: _PointRun) -> dict[str, Any]:
         """The signals of a point in steady running."""
         return {**point.loads, **point.drive.reference(point.speed)}
 
@@ -322,7 +324,7 @@ class _Work:
             for k, point in enumerate(self._points)
         ]
 
-    def _limit(self, point: _Point) -> float:
+    def _limit(self, point: _PointRun) -> float:
         """The torque of the motor's shaft at which a safety coupling opens [N m]."""
         coupling = self._rig.config.coupling
         return math.inf if coupling is None else float(coupling.trip_torque / point.drive.ratio)

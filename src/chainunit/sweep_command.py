@@ -1,0 +1,47 @@
+"""The command that runs a sweep."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .console import leave, progress_bar, study_file, terminal_console
+from .files import claim
+
+
+def sweep(
+    config: Annotated[Path, typer.Argument(help="Study file (TOML) with a table [sweep].")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for results.")] = Path("sweep"),
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            "--workers", min=1, help="Threads, or with measures processes; one for each processor by default."
+        ),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            "--scheduler",
+            help="Address of a Dask scheduler whose workers make the points: tcp://10.0.0.5:8786.",
+        ),
+    ] = None,
+) -> None:
+    """Vary parameters of a study: quantities of a turn, and measures of runs with an event, at many points.
+
+    Writes report.html, result.json, result.md, plots and the store of all points into the output folder. A sweep that
+    was killed goes on from its store.
+    """
+    loaded = study_file(config)
+    from .report import sweep as contents
+
+    with claim(output):
+        with progress_bar(terminal_console(stderr=True)) as progress:
+            summary = contents.compute(loaded, output, progress, workers, scheduler)
+        report = contents.report(summary)
+        unwritten = leave(report, contents.writers(summary, report, output))
+    if unwritten is not None:
+        raise unwritten
+    if not summary.feasible:
+        raise typer.Exit(1)
