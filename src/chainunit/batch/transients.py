@@ -60,6 +60,17 @@ def profile_rows(signal: Any, changes: int) -> list[float]:
     return rows
 
 
+def signal_table(
+    driven: Sequence[str], signals: Sequence[Mapping[str, Any]], otherwise: Mapping[str, float], changes: int
+) -> Any:
+    """The signals of runs by the names of the `driven` inputs, with the values `otherwise` of those that a run does
+    not change, as `Transients.run` takes them: shape (inputs, 1 + 3*changes, runs)."""
+    rows = [
+        [profile_rows(own.get(name, otherwise.get(name, 0.0)), changes) for own in signals] for name in driven
+    ]
+    return np.moveaxis(np.reshape(rows, (len(driven), len(signals), 1 + 3 * changes)), 1, -1)
+
+
 @dataclass(frozen=True)
 class Runs:
     """The results of a block of runs.

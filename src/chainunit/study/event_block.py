@@ -14,11 +14,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..batch.transients import Runs, Transients, profile_rows
+from ..batch.transients import Runs, Transients, signal_table
 from ..errors import RunError
-from ..model import Model
-from ..system import compiled, monolithic
-from ..system.compiled import input_starts
+from ..system import monolithic
+from ..system.compiled_simulation import LONGEST, CompiledSystem
 from ..system.signals import at_time
 from .event_runs import EventRun, Request
 from .event_table import RandomEvent
@@ -26,24 +25,17 @@ from .rig import Rig
 
 BLOCK = 64
 """Number of runs that are side by side in memory."""
-TOLERANCE = 1e-9
-"""Relative tolerance of the integrator: a run agrees with the monolithic solution to some 1e-7 of the peaks, where a
-co-simulation has an error of some 1e-5."""
-LONGEST = 20.0
-"""Longest step of the integrator, over the time between rows."""
 
 
-def kept_outputs(rig: Rig, model: type[Model], reads: Sequence[str]) -> list[str]:
-    """The outputs and states of the compiled system of a rig that the measures of a run with an event need, and the
+def kept_outputs(rig: Rig, system: CompiledSystem, reads: Sequence[str]) -> list[str]:
+    """The outputs and states of the compiled `system` of a rig that the measures of a run with an event need, and the
     outputs of the machine that the event itself `reads`."""
-    assert model.state_layout is not None
-    known = {*model.state_layout.names, *(v.name for part in model.parts for v in part.layout.variables)}
     names = {"motor.air_gap_tau", f"motor.{rig.drive.motor.current}", "machine.rocker.tau"}
     names |= {f"machine.{name}" for name in reads}
     for bond in rig.graph.bonds:
         for name, terminal in zip((bond.driver, bond.machine), bond.flanges, strict=True):
             names |= {f"{name}.{terminal.members[x]}" for x in ("phi", "w", "tau") if x in terminal.members}
-    return sorted(names & known)
+    return sorted(names & set(system.outputs))
 
 
 class EventBlock:
@@ -70,16 +62,9 @@ class EventBlock:
         states: Any = None,
     ) -> None:
         self._rig, self._random, self._steady = rig, random, steady
-        component = compiled(rig.graph)
-        self.model = component.model
-        own = component.model.parameter_layout.from_names(
-            {"solver.tolerance": TOLERANCE}, component.parameters
-        )
-        self._p = self.model.check(own)
-        assert self.model.state_layout is not None
+        self._system = CompiledSystem(rig.graph)
         normal = {full: float(at_time(signal, steady)) for full, signal in rig.signals().items()}
-        declared = {v.name: float(v.quantity.start or 0.0) for v in self.model.input_layout.variables}
-        self._inputs = declared | input_starts(rig.graph, self.model) | normal
+        self._inputs = self._system.inputs | normal
         self._given_states = states
 
     @cached_property
@@ -87,14 +72,15 @@ class EventBlock:
         """The states at the steady time, in the order of the model."""
         if self._given_states is not None:
             return self._given_states
-        assert self.model.state_layout is not None
+        layout = self._system.model.state_layout
+        assert layout is not None
         run = monolithic(self._rig.graph, self._rig.signals(ramp=True), [0.0, self._steady])
-        return np.array([float(run[name][-1]) for name in self.model.state_layout.names])
+        return np.array([float(run[name][-1]) for name in layout.names])
 
     @cached_property
     def outputs(self) -> list[str]:
         """The outputs and states that the measures of a run with an event read, and the events themselves."""
-        return kept_outputs(self._rig, self.model, self._random_reads)
+        return kept_outputs(self._rig, self._system, self._random_reads)
 
     @property
     def _random_reads(self) -> tuple[str, ...]:
@@ -118,7 +104,7 @@ class EventBlock:
     def loop(self) -> Transients:
         """The compiled loop."""
         return Transients(
-            self.model,
+            self._system.model,
             self.outputs,
             driven=list(self._driven),
             guarded=[self._rig.drive.motor_torque],
@@ -169,18 +155,15 @@ class EventBlock:
         limits: Any,
         workers: int,
     ) -> Runs:
-        table = [
-            [profile_rows(each.get(full, self._inputs[full]), self._changes) for each in signals]
-            for full in self._driven
-        ]
+        table = signal_table(list(self._driven), signals, self._inputs, self._changes)
         return self.loop.run(
-            self._p,
+            self._system.p,
             self._inputs,
             states,
             begin=begin,
             step=self._rig.step,
             stop=stop,
-            signals=np.moveaxis(np.array(table), 1, -1),
+            signals=table,
             limits=limits,
             longest=LONGEST * self._rig.step,
             workers=workers,

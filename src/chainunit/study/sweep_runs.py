@@ -16,16 +16,16 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..batch.transients import Runs, Transients, profile_rows
+from ..batch.transients import Runs, Transients, signal_table
 from ..errors import Faults, InputError
 from ..native.compilers import compiler
 from ..quantities import Layout
-from ..system import Profile, compiled
-from ..system.compiled import input_starts
+from ..system import Profile
+from ..system.compiled_simulation import LONGEST, CompiledSystem
 from .cycle import no_feed
 from .drive import Drive
 from .event import Event
-from .event_block import LONGEST, TOLERANCE, kept_outputs
+from .event_block import kept_outputs
 from .measures import read_measure
 from .rig import PATIENCE, Rig
 from .sweep_plan import SweepPlan
@@ -109,12 +109,9 @@ class SweepBlock:
 
     def __init__(self, rig: Rig, plan: SweepPlan) -> None:
         self._rig, self._plan = rig, plan
-        component = compiled(rig.graph)
-        self.model = component.model
-        layout = self.model.parameter_layout
-        own = {"solver.tolerance": TOLERANCE} if "solver.tolerance" in layout.names else {}
-        self._p = layout.from_names(own, component.parameters)
-        self._inputs = input_starts(rig.graph, self.model) | rig.drive.loads(rig.config.feed)
+        self.system = CompiledSystem(rig.graph)
+        layout = self.system.model.parameter_layout
+        self._inputs = self.system.inputs | rig.drive.loads(rig.config.feed)
         # the machine of the feed-forward has the same parameters
         self._varying = {
             full: each.name
@@ -127,7 +124,7 @@ class SweepBlock:
     @cached_property
     def outputs(self) -> list[str]:
         """The outputs and states that the measures read."""
-        return kept_outputs(self._rig, self.model, self._event.reads)
+        return kept_outputs(self._rig, self.system, self._event.reads)
 
     @property
     def _event(self) -> Event:
@@ -150,7 +147,7 @@ class SweepBlock:
     @cached_property
     def _loop(self) -> Transients:
         return Transients(
-            self.model,
+            self.system.model,
             self.outputs,
             varying=list(self._varying),
             driven=self._driven,
@@ -212,19 +209,16 @@ class _BlockWork:
         self, states: Any, signals: Sequence[Mapping[str, Any]], stop: Any, step: float, limits: Any = None
     ) -> Runs:
         block = self._block
-        table = [
-            [profile_rows(each.get(full, block._inputs.get(full, 0.0)), block._changes) for each in signals]
-            for full in block._driven
-        ]
+        table = signal_table(block._driven, signals, block._inputs, block._changes)
         return block._loop.run(
-            block._p,
+            block.system.p,
             block._inputs,
             states,
             begin=0.0,
             step=step,
             stop=np.asarray(stop, float),
             varying=self._given,
-            signals=np.moveaxis(np.array(table), 1, -1),
+            signals=table,
             limits=limits,
             longest=LONGEST * self._step,
             workers=self._threads,
@@ -236,16 +230,11 @@ class _BlockWork:
 
     def _from_rest(self) -> Any:
         """The states at rest, shape (states, points)."""
-        block = self._block
-        model, layout = block.model, block.model.parameter_layout
-        assert model.state_layout is not None
-        columns = []
+        block, columns = self._block, []
         for k, point in enumerate(self._points):
             own = dict(zip(block._varying, map(float, self._given[:, k]), strict=True))
-            inputs = block._inputs | self._constant(point) | dict.fromkeys(point.drive.reference(1.0), 0.0)
-            known = {name: x for name, x in inputs.items() if name in model.input_layout.names}
-            p = model.check(layout.from_names(own, block._p))
-            columns.append(model.state_layout.values(model.begin(p, model.input_layout.from_names(known))))
+            still = dict.fromkeys(point.drive.reference(1.0), 0.0)
+            columns.append(block.system.start(block._inputs | self._constant(point) | still, own))
         return np.array(columns, float).T
 
     def _started(self) -> Runs:

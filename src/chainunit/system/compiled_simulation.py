@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from ..batch.transients import Transients, profile_rows
+from ..batch.transients import Transients, signal_table
 from ..engines import MATH
 from ..errors import InputError, InterruptedRunError, RunError
 from ..progress import Progress
@@ -25,6 +25,42 @@ TOLERANCE = 1e-9
 co-simulation has an error of some 1e-5."""
 LONGEST = 20.0
 """Longest step of the integrator, over the time between rows."""
+
+
+class CompiledSystem:
+    """A system as one model, as native loops run it: the `model`, its parameters `p` with the `TOLERANCE`, and the
+    values of its `inputs` in the system.
+
+    Raises
+    ------
+    InputError
+        where a component of the `system` is an FMU, and where the parameters make no machine.
+    """
+
+    def __init__(self, system: System) -> None:
+        component = compiled(system)
+        self.model, layout = component.model, component.model.parameter_layout
+        self.p = self.model.check(layout.from_names({"solver.tolerance": TOLERANCE}, component.parameters))
+        declared = {v.name: float(v.quantity.start or 0.0) for v in self.model.input_layout.variables}
+        self.inputs = declared | input_starts(system, self.model)
+
+    @property
+    def outputs(self) -> dict[str, Variable]:
+        """The states and outputs by full name."""
+        assert self.model.state_layout is not None
+        parts = (self.model.state_layout, *(part.layout for part in self.model.parts))
+        return {v.name: v for layout in parts for v in layout.variables}
+
+    def start(self, inputs: Mapping[str, float], parameters: Mapping[str, float] | None = None) -> Any:
+        """The states at rest with these inputs, and with other values of some parameters; shape (states,)."""
+        model = self.model
+        assert model.state_layout is not None
+        p = self.p
+        if parameters:
+            p = model.check(model.parameter_layout.from_names(dict(parameters), self.p))
+        known = {full: x for full, x in inputs.items() if full in self.inputs}
+        own = model.input_layout.from_names(self.inputs | known)
+        return np.array(model.state_layout.values(model.begin(p, own)), float)
 
 
 class CompiledSimulation(Simulation):
@@ -45,33 +81,19 @@ class CompiledSimulation(Simulation):
     def __init__(
         self, system: System, signals: Mapping[str, Any] | None = None, start_time: float = 0.0
     ) -> None:
-        component = compiled(system)
-        self.model, layout = component.model, component.model.parameter_layout
-        self.p = self.model.check(layout.from_names({"solver.tolerance": TOLERANCE}, component.parameters))
-        declared = {v.name: float(v.quantity.start or 0.0) for v in self.model.input_layout.variables}
-        self.inputs = declared | input_starts(system, self.model)
+        self._system = CompiledSystem(system)
         self.time, self.signals = start_time, dict(signals or {})
         self._checked(self.signals)
-        states = self.model.state_layout
-        assert states is not None
         start = {full: float(at_time(signal, start_time)) for full, signal in self.signals.items()}
-        own = self.model.input_layout.from_names(self.inputs | start)
-        self._states = np.array(states.values(self.model.begin(self.p, own)), float)
+        self._states = self._system.start(start)
         self._saved = self.time, self._states
 
     def _checked(self, signals: Mapping[str, Any]) -> None:
         for full, signal in signals.items():
-            if full not in self.inputs:
+            if full not in self._system.inputs:
                 raise InputError(f"{full}: no such input of the system")
             if callable(signal) and not hasattr(signal, "changes"):
                 raise InputError(f"{full}: a compiled system takes numbers and profiles as signals")
-
-    @property
-    def outputs(self) -> dict[str, Variable]:
-        """The states and outputs that a run keeps, by full name."""
-        assert self.model.state_layout is not None
-        parts = (self.model.state_layout, *(part.layout for part in self.model.parts))
-        return {v.name: v for layout in parts for v in layout.variables}
 
     def close(self) -> None:
         """See `Simulation`; nothing is left to free."""
@@ -104,26 +126,24 @@ class CompiledSimulation(Simulation):
             )
         if file is not None:
             raise InputError("a compiled system keeps its rows in memory: leave the file out")
-        known, guards = self.outputs, dict(guards or {})
+        system = self._system
+        known, guards = system.outputs, dict(guards or {})
         kept = [name for name in known if names is None or name in set(names) or name in guards]
         self._checked(self.signals)
         driven = {full: signal for full, signal in self.signals.items() if hasattr(signal, "changes")}
         changes = max((len(signal.changes) for signal in driven.values()), default=0)
-        loop = Transients(self.model, kept, driven=list(driven), guarded=list(guards), changes=changes)
+        loop = Transients(system.model, kept, driven=list(driven), guarded=list(guards), changes=changes)
         try:
             result = loop.run(
-                self.p,
-                self.inputs | {full: float(x) for full, x in self.signals.items() if full not in driven},
+                system.p,
+                system.inputs | {full: float(x) for full, x in self.signals.items() if full not in driven},
                 self._states,
                 begin=self.time,
                 step=step,
                 stop=[stop],
-                signals=np.reshape(
-                    [profile_rows(signal, changes) for signal in driven.values()],
-                    (len(driven), 1 + 3 * changes, 1),
-                ),
+                signals=signal_table(list(driven), [driven], {}, changes),
                 limits=np.reshape(list(guards.values()), (len(guards), 1)),
-                longest=max(LONGEST * step, float(self.model.internal_step(MATH, self.p))),
+                longest=max(LONGEST * step, float(system.model.internal_step(MATH, system.p))),
             )
         except KeyboardInterrupt:
             raise InterruptedRunError(f"interrupted at t = {self.time:g} s") from None
@@ -140,12 +160,12 @@ class CompiledSimulation(Simulation):
 
     def _dataset(self, times: Any, rows: Mapping[str, Any], every: int) -> xr.Dataset:
         chosen = np.unique([*range(0, len(times), every), len(times) - 1])
-        known = self.outputs
+        known = self._system.outputs
         rows = {
             **rows,
             **{full: np.broadcast_to(at_time(x, times), times.shape) for full, x in self.signals.items()},
         }
-        inputs = {v.name: v for v in self.model.input_layout.variables}
+        inputs = {v.name: v for v in self._system.model.input_layout.variables}
         variables = {
             full: ("time", np.asarray(row)[chosen], {"units": v.unit, "long_name": v.description})
             for full, row in rows.items()
