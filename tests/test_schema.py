@@ -167,6 +167,7 @@ WRONG += [
     "[[sweep.parameter]]\nname = 'machine.r'\nfrom = 1",
     "[[sweep.parameter]]\nname = 'machine.r'\nvalues = [0.1]\ntolerance = 0.1",
     "[sweep]\nquantities = 'min(margin)'",
+    "[sweep]\nmeasures = ['coupling_trip_time']\nevent = 'jam_left'",
     "[sweep]\nquantities = ['min(margin)']\n[system]\nmachine = 'ChamberForces'\n[chain]",
     "[monte_carlo]\nevent = { force = ['1 m', 2] }",
     "[flywheel]\ncompare = ['1 kg']",

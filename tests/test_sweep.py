@@ -395,6 +395,28 @@ def test_a_jam_that_stops_the_crank_and_a_machine_that_cannot_turn():
     assert (result.dataset.reason.sel({"machine.r": 0.15}) == 0).all()
 
 
+@NATIVE
+def test_a_coupling_opens():
+    """The run ends at the torque of the coupling."""
+    head = gains() + "[coupling]\ntrip_torque = 120\n" + TRANSIENTS.split("points = 12")[0]
+    text = head + "method = 'grid'\nmeasures = ['coupling_trip_time', 'crank_torque_peak']\n"
+    text += "[[sweep.parameter]]\nname = 'event.jam_left.force'\nvalues = [100, '2 kN']\n"
+    dataset = Study.from_text(text).sweep(workers=1).dataset
+    shut, opens = dataset["coupling_trip_time"].values
+    peaks = dataset["crank_torque_peak"].values
+    assert np.isnan(shut) and 0.0 < opens < 0.3 and peaks[0] < 120.0 < peaks[1] < 125.0
+
+
+def test_the_best_may_be_the_largest():
+    text = "[sweep]\nmethod = 'grid'\nangles = 36\nquantities = ['min(margin)']\nbest_is = 'largest'\n"
+    text += "[[sweep.parameter]]\nname = 'machine.r'\nfrom = 0.1\nto = 0.9\npoints = 30\n"
+    result = Study.from_text(text).sweep(workers=1)
+    numbers = json.loads(result.to_json())
+    wanted = result.table["min(margin)"].sort_values(ascending=False).head(10)
+    assert [each["point"]["value"] for each in numbers["best"]] == list(wanted.index)
+    assert "Points with the largest" in repr(result)
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -435,7 +457,7 @@ def test_the_summary_is_that_of_the_table(grid, spread):
                 ("largest", good.loc[good[name].idxmax()]),
             ):
                 assert ends[end][name]["value"] == row[name] and ends[end]["point"]["value"] == row.name
-        best = good.sort_values(numbers["best_by"], kind="stable").head(10)
+        best = good.sort_values(numbers["best_by"].removeprefix("least "), kind="stable").head(10)
         assert [each["point"]["value"] for each in numbers["best"]] == list(best.index)
         assert [each["machine.r"]["value"] for each in numbers["best"]] == list(best["machine.r"])
 

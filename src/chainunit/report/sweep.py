@@ -119,7 +119,7 @@ def _best(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
         heads = (b.Column("point"), *_columns(names))
         some = len(s.result["parameters"])
         groups = (tuple(range(1, 1 + some)), tuple(range(1 + some, 1 + len(names))))
-        title = s.line("Points with the least {best_by}, the best first")
+        title = s.line("Points with the {best_by}, the best first")
         yield b.Table(tuple(rows), heads, title=title, groups=groups)
 
 

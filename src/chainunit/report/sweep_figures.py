@@ -98,7 +98,7 @@ def _map(summary: SweepSummary, name: str) -> fig.Figure:
     if summary.best and name == plan.best:
         k = np.unravel_index(summary.best[0], plan.shape)
         at = [float(each.values[int(i)]) for each, i in zip(plan.parameters, k, strict=True)]
-        items.append(fig.Curve("least", [at[0]], [at[1]], 3, "s", has_line=False))
+        items.append(fig.Curve(plan.best_is, [at[0]], [at[1]], 3, "s", has_line=False))
     ends = [{"low": float(axis[0]), "high": float(axis[-1])} for axis in (x, y)]
     panel = fig.Panel(_axis(across.variable, **ends[0]), _axis(up.variable, **ends[1]), tuple(items))
     return fig.Figure(

@@ -85,6 +85,11 @@ def _company(data: Mapping[str, Any], parts: Parts) -> Iterator[tuple[str, str]]
         if "sizing" in data:
             yield ("sweep", "varies one drive, and [sizing] tries many; leave out one of the two")
         measures = named_table(data, "sweep").get("measures")
+        if isinstance(measures, list) and "coupling_trip_time" in measures and "coupling" not in data:
+            yield (
+                "sweep.measures",
+                "coupling_trip_time is of a safety coupling; add [coupling], or leave it out",
+            )
         if measures and foreign["motor"]:
             yield ("sweep.measures", "need a model of the motor, which is an FMU; leave them out")
         if named_table(data, "sweep").get("quantities") and data.get("organ") == "chain":

@@ -44,6 +44,8 @@ def rules() -> Iterator[Rule]:
     some = {"type": "array", "minItems": 1}
     yield _where(_equal("organ", {"const": "chain"}), _not(_equal("sweep.quantities", some)))
     yield _where(_equal("system.motor", _FMU), _not(_equal("sweep.measures", some)))
+    trips = {"type": "array", "contains": {"const": "coupling_trip_time"}}
+    yield _where(_equal("sweep.measures", trips), _given("coupling"))
     set_by_ratios = ratios(**filled(Ratios, {}))
     yield _where(_given("ratios"), _without(*(f"machine.{name}" for name in set_by_ratios)))
 

@@ -60,7 +60,8 @@ class SweepPlan:
     """A sweep: its parameters and points, and its results by name.
 
     `basis` are the assumptions behind some quantities, an instance of `CycleBasis`; `angles` is the number of crank
-    angles, `event` the run of the event of the measures, `best` the result whose least values are best.
+    angles, `event` the run of the event of the measures, `best` the result whose least or largest values (`best_is`)
+    are best.
     """
 
     method: str
@@ -71,6 +72,7 @@ class SweepPlan:
     measures: tuple[str, ...]
     event: str
     best: str
+    best_is: str
     angles: int
     basis: Any
 

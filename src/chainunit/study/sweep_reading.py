@@ -103,6 +103,7 @@ def read_plan(
         *results,
         event,
         best,
+        form.best_is,
         int(table.angles),
         basis,
     )

@@ -30,7 +30,7 @@ from .measures import read_measure
 from .rig import PATIENCE, Rig
 from .sweep_plan import SweepPlan
 from .sweep_reading import SPEED
-from .window import Phase, Window, is_settled, whole_turns
+from .window import Phase, Trip, Window, is_settled, whole_turns
 
 REASONS_OF_RUNS = (
     "the states of the drive left all bounds",
@@ -306,12 +306,15 @@ class _BlockWork:
             stops.append(point.event.follow(point.turn))
         limits = np.array([[self._limit(point) for point in self._points]])
         runs = self._run(lead.states, signals, stops, self._step, limits)
-        return [
-            None
-            if runs.failed[k] or lead.failed[k]
-            else Window(Phase.EVENT, self._series(runs, k), point.drive, (), point.speed, 0.0, before[k])
-            for k, point in enumerate(self._points)
-        ]
+        windows: list[Window | None] = []
+        for k, point in enumerate(self._points):
+            run = self._series(runs, k)
+            end = float(run["time"][-1])
+            # the energy behind a coupling that opens is not followed
+            trip = Trip(end, math.nan, None) if end < stops[k] - 0.5 * self._step else None
+            window = Window(Phase.EVENT, run, point.drive, (), point.speed, 0.0, before[k], trip)
+            windows.append(None if runs.failed[k] or lead.failed[k] else window)
+        return windows
 
     def _limit(self, point: _PointRun) -> float:
         """The torque of the motor's shaft at which a safety coupling opens [N m]."""

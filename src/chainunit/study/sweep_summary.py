@@ -32,6 +32,7 @@ QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
 _METHODS = {"grid": "a grid", "latin_hypercube": "a Latin hypercube", "sobol": "Sobol's sequence"}
 _PART = 2**18
 _BINS = 16
+_MOST_CLASSES = 64
 _LEAST = 8
 """Least number of points of a correlation."""
 
@@ -61,6 +62,10 @@ class SweepSummary:
         return own | {name: measures[name] for name in self.findings.plan.measures}
 
     @property
+    def _sign(self) -> float:
+        return -1.0 if self.findings.plan.best_is == "largest" else 1.0
+
+    @property
     def _parameters(self) -> list[str]:
         return [each.name for each in self.findings.plan.parameters]
 
@@ -84,7 +89,7 @@ class SweepSummary:
                 x = part[name].values
                 if np.isfinite(x).any():
                     ends[name] += [(float(x[k]), begin + int(k)) for k in (np.nanargmin(x), np.nanargmax(x))]
-            x = part[self.findings.plan.best].values
+            x = self._sign * part[self.findings.plan.best].values
             order = np.argsort(x, kind="stable")[:BEST]
             best += [(float(x[k]), begin + int(k)) for k in order if np.isfinite(x[k])]
             best = sorted(best)[:BEST]
@@ -206,7 +211,7 @@ class SweepSummary:
             ],
             "basis": {name: entry(x, "1") for name, x in vars(plan.basis).items()},
             "event": config.events[plan.event].title if plan.event else None,
-            "best_by": plan.best,
+            "best_by": f"{plan.best_is} {plan.best}",
             "parameters": {
                 each.name: {
                     "description": each.variable.description,
@@ -285,8 +290,10 @@ def _correlation(a: Any, b: Any) -> float:
 def _explained(x: Any, y: Any) -> float:
     """The share of the variance of `y` that is one of classes of `x`, between 0 and 1, corrected for the number of
     classes."""
-    values = np.unique(x)
-    edges = values if len(values) <= _BINS else np.quantile(x, np.arange(_BINS) / _BINS)
+    values, bins = np.unique(x), min(_BINS, round(math.sqrt(len(x))))
+    # the values of a grid are classes themselves
+    repeat = len(values) <= max(bins, len(x) // 4) and len(values) <= _MOST_CLASSES
+    edges = values if repeat else np.quantile(x, np.arange(bins) / bins)
     place = np.searchsorted(edges, x, "right") - 1
     count = np.bincount(place, minlength=len(edges))
     used = count > 0

@@ -22,6 +22,7 @@ MEASURES_OF_SWEEP = (
     "speed_least",
     "speed_dip",
     "stall_time",
+    "coupling_trip_time",
 )
 """The measures of a run with an event that a sweep can have."""
 USUAL_QUANTITIES = ("peak(crank_torque)", "rms(crank_torque)")
@@ -63,7 +64,8 @@ FIELDS: Mapping[str, Any] = {
         Field([], max_length=len(MEASURES_OF_SWEEP), description="measures of a run with the event"),
     ),
     "event": (str, Field("", description="event of the measures, by the name of its run")),
-    "best": (str, Field("", description="quantity or measure whose least values are best")),
+    "best": (str, Field("", description="quantity or measure by which points are ranked")),
+    "best_is": (Literal["least", "largest"], Field("least", description="which of its values is best")),
     "parameter": (
         list[Any],
         Field([], max_length=MOST_PARAMETERS, description="swept quantities: tables [[sweep.parameter]]"),
