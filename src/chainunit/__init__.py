@@ -11,6 +11,7 @@ from .errors import GeometryError, InputError, RunError
 
 __all__ = [
     "EMPTY",
+    "BestResult",
     "ChainUnitMachine",
     "ChamberForces",
     "GeometryError",
@@ -26,13 +27,14 @@ __all__ = [
 if TYPE_CHECKING:
     from .machines.api import EMPTY, ChainUnitMachine
     from .machines.chain_unit import ChamberForces, SideLoads
-    from .studies import Study, StudyResult
+    from .studies import BestResult, Study, StudyResult
     from .sweeps import SweepResult
 
     __version__: str
 else:
     # numpy and scipy take longer to import than a command takes to answer: import them when they are needed
     _HOMES = {
+        "BestResult": ".studies",
         "EMPTY": ".machines.api",
         "ChainUnitMachine": ".machines.api",
         "ChamberForces": ".machines.chain_unit",

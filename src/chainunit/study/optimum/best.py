@@ -104,7 +104,7 @@ def find_best(wishes: Wishes, report: Report = _quiet, backend: Backend | None =
 
     Raises
     ------
-    GeometryError
+    RunError
         where no machine within the bounds turns.
     """
     search = Search(wishes)
@@ -172,9 +172,12 @@ def _repaired(search: Search, starts: Sequence[Any]) -> tuple[list[Answer], Conf
     """Answers from machines that meet the limits, or the conflict."""
     first, met = nearest(search, starts)
     if met and first is not None:
-        answer = search.solve(first.x, search.wishes.objectives[0])
-        # a single feasible machine may be the answer itself
-        return [answer if answer.feasible else replace(answer, x=first.x, feasible=True)], None
+        objective = search.wishes.objectives[0]
+        answer = search.solve(first.x, objective)
+        if not answer.feasible:
+            # where the limits leave hardly any room, the machine that meets them is the answer
+            answer = replace(answer, x=first.x, value=search.value(objective, first.x), feasible=True)
+        return [answer], None
     if first is None:
         first = search.solve(search.base, None)
     return [], conflict(search, starts[:_RETRIES], first)

@@ -24,7 +24,7 @@ _OPTIONS: dict[str, Any] = {
     "ipopt.acceptable_constr_viol_tol": 1e-9,
     "ipopt.bound_relax_factor": 0.0,
     "ipopt.max_iter": 300,
-    "ipopt.mu_strategy": "adaptive",
+    "ipopt.mu_strategy": "monotone",
 }
 _WARM = {
     "ipopt.warm_start_init_point": "yes",

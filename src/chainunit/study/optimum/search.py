@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import GeometryError
+from ...errors import InputError, RunError
 from ..cycle_quantities import CycleQuantity
 from .extremes import MOST_ANGLES, TurnValues, grid, peaks_of, stationary
 from .ipopt import Solution, solve
@@ -110,7 +110,7 @@ class Search:
 
         Raises
         ------
-        GeometryError
+        RunError
             where there is none.
         """
         inside = np.clip(self.today, self.space.low, self.space.low + self.space.span)
@@ -120,7 +120,15 @@ class Search:
             x = self.space.low + self.space.span * y
             if self.turns(x):
                 return x
-        raise GeometryError("no machine within the bounds of the free parameters turns")
+        raise RunError(f"No machine within the bounds of optimize.free turns. {self._obstacle(inside)}")
+
+    def _obstacle(self, x: Any) -> str:
+        """Why a machine does not turn."""
+        try:
+            self.wishes.machine.replace(dict(zip(self.wishes.names, map(float, x), strict=True)))
+        except InputError as error:
+            return f"The one nearest to today's: {error}"
+        return "The one nearest to today's cannot be assembled at each angle."
 
     def turns(self, x: Any) -> bool:
         """Whether a machine meets the requirements of its model, and can be assembled at each angle."""
@@ -206,10 +214,11 @@ class Search:
     def _clearances(self, owner: str, clearance: float) -> list[Row]:
         """Rows by which the machine keeps its distance from the requirements of its model."""
         machine, requirements = self.wishes.machine, self.space.requirements
-        today = np.abs(requirements.values(self.base))
-        sizes = np.array([max(d, 1e-6) for d in today])
+        sizes = requirements.values(self.base)
         return [
-            RequirementRow(owner, machine.model.required[subject].subject, -clearance * size, size, place=k)
+            RequirementRow(
+                owner, machine.model.required[subject].subject, -clearance * size, size, times=size, place=k
+            )
             for k, (subject, size) in enumerate(zip(requirements.subjects, sizes, strict=True))
         ]
 
