@@ -13,6 +13,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+from figures import parser, save
 from rich.console import Console
 from rich.table import Table
 
@@ -56,6 +57,7 @@ def motors():
 
 
 def main() -> None:
+    options, figures = parser().parse_args(), []
     console = Console(width=110)
     with tempfile.TemporaryDirectory() as folder:
         models = {"machine": ChamberForces, "motor": DcMotor}
@@ -110,8 +112,13 @@ def main() -> None:
                             orders[1],
                             f"{energy:.1e}",
                         )
+                        figures.append({
+                            "title": title, "force": force, "slopes": slopes, "step": step, "torque": errors[0],
+                            "speed": errors[1], "orders": orders, "energy": energy,
+                        })  # fmt: skip
                         before = errors
                 console.print(table)
+    save(options.json, figures)
 
 
 if __name__ == "__main__":

@@ -7,13 +7,15 @@
 # %%
 from __future__ import annotations
 
-import argparse
+import json
 import resource
 import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
+
+from figures import parser, save
 
 from chainunit.study.choice import choose
 from chainunit.study.config import load
@@ -29,7 +31,7 @@ WAYS = {
 }
 
 
-def one(way: str, folder: Path, seconds: float) -> None:
+def one(way: str, folder: Path, seconds: float) -> dict[str, float | str]:
     config = load()
     drive = choose(config, folder, lambda *_: None).drive
     files = {name: folder / f"{part.model.name}.fmu" for name, part in drive.graph.components.items()}
@@ -45,23 +47,27 @@ def one(way: str, folder: Path, seconds: float) -> None:
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
     duration = time.perf_counter() - began
     print(f"{way:22} {rows:7} rows of {variables:3} variables, {peak:5.0f} MB, {duration:4.0f} s", flush=True)
+    return {"way": way, "rows": rows, "variables": variables, "memory": peak, "duration": duration}
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--seconds", type=float, default=600.0)
-    parser.add_argument("--way", choices=list(WAYS))
-    parser.add_argument("--folder", type=Path)
-    values = parser.parse_args()
+    options, figures = parser(), []
+    options.add_argument("--seconds", type=float, default=600.0)
+    options.add_argument("--way", choices=list(WAYS))
+    options.add_argument("--folder", type=Path)
+    values = options.parse_args()
     if values.way:
-        one(values.way, values.folder, values.seconds)
+        save(values.json, one(values.way, values.folder, values.seconds))
         return
     with tempfile.TemporaryDirectory() as folder:
         config = load()
         choose(config, Path(folder), lambda *_: None).drive.export(Path(folder))
         for way in WAYS:
-            command = [sys.executable, __file__, "--way", way, "--folder", folder]
+            file = Path(folder) / "figures.json"
+            command = [sys.executable, __file__, "--way", way, "--folder", folder, "--json", str(file)]
             subprocess.run([*command, "--seconds", str(values.seconds)], check=True)
+            figures.append(json.loads(file.read_text("utf-8")))
+    save(values.json, {"seconds": values.seconds, "ways": figures})
 
 
 if __name__ == "__main__":

@@ -14,12 +14,13 @@ from __future__ import annotations
 import dataclasses
 import os
 import resource
-import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from figures import parser, save
 
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.study import monte_carlo
@@ -95,7 +96,7 @@ def importer(files) -> float:
     return duration
 
 
-def compare(folder: Path) -> None:
+def compare(folder: Path) -> dict[str, Any]:
     task = task_of(COMPILED, folder)
     few = dataclasses.replace(task_of(COSIMULATED, folder), cosimulated=True)
     (reference, slow), (result, fast) = timed(few, folder), timed(task, folder)
@@ -105,9 +106,16 @@ def compare(folder: Path) -> None:
     print(f"compiled system  {fast:7.1f} runs/s ({COMPILED} runs), limit: its loop alone, {loop:.0f} runs/s")
     print(f"ratio            {fast / slow:7.1f}")
     same = result.dataset.isel(run=slice(0, COSIMULATED))
+    differences = {}
     for name in MEASURES:
         a, b = (np.asarray(each[name]) for each in (same, reference.dataset))
-        print(f"{name:20} largest difference {np.nanmax(np.abs(a - b) / np.abs(b)):.1e} of the value")
+        differences[name] = float(np.nanmax(np.abs(a - b) / np.abs(b)))
+        print(f"{name:20} largest difference {differences[name]:.1e} of the value")
+    return {
+        "workers": WORKERS, "runs": {"cosimulation": COSIMULATED, "compiled": COMPILED},
+        "cosimulation": slow, "compiled": fast, "limit_cosimulation": fmpy, "limit_compiled": loop,
+        "differences": differences,
+    }  # fmt: skip
 
 
 def many(runs: int, folder: Path) -> None:
@@ -127,11 +135,14 @@ def many(runs: int, folder: Path) -> None:
 
 
 def main() -> None:
+    options = parser()
+    options.add_argument("runs", type=int, nargs="?", help="make so many runs on the compiled system")
+    values = options.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        if len(sys.argv) > 1:
-            many(int(sys.argv[1]), Path(os.environ.get("STORE", folder)))
+        if values.runs:
+            many(values.runs, Path(os.environ.get("STORE", folder)))
         else:
-            compare(Path(folder))
+            save(values.json, compare(Path(folder)))
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ import zipfile
 from pathlib import Path
 
 import numpy as np
+from figures import parser, save
 from rich.console import Console
 from rich.table import Table
 
@@ -109,6 +110,7 @@ def from_c(folder: Path) -> list[tuple[str, float]]:
 
 
 def main() -> None:
+    options, sizes = parser().parse_args(), {}
     p = ChainUnitMachine().p
     u = ChamberForces.Inputs(phi=0.5, w=6.0, a=1.0)
     outputs, slopes = (part.equations for part in ChamberForces.parts)
@@ -161,7 +163,8 @@ def main() -> None:
         for backend in ("python", "native"):
             file = Path(folder) / f"{backend}.fmu"
             export(ChamberForces, file, backend=backend)
-            print(f"{backend} FMU of ChamberForces: {file.stat().st_size / 1000:.0f} kB")
+            sizes[backend] = file.stat().st_size
+            print(f"{backend} FMU of ChamberForces: {sizes[backend] / 1000:.0f} kB")
             fmu = Fmu(file)
             unit = Instance(fmu, "unit")
             unit.initialize({}, 0.0)
@@ -218,6 +221,7 @@ def main() -> None:
     for what, time in rows:
         table.add_row(what, f"{time:.3g}", f"{time / by_math:.3g}")
     Console(width=110).print(table)
+    save(options.json, {"us": dict(rows), "size": sizes})
 
 
 if __name__ == "__main__":
