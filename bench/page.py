@@ -132,27 +132,32 @@ def engines(f: Any) -> str:
     best = fastest["native"]["rate"]
     limit = max(row["arithmetic"] for row in s["rows"] if row["key"] == "chosen")
 
-    def line(name: str, work: str, row: Any, errors: Any) -> list[str]:
-        share = row["rate"] / limit
-        errors = [small(errors.get(key)) for key in ("loop", "torque", "energy")]
+    def line(name: str, row: Any, errors: Any) -> list[str]:
+        share, faster = row["rate"] / limit, best / row["rate"]
         return [
-            name, work, threads_of(row), large(row["rate"]), f"{share:.1e}" if share < 0.01 else f"{share:.2f}",
-            large(best / row["rate"]) if best / row["rate"] > 1.5 else "1", *errors,
+            name, threads_of(row), large(row["rate"]), f"{share:.1e}" if share < 0.01 else f"{share:.2f}",
+            large(faster) if faster > 10.0 else f"{faster:.1f}",
+            *(small(errors.get(key)) for key in ("loop", "torque", "energy")),
         ]  # fmt: skip
 
-    work = f"{s['chosen']} outputs: torques and all reactions"
     for engine, row in fastest.items():
-        rows.append(line(engine, work, row, s["errors"][engine.split()[0]]))
-    rows += [line(row["engine"], row["work"], row, row) for row in s["others"]]
+        rows.append(line(engine, row, s["errors"][engine.split()[0]]))
+    rows += [line(row["engine"], row, row) for row in s["others"]]
     head = [
         "engine",
-        "an evaluation",
         "threads",
         "evaluations/s",
-        "share of the vector limit",
-        "native is so many times as fast",
+        "of the limit",
+        "native is faster",
+        "joints, m",
+        "torque",
+        "energy",
     ]
-    return table([*head, "error at the joints, m", "torque", "energy"], rows)
+    works = dict.fromkeys(f"- {row['engine']}: {row['work']}" for row in s["others"])
+    return table(head, rows) + "\nAn evaluation is\n\n" + "\n".join([WORK.format(**s), *works]) + "\n"
+
+
+WORK = "- native, numpy, jax: {chosen} outputs, the torques and all reactions, stored"
 
 
 def missing(f: Any) -> str:
@@ -249,7 +254,8 @@ def text(f: Any) -> str:
     seconds = {w["way"]: w["memory"] for w in f["cosim_memory"]["ways"]}
     return (HERE / "page.md").read_text("utf-8").format(
         cores=s["cores"], processor=s["processor"], lanes=s["lanes"], chosen=s["chosen"], all=s["all"],
-        goals=goals(f), rates=own_rates(f), limits=limits(f), engines=engines(f), missing=missing(f), notes=notes(f),
+        block=f"{min(row['states'] for row in s['rows']):,}", goals=goals(f),
+        rates=own_rates(f), limits=limits(f), engines=engines(f), missing=missing(f), notes=notes(f),
         outputs=small(max(each["outputs"] for each in s["errors"].values())),
         points=s["points"]["points"], values=s["points"]["values"], worst=small(s["points"]["worst"]),
         steps=step_rows(f), faster=large(faster), study=f"{t['study']:.0f}", again=f"{t['again']:.0f}",

@@ -146,6 +146,9 @@ class Grid:
         q = variable.quantity
         values = np.asarray(x.values, float)
         with np.errstate(invalid="ignore"):
+            # two passes over many values in place of seven; an extreme of values with a NaN is NaN
+            if values.size and q.low < values.min() and values.max() < q.high:
+                return self._shaped(x)
             above = values > q.low if q.open_low else values >= q.low - q.slack
             outside: Any = ~(np.isfinite(values) & above & (values <= q.high + q.slack))
             inside = np.where(outside, values, np.clip(values, q.low, q.high))
