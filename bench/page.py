@@ -18,7 +18,16 @@ from typing import Any
 HERE = Path(__file__).parent
 FIGURES = HERE / "figures.json"
 PAGE = HERE.parent / "docs" / "performance.md"
-BENCHES = ("states", "step_cost", "study_time", "accuracy", "chain_speed", "monte_carlo", "cosim_memory")
+BENCHES = (
+    "states",
+    "step_cost",
+    "study_time",
+    "accuracy",
+    "chain_speed",
+    "monte_carlo",
+    "sweep_time",
+    "cosim_memory",
+)
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -235,6 +244,17 @@ def overloads(f: Any) -> str:
     return table(["way", "runs/s", "limit"], rows)
 
 
+def sweep(f: Any) -> str:
+    w = f["sweep_time"]
+    row = [
+        f"{w['points']:,}", f"{w['points'] * w['angles']:.1e}", f"{w['whole']:.1f}", f"{w['loop']:.1f}",
+        f"{w['loop'] / w['whole']:.2f}", f"{w['memory']:.0f}",
+    ]  # fmt: skip
+    return table(
+        ["points", "states", "s", "limit: the native loop alone, s", "share", "largest memory, MB"], [row]
+    )
+
+
 def memory(f: Any) -> str:
     rows = (
         [w["way"], f"{w['rows']:,}", str(w["variables"]), f"{w['memory']:.0f}"]
@@ -263,7 +283,9 @@ def text(f: Any) -> str:
         rods=c["rods"], speed=f"{c['speed']:g}", error=f"{c['error']:g}", demanded=f"{c['demanded']:g}",
         exudyn="exudyn was not installed." if c["exudyn"] is None else
         f"the FMU is {c['exudyn']:.0f} times as fast as exudyn; {c['demanded_exudyn']:g} times are demanded.",
-        overloads=overloads(f), workers=m["workers"], ratio=large(m["compiled"] / m["cosimulation"]),
+        overloads=overloads(f), sweep=sweep(f), sweep_angles=f["sweep_time"]["angles"],
+        sweep_parameters=f["sweep_time"]["parameters"], sweep_quantities=f["sweep_time"]["quantities"],
+        workers=m["workers"], ratio=large(m["compiled"] / m["cosimulation"]),
         thousand=f"{1e3 / m['compiled']:.1f}", difference=small(max(m["differences"].values())),
         memory=memory(f), seconds=f"{f['cosim_memory']['seconds']:.0f}", libraries=f"{seconds['a second']:.0f}",
         size=f"{f['step_cost']['size']['native'] / 1000:.0f}",
