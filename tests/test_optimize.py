@@ -221,14 +221,14 @@ def test_one_parameter_without_limits(monkeypatch):
     text = '[optimize]\nobjectives = ["rms(crank_torque)"]\n[optimize.free.crank]\ns = { min = -1, max = 1 }'
     own = wishes(text)
     search = Search(own)
-    answers = [search.solve(x, own.objectives[0]) for x in search.starts(2)[0]]
-    lengths = np.linspace(-1.0, 1.0, 2001)
+    answers = [search.solve(x, own.objectives[0]) for x in search.starts(1)[0]]
+    lengths = np.linspace(-1.0, 1.0, 401)
     table = evaluate(
-        own.machine, own.objectives, 3.0, own.feed, {"crank.s": lengths}, angles=180, engine="numpy"
+        own.machine, own.objectives, 3.0, own.feed, {"crank.s": lengths}, angles=90, engine="numpy"
     )
     values = table["rms(crank_torque)"].values
     for answer in answers:
-        assert answer.feasible and answer.x[0] == pytest.approx(lengths[np.argmin(values)], abs=2e-3)
+        assert answer.feasible and answer.x[0] == pytest.approx(lengths[np.argmin(values)], abs=6e-3)
         assert np.min(values) * (1.0 - 1e-3) < answer.value <= np.min(values) * (1.0 + 1e-6)
 
 
@@ -268,50 +268,50 @@ def test_two_wishes_that_conflict():
 # -- other machines, other objectives, more starts
 
 
-WATT = f"""
-machine.linkage = "{(LINKAGES / "watt_six_bar.toml").as_posix()}"
+PRESS = f"""
+machine.linkage = "{(LINKAGES / "slider_crank_press.toml").as_posix()}"
 run.crank_speed = "60 rpm"
 [optimize]
 objectives = ["rms(crank_torque)"]
 starts = 2
+pareto_points = 4
 [optimize.free]
-shank = {{ min = "280 mm", max = "320 mm" }}
-h = {{ min = "230 mm", max = "245 mm" }}
+r = {{ min = "70 mm", max = "90 mm" }}
+l = {{ min = "300 mm", max = "420 mm" }}
+offset = {{ min = "-40 mm", max = "40 mm" }}
 [optimize.limits]
-"range(leg.F.x)" = {{ min = "220 mm" }}
+"max(force(A))" = {{ max = "100 kN" }}
+"range(ram.C.y)" = {{ min = "150 mm" }}
 """
 
 
 def test_a_linkage_file():
-    """Two parameters: the best one is that of a map over both."""
-    own = find_best(wishes(WATT))
+    """The best of three parameters is that of a map over all of them."""
+    own = find_best(wishes(PRESS))
     assert own.met and own.agree == 2 and own.neighbours.better == 0
-    assert all(value.deviation < 1e-9 for value in own.fmu.values()) and len(own.fmu) == 2
-    machine, quantities = own.wishes.machine, list(own.quantities.values())
-    fine = [np.linspace(low, high, 41) for low, high in own.wishes.free.values()]
-    table = evaluate(
-        machine, quantities, own.wishes.crank_speed, own.wishes.feed, dict(zip(own.wishes.names, fine, strict=True)),
-        angles=90, engine="numpy",
-    )  # fmt: skip
-    met = table["range(leg.F.x)"].values >= 0.22
-    least = np.min(np.where(met, table["rms(crank_torque)"].values, np.inf))
-    assert own.answer.value <= least * (1.0 + 1e-6)
-    assert own.answer.value == pytest.approx(least, rel=0.01)
+    assert all(value.deviation < 1e-9 for value in own.fmu.values()) and len(own.fmu) == 3
+    quantities = list(own.quantities.values())
+    fine = [np.linspace(low, high, 21) for low, high in own.wishes.free.values()]
+    values = dict(zip(own.wishes.names, fine, strict=True))
+    given = own.wishes.machine, quantities, own.wishes.crank_speed, own.wishes.feed, values
+    table = evaluate(*given, angles=60, engine="numpy")
+    met = table["range(ram.C.y)"] >= 0.15
+    least = float(table["rms(crank_torque)"].where(met).min())
+    assert own.answer.value <= least * (1.0 + 1e-6) and own.answer.value == pytest.approx(least, rel=0.01)
 
 
 def test_two_objectives():
     """No machine of the front is better than another in both; its ends are the best of each objective."""
-    text = {'["peak(crank_torque)"]': '["peak(crank_torque)", "max(force(crank_bearing))"]\npareto_points = 3',
-            "starts = 4": "starts = 2"}  # fmt: skip
-    own = find_best(wishes(**text))
-    values = np.array(sorted(point.values for point in own.front))
-    assert len(values) >= 3 and np.all(np.diff(values[:, 0]) > 0.0) and np.all(np.diff(values[:, 1]) < 0.0)
-    search, (first, second) = Search(own.wishes), own.wishes.objectives
-    assert values[-1, 1] == pytest.approx(search.solve(own.front[-1].x, second).value, rel=1e-4)
+    own = find_best(wishes(PRESS.replace('["rms(crank_torque)"]', '["rms(crank_torque)", "max(force(A))"]')))
+    values = np.array([point.values for point in own.front])
+    assert len(values) == 4 and np.all(np.diff(values[:, 0]) > 0.0) and np.all(np.diff(values[:, 1]) < 0.0)
+    search, objectives = Search(own.wishes), own.wishes.objectives
+    for k, end in enumerate((0, -1)):
+        alone = min(search.solve(x, objectives[k]).value for x in search.starts(2)[0])
+        assert values[end, k] == pytest.approx(alone, rel=2e-6)
     for point in own.front:
-        for k, q in enumerate((first, second)):
-            assert search.value(q, point.x) == pytest.approx(point.values[k], rel=1e-6)
-        assert np.all(search.space.requirements.values(point.x) > 0.0)
+        assert [search.value(q, point.x) for q in objectives] == pytest.approx(point.values, rel=1e-9)
+        assert search.value(own.wishes.limits[1].quantity, point.x) >= 0.15 * (1.0 - 1e-6)
     assert own.neighbours.better == 0
 
 
