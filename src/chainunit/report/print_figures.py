@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -33,6 +34,7 @@ from .page_figures import classes
 from .style import BARS, FILLS, HATCHES, INK, class_colours, draw, look_of
 
 _ROW, _COLUMN = 2.5, 4.3  # of a panel [in]
+_LETTERS = 11.5  # of a title, to an inch
 _WHITE = {"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.85}
 _PLACES: dict[str, tuple[tuple[int, int], str, str]] = {
     "left": ((-8, 0), "right", "center"),
@@ -83,7 +85,7 @@ def _figure(spec: Figure, units: Units) -> Any:
         sharing = figure.sharing(r, c)
         _dress(axes[r, c], panel, last=r == sharing[-1], first=r == sharing[0])
     _legend(drawing, axes, columns)
-    drawing.suptitle(capital(figure.title))
+    drawing.suptitle(fill(capital(figure.title), int(_LETTERS * drawing.get_figwidth())))
     return drawing
 
 
