@@ -229,7 +229,9 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
             break
         report(f"simulating {motor.designation}", float(k), float(len(strong)))
         candidate = proposal(config, motor, duty)
-        if files == {}:
+        if compiler() is not None and backend != "python" and not candidate.drive.outsiders:
+            files = None  # the candidates run on the compiled system
+        elif not files:
             files, _ = candidate.drive.export(folder, backend, partial(_exporting, report))
         candidates.append(with_flywheel(config, candidate, duty, files))
     rank(candidates)
