@@ -221,9 +221,7 @@ def size(config: Config, folder: Path, report: Report, backend: Backend | None =
         )
         strong = [m for m in motors if m.nameplate.power == motors[-1].nameplate.power]
     candidates: list[Candidate] = []
-    # without FMUs the candidates run on the compiled system
-    compiles = compiler() is not None and backend != "python"
-    files: Mapping[str, Path] | None = None if compiles else {}
+    files: Mapping[str, Path] | None = {}
     for k, motor in enumerate(strong):
         if len(candidates) >= limits.candidates and any(c.fits for c in candidates):
             break
