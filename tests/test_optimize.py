@@ -18,8 +18,9 @@ from chainunit.machines.machine import Machine
 from chainunit.native.compilers import compiler
 from chainunit.study import config as study_files
 from chainunit.study.cycle_quantities import cycle_quantity, evaluate
+from chainunit.study.optimum import checks
 from chainunit.study.optimum import kernel as kernels
-from chainunit.study.optimum.best import find_best
+from chainunit.study.optimum.best import find_best, machine_at
 from chainunit.study.optimum.conflict import nearest
 from chainunit.study.optimum.extremes import TurnValues, grid
 from chainunit.study.optimum.kernel import Kernel, pieces, symbols_of
@@ -179,6 +180,28 @@ def test_the_best_machine(best):
         assert float(table[name]) == pytest.approx(value, rel=1e-4), name
     assert math.degrees(best.found["range(rocker.psi)"]) >= 16.0 - 1e-6
     assert machine.slack_speed(best.wishes.feed.left, best.wishes.feed.right) >= 4.0 - 1e-6
+
+
+def test_the_slack_free_speed_counts_in_what_is_shown(best):
+    """The pulls beside the machines' own route, and among the neighbours only machines that keep them."""
+    feed = best.wishes.feed
+    for machine, pull in zip((best.wishes.machine, best.machine), best.pulls, strict=True):
+        speeds = np.linspace(0.01, 4.0, 200) * machine.ratio
+        assert pull == pytest.approx(np.min(machine.least_web_pull(speeds, feed.left, feed.right)), rel=1e-4)
+    # a speed at which some of the neighbours lose their pull
+    speed = best.machine.slack_speed(feed.left, feed.right) - 1e-3
+    counts = []
+    for own in (_with(best.wishes, slack_free_speed=s) for s in (0.0, speed)):
+        search, value = Search(own), best.answer.value
+        own_limits = own.objectives[0], own.limits
+        counts.append(checks.neighbours(search, best.answer.x, *own_limits, value).feasible)
+        if own.slack_free_speed:
+            points = checks.around(search, best.answer.x)
+            quick = [machine_at(own, x) for x in points]
+            crank = np.linspace(0.0, speed, 30) * best.machine.ratio
+            keeps = [np.min(each.least_web_pull(crank, feed.left, feed.right, 180)) >= 0.0 for each in quick]
+            assert 0 < sum(keeps) < len(points)
+    assert counts[1] <= min(counts[0], sum(keeps)) and counts[1] < counts[0]
 
 
 def test_sensitivities_are_those_of_perturbed_problems(best):

@@ -153,16 +153,21 @@ def _machine(s: b.Source, best: Best) -> Iterator[b.Block]:
     yield b.Table(
         tuple(rows), b.heads("parameter", "today", head, "least", "largest"), title="Free parameters"
     )
+    limited = [(name, f"quantities.{name}") for name in s.result["quantities"]]
+    if s.result["least_pull"] is not None:
+        limited.append(("least pull in a web", "least_pull"))
     rows = [
-        b.TableRow((name, *(s.number(f"quantities.{name}.{key}", digits=4) for key in ("today", "best")),
-                    *(s.number(f"quantities.{name}.{key}", as_given=True) for key in ("min", "max"))))
-        for name in s.result["quantities"]
+        b.TableRow((words, *(s.number(f"{path}.{key}", digits=4) for key in ("today", "best")),
+                    *(s.number(f"{path}.{key}", as_given=True) for key in ("min", "max"))))
+        for words, path in limited
     ]  # fmt: skip
     yield b.Table(
         tuple(rows),
         b.heads("quantity", "today", head, "least", "largest"),
         title=s.line("Objectives and limits, of a turn at {=speed:4}"),
     )
+    if s.result["least_pull"] is not None:
+        yield b.Text(s.line("The least pull in a web is that at crank speeds up to {=slack_free_speed:4}."))
 
 
 def _binding(s: b.Source) -> Iterator[b.Block]:

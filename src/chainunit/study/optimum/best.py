@@ -56,6 +56,9 @@ class Best:
     """quantities of today's machine, by name"""
     found: Mapping[str, float]
     """quantities of the best machine, or of the nearest one"""
+    pulls: tuple[float, float] | None
+    """least pull in the webs up to the slack-free speed, of today's machine and of the best or nearest one [N]; None
+    without that wish"""
     neighbours: Neighbours | None
     fmu: Mapping[str, FmuValue]
     front: tuple[FrontPoint, ...]
@@ -118,9 +121,23 @@ def find_best(wishes: Wishes, report: Report = _quiet, backend: Backend | None =
     today = _values(search, search.today)
     if not good:
         assert failure is not None
-        found = _values(search, failure.nearest.x)
+        found, pulls = _values(search, failure.nearest.x), _pulls(search, failure.nearest.x)
         return Best(
-            wishes, None, failure, len(starts), moved, 0, 0, (), today, found, None, {}, (), search.effort
+            wishes,
+            None,
+            failure,
+            len(starts),
+            moved,
+            0,
+            0,
+            (),
+            today,
+            found,
+            pulls,
+            None,
+            {},
+            (),
+            search.effort,
         )
     best = min(good, key=lambda answer: answer.value)
     front: tuple[FrontPoint, ...] = ()
@@ -144,6 +161,7 @@ def find_best(wishes: Wishes, report: Report = _quiet, backend: Backend | None =
         tuple(sorted(answer.value for answer in good)),
         today,
         found,
+        _pulls(search, best.x),
         around,
         _by_fmu(search, best, machine, found, backend),
         front,
@@ -189,6 +207,14 @@ def _values(search: Search, x: Any) -> dict[str, float]:
     if not search.turns(x):
         return dict.fromkeys(quantities, math.nan)
     return {name: search.value(q, x) for name, q in quantities.items()}
+
+
+def _pulls(search: Search, x: Any) -> tuple[float, float] | None:
+    """See `Best.pulls`."""
+    if not search.wishes.slack_free_speed:
+        return None
+    today, own = (search.least_pull(at) if search.turns(at) else math.nan for at in (search.today, x))
+    return today, own
 
 
 # -- two objectives

@@ -37,17 +37,22 @@ class Neighbours:
     better: int
 
 
-def neighbours(
-    search: Search, x: Any, objective: CycleQuantity, limits: Sequence[TurnLimit], value: float
-) -> Neighbours:
-    """A sweep around `x`: each free parameter alone to both sides, and random directions."""
+def around(search: Search, x: Any) -> Any:
+    """Free parameters around `x`, shape (neighbours, free): each one alone to both sides, and random directions."""
     space, n = search.space, search.space.n
     rng = np.random.default_rng(search.wishes.seed)
     directions = rng.normal(size=(_RANDOM, n))
     directions /= np.max(np.abs(directions), axis=1, keepdims=True)
     directions = np.concatenate([np.eye(n), -np.eye(n), directions])
     points = np.concatenate([x + step * space.span * directions for step in STEPS])
-    points = np.clip(points, space.low, space.low + space.span)
+    return np.clip(points, space.low, space.low + space.span)
+
+
+def neighbours(
+    search: Search, x: Any, objective: CycleQuantity, limits: Sequence[TurnLimit], value: float
+) -> Neighbours:
+    """A sweep of the machines `around` x."""
+    points = around(search, x)
     quantities = list({q.name: q for q in (objective, *(limit.quantity for limit in limits))}.values())
     machine = search.wishes.machine.replace(dict(zip(search.wishes.names, map(float, x), strict=True)))
     values = {
@@ -58,9 +63,11 @@ def neighbours(
     arguments = search.wishes.crank_speed, search.wishes.feed, values, search.wishes.basis, FINE
     table = evaluate(machine, quantities, *arguments, engine="numpy")
     turns = (table.reason.values == 0) & np.array([_clear(search, point) for point in points])
-    met = turns.copy()
+    met = turns
     for limit in limits:
         met &= _meets(limit, table[limit.name].values)
+    if search.wishes.slack_free_speed:
+        met[met] = [search.least_pull(point) >= 0.0 for point in points[met]]
     better = met & (table[objective.name].values < value * (1.0 - math.copysign(_TOLERANCE, value)))
     # the values at the angles of a grid are a little too small: the candidates are computed exactly
     exact = [k for k in np.flatnonzero(better) if _is_better(search, points[k], objective, limits, value)]
@@ -84,8 +91,6 @@ def _is_better(
     search: Search, x: Any, objective: CycleQuantity, limits: Sequence[TurnLimit], value: float
 ) -> bool:
     if not all(_meets(limit, np.array(search.value(limit.quantity, x))) for limit in limits):
-        return False
-    if search.wishes.slack_free_speed and search.least_pull(x) < 0.0:
         return False
     return search.value(objective, x) < value * (1.0 - math.copysign(_TOLERANCE, value))
 

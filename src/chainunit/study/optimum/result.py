@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ... import __version__
+from ...quantities import finite
 from ...text import array_entry, entry, shown_in
 from ..config import Config
 from .best import Best
@@ -55,6 +56,7 @@ def _as_dict(best: Best, config: Config) -> dict[str, Any]:
             for name, today, value in zip(wishes.names, wishes.today, x, strict=True)
         },
         "quantities": {name: _quantity(best, name) for name in best.quantities},
+        "least_pull": _pull(best),
         "bindings": _bindings(best),
         "clearances": clearances(best) if best.met else [],
         "conflict": _conflict(best),
@@ -81,6 +83,14 @@ def _quantity(best: Best, name: str) -> dict[str, Any]:
         "fmu": entry(fmu.fmu if fmu else None, q.unit),
         "fmu_deviation": entry(fmu.deviation if fmu else None, "1"),
     }
+
+
+def _pull(best: Best) -> dict[str, Any] | None:
+    """The least pull in the webs up to the slack-free speed, and its limit."""
+    if best.pulls is None:
+        return None
+    numbers = {"today": best.pulls[0], "best": best.pulls[1], "min": 0.0, "max": None}
+    return {name: entry(finite(x), "N") for name, x in numbers.items()}
 
 
 def _bindings(best: Best) -> list[dict[str, Any]]:

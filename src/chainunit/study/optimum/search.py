@@ -29,8 +29,9 @@ _MET = 1e-7
 """Share of its scale by which a limit counts as met."""
 _NEAR = 0.05
 """Share of its scale by which a limit must be near at an angle of the grid, to be looked at between the angles."""
-CHECKED = (0.0, 0.25, 0.5, 0.75, 1.0)
-"""Parts of the highest speed of the slack-free range at which the pulls are looked over."""
+CHECKED = tuple(k / 16.0 for k in range(17))
+"""Parts of the highest speed of the slack-free range at which the pulls are looked over; a processing force lowers
+the pull between the ends."""
 _ROUNDS = 12
 _AT_BOUND = 1e-7
 """Share of the distance between the bounds within which a parameter counts as at its bound."""
@@ -164,10 +165,21 @@ class Search:
 
     def least_pull(self, x: Any) -> float:
         """The least pull in the webs up to the highest speed of the slack-free range [N]."""
+        from scipy.optimize import minimize_scalar
+
         places = [k for column in self.webs for k in self.columns.lower(column)]
-        q = grid(FINE)
-        speeds = [part * self.wishes.slack_free_speed for part in CHECKED]
-        return min(float(np.min(self.space.kernel.values(x, q, np.full(FINE, w))[places])) for w in speeds)
+        q, highest = grid(FINE), self.wishes.slack_free_speed
+
+        def pull(part: float) -> float:
+            return float(np.min(self.space.kernel.values(x, q, np.full(FINE, part * highest))[places]))
+
+        pulls = [pull(part) for part in CHECKED]
+        k = int(np.argmin(pulls))
+        ends = CHECKED[max(k - 1, 0)], CHECKED[min(k + 1, len(CHECKED) - 1)]
+        between = minimize_scalar(
+            pull, bounds=ends, method="bounded", options={"xatol": 1e-3 * (ends[1] - ends[0])}
+        )
+        return min(pulls[k], float(between.fun))
 
     def ratio(self, x: Any) -> float:
         """Motor turns per crank turn."""
