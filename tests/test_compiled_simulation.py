@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from systems import pair
@@ -20,12 +22,18 @@ def system():
     return pair("ChamberForces", "DcMotor", values={"machine.ratio": 50.0})
 
 
+@pytest.fixture(scope="module")
+def exported(system, tmp_path_factory):
+    """The same system as separate FMUs."""
+    return export(system, tmp_path_factory.mktemp("fmus"))[0]
+
+
 def signals(force=1000.0):
     ramp = Profile(0.0, ((0.0, 0.4, 150.0),))
     return {SPEED: ramp, FORCE: Profile(0.0, ((0.5, 0.02, force), (0.6, 0.02, 0.0)))}
 
 
-def test_its_run_is_the_monolithic_solution_with_all_names(system, tmp_path):
+def test_its_run_is_the_monolithic_solution_with_all_names(system, exported):
     with CompiledSimulation(system, signals()) as simulation:
         run = simulation.run(0.7, 1e-3)
         assert simulation.time == 0.7
@@ -37,7 +45,6 @@ def test_its_run_is_the_monolithic_solution_with_all_names(system, tmp_path):
         assert run[name].attrs["units"] == row.attrs["units"]
     np.testing.assert_allclose(run[FORCE], signals()[FORCE](run["time"].values))
     # the separate FMUs have the rows of the same instants, and every name but those of the slopes
-    exported, _ = export(system, tmp_path)
     with CoSimulation(exported, signals()) as reference:
         rows = reference.run(0.7, 1e-3)
     np.testing.assert_array_equal(rows["time"], run["time"])
@@ -53,7 +60,7 @@ def test_branches_go_on_from_the_saved_state(system):
         simulation.restore()
         simulation.signals = signals(0.0)
         soft = simulation.run(0.7, 1e-3, names=["motor.tau"])
-    assert list(soft.data_vars) == ["motor.tau", SPEED, FORCE]
+    assert list(soft.data_vars) == ["motor.tau"]
     assert float(first["motor.w"][-1]) == float(hard["motor.w"][0])
     whole = CompiledSimulation(system, signals(0.0)).run(0.7, 1e-3)
     np.testing.assert_allclose(soft["motor.tau"], whole["motor.tau"][450:], atol=1e-6)
@@ -70,6 +77,30 @@ def test_a_guard_and_every_keep_the_right_rows(system):
         assert simulation.time == float(run["time"][beyond])
     wanted = sorted({*range(0, beyond, 7), beyond})
     np.testing.assert_array_equal(ended["time"], run["time"][wanted])
+
+
+def test_the_names_to_keep_are_those_of_a_co_simulation(system, exported):
+    """From an iterator, too; a guard that is not named is not kept."""
+    runs = []
+    for kind, of in ((CoSimulation, exported), (CompiledSimulation, system)):
+        with kind(of, signals()) as simulation:
+            names = iter([FORCE, "motor.tau", "machine.tau"])
+            runs.append(simulation.run(0.01, 1e-3, names=names, guards={"motor.w": 1e3}))
+            for full in ("motor.tua", "machine.right.material_mass"):
+                with pytest.raises(
+                    InputError, match=rf"^{re.escape(full)}: cannot be kept; must be an output"
+                ):
+                    simulation.run(0.02, 1e-3, names=["motor.tau", full])
+    assert all(set(run.data_vars) == {FORCE, "motor.tau", "machine.tau"} for run in runs)
+    np.testing.assert_array_equal(runs[0][FORCE], runs[1][FORCE])
+
+
+@pytest.mark.parametrize("every", [0, -2, 1.5, float("nan"), float("inf")])
+def test_every_is_a_whole_number(system, exported, every):
+    for kind, of in ((CoSimulation, exported), (CompiledSimulation, system)):
+        with kind(of, signals()) as simulation:
+            with pytest.raises(InputError, match=r"^every = .*: must be a whole number >= 1$"):
+                simulation.run(0.01, 1e-3, every=every)
 
 
 def test_faults_are_told(system):

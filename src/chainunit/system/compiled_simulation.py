@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from ..progress import Progress
 from ..quantities import Variable
 from .compiled import compiled, input_starts
 from .graph import System
+from .rows import selected
 from .signals import at_time
 from .simulation import Simulation
 
@@ -114,25 +114,23 @@ class CompiledSimulation(Simulation):
         Raises
         ------
         InputError
-            for a run that does not go forward, and for a name that cannot be guarded or kept.
+            as `FmuSimulation.run`, and for a `file`.
         InterruptedRunError
             after Ctrl-C; the time is then that before the run.
         RunError
             where the states leave all bounds; the attribute ``partial`` of the error holds the rows before.
         """
-        if not (0.0 < step < math.inf) or not self.time < stop < math.inf:
-            raise InputError(
-                f"a run from t = {self.time:g} to {stop:g} s in steps of {step:g} s: must go forward"
-            )
+        self._check_run(stop, step, every)
         if file is not None:
             raise InputError("a compiled system keeps its rows in memory: leave the file out")
         system = self._system
-        known, guards = system.outputs, dict(guards or {})
-        kept = [name for name in known if names is None or name in set(names) or name in guards]
         self._checked(self.signals)
+        kept, guards = selected(names, [*system.outputs, *self.signals]), dict(guards or {})
+        needed = {*kept, *guards}
+        outputs = [name for name in system.outputs if name in needed]
         driven = {full: signal for full, signal in self.signals.items() if hasattr(signal, "changes")}
         changes = max((len(signal.changes) for signal in driven.values()), default=0)
-        loop = Transients(system.model, kept, driven=list(driven), guarded=list(guards), changes=changes)
+        loop = Transients(system.model, outputs, driven=list(driven), guarded=list(guards), changes=changes)
         try:
             result = loop.run(
                 system.p,
@@ -149,7 +147,8 @@ class CompiledSimulation(Simulation):
             raise InterruptedRunError(f"interrupted at t = {self.time:g} s") from None
         n = int(result.count[0])
         self.time, self._states = float(result.times[0, n - 1]), result.states[:, 0]
-        run = self._dataset(result.times[0, :n], dict(zip(kept, result.rows[:, 0, :n], strict=True)), every)
+        rows = dict(zip(outputs, result.rows[:, 0, :n], strict=True))
+        run = self._dataset(result.times[0, :n], rows, kept, every)
         if result.failed[0]:
             failure = RunError(f"at t = {self.time:g} s: the states left all bounds")
             failure.partial = run.isel(time=slice(None, -1))
@@ -158,18 +157,18 @@ class CompiledSimulation(Simulation):
             progress(self.time)
         return run
 
-    def _dataset(self, times: Any, rows: Mapping[str, Any], every: int) -> xr.Dataset:
+    def _dataset(self, times: Any, outputs: Mapping[str, Any], kept: Sequence[str], every: int) -> xr.Dataset:
         chosen = np.unique([*range(0, len(times), every), len(times) - 1])
-        known = self._system.outputs
-        rows = {
-            **rows,
-            **{full: np.broadcast_to(at_time(x, times), times.shape) for full, x in self.signals.items()},
-        }
-        inputs = {v.name: v for v in self._system.model.input_layout.variables}
+        signals = {full: np.broadcast_to(at_time(x, times), times.shape) for full, x in self.signals.items()}
+        rows = {**outputs, **signals}
+        known = {v.name: v for v in self._system.model.input_layout.variables} | self._system.outputs
         variables = {
-            full: ("time", np.asarray(row)[chosen], {"units": v.unit, "long_name": v.description})
-            for full, row in rows.items()
-            for v in [known[full] if full in known else inputs[full]]
+            full: (
+                "time",
+                rows[full][chosen],
+                {"units": known[full].unit, "long_name": known[full].description},
+            )
+            for full in kept
         }
         return xr.Dataset(variables, {"time": ("time", times[chosen], {"units": "s", "long_name": "time"})})
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from ..errors import InputError
 from ..files import netcdf
 from .instance import Instance
 
@@ -17,6 +18,20 @@ Recorder = tuple[Instance, Any, list[str]]
 """An instance, the handle of its recorded variables, and their full names."""
 BLOCK = 4096
 """Rows that are written to a file at a time."""
+
+
+def selected(names: Iterable[str] | None, there: Sequence[str]) -> list[str]:
+    """Those of the full names `there` that a run is to keep, in their order: the `names`, or all without them.
+
+    Raises
+    ------
+    InputError
+        for a name that is not there.
+    """
+    wanted = set(there if names is None else names)
+    for full in sorted(wanted - set(there)):
+        raise InputError(f"{full}: cannot be kept; must be an output or an input with a signal")
+    return [full for full in there if full in wanted]
 
 
 class Rows:

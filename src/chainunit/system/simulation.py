@@ -99,6 +99,14 @@ class Simulation(ABC):
     ) -> xr.Dataset:
         """Simulate to the time `stop` [s]; see `FmuSimulation.run`."""
 
+    def _check_run(self, stop: float, step: float, every: int) -> None:
+        if not (0.0 < step < math.inf) or not self.time < stop < math.inf:
+            raise InputError(
+                f"a run from t = {self.time:g} to {stop:g} s in steps of {step:g} s: must go forward"
+            )
+        if not every >= 1 or every % 1:
+            raise InputError(f"every = {every:g}: must be a whole number >= 1")
+
     @abstractmethod
     def save(self) -> float:
         """Save the present state in place of the last saved one; returns the time."""
@@ -311,19 +319,15 @@ class FmuSimulation(Simulation):
         Raises
         ------
         InputError
-            for a run that does not go forward, and for a name that cannot be guarded or kept.
+            for a run that does not go forward, where `every` is no whole number >= 1, and for a name that cannot be
+            guarded or kept.
         RunError
             where an FMU fails; the attribute ``partial`` of the error holds the Dataset up to the failure.
         WriteError
             where the `file` cannot be written.
         """
         start = self.time
-        if not (0.0 < step < math.inf) or not start < stop < math.inf:
-            raise InputError(
-                f"a run from t = {start:g} to {stop:g} s in steps of {step:g} s: must go forward"
-            )
-        if every < 1 or every != int(every):
-            raise InputError(f"every = {every:g}: must be a whole number >= 1")
+        self._check_run(stop, step, every)
         n = max(1, math.ceil((stop - start) / step - 1e-9))
         recorders, watches = self._recorders(names), self._watches(guards or {})
         room = n // every + 2 if file is None else rows.BLOCK
@@ -402,12 +406,7 @@ class FmuSimulation(Simulation):
         for name, fmu in self._fmus.items():
             inputs = sorted(full for full in self.signals if full.startswith(f"{name}."))
             there += [*(f"{name}.{v}" for v in fmu.outputs()), *inputs]
-        if names is not None:
-            selection = set(names)
-            for full in sorted(selection - set(there)):
-                raise InputError(f"{full}: cannot be kept; must be an output or an input with a signal")
-            there = [full for full in there if full in selection]
-        return self._handles(there)
+        return self._handles(rows.selected(names, there))
 
     def _watches(self, guards: Mapping[str, float]) -> list[Watch]:
         """Handles and limits of the guards, by instance."""
