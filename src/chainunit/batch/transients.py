@@ -87,6 +87,13 @@ class Runs:
     times: Any
 
 
+def _filled(x: Any, runs: int, *shape: int) -> Any:
+    """The values of all runs, filled up to whole vectors by those of the last run; a new array of the shape
+    (*shape, lanes)."""
+    full = np.broadcast_to(np.asarray(x, float), (*shape, runs))
+    return np.ascontiguousarray(np.concatenate([full, np.repeat(full[..., -1:], -runs % _LANES, -1)], -1))
+
+
 class Transients:
     """The compiled loop of a model; `digest` is that of its source.
 
@@ -159,29 +166,19 @@ class Transients:
         """
         stop = np.atleast_1d(np.asarray(stop, float))
         runs = len(stop)
-        room = -(-runs // _LANES) * _LANES
         begin = np.broadcast_to(np.asarray(begin, float), runs)
         rows = 1 + max(0, math.ceil(float(np.max(stop - begin)) / step - 1e-9))
-        n_x = len(np.atleast_1d(states))
-
-        def filled(x: Any, *shape: int) -> Any:
-            """The values of all runs, filled up by those of the last run."""
-            full = np.broadcast_to(np.asarray(x, float), (*shape, runs))
-            return np.ascontiguousarray(
-                np.concatenate([full, np.repeat(full[..., -1:], room - runs, -1)], -1)
-            )
-
         x = np.asarray(states, float)
-        x = filled(x if x.ndim == 2 else x[:, None], n_x)
-        n_s = 1 + 3 * self._changes
+        x = _filled(x if x.ndim == 2 else x[:, None], runs, len(x))
+        room = x.shape[-1]
         arrays = [
-            filled(np.zeros(runs) if not self._varying else varying, len(self._varying)),
-            filled(np.zeros(runs) if not self._driven else signals, len(self._driven), n_s),
-            filled(begin),
-            filled(stop),
-            filled(np.inf if limits is None or not self._guarded else limits, len(self._guarded)),
+            self._uniform(parameters, inputs),
+            _filled(varying if self._varying else 0.0, runs, len(self._varying)),
+            _filled(signals if self._driven else 0.0, runs, len(self._driven), 1 + 3 * self._changes),
+            _filled(begin, runs),
+            _filled(stop, runs),
+            _filled(np.inf if limits is None or not self._guarded else limits, runs, len(self._guarded)),
         ]
-        uniform = self._uniform(parameters, inputs)
         out = np.empty((len(self.outputs), room, rows))
         count = np.zeros(room, np.int64)
         p, model = self.model.prepared(MATH, parameters), self.model
@@ -196,7 +193,7 @@ class Transients:
             self._library.transients(
                 *map(ctypes.c_long, (*ends_of, room, rows)),
                 *map(ctypes.c_double, numbers),
-                *(ctypes.c_void_p(array.ctypes.data) for array in (uniform, *arrays, x, out, count)),
+                *(ctypes.c_void_p(array.ctypes.data) for array in (*arrays, x, out, count)),
             )
 
         pieces = [(r, r + _LANES) for r in range(0, room, _LANES)]

@@ -80,27 +80,33 @@ def _company(data: Mapping[str, Any], parts: Parts) -> Iterator[tuple[str, str]]
     elif "ratio" in data.get("machine", {}):
         yield ("machine.ratio", "follows from the motor's rated speed; to have another, give gear.ratio")
     if "sweep" in data:
-        if foreign["machine"]:
-            yield ("sweep", "needs a model of the machine, which is an FMU; leave it out")
-        if "sizing" in data:
-            yield ("sweep", "varies one drive, and [sizing] tries many; leave out one of the two")
-        measures = named_table(data, "sweep").get("measures")
-        if isinstance(measures, list) and "coupling_trip_time" in measures and "coupling" not in data:
-            yield (
-                "sweep.measures",
-                "coupling_trip_time is of a safety coupling; add [coupling], or leave it out",
-            )
-        if measures and foreign["motor"]:
-            yield ("sweep.measures", "need a model of the motor, which is an FMU; leave them out")
-        if named_table(data, "sweep").get("quantities") and data.get("organ") == "chain":
-            yield (
-                "sweep.quantities",
-                'are of organs with two bars; leave out organ = "chain", or give measures',
-            )
+        yield from _sweep_company(data, foreign)
     if "torsion" in data and "driveline" not in data:
         yield ("torsion", "is of a driveline; add [driveline], or leave it out")
     if "chain" in data and data.get("organ") != "chain":
         yield ("chain", 'is of organs that are chains; add organ = "chain", or leave it out')
+
+
+def _sweep_company(data: Mapping[str, Any], foreign: Mapping[str, bool]) -> Iterator[tuple[str, str]]:
+    """Pairs of a refused key and the reason, of a study with a sweep; `foreign` tells whether motor and machine are
+    FMUs."""
+    if foreign["machine"]:
+        yield ("sweep", "needs a model of the machine, which is an FMU; leave it out")
+    if "sizing" in data:
+        yield ("sweep", "varies one drive, and [sizing] tries many; leave out one of the two")
+    measures = named_table(data, "sweep").get("measures")
+    if isinstance(measures, list) and "coupling_trip_time" in measures and "coupling" not in data:
+        yield (
+            "sweep.measures",
+            "coupling_trip_time is of a safety coupling; add [coupling], or leave it out",
+        )
+    if measures and foreign["motor"]:
+        yield ("sweep.measures", "need a model of the motor, which is an FMU; leave them out")
+    if named_table(data, "sweep").get("quantities") and data.get("organ") == "chain":
+        yield (
+            "sweep.quantities",
+            'are of organs with two bars; leave out organ = "chain", or give measures',
+        )
 
 
 _ORDER = (
