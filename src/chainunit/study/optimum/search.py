@@ -39,9 +39,9 @@ _AT_BOUND = 1e-7
 
 @dataclass(frozen=True)
 class Answer:
-    """The answer from one start: the free parameters `x`, the exact value of what is least, and whether all limits
-    are met; `sensitivities` are the derivatives of the least value by each limit, by name and side, and `at_bounds`
-    those by the bounds of the parameters."""
+    """The answer from one start: the free parameters `x`, the exact `value` of the objective there, or the sum of the
+    `misses` without an objective, and whether all limits are met; `sensitivities` are the derivatives of the value by
+    each limit, by name and side, and `at_bounds` those by the bounds of the parameters."""
 
     x: Any
     value: float
