@@ -26,10 +26,14 @@ from chainunit.drives.dc_motor import DcMotor
 from chainunit.errors import RunError
 from chainunit.job import CHECKS
 from chainunit.native.compilers import compiler
+from chainunit.report import runs as report_runs
+from chainunit.report.blocks import Source
+from chainunit.report.terminal import plain_line
 from chainunit.study import monte_carlo, quantiles
 from chainunit.study.choice import choose
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
+from chainunit.study.event_block import EventBlock
 from chainunit.study.event_runs import EventSimulation
 from chainunit.study.rig import Rig
 from chainunit.system import CoSimulation
@@ -100,7 +104,7 @@ def opened(folder):
     """The results in a folder."""
     (store,) = folder.glob("*.zarr")
     dataset = xr.open_zarr(store, consolidated=False).drop_vars(CHECKS)
-    return monte_carlo.MonteCarloResult(dataset.load(), store)
+    return monte_carlo.MonteCarloResult(dataset.load(), store, "cs")
 
 
 def content(store):
@@ -207,7 +211,7 @@ def test_quantiles_have_intervals_or_are_left_out(killed):
         k = np.arange(number)
         values = 100.0 + k % 97 + 1e-3 * k
         runs = runs.assign(crank_torque_peak=("run", values))
-        result = monte_carlo.MonteCarloResult(runs, killed[0])
+        result = monte_carlo.MonteCarloResult(runs, killed[0], "cs")
         sizes = result.quantiles()["crank_torque_peak"]
         assert list(sizes) == entries
         for name, each in sizes.items():
@@ -216,7 +220,7 @@ def test_quantiles_have_intervals_or_are_left_out(killed):
         entry = result.as_dict()["quantiles"]["crank_torque_peak"][entries[-1]]
         assert entry["low"] == {"value": sizes[entries[-1]].low, "unit": "N.m"}
         assert bool(result.remark) == (number < 368)
-    remark = monte_carlo.MonteCarloResult(few.isel(run=slice(0, 30)), killed[0]).remark
+    remark = monte_carlo.MonteCarloResult(few.isel(run=slice(0, 30)), killed[0], "cs").remark
     assert "30 runs are too few" in remark and "the 99 % quantile takes 368" in remark
 
 
@@ -302,7 +306,7 @@ def test_a_run_that_fails_is_a_result(killed, tmp_path, monkeypatch):
 
     monkeypatch.setattr(Rig, "follow", fails)
     result = monte_carlo.run(task, tmp_path, lambda *said: None, workers=1)
-    assert result.reasons == {2: "machine: it broke"} and result.failures == 1
+    assert result.reasons == {2: "machine: it broke"} and result.failures == 1 and result.method == "cs"
     assert result.as_dict()["failed"]["value"] == 1 and len(result.values("event")) == 4
     got, wanted = result.dataset, opened(killed[0]).dataset
     for name in monte_carlo.Layout(monte_carlo.Sample).names:
@@ -389,7 +393,29 @@ def test_question_and_answer_tell_of_random_overloads(tmp_path):
     assert f"the safety coupling opens in {opens} (" in answer.partition("##")[0]
     peak = shown(quantiles_of["crank_torque_peak"]["q50"]["value"], "N.m")
     assert f"Of 6 overloads at random: 50 % stay below a crank torque of {peak} (" in answer
-    assert f"the safety coupling opens in {opens} (" in " ".join(process.stdout.split())
+    said = " ".join(process.stdout.split())
+    assert f"the safety coupling opens in {opens} (" in said
+    method, words = (
+        ("compiled", "on the compiled system") if compiler() else ("cs", "by co-simulation of the FMUs")
+    )
+    assert result["monte_carlo"]["method"] == method
+    assert all(f"The random overloads were run {words}." in each for each in (text, said))
+
+
+@pytest.mark.parametrize(
+    "key, words", [("cs", "by co-simulation of the FMUs"), ("me", "by Model Exchange of the FMUs")]
+)
+def test_runs_of_the_fmus_are_told_as_such(key, words, monkeypatch):
+    """Those that the study asks for, and those that it makes as there is no C compiler."""
+    config = parse(f'simulation = "{key}"\n' + STUDY.format(runs=4))
+    task = monte_carlo.Task(config, Drive(DcMotor, config.motor, config.machine), {}, 1.0)
+    assert dataclasses.replace(task, cosimulated=True).method == key
+    monkeypatch.setattr(monte_carlo, "compiler", lambda: None)
+    # without quantiles there is no table, and the line stands alone
+    entries = {"runs": {"value": 4, "unit": "1"}, "confidence": {"value": 0.95, "unit": "1"}}
+    entries |= {"quantiles": {}, "sides": {}, "method": task.method}
+    (block,) = report_runs._random(Source({"monte_carlo": entries}))
+    assert plain_line(block.line) == f"The random overloads were run {words}."
 
 
 MOTOR = '[system]\nmotor = "InductionMotor"\n'
@@ -432,11 +458,21 @@ def test_the_compiled_system_agrees_with_the_co_simulation(text, tmp_path):
 
 
 @needs_compiler
+def test_a_parcel_builds_the_system_once(monkeypatch):
+    built, init = [], EventBlock.__init__
+    monkeypatch.setattr(EventBlock, "__init__", lambda self, *more: built.append(1) or init(self, *more))
+    task = compiled_task(STUDY)
+    parcel = monte_carlo.Parcel.of(task)
+    assert len(built) == 1 and parcel.digest == task.digest()
+
+
+@needs_compiler
 def test_runs_on_the_compiled_system_do_not_depend_on_their_batch(tmp_path):
     """In one process without Dask; made again by a worker from its parcel, in other batches."""
     task = compiled_task(STUDY, runs=30)
     result = monte_carlo.run(task, tmp_path, lambda *said: None)
     assert result.runs == 30 and not result.failures and not monte_carlo._systems
+    assert result.method == "compiled"
     parcel = pickle.loads(pickle.dumps(monte_carlo.Parcel.of(task)))
     try:
         pieces = [monte_carlo.make_runs(parcel, a, b) for a, b in ((0, 7), (7, 30))]

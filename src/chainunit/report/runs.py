@@ -130,8 +130,16 @@ def _pins(s: b.Source, study: StudyRecord) -> b.Table:
     )
 
 
+_METHODS: dict[str, str] = {
+    "compiled": "on the compiled system",
+    "cs": "by co-simulation of the FMUs",
+    "me": "by Model Exchange of the FMUs",
+}
+"""The ways in which random overloads are run, see `study.monte_carlo.Task.method`."""
+
+
 def _random(s: b.Source) -> Iterator[b.Block]:
-    """The table of the quantiles of random overloads."""
+    """The table of the quantiles of random overloads, and how they were run."""
     quantiles = {name: sizes for name, sizes in s.result["monte_carlo"]["quantiles"].items() if sizes}
     descriptions = {v.name: v.description.removeprefix("1 where ") for v in Layout(Sample).variables}
     columns = list(dict.fromkeys(k for sizes in quantiles.values() for k in sizes))
@@ -152,6 +160,9 @@ def _random(s: b.Source) -> Iterator[b.Block]:
     )
     if rows:
         yield b.Table(rows, b.heads("", *heads), title=title)
+    yield b.Text(
+        line(f"The random overloads were run {_METHODS[s.result['monte_carlo']['method']]}."), "fine"
+    )
 
 
 def number(s: b.Source, study: StudyRecord, run: str, name: str) -> Number:

@@ -93,12 +93,17 @@ class Task:
 
     @property
     def rig(self) -> Rig:
-        """The drive on its co-simulation."""
+        """The drive, with its FMUs."""
         return Rig(self.config, self.drive, self.files, fed_from=self.fed_from)
 
-    def digest(self) -> str:
+    @property
+    def method(self) -> str:
+        """How the runs are made: "compiled", on the compiled system, or by the FMUs as the key `simulation` says."""
+        return "compiled" if self.is_compiled else self.config.simulation
+
+    def digest(self, block: EventBlock | None = None) -> str:
         """A digest of everything on which the results depend: every parameter, and the code of the compiled system or
-        the content of the FMUs."""
+        the content of the FMUs. The compiled system is built unless its `block` is given."""
         config, drive = self.config, self.drive
         relevant = {
             "chainunit": __version__,
@@ -115,7 +120,7 @@ class Task:
         }
         content = hashlib.sha256(json.dumps(relevant, sort_keys=True).encode())
         if self.is_compiled:
-            content.update(self.block().loop.digest.encode())
+            content.update((block or self.block()).loop.digest.encode())
         for name in () if self.is_compiled else sorted(self.files):
             content.update(Path(self.files[name]).read_bytes())
         return content.hexdigest()[:12]
@@ -126,7 +131,7 @@ class Task:
 
 
 def result_variables(event: RandomEvent) -> list[ResultVariable]:
-    """The results of a run: its side, the drawn quantities of its event, the sample, and the reason why it
+    """The results of a run: its side, the drawn quantities of its event, the sample, and the reason why the run
     failed. The numbers of the sample are NaN where the run failed, where the machine has no such quantity, and,
     of the trip torque, without a coupling."""
     units = {v.name: v for v in variables(event.of.Parameters)}
@@ -137,7 +142,7 @@ def result_variables(event: RandomEvent) -> list[ResultVariable]:
             for name in event.ranges
         ),
         *(ResultVariable(v.name, v.unit, v.description) for v in Layout(Sample).variables),
-        ResultVariable("failed", "1", "reason why an FMU failed; empty where none did", letters=_LETTERS),
+        ResultVariable("failed", "1", "reason why the run failed; empty where it did not", letters=_LETTERS),
     ]
 
 
@@ -155,7 +160,8 @@ class Parcel:
     def of(cls, task: Task) -> Parcel:
         """The parcel of a task whose FMUs are files."""
         if task.is_compiled:
-            return cls(replace(task, files={}), task.digest(), {}, task.block().states)
+            block = task.block()
+            return cls(replace(task, files={}), task.digest(block), {}, block.states)
         return cls(task, task.digest(), {name: Path(file).read_bytes() for name, file in task.files.items()})
 
     def start(self) -> EventBlock | EventSimulation:
@@ -280,6 +286,8 @@ class MonteCarloResult:
 
     dataset: xr.Dataset
     file: Path
+    method: str
+    """see `Task.method`"""
     earlier_runs: int = 0
     """number of runs that the store had before"""
     damaged_batches: int = 0
@@ -328,12 +336,12 @@ class MonteCarloResult:
 
     @cached_property
     def reasons(self) -> dict[int, str]:
-        """Why an FMU failed, by the number of the run."""
+        """Why a run failed, by its number."""
         return {k: words for k, words in enumerate(texts(self.dataset["failed"])) if words}
 
     @property
     def failures(self) -> int:
-        """Number of runs in which an FMU failed."""
+        """Number of runs that failed."""
         return len(self.reasons)
 
     def as_dict(self) -> dict[str, Any]:
@@ -343,6 +351,7 @@ class MonteCarloResult:
             "runs": entry(self.runs, "1"),
             "sides": {side: entry(runs, "1") for side, runs in self.sides.items()},
             "failed": entry(self.failures, "1"),
+            "method": self.method,
             "damaged_batches": entry(self.damaged_batches, "1"),
             "file": self.file.name,
             "quantiles": {
@@ -395,4 +404,6 @@ def run(
     if workers is None and scheduler is None and task.is_compiled and job.points <= _IN_PROCESS * BATCH:
         workers = 1
     outcome = run_job(job, folder, report, workers, scheduler)
-    return MonteCarloResult(outcome.dataset, outcome.file, outcome.earlier_points, outcome.damaged_batches)
+    return MonteCarloResult(
+        outcome.dataset, outcome.file, task.method, outcome.earlier_points, outcome.damaged_batches
+    )
