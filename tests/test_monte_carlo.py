@@ -29,14 +29,14 @@ from chainunit.native.compilers import compiler
 from chainunit.report import runs as report_runs
 from chainunit.report.blocks import Source
 from chainunit.report.terminal import plain_line
-from chainunit.study import monte_carlo, quantiles
+from chainunit.study import event_block, monte_carlo, quantiles
 from chainunit.study.choice import choose
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 from chainunit.study.event_block import EventBlock
 from chainunit.study.event_runs import EventSimulation
 from chainunit.study.rig import Rig
-from chainunit.system import CoSimulation
+from chainunit.system import CoSimulation, monolithic
 from chainunit.text import number as shown
 
 needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler")
@@ -419,6 +419,7 @@ def test_runs_of_the_fmus_are_told_as_such(key, words, monkeypatch):
 
 
 MOTOR = '[system]\nmotor = "InductionMotor"\n'
+EMPTY = "empty_start = true\n"
 CHAIN = 'organ = "chain"\n[chain]\nrods = 3\n'
 BLOCKED = STUDY.replace(
     "event = {{ force = [4000, 9000], duration = 0.1 }}", 'event = {{ type = "blocked" }}'
@@ -455,6 +456,43 @@ def test_the_compiled_system_agrees_with_the_co_simulation(text, tmp_path):
         )
         for name, x in a.items():
             assert x == b[name] or abs(x - b[name]) < 1e-3 * max(abs(b[name]), 0.1), (name, x, b[name])
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    "text, fed_from",
+    [(STUDY, None), (BLOCKED, None), (MOTOR + STUDY, None), (CHAIN + STUDY, None), (EMPTY + STUDY, 0.5)],
+    ids="bars blocked induction chains empty".split(),
+)
+def test_a_compiled_start_is_the_monolithic_solution(text, fed_from, monkeypatch):
+    task = dataclasses.replace(compiled_task(text), fed_from=fed_from)
+    block, rig = task.block(), task.rig
+    reference = monolithic(rig.graph, rig.signals(ramp=True), np.linspace(0.0, task.steady, 25))
+    monkeypatch.delattr(event_block, "monolithic")
+    names = block._system.model.state_layout.names
+    for name, x in zip(names, block.states, strict=True):
+        row = reference[name].values
+        assert abs(x - row[-1]) <= 1e-6 * max(np.max(np.abs(row)), 1e-3), (name, x, row[-1])
+
+
+@needs_compiler
+def test_a_feed_forward_starts_by_the_monolithic_solution():
+    """Its model takes the rate of the reference, which the compiled loop does not evaluate."""
+    task = compiled_task("feed_forward = true\n" + STUDY)
+    block, rig = task.block(), task.rig
+    assert "model.a" in rig.signals(ramp=True)
+    reference = monolithic(rig.graph, rig.signals(ramp=True), [0.0, task.steady], rtol=1e-11)
+    wanted = [float(reference[name][-1]) for name in block._system.model.state_layout.names]
+    np.testing.assert_allclose(block.states, wanted, rtol=1e-6, atol=1e-9)
+
+
+@needs_compiler
+def test_a_start_that_leaves_all_bounds_is_told():
+    task = compiled_task(STUDY)
+    feed = dataclasses.replace(task.config.feed.left, processing_force=1e300)
+    config = dataclasses.replace(task.config, feed=dataclasses.replace(task.config.feed, left=feed))
+    with pytest.raises(RunError, match=r"^at t = \S+ s: the states left all bounds$"):
+        monte_carlo.Parcel.of(dataclasses.replace(task, config=config))
 
 
 @needs_compiler

@@ -17,7 +17,7 @@ import xarray as xr
 from ..batch.transients import Runs, Transients, signal_table
 from ..errors import RunError
 from ..system import monolithic
-from ..system.compiled_simulation import LONGEST, CompiledSystem
+from ..system.compiled_simulation import LONGEST, CompiledSimulation, CompiledSystem, is_evaluated
 from ..system.signals import at_time
 from .event_runs import EventRun, Request
 from .event_table import RandomEvent
@@ -46,7 +46,7 @@ class EventBlock:
     rig : of models only; its FMUs are not needed
     random : the events that are to come
     steady : time of the steady state [s]
-    states : the states at that time, in the order of the model; by default of the monolithic solution from rest
+    states : the states at that time, in the order of the model; by default those of a run from rest
 
     Raises
     ------
@@ -69,12 +69,24 @@ class EventBlock:
 
     @cached_property
     def states(self) -> Any:
-        """The states at the steady time, in the order of the model."""
+        """The states at the steady time, in the order of the model.
+
+        Raises
+        ------
+        RunError
+            where they leave all bounds before that time.
+        """
         if self._given_states is not None:
             return self._given_states
+        graph, signals = self._rig.graph, self._rig.signals(ramp=True)
+        if all(map(is_evaluated, signals.values())):
+            with CompiledSimulation(graph, signals) as simulation:
+                simulation.run(self._steady, self._rig.step, names=())
+                return simulation.states
+        # the rate of the reference, which a feed-forward takes, is no profile
         layout = self._system.model.state_layout
         assert layout is not None
-        run = monolithic(self._rig.graph, self._rig.signals(ramp=True), [0.0, self._steady])
+        run = monolithic(graph, signals, [0.0, self._steady])
         return np.array([float(run[name][-1]) for name in layout.names])
 
     @cached_property

@@ -27,6 +27,11 @@ LONGEST = 20.0
 """Longest step of the integrator, over the time between rows."""
 
 
+def is_evaluated(signal: Any) -> bool:
+    """Whether a native loop evaluates a signal: a number or a `Profile`, no other function of time."""
+    return not callable(signal) or hasattr(signal, "changes")
+
+
 class CompiledSystem:
     """A system as one model, as native loops run it: the `model`, its parameters `p` with the `TOLERANCE`, and the
     values of its `inputs` in the system.
@@ -92,8 +97,13 @@ class CompiledSimulation(Simulation):
         for full, signal in signals.items():
             if full not in self._system.inputs:
                 raise InputError(f"{full}: no such input of the system")
-            if callable(signal) and not hasattr(signal, "changes"):
+            if not is_evaluated(signal):
                 raise InputError(f"{full}: a compiled system takes numbers and profiles as signals")
+
+    @property
+    def states(self) -> Any:
+        """The present states in the order of the model, shape (states,)."""
+        return np.array(self._states)
 
     def close(self) -> None:
         """See `Simulation`; nothing is left to free."""
