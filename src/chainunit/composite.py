@@ -143,8 +143,7 @@ class CompositeModel(Model):
         point.advance(cls.of.steps)
         for name, model in cls._components():
             if model.start_required:
-                entries, _ = point.inputs(name)
-                yield from model.start_limits(xp, point.p[name], entries, point.states(name))
+                yield from model.start_limits(*point.arguments(name))
 
     # -- the run
 
@@ -156,8 +155,7 @@ class CompositeModel(Model):
         rates: list[Any] = []
         for name, model in cls._components():
             if model.state_layout:
-                entries, _ = point.inputs(name)
-                rates += model.derivatives(xp, point.p[name], entries, point.states(name))
+                rates += model.derivatives(*point.arguments(name))
         return rates
 
     @classmethod
@@ -213,8 +211,7 @@ class CompositeModel(Model):
         values: list[Any] = []
         for name, model in cls._components():
             if model.controlled:
-                entries, _ = point.inputs(name)
-                values += model.closed(xp, point.p[name], entries, point.states(name))
+                values += model.closed(*point.arguments(name))
             elif model.state_layout:
                 values += model.state_layout.values(point.states(name))
         return values

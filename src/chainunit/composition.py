@@ -324,6 +324,10 @@ class SystemPoint:
             values.append(value)
         return layout.instance(values), complete
 
+    def arguments(self, name: str) -> tuple[Any, Any, Any, Any]:
+        """What the equations of a component take: namespace, parameters, inputs as far as they are known, states."""
+        return self._xp, self.p[name], self.inputs(name)[0], self.states(name)
+
     def advance(self, steps: Steps) -> None:
         """Compute these outputs."""
         for name, outputs in steps:
