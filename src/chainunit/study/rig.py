@@ -41,8 +41,8 @@ _LONGEST_START = 30.0
 [s]."""
 _LONGEST_RISE = 600.0
 """Time after the ramp at which an empty machine is fed, however slowly it turns [s]."""
-_FEED_RISE = 0.1
-"""Share of a turn in which the feed comes."""
+FEED_RISE = 0.1
+"""Share of a turn in which the feed comes to a machine that starts empty."""
 PATIENCE = 20.0
 """Number of turns, at the requested speed, for which a study runs on until the motor has settled and made its
 turns; for a fast machine at least the time `_SETTLES`."""
@@ -167,7 +167,7 @@ class Rig:
         """A load of a machine that starts empty, over time."""
         if self.fed_from is None:
             return empty
-        return Profile(empty, ((self.fed_from, _FEED_RISE * self.config.turn, value),))
+        return Profile(empty, ((self.fed_from, FEED_RISE * self.config.turn, value),))
 
     def from_rest(self, event: Event | None = None) -> Simulation:
         """The simulation from rest on, with the `event` of a start, if one is given."""

@@ -87,10 +87,8 @@ class SweepTask:
         }
         if not own:
             # the shape of the results
-            gravity = next(iter(self.machine.by_name.items()))
-            own = {
-                gravity[0]: xr.DataArray(np.full(len(next(iter(values.values()))), gravity[1]), dims="point")
-            }
+            name, value = next(iter(self.machine.by_name.items()))
+            own = {name: xr.DataArray(np.full(len(next(iter(values.values()))), value), dims="point")}
         return evaluate(
             self.machine,
             self.quantities or [cycle_quantity("peak(crank_torque)", self.machine.model)],

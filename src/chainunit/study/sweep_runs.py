@@ -27,7 +27,7 @@ from .drive import Drive
 from .event import Event
 from .event_block import kept_outputs
 from .measures import read_measure
-from .rig import PATIENCE, Rig
+from .rig import FEED_RISE, PATIENCE, Rig
 from .sweep_plan import SweepPlan
 from .sweep_reading import SPEED
 from .window import Phase, Trip, Window, is_settled, whole_turns
@@ -41,8 +41,6 @@ _LEFT_BOUNDS, _UNSETTLED = 1, 2
 _RATIO = "machine.ratio"
 _ROWS_OF_START = 16
 """Rows of the start of a run, which no measure reads."""
-_RISE = 0.1
-"""Share of a turn in which the feed comes to a machine that starts empty."""
 
 
 @dataclass(frozen=True)
@@ -250,7 +248,7 @@ class _BlockWork:
                 empty = point.drive.loads(no_feed(config.feed))
                 fed = lasts + settle * point.turn
                 own |= {
-                    full: Profile(empty[full], ((fed, _RISE * point.turn, x),))
+                    full: Profile(empty[full], ((fed, FEED_RISE * point.turn, x),))
                     for full, x in point.loads.items()
                 }
             signals.append(own)
