@@ -1,4 +1,4 @@
-"""The end of a process: temporary folders that go with it, also where a signal ends a worker."""
+"""The end of a process or of a result: temporary folders that go with it, also where a signal ends a worker."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ import shutil
 import signal
 import tempfile
 import threading
+import weakref
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar
 
 _folders: set[str] = set()
 """The temporary folders of this process."""
@@ -29,6 +31,21 @@ def remove_folder(folder: str) -> None:
     """Remove a temporary folder of this process."""
     shutil.rmtree(folder, ignore_errors=True)
     _folders.discard(folder)
+
+
+_Result = TypeVar("_Result")
+
+
+def in_temporary_folder(make: Callable[[Path], _Result]) -> _Result:
+    """The result that `make` gives in a new temporary folder, which lasts as long as the result."""
+    folder = temporary_folder("chainunit")
+    try:
+        result = make(Path(folder))
+    except BaseException:
+        remove_folder(folder)
+        raise
+    weakref.finalize(result, remove_folder, folder)
+    return result
 
 
 _removing = threading.RLock()

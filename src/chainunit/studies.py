@@ -5,9 +5,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import shutil
-import tempfile
 import warnings
-import weakref
 from collections.abc import Mapping
 from functools import cached_property
 from html import escape
@@ -16,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from .ending import in_temporary_folder
 from .errors import InputError, RunError, WriteError, near_name, shown
 from .files import claim, clear, write_all
 from .fmu.backends import Backend
@@ -195,24 +194,21 @@ class Study:
         WriteError
             for a file that cannot be written; the others are written.
         """
-        options: dict[str, Any] = {"check": check, "backend": backend, "scheduler": scheduler}
+
+        def result_in(place: Path) -> StudyResult:
+            options: dict[str, Any] = {"check": check, "backend": backend, "scheduler": scheduler}
+            return StudyResult(results.compute(self.config, place, progress, **options), place)
+
         if folder is None:
-            temporary = Path(tempfile.mkdtemp(prefix="chainunit_"))
-            try:
-                record = results.compute(self.config, temporary, progress, **options)
-            except BaseException:
-                shutil.rmtree(temporary, ignore_errors=True)
-                raise
-            result = StudyResult(record, temporary)
-            weakref.finalize(result, shutil.rmtree, temporary, ignore_errors=True)
+            result = in_temporary_folder(result_in)
         else:
             with claim(Path(folder)) as place:
-                record = results.compute(self.config, place, progress, **options)
-                result = StudyResult(record, place)
+                result = result_in(place)
                 result._write(place)
-        if record.failure is not None:
-            record.failure.partial = result
-            raise record.failure
+        failure = result.record.failure
+        if failure is not None:
+            failure.partial = result
+            raise failure
         return result
 
     def optimize(

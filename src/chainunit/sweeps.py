@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import shutil
-import tempfile
-import weakref
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from .ending import in_temporary_folder
 from .errors import WriteError
 from .files import claim, write_all
 from .progress import Report as Progress
@@ -79,19 +77,14 @@ def make_sweep(
     def quiet(what: str, complete: float, total: float) -> None:
         pass
 
+    def result_in(place: Path) -> SweepResult:
+        return SweepResult(contents.compute(config, place, progress or quiet, workers, scheduler))
+
     if folder is None:
-        temporary = Path(tempfile.mkdtemp(prefix="chainunit_"))
-        try:
-            summary = contents.compute(config, temporary, progress or quiet, workers, scheduler)
-        except BaseException:
-            shutil.rmtree(temporary, ignore_errors=True)
-            raise
-        result = SweepResult(summary)
-        weakref.finalize(result, shutil.rmtree, temporary, ignore_errors=True)
-        return result
+        return in_temporary_folder(result_in)
     with claim(folder) as place:
-        summary = contents.compute(config, place, progress or quiet, workers, scheduler)
-        _, failure = write_all(contents.writers(summary, contents.report(summary), place))
+        result = result_in(place)
+        _, failure = write_all(contents.writers(result.summary, contents.report(result.summary), place))
         if failure is not None:
             raise WriteError(str(failure)) from failure
-    return SweepResult(summary)
+    return result
