@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
+
+from fmpy.fmi2 import FMU2Model
+
 from chainunit.drives.dc_motor import DcMotor
 from chainunit.machines.flexible import flexible
 from chainunit.models import MODELS
 from chainunit.study import config
 from chainunit.study.drive import Drive
 from chainunit.system import ModelComponent, System, shaft_joints
+from chainunit.system.instance import Fmu
 
 
 def component(model, file=None, values=None):
@@ -48,3 +53,22 @@ def whole_systems():
         "feed-forward": Drive(DcMotor, study.motor, study.machine, feed_forward=True).graph,
         "chains": pair(chains, "DcMotor", values=turning),
     }
+
+
+@contextlib.contextmanager
+def initialized(file):
+    """A Model Exchange instance of a native FMU (FMI 2.0) after its initialization, and the FMU's description."""
+    with contextlib.closing(Fmu(file)) as fmu:
+        told = fmu.description
+        unit = FMU2Model(
+            guid=told.guid, unzipDirectory=fmu.folder, instanceName="unit",
+            modelIdentifier=told.modelExchange.modelIdentifier,
+        )  # fmt: skip
+        unit.instantiate()
+        try:
+            unit.setupExperiment()
+            unit.enterInitializationMode()
+            unit.exitInitializationMode()
+            yield unit, told
+        finally:
+            unit.freeInstance()

@@ -11,9 +11,8 @@ import fmpy
 import numpy as np
 import pytest
 from command import chainunit
-from fmpy.fmi2 import FMU2Model
 from fmpy.validation import validate_fmu
-from systems import whole_systems
+from systems import initialized, whole_systems
 
 from chainunit import RunError
 from chainunit.fmu.native.export import export
@@ -155,16 +154,7 @@ def test_the_fmu_is_valid_and_its_derivatives_exact(whole):
     _, part, _, file, _ = whole
     assert not validate_fmu(str(file))
     rng = np.random.default_rng(3)
-    with contextlib.closing(Fmu(file)) as fmu:
-        told = fmu.description
-        unit = FMU2Model(
-            guid=told.guid, unzipDirectory=fmu.folder, instanceName="unit",
-            modelIdentifier=told.coSimulation.modelIdentifier,
-        )  # fmt: skip
-        unit.instantiate()
-        unit.setupExperiment()
-        unit.enterInitializationMode()
-        unit.exitInitializationMode()
+    with initialized(file) as (unit, told):
         by_name = {v.name: v.valueReference for v in told.modelVariables}
         model = part.model
         inputs, states = (list(layout.names) for layout in (model.input_layout, model.state_layout))

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
 import zipfile
 from pathlib import Path
 
-import fmpy
 import numpy as np
 import pytest
-from fmpy.fmi2 import FMU2Model
 from fmpy.validation import validate_fmu
+from systems import initialized
 from test_clients import test_ecos as test_ecos
 from test_clients import test_libcosim as test_libcosim
 from test_native import random_calls
@@ -19,7 +17,6 @@ from chainunit.fmu.native.export import export
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
 from chainunit.native.compilers import compiler
-from chainunit.system.instance import Fmu
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 GALLERY = sorted((Path(__file__).parents[1] / "examples" / "linkages").glob("*.toml"))
@@ -63,22 +60,12 @@ def test_valid(alone):
 def test_directional_derivatives(machine, alone):
     """Of all outputs by angle, speed and acceleration, against differences of the Python model."""
     model = machine.model
-    description = fmpy.read_model_description(str(alone[0][2]))
-    references = {v.name: v.valueReference for v in description.modelVariables}
-    outputs = [v.name for v in description.modelVariables if v.causality == "output"]
     low, high = model.span
     at = {"phi": low + 0.3 * (high - low), "w": 2.0 if model.turns else 0.1, "a": 0.7}
     at |= model.feed_layout.by_name(model.Feed())
-    with contextlib.closing(Fmu(alone[0][2])) as fmu:
-        told = fmu.description
-        unit = FMU2Model(
-            guid=told.guid, unzipDirectory=fmu.folder, instanceName="unit",
-            modelIdentifier=told.coSimulation.modelIdentifier,
-        )  # fmt: skip
-        unit.instantiate()
-        unit.setupExperiment()
-        unit.enterInitializationMode()
-        unit.exitInitializationMode()
+    with initialized(alone[0][2]) as (unit, description):
+        references = {v.name: v.valueReference for v in description.modelVariables}
+        outputs = [v.name for v in description.modelVariables if v.causality == "output"]
         unit.setReal([references[name] for name in at], list(at.values()))
         for name, h in (("phi", 1e-5), ("w", 1e-5), ("a", 1e-3)):
             got = np.array(
