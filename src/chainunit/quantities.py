@@ -210,10 +210,11 @@ class Quantity:
         size."""
         return ROUNDING * (self.nominal or 1.0)
 
-    def admits(self, x: float) -> bool:
-        """Whether the number `x` is finite and inside the bounds, or beyond one by rounding only."""
+    def admits(self, x: Any) -> Any:
+        """Whether the number `x`, or each of an array, is finite and inside the bounds, or beyond one by rounding
+        only."""
         above = x > self.low if self.open_low else x >= self.low - self.slack
-        return math.isfinite(x) and above and x <= self.high + self.slack
+        return (abs(x) < math.inf) & above & (x <= self.high + self.slack)
 
     def within_bounds(self, x: float) -> float:
         """The admitted number `x`, set to the bound where it is beyond it by rounding."""

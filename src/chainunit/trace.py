@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -37,6 +38,16 @@ class Trace:
         """The outputs with the states `x` in place of the symbols."""
         parts = self.model.evaluate(casadi_(), self.p, self.u, x)
         return [v for part, out in zip(self.model.parts, parts, strict=True) for v in part.layout.values(out)]
+
+    def explicit(self, expressions: Sequence[Any]) -> list[Any]:
+        """The expressions in terms of parameters, inputs and states alone, without the derived values."""
+        import casadi
+
+        if not self.model.derived:
+            return list(expressions)
+        p = self.model.parameter_layout.instance(casadi.vertsplit(self.symbols[0]))
+        derived = casadi.vertcat(*self.model.derive(casadi_(), p))
+        return list(casadi.substitute(list(expressions), [self.symbols[3]], [derived]))
 
 
 @lru_cache(maxsize=8)

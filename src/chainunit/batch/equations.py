@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -71,19 +71,24 @@ def arguments_of(model: type[Model]) -> tuple[Variable, ...]:
     return tuple(v for of in layouts if of for v in of.variables)
 
 
-def find(names: Sequence[str], among: Sequence[Variable], kind: str) -> list[int]:
-    """The places of these names.
+def names_of(variables: Iterable[Variable]) -> list[str]:
+    """The names of these variables."""
+    return [v.name for v in variables]
+
+
+def find(names: Iterable[str], among: Sequence[str], kind: str) -> list[int]:
+    """The places of these names `among` others.
 
     Raises
     ------
     InputError
         for a name that is not there.
     """
-    places = {v.name: k for k, v in enumerate(among)}
-    for name in names:
+    places, wanted = {name: k for k, name in enumerate(among)}, list(names)
+    for name in wanted:
         if name not in places:
             raise InputError(f"{name}: no such {kind} of the model{near_name(name, list(places))}")
-    return [places[name] for name in names]
+    return [places[name] for name in wanted]
 
 
 @lru_cache(maxsize=64)
@@ -98,16 +103,12 @@ def equations(model: type[Model], outputs: tuple[str, ...], by: tuple[str, ...])
     import casadi
 
     t, arguments, declared = trace(model), arguments_of(model), columns_of(model)
-    places, columns = find(outputs, declared, "output"), find(by, arguments, "parameter, input or state")
-    p, u, x, k = t.symbols
+    places = find(outputs, names_of(declared), "output")
+    columns = find(by, names_of(arguments), "parameter, input or state")
+    p, u, x, _ = t.symbols
     traced = [*t.outputs, *(value for _, value in t.further)]
     rows = casadi.vertcat(*(casadi.SX(traced[place]) for place in places), casadi.SX(0, 1))
-    codes = _first_unmet(list(model.requirements(casadi_(), t.p)))
-    if model.derived:
-        derived = casadi.vertcat(
-            *model.derive(casadi_(), model.parameter_layout.instance(casadi.vertsplit(p)))
-        )
-        rows, codes = casadi.substitute([rows, codes], [k], [derived])
+    rows, codes = t.explicit([rows, _first_unmet(list(model.requirements(casadi_(), t.p)))])
     point = casadi.vertcat(p, u, x)
     slopes = [casadi.jtimes(rows, point, _unit_vector(point.numel(), column)) for column in columns]
     results = [Result(v.name, v.unit, v.description) for v in (declared[place] for place in places)]

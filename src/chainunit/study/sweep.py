@@ -180,9 +180,8 @@ def make_points(task: SweepTask, begin: int, end: int) -> dict[str, Any]:
     table = task.turns(values)
     reason = task.codes(table.reason.values, table.reason.attrs["reasons"])
     for k, each in enumerate(plan.parameters):
-        q, x = each.variable.quantity, values[each.name]
-        above = x > q.low if q.open_low else x >= q.low - q.slack
-        reason[~(above & (x <= q.high + q.slack))] = len(task.machine.model.required) + 2 + k
+        inside = each.variable.quantity.admits(values[each.name])
+        reason[~inside] = len(task.machine.model.required) + 2 + k
     results = {plain_name(name): x for name, x in values.items()}
     for name in plan.quantities:
         results[plain_name(name)] = np.where(
