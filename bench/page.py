@@ -166,6 +166,12 @@ def engines(f: Any) -> str:
     return table(head, rows) + "\nAn evaluation is\n\n" + "\n".join([WORK.format(**s), *works]) + "\n"
 
 
+DIVISIONS = {
+    True: "Divisions and roots have a unit of their own; the busier of both units counts.",
+    False: "Divisions and roots are made of products.",
+}
+
+
 WORK = "- native, numpy, jax: {chosen} outputs, the torques and all reactions, stored"
 
 
@@ -274,7 +280,7 @@ def text(f: Any) -> str:
     seconds = {w["way"]: w["memory"] for w in f["cosim_memory"]["ways"]}
     return (HERE / "page.md").read_text("utf-8").format(
         cores=s["cores"], processor=s["processor"], lanes=s["lanes"], chosen=s["chosen"], all=s["all"],
-        block=f"{min(row['states'] for row in s['rows']):,}", goals=goals(f),
+        divisions=DIVISIONS[s["divider"]], goals=goals(f),
         rates=own_rates(f), limits=limits(f), engines=engines(f), missing=missing(f), notes=notes(f),
         outputs=small(max(each["outputs"] for each in s["errors"].values())),
         points=s["points"]["points"], values=s["points"]["values"], worst=small(s["points"]["worst"]),

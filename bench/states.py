@@ -67,18 +67,23 @@ class Rates:
         self.rows.append(row | {"cpu": n * count / spent.processor} | more)
         print(f"{work:72} {n:8} states, {threads} threads: {1e-6 * row['rate']:7.2f} million/s", flush=True)
 
-    def native(self, key: str, outputs: tuple[str, ...], n: int, by: tuple[str, ...] = ()) -> None:
-        """The native engine, on one thread and on all, beside its limits."""
+    def native(
+        self, key: str, outputs: tuple[str, ...], n: int, by: tuple[str, ...] = (), again: bool = False
+    ) -> None:
+        """The native engine, on one thread and on all, beside its limits; `again` in the memory of an earlier
+        result."""
         values, columns = motion(n), len(outputs) * (1 + len(by))
         limit = vector_limit.arithmetic(vector_limit.operations(ChamberForces, outputs, MOTION, by))
         words = f"tau and its derivatives by {len(by)} parameters" if by else f"{columns} outputs stored"
-        # a block of results that lies within 32 MB takes memory that the process has
-        pages = "used" if n == BLOCK else "fresh"
+        words += ", in memory of an earlier call" if again else ""
+        pages, out = (
+            ("used", self.machine.batch(values, list(outputs), by=list(by))) if again else ("fresh", None)
+        )
         for threads in sorted({1, CORES}):
             written = vector_limit.bandwidth(columns, n, threads)[pages]
             self.add(
                 key, f"native, {words}", n, threads,
-                lambda k=threads: self.machine.batch(values, list(outputs), by=list(by), workers=k), 12,
+                lambda k=threads: self.machine.batch(values, list(outputs), by=list(by), workers=k, out=out), 12,
                 arithmetic=limit * threads, memory=written / (8 * columns + 2), pages=pages, bytes=8 * columns + 2,
             )  # fmt: skip
 
@@ -207,12 +212,12 @@ def main() -> None:
         raise SystemExit("no C compiler: there is no native engine to measure")
     points = reference_points()
     rates, ours, missing = Rates(), ["native", "numpy"], {}
-    for n in (BLOCK, MANY):
-        rates.native("chosen", CHOSEN, n)
-        rates.native("all", ALL, n)
+    for n, again in ((BLOCK, True), (MANY, True), (MANY, False)):
+        rates.native("chosen", CHOSEN, n, again=again)
+        rates.native("all", ALL, n, again=again)
     rates.cycle("cycle tau", ("tau",))
     rates.cycle("cycle chosen", CHOSEN)
-    rates.native("derivatives", ("tau",), BLOCK, BY)
+    rates.native("derivatives", ("tau",), BLOCK, BY, again=True)
     rates.arrays()
     try:
         rates.jax()
@@ -228,7 +233,8 @@ def main() -> None:
         print(f"{name} {why}: not measured")
     kinds = ("sum", "division", "root", "sin", "cos", "asin")
     save(options.json, {
-        "cores": CORES, "processor": processor(), "lanes": vector_limit.width(), "chosen": len(CHOSEN),
+        "cores": CORES, "processor": processor(), "lanes": vector_limit.width(),
+        "divider": vector_limit.divider(), "chosen": len(CHOSEN),
         "all": len(ALL),
         "by": list(BY), "rows": rates.rows, "points": points, "errors": errors, "others": others, "missing": missing,
         "costs": {kind: vector_limit.time_of(kind) for kind in kinds},

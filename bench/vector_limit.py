@@ -3,11 +3,13 @@
 Arithmetic. The generated code of a batch has for each vector so many sums, products, divisions, roots and
 functions. A sum of a product that nothing else needs is one instruction with this product. So there remain
 `instructions` of sums and products, each of which takes the time of such an instruction in a loop with 12 independent
-chains; the same holds for comparisons. Functions (sine) take the time of 12 independent calls. Divisions and roots
-have a unit of their own beside that of sums and products. The limit counts the busier of both units as if the other
-one cost nothing, and loads, stores and the checks of the results cost nothing either:
+chains; the same holds for comparisons, divisions, roots and functions (sine). Loads, stores and the checks of the
+results count as if they cost nothing. With AVX-512 the code makes divisions and roots of products, and the limit is
 
-    seconds per vector >= max(instructions * t_sum + calls * t_call, divisions * t_division + roots * t_root).
+    seconds per vector >= instructions * t_sum + divisions * t_division + roots * t_root + calls * t_call.
+
+On other processors divisions and roots have a unit of their own beside that of sums and products, and the busier of
+both units counts, as if the other one cost nothing.
 
 Memory. The results are written once, past the cache. The limit is the rate at which the same number of threads fills
 arrays of the same size by the same instruction and does nothing else; with pages that the system has just given, as
@@ -59,6 +61,11 @@ static double now(void) {
   return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 int width(void) { return W; }
+#if defined NEAR_INVERSE
+int divider(void) { return 0; }
+#else
+int divider(void) { return 1; }
+#endif
 v sink;
 void fill(double *to, long n) {
   double from[64];
@@ -66,7 +73,7 @@ void fill(double *to, long n) {
   for (long i = 0; i < n; i += 64) copy(to + i, from, n - i < 64 ? n - i : 64);
 }
 """
-FORMS = {"sum": "x * b + c", "division": "b / x", "root": "sqrt_v(x)"}
+FORMS = {"sum": "x * b + c", "division": "div_v(b, x)", "root": "sqrt_v(x)"}
 
 
 @cache
@@ -89,6 +96,12 @@ def library(functions: Sequence[str] = ()) -> Any:
 def width() -> int:
     """Number of lanes of a vector."""
     return int(library().width())
+
+
+@cache
+def divider() -> bool:
+    """Whether divisions and roots go to a unit of their own."""
+    return bool(library().divider())
 
 
 @cache
@@ -137,8 +150,9 @@ def operations(model: Any, outputs: Sequence[str], varying: Sequence[str], by: S
 def arithmetic(counts: Counter) -> float:
     """The largest number of states a second that a processor can compute."""
     own = {kind: n * time_of(kind) for kind, n in counts.items()}
-    divided = own.pop("division", 0.0) + own.pop("root", 0.0)
-    return width() / max(sum(own.values()), divided)
+    divided = own.get("division", 0.0) + own.get("root", 0.0)
+    total = sum(own.values())
+    return width() / (max(total - divided, divided) if divider() else total)
 
 
 def bandwidth(columns: int, states: int, threads: int) -> dict[str, float]:

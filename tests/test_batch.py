@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import warnings
 
 import numpy as np
@@ -16,6 +17,7 @@ from chainunit import ChainUnitMachine, InputError, SideLoads, batch
 from chainunit.batch import native
 from chainunit.batch.equations import arguments_of, outputs_of
 from chainunit.batch.reductions import REDUCTIONS
+from chainunit.batch.vector_code import c_file
 from chainunit.engines import MATH
 from chainunit.machines.chain_unit import ChamberForces
 from chainunit.machines.machine import Machine
@@ -129,6 +131,62 @@ def test_many_states_agree_with_the_machine(engine):
         size = float(np.max(np.abs(strict[name]))) or 1.0
         assert float(np.max(np.abs(out[name].values - strict[name]))) < 1e-12 * size, name
     assert out.tau.units == "N.m" and out.tau.long_name
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("more", [{}, {"by": ["r"]}, {"over": "phi", "reduce": {"tau": ["peak", "min"]}}])
+def test_an_earlier_result_gives_its_memory(engine, more):
+    machine = ChainUnitMachine()
+    outputs = None if "over" in more else ["tau", "rocker.tau"]
+    values = {"phi": np.linspace(0.0, 6.0, 70), "r": [0.14, 0.15, 2.0], "w": 3.0}
+    others = values | {"phi": np.linspace(1.0, 4.0, 70), "r": [0.14, 2.0, 0.16]}
+    first = machine.batch(values, outputs, engine=engine, **more)
+    fresh = machine.batch(others, outputs, engine=engine, **more)
+    again = machine.batch(others, outputs, engine=engine, **more, out=first)
+    xr.testing.assert_identical(again, fresh)
+    assert all(np.shares_memory(again[name].values, first[name].values) for name in first.data_vars)
+
+
+def test_memory_that_does_not_fit_is_refused():
+    machine, values = ChainUnitMachine(), {"phi": np.linspace(0.0, 6.0, 5), "w": 3.0}
+    first = machine.batch(values, ["tau"])
+    with pytest.raises(InputError, match="out: has no tau over \\(phi: 4\\)"):
+        machine.batch(values | {"phi": values["phi"][:4]}, ["tau"], out=first)
+    with pytest.raises(InputError, match="out: has no margin over"):
+        machine.batch(values, ["tau", "margin"], out=first)
+    with pytest.raises(InputError, match="tau is no array that can be filled"):
+        machine.batch(values, ["tau"], out=first.assign(tau=first.tau.astype("float32")))
+
+
+@NEEDS_COMPILER
+def test_divisions_and_roots_of_vectors():
+    """They are products on some processors: to a unit in the last place, with all that IEEE 754 says of 0 and of
+    infinite numbers that a machine can meet."""
+    own = compiler()
+    code = (
+        c_file("lanes.h")
+        + """
+void compute(const double *x, const double *z, double *out, long n) {
+  for (long i = 0; i < n; i += W) {
+    STORE(out + i, div_v(LOAD(x + i), LOAD(z + i)));
+    STORE(out + n + i, inv_v(LOAD(z + i)));
+    STORE(out + 2 * n + i, sqrt_v(LOAD(x + i)));
+  }
+}
+"""
+    )
+    rng, n = np.random.default_rng(2), 2**16
+    x, z = (rng.uniform(-1.0, 1.0, n) * 10.0 ** rng.uniform(-140.0, 140.0, n) for _ in range(2))
+    x[:16], z[:8], z[8:16] = [0.0, 1.0, -2.0, 3.0] * 4, 0.0, [np.inf, -np.inf, np.nan, -0.0] * 2
+    out = np.empty((3, n))
+    pointers = [ctypes.c_void_p(each.ctypes.data) for each in (x, z, out)]
+    native.load(code, own).compute(*pointers, ctypes.c_long(n))
+    with np.errstate(all="ignore"):
+        for got, wanted in zip(out, (x / z, 1.0 / z, np.sqrt(x)), strict=True):
+            special = ~np.isfinite(wanted) | (wanted == 0.0)
+            np.testing.assert_array_equal(got[special], wanted[special])
+            usual = ~special
+            assert np.max(np.abs(got[usual] / wanted[usual] - 1.0)) < 2.3e-16
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -71,8 +71,8 @@ def run(xp: Any, operations: Operations, arguments: Mapping[Entry, Any]) -> list
 def by_numpy(
     operations: Operations, arguments: Mapping[Entry, Any], out: Any, reason: Any, not_finite: int
 ) -> None:
-    """Fill `out`, shape (results, outer, inner), and `reason`, shape (outer, inner), block by block; `arguments` have
-    the shapes (1 or outer, 1 or inner)."""
+    """Fill the arrays `out` and `reason`, each of shape (outer, inner), block by block; `arguments` have the shapes
+    (1 or outer, 1 or inner)."""
     outer, inner = reason.shape
     width = min(inner, BLOCK)
     height = max(1, BLOCK // width)
@@ -90,14 +90,19 @@ def by_numpy(
                 for y, value in zip(out, results, strict=True):
                     y[rows, columns] = value
                 reason[rows, columns] = code
-                _mark(out[:, rows, columns], reason[rows, columns], not_finite)
+                _mark([y[rows, columns] for y in out], reason[rows, columns], not_finite)
 
 
 def _mark(out: Any, reason: Any, not_finite: int) -> None:
     """Results of states with a reason are NaN, and states with a result that is not finite have a reason."""
-    bad = ~np.all(np.isfinite(out), axis=0)
-    reason[bad & (reason == 0)] = not_finite
-    out[:, reason != 0] = np.nan
+    finite = np.ones(reason.shape, bool)
+    for y in out:
+        finite &= np.isfinite(y)
+    reason[~finite & (reason == 0)] = not_finite
+    bad = reason != 0
+    if bad.any():
+        for y in out:
+            y[bad] = np.nan
 
 
 @cache
@@ -145,4 +150,4 @@ def by_jax(
             for y, value in zip(out, results, strict=True):
                 y[rows] = np.asarray(value)
             reason[rows] = np.asarray(code)
-            _mark(out[:, rows], reason[rows], not_finite)
+            _mark([y[rows] for y in out], reason[rows], not_finite)

@@ -6,6 +6,7 @@ import math
 import os
 import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from ..native.operations import ARGUMENT
 from ..quantities import Variable
 from ..units import convert
 from . import arrays
-from .equations import Equations, equations, find, outputs_of
+from .equations import Equations, Result, equations, find, names_of, outputs_of
 from .native import Reductions, aligned, native_kernel
 from .reductions import REDUCTIONS
 
@@ -37,6 +38,7 @@ def evaluate(
     parameters: Any = None,
     engine: str = "native",
     workers: int | None = None,
+    out: xr.Dataset | None = None,
 ) -> xr.Dataset:
     """Outputs of a model over arrays of parameters, inputs and states.
 
@@ -56,6 +58,8 @@ def evaluate(
     engine : "native" (compiled C, SIMD, threads), "numpy" or "jax"; without a C compiler "native" is numpy, with a
         warning
     workers : number of threads of the native engine; by default that of the processors
+    out : the result of an earlier call with the same outputs and dimensions. Its memory takes the new results, and
+        its own values are gone; new memory takes as long as the computation.
 
     Returns
     -------
@@ -77,8 +81,9 @@ def evaluate(
     names = tuple(outputs if outputs is not None else (v.name for v in outputs_of(model)))
     own = equations(model, names, tuple(by))
     grid = Grid(own, values, parameters, over)
-    out, reason = grid.compute(engine, reductions, workers or os.cpu_count() or 1)
-    return grid.dataset(out, reason, reductions)
+    memory = grid.memory(reductions, out)
+    grid.compute(memory, engine, reductions, workers or os.cpu_count() or 1)
+    return grid.dataset(memory, reductions)
 
 
 def _reductions(reduce: Mapping[str, Sequence[str]]) -> Reductions:
@@ -91,15 +96,23 @@ def _reductions(reduce: Mapping[str, Sequence[str]]) -> Reductions:
     return tuple(pairs)
 
 
+@dataclass(frozen=True)
+class Memory:
+    """Where the results go: an array of each, shape (outer, inner) or, reduced, (outer,), and their reasons."""
+
+    results: Any
+    reason: Any
+
+
 class Grid:
     """The states of a batch: arguments over named dimensions."""
 
     def __init__(self, own: Equations, values: Mapping[str, Any], parameters: Any, over: str | None) -> None:
         model = own.model
         self._equations = own
-        find(list(values), own.arguments, "parameter, input or state")
+        places = find(values, names_of(own.arguments), "parameter, input or state")
         given = {
-            name: _array(own.arguments[find([name], own.arguments, "")[0]], x) for name, x in values.items()
+            name: _array(own.arguments[k], x) for k, (name, x) in zip(places, values.items(), strict=True)
         }
         self.sizes: dict[str, int] = {}
         self._coords: dict[str, Any] = {}
@@ -149,8 +162,7 @@ class Grid:
             # two passes over many values in place of seven; an extreme of values with a NaN is NaN
             if values.size and q.low < values.min() and values.max() < q.high:
                 return self._shaped(x)
-            above = values > q.low if q.open_low else values >= q.low - q.slack
-            outside: Any = ~(np.isfinite(values) & above & (values <= q.high + q.slack))
+            outside: Any = ~q.admits(values)
             inside = np.where(outside, values, np.clip(values, q.low, q.high))
         if outside.any():
             self._bounds.append((variable.name, x.copy(data=outside)))
@@ -165,36 +177,68 @@ class Grid:
         shape = [math.prod(self.sizes[d] for d in side) for side in sides]
         return np.ascontiguousarray(np.broadcast_to(full.values, full.shape), float).reshape(shape)
 
-    def compute(self, engine: str, reductions: Reductions, workers: int) -> tuple[Any, Any]:
-        """Results, shape (results, outer, inner) or reduced (reductions, outer), and their reasons."""
+    def memory(self, reductions: Reductions, earlier: xr.Dataset | None) -> Memory:
+        """New memory for the results, or that of an `earlier` result.
+
+        Raises
+        ------
+        InputError
+            where the earlier result has no memory for these results.
+        """
+        shape = self.size[:1] if reductions else self.size
+        columns = self._columns(reductions)
+        if earlier is None:
+            return Memory(aligned((len(columns), *shape)), np.zeros(shape, np.int16))
+        dims = self.dims[:-1] if reductions else self.dims
+        results = []
+        for name in (*(each.name for each in columns), "reason"):
+            x = earlier.variables.get(name)
+            kind = np.int16 if name == "reason" else np.float64
+            if x is None or x.dims != tuple(dims) or x.shape != tuple(self.sizes[d] for d in dims):
+                over = ", ".join(f"{d}: {self.sizes[d]}" for d in dims) or "one state"
+                raise InputError(
+                    f"out: has no {name} over ({over}); give the result of a call like this one, or none"
+                )
+            values = x.values
+            if values.dtype != kind or not (values.flags.c_contiguous and values.flags.writeable):
+                raise InputError(
+                    f"out: {name} is no array that can be filled; give the result of a call, unchanged"
+                )
+            results.append(values.reshape(shape))
+        reason = results.pop()
+        reason[...] = 0
+        return Memory(results, reason)
+
+    def compute(self, memory: Memory, engine: str, reductions: Reductions, workers: int) -> None:
+        """Fill the memory with results and reasons."""
         own, (outer, inner) = self._equations, self.size
-        entries = self._entries()
         if not outer:
-            shape = (0,) if reductions else self.size
-            return np.empty((len(reductions or own.results), *shape)), np.zeros(shape, np.int16)
+            return
+        entries = self._entries()
         if engine == "native" and (call := self._native(entries, reductions)) is not None:
-            shape = (outer,) if reductions else (outer, inner)
-            out = aligned((len(reductions or own.results), *shape))
-            reason = np.zeros(shape, np.int16)
             columns = [np.broadcast_to(entries[e], (len(entries[e]), inner)) for e in call.columns]
             call(
                 [entries[e][:, 0].copy() for e in call.inputs],
                 [np.ascontiguousarray(c) for c in columns],
-                out,
-                reason,
+                memory.results,
+                memory.reason,
                 self.size,
                 workers,
             )
         else:
-            out, reason = np.empty((len(own.results), outer, inner)), np.zeros((outer, inner), np.int16)
-            fill = arrays.by_jax if engine == "jax" else arrays.by_numpy
-            fill(own.operations, entries, out, reason, own.not_finite)
+            states = memory
             if reductions:
-                reason = np.max(reason, axis=1)
+                states = Memory(
+                    np.empty((len(own.results), outer, inner)), np.zeros((outer, inner), np.int16)
+                )
+            fill = arrays.by_jax if engine == "jax" else arrays.by_numpy
+            fill(own.operations, entries, states.results, states.reason, own.not_finite)
+            if reductions:
                 with np.errstate(invalid="ignore"):
-                    out = np.array([REDUCTIONS[name].of_array(out[place]) for place, name in reductions])
-        self._refuse(out, reason)
-        return out, reason
+                    for to, (place, name) in zip(memory.results, reductions, strict=True):
+                        to[...] = REDUCTIONS[name].of_array(states.results[place])
+                memory.reason[...] = np.max(states.reason, axis=1)
+        self._refuse(memory)
 
     def _entries(self) -> dict[tuple[int, int], Any]:
         sizes = self._equations.sizes
@@ -216,13 +260,14 @@ class Grid:
             )
         return kernel
 
-    def _refuse(self, out: Any, reason: Any) -> None:
+    def _refuse(self, memory: Memory) -> None:
         """Values outside their bounds come before all other reasons."""
         for k, (_, outside) in enumerate(self._bounds):
             bad: Any = np.broadcast_to(self._shaped(outside).astype(bool), self.size)
-            bad = bad.any(axis=1) if reason.ndim == 1 else bad
-            reason[bad] = self._equations.not_finite + 1 + k
-            out[:, bad] = np.nan
+            bad = bad.any(axis=1) if memory.reason.ndim == 1 else bad
+            memory.reason[bad] = self._equations.not_finite + 1 + k
+            for x in memory.results:
+                x[bad] = np.nan
 
     @property
     def reasons(self) -> list[str]:
@@ -236,29 +281,31 @@ class Grid:
             *(f"{name}: must be {bounds[name]}" for name, _ in self._bounds),
         ]
 
-    def dataset(self, out: Any, reason: Any, reductions: Reductions) -> xr.Dataset:
-        """The results with names, units and coordinates."""
+    def _columns(self, reductions: Reductions) -> Sequence[Result]:
+        """Name, unit and description of each column."""
         results = self._equations.results
+        if not reductions:
+            return results
+        return [
+            Result(
+                f"{name}({results[k].name})",
+                results[k].unit,
+                f"{REDUCTIONS[name].words}, {results[k].description}",
+            )
+            for k, name in reductions
+        ]
+
+    def dataset(self, memory: Memory, reductions: Reductions) -> xr.Dataset:
+        """The results with names, units and coordinates."""
         dims = self.dims[:-1] if reductions else self.dims
         shape = [self.sizes[d] for d in dims]
-        if reductions:
-            columns = [
-                (
-                    f"{name}({results[k].name})",
-                    results[k].unit,
-                    f"{REDUCTIONS[name].words}, {results[k].description}",
-                )
-                for k, name in reductions
-            ]
-        else:
-            columns = [(r.name, r.unit, r.description) for r in results]
         variables = {
-            name: (dims, x.reshape(shape), {"units": unit, "long_name": words})
-            for (name, unit, words), x in zip(columns, out, strict=True)
+            each.name: (dims, x.reshape(shape), {"units": each.unit, "long_name": each.description})
+            for each, x in zip(self._columns(reductions), memory.results, strict=True)
         }
         flags: dict[str, Any] = {"flag_values": list(range(len(self.reasons))), "reasons": self.reasons}
         flags["long_name"] = "reason for which there is no result"
-        variables["reason"] = (dims, reason.reshape(shape), flags)
+        variables["reason"] = (dims, memory.reason.reshape(shape), flags)
         coords = {name: c for name, c in self._coords.items() if set(map(str, c.dims)) <= set(dims)}
         return xr.Dataset(variables, coords)
 

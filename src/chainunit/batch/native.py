@@ -42,7 +42,7 @@ def _source(equations: Equations, code: VectorCode, reductions: Reductions) -> s
         each, words = REDUCTIONS[name], {"a": f"A{k}", "y": f"y[{place}]", "one": "one", "n": "i1-i0"}
         begin.append(f"v A{k} = {each.begin};")
         take.append(f"A{k} = {each.take.format(**words)};")
-        end.append(f"out[{k} * out_step + o] = worst ? NAN : {each.end.format(**words)};")
+        end.append(f"out[{k}][o] = worst ? NAN : {each.end.format(**words)};")
     if reductions:
         end.append("reason[o] = worst;")
     defines = {
@@ -97,12 +97,14 @@ class NativeKernel:
         ----------
         uniform : arrays of shape (1,) or (outer,), by `inputs`, or one array of which they are the rows
         columns : arrays of shape (1, inner) or (outer, inner), by `columns`, or one array of which they are the parts
-        out, reason : arrays to be filled, (results, outer, inner) and (outer, inner), or, reduced, without `inner`
+        out : arrays to be filled, each of shape (outer, inner), or, reduced, (outer,), or one array of which they are
+            the parts
+        reason : array to be filled, of the same shape
         size : (outer, inner)
         workers : number of threads
         """
         outer, inner = size
-        pointers = [_pointers(arrays) for arrays in (uniform, columns)]
+        pointers = [_pointers(arrays) for arrays in (uniform, columns, out)]
         steps = [
             (ctypes.c_long * (len(uniform) + 1))(*(int(len(x) > 1) for x in uniform)),
             (ctypes.c_long * (len(columns) + 1))(*(inner * int(len(x) > 1) for x in columns)),
@@ -115,8 +117,7 @@ class NativeKernel:
                 steps[0],
                 pointers[1],
                 steps[1],
-                out.ctypes.data_as(ctypes.c_void_p),
-                ctypes.c_long(out[0].size if len(out) else 0),
+                pointers[2],
                 reason.ctypes.data_as(ctypes.c_void_p),
             )
 
@@ -125,8 +126,18 @@ class NativeKernel:
             for each in pieces:
                 piece(each)
         else:
-            with ThreadPoolExecutor(workers) as pool:
-                list(pool.map(piece, pieces))
+            list(threads(workers).map(piece, pieces))
+
+
+@lru_cache
+def threads(workers: int) -> ThreadPoolExecutor:
+    """So many threads, which stay: their start takes as long as some ten thousand states."""
+    return ThreadPoolExecutor(workers, "chainunit")
+
+
+if hasattr(os, "register_at_fork"):
+    # a child of a fork has none of the threads
+    os.register_at_fork(after_in_child=threads.cache_clear)
 
 
 def aligned(shape: tuple[int, ...]) -> Any:

@@ -2,7 +2,7 @@
  * and, for results that are reduced over the inner dimension, the statements BEGIN, TAKE (of each vector) and END. */
 
 void batch(long o0, long o1, long i0, long i1, long n, const double *const *in, const long *in_step,
-           const double *const *column, const long *column_step, double *out, long out_step, short *reason) {
+           const double *const *column, const long *column_step, double *const *out, short *reason) {
   for (long o = o0; o < o1; ++o) {
     double given[INPUTS + 1], U[ROOM];
     for (int k = 0; k < INPUTS; ++k) given[k] = in[k][o * in_step[k]];
@@ -37,7 +37,7 @@ void batch(long o0, long o1, long i0, long i1, long n, const double *const *in, 
       for (int r = 0; r < RESULTS; ++r) STORE(&block[r][i - begin], y[r]);
       if (i + W >= i1 || i + W - begin >= BLOCK) {
         const long length = (i + W < i1 ? i + W : i1) - begin;
-        for (int r = 0; r < RESULTS; ++r) copy(out + r * out_step + o * n + begin, block[r], length);
+        for (int r = 0; r < RESULTS; ++r) copy(out[r] + o * n + begin, block[r], length);
         begin = i + W;
       }
 #endif

@@ -13,7 +13,6 @@ import hashlib
 import math
 import os
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -28,10 +27,9 @@ from ..model import Model
 from ..native.code import constant
 from ..native.compilers import Compiler, compiler
 from ..native.operations import ARGUMENT, Operations
-from ..quantities import Variable
 from ..trace import trace
-from .equations import arguments_of, find, outputs_of
-from .native import load
+from .equations import arguments_of, find, names_of, outputs_of
+from .native import load, threads
 from .vector_code import VectorCode, c_file
 
 _NUMBERS = (
@@ -200,8 +198,7 @@ class Transients:
         if workers == 1:
             piece((0, room))
         else:
-            with ThreadPoolExecutor(min(workers, os.cpu_count() or 1)) as pool:
-                list(pool.map(piece, pieces))
+            list(threads(min(workers, os.cpu_count() or 1)).map(piece, pieces))
         times = np.minimum(begin[:, None] + step * np.arange(rows), stop[:, None])
         count = count[:runs]
         return Runs(out[:, :runs], np.abs(count), count < 0, x[:, :runs], times)
@@ -229,11 +226,11 @@ def _compiled(
     assert model.state_layout is not None
     states = model.state_layout.variables
     entries = [
-        *((0, k) for k in find(varying, model.parameter_layout.variables, "parameter")),
-        *((1, k) for k in find(driven, model.input_layout.variables, "input")),
+        *((0, k) for k in find(varying, model.parameter_layout.names, "parameter")),
+        *((1, k) for k in find(driven, model.input_layout.names, "input")),
         *((2, k) for k in range(len(states))),
     ]
-    find(guarded, [_named(name) for name in outputs], "output that is kept")
+    find(guarded, outputs, "output that is kept")
     code = VectorCode(operations, entries)
     sizes = len(model.parameter_layout.names), len(model.input_layout.names)
     places = {entry: k for k, entry in enumerate(entries)}
@@ -293,10 +290,6 @@ def _method(model: type[Model], operations: Operations) -> str:
     return "INTERPOLATED" if free else "TO_ROWS"
 
 
-def _named(name: str) -> Variable:
-    return Variable(name, "", None)  # type: ignore[arg-type]
-
-
 def _operations(model: type[Model], outputs: Sequence[str]) -> Operations:
     """Three groups: the derivatives of the states, these outputs and states, and the states that meet the constraints
     of a model with error control."""
@@ -304,14 +297,10 @@ def _operations(model: type[Model], outputs: Sequence[str]) -> Operations:
 
     t = trace(model)
     assert model.state_layout is not None
-    declared = (*model.state_layout.variables, *outputs_of(model))
+    declared = names_of((*model.state_layout.variables, *outputs_of(model)))
     values = [*casadi.vertsplit(t.symbols[2]), *t.outputs]
     rows = casadi.vertcat(*(casadi.SX(values[k]) for k in find(outputs, declared, "output")), casadi.SX(0, 1))
     rates = casadi.vertcat(*(casadi.SX(rate) for rate in t.derivatives))
     closed = model.closed(casadi_(), t.p, t.u, t.x) if model.controlled else []
     met = casadi.vertcat(*(casadi.SX(x) for x in closed), casadi.SX(0, 1))
-    if model.derived:
-        p = model.parameter_layout.instance(casadi.vertsplit(t.symbols[0]))
-        derived = casadi.vertcat(*model.derive(casadi_(), p))
-        rates, rows, met = casadi.substitute([rates, rows, met], [t.symbols[3]], [derived])
-    return Operations(t.symbols[:3], [rates, rows, met])
+    return Operations(t.symbols[:3], t.explicit([rates, rows, met]))

@@ -13,7 +13,7 @@ from importlib import resources
 from ..native.code import forms, number
 from ..native.operations import ARGUMENT, NUMBER, Operation, Operations
 
-_ARITHMETIC = {"ADD", "SUB", "MUL", "DIV", "SQ", "TWICE", "INV", "NEG", "ASSIGN"}
+_ARITHMETIC = {"ADD", "SUB", "MUL", "SQ", "TWICE", "NEG", "ASSIGN"}
 """Operations that C has for vectors, or for a vector and a number; all others are functions of vectors."""
 _NAMES = {"CONSTPOW": "pow"}
 
@@ -51,10 +51,6 @@ class VectorCode:
     def room(self) -> int:
         """Length of ``U``."""
         return max(1, len(self._slots))
-
-    def varies(self, group: int) -> bool:
-        """Whether a result of the group varies over the lanes."""
-        return any(self._varies[place] for place in self._results[group])
 
     def _needed(self, places: set[int]) -> list[int]:
         """The places of all operations on which these depend, and they themselves, in order."""
