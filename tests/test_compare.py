@@ -191,7 +191,26 @@ def test_a_folder_without_a_result_is_refused(folder, tmp_path, content, words, 
     assert not (tmp_path / "out").exists()
 
 
-def test_the_page_of_a_study_is_not_written_over(folder):
-    done = chainunit("compare", "a", "b", "-o", "a", cwd=folder)
-    assert done.returncode == 2 and "-o a: has the page of a study" in done.stderr
-    assert not (folder / "a" / "report.html").exists()
+@pytest.mark.parametrize(
+    ("command", "there", "words"),
+    [
+        (["compare", "a", "b"], "a", "a study"),
+        (["sweep", "s.toml"], "a", "a study"),
+        (["optimize", "o.toml"], "a", "a study"),
+        (["study"], "out", "a comparison"),
+    ],
+)
+def test_a_result_of_another_kind_is_not_lost(folder, command, there, words):
+    """Every command refuses it before it computes or writes."""
+    parameter = "[[sweep.parameter]]\nname = 'machine.r'\nvalues = [0.15, 0.16]\n"
+    (folder / "s.toml").write_text(f"[sweep]\nangles = 16\n{parameter}")
+    (folder / "o.toml").write_text("[optimize.free]\nr = { min = 0.1, max = 0.2 }\n")
+    before = {file: file.stat().st_mtime_ns for file in (folder / there).rglob("*")}
+    done = chainunit(*command, "-o", there, cwd=folder)
+    assert done.returncode == 2 and len(done.stderr.splitlines()) == 1
+    assert f"{there}: has the result of {words}, which would be lost; name another folder" in done.stderr
+    assert before == {file: file.stat().st_mtime_ns for file in (folder / there).rglob("*")}
+
+
+def test_a_comparison_is_made_again_in_its_folder(folder):
+    assert chainunit("compare", "a", "b", "-o", "out", cwd=folder).returncode == 0

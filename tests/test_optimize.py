@@ -456,6 +456,8 @@ def test_the_command(tmp_path, best):
     assert float(value) == pytest.approx(best.answer.value, rel=1e-4)
     # its tables are those of the study, so that the search may go on from there
     assert wishes_of(written).free == best.wishes.free
+    other = chainunit("study", "-o", "out/deep", cwd=tmp_path)
+    assert other.returncode == 2 and "has the result of a search for the best machine" in other.stderr
 
 
 def test_the_command_with_an_impossible_wish(tmp_path):

@@ -535,6 +535,8 @@ def test_the_command(tmp_path):
     assert not (tmp_path / "map" / "sweep_of_old.png").exists()
     again = json.loads((tmp_path / "map" / "result.json").read_text("utf-8"))
     assert again["title"] == "Again" and again["best"] == numbers["best"]
+    other = chainunit("study", "-o", "map", cwd=tmp_path)
+    assert other.returncode == 2 and "map: has the result of a sweep, which would be lost" in other.stderr
 
 
 def test_the_command_refuses(tmp_path):

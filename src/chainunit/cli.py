@@ -144,7 +144,7 @@ def study(
     from .report import study as contents
     from .study.record import INSUFFICIENT
 
-    with claim(output):
+    with claim(output, "study"):
         errors = terminal_console(stderr=True)
         with progress_bar(errors) as progress:
             record = results.compute(
@@ -179,14 +179,12 @@ def compare(
     Writes report.html, comparison.json and comparison.md into the output folder.
     """
     from .report import comparison, files
-    from .study.comparison import FILE, read_result
     from .study.comparison import compare as compared
+    from .study.comparison import read_result
 
     results = read_result(a), read_result(b)
-    if (output / FILE).exists():
-        raise InputError(f"-o {output}: has the page of a study, which would be lost; name another folder")
-    contents = comparison.comparison_report(compared(*results))
-    with claim(output):
+    with claim(output, "compare"):
+        contents = comparison.comparison_report(compared(*results))
         clear(output, *files.names(comparison.NAME, ()))
         finish(contents, output, comparison.NAME)
 
@@ -202,7 +200,7 @@ def optimize(
     Writes best.toml, report.html, result.json, result.md and pictures into the output folder.
     """
     loaded = study_file(config)
-    with claim(output):
+    with claim(output, "optimize"):
         from .report import optimum
 
         with progress_bar(terminal_console(stderr=True)) as progress:
@@ -262,7 +260,7 @@ def reproduce(
 
     Writes report.html, reproduction.json, reproduction.md and the figures into the output folder.
     """
-    with claim(output):
+    with claim(output, "reproduce"):
         from .papers import reproduce as compute
         from .papers.output import report
         from .report import files
@@ -283,7 +281,7 @@ def two_bar_error(
     """
     from .papers import two_bar
 
-    with claim(output):
+    with claim(output, "two-bar-error"):
         from .report import files
 
         clear(output, *files.names(two_bar.NAME, (two_bar.PICTURE,)))
@@ -315,7 +313,7 @@ def linkage_command(
     turns = machine.model.turns
     usual, unit = ("60 rpm", "rad/s") if turns else ("0.1 m/s", "m/s")
     rate = option_value("--speed", speed or usual, unit, "speed of the driver")
-    with claim(output):
+    with claim(output, "linkage"):
         from .report import files, linkage_report
         from .study.linkage_turn import linkage_findings
 

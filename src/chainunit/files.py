@@ -4,18 +4,41 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import json
 import os
 import re
 import secrets
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NamedTuple
 
 from .errors import InputError, WriteError
 
 LOCK = ".chainunit-lock"
 """Name of the file that stands in a folder while a process writes there."""
+
+
+class _Kind(NamedTuple):
+    """A kind of result: its words, the file that has its numbers, and a key that only this kind has there; without a
+    key the name of the file tells the kind."""
+
+    words: str
+    file: str
+    key: str = ""
+
+
+RESULTS: Mapping[str, _Kind] = {
+    "study": _Kind("a study", "result.json", "answers"),
+    "sweep": _Kind("a sweep", "result.json", "best_by"),
+    "optimize": _Kind("a search for the best machine", "result.json", "objectives"),
+    "compare": _Kind("a comparison", "comparison.json"),
+    "linkage": _Kind("a linkage", "linkage.json"),
+    "reproduce": _Kind("the papers", "reproduction.json"),
+    "two-bar-error": _Kind("the two-bar error", "two_bar_error.json"),
+}
+"""The kinds of results by their commands. All have a file report.html."""
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
 
 
@@ -128,9 +151,32 @@ def folder(path: Path) -> Path:
     return path
 
 
+def refuse_other_result(path: Path, command: str) -> None:
+    """Refuse a folder with a result that `command` would overwrite, as another command of `RESULTS` made it.
+
+    Raises
+    ------
+    InputError
+        which names the kind of the result.
+    """
+    for other, kind in RESULTS.items():
+        file = path / kind.file
+        if other == command or not file.is_file():
+            continue
+        if kind.key:
+            try:
+                result = json.loads(file.read_bytes())
+            except (OSError, ValueError, RecursionError):
+                continue
+            if not isinstance(result, dict) or kind.key not in result:
+                continue
+        raise InputError(f"{path}: has the result of {kind.words}, which would be lost; name another folder")
+
+
 @contextmanager
-def claim(path: Path) -> Iterator[Path]:
-    """The `folder` at `path`, for this process alone as long as the context lasts.
+def claim(path: Path, command: str = "") -> Iterator[Path]:
+    """The `folder` at `path`, for this process alone as long as the context lasts; for a `command` of `RESULTS` it
+    must not have the result of another one.
 
     A lock of the operating system on a file guards the folder. The file is removed at the end. The lock ends
     with the process, even if the process is killed. A file system without locks gives no protection. A folder
@@ -139,8 +185,10 @@ def claim(path: Path) -> Iterator[Path]:
     Raises
     ------
     InputError
-        where another process writes there; see also `folder`.
+        where another process writes there; see also `refuse_other_result` and `folder`.
     """
+    if command:
+        refuse_other_result(path, command)
     ours, left_empty = not path.exists(), False
     lock = folder(path) / LOCK
     while True:

@@ -202,7 +202,7 @@ class Study:
         if folder is None:
             result = in_temporary_folder(result_in)
         else:
-            with claim(Path(folder)) as place:
+            with claim(Path(folder), "study") as place:
                 result = result_in(place)
                 result._write(place)
         failure = result.record.failure
@@ -233,7 +233,7 @@ class Study:
         """
         if folder is None:
             return BestResult(self.config, optimum.search(self.config, progress, backend))
-        with claim(Path(folder)) as place:
+        with claim(Path(folder), "optimize") as place:
             result = BestResult(self.config, optimum.compute(self.config, place, progress, backend))
             result._write(place)
         return result
@@ -364,7 +364,7 @@ class StudyResult:
         InputError, WriteError
             as `Study.run`.
         """
-        with claim(Path(folder)) as place:
+        with claim(Path(folder), "study") as place:
             if place.resolve() != self._folder.resolve():
                 clear(place, *results.FILES)
                 shutil.copytree(self._folder / "fmu", place / "fmu", dirs_exist_ok=True)
@@ -437,7 +437,7 @@ class BestResult:
         InputError, WriteError
             as `Study.optimize`.
         """
-        with claim(Path(folder)) as place:
+        with claim(Path(folder), "optimize") as place:
             clear(place, *optimum.FILES)
             return self._write(place)
 

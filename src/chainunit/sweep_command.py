@@ -36,7 +36,7 @@ def sweep(
     loaded = study_file(config)
     from .report import sweep as contents
 
-    with claim(output):
+    with claim(output, "sweep"):
         with progress_bar(terminal_console(stderr=True)) as progress:
             summary = contents.compute(loaded, output, progress, workers, scheduler)
         report = contents.report(summary)

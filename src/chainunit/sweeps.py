@@ -82,7 +82,7 @@ def make_sweep(
 
     if folder is None:
         return in_temporary_folder(result_in)
-    with claim(folder) as place:
+    with claim(folder, "sweep") as place:
         result = result_in(place)
         _, failure = write_all(contents.writers(result.summary, contents.report(result.summary), place))
         if failure is not None:
