@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import signal
+import sys
 import tomllib
 from pathlib import Path
 
@@ -24,6 +26,7 @@ from chainunit.study.optimum.best import find_best, machine_at
 from chainunit.study.optimum.conflict import nearest
 from chainunit.study.optimum.extremes import TurnValues, grid
 from chainunit.study.optimum.kernel import Kernel, pieces, symbols_of
+from chainunit.study.optimum.program import AngleProgram
 from chainunit.study.optimum.requirements import Requirements
 from chainunit.study.optimum.search import Search
 from chainunit.study.optimum.study_file import toml_text
@@ -458,6 +461,43 @@ def test_the_command(tmp_path, best):
     assert wishes_of(written).free == best.wishes.free
     other = chainunit("study", "-o", "out/deep", cwd=tmp_path)
     assert other.returncode == 2 and "has the result of a search for the best machine" in other.stderr
+
+
+@pytest.fixture
+def few(monkeypatch, tmp_path):
+    """A search over one number, by NumPy."""
+    monkeypatch.setattr(kernels, "native_kernel", lambda *_: None)
+    (tmp_path / "mine.toml").write_text(
+        '[optimize]\nobjectives = ["rms(crank_torque)"]\n[optimize.free.crank]\ns = { min = -1, max = 1 }'
+    )
+    return tmp_path
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+@pytest.mark.parametrize(("sent", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_an_interrupt_inside_the_solver_ends_the_command(sent, status, few, monkeypatch):
+    """CasADi takes an exception in a callback for a failed evaluation: the interrupt must reach the command."""
+    calls, bend = [], AngleProgram.bend
+
+    def interrupted(self, *arguments):
+        calls.append(1)
+        if len(calls) == 2:
+            signal.raise_signal(sent)
+        return bend(self, *arguments)
+
+    monkeypatch.setattr(AngleProgram, "bend", interrupted)
+    done = chainunit("optimize", "mine.toml", "-o", "out", cwd=few)
+    assert done.returncode == status and "interrupted" in done.stderr, done.stderr
+    assert len(calls) == 2 and not (few / "out").exists()
+
+
+def test_an_error_inside_the_solver_is_no_failed_start(few, monkeypatch):
+    def broken(*_):
+        raise ZeroDivisionError("of the test")
+
+    monkeypatch.setattr(AngleProgram, "bend", broken)
+    with pytest.raises(ZeroDivisionError, match="of the test"):
+        find_best(wishes((few / "mine.toml").read_text()))
 
 
 def test_the_command_with_an_impossible_wish(tmp_path):

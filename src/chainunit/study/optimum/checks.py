@@ -14,6 +14,7 @@ import xarray as xr
 from ...fmu.backends import Backend, export
 from ...machines.machine import Machine
 from ...system.instance import Fmu, Instance
+from ...system.simulation import stoppable
 from ..cycle_quantities import CycleQuantity, evaluate
 from .extremes import grid
 from .search import FINE, Search
@@ -127,7 +128,8 @@ def by_fmu(
     file = folder / f"{model.name}.fmu"
     export(model, file, machine.by_name, backend=backend)
     columns = {i.column for q in quantities.values() for i in q.integrands}
-    series = _run(file, machine, wishes, np.array([*grid(FINE), *angles]), columns)
+    with stoppable():  # an interrupt would be a fatal error inside the FMU
+        series = _run(file, machine, wishes, np.array([*grid(FINE), *angles]), columns)
     results = {}
     for name, q in quantities.items():
         if not all(i.column in series for i in q.integrands):

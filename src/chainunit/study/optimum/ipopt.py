@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from ...system.simulation import stoppable
 from .program import AngleProgram
 
 _DONE = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
@@ -52,7 +53,13 @@ class Solution:
 def solve(
     program: AngleProgram, cost: Any, low: Any, high: Any, begin: Any, warm: Solution | None = None
 ) -> Solution:
-    """The least ``cost @ z`` under the constraints of the program, with the variables from `low` to `high`."""
+    """The least ``cost @ z`` under the constraints of the program, with the variables from `low` to `high`.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        where Ctrl-C or SIGTERM came in the meantime.
+    """
     import casadi
 
     n, m = program.size, program.constraints
@@ -73,15 +80,17 @@ def solve(
     def bend(z: Any, _: Any, factor: Any, multipliers: Any) -> list[Any]:
         return [program.bend(z, multipliers)[upper][order]]
 
+    guard = _Guard()
     callbacks = [
-        _callback("values", [x, p], [f, g], values),
-        _callback("gradient", [x, p], [f, ("grad_f_x", dense(n, 1))], gradient),
-        _callback("slopes", [x, p], [g, ("jac_g_x", dense(m, n))], slopes),
+        _callback("values", [x, p], [f, g], values, guard),
+        _callback("gradient", [x, p], [f, ("grad_f_x", dense(n, 1))], gradient, guard),
+        _callback("slopes", [x, p], [g, ("jac_g_x", dense(m, n))], slopes, guard),
         _callback(
             "bend",
             [x, p, ("lam_f", dense(1, 1)), ("lam_g", dense(m, 1))],
             [("triu_hess_gamma_x_x", casadi.Sparsity.upper(n))],
             bend,
+            guard,
         ),
     ]
     given: dict[str, Any] = dict(zip(("grad_f", "jac_g", "hess_lag"), callbacks[1:], strict=True))
@@ -90,14 +99,33 @@ def solve(
     start: dict[str, Any] = {"x0": begin}
     if warm is not None and len(warm.multipliers) == m:
         start |= {"lam_g0": warm.multipliers, "lam_x0": warm.bounds}
-    out = solver(lbx=low, ubx=high, lbg=np.where(program.equal, 0.0, -np.inf), ubg=0.0, **start)
+    # an exception inside a callback would end in IPOPT, as a step that was too long
+    with stoppable() as guard.stopped:
+        out = solver(lbx=low, ubx=high, lbg=np.where(program.equal, 0.0, -np.inf), ubg=0.0, **start)
+        interrupted = guard.stopped()
+    if interrupted:
+        raise KeyboardInterrupt
+    if guard.errors:
+        raise guard.errors[0]
     stats = solver.stats()
     status = str(stats["return_status"])
     z, multipliers, bounds = (np.array(out[name]).ravel() for name in ("x", "lam_g", "lam_x"))
     return Solution(z, multipliers, bounds, status in _DONE, status, int(stats["iter_count"]))
 
 
-def _callback(name: str, inputs: Any, outputs: Any, compute: Callable[..., list[Any]]) -> Any:
+@dataclass
+class _Guard:
+    """Tells the callbacks of a solution to end without computing: after an interrupt, or an error in one of them."""
+
+    stopped: Callable[[], bool] = lambda: False
+    errors: list[Exception] = field(default_factory=list)
+
+    @property
+    def ends(self) -> bool:
+        return bool(self.errors) or self.stopped()
+
+
+def _callback(name: str, inputs: Any, outputs: Any, compute: Callable[..., list[Any]], guard: _Guard) -> Any:
     """A function of CasADi that calls `compute` with arrays; its results may have no values (NaN), which IPOPT
     takes for a step that was too long."""
     import casadi
@@ -129,10 +157,17 @@ def _callback(name: str, inputs: Any, outputs: Any, compute: Callable[..., list[
             return True
 
         def eval_buffer(self, arguments: Any, results: Any) -> int:
+            if guard.ends:
+                return 1
             given = [
                 np.frombuffer(x, dtype=float).copy() if x is not None else np.zeros(0) for x in arguments
             ]
-            for result, value in zip(results, compute(*given), strict=True):
+            try:
+                values = compute(*given)
+            except Exception as error:
+                guard.errors.append(error)
+                return 1
+            for result, value in zip(results, values, strict=True):
                 if result is not None:
                     np.frombuffer(result, dtype=float)[:] = value
             return 0
