@@ -18,6 +18,8 @@ from chainunit.machines.knife_drive import KnifeDrive
 from chainunit.machines.linkages.file import read_linkage
 from chainunit.machines.machine import Machine
 from chainunit.native.compilers import compiler
+from chainunit.report.optimum import optimum_report
+from chainunit.report.terminal import plain
 from chainunit.study import config as study_files
 from chainunit.study.cycle_quantities import cycle_quantity, evaluate
 from chainunit.study.optimum import checks
@@ -28,11 +30,13 @@ from chainunit.study.optimum.extremes import TurnValues, grid
 from chainunit.study.optimum.kernel import Kernel, pieces, symbols_of
 from chainunit.study.optimum.program import AngleProgram
 from chainunit.study.optimum.requirements import Requirements
+from chainunit.study.optimum.result import as_dict
 from chainunit.study.optimum.search import Search
 from chainunit.study.optimum.study_file import toml_text
 from chainunit.study.optimum.table import wishes_of
 from chainunit.study.optimum.words import bindings, conflict_sentences
 from chainunit.study.parts import EXAMPLES, example
+from chainunit.study.verdict import ROCKER_GOOD
 
 LINKAGES = Path(__file__).parents[1] / "examples" / "linkages"
 TABLE = """
@@ -516,6 +520,20 @@ def test_no_machine_within_the_bounds_turns(tmp_path):
         "No machine within the bounds of optimize.free turns. The one nearest to today's: r = 1.2 m"
         in done.stderr
     )
+
+
+def test_a_speed_beyond_the_limit_of_the_organs_is_told(best):
+    """The limit of the best machine, not that of today's."""
+    config = study_files.parse(TABLE)
+    feed, answer = best.wishes.feed, best.machine
+    (organ,) = as_dict(best, config)["organs"]
+    limit = ROCKER_GOOD * answer.chain_modes(feed.left, feed.right).frequency[0]
+    assert (
+        organ["topic"] == "rocker torque" and organ["limit"]["value"] == pytest.approx(limit) and limit < 3.0
+    )
+    assert "the limit of the best machine is" in plain(optimum_report(best, config))
+    slow = _with(best, wishes=_with(best.wishes, crank_speed=0.9 * limit))
+    assert as_dict(slow, config)["organs"] == []
 
 
 def test_in_python(best):

@@ -28,6 +28,7 @@ from chainunit.study.choice import choose
 from chainunit.study.config import parse
 from chainunit.study.cycle import cycle
 from chainunit.study.sweep_summary import _correlation, _explained
+from chainunit.study.verdict import two_bars
 
 HERE = Path(__file__).parent
 NATIVE = pytest.mark.skipif(compiler() is None, reason="no C compiler")
@@ -460,6 +461,33 @@ def test_the_summary_is_that_of_the_table(grid, spread):
         best = good.sort_values(numbers["best_by"].removeprefix("least "), kind="stable").head(10)
         assert [each["point"]["value"] for each in numbers["best"]] == list(best.index)
         assert [each["machine.r"]["value"] for each in numbers["best"]] == list(best["machine.r"])
+
+
+def test_points_beyond_the_limits_of_two_bars_are_counted():
+    """By the verdict of a study at each speed; quantities of the motion alone do not depend on the organs."""
+    text = "[sweep]\nmethod = 'grid'\nangles = 16\nquantities = ['{}']\n"
+    text += "[[sweep.parameter]]\nname = '{}'\nvalues = {}\n"
+    speeds = [1.0, 2.0, 2.1, 3.0, 3.5, 5.0, 8.0]
+    study = Study.from_text(text.format("peak(tau)", "run.crank_speed", speeds))
+    machine, feed = study.machine, study.config.feed
+    mode = machine.chain_modes(feed.left, feed.right).frequency[0]
+    slack = machine.slack_speed(feed.left, feed.right)
+    topics = [each.topic for w in speeds for each in two_bars(w, mode, slack, {}, {}).reasons]
+    result = study.sweep(workers=1)
+    organs = {each["topic"]: each for each in json.loads(result.to_json())["organs"]}
+    points = {topic: each["points"]["value"] for topic, each in organs.items()}
+    both = topics.count("rocker torque") + topics.count("crank torque")
+    assert points == {topic: topics.count(topic) for topic in topics} | {"rocker torque": both}
+    assert points["rocker torque"] > points["slack speed"] > 0
+    assert organs["slack speed"]["limit"]["value"] == pytest.approx(slack)
+    assert "goes slack: 28.6 % of the points. The limit of the study's machine and feed is 4.58" in repr(
+        result
+    )
+    still = text.format("peak(tau)", "machine.r", [0.14, 0.15])
+    (organ,) = json.loads(Study.from_text(still).sweep(workers=1).to_json())["organs"]
+    assert organ["topic"] == "rocker torque" and organ["share"]["value"] == 1.0
+    motion = Study.from_text(text.format("min(margin)", "run.crank_speed", speeds)).sweep(workers=1)
+    assert json.loads(motion.to_json())["organs"] == []
 
 
 def test_influences(spread):

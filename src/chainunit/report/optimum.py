@@ -116,6 +116,12 @@ def _opening(s: b.Source, best: Best) -> Iterator[b.Block]:
             f"{name}: ", s.number(f"{path}.best"), ", today ", s.number(f"{path}.today"), _share(s, path), "."
         )
         yield b.Judgement("good", words) if k == 0 else b.Text(words)
+    for i in range(len(s.result["organs"])):
+        path = f"organs.{i}"
+        words = s.line(f"{{{path}.text}}: the crank turns at {{speed}}")
+        yield b.Judgement(
+            "warning", line(words, s.line(f", and the limit of the best machine is {{{path}.limit}}."))
+        )
     yield _turns(best)
 
 

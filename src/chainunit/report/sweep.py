@@ -77,6 +77,12 @@ def _opening(s: b.Source) -> Iterator[b.Block]:
             yield b.Judgement(
                 "warning", s.line(f"No result at {{{path}.share}} of the points: {{{path}.reason}}.")
             )
+    for i in range(len(s.result["organs"])):
+        path = f"organs.{i}"
+        words = s.line(
+            f"{{{path}.text}}: {{{path}.share}} of the points. The limit of the study's machine and feed "
+        )
+        yield b.Judgement("warning", line(words, s.line(f"is {{{path}.limit}}.")))
     if not s.result["feasible"]["value"]:
         yield b.Judgement("bad", "No point of the sweep has a result; take other ranges.", form="both")
 

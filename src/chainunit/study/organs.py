@@ -21,6 +21,7 @@ from .config import Config
 from .cycle import Cycle, cycle
 from .drive import Drive
 from .one_sided import all_on_one, alone, without
+from .organ_limits import slack_and_mode
 from .record import StudyRecord
 from .rig import Rig
 
@@ -211,14 +212,14 @@ class OrganAnalysis(Analysis):
         """The findings for two bars, also where the organs are chains."""
         machine, feed, speed = study.drive.chain_unit, study.config.feed, study.config.run.crank_speed
         (right, _), (left, _) = machine.rocker_extremes()
-        modes = machine.chain_modes(feed.left, feed.right)
+        slack, mode = slack_and_mode(machine, feed)
         return OrganFindings(
             factors={side: overload_factors(machine, speed, feed, side) for side in SIDES},
             sides=sides_over_speed(machine, feed),
             limits=Limits(
-                slack_speed=machine.slack_speed(feed.left, feed.right),
+                slack_speed=slack,
                 slack_speed_empty=machine.slack_speed(),
-                chain_resonance=math.inf if modes is None else float(modes.frequency[0]),
+                chain_resonance=mode,
                 rocker_extreme_right=right,
                 rocker_extreme_left=left,
                 margin=float(np.min(study.statics.normal.outputs.margin)),

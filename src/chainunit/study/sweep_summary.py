@@ -18,8 +18,11 @@ from .. import __version__
 from ..quantities import Layout, Quantity, Variable
 from ..text import entry, shown_in
 from .measures import Answers
+from .organ_limits import limits_of_organs
 from .quantiles import CONFIDENCE, quantile
 from .sweep import SweepFindings
+from .sweep_reading import SPEED
+from .verdict import SpeedLimit, passed_limits
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -175,6 +178,24 @@ class SweepSummary:
         values = {name: float(np.ravel(turn[name].values)[0]) for name in plan.quantities}
         return {name: x for name, x in values.items() if np.isfinite(x)}
 
+    @cached_property
+    def organs(self) -> list[tuple[SpeedLimit, int]]:
+        """The limits of the crank speed for two bars as organs, of the study's machine and feed, each with the number
+        of points beyond it; only those that a point passes, and none where no result depends on the organs."""
+        config, plan, task = self.findings.config, self.findings.plan, self.findings.task
+        # measures of a study with chains are of chains; quantities of a turn are always of two bars
+        names = plan.quantities if config.chain is not None else self.findings.results
+        units = [self.variables[name].unit for name in names] + ["N"] * (len(names) > len(plan.quantities))
+        empties = bool(plan.event) and config.events[plan.event].empties
+        limits = limits_of_organs(task.machine, config.feed, units, empties=empties)
+        if not limits or SPEED not in self._parameters:
+            return [(each, plan.points) for each in passed_limits(limits, task.crank_speed)]
+        counts = np.zeros(len(limits), np.int64)
+        for _, part in self._parts():
+            speeds = part[SPEED].values
+            counts += [np.count_nonzero(each.passed(speeds)) for each in limits]
+        return [(each, int(count)) for each, count in zip(limits, counts, strict=True) if count]
+
     @property
     def has_spread(self) -> bool:
         """Whether the points are those of tolerances."""
@@ -208,6 +229,16 @@ class SweepSummary:
                 }
                 for reason, count in self.counts.items()
                 if reason != self.findings.task.reasons[0]
+            ],
+            "organs": [
+                {
+                    "topic": limit.topic,
+                    "text": limit.words,
+                    "limit": entry(limit.speed, "rad/s", "speed"),
+                    "points": entry(count, "1"),
+                    "share": entry(count / plan.points, "1", "percent"),
+                }
+                for limit, count in self.organs
             ],
             "basis": {name: entry(x, "1") for name, x in vars(plan.basis).items()},
             "event": config.events[plan.event].title if plan.event else None,

@@ -9,7 +9,7 @@ whose links are not known.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -250,6 +250,47 @@ def _where(runs: Collection[str]) -> str:
     return f", in {', '.join(places[:-1])}{' and in ' if places[1:] else ''}{places[-1]}"
 
 
+@dataclass(frozen=True)
+class SpeedLimit:
+    """A limit of the crank speed for two bars as a model of the organs [rad/s]; `topic` as in `Reason`."""
+
+    topic: str
+    speed: float
+    grave: bool = False
+
+    def passed(self, speed: Any) -> Any:
+        """Whether each crank speed [rad/s] is beyond the limit, shape of `speed`."""
+        return speed >= self.speed if self.topic == "slack speed" else speed > self.speed
+
+    @property
+    def words(self) -> str:
+        """The begin of a sentence on speeds beyond it."""
+        return _TOPICS[self.topic][1]
+
+
+def speed_limits(slack_speed: float, mode: float, empty: bool = False) -> tuple[SpeedLimit, ...]:
+    """The limits of the crank speed for two bars: that of slack webs, of the crank torque and of the rocker torque.
+
+    Parameters
+    ----------
+    slack_speed, mode : see `two_bars`
+    empty : whether a side carries no material
+    """
+    return (
+        SpeedLimit("slack speed", slack_speed, grave=True),
+        SpeedLimit("crank torque", CRANK_GOOD * mode, grave=True),
+        SpeedLimit("rocker torque", (ROCKER_GOOD_EMPTY if empty else ROCKER_GOOD) * mode),
+    )
+
+
+def passed_limits(limits: Iterable[SpeedLimit], speed: float) -> list[SpeedLimit]:
+    """The limits that a crank speed [rad/s] passes. Where the crank torque may be wrong, the rocker torque is not
+    named beside it."""
+    passed = [each for each in limits if each.passed(speed)]
+    whole = any(each.topic == "crank torque" for each in passed)
+    return [each for each in passed if not (whole and each.topic == "rocker torque")]
+
+
 def two_bars(
     speed: float,
     mode: float,
@@ -278,16 +319,12 @@ def two_bars(
         for name, pull in zip(("web_pull", "wall_pull"), both, strict=True)
         if pull < 0.0
     ]
-    if speed >= slack_speed:
-        reasons.append(_at_speed("slack speed", speed, slack_speed, grave=True))
-    if speed > CRANK_GOOD * mode:
-        reasons.append(_at_speed("crank torque", speed, CRANK_GOOD * mode, grave=True))
-    elif speed > ROCKER_GOOD * mode:
-        reasons.append(_at_speed("rocker torque", speed, ROCKER_GOOD * mode))
-    elif speed > ROCKER_GOOD_EMPTY * mode:
-        limit = ROCKER_GOOD_EMPTY * mode
+    passed = passed_limits(speed_limits(slack_speed, mode), speed)
+    reasons += [_at_speed(each.topic, speed, each.speed, grave=each.grave) for each in passed]
+    if all(each.topic == "slack speed" for each in passed):
         runs = [""] if "" in empty else sorted(empty)
-        reasons += [_at_speed("rocker torque", speed, limit, run) for run in runs]
+        of_empty = passed_limits(speed_limits(math.inf, mode, empty=True), speed)
+        reasons += [_at_speed(each.topic, speed, each.speed, run) for each in of_empty for run in runs]
     return Verdict("organs", "two bars", speed, (*reasons, *_balance_faults(residuals)), actual)
 
 

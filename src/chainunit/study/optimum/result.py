@@ -8,6 +8,8 @@ from ... import __version__
 from ...quantities import finite
 from ...text import array_entry, entry, shown_in
 from ..config import Config
+from ..organ_limits import limits_of_organs
+from ..verdict import passed_limits
 from .best import Best
 from .checks import STEPS
 from .words import bindings, clearances, conflict_sentences, sentence
@@ -57,6 +59,7 @@ def _as_dict(best: Best, config: Config) -> dict[str, Any]:
         },
         "quantities": {name: _quantity(best, name) for name in best.quantities},
         "least_pull": _pull(best),
+        "organs": _organs(best),
         "bindings": _bindings(best),
         "clearances": clearances(best) if best.met else [],
         "conflict": _conflict(best),
@@ -91,6 +94,18 @@ def _pull(best: Best) -> dict[str, Any] | None:
         return None
     numbers = {"today": best.pulls[0], "best": best.pulls[1], "min": 0.0, "max": None}
     return {name: entry(finite(x), "N") for name, x in numbers.items()}
+
+
+def _organs(best: Best) -> list[dict[str, Any]]:
+    """The limits of the crank speed for two bars as organs that the best machine passes."""
+    wishes = best.wishes
+    if best.machine is None:
+        return []
+    limits = limits_of_organs(best.machine, wishes.feed, [q.unit for q in best.quantities.values()])
+    return [
+        {"topic": each.topic, "text": each.words, "limit": entry(each.speed, "rad/s", "speed")}
+        for each in passed_limits(limits, wishes.crank_speed)
+    ]
 
 
 def _bindings(best: Best) -> list[dict[str, Any]]:
