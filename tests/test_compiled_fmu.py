@@ -19,7 +19,7 @@ from chainunit.fmu.native.export import export
 from chainunit.native.compilers import compiler
 from chainunit.study import config
 from chainunit.study.choice import choose
-from chainunit.study.package import study_system
+from chainunit.study.package import left_out, study_system
 from chainunit.system import (
     CoSimulation,
     Jump,
@@ -251,6 +251,13 @@ def test_a_study_becomes_one_fmu(tmp_path):
     exact = monolithic(study_system(study, drive), {}, run["time"], rtol=1e-12)
     for name in ("motor.w", "machine.tau"):
         np.testing.assert_allclose(run[name], exact[name].values, rtol=1e-7, atol=1e-9)
+
+
+def test_what_an_exported_study_leaves_out():
+    events = "[coupling]\n[[event]]\ntype = 'jam'\nside = 'left'\n"
+    assert left_out(config.parse(STUDY)) == ""
+    words = "Not in it: the safety coupling; the events jam_left. Its loads are those of normal running."
+    assert left_out(config.parse(STUDY + events)) == words
 
 
 @pytest.mark.parametrize(

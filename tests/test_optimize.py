@@ -411,7 +411,10 @@ def test_a_genetic_search_finds_nothing_better():
             'mine.toml:8: optimize.free.r.max = "200 kg": must be a number in m',
         ),
         ({', max = "200 mm"': ""}, "mine.toml:8: optimize.free.r = { min = "),
-        ({'min = "0.8 m"': 'min = "1.4 m"'}, "mine.toml:9: optimize.free.h: max = 1.3 must be > min = 1.4"),
+        (
+            {'min = "0.8 m"': 'min = "1.4 m"'},
+            "mine.toml:9: optimize.free.h: max = 1.3 m must be > min = 1.4 m",
+        ),
         ({"[optimize.limits]": '[optimize.limits]\n"min(margn)" = { min = 1 }'}, 'was "margin" meant?'),
         ({'{ max = "4 kN" }': "3000"}, "must be a table with min, max, or both"),
         ({"16 deg": "21 deg"}, "must be >= min"),
@@ -428,10 +431,48 @@ def test_refusals(changes, line, tmp_path):
     assert done.returncode == 2 and line in done.stderr, done.stderr
 
 
+FAULTS = """[optimize]
+objectives = ["peak(crank_torqe)"]
+starts = 0.5
+[optimize.free]
+machine.r = { min = 0.1, max = 0.2 }
+crank.m = 3
+crank.s = { min = -0.3, max = 0.3, step = 0.1 }
+z = { min = 0.1 }
+[optimize.limits]
+"range(rocker.psi)" = { min = "40 kg", max = "20 N" }
+[[sweep.parameter]]
+name = "machine.h"
+from = 1
+to = 0.5
+"""
+
+
+@pytest.mark.parametrize("command", ["optimize", "export"])
+def test_all_faults_at_once(command, tmp_path):
+    (tmp_path / "mine.toml").write_text(FAULTS)
+    done = chainunit(command, "mine.toml", cwd=tmp_path)
+    assert done.returncode == 2
+    lines = [
+        '2: optimize.objectives: "peak(crank_torqe)": the ChamberForces has no output',
+        "3: optimize.starts = 0.5: must be >= 1",
+        "5: optimize.free.machine.r: no such parameter of the machine; write optimize.free.r",
+        "6: optimize.free.crank.m = 3: must be a table with min and max",
+        "7: optimize.free.crank.s.step: unknown key; known here: min, max",
+        "8: optimize.free.z = { min = 0.1 }: must have min and max",
+        '10: optimize.limits.range(rocker.psi).min = "40 kg": must be a number in rad',
+        '10: optimize.limits.range(rocker.psi).max = "20 N": must be a number in rad',
+        "14: sweep.parameter.1.to: must be > from, 1 m (machine.h)",
+    ]
+    for expected, line in zip(lines, done.stderr.splitlines(), strict=True):
+        assert line.startswith(f"chainunit: mine.toml:{expected}"), line
+
+
 FREE_S = "[optimize.free.crank]\ns = { min = 0, max = 1 }\n"
 UNSUITABLE = {
     "optimize: is missing": "",
     "must name at least one parameter": "[optimize]\n",
+    'quantities of a turn are of organs with two bars; leave out organ = "chain"': f'organ = "chain"\n{FREE_S}',
     "needs webs with mass or load": f'optimize.slack_free_speed = 3\n{FREE_S}[system]\nmachine = "KnifeDrive"',
 }
 

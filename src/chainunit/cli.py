@@ -354,7 +354,7 @@ def export(
 ) -> None:
     """Write a model as an FMU; of a study file its whole system, from control to machine, as one FMU."""
     from .fmu.backends import export as write
-    from .study.package import is_study_file, model_and_start
+    from .study.package import is_study_file, left_out, model_and_start
 
     file = output
     if file and file.suffix != ".fmu":
@@ -383,6 +383,8 @@ def export(
             report=status.update,
         )
     print(f"{file}: {model.name}, {made}")
+    if whole and loaded and (words := left_out(loaded)):
+        print(words)
 
 
 @app.command("export-ssp")
@@ -394,7 +396,7 @@ def export_ssp(
     backend: _BackendOption = None,
 ) -> None:
     """Write motor and machine, connected, with their parameter sets, as an SSP 1.0 package of FMUs 2.0."""
-    from .study.package import export_study
+    from .study.package import export_study, left_out
 
     if output.suffix != ".ssp":
         raise InputError(f"-o {output}: must be a file name that ends in .ssp")
@@ -402,6 +404,8 @@ def export_ssp(
     with terminal_console(stderr=True).status("exporting") as status:
         made = export_study(loaded, output, backend=backend.value if backend else None, report=status.update)
     print(f"{output}: {made}")
+    if words := left_out(loaded):
+        print(words)
 
 
 def _platforms(choice: str | None, fmi: int) -> list[str]:

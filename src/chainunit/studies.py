@@ -227,7 +227,7 @@ class Study:
         Raises
         ------
         InputError
-            for a fault of the table [optimize].
+            for a study without the table [optimize].
         WriteError
             for a file that cannot be written; the others are written.
         """

@@ -12,6 +12,9 @@ from .foreign_machine import ForeignModel
 from .parts import Parts, named_table
 from .sections import FileSection
 
+_NEEDS_MODEL = "needs a model of the machine, which is an FMU; leave it out"
+_TWO_BARS = 'quantities of a turn are of organs with two bars; leave out organ = "chain"'
+
 
 def check_company(data: Mapping[str, Any], parts: Parts) -> list[InputError]:
     """Refusals of values that would otherwise be ignored without a word."""
@@ -31,7 +34,7 @@ def _company(data: Mapping[str, Any], parts: Parts) -> Iterator[tuple[str, str]]
                 f'are of an FMU of somebody else; add {part} = "file.fmu", or leave them out',
             )
     if foreign["machine"] and data.get("feed_forward"):
-        yield ("feed_forward", "needs a model of the machine, which is an FMU; leave it out")
+        yield ("feed_forward", _NEEDS_MODEL)
     has_torque_input = foreign["motor"] or "sizing" in data or "tau_ff" in parts.motor.input_layout.names
     if data.get("feed_forward") and not has_torque_input:
         yield (
@@ -39,7 +42,7 @@ def _company(data: Mapping[str, Any], parts: Parts) -> Iterator[tuple[str, str]]
             f"a motor of the type {parts.motor.name} has no input for the torque; leave it out",
         )
     if foreign["machine"] and named_table(data, "monte_carlo").get("runs"):
-        yield ("monte_carlo.runs", "needs a model of the machine, which is an FMU; leave it out")
+        yield ("monte_carlo.runs", _NEEDS_MODEL)
     if motor is not None:
         for name in ("motor", "sizing"):
             if name in data and not (name == "motor" and parts.gives_motor):
@@ -81,6 +84,11 @@ def _company(data: Mapping[str, Any], parts: Parts) -> Iterator[tuple[str, str]]
         yield ("machine.ratio", "follows from the motor's rated speed; to have another, give gear.ratio")
     if "sweep" in data:
         yield from _sweep_company(data, foreign)
+    if "optimize" in data:
+        if foreign["machine"]:
+            yield ("optimize", _NEEDS_MODEL)
+        if data.get("organ") == "chain":
+            yield ("optimize", _TWO_BARS)
     if "torsion" in data and "driveline" not in data:
         yield ("torsion", "is of a driveline; add [driveline], or leave it out")
     if "chain" in data and data.get("organ") != "chain":
@@ -91,7 +99,7 @@ def _sweep_company(data: Mapping[str, Any], foreign: Mapping[str, bool]) -> Iter
     """Pairs of a refused key and the reason, of a study with a sweep; `foreign` tells whether motor and machine are
     FMUs."""
     if foreign["machine"]:
-        yield ("sweep", "needs a model of the machine, which is an FMU; leave it out")
+        yield ("sweep", _NEEDS_MODEL)
     if "sizing" in data:
         yield ("sweep", "varies one drive, and [sizing] tries many; leave out one of the two")
     measures = named_table(data, "sweep").get("measures")
@@ -103,10 +111,7 @@ def _sweep_company(data: Mapping[str, Any], foreign: Mapping[str, bool]) -> Iter
     if measures and foreign["motor"]:
         yield ("sweep.measures", "need a model of the motor, which is an FMU; leave them out")
     if named_table(data, "sweep").get("quantities") and data.get("organ") == "chain":
-        yield (
-            "sweep.quantities",
-            'are of organs with two bars; leave out organ = "chain", or give measures',
-        )
+        yield ("sweep.quantities", f"{_TWO_BARS}, or give measures")
 
 
 _ORDER = (

@@ -30,7 +30,8 @@ from .event_table import RandomEvent, read_events, read_random_event
 from .events import OneSidedFeed
 from .first_checks import check_values, independent, plate_of, without
 from .foreign_machine import ForeignMachine, ForeignModel
-from .optimum.table import Optimize
+from .optimum.table import read_wishes
+from .optimum.wishes import Wishes
 from .parts import Parts, beside, example, over_example, with_linkage
 from .sections import (
     CHOICES,
@@ -98,8 +99,8 @@ class Config:
     """damping ratios of that map; empty for that of the line itself"""
     chain: ChainOrgans | None
     """the organs as chains, or None for two bars"""
-    optimize: Optimize | None
-    """the table of a search for the best machine; a study does not read it"""
+    optimize: Wishes | None
+    """the table of a search for the best machine; a study makes none"""
     foreign: ForeignMotor | None
     """the motor, if it is a foreign FMU; `motor` then has no meaning"""
     sweep: SweepPlan | None
@@ -305,6 +306,11 @@ def _config(
         random = read_random_event(checked.monte_carlo.event, "monte_carlo.event")
     with faults.collected():
         of_study["sweep"] = _sweep(data, checked, parts, machine, of_study, events)
+    with faults.collected():
+        if "optimize" in data:
+            loads, run, by_motor = values["feed"], values["run"], bool(parts.designation or "sizing" in data)
+            given = values["optimize"], checked.optimize, parts.machine
+            of_study["optimize"] = read_wishes(*given, machine, loads, run.crank_speed, by_motor)
     faults.refuse()
     config = Config(
         title=checked.title,

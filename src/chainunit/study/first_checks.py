@@ -97,11 +97,17 @@ def without(data: Mapping[str, Any], faults: Collection[InputError]) -> dict[str
     return rest
 
 
+_LISTS = (
+    *(f"sweep.{name}" for name in ("parameter", "quantities", "measures")),
+    *(f"optimize.{name}" for name in ("objectives", "free", "limits")),
+)
+
+
 def _table(key: str) -> str:
-    """The table of a key; the lists of a sweep, and each of its parameters, count as tables by themselves."""
+    """The table of a key; the lists of a sweep and of a search, and each of their parameters and limits, count as
+    tables by themselves."""
     names = key.split(".")
-    lists = (["sweep", "parameter"], ["sweep", "quantities"], ["sweep", "measures"])
-    return ".".join(names[:3]) if names[:2] in lists else names[0]
+    return ".".join(names[:3]) if ".".join(names[:2]) in _LISTS else names[0]
 
 
 def _key(fault: InputError) -> str:

@@ -149,6 +149,18 @@ def whole_system(
     return part.model, part.start | input_starts(system, part.model)
 
 
+def left_out(config: Config) -> str:
+    """A sentence on the parts of a study that its exported system does not have; empty where there are none."""
+    names = ["the safety coupling"] if config.coupling is not None else []
+    if config.gives("event"):
+        names.append(f"the events {', '.join(config.events)}")
+    if config.empty_start:
+        names.append("the feed that comes once the machine runs")
+    if not names:
+        return ""
+    return f"Not in it: {'; '.join(names)}. Its loads are those of normal running."
+
+
 def with_rods(number: int, start: Mapping[str, float]) -> type[Model]:
     """ChainUnitFlexible with `number` rods an organ. They are divided between wall and web so that the rods
     are nearest to equal length, by the lengths among the `start` values.

@@ -153,9 +153,10 @@ def _of_foreign_parts() -> Iterator[Rule]:
     needs_model = [
         _equal("feed_forward", {"const": True}),
         _equal("monte_carlo.runs", {"type": "number", "exclusiveMinimum": 0}),
-        *map(_given, ("ratios", "chain", "organ", "sweep")),
+        *map(_given, ("ratios", "chain", "organ", "sweep", "optimize")),
     ]
     yield _where(_equal("system.machine", _FMU), _not(_any(*needs_model)))
+    yield _where(_equal("organ", {"const": "chain"}), _without("optimize"))
 
 
 def _of_sizing() -> Iterator[Rule]:

@@ -13,6 +13,7 @@ from ..errors import Faults, InputError, near_name, refusal_prefix, shown
 from ..mechanism.models import MachineModel
 from ..quantities import Layout, Quantity, Variable, variables
 from ..reading import given_values, read_table, to_number
+from ..refusals import unit_behind
 from .cycle_quantities import CycleBasis, cycle_quantity
 from .event import Event
 from .sections import Run
@@ -242,7 +243,7 @@ class _EntryReader(Faults):
             low, high = (self._number(name, given.get(name)) for name in ("from", "to"))
             wide = None
             if not high > low and not self.errors:
-                self._fault("to", f"must be > from, {low:g}")
+                self._fault("to", f"must be > from, {low:g}{unit_behind(variable.unit)}")
         distribution = given.get("distribution", "uniform")
         if wide is None or of_grid:
             self._without("distribution", "is of a tolerance with points that are no grid; leave it out")
