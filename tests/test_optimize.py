@@ -262,6 +262,15 @@ def test_one_parameter_without_limits(monkeypatch):
         assert np.min(values) * (1.0 - 1e-3) < answer.value <= np.min(values) * (1.0 + 1e-6)
 
 
+def test_no_parameter_has_an_effect(monkeypatch, tmp_path):
+    """The torque at the crank does not depend on the gear."""
+    monkeypatch.setattr(kernels, "native_kernel", lambda *_: None)
+    (tmp_path / "mine.toml").write_text("[optimize.free]\nratio = { min = 10, max = 60 }\n")
+    done = chainunit("optimize", "mine.toml", "-o", "none", cwd=tmp_path)
+    words = "mine.toml:1: optimize.free: ratio has no effect on peak(crank_torque); free a parameter on which"
+    assert done.returncode == 2 and words in done.stderr
+
+
 @pytest.mark.parametrize(
     ("changes", "names", "held"),
     [
@@ -484,8 +493,12 @@ def test_what_cannot_be_searched(words, tmp_path):
     assert done.returncode == 2 and words in done.stderr
 
 
+IDLE = "ratio = { min = 10, max = 60 }"
+
+
 def test_the_command(tmp_path, best):
-    (tmp_path / "mine.toml").write_text(TABLE)
+    """With a parameter on which nothing depends: it keeps its value, and the answer is that without it."""
+    (tmp_path / "mine.toml").write_text(TABLE.replace("[optimize.free]", f"[optimize.free]\n{IDLE}"))
     done = chainunit("optimize", "mine.toml", "-o", "out/deep", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "more of crank.m.min raises peak(crank_torque) by" in done.stdout
@@ -496,6 +509,11 @@ def test_the_command(tmp_path, best):
     assert result["quantities"]["peak(crank_torque)"]["best"]["value"] == pytest.approx(
         best.answer.value, rel=1e-6
     )
+    words = "ratio has no effect on peak(crank_torque) and the limits: it keeps its value of today."
+    assert words in done.stdout and words in (folder / "report.html").read_text("utf-8")
+    ratio = result["parameters"]["ratio"]
+    assert result["without_effect"] == ["ratio"] and ratio["best"] == ratio["today"]
+    assert "ratio" not in tomllib.loads((folder / "best.toml").read_text("utf-8"))["machine"]
     # the file with the best values is a study with that machine
     written = study_files.load(folder / "best.toml")
     assert written.machine.by_name == pytest.approx(best.machine.by_name, rel=1e-3)
@@ -503,7 +521,7 @@ def test_the_command(tmp_path, best):
     value = evaluate(written.machine, [q], 3.0, written.feed, engine="numpy")[q.name]
     assert float(value) == pytest.approx(best.answer.value, rel=1e-4)
     # its tables are those of the study, so that the search may go on from there
-    assert wishes_of(written).free == best.wishes.free
+    assert wishes_of(written).free == {"ratio": (10.0, 60.0), **best.wishes.free}
     other = chainunit("study", "-o", "out/deep", cwd=tmp_path)
     assert other.returncode == 2 and "has the result of a search for the best machine" in other.stderr
 

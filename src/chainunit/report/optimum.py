@@ -159,6 +159,8 @@ def _machine(s: b.Source, best: Best) -> Iterator[b.Block]:
     yield b.Table(
         tuple(rows), b.heads("parameter", "today", head, "least", "largest"), title="Free parameters"
     )
+    if best.idle:
+        yield b.Text(s.words("without_effect_words"))
     limited = [(name, f"quantities.{name}") for name in s.result["quantities"]]
     if s.result["least_pull"] is not None:
         limited.append(("least pull in a web", "least_pull"))

@@ -19,6 +19,7 @@ from ..cycle import cycle
 from ..cycle_quantities import CycleQuantity
 from .checks import FmuValue, Neighbours, by_fmu, neighbours
 from .conflict import Conflict, conflict, nearest
+from .effects import effective_search
 from .search import Answer, Effort, Search
 from .wishes import TurnLimit, Wishes
 
@@ -65,6 +66,8 @@ class Best:
     effort: Effort
     turns: Mapping[str, Any] = field(default_factory=dict)
     """crank angle [rad] and crank torque [N m] of today's machine and of the best one"""
+    idle: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """bounds of the free parameters without any effect, which keep their values; `wishes` has the others"""
 
     @property
     def quantities(self) -> dict[str, CycleQuantity]:
@@ -107,10 +110,13 @@ def find_best(wishes: Wishes, report: Report = _quiet, backend: Backend | None =
 
     Raises
     ------
+    InputError
+        where no free parameter has an effect.
     RunError
         where no machine within the bounds turns.
     """
-    search = Search(wishes)
+    search, idle = effective_search(wishes)
+    wishes = search.wishes
     starts, moved = search.starts(wishes.starts)
     answers = _from_starts(search, starts, wishes.objectives[0], report)
     good = [answer for answer in answers if answer.feasible]
@@ -138,6 +144,7 @@ def find_best(wishes: Wishes, report: Report = _quiet, backend: Backend | None =
             {},
             (),
             search.effort,
+            idle=idle,
         )
     best = min(good, key=lambda answer: answer.value)
     front: tuple[FrontPoint, ...] = ()
@@ -167,6 +174,7 @@ def find_best(wishes: Wishes, report: Report = _quiet, backend: Backend | None =
         front,
         search.effort,
         _turns(wishes, machine),
+        idle,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 from ... import __version__
@@ -12,7 +13,7 @@ from ..organ_limits import limits_of_organs
 from ..verdict import passed_limits
 from .best import Best
 from .checks import STEPS
-from .words import bindings, clearances, conflict_sentences, sentence
+from .words import bindings, clearances, conflict_sentences, idle_sentence, sentence
 
 EVERY = 4
 """One of so many angles of the turns is in the result."""
@@ -48,15 +49,16 @@ def _as_dict(best: Best, config: Config) -> dict[str, Any]:
         "operating_hours": entry(wishes.basis.operating_hours, "1"),
         "overload": entry(wishes.basis.overload, "1"),
         "parameters": {
-            name: {
-                "title": variables[name].description,
-                "today": entry(float(today), variables[name].unit, variables[name].kind),
-                "best": entry(float(value), variables[name].unit, variables[name].kind),
-                "min": entry(wishes.free[name][0], variables[name].unit, variables[name].kind),
-                "max": entry(wishes.free[name][1], variables[name].unit, variables[name].kind),
+            name: {"title": v.description}
+            | {
+                key: entry(float(number), v.unit, v.kind)
+                for key, number in zip(("today", "best", "min", "max"), numbers, strict=True)
             }
-            for name, today, value in zip(wishes.names, wishes.today, x, strict=True)
+            for name, numbers in _parameters(best, x)
+            for v in (variables[name],)
         },
+        "without_effect": list(best.idle),
+        "without_effect_words": idle_sentence(best),
         "quantities": {name: _quantity(best, name) for name in best.quantities},
         "least_pull": _pull(best),
         "organs": _organs(best),
@@ -71,6 +73,15 @@ def _as_dict(best: Best, config: Config) -> dict[str, Any]:
             for name, y in best.turns.items()
         },
     }
+
+
+def _parameters(best: Best, x: Any) -> Iterator[tuple[str, tuple[float, ...]]]:
+    """Each free parameter with its values today and in the answer, and its bounds."""
+    wishes, by_name = best.wishes, best.wishes.machine.by_name
+    for name, today, value in zip(wishes.names, wishes.today, x, strict=True):
+        yield name, (today, value, *wishes.free[name])
+    for name, bounds in best.idle.items():
+        yield name, (by_name[name], by_name[name], *bounds)
 
 
 def _quantity(best: Best, name: str) -> dict[str, Any]:

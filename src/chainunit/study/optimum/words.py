@@ -9,6 +9,7 @@ from typing import Any
 
 from ...text import number
 from .best import Best
+from .effects import no_effect
 from .wishes import SLACK, TURNS, TurnLimit
 
 _UNITS = {
@@ -101,6 +102,14 @@ def clearances(best: Best) -> list[str]:
         for (owner, subject), slope in best.answer.sensitivities.items()
         if owner == TURNS and abs(slope) * best.wishes.clearance > 1e-4 * size
     ]
+
+
+def idle_sentence(best: Best) -> str:
+    """On free parameters without an effect; empty where there are none."""
+    if not best.idle:
+        return ""
+    keep = "they keep their values" if len(best.idle) > 1 else "it keeps its value"
+    return f"{no_effect(best.wishes, tuple(best.idle))}: {keep} of today."
 
 
 def limit_words(limit: TurnLimit) -> str:
