@@ -176,3 +176,52 @@ def test_wrong_requests_are_refused(rig):
     with pytest.raises(InputError, match=r"motor\.tua: no such output.*motor\.tau"):
         Transients(rig.model, ["motor.tua"])
     assert rig.model.internal_step(MATH, rig.model.prepared(MATH, rig.p)) < STEP
+
+
+def test_a_direction_gives_the_derivative_of_the_run(rig):
+    """By a parameter, an input and a state at the start, each against differences of runs, through a lump that the
+    loop of the control follows. The values themselves are those of a run without directions."""
+    by = {"machine.left.web_mass": 2.0, "machine.right.material_mass": 3.0}
+    own = Rig(by=list(by), varying=["machine.left.web_mass"])
+    signals, size, n = events(rig.drive, 400.0), 1e-4, len(rig.start)
+    mass = own.drive.machine.by_name["left.web_mass"]
+    phi = own.model.state_layout.names.index("motor.phi")
+    states, directions = np.zeros((2 * n, 3)), np.diag(list(by.values()))
+    states[:n] = np.array(rig.start)[:, None]
+    states[n + phi, 2] = 0.5
+    result = own.run(
+        [signals] * 3,
+        states=states,
+        directions=np.hstack([directions, np.zeros((2, 1))]),
+        varying=np.full((1, 3), mass),
+    )
+
+    def ends(k, sign):
+        """The run with a small step in this direction."""
+        start, loads = states[:n, :1].copy(), dict(own.loads)
+        start[phi] += sign * size * 0.5 * (k == 2)
+        loads["machine.right.material_mass"] += sign * size * 3.0 * (k == 1)
+        own_mass = np.full((1, 1), mass + sign * size * 2.0 * (k == 0))
+        table = [[profile_rows(signals[name], 2)] for name in DRIVEN]
+        return own.loop.run(
+            own.p,
+            loads,
+            np.vstack([start, 0.0 * start]),
+            begin=0.0,
+            step=STEP,
+            stop=[STOP],
+            varying=own_mass,
+            signals=np.moveaxis(table, 1, -1),
+            directions=np.zeros((2, 1)),
+        ).rows[:, 0]
+
+    for k in range(3):
+        differences = (ends(k, 1.0) - ends(k, -1.0)) / (2.0 * size)
+        for row, name in enumerate(KEPT):
+            peak = np.max(np.abs(differences[row]))
+            assert peak > 1e-6
+            assert np.max(np.abs(result.slopes[row, k] - differences[row])) < 2e-5 * peak, (k, name)
+    alone = rig.run([signals])
+    for row in range(len(KEPT)):
+        peak = np.max(np.abs(alone.rows[row]))
+        assert np.max(np.abs(result.rows[row, 1] - alone.rows[row, 0])) < 1e-9 * peak

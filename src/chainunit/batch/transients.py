@@ -4,6 +4,10 @@ Runs differ in parameters, states at the start, signals, and end. Each is integr
 with equal steps or with error control of its own (`chainunit.integrate`), and its signals are evaluated at every
 stage. Without constraints a step need not end at a row: the rows are interpolated (the dense output of Dormand and
 Prince, of fourth order, with scipy's coefficients).
+
+A run may carry a direction in the space of parameters, inputs and states at the start. Then the exact derivative of
+the run in this direction is integrated beside it, under the same control of the error: as many runs with the same
+values and different directions give the sensitivities to as many parameters.
 """
 
 from __future__ import annotations
@@ -75,10 +79,12 @@ class Runs:
 
     `rows` has the shape (outputs, runs, rows); a run has `count` rows, shape (runs,), behind which the values have no
     meaning. Where `failed`, shape (runs,), the last of them is not finite. `states` are those at the end, shape
-    (states, runs), and `times` the times of the rows [s], shape (runs, rows).
+    (states, runs), and `times` the times of the rows [s], shape (runs, rows). With directions, `slopes` are the
+    derivatives of the rows, of the same shape, and the derivatives of the states follow the states.
     """
 
     rows: Any
+    slopes: Any
     count: Any
     failed: Any
     states: Any
@@ -102,6 +108,7 @@ class Transients:
     varying : names of the parameters that differ between runs
     driven : names of the inputs with signals or with values that differ between runs
     guarded : those of the outputs that may end a run by a limit of their size
+    by : names of the parameters and inputs of which a direction consists
 
     Raises
     ------
@@ -117,18 +124,19 @@ class Transients:
         varying: Sequence[str] = (),
         driven: Sequence[str] = (),
         guarded: Sequence[str] = (),
+        by: Sequence[str] = (),
         changes: int = 0,
     ) -> None:
         if model.state_layout is None:
             raise InputError(f"{model.name}: has no states, and so no transients")
         self.model, self.outputs = model, tuple(outputs)
         self._varying, self._driven, self._guarded = tuple(varying), tuple(driven), tuple(guarded)
-        self._changes = changes
+        self._changes, self._by = changes, tuple(by)
         own = compiler()
         if own is None:
             raise InputError("no C compiler (cc, gcc, clang, or zig by pip install 'chainunit[cross]') found")
         self.digest, self._library, self._inputs = _compiled(
-            model, self.outputs, self._varying, self._driven, self._guarded, changes, own
+            model, self.outputs, self._varying, self._driven, self._guarded, self._by, changes, own
         )
 
     def run(
@@ -143,6 +151,7 @@ class Transients:
         varying: Any = None,
         signals: Any = None,
         limits: Any = None,
+        directions: Any = None,
         longest: float | None = None,
         workers: int = 1,
     ) -> Runs:
@@ -152,13 +161,15 @@ class Transients:
         ----------
         parameters : an instance of the model's declaration, for all that do not vary
         inputs : values of the inputs by name; all others have their start values
-        states : at the begin, shape (states,) or (states, runs)
+        states : at the begin, shape (states,) or (states, runs); with directions, their derivatives follow them
         begin, stop : begin and end of each run [s], shape (runs,), or one begin of all
         step : time between rows [s]; the last step of a run may be shorter
         varying : values of the parameters that differ, shape (parameters, runs)
         signals : of the driven inputs, shape (inputs, 1 + 3*changes, runs): the value before, and for each change its
             begin [s], its duration [s] and the value after it; see `chainunit.system.signals.Profile`
         limits : of the guarded outputs, shape (guarded, runs): a run ends with the row beyond its limit
+        directions : of each run, the change of each quantity in `by`, shape (by, runs). The error of the derivative
+            is held to the tolerance of the states themselves: a change of the size that matters is a good one.
         longest : longest step of the integrator [s]; by default that of the model
         workers : number of threads
         """
@@ -171,13 +182,13 @@ class Transients:
         room = x.shape[-1]
         arrays = [
             self._uniform(parameters, inputs),
-            _filled(varying if self._varying else 0.0, runs, len(self._varying)),
+            self._given(varying, directions, runs),
             _filled(signals if self._driven else 0.0, runs, len(self._driven), 1 + 3 * self._changes),
             _filled(begin, runs),
             _filled(stop, runs),
             _filled(np.inf if limits is None or not self._guarded else limits, runs, len(self._guarded)),
         ]
-        out = np.empty((len(self.outputs), room, rows))
+        out = np.empty((len(self.outputs) * (2 if self._by else 1), room, rows))
         count = np.zeros(room, np.int64)
         p, model = self.model.prepared(MATH, parameters), self.model
         numbers = [
@@ -201,7 +212,13 @@ class Transients:
             list(threads(min(workers, os.cpu_count() or 1)).map(piece, pieces))
         times = np.minimum(begin[:, None] + step * np.arange(rows), stop[:, None])
         count = count[:runs]
-        return Runs(out[:, :runs], np.abs(count), count < 0, x[:, :runs], times)
+        table, slopes = out[: len(self.outputs), :runs], out[len(self.outputs) :, :runs]
+        return Runs(table, slopes if self._by else None, np.abs(count), count < 0, x[:, :runs], times)
+
+    def _given(self, varying: Any, directions: Any, runs: int) -> Any:
+        """The values that runs have for themselves: varying parameters, and directions."""
+        parts = [(varying, len(self._varying)), (directions, len(self._by))]
+        return np.concatenate([_filled(x if n else 0.0, runs, n) for x, n in parts])
 
     def _uniform(self, parameters: Any, inputs: Mapping[str, float]) -> Any:
         """The uniform arguments in the order of the code."""
@@ -218,15 +235,19 @@ def _compiled(
     varying: tuple[str, ...],
     driven: tuple[str, ...],
     guarded: tuple[str, ...],
+    by: tuple[str, ...],
     changes: int,
     own: Compiler,
 ) -> tuple[str, ctypes.CDLL, list[str]]:
     """A digest of the source of the loop, its library, and the names of its uniform arguments."""
-    operations = _operations(model, outputs)
+    operations = _operations(model, outputs, by)
     assert model.state_layout is not None
-    states = model.state_layout.variables
+    sides = 2 if by else 1
+    states = model.state_layout.variables * sides
+    given = len(varying) + len(by)
     entries = [
         *((0, k) for k in find(varying, model.parameter_layout.names, "parameter")),
+        *((3, k) for k in range(len(by))),
         *((1, k) for k in find(driven, model.input_layout.names, "input")),
         *((2, k) for k in range(len(states))),
     ]
@@ -237,10 +258,10 @@ def _compiled(
     put = []
     for column, entry in enumerate(code.columns):
         k = places[entry]
-        if k < len(varying):
+        if k < given:
             put.append(f"a[{column}] = b->given[{k}];")
-        elif k < len(varying) + len(driven):
-            offset = (k - len(varying)) * (1 + 3 * changes)
+        elif k < given + len(driven):
+            offset = (k - given) * (1 + 3 * changes)
             put.append(f"a[{column}] = signal_at(b->signal + {offset} * b->runs, b->runs, t);")
         else:
             put.append(f"a[{column}] = x[{entry[1]}];")
@@ -250,8 +271,8 @@ def _compiled(
     ]
     defines = {
         "STATES": len(states),
-        "ROWS": len(outputs),
-        "PARAMS": len(varying),
+        "ROWS": len(outputs) * sides,
+        "PARAMS": given,
         "COLUMNS": len(code.columns),
         "ROOM": code.room,
         "CHANGES": changes,
@@ -290,9 +311,10 @@ def _method(model: type[Model], operations: Operations) -> str:
     return "INTERPOLATED" if free else "TO_ROWS"
 
 
-def _operations(model: type[Model], outputs: Sequence[str]) -> Operations:
+def _operations(model: type[Model], outputs: Sequence[str], by: Sequence[str]) -> Operations:
     """Three groups: the derivatives of the states, these outputs and states, and the states that meet the constraints
-    of a model with error control."""
+    of a model with error control. The derivatives of each group in a direction follow it; the direction consists of
+    derivatives of the states, behind the states, and of those `by` names, a fourth argument."""
     import casadi
 
     t = trace(model)
@@ -303,4 +325,15 @@ def _operations(model: type[Model], outputs: Sequence[str]) -> Operations:
     rates = casadi.vertcat(*(casadi.SX(rate) for rate in t.derivatives))
     closed = model.closed(casadi_(), t.p, t.u, t.x) if model.controlled else []
     met = casadi.vertcat(*(casadi.SX(x) for x in closed), casadi.SX(0, 1))
-    return Operations(t.symbols[:3], t.explicit([rates, rows, met]))
+    p, u, x = t.symbols[:3]
+    groups = t.explicit([rates, rows, met])
+    if not by:
+        return Operations([p, u, x], groups)
+    known = [*model.parameter_layout.names, *model.input_layout.names]
+    direction, changes = casadi.SX.zeros(len(known)), casadi.SX.sym("d", len(by))
+    for k, place in enumerate(find(by, known, "parameter or input")):
+        direction[place] = changes[k]
+    slopes = casadi.SX.sym("dx", x.numel())
+    point, direction = casadi.vertcat(p, u, x), casadi.vertcat(direction, slopes)
+    groups = [casadi.vertcat(group, casadi.jtimes(group, point, direction)) for group in groups]
+    return Operations([p, u, casadi.vertcat(x, slopes), changes], groups)
