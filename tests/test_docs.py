@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from command import chainunit
 
 from chainunit.study.config import load
 from chainunit.study.run import run_study
@@ -148,10 +149,8 @@ def test_the_tables_of_keys_that_pages_name_are_there():
     names = sorted({name for text in texts for name in KEYS_OF.findall(text)} - {"TABLE"})
     assert len(names) > 5
     for name in names:
-        process = subprocess.run(
-            [sys.executable, "-m", "chainunit", "keys", name], capture_output=True, text=True
-        )
-        assert process.returncode == 0, process.stderr
+        done = chainunit("keys", name, cwd=ROOT)
+        assert done.returncode == 0, done.stderr
 
 
 def test_an_excerpt_is_compared_line_by_line():

@@ -154,7 +154,8 @@ class Machine:
         self, values: Mapping[str, Any], outputs: Sequence[str] | None = None, **options: Any
     ) -> xr.Dataset:
         """Outputs, derivatives and cycle quantities over arrays of inputs and parameters, in compiled code; this
-        machine gives all other parameters. Arguments and result are those of `chainunit.batch.evaluate`.
+        machine gives all other parameters, and all other inputs have their start values, as in the FMU (`evaluate`
+        takes 0). Arguments and result are those of `chainunit.batch.evaluate`.
 
         Examples
         --------

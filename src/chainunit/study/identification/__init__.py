@@ -1,0 +1,1 @@
+"""Identification of a real machine from recordings of its motor."""

@@ -1,0 +1,168 @@
+"""A recording: columns over time from a CSV file, with names and units in its header."""
+
+from __future__ import annotations
+
+import gzip
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...errors import Faults, InputError, meant, near_name, printable
+from ...units import convert, split
+from .signals import SIGNALS, Signal
+
+FEWEST = 100
+"""Fewest rows of a recording."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """The rows of a file: `time` [s], shape (n,), and the `columns` by the name of the signal, each of shape (n,), in
+    the unit of the signal. `heads` are the heads of the columns in the file."""
+
+    source: str
+    time: Any
+    columns: Mapping[str, Any]
+    heads: Mapping[str, str]
+
+    @property
+    def step(self) -> float:
+        """Time between rows that follow one another without a gap [s]."""
+        return float(np.median(np.diff(self.time)))
+
+    @property
+    def missing(self) -> float:
+        """Share of the rows that are missing in gaps."""
+        rows = (self.time[-1] - self.time[0]) / self.step + 1.0
+        return max(0.0, 1.0 - len(self.time) / rows)
+
+    @property
+    def gaps(self) -> list[tuple[float, float]]:
+        """Begin and end of each gap [s]."""
+        places = np.flatnonzero(np.diff(self.time) > 1.5 * self.step)
+        return [(float(self.time[k]), float(self.time[k + 1])) for k in places]
+
+    def part(self, begin: float = -math.inf, end: float = math.inf) -> Recording:
+        """The rows from `begin` to `end` [s], both included."""
+        rows = (self.time >= begin) & (self.time <= end)
+        columns = {name: x[rows] for name, x in self.columns.items()}
+        return Recording(self.source, self.time[rows], columns, self.heads)
+
+
+def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Recording:
+    """Read a recording.
+
+    The first row of the file is its head, with a name and a unit for each column (``motor.i [A]``). A file whose name
+    ends with ``.gz`` is unpacked. Columns that are no signal are left out.
+
+    Parameters
+    ----------
+    file : the CSV file, with commas or semicolons between the columns; after semicolons, numbers may have a decimal
+        comma
+    names : by the name of a signal, the head of its column, where that is not the name of the signal
+
+    Raises
+    ------
+    InputError
+        with a line for each fault: the file that cannot be read, a column without unit or with a unit that does not
+        fit, a cell that is no number, times that do not rise.
+    """
+    lines = _text(file).splitlines()
+    if len(lines) < 1 + FEWEST:
+        raise InputError(f"{file}: has {max(0, len(lines) - 1)} rows behind its head; must have >= {FEWEST}")
+    mark = ";" if lines[0].count(";") > lines[0].count(",") else ","
+    heads = [head.strip().strip('"').lstrip("\ufeff") for head in lines[0].split(mark)]
+    faults, units = Faults(), dict[str, tuple[int, float, float]]()
+    known = dict(_signals(file, heads, names or {}, faults))
+    for name, (place, unit) in known.items():
+        with faults.collected():
+            units[name] = (place, *_scale(file, heads[place], SIGNALS[name], unit))
+    if "time" not in known:
+        faults.add([InputError(f"{file}: has no column time [s]{meant('time', heads)} its heads are: {', '.join(heads)}")])
+    if not known.keys() - {"time"}:
+        words = ", ".join(f"{each.name} [{each.unit}]" for each in SIGNALS.values() if each.name != "time")
+        faults.add([InputError(f"{file}: has no column of a signal; signals are {words}")])
+    faults.refuse()
+    table = _numbers(file, lines[1:], mark, [units[name][0] for name in known])
+    columns = {
+        name: table[:, k] * units[name][1] + units[name][2] for k, name in enumerate(known)
+    }
+    time = columns.pop("time")
+    back = np.flatnonzero(np.diff(time) <= 0.0)
+    if len(back):
+        row = int(back[0]) + 3
+        raise InputError(
+            f"{file}, line {row}: time = {time[row - 2]:g} s: must be later than {time[row - 3]:g} s of the line before"
+        )
+    return Recording(str(file), time, columns, {name: heads[place] for name, (place, _) in known.items()})
+
+
+def _text(file: Path) -> str:
+    try:
+        content = file.read_bytes()
+        return (gzip.decompress(content) if file.suffix == ".gz" else content).decode("utf-8")
+    except (OSError, EOFError) as error:
+        raise InputError(f"{file}: cannot be read: {printable(str(error))}") from error
+    except UnicodeDecodeError as error:
+        raise InputError(f"{file}: is no text in UTF-8; save the recording as CSV") from error
+
+
+def _signals(
+    file: Path, heads: list[str], names: Mapping[str, str], faults: Faults
+) -> Iterator[tuple[str, tuple[int, str]]]:
+    """By signal, the place of its column and its unit in the head."""
+    plain = [head.partition("[")[0].strip() for head in heads]
+    for signal, head in names.items():
+        if signal not in SIGNALS:
+            hint = near_name(signal, SIGNALS) or f"; signals are {', '.join(SIGNALS)}"
+            faults.add([InputError(f"columns.{signal}: no such signal{hint}")])
+        elif head not in plain and head not in heads:
+            hint = near_name(head, plain) or f"; its heads are: {', '.join(heads)}"
+            faults.add([InputError(f"columns.{signal} = {head!r}: no such column of {file}{hint}")])
+    taken = {head: signal for signal, head in names.items()}
+    for place, (head, name) in enumerate(zip(heads, plain, strict=True)):
+        signal = taken.get(head, taken.get(name, name if name not in names else ""))
+        if signal in SIGNALS:
+            yield signal, (place, head.partition("[")[2].partition("]")[0].strip())
+
+
+def _scale(file: Path, head: str, signal: Signal, unit: str) -> tuple[float, float]:
+    """Factor and offset from the unit of the column to that of the signal."""
+    if signal.unit == "1":
+        if unit not in ("", "1"):
+            raise InputError(f"{file}, column {head}: must have the unit [1]")
+        return 1.0, 0.0
+    if not unit:
+        raise InputError(f"{file}, column {head}: has no unit; write [{signal.unit}] behind its name, or its own unit")
+    try:
+        offset = convert(0.0, unit, signal.unit)
+        return convert(1.0, unit, signal.unit) - offset, offset
+    except ValueError as error:
+        raise InputError(f"{file}, column {head}: must have a unit like [{signal.unit}]: {error}") from error
+
+
+def _numbers(file: Path, lines: list[str], mark: str, places: list[int]) -> Any:
+    """The cells of these columns, shape (rows, columns)."""
+    if mark == ";":
+        lines = [line.replace(",", ".") for line in lines]
+    try:
+        return np.loadtxt(lines, delimiter=mark, usecols=places, ndmin=2)
+    except (ValueError, IndexError):
+        pass
+    for number, line in enumerate(lines, 2):
+        cells = line.split(mark)
+        for place in places:
+            cell = cells[place].strip() if place < len(cells) else ""
+            try:
+                if not math.isfinite(float(cell)):
+                    raise ValueError
+            except ValueError:
+                raise InputError(
+                    f"{file}, line {number}, column {place + 1}: {printable(cell) or 'nothing'} is no number; leave "
+                    "out rows without measurement"
+                ) from None
+    raise InputError(f"{file}: is no table of numbers")

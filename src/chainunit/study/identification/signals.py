@@ -1,0 +1,31 @@
+"""The signals that a recording may have."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A measured quantity: its name in the head of a column, its unit, and a description. An `analog` one has noise
+    and a scale; the others are counted."""
+
+    name: str
+    unit: str
+    description: str
+    analog: bool = True
+
+
+_ALL = (
+    Signal("time", "s", "time of the row by the clock of the logger", analog=False),
+    Signal("motor.i", "A", "current: of the armature, or RMS of a phase of an induction motor"),
+    Signal("motor.u", "V", "voltage of the armature"),
+    Signal("motor.power", "W", "active power at the terminals of the motor"),
+    Signal("motor.w", "rad/s", "speed of the motor's shaft"),
+    Signal("motor.count", "1", "count of an encoder on the motor's shaft", analog=False),
+    Signal("crank.tau", "N.m", "torque in the shaft between gear and crank"),
+    Signal("crank.w", "rad/s", "speed of the crank"),
+    Signal("mark", "1", "1 in the first row after the crank passed the mark, else 0", analog=False),
+)
+SIGNALS = {each.name: each for each in _ALL}
+"""By name."""
