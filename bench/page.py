@@ -234,7 +234,15 @@ def chains(f: Any) -> str:
         [f"{1e3 * r['step']:g} ms", f"{r['rate']:.0f}", f"{r['limit']:.0f}", f"{r['rate'] / r['limit']:.2f}"]
         for r in c["rows"]
     )
-    return table(["communication step", "times real time", "right-hand sides and projections alone", "share"], rows)
+    return table(
+        ["communication step", "times real time", "right-hand sides and projections alone", "share"], rows
+    )
+
+
+def reached(c: Any) -> str:
+    """The communication steps that reach the rate that is demanded."""
+    steps = [f"{1e3 * r['step']:g} ms" for r in c["rows"] if r["rate"] >= c["demanded"]]
+    return " and ".join(steps) or "no length"
 
 
 def overloads(f: Any) -> str:
@@ -287,7 +295,7 @@ def text(f: Any) -> str:
         steps=step_rows(f), faster=large(faster), study=f"{t['study']:.0f}", again=f"{t['again']:.0f}",
         importing=f"{t['importing']:.1f}", allowed=f"{t['allowed']:.0f}", accuracy=accuracy_rows(f), chains=chains(f),
         rods=c["rods"], speed=f"{c['speed']:g}", error=f"{c['error']:g}", demanded=f"{c['demanded']:g}",
-        reached=" and ".join(f"{1e3 * r['step']:g} ms" for r in c["rows"] if r["rate"] >= c["demanded"]) or "no length",
+        reached=reached(c),
         exudyn="exudyn was not installed." if c["exudyn"] is None else
         f"the FMU is {c['exudyn']:.0f} times as fast as exudyn; {c['demanded_exudyn']:g} times are demanded.",
         overloads=overloads(f), sweep=sweep(f), sweep_angles=f["sweep_time"]["angles"],

@@ -117,8 +117,9 @@ def _rows(recording: Recording, crank_speed: float) -> Iterator[InputError]:
         begin, end = max(recording.gaps, key=lambda gap: gap[1] - gap[0])
         yield _fault(
             recording, "time",
-            f"{100.0 * recording.missing:.0f} % of the rows are missing, {end - begin:.3g} s of them in one piece from "
-            f"{begin:.3g} s; must be <= {100.0 * MISSING:.0f} %: name a part without gaps (from, to), or record again",
+            f"{100.0 * recording.missing:.0f} % of the rows are missing, {end - begin:.3g} s of them in one piece "
+            f"from {begin:.3g} s; must be <= {100.0 * MISSING:.0f} %: name a part without gaps (from, to), or record "
+            "again",
         )  # fmt: skip
     span = float(recording.time[-1] - recording.time[0])
     if span < FEWEST_TURNS * turn:
@@ -146,7 +147,9 @@ def _stands(recording: Recording, crank_speed: float, ratio: float) -> list[Inpu
 
 def _standing(recording: Recording, name: str, words: str) -> InputError:
     return _fault(
-        recording, name, f"{words}: the machine stands, or the sensor is not connected; record the running machine"
+        recording,
+        name,
+        f"{words}: the machine stands, or the sensor is not connected; record the running machine",
     )
 
 
@@ -156,7 +159,9 @@ def _scale_words(name: str, size: float, expected: Expectation) -> str:
     unit = SIGNALS[name].unit
     for factor, prefix in ((1e-3, "m"), (1e3, "k")):
         if expected.admits(size * factor):
-            return f"{words}; {limit}: the values look like {prefix}{unit}; write [{prefix}{unit}] into its head"
+            return (
+                f"{words}; {limit}: the values look like {prefix}{unit}; write [{prefix}{unit}] into its head"
+            )
     return f"{words}; {limit}: check the sensor, and the unit in its head"
 
 

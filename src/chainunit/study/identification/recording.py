@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import Faults, InputError, meant, near_name, printable
-from ...units import convert, split
+from ...units import convert
 from .signals import SIGNALS, Signal
 
 FEWEST = 100
@@ -82,21 +82,26 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
         with faults.collected():
             units[name] = (place, *_scale(file, heads[place], SIGNALS[name], unit))
     if "time" not in known:
-        faults.add([InputError(f"{file}: has no column time [s]{meant('time', heads)} its heads are: {', '.join(heads)}")])
+        faults.add(
+            [
+                InputError(
+                    f"{file}: has no column time [s]{meant('time', heads)} its heads are: {', '.join(heads)}"
+                )
+            ]
+        )
     if not known.keys() - {"time"}:
         words = ", ".join(f"{each.name} [{each.unit}]" for each in SIGNALS.values() if each.name != "time")
         faults.add([InputError(f"{file}: has no column of a signal; signals are {words}")])
     faults.refuse()
     table = _numbers(file, lines[1:], mark, [units[name][0] for name in known])
-    columns = {
-        name: table[:, k] * units[name][1] + units[name][2] for k, name in enumerate(known)
-    }
+    columns = {name: table[:, k] * units[name][1] + units[name][2] for k, name in enumerate(known)}
     time = columns.pop("time")
     back = np.flatnonzero(np.diff(time) <= 0.0)
     if len(back):
         row = int(back[0]) + 3
         raise InputError(
-            f"{file}, line {row}: time = {time[row - 2]:g} s: must be later than {time[row - 3]:g} s of the line before"
+            f"{file}, line {row}: time = {time[row - 2]:g} s: must be later than {time[row - 3]:g} s of the line "
+            "before"
         )
     return Recording(str(file), time, columns, {name: heads[place] for name, (place, _) in known.items()})
 
@@ -137,7 +142,9 @@ def _scale(file: Path, head: str, signal: Signal, unit: str) -> tuple[float, flo
             raise InputError(f"{file}, column {head}: must have the unit [1]")
         return 1.0, 0.0
     if not unit:
-        raise InputError(f"{file}, column {head}: has no unit; write [{signal.unit}] behind its name, or its own unit")
+        raise InputError(
+            f"{file}, column {head}: has no unit; write [{signal.unit}] behind its name, or its own unit"
+        )
     try:
         offset = convert(0.0, unit, signal.unit)
         return convert(1.0, unit, signal.unit) - offset, offset
