@@ -137,7 +137,7 @@ def test_columns_may_have_other_heads_and_decimal_commas(tmp_path):
     [
         ("time [s],motor.i [A]\n0,1\n", "has 1 rows behind its head; must have >= 100"),
         (table("t [s],motor.i [A]"), "has no column time [s]"),
-        (table("time [s],x [A]"), "has no column of a signal; signals are motor.i [A], "),
+        (table("time [s],x [A]"), "has no column of a known quantity, such as motor.i [A], "),
         (table("time [s],motor.i"), "column motor.i: has no unit; write [A] behind its name"),
         (table("time [s],motor.i [V]"), "column motor.i [V]: must have a unit like [A]"),
         (table("time [s],motor.i [A]").replace("\n0.003,4\n", "\n0.003,-\n"), "line 5, column 2: - is no number"),
@@ -156,7 +156,7 @@ def test_all_faults_of_a_head_at_once(tmp_path):
     with pytest.raises(InputError) as refusal:
         read_recording(written(tmp_path, table("time,motor.u [A]")), {"motor.y": "x", "motor.i": "Stron"})
     text = str(refusal.value)
-    assert "columns.motor.y: no such signal" in text and "columns.motor.i = 'Stron': no such column" in text
+    assert "columns.motor.y: no such quantity" in text and "columns.motor.i = 'Stron': no such column" in text
     assert "column time: has no unit" in text and "column motor.u [A]: must have a unit like [V]" in text
     with pytest.raises(InputError, match="cannot be read"):
         read_recording(tmp_path / "absent.csv")

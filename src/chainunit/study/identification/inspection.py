@@ -11,8 +11,8 @@ import numpy as np
 
 from ...errors import InputError
 from ...refusals import unit_behind
+from .measurands import MEASURANDS
 from .recording import Recording
-from .signals import SIGNALS
 
 MISSING = 0.2
 """Largest share of rows that may be missing."""
@@ -31,7 +31,7 @@ _ROWS_STUCK = 20
 @dataclass(frozen=True)
 class Expectation:
     """The sizes that a column can have: its RMS lies between `low` and `high`; `words` say from where the upper limit
-    comes. A signal that is `driving` has a mean of the sign of the speed."""
+    comes. A quantity that is `driving` has a mean of the sign of the speed."""
 
     low: float
     high: float
@@ -50,7 +50,7 @@ def inspect(
 
     Parameters
     ----------
-    expected : by signal, the sizes that its column can have
+    expected : by quantity, the sizes that its column can have
     crank_speed : the usual speed of the crank [rad/s]
     ratio : motor turns per crank turn
     """
@@ -156,7 +156,7 @@ def _standing(recording: Recording, name: str, words: str) -> InputError:
 def _scale_words(name: str, size: float, expected: Expectation) -> str:
     words = f"RMS of {_size(name, size)}"
     limit = f"must be from {_size(name, expected.low)} to {_size(name, expected.high)} ({expected.words})"
-    unit = SIGNALS[name].unit
+    unit = MEASURANDS[name].unit
     for factor, prefix in ((1e-3, "m"), (1e3, "k")):
         if expected.admits(size * factor):
             return (
@@ -201,7 +201,7 @@ def _rms(x: Any) -> float:
 
 
 def _size(name: str, x: float) -> str:
-    return f"{x:.3g}{unit_behind(SIGNALS[name].unit)}"
+    return f"{x:.3g}{unit_behind(MEASURANDS[name].unit)}"
 
 
 def _fault(recording: Recording, name: str, words: str) -> InputError:

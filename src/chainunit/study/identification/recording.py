@@ -13,7 +13,7 @@ import numpy as np
 
 from ...errors import Faults, InputError, meant, near_name, printable
 from ...units import convert
-from .signals import SIGNALS, Signal
+from .measurands import MEASURANDS, Measurand
 
 FEWEST = 100
 """Fewest rows of a recording."""
@@ -21,8 +21,8 @@ FEWEST = 100
 
 @dataclass(frozen=True)
 class Recording:
-    """The rows of a file: `time` [s], shape (n,), and the `columns` by the name of the signal, each of shape (n,), in
-    the unit of the signal. `heads` are the heads of the columns in the file."""
+    """The rows of a file: `time` [s], shape (n,), and the `columns` by the name of the quantity, each of shape (n,),
+    in the unit of the quantity. `heads` are the heads of the columns in the file."""
 
     source: str
     time: Any
@@ -57,13 +57,13 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
     """Read a recording.
 
     The first row of the file is its head, with a name and a unit for each column (``motor.i [A]``). A file whose name
-    ends with ``.gz`` is unpacked. Columns that are no signal are left out.
+    ends with ``.gz`` is unpacked. Columns that are none of `MEASURANDS` are left out.
 
     Parameters
     ----------
     file : the CSV file, with commas or semicolons between the columns; after semicolons, numbers may have a decimal
         comma
-    names : by the name of a signal, the head of its column, where that is not the name of the signal
+    names : by the name of a quantity, the head of its column, where that is not the name of the quantity
 
     Raises
     ------
@@ -77,10 +77,10 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
     mark = ";" if lines[0].count(";") > lines[0].count(",") else ","
     heads = [head.strip().strip('"').lstrip("\ufeff") for head in lines[0].split(mark)]
     faults, units = Faults(), dict[str, tuple[int, float, float]]()
-    known = dict(_signals(file, heads, names or {}, faults))
+    known = dict(_places(file, heads, names or {}, faults))
     for name, (place, unit) in known.items():
         with faults.collected():
-            units[name] = (place, *_scale(file, heads[place], SIGNALS[name], unit))
+            units[name] = (place, *_scale(file, heads[place], MEASURANDS[name], unit))
     if "time" not in known:
         faults.add(
             [
@@ -90,8 +90,8 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
             ]
         )
     if not known.keys() - {"time"}:
-        words = ", ".join(f"{each.name} [{each.unit}]" for each in SIGNALS.values() if each.name != "time")
-        faults.add([InputError(f"{file}: has no column of a signal; signals are {words}")])
+        words = ", ".join(f"{each.name} [{each.unit}]" for each in MEASURANDS.values() if each.name != "time")
+        faults.add([InputError(f"{file}: has no column of a known quantity, such as {words}")])
     faults.refuse()
     table = _numbers(file, lines[1:], mark, [units[name][0] for name in known])
     columns = {name: table[:, k] * units[name][1] + units[name][2] for k, name in enumerate(known)}
@@ -116,40 +116,42 @@ def _text(file: Path) -> str:
         raise InputError(f"{file}: is no text in UTF-8; save the recording as CSV") from error
 
 
-def _signals(
+def _places(
     file: Path, heads: list[str], names: Mapping[str, str], faults: Faults
 ) -> Iterator[tuple[str, tuple[int, str]]]:
-    """By signal, the place of its column and its unit in the head."""
+    """By quantity, the place of its column and its unit in the head."""
     plain = [head.partition("[")[0].strip() for head in heads]
-    for signal, head in names.items():
-        if signal not in SIGNALS:
-            hint = near_name(signal, SIGNALS) or f"; signals are {', '.join(SIGNALS)}"
-            faults.add([InputError(f"columns.{signal}: no such signal{hint}")])
+    for quantity, head in names.items():
+        if quantity not in MEASURANDS:
+            hint = near_name(quantity, MEASURANDS) or f"; there are {', '.join(MEASURANDS)}"
+            faults.add([InputError(f"columns.{quantity}: no such quantity{hint}")])
         elif head not in plain and head not in heads:
             hint = near_name(head, plain) or f"; its heads are: {', '.join(heads)}"
-            faults.add([InputError(f"columns.{signal} = {head!r}: no such column of {file}{hint}")])
-    taken = {head: signal for signal, head in names.items()}
+            faults.add([InputError(f"columns.{quantity} = {head!r}: no such column of {file}{hint}")])
+    taken = {head: quantity for quantity, head in names.items()}
     for place, (head, name) in enumerate(zip(heads, plain, strict=True)):
-        signal = taken.get(head, taken.get(name, name if name not in names else ""))
-        if signal in SIGNALS:
-            yield signal, (place, head.partition("[")[2].partition("]")[0].strip())
+        quantity = taken.get(head, taken.get(name, name if name not in names else ""))
+        if quantity in MEASURANDS:
+            yield quantity, (place, head.partition("[")[2].partition("]")[0].strip())
 
 
-def _scale(file: Path, head: str, signal: Signal, unit: str) -> tuple[float, float]:
-    """Factor and offset from the unit of the column to that of the signal."""
-    if signal.unit == "1":
+def _scale(file: Path, head: str, quantity: Measurand, unit: str) -> tuple[float, float]:
+    """Factor and offset from the unit of the column to that of the quantity."""
+    if quantity.unit == "1":
         if unit not in ("", "1"):
             raise InputError(f"{file}, column {head}: must have the unit [1]")
         return 1.0, 0.0
     if not unit:
         raise InputError(
-            f"{file}, column {head}: has no unit; write [{signal.unit}] behind its name, or its own unit"
+            f"{file}, column {head}: has no unit; write [{quantity.unit}] behind its name, or its own unit"
         )
     try:
-        offset = convert(0.0, unit, signal.unit)
-        return convert(1.0, unit, signal.unit) - offset, offset
+        offset = convert(0.0, unit, quantity.unit)
+        return convert(1.0, unit, quantity.unit) - offset, offset
     except ValueError as error:
-        raise InputError(f"{file}, column {head}: must have a unit like [{signal.unit}]: {error}") from error
+        raise InputError(
+            f"{file}, column {head}: must have a unit like [{quantity.unit}]: {error}"
+        ) from error
 
 
 def _numbers(file: Path, lines: list[str], mark: str, places: list[int]) -> Any:
