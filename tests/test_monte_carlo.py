@@ -16,6 +16,7 @@ import sys
 import textwrap
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -35,6 +36,8 @@ from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 from chainunit.study.event_block import EventBlock
 from chainunit.study.event_runs import EventSimulation
+from chainunit.study.quantiles import Estimate
+from chainunit.study.random_remarks import remark_on_random_overloads
 from chainunit.study.rig import Rig
 from chainunit.system import CoSimulation, monolithic
 from chainunit.text import number as shown
@@ -372,6 +375,25 @@ def test_processes_leave_nothing_behind(end, tmp_path):
     assert (running.returncode == 0) == (end is None), errors
     vanish(running)
     assert list(scratch.glob("chainunit*")) == []
+
+
+@pytest.mark.parametrize(("current", "told"), [(4.4, True), (4.3, False)])
+def test_a_current_at_its_limit_and_damaged_batches_are_noted(current, told):
+    drive = choose(parse(""), Path(), lambda *said: None).drive
+    assert drive.parameters.limit.i == 4.4
+    quantiles = {"current_peak": {"q50": Estimate(2.0, 1.0, 3.0), "q95": Estimate(current, 4.0, 4.4)}}
+    random = SimpleNamespace(
+        quantiles=lambda: quantiles, remark="", damaged_batches=1, file=Path("out/runs.zarr")
+    )
+    notes = {}
+    study = SimpleNamespace(
+        monte_carlo=random, drive=drive, note=lambda kind, words, **of: notes.update({kind: of})
+    )
+    remark_on_random_overloads(study)
+    at = notes.get("random overloads at current limit")
+    assert at == ({"limit": (4.4, "A")} if told else None)
+    words = "1 batch of runs in runs.zarr was damaged, and was computed anew"
+    assert notes["runs made anew"] == {"text": words}
 
 
 def test_question_and_answer_tell_of_random_overloads(tmp_path):

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import pickle
+import re
 import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -19,10 +21,12 @@ from command import chainunit
 from scipy.stats import qmc, spearmanr
 
 from chainunit import GeometryError, InputError, Study
+from chainunit.batch_store import made_anew
 from chainunit.errors import InputError as Refusal
 from chainunit.job import CHECKS
 from chainunit.native.compilers import compiler
 from chainunit.report.figure import Hatch, hatch_lines
+from chainunit.report.terminal import plain
 from chainunit.study import sweep
 from chainunit.study.choice import choose
 from chainunit.study.config import parse
@@ -367,6 +371,37 @@ def test_measures_are_those_of_the_co_simulation(jams):
 
 
 @NATIVE
+def test_the_largest_loads_come_first_and_the_limit_of_the_current_is_told():
+    text = TRANSIENTS.replace('quantities = ["min(margin)"]\n', "")
+    plans = [
+        Study.from_text(text.replace("[sweep]\n", f"[sweep]\n{more}")).config.sweep
+        for more in ("", "best = 'current_peak'\n", "best_is = 'least'\n")
+    ]
+    assert [plan.best_is for plan in plans] == ["largest", "least", "least"]
+    assert Study.from_text(TRANSIENTS).config.sweep.best_is == "least"
+    limit = Study.from_text("").config.motor.limit.i
+    hard, soft = (Study.from_text(ONE_JAM.format(force)).sweep(workers=1) for force in (3889, 300))
+    assert hard.table["current_peak"].max() == pytest.approx(limit, rel=1e-3)
+    assert json.loads(hard.to_json())["current_limit"]["value"] == limit
+    assert "The current is at its limit, 4.4 A," in repr(hard)
+    assert soft.table["current_peak"].max() < 0.9 * limit
+    assert json.loads(soft.to_json())["current_limit"]["value"] is None
+
+
+ONE_JAM = """\
+[[event]]
+type = "jam"
+side = "left"
+[sweep]
+points = 1
+measures = ["current_peak"]
+[[sweep.parameter]]
+name = "event.jam_left.force"
+values = [{}]
+"""
+
+
+@NATIVE
 def test_transients_do_not_know_one_another(jams):
     _, task = jams
     whole = sweep.make_points(task, 0, 9)
@@ -490,6 +525,59 @@ def test_points_beyond_the_limits_of_two_bars_are_counted():
     assert json.loads(motion.to_json())["organs"] == []
 
 
+def _between(x, y):
+    """The share of the variance between 16 classes of x, as it is."""
+    means = np.array([np.mean(y[part]) for part in np.array_split(np.argsort(x), 16)])
+    return np.var(means) / np.var(y)
+
+
+def test_shares_are_left_out_where_they_are_not_defined(grid, spread):
+    """In the grid most cranks cannot turn: those that do are no independent parameters."""
+    numbers = json.loads(grid.to_json())
+    table = grid.table
+    gap = 1.0 - np.count_nonzero(table["reason"] == "") / len(table)
+    assert gap > 0.05
+    for name, of in numbers["influences"].items():
+        assert numbers["gaps"][name]["value"] == pytest.approx(gap)
+        assert all(
+            each["share"]["value"] is None and abs(each["rank"]["value"]) <= 1.0 for each in of.values()
+        )
+    words = "of the points have no value, and the parameters of the others are not independent"
+    assert words in repr(grid) and words not in repr(spread)
+    assert "moves it most" not in grid._repr_html_() and "moves it most" in spread._repr_html_()
+    # within their error
+    torque = spread.summary.influences["peak(crank_torque)"]
+    assert torque["machine.r"].share > 0.9 and torque["machine.crank.m"].share is None
+    assert "within their error" in repr(spread)
+
+
+def test_the_spread_names_the_ranges_that_are_no_tolerances(spread):
+    assert json.loads(spread.to_json())["evenly"] == ["machine.r"]
+    assert "machine.r has no tolerance: the spread counts each of their values" in repr(spread)
+    text = SPREAD.replace('from = "130 mm"\nto = "170 mm"', 'tolerance = "2 mm"')
+    numbers = json.loads(Study.from_text(text.replace("200", "16")).sweep(workers=1).to_json())
+    assert numbers["evenly"] == [] and numbers["spread"]
+
+
+def test_tables_fit_into_80_columns_with_whole_names(spread):
+    text = SPREAD.replace("machine.crank.m", "feed.left.material_mass").replace("200", "16")
+    for result in (spread, Study.from_text(text).sweep(workers=1)):
+        lines = plain(result._report, 80).splitlines()
+        tables = [line for line in lines if line.startswith(("┃", "│"))]
+        assert max(map(len, tables)) <= 80 and "…" not in "".join(tables)
+        for name in result.summary.variables:
+            assert any(name in line for line in tables), name
+
+
+def test_energy_is_shown_in_kilowatt_hours():
+    text = "[sweep]\nangles = 16\nmethod = 'grid'\nquantities = ['energy_per_year']\n"
+    text += "[[sweep.parameter]]\nname = 'machine.r'\nvalues = [0.14, 0.15]\n"
+    result = Study.from_text(text).sweep(workers=1)
+    least = json.loads(result.to_json())["extremes"]["energy_per_year"]["least"]["energy_per_year"]
+    assert least["unit"] == "J" and least["value"] == result.table["energy_per_year"].min()
+    assert re.search(rf"\b{least['value'] / 3.6e6:.4g}\d* kWh", repr(result))
+
+
 def test_influences(spread):
     table = spread.table
     for name, of in spread.summary.influences.items():
@@ -499,15 +587,22 @@ def test_influences(spread):
     assert (
         torque["machine.r"].rank > 0.99
         and torque["machine.r"].share > 0.97
-        and torque["machine.crank.m"].share < 0.05
+        and torque["machine.crank.m"].share is None
     )
     x = qmc.Sobol(2, rng=np.random.default_rng(0)).random(4096) - 0.5
     y = x[:, 0] ** 2 + 0.1 * x[:, 1]
     # Var(x^2) = 1/180, Var(0.1 x) = 1/1200: neither rank nor slope tells of the first
     assert abs(_correlation(x[:, 0], y)) < 0.02
-    assert _explained(x[:, 0], y) == pytest.approx((1 / 180) / (1 / 180 + 1 / 1200), abs=0.02)
-    assert _explained(x[:, 1], y) == pytest.approx((1 / 1200) / (1 / 180 + 1 / 1200), abs=0.02)
-    assert _explained(np.random.default_rng(1).random(4096), y) < 0.01
+    assert _explained(x[:, 0], y)[0] == pytest.approx((1 / 180) / (1 / 180 + 1 / 1200), abs=0.02)
+    assert _explained(x[:, 1], y)[0] == pytest.approx((1 / 1200) / (1 / 180 + 1 / 1200), abs=0.02)
+    assert _explained(np.random.default_rng(1).random(4096), y)[0] < 0.01
+    # an x that explains nothing is within its error nearly always, and that is its deviation, twice
+    shares, errors = np.array(
+        [_explained(x[:, 0], np.random.default_rng(k).random(4096)) for k in range(200)]
+    ).T
+    assert np.mean(shares < errors) > 0.9
+    raw = np.array([_between(x[:, 0], np.random.default_rng(k).random(4096)) for k in range(200)])
+    assert errors[0] == pytest.approx(2.0 * np.std(raw), rel=0.2)
 
 
 def test_the_spread_has_quantiles_and_the_values_of_the_study(spread):
@@ -585,6 +680,42 @@ def test_the_command_refuses(tmp_path):
     (tmp_path / "z.toml").write_text(text, "utf-8")
     done = chainunit("sweep", "z.toml", cwd=tmp_path)
     assert done.returncode == 1 and "No point of the sweep has a result" in done.stdout
+
+
+def test_a_damaged_batch_is_told(tmp_path):
+    study = Study.from_text(SPREAD)
+    store = study.sweep(tmp_path, workers=1).file
+    assert json.loads((tmp_path / "result.json").read_text("utf-8"))["damaged_batches"]["value"] == 0
+    (chunk, *_) = sorted(store.glob("machine_r/c/*"))
+    chunk.write_bytes(chunk.read_bytes()[:-1] + b"x")
+    words = f"1 batch of points in {store.name} was damaged, and was computed anew"
+    assert words in repr(study.sweep(tmp_path, workers=1))
+    assert made_anew(3, "runs", "x") == "3 batches of runs in x were damaged, and were computed anew"
+
+
+def test_a_refused_sweep_leaves_nothing(tmp_path):
+    """A server that answers and is no scheduler, and a number of workers that is none."""
+    study = Study.from_text(SPREAD)
+    with pytest.raises(InputError, match='workers = "a": must be a whole number >= 1'):
+        study.sweep(tmp_path / "out", workers="a")
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def answer():
+            while True:
+                try:
+                    with server.accept()[0] as peer:
+                        peer.recv(1000)
+                        peer.sendall(b"HTTP/1.1 400 Bad Request\r\n\r\n" * 4)
+                except OSError:
+                    return
+
+        threading.Thread(target=answer, daemon=True).start()
+        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        with pytest.raises(InputError, match="answers, but is no Dask scheduler"):
+            study.sweep(tmp_path / "out", scheduler=address)
+        # it ends the thread
+        server.shutdown(socket.SHUT_RDWR)
+    assert not (tmp_path / "out").exists()
 
 
 def test_one_parameter_gives_curves(tmp_path):

@@ -210,3 +210,13 @@ class BatchStore:
         dataset = xr.open_zarr(self.path, chunks=None, consolidated=False, decode_times=False)
         dataset.attrs["points"] = self.job.points
         return dataset[self._names].isel({self.job.dimension: slice(0, self.job.points)})
+
+
+def made_anew(batches: int, points: str, store: str) -> str:
+    """Words on damaged batches of a store."""
+    were = (
+        "batch of {} in {} was damaged, and was"
+        if batches == 1
+        else "batches of {} in {} were damaged, and were"
+    )
+    return f"{batches} {were.format(points, store)} computed anew"

@@ -326,13 +326,21 @@ def _ask(scheduler: str) -> None:
         with concurrent.futures.ThreadPoolExecutor(1) as thread:
             answer = thread.submit(lambda: asyncio.run(ask_in_time())).result()
     except Exception as error:
+        if not isinstance(error, OSError | TimeoutError):
+            # bytes that are no message of Dask: the length of a message is then any number
+            raise InputError(
+                f"scheduler {address}: answers, but is no Dask scheduler; give the address that it prints, such as "
+                "tcp://10.0.0.5:8786"
+            ) from error
         words = f"within {PATIENCE:g} s" if isinstance(error, TimeoutError) else f"({_reason(error)})"
         raise InputError(
             f'scheduler {address}: does not answer {words}; start it by "dask scheduler", and give the address that '
             "it prints, such as tcp://10.0.0.5:8786"
         ) from error
     if answer.get("type") != "Scheduler":
-        raise InputError(f"scheduler {address}: is no scheduler of Dask; give the address that it prints")
+        raise InputError(
+            f"scheduler {address}: answers, but is no Dask scheduler; give the address that it prints"
+        )
     if not answer.get("workers"):
         raise InputError(f'scheduler {address}: has no workers; start them by "dask worker {address}"')
 

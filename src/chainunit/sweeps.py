@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from functools import cached_property
+from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .ending import in_temporary_folder
-from .errors import WriteError
+from .errors import InputError, WriteError, shown
 from .files import claim, write_all
 from .progress import Report as Progress
 from .report import files, html, terminal
@@ -73,6 +74,10 @@ def make_sweep(
     progress: Progress | None = None,
 ) -> SweepResult:
     """Run the sweep of a study, see `chainunit.Study.sweep`."""
+    if workers is not None and (
+        isinstance(workers, bool) or not isinstance(workers, Integral) or workers < 1
+    ):
+        raise InputError(f"workers = {shown(workers)}: must be a whole number >= 1")
 
     def quiet(what: str, complete: float, total: float) -> None:
         pass

@@ -8,6 +8,7 @@ Kinds, beside the unit (see `quantities.quantity`):
 ``difference``   a difference of temperatures, which stays in K
 ``speed``        the speed of a shaft, in rad/s and rev/min
 ``frequency``    an angular frequency, in rad/s and Hz
+``energy``       the energy of long operation, in kWh
 ``assumed``      a value that is known to one digit
 ``millimetres``  a length in mm
 """
@@ -41,7 +42,13 @@ Units: TypeAlias = Mapping[str, tuple[str, ...]]
 """By kind, the units in which its numbers are shown: one unit, or one and a second beside it."""
 
 DEFAULT_UNITS: Units = MappingProxyType(
-    {"speed": ("rad/s", "rev/min"), "frequency": ("rad/s", "Hz"), "power": ("kW",), "millimetres": ("mm",)}
+    {
+        "speed": ("rad/s", "rev/min"),
+        "frequency": ("rad/s", "Hz"),
+        "power": ("kW",),
+        "energy": ("kWh",),
+        "millimetres": ("mm",),
+    }
 )
 _SHOWN_IN: ContextVar[Units] = ContextVar("units of words", default=DEFAULT_UNITS)
 _KIND_OF = {"W": "power", "N.m": "torque", "N": "force"}
@@ -50,12 +57,17 @@ _SCALES: dict[str, dict[str, tuple[float, float]]] = {
     "speed": {"rad/s": (1.0, 0.0), "rev/min": (30.0 / math.pi, 0.0)},
     "frequency": {"rad/s": (1.0, 0.0), "Hz": (0.5 / math.pi, 0.0)},
     "power": {"W": (1.0, 0.0), "kW": (1e-3, 0.0)},
+    "energy": {"J": (1.0, 0.0), "kWh": (1.0 / 3.6e6, 0.0)},
     "torque": {"N.m": (1.0, 0.0), "kN.m": (1e-3, 0.0)},
     "force": {"N": (1.0, 0.0), "kN": (1e-3, 0.0)},
     "millimetres": {"mm": (1e3, 0.0)},
 }
 """By kind, the units in which it may be shown, with factor and offset: shown = factor * value + offset."""
-CHOICES = {kind: tuple(scales) for kind, scales in _SCALES.items() if len(scales) > 1 and kind != "frequency"}
+CHOICES = {
+    kind: tuple(scales)
+    for kind, scales in _SCALES.items()
+    if len(scales) > 1 and kind not in ("frequency", "energy")
+}
 """Units that an engineer may choose, by kind."""
 
 

@@ -26,11 +26,11 @@ def report(summary: SweepSummary) -> b.Report:
     findings = summary.findings
     with shown_in(findings.config.units):
         sections = (
-            b.Section("best", "Best points", tuple(_best(s, summary))),
+            b.Section("best", "Points in order", tuple(_best(s, summary))),
             b.Section("extremes", "Extremes", tuple(_extremes(s, summary))),
             b.Section("maps", "Results over the parameters", tuple(sweep_figures.over_parameters(summary))),
             b.Section("influences", "Which parameter moves what", tuple(_influences(s, summary))),
-            b.Section("spread", "Spread by tolerances", tuple(_spread(s, summary))),
+            b.Section("spread", _spread_heading(summary), tuple(_spread(s, summary))),
             b.Section("basis", "Basis of the numbers", tuple(_basis(s, summary))),
         )
         entries = [s.line(f"{capital(name)}: {{report.{name}}} · ") for name in s.result["report"]]
@@ -95,12 +95,9 @@ def _range(s: b.Source, name: str) -> Line:
 
 
 def _columns(names: list[str]) -> tuple[b.Column, ...]:
-    """Columns of parameters or results. On a terminal a parameter is called by the last part of its name, where no
-    other one has it."""
-    ends = [name.rpartition(".")[2] if "(" not in name else name for name in names]
+    """Columns of parameters or results."""
     return tuple(
-        b.Column(Name(name), end if ends.count(end) == 1 else "", "both" if k < _MOST_COLUMNS else "long")
-        for k, (name, end) in enumerate(zip(names, ends, strict=True))
+        b.Column(Name(name), form="both" if k < _MOST_COLUMNS else "long") for k, name in enumerate(names)
     )
 
 
@@ -125,7 +122,7 @@ def _best(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
         heads = (b.Column("point"), *_columns(names))
         some = len(s.result["parameters"])
         groups = (tuple(range(1, 1 + some)), tuple(range(1 + some, 1 + len(names))))
-        title = s.line("Points with the {best_by}, the best first")
+        title = s.line("Points with the {best_by} first")
         yield b.Table(tuple(rows), heads, title=title, groups=groups)
 
 
@@ -150,6 +147,8 @@ def _influences(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
         return
     for name, of in table.items():
         most = max(of, key=lambda each: of[each]["share"]["value"] or 0.0)
+        if of[most]["share"]["value"] is None:
+            continue
         path = f"influences.{name}.{most}"
         words = f"{{name}}: {{most}} moves it most; alone it explains {{{path}.share}} of the variance."
         yield b.Text(s.line(words, name=Name(name), most=Name(most)), form="long")
@@ -158,11 +157,23 @@ def _influences(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
         if each not in table[name]:
             return "-"
         path = f"influences.{name}.{each}"
+        if table[name][each]["share"]["value"] is None:
+            return s.line(f"{{{path}.rank:2}}")
         return s.line(f"{{{path}.rank:2}} ({{{path}.share:2}})")
 
     rows = (b.TableRow((Name(each), *(cell(name, each) for name in table))) for each in parameters)
-    title = "Rank correlation; in brackets the share of the variance that the parameter explains alone"
+    shares = [each["share"]["value"] is not None for of in table.values() for each in of.values()]
+    title = "Rank correlation"
+    if any(shares):
+        title += "; in brackets the share of the variance that the parameter explains alone"
     yield b.Table(tuple(rows), (b.Column("parameter"), *_columns(list(table))), title=title)
+    wide = [name for name, gap in summary.undefined.items() if gap]
+    if wide:
+        worst = max(wide, key=lambda name: s.value(f"gaps.{name}") or 0.0)
+        words = "No shares of the variance: up to {gap} of the points have no value, and the parameters of the others"
+        yield b.Text(s.line(f"{words} are not independent.", gap=s.number(f"gaps.{worst}")), "note")
+    elif not all(shares):
+        yield b.Text("Shares of the variance that are within their error are left out.", "fine")
     yield b.Text(
         "A rank correlation of 1 or -1: the result only rises or only falls with the parameter. Near 0 with a large "
         "share: it rises and falls. Shares that add up to less than 100 %: the parameters act together.",
@@ -171,6 +182,10 @@ def _influences(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
     )
     if len(parameters) > 2:
         yield from sweep_figures.tornado(summary)
+
+
+def _spread_heading(summary: SweepSummary) -> str:
+    return "Spread by tolerances and ranges" if summary.evenly else "Spread by tolerances"
 
 
 def _spread(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
@@ -202,6 +217,12 @@ def _spread(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
     columns = (b.Column("result"), *of_study, *(b.Column(f"{key.removeprefix('q')} %") for key in quantiles))
     groups = ((1, 2, 3), tuple(range(4, len(columns))))
     yield b.Table(tuple(rows), columns, title="Spread of the results and their quantiles", groups=groups)
+    if summary.evenly:
+        ranges = join(map(Name, summary.evenly))
+        words = " has no tolerance" if len(summary.evenly) == 1 else " have no tolerance"
+        yield b.Text(
+            line(ranges, words, ": the spread counts each of their values as equally frequent."), "note"
+        )
     yield b.Text(
         s.line(
             "result.json has the interval of {=confidence} confidence of each quantile, as for points that are drawn "
@@ -258,4 +279,9 @@ def _basis(s: b.Source, summary: SweepSummary) -> Iterator[b.Block]:
             ),
             "note",
         )
+    if s.value("current_limit") is not None:
+        words = "The current is at its limit, {=current_limit}, at the points with the largest current_peak."
+        yield b.Text(s.line(words), "note")
+    if s.result["made_anew"]:
+        yield b.Text(s.line("{made_anew}."), "note")
     yield b.Text(s.line("All points: {store} (Zarr)."), "fine", "long")

@@ -176,8 +176,10 @@ def tornado(summary: SweepSummary) -> Iterator[fig.Figure]:
     for k, some in enumerate(_pieces(summary.influences.items(), _MOST_PANELS)):
         panels = []
         for name, table in some:
-            order = sorted(table, key=lambda each: -table[each].share)
-            words = tuple(f"{100.0 * table[each].share:.0f} %" for each in order)
+            size = {each: (of.share or 0.0, abs(of.rank)) for each, of in table.items()}
+            order = sorted(table, key=size.__getitem__, reverse=True)
+            shares = [table[each].share for each in order]
+            words = tuple("" if x is None else f"{100.0 * x:.0f} %" for x in shares)
             ranks = [table[each].rank for each in order]
             bars = fig.Bars("rank correlation", np.arange(len(order)), ranks, 0.7, 1, words=words)
             x = fig.Axis("rank correlation", low=-1.5, high=1.5, step=0.5)
@@ -187,7 +189,7 @@ def tornado(summary: SweepSummary) -> Iterator[fig.Figure]:
         rows = _in_pairs(panels)
         yield fig.Figure(
             f"tornado-{k}" if k else "tornado",
-            "Which parameter moves what; beside the bars the share of the variance that it explains alone",
+            "Which parameter moves what; beside the bars shares of the variance that they explain alone",
             "Bars of the rank correlation between each result and each parameter.",
             rows,
             file=f"sweep_tornado{f'_{k + 1}' if k else ''}.png",
@@ -213,7 +215,7 @@ def distribution(summary: SweepSummary) -> Iterator[fig.Figure]:
         rows = _in_pairs(panels)
         yield fig.Figure(
             f"spread-{k}" if k else "spread",
-            "Distribution of the results by the tolerances",
+            "Distribution of the results",
             "The share of the points below each value of each result.",
             rows,
             file=f"sweep_spread{f'_{k + 1}' if k else ''}.png",

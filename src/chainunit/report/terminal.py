@@ -92,7 +92,8 @@ def _sentences(block: Block, units: Units) -> list[str]:
 
 
 def _show_table(table: Table, console: Console, units: Units) -> None:
-    """Print a table. Where it is too wide, print a table for each group of columns, with the columns of no group."""
+    """Print a table. Where it is too wide, print a table for each group of columns, with the columns of no group; a
+    group whose words do not fit is parted into further tables."""
     widest = console.options.update(width=10_000)
     title = plain_line(table.title, units)
     count = len(table.columns) or len(table.rows[0].cells)
@@ -103,7 +104,30 @@ def _show_table(table: Table, console: Console, units: Units) -> None:
     group_columns = {i for group in table.groups for i in group}
     for group in table.groups if len(table.groups) > 1 else [range(count)]:
         places = [i for i in range(count) if i not in group_columns or i in group or len(table.groups) < 2]
-        console.print(_grid(table, places, units, title, console.width))
+        for part in _parted(table, places, units, console.width):
+            console.print(_grid(table, part, units, title, console.width))
+
+
+def _parted(table: Table, places: Sequence[int], units: Units, room: int) -> list[list[int]]:
+    """The columns at `places` in parts whose numbers fit into the width `room`, each with the first column; a table
+    with notes stays whole."""
+    if table.columns:
+        places = [i for i in places if table.columns[i].form != "long"]
+    if table.note_title or not table.columns or not table.numeric:
+        return [list(places)]
+    first, *others = places
+    rows = [row for row in table.rows if row.form != "long"]
+
+    def width(i: int) -> int:
+        cells = [_head(table.columns[i], units), *(row.cells[i] for row in rows)]
+        return max(len(part) for cell in cells for part in _parts(cell, units)) + 3
+
+    parts: list[list[int]] = [[first]]
+    for i in others:
+        if len(parts[-1]) > 1 and sum(map(width, (*parts[-1], i))) + 1 > room:
+            parts.append([first])
+        parts[-1].append(i)
+    return parts
 
 
 def _grid(table: Table, places: Sequence[int], units: Units, title: str, room: int | None = None) -> Grid:

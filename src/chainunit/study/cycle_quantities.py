@@ -70,6 +70,8 @@ class CycleQuantity:
     description: str
     integrands: tuple[Integrand, ...]
     combine: Callable[[Sequence[Any], Any, CycleBasis], Any]
+    kind: str = ""
+    """how people show it, see `chainunit.text`"""
 
 
 def _installed_power(values: Sequence[Any], w: Any, basis: CycleBasis) -> Any:
@@ -147,7 +149,7 @@ def _named(name: str, model: type[Model]) -> CycleQuantity:
     if name == "installed_power":
         return of((Integrand("tau", "rms"), Integrand("tau", "peak")), _installed_power)
     if name == "energy_per_year":
-        return of((Integrand("power", "mean"),), _energy_per_year)
+        return of((Integrand("power", "mean"),), _energy_per_year, "energy")
     axis = {"box.width": "x", "box.height": "y"}[name]
     pins = [v.name for v in columns_of(model) if v.name.startswith(f"{axis}(")]
     if not pins:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +16,16 @@ from .window import BURNT
 SPEED_DEVIATION = 0.03
 """Relative deviation of the crank's mean speed from the requested one, up to which a drive keeps the
 speed."""
+
+
+_AT_LIMIT = 1e-3
+"""Relative distance within which a current is at its limit."""
+
+
+def limit_reached(drive: Drive, currents: Iterable[float]) -> float | None:
+    """The limit of the motor's current [A], where one of the `currents` is at it; else None."""
+    limit = drive.motor.current_limit(drive.parameters) if drive.foreign is None else None
+    return limit if limit is not None and any(i >= (1.0 - _AT_LIMIT) * limit for i in currents) else None
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from .coupling import peaks_on_coupling, remark_on_coupling
 from .events import Jam
 from .judgement import model_verdict, motor_limits, no_reserve
 from .measures import STARTED, Answers
+from .random_remarks import remark_on_random_overloads
 from .record import LOAD_CYCLE, Amount, StudyRecord
 from .sections import ChainOrgans
 from .shaft import AMPLIFIED, UNEVEN, remedies
@@ -72,7 +73,7 @@ def conclude(study: StudyRecord) -> None:
         remark_on_coupling(study, config.coupling.trip_torque)
     _on_runs(study)
     _on_inverter(study)
-    _on_random_overloads(study)
+    remark_on_random_overloads(study)
     _on_assumptions(study)
     if study.statics.torsion is not None:
         _on_shaft(study)
@@ -342,35 +343,6 @@ def _on_inverter(study: StudyRecord) -> None:
             rated=(rated_current, "A"),
             where="; ".join(where),
             **{f"{name}.current_peak": (peak, "A") for name, peak in high.items()},
-        )
-
-
-_OUTCOMES = {
-    "trips": "in {share} of them the safety coupling opens",
-    "stalls": "in {share} of them the crank stands at the end",
-}
-"""By quantity of a random run, the words on the share of the runs that end so."""
-
-
-def _on_random_overloads(study: StudyRecord) -> None:
-    random, note = study.monte_carlo, study.note
-    shares = random.quantiles() if random else {}
-    for name, words in _OUTCOMES.items():
-        share = shares.get(name, {}).get("share")
-        if share is not None and share.value > 0.0:
-            study.warn(
-                f"random overload {name}",
-                f"overloads at random: {words}.",
-                share=(share.value, "1", "percent"),
-            )
-    if random and random.remark:
-        note("too few runs", "overloads at random: {text}", text=random.remark)
-    if random and random.damaged_batches:
-        note(
-            "runs made anew",
-            "overloads at random: {batches} batches of runs in {file} were damaged, and were computed anew.",
-            batches=str(random.damaged_batches),
-            file=random.file.name,
         )
 
 

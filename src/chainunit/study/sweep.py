@@ -22,7 +22,7 @@ from ..job import Job, ResultVariable
 from ..machines.machine import Machine
 from ..progress import Report
 from ..quantities import Layout
-from ..runner import Outcome
+from ..runner import Outcome, check_scheduler
 from ..runner import run as run_job
 from .choice import choose
 from .config import Config
@@ -287,6 +287,9 @@ def run_sweep(
     """Make the points of the sweep of a study that its store in `folder` does not have; the other arguments and the
     errors are those of `task_of` and `chainunit.runner.run`."""
     task = task_of(config)
+    if scheduler is not None:
+        # before there is a store, which a refusal would leave behind
+        check_scheduler(scheduler)
     if scheduler is None and not task.plan.measures:
         # the native loop leaves so little to Python that threads do; processes take longer to start
         task, workers = replace(task, threads=workers or os.cpu_count() or 1), 1

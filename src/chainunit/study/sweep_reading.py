@@ -18,7 +18,14 @@ from .cycle_quantities import CycleBasis, cycle_quantity
 from .event import Event
 from .sections import Run
 from .sweep_plan import MOST_OF_HYPERCUBE, SweepPlan, SweptParameter
-from .sweep_table import MEASURES_OF_SWEEP, MOST_VALUES, USUAL_QUANTITIES, SweepEntry, SweepTable
+from .sweep_table import (
+    LOADS_OF_SWEEP,
+    MEASURES_OF_SWEEP,
+    MOST_VALUES,
+    USUAL_QUANTITIES,
+    SweepEntry,
+    SweepTable,
+)
 
 SPEED = "run.crank_speed"
 _MOST_OF_GRID = 1_000_000_000
@@ -104,10 +111,18 @@ def read_plan(
         *results,
         event,
         best,
-        form.best_is,
+        _best_is(form, best),
         int(table.angles),
         basis,
     )
+
+
+def _best_is(form: Any, best: str) -> str:
+    """Whether the points with the least or the largest values of `best` come first. Where the file does not say, the
+    largest loads of runs do: no value of them is wished for."""
+    if not form.best and "best_is" not in form.model_fields_set and best in LOADS_OF_SWEEP:
+        return "largest"
+    return str(form.best_is)
 
 
 def _check_results(form: Any, model: type[MachineModel]) -> None:

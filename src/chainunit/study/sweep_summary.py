@@ -15,8 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import __version__
+from ..batch_store import made_anew
 from ..quantities import Layout, Quantity, Variable
 from ..text import entry, shown_in
+from .limits import limit_reached
 from .measures import Answers
 from .organ_limits import limits_of_organs
 from .quantiles import CONFIDENCE, quantile
@@ -36,6 +38,8 @@ _METHODS = {"grid": "a grid", "latin_hypercube": "a Latin hypercube", "sobol": "
 _PART = 2**18
 _BINS = 16
 _MOST_CLASSES = 64
+_MOST_GAPS = 0.05
+"""Share of points without a value from which on the shares of the variance are not defined."""
 _LEAST = 8
 """Least number of points of a correlation."""
 
@@ -43,10 +47,12 @@ _LEAST = 8
 @dataclass(frozen=True)
 class Influence:
     """What a parameter does to a result: their rank correlation (Spearman), and the share of the variance of the
-    result that the parameter explains alone (the correlation ratio over classes of the parameter, less its bias)."""
+    result that the parameter explains alone (the correlation ratio over classes of the parameter, less its bias). The
+    share is None where it is within its own error, and where it is not defined: with many points without a value the
+    others are no independent parameters any more."""
 
     rank: float
-    share: float
+    share: float | None
 
 
 @dataclass(frozen=True)
@@ -60,7 +66,9 @@ class SweepSummary:
         """Parameters and results by name."""
         own = {each.name: each.variable for each in self.findings.plan.parameters}
         for each in self.findings.task.quantities:
-            own[each.name] = Variable(each.name, each.description, Quantity(each.unit, each.description))
+            own[each.name] = Variable(
+                each.name, each.description, Quantity(each.unit, each.description, kind=each.kind)
+            )
         measures = {v.name: v for v in Layout(Answers).variables}
         return own | {name: measures[name] for name in self.findings.plan.measures}
 
@@ -128,14 +136,24 @@ class SweepSummary:
     def sample(self) -> dict[str, Any]:
         """Parameters and results at the points behind correlations and quantiles, shape (points,), without those that
         have a reason."""
-        points = self.findings.points
-        count = points.sizes["point"]
-        if self.findings.plan.is_grid:
-            part = points.isel(point=slice(None, None, -(-count // SAMPLE)))
-        else:
-            part = points.isel(point=slice(0, SAMPLE))
+        part = self._sampled
         sound = part["reason"].values == 0
         return {name: part[name].values[sound] for name in self.variables}
+
+    @property
+    def _sampled(self) -> xr.Dataset:
+        points = self.findings.points
+        step = -(-points.sizes["point"] // SAMPLE) if self.findings.plan.is_grid else 1
+        return points.isel(point=slice(None, None, step)).isel(point=slice(0, SAMPLE))
+
+    def gaps(self, name: str) -> float:
+        """The share of the points behind correlations at which a result has no value."""
+        return 1.0 - np.count_nonzero(np.isfinite(self.sample[name])) / self._sampled.sizes["point"]
+
+    @property
+    def undefined(self) -> dict[str, bool]:
+        """By result that varies, whether shares of its variance are not defined."""
+        return {name: self.gaps(name) > _MOST_GAPS for name in self.influences}
 
     @cached_property
     def influences(self) -> dict[str, dict[str, Influence]]:
@@ -150,9 +168,11 @@ class SweepSummary:
             if has.sum() < _LEAST or np.ptp(y[has]) <= 1e-12 * np.max(np.abs(y[has])):
                 continue
             order = rankdata(y[has])
+            defined = self.gaps(name) <= _MOST_GAPS
             table[name] = {
                 each: Influence(
-                    _correlation(ranks[each][has], order), _explained(self.sample[each][has], y[has])
+                    _correlation(ranks[each][has], order),
+                    _sure_share(self.sample[each][has], y[has]) if defined else None,
                 )
                 for each in self._parameters
                 if np.ptp(self.sample[each][has]) > 0.0
@@ -196,11 +216,26 @@ class SweepSummary:
             counts += [np.count_nonzero(each.passed(speeds)) for each in limits]
         return [(each, int(count)) for each, count in zip(limits, counts, strict=True) if count]
 
+    @cached_property
+    def current_limit(self) -> float | None:
+        """The limit of the motor's current [A], where the largest current of the points is at it."""
+        rig, name = self.findings.task.rig, "current_peak"
+        if rig is None or name not in self.extremes:
+            return None
+        largest = float(self.findings.points[name].values[self.extremes[name][1]])
+        return limit_reached(rig.drive, [largest])
+
     @property
     def has_spread(self) -> bool:
-        """Whether the points are those of tolerances."""
+        """Whether points are those of tolerances; see `evenly` on the other parameters."""
         plan = self.findings.plan
         return not plan.is_grid and any(each.tolerance is not None for each in plan.parameters)
+
+    @property
+    def evenly(self) -> list[str]:
+        """The parameters without a tolerance, which the spread counts as evenly distributed."""
+        plan = self.findings.plan
+        return [each.name for each in plan.parameters if each.tolerance is None] if self.has_spread else []
 
     def as_dict(self) -> dict[str, Any]:
         """Ready for JSON, each number with its unit."""
@@ -209,6 +244,8 @@ class SweepSummary:
 
     def _as_dict(self) -> dict[str, Any]:
         config, plan = self.findings.config, self.findings.plan
+        outcome = self.findings.outcome
+        damaged = outcome.damaged_batches
         rows = self._rows(sorted({*self.best, *(k for ends in self.extremes.values() for k in ends)}))
         return {
             "chainunit": __version__,
@@ -273,8 +310,13 @@ class SweepSummary:
                 }
                 for name, table in self.influences.items()
             },
+            "gaps": {name: entry(self.gaps(name), "1", "percent") for name in self.influences},
+            "current_limit": entry(self.current_limit, "A"),
+            "evenly": self.evenly,
             "spread": self._spread() if self.has_spread else {},
             "confidence": entry(CONFIDENCE, "1", "percent"),
+            "made_anew": made_anew(damaged, "points", outcome.file.name) if damaged else None,
+            "damaged_batches": entry(damaged, "1"),
             "store": self.findings.outcome.file.name,
         }
 
@@ -318,9 +360,15 @@ def _correlation(a: Any, b: Any) -> float:
     return float(np.sum(a * b) / size) if size > 0.0 else 0.0
 
 
-def _explained(x: Any, y: Any) -> float:
+def _sure_share(x: Any, y: Any) -> float | None:
+    """The share of `_explained`; None where it is within its error."""
+    share, error = _explained(x, y)
+    return share if share > error else None
+
+
+def _explained(x: Any, y: Any) -> tuple[float, float]:
     """The share of the variance of `y` that is one of classes of `x`, between 0 and 1, corrected for the number of
-    classes."""
+    classes; and its error: two standard deviations of the share of an `x` that explains nothing."""
     values, bins = np.unique(x), min(_BINS, round(math.sqrt(len(x))))
     # the values of a grid are classes themselves
     repeat = len(values) <= max(bins, len(x) // 4) and len(values) <= _MOST_CLASSES
@@ -330,5 +378,9 @@ def _explained(x: Any, y: Any) -> float:
     used = count > 0
     means = np.bincount(place, y, len(edges))[used] / count[used]
     between = np.sum(count[used] * (means - np.mean(y)) ** 2) / np.sum((y - np.mean(y)) ** 2)
-    chance = (np.count_nonzero(used) - 1) / max(1, len(y) - 1)
-    return float(min(1.0, max(0.0, (between - chance) / (1.0 - chance)))) if chance < 1.0 else 0.0
+    freedom, count_less_one = np.count_nonzero(used) - 1, max(1, len(y) - 1)
+    chance = freedom / count_less_one
+    if chance >= 1.0:
+        return 0.0, 1.0
+    share = min(1.0, max(0.0, (between - chance) / (1.0 - chance)))
+    return float(share), 2.0 * math.sqrt(2.0 * freedom) / count_less_one / (1.0 - chance)

@@ -25,6 +25,8 @@ MEASURES_OF_SWEEP = (
     "coupling_trip_time",
 )
 """The measures of a run with an event that a sweep can have."""
+LOADS_OF_SWEEP = (*MEASURES_OF_SWEEP[:4], "speed_dip", "stall_time")
+"""The measures whose largest values are the worst."""
 USUAL_QUANTITIES = ("peak(crank_torque)", "rms(crank_torque)")
 """The cycle quantities of a sweep that names neither quantities nor measures."""
 MOST_PARAMETERS, MOST_VALUES, MOST_RESULTS = 32, 1000, 40
@@ -65,7 +67,13 @@ FIELDS: Mapping[str, Any] = {
     ),
     "event": (str, Field("", description="event of the measures, by the name of its run")),
     "best": (str, Field("", description="quantity or measure by which points are ranked")),
-    "best_is": (Literal["least", "largest"], Field("least", description="which of its values is best")),
+    "best_is": (
+        Literal["least", "largest"],
+        Field(
+            "least",
+            description="which of its values is best; of a load, where best is not given, the largest",
+        ),
+    ),
     "parameter": (
         list[Any],
         Field([], max_length=MOST_PARAMETERS, description="swept quantities: tables [[sweep.parameter]]"),

@@ -90,11 +90,11 @@ def _quantity(best: Best, name: str) -> dict[str, Any]:
     fmu = best.fmu.get(name)
     return {
         "title": q.description,
-        "today": entry(best.today[name], q.unit),
-        "best": entry(best.found[name], q.unit),
-        "min": entry(limit.low if limit else None, q.unit),
-        "max": entry(limit.high if limit else None, q.unit),
-        "fmu": entry(fmu.fmu if fmu else None, q.unit),
+        "today": entry(best.today[name], q.unit, q.kind),
+        "best": entry(best.found[name], q.unit, q.kind),
+        "min": entry(limit.low if limit else None, q.unit, q.kind),
+        "max": entry(limit.high if limit else None, q.unit, q.kind),
+        "fmu": entry(fmu.fmu if fmu else None, q.unit, q.kind),
         "fmu_deviation": entry(fmu.deviation if fmu else None, "1"),
     }
 
