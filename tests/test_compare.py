@@ -88,11 +88,51 @@ def test_every_measure_is_shown_with_its_difference(folder, run, title):
             assert cells[2:] == ["-", "-"]
             continue
         assert measures[name]["difference"]["value"] == y - x
-        kind_of_difference = {"dip": "percent", "used": "percent"}.get(kind, kind)
-        assert cells[2] == shown(y - x, unit, "difference" if unit == "K" else kind_of_difference), name
-        share = None if x == 0.0 or unit == "K" else (y - x) / abs(x)
+        is_share = kind in ("percent", "dip", "used")
+        wanted = shown(y - x, unit, "difference" if unit == "K" else kind)
+        if is_share:
+            wanted = shown(100.0 * (y - x), "% points")
+        assert cells[2] == wanted, name
+        share = (y - x) / x if x > 0.0 and y >= 0.0 and unit != "K" and not is_share else None
         assert measures[name]["relative"]["value"] == share
         assert cells[3] == shown(share, "1", "percent")
+
+
+def test_verdicts_and_warnings_of_one_alone_come_first(folder):
+    data = json.loads((folder / "out" / "comparison.json").read_text())
+    page = (folder / "out" / "report.html").read_text().partition("</header>")[0]
+    printed = (folder / "printed.txt").read_text()
+    for name in "ab":
+        own = numbers(folder, name)
+        for subject, verdict in own["verdict"].items():
+            assert data["verdict"][name][subject] == {key: verdict[key] for key in ("holds", "text")}
+            words = f"{name.upper()}: {verdict['text']}"
+            assert words in printed and printed.index(words) < printed.index("Given values that differ")
+            assert verdict["text"].partition(":")[0] in page
+    # the right side of the second machine empties, and its bars are pushed
+    warnings = {name: [each["text"] for each in numbers(folder, name)["warnings"]] for name in "ab"}
+    for name in "ab":
+        assert set(data["warnings"][name]) <= set(warnings[name])
+        assert all(f"Warning: only {name.upper()}: {text}" in printed for text in data["warnings"][name])
+
+
+def test_warnings_are_compared_without_their_numbers(folder, tmp_path):
+    results = []
+    for name, texts in (("a", ["Speed 3.1 rad/s, too high: 1", "Common: 2"]), ("b", ["Common: 3", "Hot"])):
+        data = numbers(folder, name)
+        data["warnings"] = [{"kind": "x", "text": text, "runs": []} for text in texts]
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "result.json").write_text(json.dumps(data))
+        results.append(read_result(tmp_path / name))
+    alone = compare(*results)["warnings"]
+    assert alone == {"a": ["Speed 3.1 rad/s, too high: 1"], "b": ["Hot"]}
+
+
+def test_keys_keep_their_letters(folder):
+    """The page writes the first letter of a row's head large, except of a name."""
+    page = (folder / "out" / "report.html").read_text()
+    assert '<th scope="row"><span class="as-is">machine.r</span></th>' in page
+    assert '<th scope="row">machine' not in page and '<th scope="row">run.' not in page
 
 
 def test_numbers_of_pins_and_of_the_start_are_there(folder):

@@ -522,6 +522,9 @@ def test_the_command(tmp_path, best):
     assert float(value) == pytest.approx(best.answer.value, rel=1e-4)
     # its tables are those of the study, so that the search may go on from there
     assert wishes_of(written).free == {"ratio": (10.0, 60.0), **best.wishes.free}
+    page = (folder / "report.html").read_text("utf-8")
+    for name in ("r", "crank.m", "peak(crank_torque)"):
+        assert f'<th scope="row"><span class="as-is">{name}</span></th>' in page
     other = chainunit("study", "-o", "out/deep", cwd=tmp_path)
     assert other.returncode == 2 and "has the result of a search for the best machine" in other.stderr
 

@@ -5,6 +5,7 @@ Kinds, beside the unit (see `quantities.quantity`):
 ``percent``      a share, shown in %
 ``dip``          the lost share of a speed; at 100 % or more, "stands" or "turns back"
 ``used``         the used share of a limit: in % up to ten times the limit, beyond that as a multiple
+``points``       a difference of shares, in percentage points
 ``difference``   a difference of temperatures, which stays in K
 ``speed``        the speed of a shaft, in rad/s and rev/min
 ``frequency``    an angular frequency, in rad/s and Hz
@@ -46,6 +47,7 @@ DEFAULT_UNITS: Units = MappingProxyType(
         "speed": ("rad/s", "rev/min"),
         "frequency": ("rad/s", "Hz"),
         "power": ("kW",),
+        "points": ("% points",),
         "energy": ("kWh",),
         "millimetres": ("mm",),
     }
@@ -57,6 +59,7 @@ _SCALES: dict[str, dict[str, tuple[float, float]]] = {
     "speed": {"rad/s": (1.0, 0.0), "rev/min": (30.0 / math.pi, 0.0)},
     "frequency": {"rad/s": (1.0, 0.0), "Hz": (0.5 / math.pi, 0.0)},
     "power": {"W": (1.0, 0.0), "kW": (1e-3, 0.0)},
+    "points": {"% points": (100.0, 0.0)},
     "energy": {"J": (1.0, 0.0), "kWh": (1.0 / 3.6e6, 0.0)},
     "torque": {"N.m": (1.0, 0.0), "kN.m": (1e-3, 0.0)},
     "force": {"N": (1.0, 0.0), "kN": (1e-3, 0.0)},

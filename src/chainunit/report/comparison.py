@@ -7,7 +7,7 @@ from typing import Any
 
 from ..study.measures import MEASURES
 from . import blocks as b
-from .lines import Aside, Line, capital, line
+from .lines import Aside, Line, Name, capital, line
 
 NAME = "comparison"
 _SIDES = ("a", "b")
@@ -28,7 +28,7 @@ def comparison_report(result: Mapping[str, Any]) -> b.Report:
             b.Section("runs", "Every run in numbers", tuple(_runs(s))),
         ),
         source=s.line("chainunit {chainunit}"),
-        opening_title="What differs in the given values",
+        opening_title="Verdicts, and what differs in the given values",
     )
 
 
@@ -41,6 +41,7 @@ def _given(s: b.Source) -> Iterator[b.Block]:
         )
         if head["status"] != "complete":
             yield b.Judgement("warning", line(f"{side.upper()}: ", s.words(f"{side}.status"), "."))
+    yield from _verdicts(s)
     names = s.result["given"]
     if not names:
         yield b.Text(s.line("All {=given_equal} given values are the same."))
@@ -49,7 +50,7 @@ def _given(s: b.Source) -> Iterator[b.Block]:
     rows = (
         # of an event that one of them has alone the terminal gives the name of its run
         b.TableRow(
-            (name, *(_value(s, name, side) for side in _SIDES)),
+            (Name(name), *(_value(s, name, side) for side in _SIDES)),
             form="long" if name.startswith(alone) else "both",
         )
         for name in names
@@ -59,6 +60,20 @@ def _given(s: b.Source) -> Iterator[b.Block]:
         b.heads("key", "A", "B"),
         title=s.line("Given values that differ; {=given_equal} are the same"),
     )
+
+
+_SEVERITY: dict[str, b.Severity] = {"true": "good", "in part": "partly", "false": "bad"}
+
+
+def _verdicts(s: b.Source) -> Iterator[b.Block]:
+    """The verdicts of both, and the warnings that only one has."""
+    for side in _SIDES:
+        for name, verdict in s.result["verdict"][side].items():
+            severity = _SEVERITY.get(verdict["holds"], "warning")
+            yield b.Judgement(severity, line(f"{side.upper()}: ", s.words(f"verdict.{side}.{name}.text")))
+    for side in _SIDES:
+        for words in s.lines(f"warnings.{side}"):
+            yield b.Judgement("warning", line(f"only {side.upper()}: ", words))
 
 
 def _value(s: b.Source, name: str, side: str) -> Line:

@@ -22,7 +22,7 @@ from ..study.optimum.wishes import Wishes
 from . import blocks as b
 from . import figure as fig
 from . import files
-from .lines import Line, line
+from .lines import Line, Name, line
 
 NAME, PICTURES = "result", ("torque.png", "front.png")
 FILE = "best.toml"
@@ -152,7 +152,7 @@ def _turns(best: Best) -> fig.Figure:
 def _machine(s: b.Source, best: Best) -> Iterator[b.Block]:
     head = "best" if best.met else "nearest"
     rows = [
-        b.TableRow((name, *(s.number(f"parameters.{name}.{key}", digits=5) for key in ("today", "best")),
+        b.TableRow((Name(name), *(s.number(f"parameters.{name}.{key}", digits=5) for key in ("today", "best")),
                     *(s.number(f"parameters.{name}.{key}", as_given=True) for key in ("min", "max"))))
         for name in s.result["parameters"]
     ]  # fmt: skip
@@ -161,7 +161,7 @@ def _machine(s: b.Source, best: Best) -> Iterator[b.Block]:
     )
     if best.idle:
         yield b.Text(s.words("without_effect_words"))
-    limited = [(name, f"quantities.{name}") for name in s.result["quantities"]]
+    limited: list[tuple[Line, str]] = [(Name(name), f"quantities.{name}") for name in s.result["quantities"]]
     if s.result["least_pull"] is not None:
         limited.append(("least pull in a web", "least_pull"))
     rows = [
@@ -207,7 +207,11 @@ def _front(s: b.Source, best: Best) -> Iterator[b.Block]:
         "machine of this report is the one nearest to the least values of both.",
         "lead",
     )
-    yield b.Table(tuple(rows), b.heads(first.name, second.name, *names), title="Front of the two objectives")
+    yield b.Table(
+        tuple(rows),
+        b.heads(*map(Name, (first.name, second.name, *names))),
+        title="Front of the two objectives",
+    )
     values = np.array([point.values for point in best.front])
     chosen = [[best.found[q.name]] for q in (first, second)]
     items: tuple[Any, ...] = (
@@ -251,7 +255,7 @@ def _checks(s: b.Source, best: Best) -> Iterator[b.Block]:
         rows = (
             b.TableRow(
                 (
-                    name,
+                    Name(name),
                     s.number(f"quantities.{name}.best", digits=7),
                     s.number(f"quantities.{name}.fmu", digits=7),
                 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -74,8 +75,11 @@ def _refuse(constant: str) -> None:
 def compare(a: StoredResult, b: StoredResult) -> dict[str, Any]:
     """The comparison, ready for JSON.
 
+    - ``verdict``: by result, those on its model and its motor
+    - ``warnings``: by result, the warnings that it has alone, whatever the numbers in them are
     - ``given``: by the name in a study file, the given values that differ, those of `a` and of `b`
-    - ``runs``: by run, each measure of both: the values, the difference b - a, and its share of the size of a's
+    - ``runs``: by run, each measure of both: the values, the difference b - a, and its share of a's, of
+      values that are not negative and no shares themselves
     - ``only``: the runs, events and measures that one of them has alone
     """
     results = {"a": a, "b": b}
@@ -88,6 +92,10 @@ def compare(a: StoredResult, b: StoredResult) -> dict[str, Any]:
         "chainunit": __version__,
         "a": _head(a),
         "b": _head(b),
+        "verdict": {side: _verdicts(each) for side, each in results.items()},
+        "warnings": {
+            side: _warnings_alone(results[side], results[other]) for side, other in (_SIDES, _SIDES[::-1])
+        },
         "given": {
             name: {side: given[side].get(name) for side in _SIDES}
             | {
@@ -131,6 +139,32 @@ def _alone(
             if measure not in others[name].numbers
         ],
     }
+
+
+def _verdicts(result: StoredResult) -> dict[str, dict[str, str]]:
+    """The verdicts of a result by their subject: whether it holds, and the text."""
+    verdicts = {}
+    for name, verdict in _mapping(result.data.get("verdict")).items():
+        words = {key: _mapping(verdict).get(key) for key in ("holds", "text")}
+        if all(isinstance(each, str) for each in words.values()):
+            verdicts[printable(name)] = {key: printable(str(each), 2000) for key, each in words.items()}
+    return verdicts
+
+
+def _warnings_alone(mine: StoredResult, theirs: StoredResult) -> list[str]:
+    """The warnings that one result has and the other has not."""
+    others = {subject for subject, _ in _warnings(theirs)}
+    return [text for subject, text in _warnings(mine) if subject not in others]
+
+
+def _warnings(result: StoredResult) -> Iterator[tuple[Any, str]]:
+    """The warnings of a result, each with its subject: kind, runs and first words, without its numbers."""
+    warnings = result.data.get("warnings")
+    for each in warnings if isinstance(warnings, list) else []:
+        text = _mapping(each).get("text")
+        if isinstance(text, str):
+            words = re.sub(r"[-\d.]+", "", text.partition(":")[0])
+            yield (str(each.get("kind")), str(each.get("runs")), words), printable(text, 2000)
 
 
 def _head(result: StoredResult) -> dict[str, str]:
@@ -249,13 +283,14 @@ def _measures(a: _Group, b: _Group) -> dict[str, Any]:
 def _pair(a: Mapping[str, Any], b: Mapping[str, Any]) -> dict[str, Any]:
     """Two values of a measure with their difference and its share, which are None where they have no meaning."""
     kind, unit = str(a.get("kind", "")), a["unit"]
-    of_difference = "percent" if kind in ("dip", "used") else "difference" if unit == "K" else kind
+    is_share = kind in ("percent", "dip", "used")
+    of_difference = "points" if is_share else "difference" if unit == "K" else kind
     difference = share = None
     if a["value"] is not None and b["value"] is not None and unit == b["unit"]:
         difference = b["value"] - a["value"]
-        # a temperature in K has a zero that says nothing
-        if a["value"] and unit != "K":
-            share = difference / abs(a["value"])
+        # a temperature in K has a zero that says nothing, and so has a value of either sign
+        if a["value"] > 0.0 and b["value"] >= 0.0 and unit != "K" and not is_share:
+            share = difference / a["value"]
     return {
         "a": entry(a["value"], unit, kind),
         "b": entry(b["value"], b["unit"], str(b.get("kind", ""))),
