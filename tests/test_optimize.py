@@ -30,10 +30,11 @@ from chainunit.study.optimum.extremes import TurnValues, grid
 from chainunit.study.optimum.kernel import Kernel, pieces, symbols_of
 from chainunit.study.optimum.program import AngleProgram
 from chainunit.study.optimum.requirements import Requirements
-from chainunit.study.optimum.result import as_dict
+from chainunit.study.optimum.result import as_dict, units_of
 from chainunit.study.optimum.search import Search
 from chainunit.study.optimum.study_file import toml_text
 from chainunit.study.optimum.table import wishes_of
+from chainunit.study.optimum.wishes import TurnLimit
 from chainunit.study.optimum.words import bindings, conflict_sentences
 from chainunit.study.parts import EXAMPLES, example
 from chainunit.study.verdict import ROCKER_GOOD
@@ -293,6 +294,51 @@ def test_an_impossible_wish(changes, names, held):
     )
 
 
+def test_each_impossible_wish_is_named():
+    pair = {'"16 deg", max = "20 deg"': '"40 deg"', '"4 kN"': '"1 N"', "starts = 4": "starts = 1"}
+    text = TABLE
+    for before, after in pair.items():
+        assert before in text
+        text = text.replace(before, after)
+    config = study_files.parse(text)
+    own = find_best(wishes_of(config))
+    assert set(own.conflict.alone) == {"range(rocker.psi)", "max(force(crank_bearing))"}
+    assert not own.conflict.together
+    # each alone comes as near as it comes without the other
+    search = Search(own.wishes)
+    for limit in own.wishes.limits:
+        if limit.name in own.conflict.alone:
+            others = frozenset(each.name for each in own.wishes.limits) - {limit.name}
+            answer, met = nearest(search, search.starts(1)[0], others | {"slack_free_speed", "clearance"})
+            value = search.value(limit.quantity, answer.x)
+            assert not met and own.conflict.alone[limit.name] == pytest.approx(value, rel=1e-4)
+    page = optimum_report(own, config)
+    assert page.title == "A lighter drive: no machine found" and page.status == "no machine found"
+    shown = " ".join(plain(page).split())
+    assert (
+        "range(rocker.psi) of at least 40 deg; none has max(force(crank_bearing)) of at most 1 N. Each"
+        in shown
+    )
+    assert shown.count(" missed ") == 2 and "1 start over the bounds: none ended at a machine that" in shown
+    quantities = page.result["quantities"]
+    assert {name for name, q in quantities.items() if q["missed"]} == set(own.conflict.alone)
+
+
+def test_small_powers_are_in_watts(best):
+    power = cycle_quantity("installed_power", best.machine.model)
+    limits = (*best.wishes.limits, TurnLimit(power, None, 1.0))
+    values = {"installed_power": 70.0}
+    own = _with(
+        best,
+        wishes=_with(best.wishes, limits=limits),
+        found={**best.found, **values},
+        today={**best.today, **values},
+    )
+    assert units_of(own, study_files.parse(TABLE))["power"] == ("W",)
+    chosen = study_files.parse(f'{TABLE}[report.units]\npower = "kW"\n')
+    assert units_of(own, chosen)["power"] == units_of(best, chosen)["power"] == ("kW",)
+
+
 def test_two_wishes_that_conflict():
     """A swing and a speed of slack, each of which can be met alone."""
     pair = {'"16 deg"': '"19 deg"', "4 rad/s": "5 rad/s", "starts = 4": "starts = 2"}
@@ -341,7 +387,8 @@ def test_a_linkage_file():
 
 def test_two_objectives():
     """No machine of the front is better than another in both; its ends are the best of each objective."""
-    own = find_best(wishes(PRESS.replace('["rms(crank_torque)"]', '["rms(crank_torque)", "max(force(A))"]')))
+    text = PRESS.replace('["rms(crank_torque)"]', '["rms(crank_torque)", "max(force(A))"]')
+    own = find_best(wishes(text))
     values = np.array([point.values for point in own.front])
     assert len(values) == 4 and np.all(np.diff(values[:, 0]) > 0.0) and np.all(np.diff(values[:, 1]) < 0.0)
     search, objectives = Search(own.wishes), own.wishes.objectives
@@ -352,6 +399,16 @@ def test_two_objectives():
         assert [search.value(q, point.x) for q in objectives] == pytest.approx(point.values, rel=1e-9)
         assert search.value(own.wishes.limits[1].quantity, point.x) >= 0.15 * (1.0 - 1e-6)
     assert own.neighbours.better == 0
+    page = optimum_report(own, study_files.parse(text))
+    words = plain(page)
+    assert (
+        "meet all limits and have no more max(force(A)), and 0 of these are better in rms(crank_torque)"
+        in words
+    )
+    (chosen,) = (point for point in page.result["front"] if point["chosen"])
+    assert chosen["values"]["max(force(A))"]["value"] == pytest.approx(own.found["max(force(A))"], rel=1e-6)
+    assert all(", with max(force(A)) held at" in each["text"] for each in page.result["bindings"])
+    assert page.result["bindings"] and words.count("best.toml") == 1
 
 
 MANY = TABLE.replace("starts = 4", "starts = 32").replace(

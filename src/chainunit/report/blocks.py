@@ -179,6 +179,8 @@ class Report:
     failure: Line = ()
     units: Units = field(default_factory=lambda: DEFAULT_UNITS)
     opening_title: str = "The question"
+    status: str = "complete"
+    """the status of a report without a failure"""
 
     def blocks(self, form: Form) -> list[Block]:
         """The blocks of one form, in order."""

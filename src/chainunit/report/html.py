@@ -335,7 +335,7 @@ class _Page:
         return (
             f'<header>\n<p class="kind">{escape(report.kind)}</p>\n<h1>{escape(title)}</h1>\n'
             f'<p class="from">{source}{" · " if source else ""}status: '
-            f"{'stopped early' if status else 'complete'}</p>\n"
+            f"{'stopped early' if status else report.status}</p>\n"
             f'{status}\n<nav aria-label="Sections">{links}</nav>\n'
             + (
                 f'<h2 id="asked">{report.opening_title}</h2>\n<div class="asked">{opening}</div>\n'

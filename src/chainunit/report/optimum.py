@@ -15,7 +15,7 @@ from ..progress import Report as Progress
 from ..reading import in_file
 from ..study.config import Config
 from ..study.optimum.best import Best, find_best
-from ..study.optimum.result import as_dict
+from ..study.optimum.result import as_dict, units_of
 from ..study.optimum.study_file import best_tables, toml_text
 from ..study.optimum.table import wishes_of
 from ..study.optimum.wishes import Wishes
@@ -42,15 +42,22 @@ def optimum_report(best: Best, config: Config) -> b.Report:
         sections.append(b.Section("front", "Two objectives", tuple(_front(s, best))))
     sections.append(b.Section("checks", "Starts and checks", tuple(_checks(s, best))))
     return b.Report(
-        config.title or "The best machine",
+        _title(best, config),
         "Search for the best machine",
         result,
         tuple(_opening(s, best)),
         tuple(sections),
         source=s.line("Study file: {source} · chainunit {chainunit}"),
-        units=config.units,
+        units=units_of(best, config),
         opening_title="The answer",
+        status="complete" if best.met else "no machine found",
     )
+
+
+def _title(best: Best, config: Config) -> str:
+    if best.met:
+        return config.title or "The best machine"
+    return f"{config.title}: no machine found" if config.title else "No machine found"
 
 
 def compute(
@@ -164,14 +171,17 @@ def _machine(s: b.Source, best: Best) -> Iterator[b.Block]:
     limited: list[tuple[Line, str]] = [(Name(name), f"quantities.{name}") for name in s.result["quantities"]]
     if s.result["least_pull"] is not None:
         limited.append(("least pull in a web", "least_pull"))
+    # where no machine meets all limits, a column marks those that the nearest one misses
+    marks = () if best.met else ("limit",)
     rows = [
         b.TableRow((words, *(s.number(f"{path}.{key}", digits=4) for key in ("today", "best")),
-                    *(s.number(f"{path}.{key}", as_given=True) for key in ("min", "max"))))
+                    *(s.number(f"{path}.{key}", as_given=True) for key in ("min", "max")),
+                    *("missed" if b.at(s.result, path)["missed"] else "" for _ in marks)))
         for words, path in limited
     ]  # fmt: skip
     yield b.Table(
         tuple(rows),
-        b.heads("quantity", "today", head, "least", "largest"),
+        b.heads("quantity", "today", head, "least", "largest", *marks),
         title=s.line("Objectives and limits, of a turn at {=speed:4}"),
     )
     if s.result["least_pull"] is not None:
@@ -198,6 +208,7 @@ def _front(s: b.Source, best: Best) -> Iterator[b.Block]:
                 s.number(f"front.{k}.values.{first.name}", digits=4),
                 s.number(f"front.{k}.values.{second.name}", digits=4),
                 *(s.number(f"front.{k}.parameters.{name}", digits=4) for name in names),
+                FILE if s.result["front"][k]["chosen"] else "",
             )
         )
         for k in range(len(best.front))
@@ -209,7 +220,7 @@ def _front(s: b.Source, best: Best) -> Iterator[b.Block]:
     )
     yield b.Table(
         tuple(rows),
-        b.heads(*map(Name, (first.name, second.name, *names))),
+        b.heads(*map(Name, (first.name, second.name, *names)), "file"),
         title="Front of the two objectives",
     )
     values = np.array([point.values for point in best.front])
@@ -228,13 +239,7 @@ def _front(s: b.Source, best: Best) -> Iterator[b.Block]:
 
 
 def _checks(s: b.Source, best: Best) -> Iterator[b.Block]:
-    yield b.Text(
-        s.line(
-            "{=starts.number} starts over the bounds, {=starts.moved} of them moved until the machine closes: "
-            "{=starts.feasible} ended at a machine that meets all limits, {=starts.agree} at the best value to a "
-            "millionth."
-        )
-    )
+    yield b.Text(s.words("starts.text"))
     yield b.Text(
         s.line(
             "{=starts.programs} programs, {=starts.iterations} iterations, {=starts.evaluations} turns computed."
@@ -244,13 +249,7 @@ def _checks(s: b.Source, best: Best) -> Iterator[b.Block]:
     )
     if best.neighbours is not None:
         severity: b.Severity = "warning" if best.neighbours.better else "good"
-        yield b.Judgement(
-            severity,
-            s.line(
-                "Of {=neighbours.number} machines around it {=neighbours.feasible} meet all limits, and "
-                "{=neighbours.better} of these are better."
-            ),
-        )
+        yield b.Judgement(severity, s.words("neighbours.text"))
     if best.fmu:
         rows = (
             b.TableRow(

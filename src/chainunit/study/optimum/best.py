@@ -80,6 +80,11 @@ class Best:
         return None if self.answer is None else machine_at(self.wishes, self.answer.x)
 
     @property
+    def is_limited(self) -> bool:
+        """Whether the study has limits beside the one that the machine turns."""
+        return bool(self.wishes.limits or self.wishes.slack_free_speed)
+
+    @property
     def met(self) -> bool:
         """Whether a machine was found that meets all limits."""
         return self.answer is not None

@@ -23,7 +23,7 @@ from .wishes import TurnLimit, Wishes
 STEPS = (1e-3, 1e-2)
 """Distances of the neighbours, as shares of the distance between the bounds."""
 _RANDOM = 64
-_TOLERANCE = 1e-7
+_TOLERANCE, _ROUNDING = 1e-7, 1e-11
 _STEP = 1e-3
 """Step of the FMU at each angle [s]: its outputs follow from its inputs alone."""
 
@@ -71,7 +71,10 @@ def neighbours(
         met[met] = [search.least_pull(point) >= 0.0 for point in points[met]]
     better = met & (table[objective.name].values < value * (1.0 - math.copysign(_TOLERANCE, value)))
     # the values at the angles of a grid are a little too small: the candidates are computed exactly
-    exact = [k for k in np.flatnonzero(better) if _is_better(search, points[k], objective, limits, value)]
+    candidates = np.flatnonzero(better)
+    # and a limit may be exceeded no more than at the best machine: a steep objective gains from any share
+    own = [_widened(limit, search.value(limit.quantity, x)) for limit in limits] if len(candidates) else []
+    exact = [k for k in candidates if _is_better(search, points[k], objective, own, value)]
     return Neighbours(len(points), int(np.sum(met)), len(exact))
 
 
@@ -80,18 +83,25 @@ def _clear(search: Search, x: Any) -> bool:
     return bool(np.all(search.space.requirements.values(x) >= search.wishes.clearance * today * (1.0 - 1e-9)))
 
 
-def _meets(limit: TurnLimit, values: Any) -> Any:
+def _widened(limit: TurnLimit, value: float) -> TurnLimit:
+    """The limit, or the value where it is beyond."""
+    low = None if limit.low is None else min(limit.low, value)
+    high = None if limit.high is None else max(limit.high, value)
+    return TurnLimit(limit.quantity, low, high)
+
+
+def _meets(limit: TurnLimit, values: Any, tolerance: float = _TOLERANCE) -> Any:
     met = np.isfinite(values)
     for bound, sign in ((limit.low, 1.0), (limit.high, -1.0)):
         if bound is not None:
-            met &= sign * (values - bound) >= -_TOLERANCE * max(abs(bound), 1e-12)
+            met &= sign * (values - bound) >= -tolerance * max(abs(bound), 1e-12)
     return met
 
 
 def _is_better(
     search: Search, x: Any, objective: CycleQuantity, limits: Sequence[TurnLimit], value: float
 ) -> bool:
-    if not all(_meets(limit, np.array(search.value(limit.quantity, x))) for limit in limits):
+    if not all(_meets(limit, np.array(search.value(limit.quantity, x)), _ROUNDING) for limit in limits):
         return False
     return search.value(objective, x) < value * (1.0 - math.copysign(_TOLERANCE, value))
 

@@ -1,4 +1,4 @@
-"""Limits that no machine meets together: a smallest set of them, by deletion.
+"""Limits that no machine meets: each one that is impossible alone, and a smallest set of others, by deletion.
 
 An elastic program gives each limit a slack and makes the sum of the slacks least. Where it stays above 0 from all
 starts, the limits conflict. A limit is taken out for good where the others conflict without it; those that remain
@@ -7,7 +7,8 @@ conflict, and without any one of them the others can be met.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,12 +23,22 @@ _HELD = 1e-6
 
 @dataclass(frozen=True)
 class Conflict:
-    """The limits that conflict, by name; the machine that misses the limits by the least sum of shares; and the
-    bounds of parameters, (name, side), that hold it."""
+    """Why no machine meets the limits."""
 
-    names: tuple[str, ...]
+    alone: Mapping[str, float]
+    """limits that no machine meets, even without all others, each with the value of its quantity that comes nearest;
+    NaN for one of no quantity"""
+    together: tuple[str, ...]
+    """limits beside these, each of which can be met, that conflict"""
     nearest: Answer
+    """the machine that misses the limits of `names` by the least sum of shares"""
     bounds: tuple[tuple[str, str], ...]
+    """the bounds of parameters, (name, side), that hold it"""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The limits of both kinds."""
+        return (*self.alone, *self.together)
 
 
 def nearest(
@@ -45,22 +56,49 @@ def nearest(
 
 
 def conflict(search: Search, starts: Sequence[Any], first: Answer) -> Conflict:
-    """A smallest set of limits that cannot be met together; `first` is the nearest machine under all limits."""
+    """All limits that cannot be met alone, and a smallest set of others that cannot be met together; `first` is the
+    nearest machine under all limits."""
     wishes = search.wishes
     names = [limit.name for limit in wishes.limits]
     names += [SLACK] if wishes.slack_free_speed else []
     names += [TURNS]
-    # limits that the nearest machine meets are the first to be taken out
-    names.sort(key=lambda name: first.misses.get(name, 0.0))
     # the nearest machine is the best start: a limit less moves it little
     starts = [first.x, *starts]
-    out: frozenset[str] = frozenset()
-    last = first
-    for name in names:
-        if len(out) == len(names) - 1:
+    # a limit that the nearest machine meets is not impossible alone
+    missed = [name for name in names if first.misses.get(name, 0.0) > MET]
+    last, alone = first, {}
+    for name in missed:
+        answer, met = nearest(search, starts, frozenset(names) - {name})
+        if not met and answer is not None:
+            last, alone[name] = answer, _value(search, name, answer.x)
+    together: tuple[str, ...] = ()
+    out = frozenset(alone)
+    if not alone or not nearest(search, starts, out)[1]:
+        last, together = _together(search, starts, first, [name for name in names if name not in alone], out)
+    if len(alone) > 1 or (alone and together):
+        answer, _ = nearest(search, starts, frozenset(names) - {*alone, *together})
+        last = answer or first
+    bounds = tuple(key for key, factor in last.at_bounds.items() if abs(factor) > _HELD)
+    return Conflict(alone, together, last, bounds)
+
+
+def _value(search: Search, name: str, x: Any) -> float:
+    q = next((limit.quantity for limit in search.wishes.limits if limit.name == name), None)
+    return search.value(q, x) if q is not None and search.turns(x) else math.nan
+
+
+def _together(
+    search: Search, starts: Sequence[Any], first: Answer, names: list[str], out: frozenset[str]
+) -> tuple[Answer, tuple[str, ...]]:
+    """A smallest set of the limits `names` that conflict, by deletion, and the nearest machine under it; the limits
+    `out` are left out."""
+    # limits that the nearest machine meets are the first to be taken out
+    rest, last = sorted(names, key=lambda name: first.misses.get(name, 0.0)), first
+    for name in list(rest):
+        if len(rest) == 1:
             break
         answer, met = nearest(search, starts, out | {name})
         if not met and answer is not None:
             out, last = out | {name}, answer
-    bounds = tuple(key for key, factor in last.at_bounds.items() if abs(factor) > _HELD)
-    return Conflict(tuple(name for name in names if name not in out), last, bounds)
+            rest.remove(name)
+    return last, tuple(rest)

@@ -5,25 +5,58 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
+
 from ... import __version__
 from ...quantities import finite
-from ...text import array_entry, entry, shown_in
+from ...text import Units, array_entry, entry, shown_in
 from ..config import Config
 from ..organ_limits import limits_of_organs
 from ..verdict import passed_limits
 from .best import Best
 from .checks import STEPS
-from .words import bindings, clearances, conflict_sentences, idle_sentence, sentence
+from .wishes import TurnLimit
+from .words import (
+    bindings,
+    clearances,
+    conflict_sentences,
+    idle_sentence,
+    neighbours_sentence,
+    sentence,
+    starts_sentence,
+)
 
 EVERY = 4
 """One of so many angles of the turns is in the result."""
 CONFLICT = "no machine meets all limits"
+_SMALL = 100.0
+"""Power below which powers are shown in W [W]."""
 
 
 def as_dict(best: Best, config: Config) -> dict[str, Any]:
     """All results, ready for JSON, each number with its unit."""
-    with shown_in(config.units):
+    with shown_in(units_of(best, config)):
         return _as_dict(best, config)
+
+
+def units_of(best: Best, config: Config) -> Units:
+    """The units of the report: those of the study, and W for powers where one is below 100 W and the study does not
+    name a unit."""
+    powers = [
+        abs(x)
+        for name, q in best.quantities.items()
+        for limit in (_limit_of(best, name),)
+        for x in (best.today[name], best.found[name], limit and limit.low, limit and limit.high)
+        if q.unit == "W" and x
+    ]
+    named = config.tables.get("report", {}).get("units", {})
+    if "power" in named or not any(x < _SMALL for x in powers):
+        return config.units
+    return {**config.units, "power": ("W",)}
+
+
+def _limit_of(best: Best, name: str) -> TurnLimit | None:
+    return next((each for each in best.wishes.limits if each.name == name), None)
 
 
 def _as_dict(best: Best, config: Config) -> dict[str, Any]:
@@ -86,7 +119,7 @@ def _parameters(best: Best, x: Any) -> Iterator[tuple[str, tuple[float, ...]]]:
 
 def _quantity(best: Best, name: str) -> dict[str, Any]:
     q = best.quantities[name]
-    limit = next((each for each in best.wishes.limits if each.name == name), None)
+    limit = _limit_of(best, name)
     fmu = best.fmu.get(name)
     return {
         "title": q.description,
@@ -94,6 +127,7 @@ def _quantity(best: Best, name: str) -> dict[str, Any]:
         "best": entry(best.found[name], q.unit, q.kind),
         "min": entry(limit.low if limit else None, q.unit, q.kind),
         "max": entry(limit.high if limit else None, q.unit, q.kind),
+        "missed": limit is not None and limit.is_missed(best.found[name]),
         "fmu": entry(fmu.fmu if fmu else None, q.unit, q.kind),
         "fmu_deviation": entry(fmu.deviation if fmu else None, "1"),
     }
@@ -104,7 +138,9 @@ def _pull(best: Best) -> dict[str, Any] | None:
     if best.pulls is None:
         return None
     numbers = {"today": best.pulls[0], "best": best.pulls[1], "min": 0.0, "max": None}
-    return {name: entry(finite(x), "N") for name, x in numbers.items()}
+    # in comparison with the weight of the webs a millionth of a newton is none
+    missed = not best.pulls[1] >= -1e-6
+    return {name: entry(finite(x), "N") for name, x in numbers.items()} | {"missed": missed}
 
 
 def _organs(best: Best) -> list[dict[str, Any]]:
@@ -141,6 +177,8 @@ def _conflict(best: Best) -> dict[str, Any] | None:
         return None
     return {
         "limits": list(best.conflict.names),
+        "alone": list(best.conflict.alone),
+        "together": list(best.conflict.together),
         "bounds": [f"{name}.{side}" for name, side in best.conflict.bounds],
         "sentences": list(conflict_sentences(best)),
     }
@@ -149,6 +187,7 @@ def _conflict(best: Best) -> dict[str, Any] | None:
 def _starts(best: Best) -> dict[str, Any]:
     objective = best.wishes.objectives[0]
     return {
+        "text": starts_sentence(best),
         "number": entry(float(best.starts), "1"),
         "moved": entry(float(best.moved), "1"),
         "feasible": entry(float(best.feasible), "1"),
@@ -165,6 +204,8 @@ def _neighbours(best: Best) -> dict[str, Any] | None:
         return None
     own = best.neighbours
     return {
+        "text": neighbours_sentence(best),
+        "held": [q.name for q in best.wishes.objectives[1:]],
         "steps": array_entry(STEPS, "1"),
         "number": entry(float(own.number), "1"),
         "feasible": entry(float(own.feasible), "1"),
@@ -173,10 +214,17 @@ def _neighbours(best: Best) -> dict[str, Any] | None:
 
 
 def _front(best: Best) -> list[dict[str, Any]]:
-    names = best.wishes.names
+    if not best.front:
+        return []
+    names, objectives = best.wishes.names, best.wishes.objectives
+    values = np.array([point.values for point in best.front])
+    # the best machine is solved again from its point of the front
+    distances = np.abs(values / [best.found[q.name] for q in objectives] - 1.0)
+    chosen = best.front[int(np.argmin(np.max(distances, axis=1)))]
     units = {v.name: v.unit for v in best.wishes.machine.model.parameter_layout.variables}
     return [
         {
+            "chosen": point is chosen,
             "values": {
                 q.name: entry(value, q.unit)
                 for q, value in zip(best.wishes.objectives, point.values, strict=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -27,6 +28,14 @@ class TurnLimit:
     def name(self) -> str:
         """The name of the quantity, by which the limit is called."""
         return self.quantity.name
+
+    def is_missed(self, value: float) -> bool:
+        """Whether a value is outside the limits by more than a millionth of them."""
+        low, high = (
+            sign * value < sign * bound - 1e-6 * abs(bound) if bound is not None else False
+            for sign, bound in ((1.0, self.low), (-1.0, self.high))
+        )
+        return low or high or math.isnan(value)
 
 
 @dataclass(frozen=True)

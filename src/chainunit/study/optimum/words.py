@@ -86,11 +86,11 @@ def sentence(best: Best, each: Binding) -> str:
     objective = best.wishes.objectives[0]
     amount = number(abs(each.change), objective.unit)
     verb = "lowers" if each.change < 0.0 else "raises"
+    others = best.wishes.objectives[1:]
+    held = "".join(f", with {q.name} held at {number(best.found[q.name], q.unit)}" for q in others)
     if each.name == SLACK:
-        return (
-            f"{each.step_words} of least pull in the webs at that speed {verb} {objective.name} by {amount}"
-        )
-    return f"{each.step_words} more of {each.name}.{each.side} {verb} {objective.name} by {amount}"
+        return f"{each.step_words} of least pull in the webs at that speed {verb} {objective.name} by {amount}{held}"
+    return f"{each.step_words} more of {each.name}.{each.side} {verb} {objective.name} by {amount}{held}"
 
 
 def clearances(best: Best) -> list[str]:
@@ -126,20 +126,27 @@ def conflict_sentences(best: Best) -> Iterator[str]:
     assert best.conflict is not None
     wishes, own = best.wishes, best.conflict
     limits = {limit.name: limit for limit in wishes.limits}
-    names = [_wish_words(best, name) for name in own.names]
-    if len(names) == 1:
-        yield f"No machine within the bounds has {names[0]}."
-    else:
+    alone, together = ([_wish_words(best, name) for name in names] for names in (own.alone, own.together))
+    if alone:
+        each = " Each of these limits is impossible alone." if len(alone) > 1 else ""
+        yield f"No machine within the bounds has {'; none has '.join(alone)}.{each}"
+    if together:
+        begin = "Beside that, no machine" if alone else "No machine within the bounds"
         yield (
-            f"No machine within the bounds has {', '.join(names[:-1])} and {names[-1]} together; without any one "
-            "of them the others can be met."
+            f"{begin} has {' and '.join(filter(None, (', '.join(together[:-1]), together[-1])))} together; without "
+            "any one of them the others can be met."
         )
+    several = len(own.names) > len(own.together) and len(own.names) > 1
     reached = [
         f"{name} = {number(value, limits[name].quantity.unit)}"
-        for name in own.names
-        if name in limits and not math.isnan(value := best.found[name])
+        for name, value in (
+            own.alone if several else {n: best.found.get(n, math.nan) for n in own.names}
+        ).items()
+        if name in limits and not math.isnan(value)
     ]
-    if reached:
+    if reached and several:
+        yield f"The machines that come nearest to each of these limits alone have {', '.join(reached)}."
+    elif reached:
         yield f"The machine that comes nearest has {', '.join(reached)}."
     if own.bounds:
         units = {v.name: v.unit for v in wishes.machine.model.parameter_layout.variables}
@@ -147,7 +154,7 @@ def conflict_sentences(best: Best) -> Iterator[str]:
             f"{name}.{side} = {number(wishes.free[name][side == 'max'], units[name], full=False)}"
             for name, side in own.bounds
         )
-        yield f"The bounds that hold it: {', '.join(words)}."
+        yield f"The bounds that hold {'the nearest to all of them' if several else 'it'}: {', '.join(words)}."
 
 
 def _wish_words(best: Best, name: str) -> str:
@@ -156,3 +163,26 @@ def _wish_words(best: Best, name: str) -> str:
     if name == TURNS:
         return f"a distance of {number(best.wishes.clearance, '1', 'percent')} from where it no longer turns"
     return limit_words(next(limit for limit in best.wishes.limits if limit.name == name))
+
+
+def starts_sentence(best: Best) -> str:
+    """How the starts ended."""
+    moved = f", {best.moved} of them moved until the machine closes" if best.moved else ""
+    begin = f"{best.starts} {'starts' if best.starts > 1 else 'start'} over the bounds{moved}"
+    if not best.met:
+        return f"{begin}: none ended at a machine that meets all limits."
+    goal = "that meets all limits" if best.is_limited else "with a least value"
+    return (
+        f"{begin}: {best.feasible} ended at a machine {goal}, {best.agree} at the best value to a millionth."
+    )
+
+
+def neighbours_sentence(best: Best) -> str:
+    """How the machines around the best one compare with it."""
+    own = best.neighbours
+    assert own is not None
+    held = " and ".join(f"have no more {q.name}" for q in best.wishes.objectives[1:])
+    conditions = " and ".join(filter(None, ("meet all limits" if best.is_limited else "", held))) or "turn"
+    first = f" in {best.wishes.objectives[0].name}" if held else ""
+    better = f"{own.better} of these {'is' if own.better == 1 else 'are'} better{first}"
+    return f"Of {own.number} machines around it {own.feasible} {conditions}, and {better}."
