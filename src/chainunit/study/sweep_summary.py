@@ -210,9 +210,9 @@ class SweepSummary:
         limits = limits_of_organs(task.machine, config.feed, units, empties=empties)
         if not limits or SPEED not in self._parameters:
             return [(each, plan.points) for each in passed_limits(limits, task.crank_speed)]
-        counts = np.zeros(len(limits), np.int64)
-        for _, part in self._parts():
-            speeds = part[SPEED].values
+        counts, all_speeds = np.zeros(len(limits), np.int64), self.findings.points[SPEED]
+        for begin in range(0, plan.points, _PART):
+            speeds = all_speeds.isel(point=slice(begin, begin + _PART)).values
             counts += [np.count_nonzero(each.passed(speeds)) for each in limits]
         return [(each, int(count)) for each, count in zip(limits, counts, strict=True) if count]
 
@@ -222,7 +222,7 @@ class SweepSummary:
         rig, name = self.findings.task.rig, "current_peak"
         if rig is None or name not in self.extremes:
             return None
-        largest = float(self.findings.points[name].values[self.extremes[name][1]])
+        largest = float(self.findings.points[name].isel(point=self.extremes[name][1]).values)
         return limit_reached(rig.drive, [largest])
 
     @property
