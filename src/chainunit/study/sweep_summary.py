@@ -203,9 +203,9 @@ class SweepSummary:
         """The limits of the crank speed for two bars as organs, of the study's machine and feed, each with the number
         of points beyond it; only those that a point passes, and none where no result depends on the organs."""
         config, plan, task = self.findings.config, self.findings.plan, self.findings.task
-        # measures of a study with chains are of chains; quantities of a turn are always of two bars
-        names = plan.quantities if config.chain is not None else self.findings.results
-        units = [self.variables[name].unit for name in names] + ["N"] * (len(names) > len(plan.quantities))
+        if config.chain is not None:
+            return []
+        units = ["N"] if plan.measures else [self.variables[name].unit for name in plan.quantities]
         empties = bool(plan.event) and config.events[plan.event].empties
         limits = limits_of_organs(task.machine, config.feed, units, empties=empties)
         if not limits or SPEED not in self._parameters:
