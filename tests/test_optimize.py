@@ -25,7 +25,7 @@ from chainunit.study.cycle_quantities import cycle_quantity, evaluate
 from chainunit.study.optimum import checks
 from chainunit.study.optimum import kernel as kernels
 from chainunit.study.optimum.best import find_best, machine_at
-from chainunit.study.optimum.conflict import nearest
+from chainunit.study.optimum.conflict import Conflict, nearest
 from chainunit.study.optimum.extremes import TurnValues, grid
 from chainunit.study.optimum.kernel import Kernel, pieces, symbols_of
 from chainunit.study.optimum.program import AngleProgram
@@ -323,6 +323,18 @@ def test_each_impossible_wish_is_named():
     assert shown.count(" missed ") == 2 and "1 start over the bounds: none ended at a machine that" in shown
     quantities = page.result["quantities"]
     assert {name for name, q in quantities.items() if q["missed"]} == set(own.conflict.alone)
+
+
+def test_words_of_both_kinds_of_conflict(best):
+    alone, pair = {"max(force(crank_bearing))": 235.0}, ("range(rocker.psi)", "slack_free_speed")
+    own = _with(best, answer=None, conflict=Conflict(alone, pair, best.answer, (("r", "min"),)))
+    first, second, third, fourth = conflict_sentences(own)
+    assert first == "No machine within the bounds has max(force(crank_bearing)) of at most 4000 N."
+    assert second.startswith(
+        "Beside that, no machine has range(rocker.psi) from 16 deg to 20 deg and webs that keep"
+    )
+    assert third.endswith("the first of these limits alone has max(force(crank_bearing)) = 235 N.")
+    assert fourth == "The bounds that hold the nearest to all of them: r.min = 0.1 m."
 
 
 def test_small_powers_are_in_watts(best):

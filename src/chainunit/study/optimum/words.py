@@ -145,7 +145,10 @@ def conflict_sentences(best: Best) -> Iterator[str]:
         if name in limits and not math.isnan(value)
     ]
     if reached and several:
-        yield f"The machines that come nearest to each of these limits alone have {', '.join(reached)}."
+        which = "machines that come nearest to each of these limits alone have"
+        if len(own.alone) == 1:
+            which = "machine that comes nearest to the first of these limits alone has"
+        yield f"The {which} {', '.join(reached)}."
     elif reached:
         yield f"The machine that comes nearest has {', '.join(reached)}."
     if own.bounds:
