@@ -109,8 +109,8 @@ def _show_table(table: Table, console: Console, units: Units) -> None:
 
 
 def _parted(table: Table, places: Sequence[int], units: Units, room: int) -> list[list[int]]:
-    """The columns at `places` in parts whose numbers fit into the width `room`, each with the first column; a table
-    with notes stays whole."""
+    """The columns at `places` in parts that fit into the width `room`, each with the first column, where the words of
+    all are too wide for it; a table with notes stays whole."""
     if table.columns:
         places = [i for i in places if table.columns[i].form != "long"]
     if table.note_title or not table.columns or not table.numeric:
@@ -118,10 +118,18 @@ def _parted(table: Table, places: Sequence[int], units: Units, room: int) -> lis
     first, *others = places
     rows = [row for row in table.rows if row.form != "long"]
 
-    def width(i: int) -> int:
-        cells = [_head(table.columns[i], units), *(row.cells[i] for row in rows)]
-        return max(len(part) for cell in cells for part in _parts(cell, units)) + 3
+    def cells(i: int) -> list[Cell]:
+        return [_head(table.columns[i], units), *(row.cells[i] for row in rows)]
 
+    def width(i: int) -> int:
+        return max(len(part) for cell in cells(i) for part in _parts(cell, units)) + 3
+
+    words = {
+        i: max(len(word) for cell in cells(i) for word in plain_cell(cell, units).split() or [""])
+        for i in places
+    }
+    if sum(words.values()) + 3 * len(words) + 1 <= room:
+        return [list(places)]
     parts: list[list[int]] = [[first]]
     for i in others:
         if len(parts[-1]) > 1 and sum(map(width, (*parts[-1], i))) + 1 > room:
