@@ -12,17 +12,14 @@ from ..drives.cardan import check
 from ..drives.catalogue import CatalogueMotor
 from ..drives.gearing import Transmission
 from ..drives.motor import Motor
-from ..drives.motors import MOTORS
-from ..errors import Faults, GeometryError, InputError, each_refusal, near_name, refusal_prefix
+from ..errors import Faults, GeometryError, InputError, each_refusal, refusal_prefix
 from ..machines.api import machine_of, ratios
-from ..machines.chain_unit import SideLoads, SideName
+from ..machines.chain_unit import SideName
 from ..machines.machine import Machine
 from ..mechanism.models import MachineModel
 from ..places import lines_of
 from ..quantities import Layout
 from ..reading import Slip, filled, given_values, read, read_table, slips, toml
-from ..refusals import unit_behind
-from ..system.signals import Profile
 from ..text import DEFAULT_UNITS, Units, chosen_units
 from .checks import check_order
 from .event import Event
@@ -33,6 +30,7 @@ from .foreign_machine import ForeignMachine, ForeignModel
 from .optimum.table import read_wishes
 from .optimum.wishes import Wishes
 from .parts import Parts, beside, example, over_example, with_linkage
+from .run_checks import endless, loads_beyond
 from .sections import (
     CHOICES,
     ChainOrgans,
@@ -343,8 +341,8 @@ def _config(
         labels=checked.report.labels,
         **of_study,
     )
-    faults.add(_loads_beyond(config))
-    faults.add(_endless(config))
+    faults.add(loads_beyond(config))
+    faults.add(endless(config))
     faults.refuse()
     return config
 
@@ -434,69 +432,3 @@ def _taken_over(error: InputError, machine: type[MachineModel], given: Mapping[s
     declared = Layout(machine.Parameters).by_name(machine.Parameters())
     taken = [f"{name} = {declared[name]:g}" for name in names if name in declared and name not in given]
     return f"; not in the file, so at the declared start value: {', '.join(taken)}" if taken else ""
-
-
-def _loads_beyond(config: Config) -> Iterator[InputError]:
-    """Refusals of loads that are beyond any machine together: all on one side, and at the height of each
-    event."""
-    feed, model = config.feed, config.machine.model
-    for v in Layout(SideLoads).variables if model.sides else ():
-        most = getattr(feed.left, v.name) + getattr(feed.right, v.name)
-        if not v.quantity.admits(most):
-            unit = unit_behind(v.unit)
-            yield InputError(
-                f"feed: {v.name} of both sides = {most:.9g}{unit}: must be <= {v.quantity.high:g}{unit} "
-                "together, as an overload may lay all of it on one side",
-                key="feed",
-            )
-    inputs = {v.name: v for v in model.input_layout.variables}
-    normal = {name: v.quantity.start or 0.0 for name, v in inputs.items()} | Layout(model.Feed).by_name(feed)
-    hardest = [
-        (f"event.{name}", f"event.{k}", event) for k, (name, event) in enumerate(config.events.items(), 1)
-    ]
-    hardest += [("monte_carlo.event", "monte_carlo.event", event) for event in config.random.hardest()]
-    of_motors = {name for motor in MOTORS.values() for name in motor.input_layout.names}
-    for where, key, event in hardest:
-        needed = set(event.inputs(event.side))
-        if not needed <= set(inputs):
-            asked = config.monte_carlo.runs or where != "monte_carlo.event"
-            if asked and config.foreign is None and not needed <= {*inputs, *of_motors}:
-                yield InputError(
-                    f"{where}: the {model.name} has no {' or '.join(sorted(needed))}; leave it out"
-                    + "".join(near_name(name, inputs) for name in needed),
-                    key=key,
-                )
-            # an input of the motor: the study checks whether the motor has it
-            continue
-        if words := event.fault(normal):
-            yield InputError(f"{where}: {words}", key=key)
-        for name, signal in event.signals(normal, 0.0, dict.fromkeys(event.reads, 0.0)).items():
-            most = (
-                max([signal.start, *(x for *_, x in signal.changes)])
-                if isinstance(signal, Profile)
-                else signal
-            )
-            v = inputs[name]
-            if not v.quantity.admits(most):
-                yield InputError(
-                    f"{where}: {name} comes to {most:.9g}{unit_behind(v.unit)} with the feed: must be "
-                    f"{v.quantity.allowed_range}",
-                    key=key,
-                )
-
-
-MOST_STEPS = 1e6
-
-
-def _endless(config: Config) -> Iterator[InputError]:
-    """The refusal of a study that would never end."""
-    run, turn = config.run, config.turn
-    seconds = config.steady_begin + run.turns * turn
-    seconds += sum(event.follow(turn) + 2.0 * turn for event in config.events.values())
-    steps = max(seconds, config.monte_carlo.duration) / run.step
-    if not steps <= MOST_STEPS:
-        yield InputError(
-            f"run.step = {run.step:g} s: the study would take {steps:.2g} steps, more than {MOST_STEPS:.0e}; "
-            "lengthen the step, raise the speed, or lessen the turns",
-            key="run.step",
-        )

@@ -84,10 +84,10 @@ def _binding(name: str, side: str, value: Any, unit: str, slope: float, is_bound
 def sentence(best: Best, each: Binding) -> str:
     """A binding in words: ``1 mm more of r.max lowers peak(crank_torque) by 0.3 N m``."""
     objective = best.wishes.objectives[0]
-    amount = number(abs(each.change), objective.unit)
+    amount = number(abs(each.change), objective.unit, objective.kind)
     verb = "lowers" if each.change < 0.0 else "raises"
     others = best.wishes.objectives[1:]
-    held = "".join(f", with {q.name} held at {number(best.found[q.name], q.unit)}" for q in others)
+    held = "".join(f", with {q.name} held at {number(best.found[q.name], q.unit, q.kind)}" for q in others)
     if each.name == SLACK:
         return f"{each.step_words} of least pull in the webs at that speed {verb} {objective.name} by {amount}{held}"
     return f"{each.step_words} more of {each.name}.{each.side} {verb} {objective.name} by {amount}{held}"
@@ -115,7 +115,9 @@ def idle_sentence(best: Best) -> str:
 def limit_words(limit: TurnLimit) -> str:
     """A limit in words: ``range(rocker.psi) from 16 deg to 20 deg``."""
     q = limit.quantity
-    low, high = (None if x is None else number(x, q.unit, full=False) for x in (limit.low, limit.high))
+    low, high = (
+        None if x is None else number(x, q.unit, q.kind, full=False) for x in (limit.low, limit.high)
+    )
     if low is not None and high is not None:
         return f"{q.name} = {low}" if limit.low == limit.high else f"{q.name} from {low} to {high}"
     return f"{q.name} of at least {low}" if low is not None else f"{q.name} of at most {high}"
@@ -138,7 +140,7 @@ def conflict_sentences(best: Best) -> Iterator[str]:
         )
     several = len(own.names) > len(own.together) and len(own.names) > 1
     reached = [
-        f"{name} = {number(value, limits[name].quantity.unit)}"
+        f"{name} = {number(value, limits[name].quantity.unit, limits[name].quantity.kind)}"
         for name, value in (
             own.alone if several else {n: best.found.get(n, math.nan) for n in own.names}
         ).items()

@@ -1,0 +1,79 @@
+"""Refusals of a study whose runs could not be made: loads beyond any machine, and runs without end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from ..drives.motors import MOTORS
+from ..errors import InputError, near_name
+from ..machines.chain_unit import SideLoads
+from ..quantities import Layout
+from ..refusals import unit_behind
+from ..system.signals import Profile
+
+MOST_STEPS = 1e6
+"""Most steps of a study."""
+
+
+def loads_beyond(config: Any) -> Iterator[InputError]:
+    """Refusals of loads of a `Config` that are beyond any machine together: all on one side, and at the height of
+    each event."""
+    feed, model = config.feed, config.machine.model
+    for v in Layout(SideLoads).variables if model.sides else ():
+        most = getattr(feed.left, v.name) + getattr(feed.right, v.name)
+        if not v.quantity.admits(most):
+            unit = unit_behind(v.unit)
+            yield InputError(
+                f"feed: {v.name} of both sides = {most:.9g}{unit}: must be <= {v.quantity.high:g}{unit} "
+                "together, as an overload may lay all of it on one side",
+                key="feed",
+            )
+    inputs = {v.name: v for v in model.input_layout.variables}
+    normal = {name: v.quantity.start or 0.0 for name, v in inputs.items()} | Layout(model.Feed).by_name(feed)
+    hardest = [
+        (f"event.{name}", f"event.{k}", event) for k, (name, event) in enumerate(config.events.items(), 1)
+    ]
+    hardest += [("monte_carlo.event", "monte_carlo.event", event) for event in config.random.hardest()]
+    of_motors = {name for motor in MOTORS.values() for name in motor.input_layout.names}
+    for where, key, event in hardest:
+        needed = set(event.inputs(event.side))
+        if not needed <= set(inputs):
+            asked = config.monte_carlo.runs or where != "monte_carlo.event"
+            if asked and config.foreign is None and not needed <= {*inputs, *of_motors}:
+                yield InputError(
+                    f"{where}: the {model.name} has no {' or '.join(sorted(needed))}; leave it out"
+                    + "".join(near_name(name, inputs) for name in needed),
+                    key=key,
+                )
+            # an input of the motor: the study checks whether the motor has it
+            continue
+        if words := event.fault(normal):
+            yield InputError(f"{where}: {words}", key=key)
+        for name, signal in event.signals(normal, 0.0, dict.fromkeys(event.reads, 0.0)).items():
+            most = (
+                max([signal.start, *(x for *_, x in signal.changes)])
+                if isinstance(signal, Profile)
+                else signal
+            )
+            v = inputs[name]
+            if not v.quantity.admits(most):
+                yield InputError(
+                    f"{where}: {name} comes to {most:.9g}{unit_behind(v.unit)} with the feed: must be "
+                    f"{v.quantity.allowed_range}",
+                    key=key,
+                )
+
+
+def endless(config: Any) -> Iterator[InputError]:
+    """The refusal of a study, a `Config`, that would never end."""
+    run, turn = config.run, config.turn
+    seconds = config.steady_begin + run.turns * turn
+    seconds += sum(event.follow(turn) + 2.0 * turn for event in config.events.values())
+    steps = max(seconds, config.monte_carlo.duration) / run.step
+    if not steps <= MOST_STEPS:
+        yield InputError(
+            f"run.step = {run.step:g} s: the study would take {steps:.2g} steps, more than {MOST_STEPS:.0e}; "
+            "lengthen the step, raise the speed, or lessen the turns",
+            key="run.step",
+        )
