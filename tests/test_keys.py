@@ -4,6 +4,7 @@ import importlib.util
 import json
 import re
 import tomllib
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -78,6 +79,8 @@ def _one_key(table, key):
     if table.name == "sweep.parameter":
         own = f"{key.name} = {key.left_out}\n"
         return f'[[sweep.parameter]]\nname = "machine.r"\ntolerance = "1 mm"\n{own}'
+    if table.name == "optimize":
+        return f"[optimize]\n{key.name} = {key.left_out}\n[optimize.free]\nr = {{ min = 0.1, max = 0.2 }}\n"
     if table.name in ("gear", "starter"):
         system = '[system]\nmotor = "IE3 4-pole 0.75 kW, 80M"\n'
     if table.name == "torsion":
@@ -131,6 +134,10 @@ def test_a_key_at_its_value_changes_nothing(table, key):
         "place",
     ):
         assert getattr(values, part) == getattr(left_out, part)
+    if table.name == "optimize":
+        own = {each.name for each in fields(values.optimize)} - {"machine"}
+        assert "seed" in own
+        assert all(getattr(values.optimize, x) == getattr(left_out.optimize, x) for x in own)
 
 
 def _values(part):

@@ -394,7 +394,8 @@ def test_default_name_and_what_the_command_refuses(tmp_path, monkeypatch, capsys
         return ended.value.code, *capsys.readouterr()
 
     status, out, _ = command("--backend", "python")
-    assert not status and out.startswith("ChainUnitDrive.ssp: SSP 1.0, ") and out.count("\n") == 1
+    assert not status and out.startswith("ChainUnitDrive.ssp: SSP 1.0, ")
+    assert out.count("\n") == 2 and "\nNot in it: the events " in out
     before = Path("ChainUnitDrive.ssp").read_bytes()
     Path("wrong.toml").write_text("[machine]\nr = 0.9")
     for arguments, messages in (

@@ -326,7 +326,7 @@ def _ask(scheduler: str) -> None:
         with concurrent.futures.ThreadPoolExecutor(1) as thread:
             answer = thread.submit(lambda: asyncio.run(ask_in_time())).result()
     except Exception as error:
-        if not isinstance(error, OSError | TimeoutError):
+        if not isinstance(error, OSError | TimeoutError | ValueError):
             # bytes that are no message of Dask: the length of a message is then any number
             raise InputError(
                 f"scheduler {address}: answers, but is no Dask scheduler; give the address that it prints, such as "
