@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+COUNTS = 4096
+"""Counts of the encoder in a turn of the motor: 1024 lines with four edges each."""
+
 
 @dataclass(frozen=True)
 class Measurand:

@@ -1,0 +1,313 @@
+"""What is sought, what is known, and the residuals of recorded runs with their exact derivatives."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from .measurands import MEASURANDS
+from .plant import ANGLE, CRANK, TEMPERATURE, Course, Plant, Response
+from .recording import Recording
+
+JITTER = 2e-5
+"""Scatter of the instants at which rows are sampled [s]."""
+OUTLIER = 6.0
+"""Size of a residual, in standard deviations, from which it counts less."""
+LONGEST_STEP = 2e-3
+"""Longest time between rows of a simulation [s], between which it is interpolated."""
+ANGLES, TURNS = 24, 3.0
+"""Number of crank angles at which a run without marks is tried, and the turns that are tried."""
+ORDERS, SLIP = (1, 2, 3), 1e4
+"""Orders of a polynomial over the run by which the count of an encoder may deviate, and its size in counts. The mean
+speed depends on the frequency of the supply and on the warming of the motor, to which the count is far more sensitive
+than any other column; within a turn it shows the motion."""
+_CHANGE = 0.2
+"""Change of an unknown for which the derivatives are integrated, in parts of its spread."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A number that is sought: its start value, its bounds, and the standard deviation `spread` of the start value
+    that is known beforehand. Bounds alone have the standard deviation of an even distribution."""
+
+    name: str
+    unit: str
+    start: float
+    low: float
+    high: float
+    spread: float
+    is_nuisance: bool = False
+
+    @classmethod
+    def within(cls, name: str, unit: str, low: float, high: float) -> Unknown:
+        """One of which only the bounds are known."""
+        return cls(name, unit, 0.5 * (low + high), low, high, (high - low) / math.sqrt(12.0))
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """An analog sensor: noise in parts of the RMS of its column, step of its converter in the unit of the column, and
+    the standard deviations of its gain and of its offset, 0 where they are known."""
+
+    noise: float = 0.01
+    resolution: float = 0.0
+    gain: float = 0.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class RecordedRun:
+    """A recording, and what is known of it.
+
+    `values` are the known values of inputs and parameters of the system by full name, such as those of an empty
+    machine, `added` what was added to a parameter. `crank_speed` is that with which the simulation begins [rad/s].
+    """
+
+    name: str
+    recording: Recording
+    crank_speed: float
+    values: Mapping[str, float] = field(default_factory=dict)
+    added: Mapping[str, float] = field(default_factory=dict)
+    ambient: float = 293.15
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Residuals of a column of a run, in standard deviations, shape (n,), and the derivatives of the simulated column
+    by the unknowns at the `places`, shape (n, places)."""
+
+    run: str
+    column: str
+    residuals: Any
+    slopes: Any
+    places: Sequence[int]
+
+
+class Problem:
+    """Runs of one machine, and the numbers that are sought.
+
+    Parameters
+    ----------
+    plant : the drive; its `by` are the names of `sought`
+    runs : the recordings
+    sought : the unknown parameters and inputs of the system, by full name
+    sensors : by measured quantity; all others have the usual noise
+    """
+
+    def __init__(
+        self,
+        plant: Plant,
+        runs: Sequence[RecordedRun],
+        sought: Sequence[Unknown],
+        sensors: Mapping[str, Sensor],
+    ) -> None:
+        self.plant, self.runs, self.sought = plant, tuple(runs), tuple(sought)
+        self.sensors = {name: sensors.get(name, Sensor()) for run in runs for name in run.recording.columns}
+        self.unknowns = (
+            *self.sought,
+            *self._of_sensors(),
+            *(u for run in self.runs for u in self._of_run(run)),
+        )
+        self.place = {unknown.name: k for k, unknown in enumerate(self.unknowns)}
+
+    @property
+    def starts(self) -> Any:
+        """The start values, shape (unknowns,)."""
+        return np.array([u.start for u in self.unknowns])
+
+    @property
+    def spreads(self) -> Any:
+        """The standard deviations that are known beforehand, shape (unknowns,)."""
+        return np.array([u.spread for u in self.unknowns])
+
+    @cached_property
+    def bounds(self) -> tuple[Any, Any]:
+        """Lower and upper bounds, each of shape (unknowns,)."""
+        return np.array([u.low for u in self.unknowns]), np.array([u.high for u in self.unknowns])
+
+    def _of_sensors(self) -> Iterator[Unknown]:
+        """What the runs have in common: the gains of sensors, and the angle of the mark."""
+        for name, sensor in self.sensors.items():
+            if sensor.gain:
+                yield _nuisance(f"gain({name})", "1", 1.0, sensor.gain)
+        if "mark" in self.sensors:
+            # the mark is near the crank angle 0, at most a twentieth of a turn beside it
+            yield _nuisance("mark.angle", "rad", 0.0, 0.2)
+
+    def _of_run(self, run: RecordedRun) -> Iterator[Unknown]:
+        columns = run.recording.columns
+        yield _nuisance(f"{run.name}.angle", "rad", self._first_angle(run), 10.0)
+        yield _nuisance(f"{run.name}.temperature", "K", run.ambient + 20.0, 40.0)
+        if "mark" in columns or "motor.count" in columns:
+            yield _nuisance(f"{run.name}.drift", "1", 0.0, 5e-5)
+        if "motor.count" in columns:
+            yield _nuisance(f"{run.name}.count", "1", 0.0, 3.0)
+            yield from (_nuisance(f"{run.name}.count.{k}", "1", 0.0, SLIP) for k in ORDERS)
+        for name in columns:
+            if MEASURANDS[name].analog and self.sensors[name].offset:
+                yield _nuisance(
+                    f"{run.name}.offset({name})", MEASURANDS[name].unit, 0.0, self.sensors[name].offset
+                )
+
+    def _first_angle(self, run: RecordedRun) -> float:
+        """The crank angle at the first row, from the marks if there are any."""
+        passed = mark_times(run.recording)
+        if not len(passed):
+            return 0.0
+        return -speed_of(run) * float(passed[0] - run.recording.time[0])
+
+    def started(self, workers: int = 2) -> Any:
+        """The start values, shape (unknowns,), with the crank angle of each run without marks at which the course of
+        its analog columns is most like the simulated one."""
+        z = self.starts
+        for run in self.runs:
+            if not len(mark_times(run.recording)):
+                place = self.place[f"{run.name}.angle"]
+                angles = np.arange(ANGLES) * (2.0 * math.pi / ANGLES)
+                z[place] = max(angles, key=lambda angle: self._likeness(run, z, place, angle, workers))
+        return z
+
+    def _likeness(self, run: RecordedRun, z: Any, place: int, angle: float, workers: int) -> float:
+        """The sum of the correlations of measured and simulated columns over some turns."""
+        z = z.copy()
+        z[place] = angle
+        turns = TURNS * 2.0 * math.pi / run.crank_speed
+        first = replace(run, recording=run.recording.part(end=float(run.recording.time[0]) + turns))
+        response = self.plant.respond(self._course(first, self._values(z)), {}, workers)
+        columns = (name for name in first.recording.columns if MEASURANDS[name].analog)
+        total = 0.0
+        for name in columns:
+            y, x = (
+                first.recording.columns[name],
+                np.interp(first.recording.time, response.time, response.values[name]),
+            )
+            total += float(np.corrcoef(y, x)[0, 1]) if np.ptp(y) and np.ptp(x) else 0.0
+        return total
+
+    def comparisons(self, z: Any, workers: int = 2) -> Iterator[Comparison]:
+        """The comparisons of all runs with the values `z` of the unknowns, shape (unknowns,)."""
+        for run in self.runs:
+            yield from self._of(run, z, workers)
+
+    def _values(self, z: Any) -> dict[str, float]:
+        return {u.name: float(x) for u, x in zip(self.unknowns, z, strict=True)}
+
+    def _course(self, run: RecordedRun, value: Mapping[str, float]) -> Course:
+        """How the run goes with these values of the unknowns."""
+        recording = run.recording
+        begin, end = float(recording.time[0]), float(recording.time[-1])
+        # the clock of the logger may be wrong by a ten-thousandth
+        margin = 2.0 * recording.step + 1e-3 * (end - begin)
+        return Course(
+            {u.name: value[u.name] + run.added.get(u.name, 0.0) for u in self.sought} | dict(run.values),
+            value[f"{run.name}.angle"],
+            value[f"{run.name}.temperature"],
+            run.crank_speed,
+            begin,
+            end + margin,
+            min(recording.step, LONGEST_STEP),
+        )
+
+    def _of(self, run: RecordedRun, z: Any, workers: int) -> Iterator[Comparison]:
+        value = self._values(z)
+        free = [u for u in self.sought if u.name not in run.values]
+        directions = {u.name: (u.name, _CHANGE * u.spread) for u in free}
+        directions |= {f"{run.name}.angle": (ANGLE, 0.01), f"{run.name}.temperature": (TEMPERATURE, 5.0)}
+        response = self.plant.respond(self._course(run, value), directions, workers)
+        sizes = np.array([size for _, size in directions.values()])
+        yield from self._compared(run, value, response, list(directions), sizes)
+
+    def _compared(
+        self,
+        run: RecordedRun,
+        value: Mapping[str, float],
+        response: Response,
+        names: Sequence[str],
+        sizes: Any,
+    ) -> Iterator[Comparison]:
+        """Measured over simulated, column by column."""
+        recording, drift = run.recording, f"{run.name}.drift"
+        since = recording.time - recording.time[0]
+        time = recording.time + value.get(drift, 0.0) * since
+
+        def sampled(name: str, at: Any) -> tuple[Any, Any, Any]:
+            """A simulated quantity at these times, its derivatives by `names` and by time."""
+            course = CubicSpline(response.time, response.values[name])
+            slopes = [
+                np.interp(at, response.time, each) / s
+                for each, s in zip(response.slopes[name], sizes, strict=True)
+            ]
+            return course(at), np.stack(slopes, axis=1), course(at, 1)
+
+        for name, y in recording.columns.items():
+            if name == "mark":
+                passed = mark_times(recording)
+                if len(passed) < 2:
+                    continue
+                sooner = passed - recording.time[0]
+                x, slopes, rate = sampled(CRANK, passed + value.get(drift, 0.0) * sooner)
+                size = speed_of(run) * recording.step / math.sqrt(12.0)
+                off = (x - value["mark.angle"] + math.pi) % (2.0 * math.pi) - math.pi
+                more = {drift: rate * sooner, "mark.angle": -np.ones(len(x))}
+                yield self._comparison(run, name, -off / size, slopes / size, names, more, size)
+                continue
+            x, slopes, rate = sampled(name, time)
+            more = {drift: rate * since} if drift in self.place else {}
+            if name == "motor.count":
+                size = math.hypot(math.sqrt(1.0 / 12.0), JITTER * float(np.mean(np.abs(rate))))
+                more[f"{run.name}.count"] = np.ones(len(x))
+                # it counts from the first row on, and rounds down
+                x, slopes = x - x[0] + value[f"{run.name}.count"] - 0.5, slopes - slopes[0]
+                part = 2.0 * since / since[-1] - 1.0
+                for k in ORDERS:
+                    more[f"{run.name}.count.{k}"] = part**k
+                    x = x + value[f"{run.name}.count.{k}"] * part**k
+            else:
+                sensor, gain, offset = self.sensors[name], f"gain({name})", f"{run.name}.offset({name})"
+                size = math.hypot(
+                    sensor.noise * float(np.sqrt(np.mean(np.square(y)))), sensor.resolution / math.sqrt(12.0)
+                )
+                if gain in self.place:
+                    more[gain] = x
+                    x, slopes = x * value[gain], slopes * value[gain]
+                    more |= {drift: more[drift] * value[gain]} if drift in more else {}
+                if offset in self.place:
+                    more[offset] = np.ones(len(x))
+                    x = x + value[offset]
+            yield self._comparison(run, name, (y - x) / size, slopes / size, names, more, size)
+
+    def _comparison(
+        self, run: RecordedRun, column: str, residuals: Any, slopes: Any, names: Sequence[str],
+        more: Mapping[str, Any], size: float,
+    ) -> Comparison:  # fmt: skip
+        """The residuals with the derivatives by all unknowns."""
+        columns = [slopes, *(np.reshape(x, (-1, 1)) / size for x in more.values())]
+        places = [self.place[name] for name in (*names, *more)]
+        return Comparison(run.name, column, residuals, np.hstack(columns), places)
+
+
+def _nuisance(name: str, unit: str, start: float, spread: float) -> Unknown:
+    return Unknown(name, unit, start, -math.inf, math.inf, spread, is_nuisance=True)
+
+
+def mark_times(recording: Recording) -> Any:
+    """The times at which the crank passed the mark: half a row before the rows that say so."""
+    if "mark" not in recording.columns:
+        return np.zeros(0)
+    return recording.time[recording.columns["mark"] > 0.5] - 0.5 * recording.step
+
+
+def speed_of(run: RecordedRun) -> float:
+    """Mean speed of the crank [rad/s], by the marks where there are two."""
+    passed = mark_times(run.recording)
+    if len(passed) < 2:
+        return run.crank_speed
+    turn = np.median(np.diff(passed))
+    turns = np.round((passed[-1] - passed[0]) / turn)
+    return float(2.0 * math.pi * turns / (passed[-1] - passed[0]))

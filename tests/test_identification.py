@@ -1,0 +1,174 @@
+"""Identification: residuals and their derivatives, and the fit of recordings that the monolithic solution made."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from chainunit import InputError
+from chainunit.drives.dc_motor import DcMotor
+from chainunit.native.compilers import compiler
+from chainunit.study.config import parse
+from chainunit.study.drive import Drive
+from chainunit.study.identification.fit import fit, normal
+from chainunit.study.identification.measurands import COUNTS
+from chainunit.study.identification.plant import Plant
+from chainunit.study.identification.problem import JITTER, Problem, RecordedRun, Sensor, Unknown
+from chainunit.study.identification.recording import Recording
+from chainunit.system import Profile, monolithic
+
+pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
+TRUTH = {
+    "machine.left.material_mass": 41.0,
+    "machine.right.material_mass": 24.0,
+    "machine.joint_damping": 1.3,
+    "machine.pin.friction": 0.09,
+}
+RATE, LATER, DURATION, SPEED = 200.0, 6.0, 9.0, 3.0
+MARK, OFFSET, DRIFT = -0.11, 0.03, 4e-5
+SOUGHT = (
+    Unknown.within("machine.left.material_mass", "kg", 10.0, 60.0),
+    Unknown.within("machine.right.material_mass", "kg", 10.0, 60.0),
+    Unknown.within("machine.joint_damping", "N.m.s/rad", 0.1, 3.0),
+    Unknown.within("machine.pin.friction", "1", 0.02, 0.25),
+)
+SENSORS = {"motor.i": Sensor(offset=0.2, gain=0.01), "motor.u": Sensor(resolution=0.1)}
+
+
+def drive_of(**parameters):
+    config = parse("")
+    return Drive(DcMotor, config.motor, config.machine.replace(parameters))
+
+
+def recorded(empty=False, seed=4):
+    """A recording of the drive with the true values, by scipy's integrator, from standstill."""
+    own = {name.removeprefix("machine."): x for name, x in TRUTH.items() if "mass" not in name}
+    drive = drive_of(**own)
+    loads = {f"machine.{side}.{load}": 0.0 for side in ("left", "right") for load in ("processing_force",)}
+    loads |= {name: 0.0 if empty else x for name, x in TRUTH.items() if "mass" in name}
+    signals = loads | {"motor.w_ref": Profile(0.0, ((0.0, 2.0, SPEED * drive.ratio),))}
+    shown = np.arange(round(RATE * DURATION)) / RATE
+    rng = np.random.default_rng(seed)
+    sampled = LATER + shown * (1.0 + DRIFT) + JITTER * rng.standard_normal(len(shown))
+    run = monolithic(drive.graph, signals, [0.0, *sampled], rtol=1e-9).isel(time=slice(1, None))
+
+    def noisy(x):
+        return x + 0.01 * np.sqrt(np.mean(x**2)) * rng.standard_normal(len(x))
+
+    phi, crank = run["motor.phi"].values, run["motor.phi"].values / drive.ratio
+    passed = np.floor((crank - MARK) / (2.0 * np.pi))
+    columns = {
+        "motor.i": noisy(run["motor.armature.i"].values) + OFFSET,
+        "motor.u": np.round(noisy(run["motor.v"].values), 1),
+        "motor.w": noisy(run["motor.w"].values),
+        "mark": np.append(0.0, np.diff(passed)),
+        "motor.count": np.floor((phi - phi[0]) * COUNTS / (2.0 * np.pi)),
+    }
+    return Recording("run.csv", shown, columns, {name: name for name in ("time", *columns)})
+
+
+def without(recording, *names):
+    columns = {name: x for name, x in recording.columns.items() if name not in names}
+    return Recording(recording.source, recording.time, columns, recording.heads)
+
+
+def problem_of(*recordings, empty=()):
+    measured = [name for name in recordings[0].columns if name != "mark"]
+    known = {"machine.left.processing_force": 0.0, "machine.right.processing_force": 0.0}
+    none = dict.fromkeys((name for name in TRUTH if "material" in name), 0.0)
+    runs = [
+        RecordedRun(f"run{k}", each, SPEED, known | {"motor.w_ref": 150.0} | (none if k in empty else {}))
+        for k, each in enumerate(recordings)
+    ]
+    plant = Plant(drive_of(), measured, [u.name for u in SOUGHT])
+    return Problem(plant, runs, SOUGHT, SENSORS)
+
+
+@pytest.fixture(scope="module")
+def loaded():
+    return recorded()
+
+
+@pytest.fixture(scope="module")
+def empty():
+    return recorded(empty=True, seed=5)
+
+
+def test_derivatives_of_residuals(loaded):
+    """By every unknown, of every column, against differences."""
+    problem = problem_of(loaded)
+    z = problem.starts
+    z[problem.place["run0.temperature"]], z[problem.place["gain(motor.i)"]] = 305.0, 1.02
+    z[problem.place["run0.count.2"]], z[problem.place["run0.drift"]] = 0.7, 3e-5
+    comparisons = list(problem.comparisons(z))
+    assert {each.column for each in comparisons} == set(loaded.columns)
+    seen = set()
+    for unknown in problem.unknowns:
+        place = problem.place[unknown.name]
+        step = 1e-4 * (unknown.spread if np.isfinite(unknown.spread) else 1.0)
+        near = []
+        for sign in (1.0, -1.0):
+            other = z.copy()
+            other[place] += sign * step
+            near.append([each.residuals for each in problem.comparisons(other)])
+        for each, ahead, behind in zip(comparisons, *near, strict=True):
+            difference = -(ahead - behind) / (2.0 * step)
+            if place not in each.places:
+                assert np.max(np.abs(difference)) * unknown.spread < 1e-3, (unknown.name, each.column)
+                continue
+            seen.add(unknown.name)
+            own = each.slopes[:, list(each.places).index(place)]
+            size = np.max(np.abs(difference))
+            assert np.max(np.abs(own - difference)) < 2e-3 * size + 1e-6 / unknown.spread, (
+                unknown.name,
+                each.column,
+            )
+    assert seen == set(problem.place)
+
+
+@pytest.mark.parametrize("angle", ["mark", "motor.count", None])
+def test_a_loaded_and_an_empty_run_are_identified(loaded, empty, angle):
+    """With a mark, with an encoder, and with neither, from the middle of the bounds: within four standard deviations,
+    and the residuals are noise. The feed is told to parts of a kilogram."""
+    leave_out = [name for name in ("mark", "motor.count") if name != angle]
+    problem = problem_of(*(without(each, *leave_out) for each in (loaded, empty)), empty=(1,))
+    best = fit(problem)
+    deviation = dict(zip(problem.place, best.deviations, strict=True))
+    found = dict(zip(problem.place, best.z, strict=True))
+    for name, true in TRUTH.items():
+        assert abs(found[name] - true) < 4.0 * deviation[name], name
+        assert deviation[name] < 0.05 * true, name
+    assert abs(found["run0.offset(motor.i)"] - OFFSET) < 4.0 * deviation["run0.offset(motor.i)"]
+    if angle == "mark":
+        assert abs(found["mark.angle"] - MARK) < 4.0 * deviation["mark.angle"] < 0.1
+    for key, share in best.shares.items():
+        # there are four marks
+        assert 0.02 < share < 3.0 if key[1] == "mark" else 0.85 < share < 1.15, key
+
+
+def test_a_wrong_machine_shows_in_the_residuals(loaded, empty):
+    """Of a machine with another gear no values of the unknowns make noise."""
+    problem = problem_of(*(without(each, "motor.count") for each in (loaded, empty)), empty=(1,))
+    wrong = Problem(
+        Plant(drive_of(ratio=45.0), ["motor.i", "motor.u", "motor.w"], [u.name for u in SOUGHT]),
+        [RecordedRun(run.name, run.recording, 150.0 / 45.0, run.values) for run in problem.runs],
+        SOUGHT,
+        SENSORS,
+    )
+    assert max(fit(wrong).shares.values()) > 5.0
+
+
+def test_what_is_known_beforehand_counts(loaded):
+    """The normal equations are those of the runs and of what is known beforehand."""
+    problem = problem_of(without(loaded, "motor.count"))
+    at = normal(problem, problem.starts)
+    assert at.matrix - at.fisher == pytest.approx(np.diag(1.0 / problem.spreads**2))
+    np.testing.assert_allclose(at.covariance @ at.matrix, np.eye(len(at.z)), atol=1e-6)
+    assert np.all(at.deviations <= problem.spreads * (1.0 + 1e-9))
+
+
+def test_a_quantity_that_the_drive_does_not_have():
+    with pytest.raises(
+        InputError, match=r"motor\.power2: is not measured at this drive; there are motor\.i, motor\.u"
+    ):
+        Plant(drive_of(), ["motor.power2"], ["machine.r"])
