@@ -11,6 +11,7 @@ from chainunit.native.compilers import compiler
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
 from chainunit.study.identification.fit import fit, normal
+from chainunit.study.identification.information import information
 from chainunit.study.identification.measurands import COUNTS
 from chainunit.study.identification.plant import Plant
 from chainunit.study.identification.problem import JITTER, Problem, RecordedRun, Sensor, Unknown
@@ -72,7 +73,7 @@ def without(recording, *names):
     return Recording(recording.source, recording.time, columns, recording.heads)
 
 
-def problem_of(*recordings, empty=()):
+def problem_of(*recordings, empty=(), sought=SOUGHT):
     measured = [name for name in recordings[0].columns if name != "mark"]
     known = {"machine.left.processing_force": 0.0, "machine.right.processing_force": 0.0}
     none = dict.fromkeys((name for name in TRUTH if "material" in name), 0.0)
@@ -80,8 +81,8 @@ def problem_of(*recordings, empty=()):
         RecordedRun(f"run{k}", each, SPEED, known | {"motor.w_ref": 150.0} | (none if k in empty else {}))
         for k, each in enumerate(recordings)
     ]
-    plant = Plant(drive_of(), measured, [u.name for u in SOUGHT])
-    return Problem(plant, runs, SOUGHT, SENSORS)
+    plant = Plant(drive_of(), measured, [u.name for u in sought])
+    return Problem(plant, runs, sought, SENSORS)
 
 
 @pytest.fixture(scope="module")
@@ -172,3 +173,58 @@ def test_a_quantity_that_the_drive_does_not_have():
         InputError, match=r"motor\.power2: is not measured at this drive; there are motor\.i, motor\.u"
     ):
         Plant(drive_of(), ["motor.power2"], ["machine.r"])
+
+
+WITH_MASSES = (
+    *SOUGHT,
+    Unknown.within("machine.left.web_mass", "kg", 8.0, 40.0),
+    Unknown.within("machine.crank.m", "kg", 20.0, 60.0),
+    Unknown.within("machine.coupler.m", "kg", 10.0, 50.0),
+)
+
+
+def test_what_runs_cannot_tell_is_named(loaded, empty):
+    """In one run the material on the left web acts as the web itself. An empty run tells them apart, and is what is
+    proposed."""
+    recordings = [without(each, "motor.count") for each in (loaded, empty)]
+    one = information(problem_of(recordings[0], sought=WITH_MASSES))
+    (blind,) = one.blind
+    assert sorted(name for name, _ in blind.terms) == ["machine.left.material_mass", "machine.left.web_mass"]
+    assert [c for _, c in blind.terms] == [1.0, pytest.approx(-1.0, abs=1e-4)]
+    told = {each.name: each for each in one.outlooks}
+    assert not told["machine.left.web_mass"].is_told and told["machine.left.web_mass"].by_runs > 500.0
+    assert told["machine.right.material_mass"].is_told
+    assert {each.with_known <= each.spread for each in one.outlooks} == {True}
+    best = one.proposals[0]
+    assert best.words == "empty" and best.factor > max(each.factor for each in one.proposals[1:]) > 1.0
+    both = information(problem_of(*recordings, empty=(1,), sought=WITH_MASSES), propose=False)
+    assert both.blind == () and both.proposals == ()
+    factors = [a.with_known / b.with_known for a, b in zip(one.outlooks, both.outlooks, strict=True)]
+    # the proposal was simulated from the start values, without noise
+    assert np.exp(np.mean(np.log(factors))) == pytest.approx(best.factor, rel=0.1)
+
+
+def test_a_combination_has_the_deviation_that_is_stated(loaded):
+    """By the covariance with as good as nothing known beforehand, as a quadratic form of its coefficients. It is much
+    less than that of its first number."""
+    problem = problem_of(without(loaded, "motor.count"), sought=WITH_MASSES)
+    found = information(problem, propose=False)
+    assert found.combinations
+    fisher = normal(problem, problem.started()).fisher
+    spread = problem.spreads.copy()
+    spread[: len(WITH_MASSES)] *= 1e3
+    covariance = np.linalg.inv(fisher + np.diag(1.0 / spread**2))
+    for each in found.combinations:
+        places = [problem.place[name] for name, _ in each.terms]
+        weights = np.array([c for _, c in each.terms])
+        own = np.sqrt(weights @ covariance[np.ix_(places, places)] @ weights)
+        assert each.deviation == pytest.approx(own, rel=1e-3)
+        assert own < 0.2 * np.sqrt(covariance[places[0], places[0]])
+        assert str(each).startswith(each.terms[0][0].removeprefix("machine."))
+
+
+def test_the_expected_deviations_are_those_of_the_fit(loaded, empty):
+    problem = problem_of(*(without(each, "motor.count") for each in (loaded, empty)), empty=(1,))
+    best = fit(problem)
+    expected = [each.with_known for each in information(problem, best.z, propose=False).outlooks]
+    np.testing.assert_allclose(expected, best.deviations[: len(SOUGHT)], rtol=1e-6)

@@ -223,6 +223,10 @@ class Problem:
         sizes = np.array([size for _, size in directions.values()])
         yield from self._compared(run, value, response, list(directions), sizes)
 
+    def simulated(self, run: RecordedRun, z: Any, workers: int = 2) -> Response:
+        """The course of a run with these values of the unknowns, shape (unknowns,), without derivatives."""
+        return self.plant.respond(self._course(run, self._values(z)), {}, workers)
+
     def _compared(
         self,
         run: RecordedRun,

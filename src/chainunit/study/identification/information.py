@@ -1,0 +1,254 @@
+"""What runs can tell: standard deviations to expect, numbers that cannot be told apart, and runs that tell more.
+
+The matrix of Fisher's information follows from the exact sensitivities of the simulated runs; of what is measured
+only the sizes of the noise enter. Nuisances, such as the angle of the crank, are not known. A number is *told* by the
+runs if they alone give it to less than half of what is known beforehand.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from .fit import normal
+from .plant import CRANK
+from .problem import Problem, RecordedRun
+from .recording import Recording
+
+TOLD = 0.5
+"""Standard deviation by the runs alone, in parts of what is known beforehand, below which they tell a number."""
+SHARP = 0.1
+"""The same of a combination that is worth naming."""
+MOST_TERMS = 4
+WEAK = 1e3
+"""Standard deviation of the sought numbers where nothing is known beforehand, in parts of what is: it makes a
+singular matrix regular."""
+BLIND, PART = 1e-4, 0.05
+"""Information on a direction, in parts of what is known beforehand, below which the runs are blind for it, and the
+least part of a number in it that is named."""
+ADDED = 15.0
+"""Mass to add to a part in a run that is proposed [kg]."""
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """A sought number: its standard deviation by the runs alone, and with what is known beforehand."""
+
+    name: str
+    unit: str
+    spread: float
+    by_runs: float
+    with_known: float
+
+    @property
+    def is_told(self) -> bool:
+        """Whether the runs tell the number."""
+        return self.by_runs < TOLD * self.spread
+
+
+@dataclass(frozen=True)
+class Combination:
+    """A sum of sought numbers: `terms` are names with coefficients, the first of which is 1, and `deviation` is its
+    standard deviation by the runs alone, in the unit of the first term."""
+
+    terms: tuple[tuple[str, float], ...]
+    unit: str
+    deviation: float
+
+    def __str__(self) -> str:
+        first, *others = self.terms
+        words = "".join(f" {'+' if c > 0.0 else '-'} {_factor(abs(c))}{_short(name)}" for name, c in others)
+        return _short(first[0]) + words
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A further run, in words, and what it would tell: the mean factor by which the standard deviations of the sought
+    numbers would fall, and the number of those that would be told."""
+
+    words: str
+    factor: float
+    told: int
+
+
+@dataclass(frozen=True)
+class Information:
+    """What the runs can tell: of each number, of sums whose first number they do not tell, and further runs.
+
+    `blind` are changes of the sought numbers together, in the proportions of the coefficients, which leave no trace
+    in any column.
+    """
+
+    outlooks: tuple[Outlook, ...]
+    combinations: tuple[Combination, ...]
+    blind: tuple[Combination, ...]
+    proposals: tuple[Proposal, ...]
+
+
+def information(problem: Problem, z: Any = None, workers: int = 2, propose: bool = True) -> Information:
+    """What the runs of a problem can tell at the values `z` of the unknowns, by default the start values.
+
+    Of the recordings the columns, the times of the rows and the sizes of the noise count. With `propose` further runs
+    are ranked, each of which is simulated.
+    """
+    z = problem.started(workers) if z is None else z
+    fisher = normal(problem, z, workers).fisher
+    outlooks, told = _outlooks(problem, fisher), _combinations(problem, fisher)
+    proposals = _proposals(problem, z, fisher, outlooks, workers) if propose else ()
+    return Information(outlooks, told, _blind(problem, fisher), tuple(proposals))
+
+
+def _covariance(problem: Problem, fisher: Any, known: float) -> Any:
+    """The covariance of the sought numbers, if `known` times their spread is known of them beforehand."""
+    count = len(problem.sought)
+    spread = problem.spreads.copy()
+    spread[:count] *= known
+    matrix = fisher + np.diag(1.0 / spread**2)
+    scale = 1.0 / np.sqrt(np.diag(matrix))
+    return (np.linalg.inv(matrix * np.outer(scale, scale)) * np.outer(scale, scale))[:count, :count]
+
+
+def _outlooks(problem: Problem, fisher: Any) -> tuple[Outlook, ...]:
+    alone, known = (np.sqrt(np.diag(_covariance(problem, fisher, x))) for x in (WEAK, 1.0))
+    return tuple(
+        Outlook(u.name, u.unit, u.spread, float(a), float(k))
+        for u, a, k in zip(problem.sought, alone, known, strict=True)
+    )
+
+
+def _combinations(problem: Problem, fisher: Any) -> tuple[Combination, ...]:
+    """For each number that is not told, the sum with the fewest others that is."""
+    covariance = _covariance(problem, fisher, WEAK)
+    sought, found = problem.sought, dict[frozenset[str], Combination]()
+    for first, unknown in enumerate(sought):
+        if math.sqrt(covariance[first, first]) < TOLD * unknown.spread:
+            continue
+        others: list[int] = []
+        while len(others) < MOST_TERMS - 1:
+            left = set(range(len(sought))) - {first, *others}
+            others.append(min(left, key=lambda k: _rest(covariance, first, [*others, k])))
+            deviation = math.sqrt(_rest(covariance, first, others))
+            if deviation < SHARP * unknown.spread:
+                factors = -np.linalg.solve(covariance[np.ix_(others, others)], covariance[others, first])
+                names = [sought[k].name for k in others]
+                terms = ((unknown.name, 1.0), *zip(names, map(float, factors), strict=True))
+                found.setdefault(
+                    frozenset((unknown.name, *names)), Combination(terms, unknown.unit, deviation)
+                )
+                break
+    return tuple(found.values())
+
+
+def _blind(problem: Problem, fisher: Any) -> tuple[Combination, ...]:
+    """The directions without information, each with as few numbers as possible."""
+    count, spread = len(problem.sought), problem.spreads
+    matrix = fisher + np.diag(np.where(np.arange(len(spread)) < count, 0.0, 1.0 / spread**2))
+    nuisances = matrix[count:, count:]
+    own = matrix[:count, :count] - matrix[:count, count:] @ np.linalg.solve(nuisances, matrix[count:, :count])
+    sizes, directions = np.linalg.eigh(own * np.outer(spread[:count], spread[:count]))
+    basis = directions[:, sizes < BLIND].T
+    rows = []
+    for k in range(len(basis)):
+        # the largest entry is eliminated from all others
+        place = int(np.argmax(np.max(np.abs(basis[k:]), axis=0)))
+        row = k + int(np.argmax(np.abs(basis[k:, place])))
+        basis[[k, row]] = basis[[row, k]]
+        basis[k] /= basis[k, place]
+        for other in range(len(basis)):
+            if other != k:
+                basis[other] -= basis[other, place] * basis[k]
+        rows.append(place)
+    found = []
+    for place, row in zip(rows, basis, strict=True):
+        first = problem.sought[place]
+        others = [k for k in np.argsort(-np.abs(row)) if k != place and abs(row[k]) > PART]
+        terms = [(problem.sought[k].name, float(row[k] * spread[k] / spread[place])) for k in others]
+        found.append(Combination(((first.name, 1.0), *terms), first.unit, math.inf))
+    return tuple(found)
+
+
+def _rest(covariance: Any, first: int, others: Sequence[int]) -> float:
+    """The variance of a number that remains if the others were known."""
+    cross = covariance[np.ix_(others, [first])][:, 0]
+    rest = covariance[first, first] - cross @ np.linalg.solve(covariance[np.ix_(others, others)], cross)
+    return max(float(rest), 0.0)
+
+
+def _proposals(
+    problem: Problem, z: Any, fisher: Any, now: Sequence[Outlook], workers: int
+) -> Iterator[Proposal]:
+    """Further runs, the best first."""
+    ranked = []
+    for words, run in _candidates(problem):
+        more = Problem(problem.plant, (*problem.runs, run), problem.sought, problem.sensors)
+        at = more.starts
+        for name, place in problem.place.items():
+            at[more.place[name]] = z[place]
+        single = Problem(
+            problem.plant, (_simulated(more, run, at, workers),), problem.sought, problem.sensors
+        )
+        own = normal(single, np.array([at[more.place[name]] for name in single.place]), workers).fisher
+        total = np.zeros((len(at), len(at)))
+        for part, matrix in ((problem, fisher), (single, own)):
+            places = [more.place[name] for name in part.place]
+            total[np.ix_(places, places)] += matrix
+        then = _outlooks(more, total)
+        factor = np.exp(
+            np.mean([math.log(a.with_known / b.with_known) for a, b in zip(now, then, strict=True)])
+        )
+        ranked.append(Proposal(words, float(factor), sum(each.is_told for each in then)))
+    yield from sorted(ranked, key=lambda each: -each.factor)
+
+
+def _candidates(problem: Problem) -> Iterator[tuple[str, RecordedRun]]:
+    """Runs that an engineer can make, in words."""
+    first = problem.runs[0]
+    own = replace(first, name="next", added={})
+    feed = [u.name for u in problem.sought if u.name.endswith(("material_mass", "processing_force"))]
+    if feed and not any(set(feed) <= set(run.values) for run in problem.runs):
+        yield "empty", replace(own, values={**first.values, **dict.fromkeys(feed, 0.0)})
+    if "motor.w_ref" in first.values:
+        for share in (0.5, 1.5):
+            w_ref = share * first.values["motor.w_ref"]
+            if not any(
+                abs(run.values.get("motor.w_ref", 0.0) - w_ref) < 0.05 * w_ref for run in problem.runs
+            ):
+                yield (
+                    f"at {share:g} times the speed",
+                    replace(
+                        own,
+                        values={**first.values, "motor.w_ref": w_ref},
+                        crank_speed=share * first.crank_speed,
+                    ),
+                )
+    for u in problem.sought:
+        if u.name.endswith(("web_mass", "wall_mass")) and not any(
+            u.name in run.added for run in problem.runs
+        ):
+            yield f"with {ADDED:g} kg added to {_short(u.name)}", replace(own, added={u.name: ADDED})
+
+
+def _simulated(problem: Problem, run: RecordedRun, z: Any, workers: int) -> RecordedRun:
+    """The run with a recording as the plant would give it, without noise."""
+    response = problem.simulated(run, z, workers)
+    time = run.recording.time
+    columns = {}
+    for name in run.recording.columns:
+        if name == "mark":
+            crank = np.interp(time, response.time, response.values[CRANK])
+            columns[name] = np.append(0.0, np.diff(np.floor(crank / (2.0 * math.pi))))
+        else:
+            columns[name] = np.interp(time, response.time, response.values[name])
+    return replace(run, recording=Recording("simulated", time, columns, run.recording.heads))
+
+
+def _short(name: str) -> str:
+    return name.removeprefix("machine.")
+
+
+def _factor(x: float) -> str:
+    return "" if abs(x - 1.0) < 0.005 else f"{x:.2g} "
