@@ -10,12 +10,14 @@ from chainunit.drives.dc_motor import DcMotor
 from chainunit.native.compilers import compiler
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
+from chainunit.study.identification import residuals
 from chainunit.study.identification.fit import fit, normal
 from chainunit.study.identification.information import information
 from chainunit.study.identification.measurands import COUNTS
 from chainunit.study.identification.plant import Plant
-from chainunit.study.identification.problem import JITTER, Problem, RecordedRun, Sensor, Unknown
+from chainunit.study.identification.problem import JITTER, Comparison, Problem, RecordedRun, Sensor, Unknown
 from chainunit.study.identification.recording import Recording
+from chainunit.study.identification.residuals import check_residuals
 from chainunit.system import Profile, monolithic
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
@@ -73,7 +75,7 @@ def without(recording, *names):
     return Recording(recording.source, recording.time, columns, recording.heads)
 
 
-def problem_of(*recordings, empty=(), sought=SOUGHT):
+def problem_of(*recordings, empty=(), sought=SOUGHT, **machine):
     measured = [name for name in recordings[0].columns if name != "mark"]
     known = {"machine.left.processing_force": 0.0, "machine.right.processing_force": 0.0}
     none = dict.fromkeys((name for name in TRUTH if "material" in name), 0.0)
@@ -81,7 +83,7 @@ def problem_of(*recordings, empty=(), sought=SOUGHT):
         RecordedRun(f"run{k}", each, SPEED, known | {"motor.w_ref": 150.0} | (none if k in empty else {}))
         for k, each in enumerate(recordings)
     ]
-    plant = Plant(drive_of(), measured, [u.name for u in sought])
+    plant = Plant(drive_of(**machine), measured, [u.name for u in sought])
     return Problem(plant, runs, sought, SENSORS)
 
 
@@ -147,16 +149,37 @@ def test_a_loaded_and_an_empty_run_are_identified(loaded, empty, angle):
         assert 0.02 < share < 3.0 if key[1] == "mark" else 0.85 < share < 1.15, key
 
 
-def test_a_wrong_machine_shows_in_the_residuals(loaded, empty):
-    """Of a machine with another gear no values of the unknowns make noise."""
-    problem = problem_of(*(without(each, "motor.count") for each in (loaded, empty)), empty=(1,))
-    wrong = Problem(
-        Plant(drive_of(ratio=45.0), ["motor.i", "motor.u", "motor.w"], [u.name for u in SOUGHT]),
-        [RecordedRun(run.name, run.recording, 150.0 / 45.0, run.values) for run in problem.runs],
-        SOUGHT,
-        SENSORS,
-    )
-    assert max(fit(wrong).shares.values()) > 5.0
+def test_the_residuals_tell_a_wrong_machine(loaded, empty):
+    """Of the right one they are noise of the size that is stated. A crank that is longer by 2 % leaves orders of the
+    crank in them, which noise of twice the size does not."""
+    recordings = [without(each, "motor.count") for each in (loaded, empty)]
+    problem = problem_of(*recordings, empty=(1,))
+    right = check_residuals(problem, fit(problem))
+    assert [(each.run, each.column) for each in right] == [
+        (f"run{k}", name) for k in (0, 1) for name in ("motor.i", "motor.u", "motor.w")
+    ]
+    assert all(each.is_noise and 0.9 < each.noise < 1.1 for each in right)
+    loud = Problem(problem.plant, problem.runs, SOUGHT, {**SENSORS, "motor.w": Sensor(noise=0.005)})
+    (own, *_) = [each for each in check_residuals(loud, fit(loud)) if each.column == "motor.w"]
+    assert own.is_noise and 1.8 < own.noise < 2.2
+    wrong = problem_of(*recordings, empty=(1,), r=0.153)
+    worst = max(check_residuals(wrong, fit(wrong)), key=lambda each: each.statistic)
+    assert worst.column == "motor.i" and worst.statistic > 2.0 * worst.limit and not worst.is_noise
+
+
+def test_the_statistic_of_noise_is_that_of_its_distribution():
+    """Its mean is the number of waves, and it exceeds its limit as seldom as is stated; an order of known size is
+    found in the unit of the column."""
+    rng, angle = np.random.default_rng(7), np.linspace(0.0, 60.0, 1500)
+    found = [
+        residuals.check(Comparison("run", "motor.i", rng.standard_normal(1500), None, (), angle, 0.2), 63.7)
+        for _ in range(300)
+    ]
+    assert np.mean([each.statistic for each in found]) == pytest.approx(40.0, abs=2.0)
+    assert np.mean([each.is_noise for each in found]) > 0.97  # the limit is that of 1 %
+    wave = rng.standard_normal(1500) + 0.9 * np.cos(3.0 * angle + 0.4)
+    own = residuals.check(Comparison("run", "motor.i", wave, None, (), angle, 0.2), 63.7)
+    assert own.orders[0] == (3, pytest.approx(0.18, abs=0.02)) and not own.is_noise
 
 
 def test_what_is_known_beforehand_counts(loaded):

@@ -80,13 +80,16 @@ class RecordedRun:
 @dataclass(frozen=True)
 class Comparison:
     """Residuals of a column of a run, in standard deviations, shape (n,), and the derivatives of the simulated column
-    by the unknowns at the `places`, shape (n, places)."""
+    by the unknowns at the `places`, shape (n, places). `angle` is the simulated crank angle at the rows [rad], shape
+    (n,), and `size` the standard deviation in the unit of the column."""
 
     run: str
     column: str
     residuals: Any
     slopes: Any
     places: Sequence[int]
+    angle: Any
+    size: float
 
 
 class Problem:
@@ -249,6 +252,7 @@ class Problem:
             ]
             return course(at), np.stack(slopes, axis=1), course(at, 1)
 
+        angle = np.interp(time, response.time, response.values[CRANK])
         for name, y in recording.columns.items():
             if name == "mark":
                 passed = mark_times(recording)
@@ -259,7 +263,7 @@ class Problem:
                 size = speed_of(run) * recording.step / math.sqrt(12.0)
                 off = (x - value["mark.angle"] + math.pi) % (2.0 * math.pi) - math.pi
                 more = {drift: rate * sooner, "mark.angle": -np.ones(len(x))}
-                yield self._comparison(run, name, -off / size, slopes / size, names, more, size)
+                yield self._comparison(run, name, -off / size, slopes / size, names, more, x, size)
                 continue
             x, slopes, rate = sampled(name, time)
             more = {drift: rate * since} if drift in self.place else {}
@@ -284,16 +288,16 @@ class Problem:
                 if offset in self.place:
                     more[offset] = np.ones(len(x))
                     x = x + value[offset]
-            yield self._comparison(run, name, (y - x) / size, slopes / size, names, more, size)
+            yield self._comparison(run, name, (y - x) / size, slopes / size, names, more, angle, size)
 
     def _comparison(
         self, run: RecordedRun, column: str, residuals: Any, slopes: Any, names: Sequence[str],
-        more: Mapping[str, Any], size: float,
+        more: Mapping[str, Any], angle: Any, size: float,
     ) -> Comparison:  # fmt: skip
         """The residuals with the derivatives by all unknowns."""
         columns = [slopes, *(np.reshape(x, (-1, 1)) / size for x in more.values())]
         places = [self.place[name] for name in (*names, *more)]
-        return Comparison(run.name, column, residuals, np.hstack(columns), places)
+        return Comparison(run.name, column, residuals, np.hstack(columns), places, angle, size)
 
 
 def _nuisance(name: str, unit: str, start: float, spread: float) -> Unknown:

@@ -1,0 +1,71 @@
+"""Whether the residuals of a fit are noise. A wrong model leaves orders of the crank in them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2
+
+from .fit import Normal
+from .measurands import MEASURANDS
+from .problem import Comparison, Problem
+
+ORDERS = 20
+"""Highest order of the crank that is looked at."""
+FALSE_ALARMS = 0.01
+"""Share of right models of which some column is taken for wrong."""
+
+
+@dataclass(frozen=True)
+class ResidualCheck:
+    """The residuals of a column of a run.
+
+    `statistic` is the sum of the squares of the cosine and sine parts of all orders, in standard deviations of noise
+    of the same size; noise exceeds `limit` in the permitted share of fits. `orders` are the three largest orders with
+    their amplitudes in the unit of the column. `noise` is the standard deviation of the rest, in parts of what is
+    stated for the sensor.
+    """
+
+    run: str
+    column: str
+    statistic: float
+    limit: float
+    orders: tuple[tuple[int, float], ...]
+    noise: float
+
+    @property
+    def is_noise(self) -> bool:
+        """Whether the residuals may be noise."""
+        return self.statistic <= self.limit
+
+
+def check_residuals(problem: Problem, best: Normal, workers: int = 2) -> list[ResidualCheck]:
+    """The checks of all analog columns at the values of a fit."""
+    columns = [each for each in problem.comparisons(best.z, workers) if MEASURANDS[each.column].analog]
+    limit = float(chi2.ppf((1.0 - FALSE_ALARMS) ** (1.0 / max(1, len(columns))), 2 * ORDERS))
+    return [check(each, limit) for each in columns]
+
+
+def check(of: Comparison, limit: float) -> ResidualCheck:
+    """The check of one column, with this limit of the statistic."""
+    waves = np.stack(list(_waves(of.angle)), axis=1)
+    parts, *_ = np.linalg.lstsq(waves, of.residuals, rcond=None)
+    rest = of.residuals - waves @ parts
+    noise = float(np.sqrt(np.sum(rest**2) / (len(rest) - waves.shape[1])))
+    # the constant part is that of an offset
+    covariance = np.linalg.inv(waves.T @ waves)[1:, 1:]
+    statistic = float(parts[1:] @ np.linalg.solve(covariance, parts[1:])) / noise**2
+    sizes = np.hypot(parts[1::2], parts[2::2]) * of.size
+    largest = np.argsort(-sizes)[:3]
+    orders = tuple((int(k) + 1, float(sizes[k])) for k in largest)
+    return ResidualCheck(of.run, of.column, statistic, limit, orders, noise)
+
+
+def _waves(angle: Any) -> Iterator[Any]:
+    yield np.ones(len(angle))
+    for order in range(1, ORDERS + 1):
+        yield np.cos(order * angle)
+        yield np.sin(order * angle)
