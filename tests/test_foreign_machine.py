@@ -311,7 +311,7 @@ def test_the_least_that_it_needs(left_out, folder, tmp_path):
         assert getattr(study.answers["steady"], name) == pytest.approx(getattr(whole, name), rel=2e-2), name
 
 
-@pytest.mark.parametrize("place", ["motor", "crank"])
+@pytest.mark.parametrize("place", [pytest.param("motor", marks=pytest.mark.slow), "crank"])
 def test_a_cardan_line_before_it(place, folder):
     """Line and gear are parts of the system; its twin with a rigid shaft is there, too."""
     sizes = {"motor": "J4 = 0.02\nc2 = 300\nc3 = 300", "crank": 'J4 = 2\nalpha1 = "10 deg"'}[place]

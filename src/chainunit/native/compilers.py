@@ -114,7 +114,7 @@ def for_this_processor(compiler: Compiler) -> tuple[tuple[str, ...], tuple[str, 
     The code has vectors and may contract products and sums; it does not reorder sums, and NaN and infinity keep their
     meaning.
     """
-    flags: tuple[str, ...] = ("-std=gnu11", "-O3", "-march=native", "-fPIC", "-shared", "-w")
+    flags: tuple[str, ...] = ("-std=gnu11", "-O2", "-march=native", "-fPIC", "-shared", "-w")
     flags += ("-fno-math-errno", "-fno-trapping-math", "-ffp-contract=fast", "-fno-semantic-interposition")
     macros = subprocess.run(
         [*compiler.command, "-march=native", "-dM", "-E", "-x", "c", os.devnull], capture_output=True
