@@ -154,16 +154,16 @@ def test_the_residuals_tell_a_wrong_machine(loaded, empty):
     crank in them, which noise of twice the size does not."""
     recordings = [without(each, "motor.count") for each in (loaded, empty)]
     problem = problem_of(*recordings, empty=(1,))
-    right = check_residuals(problem, fit(problem))
+    right = check_residuals(fit(problem))
     assert [(each.run, each.column) for each in right] == [
         (f"run{k}", name) for k in (0, 1) for name in ("motor.i", "motor.u", "motor.w")
     ]
     assert all(each.is_noise and 0.9 < each.noise < 1.1 for each in right)
     loud = Problem(problem.plant, problem.runs, SOUGHT, {**SENSORS, "motor.w": Sensor(noise=0.005)})
-    (own, *_) = [each for each in check_residuals(loud, fit(loud)) if each.column == "motor.w"]
+    (own, *_) = [each for each in check_residuals(fit(loud)) if each.column == "motor.w"]
     assert own.is_noise and 1.8 < own.noise < 2.2
     wrong = problem_of(*recordings, empty=(1,), r=0.153)
-    worst = max(check_residuals(wrong, fit(wrong)), key=lambda each: each.statistic)
+    worst = max(check_residuals(fit(wrong)), key=lambda each: each.statistic)
     assert worst.column == "motor.i" and worst.statistic > 2.0 * worst.limit and not worst.is_noise
 
 
@@ -217,12 +217,12 @@ def test_what_runs_cannot_tell_is_named(loaded, empty):
     told = {each.name: each for each in one.outlooks}
     assert not told["machine.left.web_mass"].is_told and told["machine.left.web_mass"].by_runs > 500.0
     assert told["machine.right.material_mass"].is_told
-    assert {each.with_known <= each.spread for each in one.outlooks} == {True}
+    assert {each.by_both <= each.spread for each in one.outlooks} == {True}
     best = one.proposals[0]
     assert best.words == "empty" and best.factor > max(each.factor for each in one.proposals[1:]) > 1.0
     both = information(problem_of(*recordings, empty=(1,), sought=WITH_MASSES), propose=False)
     assert both.blind == () and both.proposals == ()
-    factors = [a.with_known / b.with_known for a, b in zip(one.outlooks, both.outlooks, strict=True)]
+    factors = [a.by_both / b.by_both for a, b in zip(one.outlooks, both.outlooks, strict=True)]
     # the proposal was simulated from the start values, without noise
     assert np.exp(np.mean(np.log(factors))) == pytest.approx(best.factor, rel=0.1)
 
@@ -249,5 +249,5 @@ def test_a_combination_has_the_deviation_that_is_stated(loaded):
 def test_the_expected_deviations_are_those_of_the_fit(loaded, empty):
     problem = problem_of(*(without(each, "motor.count") for each in (loaded, empty)), empty=(1,))
     best = fit(problem)
-    expected = [each.with_known for each in information(problem, best.z, propose=False).outlooks]
+    expected = [each.by_both for each in information(problem, best.z, propose=False).outlooks]
     np.testing.assert_allclose(expected, best.deviations[: len(SOUGHT)], rtol=1e-6)

@@ -408,10 +408,31 @@ def file_text(file: Path) -> str:
     InputError
         in one line that begins with the name of the file.
     """
+    return decoded(file, file_bytes(file))
+
+
+def file_bytes(file: Path) -> bytes:
+    """The content of a file.
+
+    Raises
+    ------
+    InputError
+        in one line that begins with the name of the file.
+    """
     try:
-        data = file.read_bytes()
+        return file.read_bytes()
     except OSError as error:
         raise InputError(f"{file}: cannot be read ({error.strerror or error})") from error
+
+
+def decoded(file: Path, data: bytes) -> str:
+    """The text in the content of a file, see `file_text`.
+
+    Raises
+    ------
+    InputError
+        in one line that begins with the name of the file.
+    """
     for begin, kind in _OTHER_KINDS.items():
         if data.startswith(begin):
             raise InputError(f"{file}: is {kind}; must be a text file")

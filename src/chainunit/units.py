@@ -195,6 +195,12 @@ def convert(number: float, unit_text: str, unit: str, kind: str = "") -> float:
         raise ValueError(f"{unit_text}: is no unit of {unit}") from error
 
 
+def scale(unit_text: str, unit: str, kind: str = "") -> tuple[float, float]:
+    """Factor and offset from the unit `unit_text` to the declared `unit`; the errors are those of `convert`."""
+    offset = convert(0.0, unit_text, unit, kind)
+    return convert(1.0, unit_text, unit, kind) - offset, offset
+
+
 def probable_text(text: str, unit: str, kind: str = "") -> str:
     """The text that the user probably meant, for a quantity of this `unit` and `kind`: with a point in place
     of a comma, or with the right case of letters. Empty where there is none; two texts where a comma may be
@@ -326,7 +332,7 @@ def shortest_text(value: float, unit: str, kind: str = "") -> str:
     for name in fitting(unit, kind):
         if name in _RARE and name != unit:
             continue
-        factor = convert(1.0, name, unit, kind) - (zero := convert(0.0, name, unit, kind))
+        factor, zero = scale(name, unit, kind)
         number = f"{(value - zero) / factor:.12g}"
         if abs(convert(float(number), name, unit, kind) - value) <= 1e-12 * abs(value):
             texts.append(f'"{number} {name}"')

@@ -12,6 +12,11 @@ def peak(x: Any) -> float:
     return float(np.max(np.abs(x)))
 
 
+def rms(x: Any) -> float:
+    """Root of the mean square of an array."""
+    return float(np.sqrt(np.mean(np.square(x))))
+
+
 def stretches(inside: Any) -> list[tuple[int, int]]:
     """Begin and end, as of a slice, of each stretch of true values in an array of shape (n,)."""
     edge = np.diff(np.concatenate([[False], inside, [False]]).astype(int))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +12,7 @@ from ..machines.linkages.model import LinkageDescription
 from ..machines.linkages.structure import CYLINDER
 from ..machines.machine import Machine
 from ..quantities import Value, declaration, quantity
+from .arrays import rms
 
 PLACES = 361
 
@@ -125,4 +125,4 @@ def linkage_findings(machine: Machine, speed: float) -> LinkageFindings:
 
 def _rms(x: Any) -> float:
     """Over the way of the driver; its two ends count as one."""
-    return math.sqrt(float(np.mean(np.square(x[:-1]))))
+    return rms(x[:-1])

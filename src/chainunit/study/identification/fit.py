@@ -1,16 +1,17 @@
-"""Joint fit of all runs: least squares with exact derivatives, bounds, and what is known beforehand."""
+"""Joint fit of all runs: least squares with exact derivatives, bounds and priors."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ...errors import RunError
-from .problem import OUTLIER, Problem
+from .problem import OUTLIER, Comparison, Problem
 
 MOST_ROUNDS = 80
 NEAR = 1.5
@@ -21,27 +22,36 @@ ENOUGH = 1e-2
 
 @dataclass(frozen=True)
 class Normal:
-    """The sum of squares at a point `z`, its gradient and the matrix of the normal equations: of the runs alone,
-    `fisher`, and with what is known beforehand, `matrix`. `shares` are the mean squares of the residuals by run and
-    column."""
+    """The `comparisons` at a point `z`, their sum of squares with that of the priors, its gradient, and the matrix of
+    the normal equations: of the runs alone, `fisher`, and with the priors, `matrix`."""
 
     z: Any
+    comparisons: tuple[Comparison, ...]
     cost: float
     gradient: Any
     fisher: Any
     matrix: Any
-    shares: dict[tuple[str, str], float]
+
+    @cached_property
+    def shares(self) -> dict[tuple[str, str], float]:
+        """The mean squares of the residuals by run and column."""
+        return {(each.run, each.column): float(np.mean(each.residuals**2)) for each in self.comparisons}
 
     @property
     def covariance(self) -> Any:
         """The covariance of all unknowns, shape (unknowns, unknowns)."""
-        scale = 1.0 / np.sqrt(np.diag(self.matrix))
-        return np.linalg.inv(self.matrix * np.outer(scale, scale)) * np.outer(scale, scale)
+        return inverse(self.matrix)
 
     @property
     def deviations(self) -> Any:
         """The standard deviation of each unknown, shape (unknowns,)."""
         return np.sqrt(np.diag(self.covariance))
+
+
+def inverse(matrix: Any) -> Any:
+    """The inverse of a matrix of normal equations, whose unknowns differ in size by many orders."""
+    scale = np.outer(*[1.0 / np.sqrt(np.diag(matrix))] * 2)
+    return np.linalg.inv(matrix * scale) * scale
 
 
 Scales = Mapping[tuple[str, str], float]
@@ -50,12 +60,17 @@ Scales = Mapping[tuple[str, str], float]
 
 def normal(problem: Problem, z: Any, workers: int = 2, scales: Scales | None = None) -> Normal:
     """The normal equations at these values of the unknowns. A residual that is an outlier counts less (Huber)."""
+    return _normal(problem, z, tuple(problem.comparisons(z, workers)), scales)
+
+
+def _normal(
+    problem: Problem, z: Any, comparisons: tuple[Comparison, ...], scales: Scales | None = None
+) -> Normal:
     spread = problem.spreads
     size = len(spread)
     fisher, gradient = np.zeros((size, size)), (problem.starts - z) / spread**2
-    cost, shares = float(np.sum(((z - problem.starts) / spread) ** 2)), {}
-    for each in problem.comparisons(z, workers):
-        shares[each.run, each.column] = float(np.mean(each.residuals**2))
+    cost = float(np.sum(((z - problem.starts) / spread) ** 2))
+    for each in comparisons:
         factor = 1.0 / (scales or {}).get((each.run, each.column), 1.0)
         residuals, slopes = each.residuals * factor, each.slopes * factor
         r = np.abs(residuals)
@@ -64,7 +79,7 @@ def normal(problem: Problem, z: Any, workers: int = 2, scales: Scales | None = N
         weighted, places = slopes * weight[:, None], np.array(each.places)
         fisher[np.ix_(places, places)] += slopes.T @ weighted
         gradient[places] += weighted.T @ residuals
-    return Normal(z, cost, gradient, fisher, fisher + np.diag(1.0 / spread**2), shares)
+    return Normal(z, comparisons, cost, gradient, fisher, fisher + np.diag(1.0 / spread**2))
 
 
 def fit(
@@ -81,17 +96,19 @@ def fit(
     RunError
         where the fit does not end in `MOST_ROUNDS` rounds.
     """
-    nuisances = np.array([u.is_nuisance for u in problem.unknowns])
+    nuisances, all_unknowns = (
+        np.array([u.is_nuisance or x for u in problem.unknowns]) for x in (False, True)
+    )
     best = normal(problem, problem.started(workers) if z is None else z, workers)
     rounds = _Rounds(problem, workers, report)
-    for free in (nuisances, np.ones(len(nuisances), bool)):
+    for free in (nuisances, all_unknowns):
         best = rounds.down(best, free, _scales(best), 0.02)
     while max((scales := _scales(best)).values()) > NEAR:
         before = best.shares
-        best = rounds.down(best, np.ones(len(nuisances), bool), scales, 0.02)
+        best = rounds.down(best, all_unknowns, scales, 0.02)
         if all(best.shares[key] > 0.9 * share for key, share in before.items()):
             break
-    return rounds.down(best, np.ones(len(nuisances), bool), None, 0.0)
+    return rounds.down(best, all_unknowns, None, 0.0)
 
 
 def _scales(at: Normal) -> dict[tuple[str, str], float]:
@@ -107,7 +124,7 @@ class _Rounds:
     def down(self, best: Normal, free: Any, scales: Scales | None, enough: float) -> Normal:
         """The least sum of squares over the `free` unknowns, up to the share `enough` of it."""
         problem, damping, growth = self._problem, 1.0, 2.0
-        best = normal(problem, best.z, self._workers, scales)
+        best = _normal(problem, best.z, best.comparisons, scales)
         while damping < 1e12:
             if self._count == MOST_ROUNDS:
                 raise RunError(

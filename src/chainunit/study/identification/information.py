@@ -1,8 +1,8 @@
 """What runs can tell: standard deviations to expect, numbers that cannot be told apart, and runs that tell more.
 
-The matrix of Fisher's information follows from the exact sensitivities of the simulated runs; of what is measured
+The matrix of Fisher's information follows from the exact sensitivities of the simulated runs; of the measured values
 only the sizes of the noise enter. Nuisances, such as the angle of the crank, are not known. A number is *told* by the
-runs if they alone give it to less than half of what is known beforehand.
+runs if their standard deviation of it is less than half of that of its prior.
 """
 
 from __future__ import annotations
@@ -14,35 +14,34 @@ from typing import Any
 
 import numpy as np
 
-from .fit import normal
+from .fit import inverse, normal
 from .plant import CRANK
 from .problem import Problem, RecordedRun
 from .recording import Recording
 
 TOLD = 0.5
-"""Standard deviation by the runs alone, in parts of what is known beforehand, below which they tell a number."""
+"""Standard deviation by the runs alone, in parts of that of the prior, below which they tell a number."""
 SHARP = 0.1
 """The same of a combination that is worth naming."""
 MOST_TERMS = 4
 WEAK = 1e3
-"""Standard deviation of the sought numbers where nothing is known beforehand, in parts of what is: it makes a
-singular matrix regular."""
+"""Standard deviation that stands for no prior, in parts of that of the prior: it makes a singular matrix regular."""
 BLIND, PART = 1e-4, 0.05
-"""Information on a direction, in parts of what is known beforehand, below which the runs are blind for it, and the
-least part of a number in it that is named."""
+"""Information on a direction, in parts of that of the prior, below which the runs are blind for it, and the least
+part of a number in it that is named."""
 ADDED = 15.0
 """Mass to add to a part in a run that is proposed [kg]."""
 
 
 @dataclass(frozen=True)
 class Outlook:
-    """A sought number: its standard deviation by the runs alone, and with what is known beforehand."""
+    """A sought number: its standard deviation by the prior (`spread`), by the runs alone, and by both."""
 
     name: str
     unit: str
     spread: float
     by_runs: float
-    with_known: float
+    by_both: float
 
     @property
     def is_told(self) -> bool:
@@ -102,21 +101,19 @@ def information(problem: Problem, z: Any = None, workers: int = 2, propose: bool
     return Information(outlooks, told, _blind(problem, fisher), tuple(proposals))
 
 
-def _covariance(problem: Problem, fisher: Any, known: float) -> Any:
-    """The covariance of the sought numbers, if `known` times their spread is known of them beforehand."""
+def _covariance(problem: Problem, fisher: Any, wider: float) -> Any:
+    """The covariance of the sought numbers with priors that are `wider` by this factor."""
     count = len(problem.sought)
     spread = problem.spreads.copy()
-    spread[:count] *= known
-    matrix = fisher + np.diag(1.0 / spread**2)
-    scale = 1.0 / np.sqrt(np.diag(matrix))
-    return (np.linalg.inv(matrix * np.outer(scale, scale)) * np.outer(scale, scale))[:count, :count]
+    spread[:count] *= wider
+    return inverse(fisher + np.diag(1.0 / spread**2))[:count, :count]
 
 
 def _outlooks(problem: Problem, fisher: Any) -> tuple[Outlook, ...]:
-    alone, known = (np.sqrt(np.diag(_covariance(problem, fisher, x))) for x in (WEAK, 1.0))
+    alone, both = (np.sqrt(np.diag(_covariance(problem, fisher, x))) for x in (WEAK, 1.0))
     return tuple(
         Outlook(u.name, u.unit, u.spread, float(a), float(k))
-        for u, a, k in zip(problem.sought, alone, known, strict=True)
+        for u, a, k in zip(problem.sought, alone, both, strict=True)
     )
 
 
@@ -197,9 +194,7 @@ def _proposals(
             places = [more.place[name] for name in part.place]
             total[np.ix_(places, places)] += matrix
         then = _outlooks(more, total)
-        factor = np.exp(
-            np.mean([math.log(a.with_known / b.with_known) for a, b in zip(now, then, strict=True)])
-        )
+        factor = np.exp(np.mean([math.log(a.by_both / b.by_both) for a, b in zip(now, then, strict=True)]))
         ranked.append(Proposal(words, float(factor), sum(each.is_told for each in then)))
     yield from sorted(ranked, key=lambda each: -each.factor)
 

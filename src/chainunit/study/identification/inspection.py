@@ -11,6 +11,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...refusals import unit_behind
+from ..arrays import rms, stretches
 from .measurands import MEASURANDS
 from .recording import Recording
 
@@ -58,7 +59,7 @@ def inspect(
     stands = _stands(recording, crank_speed, ratio)
     if stands:
         return [*faults, *stands]
-    sizes = {name: _rms(x) for name, x in recording.columns.items()}
+    sizes = {name: rms(x) for name, x in recording.columns.items()}
     swapped = _swapped(sizes, expected)
     if swapped:
         first, second = swapped
@@ -175,12 +176,13 @@ def _swapped(sizes: Mapping[str, float], expected: Mapping[str, Expectation]) ->
     return None
 
 
+def _longest(stretched: list[tuple[int, int]]) -> tuple[int, int]:
+    return max(stretched, key=lambda ends: ends[1] - ends[0], default=(0, 0))
+
+
 def _longest_constant(time: Any, x: Any) -> tuple[int, int] | None:
     """First and last row of the longest part in which the column keeps its value, if that is too long."""
-    changes = np.flatnonzero(np.diff(x) != 0.0)
-    begins, ends = np.append(0, changes + 1), np.append(changes, len(x) - 1)
-    k = int(np.argmax(ends - begins))
-    begin, end = int(begins[k]), int(ends[k])
+    begin, end = _longest(stretches(np.diff(x) == 0.0))
     return (begin, end) if end - begin >= _ROWS_STUCK and time[end] - time[begin] >= STUCK else None
 
 
@@ -188,16 +190,10 @@ def _extremes(x: Any) -> tuple[str, float, int]:
     """Which extreme value more rows have, their share, and the length of the longest series of them."""
     found = []
     for name, value in (("largest", x.max()), ("least", x.min())):
-        at = np.append(np.append(0, x == value), 0)
-        ends = np.flatnonzero(np.diff(at))
-        longest = int(np.max(ends[1::2] - ends[::2]))
-        found.append((float(np.mean(x == value)), longest, name))
+        begin, end = _longest(stretches(x == value))
+        found.append((float(np.mean(x == value)), end - begin, name))
     share, longest, name = max(found)
     return name, share, longest
-
-
-def _rms(x: Any) -> float:
-    return float(np.sqrt(np.mean(np.square(x))))
 
 
 def _size(name: str, x: float) -> str:

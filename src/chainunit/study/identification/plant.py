@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...batch.transients import Transients
-from ...errors import InputError, RunError
+from ...errors import InputError
 from ...system.compiled_simulation import LONGEST, CompiledSystem
 from ..drive import Drive
 from .measurands import COUNTS
@@ -73,15 +73,11 @@ class Plant:
         self._by = tuple(by)
         outputs = ["motor.phi", *dict.fromkeys(output for output, _ in self._sources.values())]
         self._rows = {name: k for k, name in enumerate(dict.fromkeys(outputs))}
-        self._loop = Transients(self.system.model, list(self._rows), by=self._by or self._any())
+        self._loop = Transients(self.system.model, list(self._rows), by=self._by)
         layout = self.system.model.state_layout
         assert layout is not None
         self._angle = layout.names.index("motor.phi")
         self._temperature = layout.names.index(f"motor.{drive.motor.temperature}")
-
-    def _any(self) -> tuple[str, ...]:
-        """Some parameter, for a loop that has directions of the start alone."""
-        return self.system.model.parameter_layout.names[:1]
 
     def _source(self, drive: Drive, name: str) -> tuple[str, float]:
         """The output of the system that is measured, and its factor."""
@@ -119,18 +115,15 @@ class Plant:
         """
         system, count = self.system, max(1, len(directions))
         layout = system.model.parameter_layout
-        known = set(layout.names)
-        p = system.model.check(
-            layout.from_names({k: x for k, x in course.values.items() if k in known}, system.p)
-        )
-        inputs = system.inputs | {k: x for k, x in course.values.items() if k not in known}
+        own = {name: x for name, x in course.values.items() if name in layout.names}
+        inputs = system.inputs | {name: x for name, x in course.values.items() if name not in own}
         speed = course.crank_speed * self.ratio
         start = {"motor.phi_start": course.angle * self.ratio - speed * LEAD, "motor.w_start": speed}
-        x = system.start(inputs, {k: v for k, v in course.values.items() if k in known} | start)
+        x = system.start(inputs, own | start)
         x[self._temperature] = course.temperature
         states = np.zeros((2 * len(x), count))
         states[: len(x)] = x[:, None]
-        changes = np.zeros((len(self._by) or 1, count))
+        changes = np.zeros((len(self._by), count))
         for k, (name, size) in enumerate(directions.values()):
             if name == ANGLE:
                 states[len(x) + self._angle, k] = size * self.ratio
@@ -139,7 +132,7 @@ class Plant:
             else:
                 changes[self._by.index(name), k] = size
         result = self._loop.run(
-            p,
+            system.model.check(layout.from_names(own, system.p)),
             inputs,
             states,
             begin=course.begin - LEAD,
@@ -149,10 +142,9 @@ class Plant:
             longest=LONGEST * course.step,
             workers=workers,
         )
-        if result.failed.any():
-            raise RunError(
-                f"at t = {float(np.min(result.times[0, result.count - 1])):g} s: the states left all bounds"
-            )
+        failures = filter(None, map(result.failure, range(count)))
+        if (failure := next(failures, None)) is not None:
+            raise failure
         first = int(np.searchsorted(result.times[0], course.begin - course.step))
         return Response(
             result.times[0, first:],

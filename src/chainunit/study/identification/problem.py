@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from ..arrays import rms
 from .measurands import MEASURANDS
 from .plant import ANGLE, CRANK, TEMPERATURE, Course, Plant, Response
 from .recording import Recording
@@ -33,8 +34,8 @@ _CHANGE = 0.2
 
 @dataclass(frozen=True)
 class Unknown:
-    """A number that is sought: its start value, its bounds, and the standard deviation `spread` of the start value
-    that is known beforehand. Bounds alone have the standard deviation of an even distribution."""
+    """A number that is sought: its start value, its bounds, and its prior, the start value with the standard
+    deviation `spread`. Bounds alone have the standard deviation of an even distribution."""
 
     name: str
     unit: str
@@ -126,7 +127,7 @@ class Problem:
 
     @property
     def spreads(self) -> Any:
-        """The standard deviations that are known beforehand, shape (unknowns,)."""
+        """The standard deviations of the priors, shape (unknowns,)."""
         return np.array([u.spread for u in self.unknowns])
 
     @cached_property
@@ -171,26 +172,25 @@ class Problem:
         z = self.starts
         for run in self.runs:
             if not len(mark_times(run.recording)):
-                place = self.place[f"{run.name}.angle"]
+                turns = TURNS * 2.0 * math.pi / run.crank_speed
+                end = float(run.recording.time[0]) + turns
+                first, value = replace(run, recording=run.recording.part(end=end)), self._values(z)
                 angles = np.arange(ANGLES) * (2.0 * math.pi / ANGLES)
-                z[place] = max(angles, key=lambda angle: self._likeness(run, z, place, angle, workers))
+                name = f"{run.name}.angle"
+                z[self.place[name]] = max(
+                    angles,
+                    key=lambda angle: self._likeness(first, value | {name: angle}, workers),
+                )
         return z
 
-    def _likeness(self, run: RecordedRun, z: Any, place: int, angle: float, workers: int) -> float:
-        """The sum of the correlations of measured and simulated columns over some turns."""
-        z = z.copy()
-        z[place] = angle
-        turns = TURNS * 2.0 * math.pi / run.crank_speed
-        first = replace(run, recording=run.recording.part(end=float(run.recording.time[0]) + turns))
-        response = self.plant.respond(self._course(first, self._values(z)), {}, workers)
-        columns = (name for name in first.recording.columns if MEASURANDS[name].analog)
+    def _likeness(self, run: RecordedRun, value: Mapping[str, float], workers: int) -> float:
+        """The sum of the correlations of measured and simulated columns."""
+        response = self.plant.respond(self._course(run, value), {}, workers)
         total = 0.0
-        for name in columns:
-            y, x = (
-                first.recording.columns[name],
-                np.interp(first.recording.time, response.time, response.values[name]),
-            )
-            total += float(np.corrcoef(y, x)[0, 1]) if np.ptp(y) and np.ptp(x) else 0.0
+        for name, y in run.recording.columns.items():
+            if MEASURANDS[name].analog and np.ptp(y):
+                x = np.interp(run.recording.time, response.time, response.values[name])
+                total += float(np.corrcoef(y, x)[0, 1]) if np.ptp(x) else 0.0
         return total
 
     def comparisons(self, z: Any, workers: int = 2) -> Iterator[Comparison]:
@@ -278,9 +278,7 @@ class Problem:
                     x = x + value[f"{run.name}.count.{k}"] * part**k
             else:
                 sensor, gain, offset = self.sensors[name], f"gain({name})", f"{run.name}.offset({name})"
-                size = math.hypot(
-                    sensor.noise * float(np.sqrt(np.mean(np.square(y)))), sensor.resolution / math.sqrt(12.0)
-                )
+                size = math.hypot(sensor.noise * rms(y), sensor.resolution / math.sqrt(12.0))
                 if gain in self.place:
                     more[gain] = x
                     x, slopes = x * value[gain], slopes * value[gain]

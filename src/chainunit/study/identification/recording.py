@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import math
+import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from ...errors import Faults, InputError, meant, near_name, printable
-from ...units import convert
+from ...reading import decoded, file_bytes
+from ...units import scale
 from .measurands import MEASURANDS, Measurand
 
 FEWEST = 100
@@ -75,20 +77,15 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
     if len(lines) < 1 + FEWEST:
         raise InputError(f"{file}: has {max(0, len(lines) - 1)} rows behind its head; must have >= {FEWEST}")
     mark = ";" if lines[0].count(";") > lines[0].count(",") else ","
-    heads = [head.strip().strip('"').lstrip("\ufeff") for head in lines[0].split(mark)]
+    heads = [head.strip().strip('"') for head in lines[0].split(mark)]
     faults, units = Faults(), dict[str, tuple[int, float, float]]()
     known = dict(_places(file, heads, names or {}, faults))
     for name, (place, unit) in known.items():
         with faults.collected():
             units[name] = (place, *_scale(file, heads[place], MEASURANDS[name], unit))
     if "time" not in known:
-        faults.add(
-            [
-                InputError(
-                    f"{file}: has no column time [s]{meant('time', heads)} its heads are: {', '.join(heads)}"
-                )
-            ]
-        )
+        words = f"{meant('time', heads)} its heads are: {', '.join(heads)}"
+        faults.add([InputError(f"{file}: has no column time [s]{words}")])
     if not known.keys() - {"time"}:
         words = ", ".join(f"{each.name} [{each.unit}]" for each in MEASURANDS.values() if each.name != "time")
         faults.add([InputError(f"{file}: has no column of a known quantity, such as {words}")])
@@ -107,13 +104,13 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
 
 
 def _text(file: Path) -> str:
-    try:
-        content = file.read_bytes()
-        return (gzip.decompress(content) if file.suffix == ".gz" else content).decode("utf-8")
-    except (OSError, EOFError) as error:
-        raise InputError(f"{file}: cannot be read: {printable(str(error))}") from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{file}: is no text in UTF-8; save the recording as CSV") from error
+    content = file_bytes(file)
+    if file.suffix == ".gz":
+        try:
+            content = gzip.decompress(content)
+        except (OSError, EOFError, zlib.error) as error:
+            raise InputError(f"{file}: cannot be unpacked ({printable(str(error))})") from error
+    return decoded(file, content)
 
 
 def _places(
@@ -146,8 +143,7 @@ def _scale(file: Path, head: str, quantity: Measurand, unit: str) -> tuple[float
             f"{file}, column {head}: has no unit; write [{quantity.unit}] behind its name, or its own unit"
         )
     try:
-        offset = convert(0.0, unit, quantity.unit)
-        return convert(1.0, unit, quantity.unit) - offset, offset
+        return scale(unit, quantity.unit)
     except ValueError as error:
         raise InputError(
             f"{file}, column {head}: must have a unit like [{quantity.unit}]: {error}"

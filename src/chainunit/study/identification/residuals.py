@@ -11,7 +11,7 @@ from scipy.stats import chi2
 
 from .fit import Normal
 from .measurands import MEASURANDS
-from .problem import Comparison, Problem
+from .problem import Comparison
 
 ORDERS = 20
 """Highest order of the crank that is looked at."""
@@ -25,8 +25,8 @@ class ResidualCheck:
 
     `statistic` is the sum of the squares of the cosine and sine parts of all orders, in standard deviations of noise
     of the same size; noise exceeds `limit` in the permitted share of fits. `orders` are the three largest orders with
-    their amplitudes in the unit of the column. `noise` is the standard deviation of the rest, in parts of what is
-    stated for the sensor.
+    their amplitudes in the unit of the column. `noise` is the standard deviation of the rest, in parts of the
+    stated noise of the sensor.
     """
 
     run: str
@@ -42,9 +42,9 @@ class ResidualCheck:
         return self.statistic <= self.limit
 
 
-def check_residuals(problem: Problem, best: Normal, workers: int = 2) -> list[ResidualCheck]:
-    """The checks of all analog columns at the values of a fit."""
-    columns = [each for each in problem.comparisons(best.z, workers) if MEASURANDS[each.column].analog]
+def check_residuals(best: Normal) -> list[ResidualCheck]:
+    """The checks of all analog columns of a fit."""
+    columns = [each for each in best.comparisons if MEASURANDS[each.column].analog]
     limit = float(chi2.ppf((1.0 - FALSE_ALARMS) ** (1.0 / max(1, len(columns))), 2 * ORDERS))
     return [check(each, limit) for each in columns]
 
