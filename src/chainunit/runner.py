@@ -309,6 +309,13 @@ def _connected(scheduler: str) -> Iterator[Any]:
         yield client
 
 
+def _not_dask(address: str) -> InputError:
+    return InputError(
+        f"scheduler {address}: answers, but is no Dask scheduler; give the address that it prints, such as "
+        "tcp://10.0.0.5:8786"
+    )
+
+
 def _ask(scheduler: str) -> None:
     """Ask a scheduler for its workers. A client that cannot connect would go on trying in the background."""
     import distributed
@@ -328,19 +335,14 @@ def _ask(scheduler: str) -> None:
     except Exception as error:
         if not isinstance(error, OSError | TimeoutError | ValueError):
             # bytes that are no message of Dask: the length of a message is then any number
-            raise InputError(
-                f"scheduler {address}: answers, but is no Dask scheduler; give the address that it prints, such as "
-                "tcp://10.0.0.5:8786"
-            ) from error
+            raise _not_dask(address) from error
         words = f"within {PATIENCE:g} s" if isinstance(error, TimeoutError) else f"({_reason(error)})"
         raise InputError(
             f'scheduler {address}: does not answer {words}; start it by "dask scheduler", and give the address that '
             "it prints, such as tcp://10.0.0.5:8786"
         ) from error
     if answer.get("type") != "Scheduler":
-        raise InputError(
-            f"scheduler {address}: answers, but is no Dask scheduler; give the address that it prints"
-        )
+        raise _not_dask(address)
     if not answer.get("workers"):
         raise InputError(f'scheduler {address}: has no workers; start them by "dask worker {address}"')
 

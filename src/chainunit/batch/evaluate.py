@@ -16,7 +16,7 @@ from ..errors import InputError, RunError
 from ..model import Model
 from ..native.operations import ARGUMENT
 from ..quantities import Variable
-from ..units import convert
+from ..units import scale
 from . import arrays
 from .equations import Equations, Result, equations, find, names_of, outputs_of
 from .native import Reductions, aligned, native_kernel
@@ -189,7 +189,7 @@ class Grid:
         columns = self._columns(reductions)
         if earlier is None:
             return Memory(aligned((len(columns), *shape)), np.zeros(shape, np.int16))
-        dims = self.dims[:-1] if reductions else self.dims
+        dims = self._dims(reductions)
         results = []
         for name in (*(each.name for each in columns), "reason"):
             x = earlier.variables.get(name)
@@ -281,6 +281,10 @@ class Grid:
             *(f"{name}: must be {bounds[name]}" for name, _ in self._bounds),
         ]
 
+    def _dims(self, reductions: Reductions) -> list[str]:
+        """The dimensions of the results."""
+        return self.dims[:-1] if reductions else self.dims
+
     def _columns(self, reductions: Reductions) -> Sequence[Result]:
         """Name, unit and description of each column."""
         results = self._equations.results
@@ -297,7 +301,7 @@ class Grid:
 
     def dataset(self, memory: Memory, reductions: Reductions) -> xr.Dataset:
         """The results with names, units and coordinates."""
-        dims = self.dims[:-1] if reductions else self.dims
+        dims = self._dims(reductions)
         shape = [self.sizes[d] for d in dims]
         variables = {
             each.name: (dims, x.reshape(shape), {"units": each.unit, "long_name": each.description})
@@ -317,11 +321,10 @@ def _array(variable: Variable, x: Any) -> xr.DataArray:
         if unit is None or unit == variable.unit:
             return x
         try:
-            offset = convert(0.0, str(unit), variable.unit, variable.kind)
-            scale = convert(1.0, str(unit), variable.unit, variable.kind) - offset
+            factor, offset = scale(str(unit), variable.unit, variable.kind)
         except ValueError as error:
             raise InputError(f"{variable.name} in {unit}: {error}") from error
-        return x * scale + offset
+        return x * factor + offset
     values = np.asarray(x, float)
     if values.ndim > 1:
         raise InputError(f"{variable.name}: has {values.ndim} dimensions; give them names, in a DataArray")

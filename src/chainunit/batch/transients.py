@@ -26,7 +26,7 @@ from scipy.integrate import RK45
 
 from .. import integrate
 from ..engines import MATH, casadi_
-from ..errors import InputError
+from ..errors import InputError, RunError
 from ..model import Model
 from ..native.code import constant
 from ..native.compilers import Compiler, compiler
@@ -89,6 +89,16 @@ class Runs:
     failed: Any
     states: Any
     times: Any
+
+    def end(self, run: int) -> float:
+        """The time of the last row of a run [s]."""
+        return float(self.times[run, self.count[run] - 1])
+
+    def failure(self, run: int) -> RunError | None:
+        """The error of a run that failed."""
+        return (
+            RunError(f"at t = {self.end(run):g} s: the states left all bounds") if self.failed[run] else None
+        )
 
 
 def _filled(x: Any, runs: int, *shape: int) -> Any:

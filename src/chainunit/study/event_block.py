@@ -15,7 +15,6 @@ import numpy as np
 import xarray as xr
 
 from ..batch.transients import Runs, Transients, signal_table
-from ..errors import RunError
 from ..system import monolithic
 from ..system.compiled_simulation import LONGEST, CompiledSimulation, CompiledSystem, is_evaluated
 from ..system.signals import at_time
@@ -183,18 +182,14 @@ class EventBlock:
 
     def _event_run(self, k: int, request: Request, result: Runs, lead: Runs | None) -> EventRun:
         pieces = [self._rows(k, lead)[:, :-1]] if lead is not None else []
-        n = int(result.count[k])
         table = np.concatenate([*pieces, self._rows(k, result)], axis=1)
         # without an index, which would take as long as a tenth of the run
         time = xr.Coordinates({"time": ("time", table[0])}, indexes={})
         series = xr.Dataset(
             {name: ("time", row) for name, row in zip(self.outputs, table[1:], strict=True)}, time
         )
-        end = float(result.times[k, n - 1])
-        error = None
-        if result.failed[k]:
-            error = RunError(f"at t = {end:g} s: the states left all bounds")
-        return EventRun(series, end < request.stop - 0.5 * self._rig.step, error)
+        ended = result.end(k) < request.stop - 0.5 * self._rig.step
+        return EventRun(series, ended, result.failure(k))
 
     def _rows(self, k: int, runs: Runs) -> Any:
         """Time and outputs of a run, shape (1 + outputs, rows)."""

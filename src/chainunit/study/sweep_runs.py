@@ -306,12 +306,14 @@ class _BlockWork:
         runs = self._run(lead.states, signals, stops, self._step, limits)
         windows: list[Window | None] = []
         for k, point in enumerate(self._points):
-            run = self._series(runs, k)
-            end = float(run["time"][-1])
+            if runs.failed[k] or lead.failed[k]:
+                windows.append(None)
+                continue
+            end = runs.end(k)
             # the energy behind a coupling that opens is not followed
             trip = Trip(end, math.nan, None) if end < stops[k] - 0.5 * self._step else None
-            window = Window(Phase.EVENT, run, point.drive, (), point.speed, 0.0, before[k], trip)
-            windows.append(None if runs.failed[k] or lead.failed[k] else window)
+            run = self._series(runs, k)
+            windows.append(Window(Phase.EVENT, run, point.drive, (), point.speed, 0.0, before[k], trip))
         return windows
 
     def _limit(self, point: _PointRun) -> float:

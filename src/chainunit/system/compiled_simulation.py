@@ -11,7 +11,7 @@ import xarray as xr
 
 from ..batch.transients import Transients, signal_table
 from ..engines import MATH
-from ..errors import InputError, InterruptedRunError, RunError
+from ..errors import InputError, InterruptedRunError
 from ..progress import Progress
 from ..quantities import Variable
 from .compiled import compiled, input_starts
@@ -156,11 +156,11 @@ class CompiledSimulation(Simulation):
         except KeyboardInterrupt:
             raise InterruptedRunError(f"interrupted at t = {self.time:g} s") from None
         n = int(result.count[0])
-        self.time, self._states = float(result.times[0, n - 1]), result.states[:, 0]
+        self.time, self._states = result.end(0), result.states[:, 0]
         rows = dict(zip(outputs, result.rows[:, 0, :n], strict=True))
         run = self._dataset(result.times[0, :n], rows, kept, every)
-        if result.failed[0]:
-            failure = RunError(f"at t = {self.time:g} s: the states left all bounds")
+        failure = result.failure(0)
+        if failure is not None:
             failure.partial = run.isel(time=slice(None, -1))
             raise failure
         if progress:

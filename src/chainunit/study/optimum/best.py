@@ -115,10 +115,8 @@ def find_best(wishes: Wishes, report: Report = _quiet, backend: Backend | None =
 
     Raises
     ------
-    InputError
-        where no free parameter has an effect.
-    RunError
-        where no machine within the bounds turns.
+    InputError, RunError
+        see `effective_search`.
     """
     search, idle = effective_search(wishes)
     wishes = search.wishes
