@@ -13,12 +13,11 @@ from chainunit.study.drive import Drive
 from chainunit.study.identification import residuals
 from chainunit.study.identification.fit import fit, normal
 from chainunit.study.identification.information import information
-from chainunit.study.identification.measurands import COUNTS
 from chainunit.study.identification.plant import Plant
-from chainunit.study.identification.problem import JITTER, Comparison, Problem, RecordedRun, Sensor, Unknown
+from chainunit.study.identification.problem import Comparison, Problem, RecordedRun, Sensor, Unknown
 from chainunit.study.identification.recording import Recording
 from chainunit.study.identification.residuals import check_residuals
-from chainunit.system import Profile, monolithic
+from chainunit.study.identification.synthetic import HiddenRun, Logger, synthetic
 
 pytestmark = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 TRUTH = {
@@ -27,15 +26,25 @@ TRUTH = {
     "machine.joint_damping": 1.3,
     "machine.pin.friction": 0.09,
 }
-RATE, LATER, DURATION, SPEED = 200.0, 6.0, 9.0, 3.0
+FORCES = {f"machine.{side}.processing_force": 0.0 for side in ("left", "right")}
+NO_FEED = {name: 0.0 for name in TRUTH if "material" in name}
+RATE, DURATION, SPEED = 200.0, 12.0, 3.0
 MARK, OFFSET, DRIFT = -0.11, 0.03, 4e-5
+LOGGER = Logger(
+    rate=RATE,
+    full={"motor.u": 250.0},
+    offset={"motor.i": OFFSET},
+    angles=("mark", "motor.count"),
+    mark_angle=MARK,
+    drift=DRIFT,
+)
 SOUGHT = (
     Unknown.within("machine.left.material_mass", "kg", 10.0, 60.0),
     Unknown.within("machine.right.material_mass", "kg", 10.0, 60.0),
     Unknown.within("machine.joint_damping", "N.m.s/rad", 0.1, 3.0),
     Unknown.within("machine.pin.friction", "1", 0.02, 0.25),
 )
-SENSORS = {"motor.i": Sensor(offset=0.2, gain=0.01), "motor.u": Sensor(resolution=0.1)}
+SENSORS = {"motor.i": Sensor(offset=0.2, gain=0.01), "motor.u": Sensor(resolution=250.0 / 2048.0)}
 
 
 def drive_of(**parameters):
@@ -44,30 +53,11 @@ def drive_of(**parameters):
 
 
 def recorded(empty=False, seed=4):
-    """A recording of the drive with the true values, by scipy's integrator, from standstill."""
-    own = {name.removeprefix("machine."): x for name, x in TRUTH.items() if "mass" not in name}
-    drive = drive_of(**own)
-    loads = {f"machine.{side}.{load}": 0.0 for side in ("left", "right") for load in ("processing_force",)}
-    loads |= {name: 0.0 if empty else x for name, x in TRUTH.items() if "mass" in name}
-    signals = loads | {"motor.w_ref": Profile(0.0, ((0.0, 2.0, SPEED * drive.ratio),))}
-    shown = np.arange(round(RATE * DURATION)) / RATE
+    """A recording of the drive with the true values, by scipy's integrator."""
+    values = {**TRUTH, **FORCES, "motor.w_ref": 150.0} | (NO_FEED if empty else {})
+    run = HiddenRun(SPEED, DURATION, values, angle=1.0, before=5.0)
     rng = np.random.default_rng(seed)
-    sampled = LATER + shown * (1.0 + DRIFT) + JITTER * rng.standard_normal(len(shown))
-    run = monolithic(drive.graph, signals, [0.0, *sampled], rtol=1e-9).isel(time=slice(1, None))
-
-    def noisy(x):
-        return x + 0.01 * np.sqrt(np.mean(x**2)) * rng.standard_normal(len(x))
-
-    phi, crank = run["motor.phi"].values, run["motor.phi"].values / drive.ratio
-    passed = np.floor((crank - MARK) / (2.0 * np.pi))
-    columns = {
-        "motor.i": noisy(run["motor.armature.i"].values) + OFFSET,
-        "motor.u": np.round(noisy(run["motor.v"].values), 1),
-        "motor.w": noisy(run["motor.w"].values),
-        "mark": np.append(0.0, np.diff(passed)),
-        "motor.count": np.floor((phi - phi[0]) * COUNTS / (2.0 * np.pi)),
-    }
-    return Recording("run.csv", shown, columns, {name: name for name in ("time", *columns)})
+    return synthetic(drive_of(), ("motor.i", "motor.u", "motor.w"), run, LOGGER, rng, "monolithic")
 
 
 def without(recording, *names):
@@ -77,10 +67,8 @@ def without(recording, *names):
 
 def problem_of(*recordings, empty=(), sought=SOUGHT, **machine):
     measured = [name for name in recordings[0].columns if name != "mark"]
-    known = {"machine.left.processing_force": 0.0, "machine.right.processing_force": 0.0}
-    none = dict.fromkeys((name for name in TRUTH if "material" in name), 0.0)
     runs = [
-        RecordedRun(f"run{k}", each, SPEED, known | {"motor.w_ref": 150.0} | (none if k in empty else {}))
+        RecordedRun(f"run{k}", each, SPEED, FORCES | {"motor.w_ref": 150.0} | (NO_FEED if k in empty else {}))
         for k, each in enumerate(recordings)
     ]
     plant = Plant(drive_of(**machine), measured, [u.name for u in sought])
@@ -145,7 +133,7 @@ def test_a_loaded_and_an_empty_run_are_identified(loaded, empty, angle):
     if angle == "mark":
         assert abs(found["mark.angle"] - MARK) < 4.0 * deviation["mark.angle"] < 0.1
     for key, share in best.shares.items():
-        # there are four marks
+        # there are five marks
         assert 0.02 < share < 3.0 if key[1] == "mark" else 0.85 < share < 1.15, key
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -52,6 +52,29 @@ CRANK = "crank"
 """Name of the crank angle in a `Response`."""
 
 
+def source_of(drive: Drive, name: str, outputs: Container[str]) -> tuple[str, float]:
+    """The output of the system of a drive that is measured as `name`, and its factor.
+
+    Raises
+    ------
+    InputError
+        for a quantity that is none of these `outputs`.
+    """
+    sources = {
+        "motor.i": (f"motor.{drive.motor.current}", 1.0),
+        "motor.u": ("motor.v", 1.0),
+        "motor.power": ("motor.supply_power", 1.0),
+        "motor.w": ("motor.w", 1.0),
+        "motor.count": ("motor.phi", COUNTS / (2.0 * math.pi)),
+        "crank.tau": ("machine.tau", drive.ratio),
+        "crank.w": ("motor.w", 1.0 / drive.ratio),
+    }
+    if name not in sources or sources[name][0] not in outputs:
+        known = [key for key, (output, _) in sources.items() if output in outputs]
+        raise InputError(f"{name}: is not measured at this drive; there are {', '.join(known)}")
+    return sources[name]
+
+
 class Plant:
     """The compiled system of a drive that is recorded.
 
@@ -69,7 +92,7 @@ class Plant:
 
     def __init__(self, drive: Drive, measured: Sequence[str], by: Sequence[str]) -> None:
         self.system, self.ratio = CompiledSystem(drive.graph), drive.ratio
-        self._sources = {name: self._source(drive, name) for name in measured}
+        self._sources = {name: source_of(drive, name, self.system.outputs) for name in measured}
         self._by = tuple(by)
         outputs = ["motor.phi", *dict.fromkeys(output for output, _ in self._sources.values())]
         self._rows = {name: k for k, name in enumerate(dict.fromkeys(outputs))}
@@ -78,22 +101,6 @@ class Plant:
         assert layout is not None
         self._angle = layout.names.index("motor.phi")
         self._temperature = layout.names.index(f"motor.{drive.motor.temperature}")
-
-    def _source(self, drive: Drive, name: str) -> tuple[str, float]:
-        """The output of the system that is measured, and its factor."""
-        sources = {
-            "motor.i": (f"motor.{drive.motor.current}", 1.0),
-            "motor.u": ("motor.v", 1.0),
-            "motor.power": ("motor.supply_power", 1.0),
-            "motor.w": ("motor.w", 1.0),
-            "motor.count": ("motor.phi", COUNTS / (2.0 * math.pi)),
-            "crank.tau": ("machine.tau", drive.ratio),
-            "crank.w": ("motor.w", 1.0 / drive.ratio),
-        }
-        if name not in sources or sources[name][0] not in self.system.outputs:
-            known = [key for key, (output, _) in sources.items() if output in self.system.outputs]
-            raise InputError(f"{name}: is not measured at this drive; there are {', '.join(known)}")
-        return sources[name]
 
     def respond(
         self, course: Course, directions: Mapping[str, tuple[str, float]], workers: int = 1

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import Faults, InputError, meant, near_name, printable
+from ...files import whole
 from ...reading import decoded, file_bytes
 from ...units import scale
 from .measurands import MEASURANDS, Measurand
@@ -101,6 +102,23 @@ def read_recording(file: Path, names: Mapping[str, str] | None = None) -> Record
             "before"
         )
     return Recording(str(file), time, columns, {name: heads[place] for name, (place, _) in known.items()})
+
+
+def write_recording(recording: Recording, file: Path) -> None:
+    """Write a recording as `read_recording` takes it, with seven digits; packed where the name ends with ``.gz``.
+
+    Raises
+    ------
+    WriteError
+        where the file cannot be written.
+    """
+    rows = np.column_stack([recording.time, *recording.columns.values()])
+    heads = [recording.heads[name] for name in ("time", *recording.columns)]
+    lines = [",".join(heads), *(",".join(f"{x:.7g}" for x in row) for row in rows)]
+    content = ("\n".join(lines) + "\n").encode()
+    with whole(file) as part:
+        # without a time in its head, the same recording gives the same file
+        part.write_bytes(gzip.compress(content, mtime=0) if file.suffix == ".gz" else content)
 
 
 def _text(file: Path) -> str:
