@@ -7,6 +7,7 @@ import pytest
 
 from chainunit import InputError
 from chainunit.drives.dc_motor import DcMotor
+from chainunit.drives.induction_motor import InductionMotor
 from chainunit.native.compilers import compiler
 from chainunit.study.config import parse
 from chainunit.study.drive import Drive
@@ -135,6 +136,40 @@ def test_a_loaded_and_an_empty_run_are_identified(loaded, empty, angle):
     for key, share in best.shares.items():
         # there are five marks
         assert 0.02 < share < 3.0 if key[1] == "mark" else 0.85 < share < 1.15, key
+
+
+@pytest.mark.parametrize("angle", ["mark", "motor.count"])
+def test_a_minute_of_an_induction_motor_from_many_starts(angle):
+    """A motor without speed control loses step with a simulated one of another load, by parts of a turn in a minute,
+    and its encoder counts thousandths of a degree: from all starts the fit ends at the same point, soon."""
+    values = {"machine.pin.friction": 0.18, "machine.joint_damping": 0.4, "machine.left.material_mass": 55.0}
+    sought = [
+        Unknown.within(name, unit, low, high)
+        for name, unit, low, high in (
+            ("machine.pin.friction", "1", 0.02, 0.25),
+            ("machine.joint_damping", "N.m.s/rad", 0.1, 2.5),
+            ("machine.left.material_mass", "kg", 5.0, 70.0),
+        )
+    ]
+    drive = Drive(InductionMotor, InductionMotor.Parameters(), parse("").machine)
+    logger = Logger(rate=200.0, angles=(angle,), drift=-3e-5, offset={"motor.i": 0.02})
+    hidden = HiddenRun(3.08, 60.0, values, angle=1.3, temperature=310.0)
+    measured = ("motor.i", "motor.power")
+    recording = synthetic(drive, measured, hidden, logger, np.random.default_rng(5))
+    run = RecordedRun("run", recording, 3.08)
+    plant = Plant(drive, [name for name in recording.columns if name != "mark"], [u.name for u in sought])
+    seen = []
+    best = fit(
+        Problem(plant, [run], sought, {"motor.i": Sensor(offset=0.1)}),
+        starts=3,
+        report=lambda count, _: seen.append(count),
+    )
+    assert (best.starts, best.agreeing) == (3, 3)
+    assert seen == list(range(1, best.rounds + 1)) and best.rounds <= 30
+    for u, found, deviation in zip(sought, best.z, best.deviations, strict=False):
+        assert abs(found - values[u.name]) < 4.0 * deviation, u.name
+        assert deviation < 0.05 * u.spread, u.name
+    assert all(0.5 < share < 1.1 for share in best.shares.values())
 
 
 def test_the_residuals_tell_a_wrong_machine(loaded, empty):

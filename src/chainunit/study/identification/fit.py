@@ -2,18 +2,30 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ...errors import RunError
-from .problem import OUTLIER, Comparison, Problem
+from .problem import OUTLIER, Comparison, Problem, SimulatedRun
 
-MOST_ROUNDS = 80
+MOST_ROUNDS = 60
+"""Most rounds from a start to its end."""
+TURNS = 5.0
+"""Turns of the crank that are fitted first."""
+ROUGH = 1e-3
+"""Expected decrease of the sum of squares of the first turns, in parts of it, below which their fit ends."""
+ALIKE = 1.005
+"""Sums of squares that differ by less than this factor are those of the same point."""
+DAMPING = 1e-2
+"""Damping of the first step, in parts of what is known beforehand."""
+SETTLINGS = 5
+"""Most steps of the unknowns of clocks and sensors without simulation."""
 NEAR = 1.5
 """Deviation of a column, in parts of its noise, from which on it counts by its noise."""
 ENOUGH = 1e-2
@@ -76,39 +88,101 @@ def _normal(
         r = np.abs(residuals)
         weight = np.minimum(1.0, OUTLIER / np.maximum(r, OUTLIER))
         cost += float(np.sum(np.where(r < OUTLIER, r * r, OUTLIER * (2.0 * r - OUTLIER))))
-        weighted, places = slopes * weight[:, None], np.array(each.places)
+        weighted, places = slopes * weight[:, None], np.array(each.places, int)
         fisher[np.ix_(places, places)] += slopes.T @ weighted
         gradient[places] += weighted.T @ residuals
     return Normal(z, comparisons, cost, gradient, fisher, fisher + np.diag(1.0 / spread**2))
 
 
-def fit(
-    problem: Problem, z: Any = None, workers: int = 2, report: Callable[[int, float], None] = lambda *_: None
-) -> Normal:
-    """The values of the unknowns that fit best, from `z` or from the start values.
+@dataclass(frozen=True)
+class Fit(Normal):
+    """The best fit, and the number of `rounds` that it took. `starts` is the number of points from which it was
+    sought, and `agreeing` of them led to it."""
 
-    The nuisances come first: with a wrong angle of the crank the other unknowns have no direction. As long as a
-    column deviates by more than its noise, it counts by its deviation: else the most exact one, such as the count of
-    an encoder, alone would lead.
+    rounds: int
+    starts: int
+    agreeing: int
+
+
+def fit(
+    problem: Problem,
+    z: Any = None,
+    workers: int = 2,
+    report: Callable[[int, float], None] = lambda *_: None,
+    starts: int = 1,
+    seed: int = 0,
+) -> Fit:
+    """The values of the unknowns that fit best, from `z` or from the start values, and from `starts` - 1 random ones.
+
+    The first turns of the runs are fitted before the whole: over a few turns a motor without speed control keeps in
+    step with a simulated one of another load, and each of the starts costs little. There, and in the whole, a column
+    counts by its deviation as long as it deviates by more than its noise: else the most exact one, such as the count
+    of an encoder, alone would lead. The unknowns of clocks and sensors follow all others without simulation.
 
     Raises
     ------
     RunError
         where the fit does not end in `MOST_ROUNDS` rounds.
     """
-    nuisances, all_unknowns = (
-        np.array([u.is_nuisance or x for u in problem.unknowns]) for x in (False, True)
-    )
-    best = normal(problem, problem.started(workers) if z is None else z, workers)
-    rounds = _Rounds(problem, workers, report)
-    for free in (nuisances, all_unknowns):
-        best = rounds.down(best, free, _scales(best), 0.02)
+    counter = itertools.count(1)
+
+    def rounds_of(own: Problem) -> _Rounds:
+        return _Rounds(own, workers, lambda cost: report(next(counter), cost))
+
+    first, rng = _first_turns(problem), np.random.default_rng(seed)
+    z = problem.started(workers) if z is None else z
+    ends = list[Normal]()
+    for k in range(starts if first is not problem or starts > 1 else 0):
+        rounds = rounds_of(first)
+        try:
+            near = _near(rounds, _random(problem, z, rng) if k else z)
+            ends.append(rounds.down(near, None, ROUGH))
+        except RunError:
+            if starts == 1:
+                raise
+    if ends:
+        best = min(ends, key=lambda end: end.cost)
+        # what the clock does in the first turns tells nothing about the rest
+        z = np.where([".count." in u.name for u in problem.unknowns], problem.starts, best.z)
+    rounds = rounds_of(problem)
+    whole = rounds.down(_near(rounds, z), None, 0.0)
+    agreeing = sum(end.cost < ALIKE * best.cost for end in ends) if ends else 1
+    point = whole.z, whole.comparisons, whole.cost, whole.gradient, whole.fisher, whole.matrix
+    return Fit(*point, next(counter) - 1, starts, agreeing)
+
+
+def _first_turns(problem: Problem) -> Problem:
+    """The problem of the first turns of all runs, where that is much less."""
+    runs = []
+    for run in problem.runs:
+        begin = float(run.recording.time[0])
+        part = run.recording.part(end=begin + TURNS * 2.0 * math.pi / run.crank_speed)
+        runs.append(replace(run, recording=part))
+    rows = [sum(len(run.recording.time) for run in some) for some in (runs, problem.runs)]
+    if 2 * rows[0] > rows[1]:
+        return problem
+    return Problem(problem.plant, runs, problem.sought, problem.sensors)
+
+
+def _random(problem: Problem, z: Any, rng: Any) -> Any:
+    """A point with random values of the sought numbers in their bounds."""
+    low, high = problem.bounds
+    sought = ~np.array([u.is_nuisance for u in problem.unknowns])
+    random = np.clip(problem.starts + problem.spreads * rng.standard_normal(len(z)), low, high)
+    bounded = sought & np.isfinite(high - low)
+    random[bounded] = rng.uniform(low[bounded], high[bounded])
+    return np.where(sought, random, z)
+
+
+def _near(rounds: _Rounds, z: Any) -> Normal:
+    """From `z` on, the fit with columns that count by their deviations, until all deviate by their noise."""
+    best = rounds.at(z, None)
     while max((scales := _scales(best)).values()) > NEAR:
         before = best.shares
-        best = rounds.down(best, all_unknowns, scales, 0.02)
+        best = rounds.down(best, scales, 0.02)
         if all(best.shares[key] > 0.9 * share for key, share in before.items()):
             break
-    return rounds.down(best, all_unknowns, None, 0.0)
+    return rounds.scaled(best, None)
 
 
 def _scales(at: Normal) -> dict[tuple[str, str], float]:
@@ -118,46 +192,88 @@ def _scales(at: Normal) -> dict[tuple[str, str], float]:
 class _Rounds:
     """The rounds of a fit, by Levenberg's and Marquardt's method."""
 
-    def __init__(self, problem: Problem, workers: int, report: Callable[[int, float], None]) -> None:
+    def __init__(self, problem: Problem, workers: int, report: Callable[[float], None]) -> None:
         self._problem, self._workers, self._report, self._count = problem, workers, report, 0
+        self._damping = DAMPING
 
-    def down(self, best: Normal, free: Any, scales: Scales | None, enough: float) -> Normal:
-        """The least sum of squares over the `free` unknowns, up to the share `enough` of it."""
-        problem, damping, growth = self._problem, 1.0, 2.0
-        best = _normal(problem, best.z, best.comparisons, scales)
-        while damping < 1e12:
-            if self._count == MOST_ROUNDS:
-                raise RunError(
-                    f"the fit did not end in {MOST_ROUNDS} rounds; start nearer, or give narrower bounds"
-                )
-            self._count += 1
-            self._report(self._count, best.cost)
-            z = _next(problem, best, free, damping)
-            trial = normal(problem, z, self._workers, scales)
-            gain, step = best.cost - trial.cost, z - best.z
-            if gain > 0.0:
+    def scaled(self, at: Normal, scales: Scales | None) -> Normal:
+        """The same point, with columns that count otherwise."""
+        return _normal(self._problem, at.z, at.comparisons, scales)
+
+    def at(self, z: Any, scales: Scales | None) -> Normal:
+        """The normal equations at these values; those of clocks and sensors are the best."""
+        self._count += 1
+        simulations = self._problem.simulations(z, self._workers)
+        z = _settled(self._problem, simulations, z, scales)
+        found = _normal(self._problem, z, tuple(self._problem.compared(simulations, z)), scales)
+        self._report(found.cost)
+        return found
+
+    def _tried(self, z: Any, scales: Scales | None) -> Normal | None:
+        """The normal equations at these values, or None where the machine does not run with them."""
+        if self._count == MOST_ROUNDS:
+            raise RunError(
+                f"the fit did not end in {MOST_ROUNDS} rounds; start nearer, or give narrower bounds"
+            )
+        try:
+            return self.at(z, scales)
+        except RunError:
+            return None
+
+    def down(self, best: Normal, scales: Scales | None, enough: float) -> Normal:
+        """The least sum of squares, up to the share `enough` of it."""
+        problem, growth = self._problem, 2.0
+        best = self.scaled(best, scales)
+        while self._damping < 1e12:
+            z = _next(problem, best, self._damping)
+            step = z - best.z
+            expected = float(2.0 * step @ best.gradient - step @ best.matrix @ step)
+            if expected < max(ENOUGH, enough * best.cost):
+                return best
+            trial = self._tried(z, scales)
+            gain = best.cost - trial.cost if trial else 0.0
+            if trial and gain > 0.0:
                 # the damping follows the agreement with the expected gain (Nielsen)
-                expected = float(2.0 * step @ best.gradient - step @ best.matrix @ step)
-                damping *= max(1.0 / 8.0, 1.0 - (2.0 * gain / max(expected, gain) - 1.0) ** 3)
+                self._damping *= max(0.1, 1.0 - (2.0 * gain / max(expected, gain) - 1.0) ** 3)
                 best, growth = trial, 2.0
-                if gain < max(ENOUGH, enough * best.cost):
-                    return best
             else:
-                damping, growth = damping * growth, 2.0 * growth
+                self._damping, growth = self._damping * growth, 2.0 * growth
+        self._damping = DAMPING
         return best
 
 
-def _next(problem: Problem, at: Normal, free: Any, damping: float) -> Any:
+def _settled(problem: Problem, simulations: Sequence[SimulatedRun], z: Any, scales: Scales | None) -> Any:
+    """The values with those of clocks and sensors that fit best, without another simulation."""
+    own = ~problem.simulated_with
+    best = None
+    for _ in range(SETTLINGS):
+        at = _normal(problem, z, tuple(problem.compared(simulations, z, with_slopes=False)), scales)
+        if best is not None and at.cost >= best.cost:
+            break
+        best, step = at, np.zeros(len(z))
+        step[own] = _solve(at.matrix[np.ix_(own, own)], at.gradient[own])
+        if step @ at.gradient < ENOUGH:
+            break
+        z = z + step
+    assert best is not None
+    return best.z
+
+
+def _solve(matrix: Any, gradient: Any) -> Any:
+    """The solution of normal equations, whose unknowns differ in size by many orders."""
+    scale = 1.0 / np.sqrt(np.diag(matrix))
+    return scale * np.linalg.solve(matrix * np.outer(scale, scale), scale * gradient)
+
+
+def _next(problem: Problem, at: Normal, damping: float) -> Any:
     """The next point. Unknowns that would pass a bound stop there, and the others follow."""
     low, high = problem.bounds
-    step, moving = np.zeros(len(at.z)), free.copy()
+    step, moving = np.zeros(len(at.z)), np.ones(len(at.z), bool)
+    damped = at.matrix + np.diag(np.where(problem.simulated_with, damping / problem.spreads**2, 0.0))
     for _ in range(len(at.z)):
-        matrix = at.matrix[np.ix_(moving, moving)]
         # those that have stopped change the gradient of the others
         gradient = at.gradient[moving] - at.matrix[np.ix_(moving, ~moving)] @ step[~moving]
-        matrix = matrix + damping * np.diag(1.0 / problem.spreads[moving] ** 2)
-        scale = 1.0 / np.sqrt(np.diag(matrix))
-        step[moving] = scale * np.linalg.solve(matrix * np.outer(scale, scale), scale * gradient)
+        step[moving] = _solve(damped[np.ix_(moving, moving)], gradient)
         z = at.z + step
         passing = moving & ((z < low) | (z > high))
         if not passing.any():

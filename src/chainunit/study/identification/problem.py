@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from ..arrays import rms
-from .measurands import MEASURANDS
+from .measurands import COUNTS, MEASURANDS
 from .plant import ANGLE, CRANK, TEMPERATURE, Course, Plant, Response
 from .recording import Recording
 
@@ -25,9 +25,11 @@ LONGEST_STEP = 2e-3
 ANGLES, TURNS = 24, 3.0
 """Number of crank angles at which a run without marks is tried, and the turns that are tried."""
 ORDERS, SLIP = (1, 2, 3), 1e4
-"""Orders of a polynomial over the run by which the count of an encoder may deviate, and its size in counts. The mean
-speed depends on the frequency of the supply and on the warming of the motor, to which the count is far more sensitive
-than any other column; within a turn it shows the motion."""
+"""Orders of a polynomial over the run by which the machine may be ahead of the simulated one, and its size in counts
+of the encoder. The mean speed depends on the frequency of the supply and on the warming of the motor, to which the
+count is far more sensitive than any other column; within a turn it shows the motion."""
+AHEAD = 0.04
+"""Part of a run with an encoder by which the simulation is longer: with the start values its speed is another."""
 _CHANGE = 0.2
 """Change of an unknown for which the derivatives are integrated, in parts of its spread."""
 
@@ -91,6 +93,26 @@ class Comparison:
     places: Sequence[int]
     angle: Any
     size: float
+
+
+class SimulatedRun:
+    """A simulated `run`, with derivatives by the unknowns `names`, each integrated for a change of its size."""
+
+    def __init__(self, run: RecordedRun, response: Response, names: Sequence[str], sizes: Any) -> None:
+        self.run, self.response, self.names, self._sizes = run, response, tuple(names), sizes
+        self._courses = dict[str, CubicSpline]()
+
+    def sampled(self, name: str, at: Any, with_slopes: bool = True) -> tuple[Any, Any, Any]:
+        """A simulated quantity at the times `at` [s], shape (n,), its derivatives by `names`, shape (n, names), and
+        by time. Before the first and behind the last simulated time it stands."""
+        response = self.response
+        at = np.clip(at, response.time[0], response.time[-1])
+        if name not in self._courses:
+            self._courses[name] = CubicSpline(response.time, response.values[name])
+        course, slopes = self._courses[name], np.empty((len(at), len(self.names) if with_slopes else 0))
+        for k in range(slopes.shape[1]):
+            slopes[:, k] = np.interp(at, response.time, response.slopes[name][k]) / self._sizes[k]
+        return course(at), slopes, course(at, 1)
 
 
 class Problem:
@@ -193,10 +215,29 @@ class Problem:
                 total += float(np.corrcoef(y, x)[0, 1]) if np.ptp(x) else 0.0
         return total
 
+    @cached_property
+    def simulated_with(self) -> Any:
+        """Whether a change of the unknown needs another simulation, shape (unknowns,). The others are those of clocks
+        and sensors."""
+        starts = {f"{run.name}.{name}" for run in self.runs for name in (ANGLE, TEMPERATURE)}
+        return np.array([not u.is_nuisance or u.name in starts for u in self.unknowns])
+
     def comparisons(self, z: Any, workers: int = 2) -> Iterator[Comparison]:
         """The comparisons of all runs with the values `z` of the unknowns, shape (unknowns,)."""
-        for run in self.runs:
-            yield from self._of(run, z, workers)
+        yield from self.compared(self.simulations(z, workers), z)
+
+    def simulations(self, z: Any, workers: int = 2) -> list[SimulatedRun]:
+        """All runs, simulated with the values `z` of the unknowns, shape (unknowns,)."""
+        return [self._simulation(run, self._values(z), workers) for run in self.runs]
+
+    def compared(
+        self, simulations: Iterable[SimulatedRun], z: Any, with_slopes: bool = True
+    ) -> Iterator[Comparison]:
+        """The comparisons of simulated runs with the values `z` of clocks and sensors; without slopes, with the
+        derivatives by clocks and sensors alone."""
+        value = self._values(z)
+        for each in simulations:
+            yield from self._compared(each, value, with_slopes)
 
     def _values(self, z: Any) -> dict[str, float]:
         return {u.name: float(x) for u, x in zip(self.unknowns, z, strict=True)}
@@ -206,7 +247,9 @@ class Problem:
         recording = run.recording
         begin, end = float(recording.time[0]), float(recording.time[-1])
         # the clock of the logger may be wrong by a ten-thousandth
-        margin = 2.0 * recording.step + 1e-3 * (end - begin)
+        ahead = self._clock(run, np.array([end]), value)[0][0] - end
+        part = AHEAD if "motor.count" in recording.columns else 1e-3
+        margin = 2.0 * recording.step + part * (end - begin) + max(0.0, float(ahead))
         return Course(
             {u.name: value[u.name] + run.added.get(u.name, 0.0) for u in self.sought} | dict(run.values),
             value[f"{run.name}.angle"],
@@ -217,72 +260,60 @@ class Problem:
             min(recording.step, LONGEST_STEP),
         )
 
-    def _of(self, run: RecordedRun, z: Any, workers: int) -> Iterator[Comparison]:
-        value = self._values(z)
+    def _simulation(self, run: RecordedRun, value: Mapping[str, float], workers: int) -> SimulatedRun:
         free = [u for u in self.sought if u.name not in run.values]
         directions = {u.name: (u.name, _CHANGE * u.spread) for u in free}
         directions |= {f"{run.name}.angle": (ANGLE, 0.01), f"{run.name}.temperature": (TEMPERATURE, 5.0)}
         response = self.plant.respond(self._course(run, value), directions, workers)
-        sizes = np.array([size for _, size in directions.values()])
-        yield from self._compared(run, value, response, list(directions), sizes)
+        return SimulatedRun(run, response, list(directions), [size for _, size in directions.values()])
 
     def simulated(self, run: RecordedRun, z: Any, workers: int = 2) -> Response:
         """The course of a run with these values of the unknowns, shape (unknowns,), without derivatives."""
         return self.plant.respond(self._course(run, self._values(z)), {}, workers)
 
+    def _clock(self, run: RecordedRun, at: Any, value: Mapping[str, float]) -> tuple[Any, dict[str, Any]]:
+        """The times of the simulation that belong to times of the logger, and their derivatives by unknowns."""
+        begin, end = float(run.recording.time[0]), float(run.recording.time[-1])
+        since = at - begin
+        rates = {f"{run.name}.drift": since}
+        part, counts = since / (end - begin), run.crank_speed * self.plant.ratio * COUNTS / (2.0 * math.pi)
+        rates |= {f"{run.name}.count.{k}": part**k / counts for k in ORDERS}
+        rates = {name: rate for name, rate in rates.items() if name in self.place}
+        return at + sum(value[name] * rate for name, rate in rates.items()), rates
+
     def _compared(
-        self,
-        run: RecordedRun,
-        value: Mapping[str, float],
-        response: Response,
-        names: Sequence[str],
-        sizes: Any,
+        self, simulation: SimulatedRun, value: Mapping[str, float], with_slopes: bool
     ) -> Iterator[Comparison]:
         """Measured over simulated, column by column."""
-        recording, drift = run.recording, f"{run.name}.drift"
-        since = recording.time - recording.time[0]
-        time = recording.time + value.get(drift, 0.0) * since
-
-        def sampled(name: str, at: Any) -> tuple[Any, Any, Any]:
-            """A simulated quantity at these times, its derivatives by `names` and by time."""
-            course = CubicSpline(response.time, response.values[name])
-            slopes = [
-                np.interp(at, response.time, each) / s
-                for each, s in zip(response.slopes[name], sizes, strict=True)
-            ]
-            return course(at), np.stack(slopes, axis=1), course(at, 1)
-
-        angle = np.interp(time, response.time, response.values[CRANK])
+        run = simulation.run
+        recording, names = run.recording, simulation.names if with_slopes else ()
+        time, rates = self._clock(run, recording.time, value)
+        angle = np.interp(time, simulation.response.time, simulation.response.values[CRANK])
         for name, y in recording.columns.items():
             if name == "mark":
                 passed = mark_times(recording)
                 if len(passed) < 2:
                     continue
-                sooner = passed - recording.time[0]
-                x, slopes, rate = sampled(CRANK, passed + value.get(drift, 0.0) * sooner)
+                at, sooner = self._clock(run, passed, value)
+                x, slopes, rate = simulation.sampled(CRANK, at, with_slopes)
                 size = speed_of(run) * recording.step / math.sqrt(12.0)
                 off = (x - value["mark.angle"] + math.pi) % (2.0 * math.pi) - math.pi
-                more = {drift: rate * sooner, "mark.angle": -np.ones(len(x))}
+                more = {key: rate * each for key, each in sooner.items()} | {"mark.angle": -np.ones(len(x))}
                 yield self._comparison(run, name, -off / size, slopes / size, names, more, x, size)
                 continue
-            x, slopes, rate = sampled(name, time)
-            more = {drift: rate * since} if drift in self.place else {}
+            x, slopes, rate = simulation.sampled(name, time, with_slopes)
+            more = {key: rate * each for key, each in rates.items()}
             if name == "motor.count":
                 size = math.hypot(math.sqrt(1.0 / 12.0), JITTER * float(np.mean(np.abs(rate))))
                 more[f"{run.name}.count"] = np.ones(len(x))
                 # it counts from the first row on, and rounds down
                 x, slopes = x - x[0] + value[f"{run.name}.count"] - 0.5, slopes - slopes[0]
-                part = 2.0 * since / since[-1] - 1.0
-                for k in ORDERS:
-                    more[f"{run.name}.count.{k}"] = part**k
-                    x = x + value[f"{run.name}.count.{k}"] * part**k
             else:
                 sensor, gain, offset = self.sensors[name], f"gain({name})", f"{run.name}.offset({name})"
                 size = math.hypot(sensor.noise * rms(y), sensor.resolution / math.sqrt(12.0))
                 if gain in self.place:
-                    more[gain] = x
+                    more = {key: each * value[gain] for key, each in more.items()} | {gain: x}
                     x, slopes = x * value[gain], slopes * value[gain]
-                    more |= {drift: more[drift] * value[gain]} if drift in more else {}
                 if offset in self.place:
                     more[offset] = np.ones(len(x))
                     x = x + value[offset]
