@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 
 from ..arrays import rms
 from .measurands import COUNTS, MEASURANDS
-from .plant import ANGLE, CRANK, TEMPERATURE, Course, Plant, Response
+from .plant import ANGLE, CRANK, AnyPlant, Course, Nuisance, Overview, Response
 from .recording import Recording
 
 JITTER = 2e-5
@@ -69,15 +69,18 @@ class RecordedRun:
     """A recording, and what is known of it.
 
     `values` are the known values of inputs and parameters of the system by full name, such as those of an empty
-    machine, `added` what was added to a parameter. `crank_speed` is that with which the simulation begins [rad/s].
+    machine; those of inputs may be `chainunit.system.Profile`, such as a reference that is shaken. `added` is what
+    was added to a parameter. `crank_speed` is that with which the simulation begins [rad/s], and `off` the time of
+    the recording at which the motor is switched off [s].
     """
 
     name: str
     recording: Recording
     crank_speed: float
-    values: Mapping[str, float] = field(default_factory=dict)
+    values: Mapping[str, Any] = field(default_factory=dict)
     added: Mapping[str, float] = field(default_factory=dict)
     ambient: float = 293.15
+    off: float | None = None
 
 
 @dataclass(frozen=True)
@@ -100,19 +103,25 @@ class SimulatedRun:
 
     def __init__(self, run: RecordedRun, response: Response, names: Sequence[str], sizes: Any) -> None:
         self.run, self.response, self.names, self._sizes = run, response, tuple(names), sizes
-        self._courses = dict[str, CubicSpline]()
+        self._courses = dict[tuple[str, int], CubicSpline]()
 
     def sampled(self, name: str, at: Any, with_slopes: bool = True) -> tuple[Any, Any, Any]:
         """A simulated quantity at the times `at` [s], shape (n,), its derivatives by `names`, shape (n, names), and
         by time. Before the first and behind the last simulated time it stands."""
         response = self.response
         at = np.clip(at, response.time[0], response.time[-1])
-        if name not in self._courses:
-            self._courses[name] = CubicSpline(response.time, response.values[name])
-        course, slopes = self._courses[name], np.empty((len(at), len(self.names) if with_slopes else 0))
-        for k in range(slopes.shape[1]):
-            slopes[:, k] = np.interp(at, response.time, response.slopes[name][k]) / self._sizes[k]
-        return course(at), slopes, course(at, 1)
+        x, rate = np.empty(len(at)), np.empty(len(at))
+        slopes = np.empty((len(at), len(self.names) if with_slopes else 0))
+        for rows in response.pieces:
+            time = response.time[rows]
+            here = at >= time[0]
+            if (name, rows.start) not in self._courses:
+                self._courses[name, rows.start] = CubicSpline(time, response.values[name][rows])
+            course, inside = self._courses[name, rows.start], at[here]
+            x[here], rate[here] = course(inside), course(inside, 1)
+            for k in range(slopes.shape[1]):
+                slopes[here, k] = np.interp(inside, time, response.slopes[name][k, rows]) / self._sizes[k]
+        return x, slopes, rate
 
 
 class Problem:
@@ -120,7 +129,7 @@ class Problem:
 
     Parameters
     ----------
-    plant : the drive; its `by` are the names of `sought`
+    plant : what was recorded; its `by` are the names of `sought`
     runs : the recordings
     sought : the unknown parameters and inputs of the system, by full name
     sensors : by measured quantity; all others have the usual noise
@@ -128,7 +137,7 @@ class Problem:
 
     def __init__(
         self,
-        plant: Plant,
+        plant: AnyPlant,
         runs: Sequence[RecordedRun],
         sought: Sequence[Unknown],
         sensors: Mapping[str, Sensor],
@@ -168,25 +177,34 @@ class Problem:
 
     def _of_run(self, run: RecordedRun) -> Iterator[Unknown]:
         columns = run.recording.columns
-        yield _nuisance(f"{run.name}.angle", "rad", self._first_angle(run), 10.0)
-        yield _nuisance(f"{run.name}.temperature", "K", run.ambient + 20.0, 40.0)
+        for each in self._nuisances(run):
+            yield Unknown(
+                f"{run.name}.{each.name}",
+                each.unit,
+                each.start,
+                each.low,
+                math.inf,
+                each.spread,
+                is_nuisance=True,
+            )
         if "mark" in columns or "motor.count" in columns:
             yield _nuisance(f"{run.name}.drift", "1", 0.0, 5e-5)
         if "motor.count" in columns:
             yield _nuisance(f"{run.name}.count", "1", 0.0, 3.0)
-            yield from (_nuisance(f"{run.name}.count.{k}", "1", 0.0, SLIP) for k in ORDERS)
+            if self.plant.slips:
+                yield from (_nuisance(f"{run.name}.count.{k}", "1", 0.0, SLIP) for k in ORDERS)
         for name in columns:
             if MEASURANDS[name].analog and self.sensors[name].offset:
                 yield _nuisance(
                     f"{run.name}.offset({name})", MEASURANDS[name].unit, 0.0, self.sensors[name].offset
                 )
 
-    def _first_angle(self, run: RecordedRun) -> float:
-        """The crank angle at the first row, from the marks if there are any."""
-        passed = mark_times(run.recording)
-        if not len(passed):
-            return 0.0
-        return -speed_of(run) * float(passed[0] - run.recording.time[0])
+    def _nuisances(self, run: RecordedRun) -> Iterator[Nuisance]:
+        """What the plant needs of a run."""
+        time, speed, passed = run.recording.time, speed_of(run, self.plant.ratio), mark_times(run.recording)
+        angle = -speed * float(passed[0] - time[0]) if len(passed) else 0.0
+        overview = Overview(angle, speed, run.ambient, float(time[0]), float(time[-1]), run.off)
+        return self.plant.nuisances(overview)
 
     def started(self, workers: int = 2) -> Any:
         """The start values, shape (unknowns,), with the crank angle of each run without marks at which the course of
@@ -198,7 +216,7 @@ class Problem:
                 end = float(run.recording.time[0]) + turns
                 first, value = replace(run, recording=run.recording.part(end=end)), self._values(z)
                 angles = np.arange(ANGLES) * (2.0 * math.pi / ANGLES)
-                name = f"{run.name}.angle"
+                name = f"{run.name}.{ANGLE}"
                 z[self.place[name]] = max(
                     angles,
                     key=lambda angle: self._likeness(first, value | {name: angle}, workers),
@@ -219,8 +237,8 @@ class Problem:
     def simulated_with(self) -> Any:
         """Whether a change of the unknown needs another simulation, shape (unknowns,). The others are those of clocks
         and sensors."""
-        starts = {f"{run.name}.{name}" for run in self.runs for name in (ANGLE, TEMPERATURE)}
-        return np.array([not u.is_nuisance or u.name in starts for u in self.unknowns])
+        own = {f"{run.name}.{each.name}" for run in self.runs for each in self._nuisances(run)}
+        return np.array([not u.is_nuisance or u.name in own for u in self.unknowns])
 
     def comparisons(self, z: Any, workers: int = 2) -> Iterator[Comparison]:
         """The comparisons of all runs with the values `z` of the unknowns, shape (unknowns,)."""
@@ -252,18 +270,19 @@ class Problem:
         margin = 2.0 * recording.step + part * (end - begin) + max(0.0, float(ahead))
         return Course(
             {u.name: value[u.name] + run.added.get(u.name, 0.0) for u in self.sought} | dict(run.values),
-            value[f"{run.name}.angle"],
-            value[f"{run.name}.temperature"],
+            {each.name: value[f"{run.name}.{each.name}"] for each in self._nuisances(run)},
             run.crank_speed,
             begin,
             end + margin,
             min(recording.step, LONGEST_STEP),
+            self._clock(run, np.union1d(recording.time, mark_times(recording)), value)[0],
+            run.off,
         )
 
     def _simulation(self, run: RecordedRun, value: Mapping[str, float], workers: int) -> SimulatedRun:
         free = [u for u in self.sought if u.name not in run.values]
         directions = {u.name: (u.name, _CHANGE * u.spread) for u in free}
-        directions |= {f"{run.name}.angle": (ANGLE, 0.01), f"{run.name}.temperature": (TEMPERATURE, 5.0)}
+        directions |= {f"{run.name}.{each.name}": (each.name, each.change) for each in self._nuisances(run)}
         response = self.plant.respond(self._course(run, value), directions, workers)
         return SimulatedRun(run, response, list(directions), [size for _, size in directions.values()])
 
@@ -285,18 +304,19 @@ class Problem:
         self, simulation: SimulatedRun, value: Mapping[str, float], with_slopes: bool
     ) -> Iterator[Comparison]:
         """Measured over simulated, column by column."""
-        run = simulation.run
+        run, response = simulation.run, simulation.response
         recording, names = run.recording, simulation.names if with_slopes else ()
         time, rates = self._clock(run, recording.time, value)
-        angle = np.interp(time, simulation.response.time, simulation.response.values[CRANK])
+        angle = np.interp(time, response.time, response.values[CRANK])
         for name, y in recording.columns.items():
             if name == "mark":
                 passed = mark_times(recording)
+                passed = passed[response.describes(CRANK, passed)]
                 if len(passed) < 2:
                     continue
                 at, sooner = self._clock(run, passed, value)
                 x, slopes, rate = simulation.sampled(CRANK, at, with_slopes)
-                size = speed_of(run) * recording.step / math.sqrt(12.0)
+                size = speed_of(run, self.plant.ratio) * recording.step / math.sqrt(12.0)
                 off = (x - value["mark.angle"] + math.pi) % (2.0 * math.pi) - math.pi
                 more = {key: rate * each for key, each in sooner.items()} | {"mark.angle": -np.ones(len(x))}
                 yield self._comparison(run, name, -off / size, slopes / size, names, more, x, size)
@@ -304,7 +324,9 @@ class Problem:
             x, slopes, rate = simulation.sampled(name, time, with_slopes)
             more = {key: rate * each for key, each in rates.items()}
             if name == "motor.count":
-                size = math.hypot(math.sqrt(1.0 / 12.0), JITTER * float(np.mean(np.abs(rate))))
+                size = math.hypot(
+                    math.sqrt(1.0 / 12.0), JITTER * float(np.sum(np.abs(np.diff(y)))) / np.ptp(recording.time)
+                )
                 more[f"{run.name}.count"] = np.ones(len(x))
                 # it counts from the first row on, and rounds down
                 x, slopes = x - x[0] + value[f"{run.name}.count"] - 0.5, slopes - slopes[0]
@@ -317,7 +339,13 @@ class Problem:
                 if offset in self.place:
                     more[offset] = np.ones(len(x))
                     x = x + value[offset]
-            yield self._comparison(run, name, (y - x) / size, slopes / size, names, more, angle, size)
+            rows = response.describes(name, recording.time)
+            if rows.any():
+                own = {key: each[rows] for key, each in more.items()}
+                residuals = (y - x)[rows] / size
+                yield self._comparison(
+                    run, name, residuals, slopes[rows] / size, names, own, angle[rows], size
+                )
 
     def _comparison(
         self, run: RecordedRun, column: str, residuals: Any, slopes: Any, names: Sequence[str],
@@ -340,11 +368,18 @@ def mark_times(recording: Recording) -> Any:
     return recording.time[recording.columns["mark"] > 0.5] - 0.5 * recording.step
 
 
-def speed_of(run: RecordedRun) -> float:
-    """Mean speed of the crank [rad/s], by the marks where there are two."""
-    passed = mark_times(run.recording)
-    if len(passed) < 2:
-        return run.crank_speed
-    turn = np.median(np.diff(passed))
-    turns = np.round((passed[-1] - passed[0]) / turn)
-    return float(2.0 * math.pi * turns / (passed[-1] - passed[0]))
+def speed_of(run: RecordedRun, ratio: float) -> float:
+    """Mean speed of the crank before the motor is switched off [rad/s]: by the marks where there are two, by the
+    count of an encoder, or by the measured speed. `ratio` are the turns of the motor in a turn of the crank."""
+    recording = run.recording.part(end=math.inf if run.off is None else run.off)
+    passed, columns = mark_times(recording), recording.columns
+    if len(passed) > 1:
+        turn = np.median(np.diff(passed))
+        turns = np.round((passed[-1] - passed[0]) / turn)
+        return float(2.0 * math.pi * turns / (passed[-1] - passed[0]))
+    if "motor.count" in columns:
+        turns = np.ptp(columns["motor.count"]) / (COUNTS * ratio)
+        return float(2.0 * math.pi * turns / np.ptp(recording.time))
+    if "crank.w" in columns:
+        return float(np.mean(columns["crank.w"]))
+    return float(np.mean(columns["motor.w"])) / ratio if "motor.w" in columns else run.crank_speed
