@@ -119,7 +119,7 @@ class MeasuredShaft:
         if course.off is not None:
             return self._switched_off(course, course.off, changes, workers)
         time = course.rows
-        motion = SteadyMotion(course.nuisances, time, (course.begin, course.end))
+        motion = CrankSeries(course.nuisances, time, (course.begin, course.end))
         by = [name for name, _ in changes if name in self._by]
         torque, slopes_of = self._torque(course.values, motion.rows, by, workers)
         angle, speed = motion.rows[:2]
@@ -208,7 +208,7 @@ def _rows(result: xr.Dataset, name: str, motion: Any) -> Any:
     return np.broadcast_to(result[name].values, motion[0].shape)
 
 
-class SteadyMotion:
+class CrankSeries:
     """The motion of the crank with these nuisances at these times: `rows` are angle [rad], speed [rad/s] and
     acceleration [rad/s2], shape (3, times). `span` is that of the run [s]."""
 
